@@ -1,0 +1,83 @@
+"""Pinhole cameras, OpenCV axes: projection, rays, fields of view. Pixel centres at +0.5."""
+
+import math
+
+import torch
+from torch import Tensor
+
+
+def intrinsics_from_fov(fov_degrees: float, width: int, height: int) -> Tensor:
+    """K (3, 3) of a centred camera whose *longer* image side spans `fov_degrees`.
+
+    Raises:
+        ValueError: the field of view is not in (1, 179) degrees.
+    """
+    if not 1.0 < fov_degrees < 179.0:
+        raise ValueError(f"fov_degrees: expected 1 to 179, received {fov_degrees}")
+    focal = 0.5 * max(width, height) / math.tan(math.radians(fov_degrees) / 2)
+    return torch.tensor([[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]])
+
+
+def fov_degrees(K: Tensor, width: int, height: int) -> tuple[float, float]:
+    """Horizontal and vertical field of view in degrees; the principal point may be off centre."""
+    (fx, _, cx), (_, fy, cy) = K[0].tolist(), K[1].tolist()
+    horizontal = math.atan(cx / fx) + math.atan((width - cx) / fx)
+    vertical = math.atan(cy / fy) + math.atan((height - cy) / fy)
+    return math.degrees(horizontal), math.degrees(vertical)
+
+
+def pixel_grid(width: int, height: int, *, like: Tensor) -> Tensor:
+    """Pixel centres (H, W, 2) as (x, y), of `like`'s dtype and device."""
+    ys = torch.arange(height, dtype=like.dtype, device=like.device) + 0.5
+    xs = torch.arange(width, dtype=like.dtype, device=like.device) + 0.5
+    grid_y, grid_x = torch.meshgrid(ys, xs, indexing="ij")
+    return torch.stack((grid_x, grid_y), -1)
+
+
+def rays(Ks: Tensor, width: int, height: int) -> Tensor:
+    """Viewing directions (..., H, W, 3) with z = 1 in the camera frame, for K (..., 3, 3)."""
+    grid = pixel_grid(width, height, like=Ks)
+    focal = torch.stack((Ks[..., 0, 0], Ks[..., 1, 1]), -1)[..., None, None, :]
+    centre = Ks[..., None, None, :2, 2]
+    xy = (grid - centre) / focal
+    return torch.cat((xy, torch.ones_like(xy[..., :1])), -1)
+
+
+def unproject(depths: Tensor, Ks: Tensor) -> Tensor:
+    """Points (..., H, W, 3) in the camera frame from z-depths (..., H, W)."""
+    height, width = depths.shape[-2:]
+    return rays(Ks, width, height) * depths[..., None]
+
+
+def project(pos_c: Tensor, K: Tensor, eps: float = 1e-8) -> Tensor:
+    """Pixels (..., 2) of camera-frame points (..., 3); K (3, 3) or broadcastable to (..., 3, 3)."""
+    xy = pos_c[..., :2] / pos_c[..., 2:].clamp_min(eps)
+    focal = torch.stack((K[..., 0, 0], K[..., 1, 1]), -1)
+    return xy * focal + K[..., :2, 2]
+
+
+def transform(matrices: Tensor, points: Tensor) -> Tensor:
+    """Rigid matrices (..., 4, 4) applied to points (..., n, 3)."""
+    return points @ matrices[..., :3, :3].transpose(-1, -2) + matrices[..., None, :3, 3]
+
+
+def invert_rigid(matrices: Tensor) -> Tensor:
+    """Inverse of rigid (..., 4, 4) without a linear solve: [R^T, -R^T t]."""
+    rotations = matrices[..., :3, :3].transpose(-1, -2)
+    inverse = torch.zeros_like(matrices)
+    inverse[..., :3, :3] = rotations
+    inverse[..., :3, 3] = -(rotations @ matrices[..., :3, 3:]).squeeze(-1)
+    inverse[..., 3, 3] = 1
+    return inverse
+
+
+def rotation_angle_degrees(left: Tensor, right: Tensor) -> Tensor:
+    """Angle (...) in degrees between rotations (..., 3, 3).
+
+    atan2 of the skew and symmetric parts keeps small angles exact where arccos would not.
+    """
+    relative = left.transpose(-1, -2) @ right
+    skew = relative - relative.transpose(-1, -2)
+    sine = torch.stack((skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]), -1).norm(dim=-1) / 2
+    cosine = (relative.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2
+    return torch.rad2deg(torch.atan2(sine, cosine))

@@ -1,0 +1,75 @@
+"""Unit quaternions, wxyz. q and -q are the same rotation."""
+
+import torch
+from torch import Tensor
+from torch.nn.functional import normalize
+
+
+def quats_to_matrices(quats: Tensor, eps: float = 1e-12) -> Tensor:
+    """Rotation matrices of quaternions that need not be unit.
+
+    Args:
+        quats: (..., 4) wxyz, any norm; a norm below `eps` gives the identity.
+
+    Returns:
+        (..., 3, 3) rotation matrices.
+
+    Source: standard formula; twin scipy.spatial.transform.Rotation in the tests.
+    """
+    norms = quats.norm(dim=-1, keepdim=True)
+    identity = torch.zeros_like(quats)
+    identity[..., 0] = 1
+    w, x, y, z = torch.where(norms > eps, quats / norms.clamp_min(eps), identity).unbind(-1)
+    rows = (
+        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
+    )  # fmt: skip
+    return torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
+
+
+def matrices_to_quats(matrices: Tensor) -> Tensor:
+    """Quaternions wxyz with w >= 0 of rotation matrices (..., 3, 3).
+
+    The four candidate forms differ in their divisor; the largest divisor is the stable one.
+    Source: Shepperd, "Quaternion from rotation matrix", 1978.
+    """
+    m = matrices
+    xx, yy, zz = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
+    diagonal = torch.stack((xx + yy + zz, xx - yy - zz, yy - xx - zz, zz - xx - yy), -1)
+    a, b, c = (m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1])
+    d, e, f = (m[..., 1, 0] + m[..., 0, 1], m[..., 0, 2] + m[..., 2, 0], m[..., 2, 1] + m[..., 1, 2])
+    one = 1 + diagonal
+    candidates = torch.stack(
+        (
+            torch.stack((one[..., 0], a, b, c), -1),
+            torch.stack((a, one[..., 1], d, e), -1),
+            torch.stack((b, d, one[..., 2], f), -1),
+            torch.stack((c, e, f, one[..., 3]), -1),
+        ),
+        -2,
+    )
+    best = diagonal.argmax(-1)[..., None, None].expand(*diagonal.shape[:-1], 1, 4)
+    quats = normalize(candidates.gather(-2, best).squeeze(-2), dim=-1)
+    return torch.where(quats[..., :1] < 0, -quats, quats)
+
+
+def multiply_quats(left: Tensor, right: Tensor) -> Tensor:
+    """Hamilton product (..., 4): the rotation `right` first, then `left`."""
+    a, b, c, d = left.unbind(-1)
+    e, f, g, h = right.unbind(-1)
+    return torch.stack(
+        (
+            a * e - b * f - c * g - d * h,
+            a * f + b * e + c * h - d * g,
+            a * g - b * h + c * e + d * f,
+            a * h + b * g - c * f + d * e,
+        ),
+        -1,
+    )
+
+
+def covariances(quats: Tensor, scales: Tensor) -> Tensor:
+    """Covariance matrices R diag(s^2) R^T, (..., 3, 3), symmetric positive semi-definite."""
+    half = quats_to_matrices(quats) * scales[..., None, :]
+    return half @ half.transpose(-1, -2)
