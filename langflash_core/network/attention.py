@@ -1,0 +1,107 @@
+"""Transformer blocks. n query tokens, m memory tokens, C channels; pre-norm throughout."""
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+
+def rope_2d(grid: tuple[int, int], head_dim: int, base: float, *, extra: int = 0) -> Tensor:
+    """Cosines and sines (2, h*w + extra, head_dim) of rotary codes for patch rows and columns.
+
+    The first half of a head turns with y, the second with x. `extra` tokens after the grid sit
+    at (y, x) = (h, 0), where the intrinsics token lives.
+
+    Source: Su et al. 2021 (RoPE), applied per axis as in CroCo v2.
+    """
+    height, width = grid
+    ys, xs = torch.meshgrid(torch.arange(height), torch.arange(width), indexing="ij")
+    positions = torch.stack((ys, xs), -1).reshape(-1, 2)
+    positions = torch.cat((positions, torch.tensor([[height, 0]]).expand(extra, 2))).float()
+    quarter = head_dim // 4
+    rates = base ** (-torch.arange(quarter) / quarter)
+    angles = positions[:, :, None] * rates  # (n, 2, quarter)
+    angles = torch.cat((angles, angles), -1).flatten(1)  # (n, head_dim)
+    return torch.stack((angles.cos(), angles.sin()))
+
+
+def rotate(tokens: Tensor, code: Tensor) -> Tensor:
+    """Apply a `rope_2d` code to tokens (B, heads, n, head_dim)."""
+    first, second = tokens.unflatten(-1, (2, 2, -1)).unbind(-2)  # (B, heads, n, 2 axes, quarter)
+    turned = torch.stack((-second, first), -2).flatten(-3)
+    return tokens * code[0].to(tokens) + turned * code[1].to(tokens)
+
+
+class Attention(nn.Module):
+    """Multi-head attention; rotary codes and additive position codes are the caller's choice."""
+
+    def __init__(self, dim: int, heads: int):
+        super().__init__()
+        self.heads = heads
+        self.query, self.key, self.value = (nn.Linear(dim, dim) for _ in range(3))
+        self.out = nn.Linear(dim, dim)
+
+    def forward(self, query: Tensor, key: Tensor, value: Tensor, codes: tuple[Tensor, Tensor] | None = None) -> Tensor:
+        """(B, n, C) from queries (B, n, C), keys and values (B, m, C)."""
+        q, k, v = (
+            layer(x).unflatten(-1, (self.heads, -1)).transpose(1, 2)
+            for layer, x in ((self.query, query), (self.key, key), (self.value, value))
+        )
+        if codes is not None:
+            q, k = rotate(q, codes[0]), rotate(k, codes[1])
+        return self.out(F.scaled_dot_product_attention(q, k, v).transpose(1, 2).flatten(2))
+
+
+class MLP(nn.Sequential):
+    """Linear, GELU, Linear."""
+
+    def __init__(self, dim: int, hidden: int, out: int | None = None):
+        super().__init__(nn.Linear(dim, hidden), nn.GELU(), nn.Linear(hidden, dim if out is None else out))
+
+
+class SelfBlock(nn.Module):
+    """Self-attention with rotary codes, then an MLP."""
+
+    def __init__(self, dim: int, heads: int):
+        super().__init__()
+        self.norm1, self.norm2 = nn.LayerNorm(dim), nn.LayerNorm(dim)
+        self.attn, self.mlp = Attention(dim, heads), MLP(dim, 4 * dim)
+
+    def forward(self, tokens: Tensor, code: Tensor) -> Tensor:
+        x = self.norm1(tokens)
+        tokens = tokens + self.attn(x, x, x, (code, code))
+        return tokens + self.mlp(self.norm2(tokens))
+
+
+class CrossBlock(nn.Module):
+    """Self-attention, cross-attention to a memory, MLP; rotary codes on both sides."""
+
+    def __init__(self, dim: int, heads: int):
+        super().__init__()
+        self.norm1, self.norm2, self.norm3, self.norm_memory = (nn.LayerNorm(dim) for _ in range(4))
+        self.attn, self.cross, self.mlp = Attention(dim, heads), Attention(dim, heads), MLP(dim, 4 * dim)
+
+    def forward(self, tokens: Tensor, memory: Tensor, code: Tensor, memory_code: Tensor) -> Tensor:
+        x = self.norm1(tokens)
+        tokens = tokens + self.attn(x, x, x, (code, code))
+        m = self.norm_memory(memory)
+        tokens = tokens + self.cross(self.norm2(tokens), m, m, (code, memory_code))
+        return tokens + self.mlp(self.norm3(tokens))
+
+
+class QueryBlock(nn.Module):
+    """Learned queries: self-attention among them, cross-attention to a memory, MLP.
+
+    Positions are added to queries and keys, never to values (DETR, Carion et al. 2020).
+    """
+
+    def __init__(self, dim: int, heads: int):
+        super().__init__()
+        self.norm1, self.norm2, self.norm3, self.norm_memory = (nn.LayerNorm(dim) for _ in range(4))
+        self.attn, self.cross, self.mlp = Attention(dim, heads), Attention(dim, heads), MLP(dim, 4 * dim)
+
+    def forward(self, queries: Tensor, memory: Tensor, query_pos: Tensor | float = 0.0, memory_pos: Tensor | float = 0.0) -> Tensor:
+        x = self.norm1(queries)
+        queries = queries + self.attn(x + query_pos, x + query_pos, x)
+        m = self.norm_memory(memory)
+        queries = queries + self.cross(self.norm2(queries) + query_pos, m + memory_pos, m)
+        return queries + self.mlp(self.norm3(queries))

@@ -1,0 +1,137 @@
+"""Weights on disk: one safetensors file, matrices as int8 rows, metadata in the header.
+
+A matrix or convolution is stored as int8 with one float16 scale per output row under
+`<key>.scale`; everything else is float16.
+"""
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor
+
+from langflash_core.errors import WeightsError
+from langflash_core.network.model import LangFlashNet
+from langflash_core.network.presets import PRESETS, Preset
+from langflash_core.resources import asset_path
+
+FORMAT = "langflash-weights-1"
+_MIN_QUANTISED = 4096  # numbers; smaller tensors are not worth a scale per row
+
+
+def load_network(preset: str = "mini", weights: Path | None = None, device: str | torch.device = "cpu") -> LangFlashNet:
+    """The network of a preset with trained weights, in evaluation mode.
+
+    Args:
+        weights: a file written by `save_network`; None takes the embedded one.
+
+    Raises:
+        WeightsError: the file is missing, damaged, of another preset, or does not fit.
+    """
+    if preset not in PRESETS:
+        raise WeightsError(f"There is no preset '{preset}'; choose one of {', '.join(PRESETS)}")
+    path = asset_path(f"weights/{preset}.safetensors") if weights is None else Path(weights)
+    tensors, metadata = read_weights(path)
+    if metadata.get("preset") != preset:
+        raise WeightsError(
+            f"{path.name} holds weights of preset '{metadata.get('preset')}', not '{preset}'; choose --preset to match"
+        )
+    network = LangFlashNet(PRESETS[preset])
+    _load_strictly(network, tensors, path)
+    network.calibration = metadata.get("calibration", {})
+    return network.eval().to(device)
+
+
+def initial_network(preset: Preset, encoder: Path, seed: int = 0) -> LangFlashNet:
+    """A network to train: the encoder from a file, every head freshly drawn from `seed`.
+
+    The encoder goes through the int8 rows it will be shipped in, so that the heads learn on the
+    tokens they will see.
+
+    Args:
+        encoder: a timm state dict of the preset's encoder, or a file of `save_network`.
+    """
+    torch.manual_seed(seed)
+    network = LangFlashNet(preset)
+    tensors, metadata = read_weights(encoder)
+    prefix = "encoder.vit." if metadata.get("preset") else ""
+    own = {k.removeprefix(prefix): v for k, v in tensors.items() if k.startswith(prefix)}
+    _load_strictly(network.encoder.vit, dequantise(quantise(own)), encoder)
+    return network
+
+
+def save_network(network: LangFlashNet, path: Path, metadata: Mapping | None = None) -> None:
+    """Write all weights atomically. `metadata` is plain JSON: data, steps, hours, metrics, calibration."""
+    header = {"format": FORMAT, "preset": network.preset.name, "calibration": network.calibration, **(metadata or {})}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
+    os.close(handle)
+    try:
+        save_file(quantise(network.state_dict()), temporary, metadata={"langflash": json.dumps(header)})
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def read_weights(path: Path) -> tuple[dict[str, Tensor], dict]:
+    """Float32 tensors and metadata of a safetensors file ({} for a foreign one)."""
+    try:
+        with safe_open(str(path), framework="pt") as file:
+            tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 (no mapping)
+            header = json.loads((file.metadata() or {}).get("langflash", "{}"))
+    except FileNotFoundError:
+        raise WeightsError(f"There is no weights file {path}; check the path or leave --weights out") from None
+    except (SafetensorError, OSError, ValueError) as error:
+        raise WeightsError(
+            f"{path} is not a readable safetensors file ({error}); download or convert it again"
+        ) from None
+    return dequantise(tensors), header
+
+
+def quantise(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """Int8 rows for matrices, float16 for the rest. Rows of zeros keep a scale of 0."""
+    stored = {}
+    for key, value in tensors.items():
+        value = value.detach().float().cpu().contiguous()
+        if value.ndim < 2 or value.numel() < _MIN_QUANTISED or key.endswith(("pos_embed", "patterns", "positions")):
+            stored[key] = value.half()
+            continue
+        scale = (value.flatten(1).abs().amax(1) / 127).half()
+        divisor = scale.float().clamp_min(1e-12).reshape(-1, *[1] * (value.ndim - 1))
+        stored[key] = (value / divisor).round().clamp(-127, 127).to(torch.int8)
+        stored[f"{key}.scale"] = scale
+    return stored
+
+
+def dequantise(stored: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """Float32 tensors of `quantise`."""
+    tensors = {}
+    for key, value in stored.items():
+        if value.dtype == torch.int8:
+            scale = stored[f"{key}.scale"].float().reshape(-1, *[1] * (value.ndim - 1))
+            tensors[key] = value.float() * scale
+        elif not key.endswith(".scale"):
+            tensors[key] = value.float()
+    return tensors
+
+
+def _load_strictly(module: torch.nn.Module, tensors: dict[str, Tensor], path: Path) -> None:
+    expected = {k: tuple(v.shape) for k, v in module.state_dict().items()}
+    found = {k: tuple(v.shape) for k, v in tensors.items()}
+    problems = [f"missing {k}" for k in expected.keys() - found.keys()]
+    problems += [f"surplus {k}" for k in found.keys() - expected.keys()]
+    problems += [
+        f"{k} is {found[k]}, expected {expected[k]}" for k in expected.keys() & found.keys() if expected[k] != found[k]
+    ]
+    bad = [k for k, v in tensors.items() if not bool(torch.isfinite(v).all())]
+    problems += [f"{k} holds NaN or Inf" for k in bad]
+    if problems:
+        shown = "; ".join(sorted(problems)[:5]) + ("; ..." if len(problems) > 5 else "")
+        raise WeightsError(f"{path} does not fit this network ({len(problems)} tensors: {shown}); choose another file")
+    module.load_state_dict(tensors)

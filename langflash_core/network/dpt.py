@@ -1,0 +1,79 @@
+"""Dense prediction from tokens: four levels are brought to a pyramid and fused coarse to fine.
+
+Source: Ranftl et al. 2021 (DPT). With a token grid of h x w the paths are
+path_4 at 1x, path_3 at 2x, path_2 at 4x and path_1 at 8x the grid.
+"""
+
+from dataclasses import dataclass
+
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+
+@dataclass(frozen=True)
+class Paths:
+    """Fused maps (n, feature, s*h, s*w), coarse to fine: s = 1, 2, 4, 8."""
+
+    path_4: Tensor
+    path_3: Tensor
+    path_2: Tensor
+    path_1: Tensor
+
+
+class ResidualUnit(nn.Module):
+    def __init__(self, feature: int):
+        super().__init__()
+        self.conv1 = nn.Conv2d(feature, feature, 3, padding=1)
+        self.conv2 = nn.Conv2d(feature, feature, 3, padding=1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        return x + self.conv2(F.relu(self.conv1(F.relu(x))))
+
+
+class Fusion(nn.Module):
+    """Add the finer level, mix, double the size."""
+
+    def __init__(self, feature: int, *, coarsest: bool = False):
+        super().__init__()
+        self.lateral = None if coarsest else ResidualUnit(feature)
+        self.mix = ResidualUnit(feature)
+        self.out = nn.Conv2d(feature, feature, 1)
+
+    def forward(self, coarse: Tensor, lateral: Tensor | None = None) -> Tensor:
+        if self.lateral is not None and lateral is not None:
+            coarse = coarse[..., : lateral.shape[-2], : lateral.shape[-1]] + self.lateral(lateral)
+        # The 1x1 convolution commutes with the bilinear resize and is four times cheaper before it.
+        return F.interpolate(self.out(self.mix(coarse)), scale_factor=2.0, mode="bilinear", align_corners=False)
+
+
+class DPT(nn.Module):
+    """Four token levels -> `Paths`."""
+
+    def __init__(self, token_dims: tuple[int, int, int, int], level_dims: tuple[int, int, int, int], feature: int):
+        super().__init__()
+        a, b, c, d = level_dims
+        self.project = nn.ModuleList(nn.Conv2d(t, n, 1) for t, n in zip(token_dims, level_dims, strict=True))
+        self.resize = nn.ModuleList(
+            (
+                nn.ConvTranspose2d(a, a, 4, stride=4),
+                nn.ConvTranspose2d(b, b, 2, stride=2),
+                nn.Identity(),
+                nn.Conv2d(d, d, 3, stride=2, padding=1),
+            )
+        )
+        self.level = nn.ModuleList(nn.Conv2d(n, feature, 3, padding=1, bias=False) for n in level_dims)
+        self.fuse = nn.ModuleList(Fusion(feature, coarsest=i == 3) for i in range(4))
+
+    def forward(self, maps: tuple[Tensor, Tensor, Tensor, Tensor]) -> Paths:
+        """Fuse token maps (n, C_i, h, w), shallow first."""
+        levels = [
+            level(resize(project(m)))
+            for m, project, resize, level in zip(maps, self.project, self.resize, self.level, strict=True)
+        ]
+        path_4 = self.fuse[3](levels[3])
+        path_3 = self.fuse[2](path_4, levels[2])
+        path_2 = self.fuse[1](path_3, levels[1])
+        path_1 = self.fuse[0](path_2, levels[0])
+        # An odd token grid makes the coarsest path one row too large; the others follow the laterals.
+        height, width = levels[2].shape[-2:]
+        return Paths(path_4[..., :height, :width], path_3, path_2, path_1)

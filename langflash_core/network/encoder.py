@@ -1,0 +1,62 @@
+"""The shared image encoder: pictures in, tokens of four blocks out. Run once, read by all heads."""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from langflash_core.network.presets import Preset
+from langflash_core.torchvision_fix import ensure_torchvision
+
+_MEAN = (0.485, 0.456, 0.406)
+_STD = (0.229, 0.224, 0.225)
+
+
+@dataclass(frozen=True)
+class Tokens:
+    """Encoder tokens of V views: four hooks (B, V, h*w, C), after the final norm; grid (h, w)."""
+
+    hooks: tuple[Tensor, ...]
+    grid: tuple[int, int]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(B, V)."""
+        return self.hooks[0].shape[0], self.hooks[0].shape[1]
+
+    def maps(self, index: int) -> Tensor:
+        """Hook `index` as feature maps (B*V, C, h, w)."""
+        return tokens_to_maps(self.hooks[index].flatten(0, 1), self.grid)
+
+
+def tokens_to_maps(tokens: Tensor, grid: tuple[int, int]) -> Tensor:
+    """(n, h*w, C) -> (n, C, h, w)."""
+    return tokens.transpose(1, 2).unflatten(2, grid)
+
+
+class Encoder(nn.Module):
+    """A plain ViT through timm, frozen: sides are multiples of the patch, any aspect ratio."""
+
+    def __init__(self, preset: Preset):
+        super().__init__()
+        ensure_torchvision()
+        import timm  # heavy, and only importable after the line above
+
+        self.hook_blocks = preset.hooks
+        self.vit = timm.create_model(preset.encoder, pretrained=False, num_classes=0, dynamic_img_size=True)
+        self.register_buffer("mean", torch.tensor(_MEAN)[:, None, None], persistent=False)
+        self.register_buffer("std", torch.tensor(_STD)[:, None, None], persistent=False)
+        self.requires_grad_(False).eval()
+
+    def train(self, mode: bool = True) -> "Encoder":
+        """Stays in evaluation mode: the encoder is frozen."""
+        return super().train(False)
+
+    @torch.no_grad()
+    def forward(self, images: Tensor) -> Tokens:
+        """Tokens of images (B, V, 3, H, W) in [0, 1]."""
+        flat = (images.flatten(0, 1) - self.mean) / self.std
+        maps = self.vit.get_intermediate_layers(flat, n=list(self.hook_blocks), norm=True)
+        patch = self.vit.patch_embed.patch_size[0]
+        grid = (images.shape[-2] // patch, images.shape[-1] // patch)
+        return Tokens(tuple(m.unflatten(0, images.shape[:2]) for m in maps), grid)

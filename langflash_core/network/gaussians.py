@@ -1,0 +1,116 @@
+"""One Gaussian per pixel: its place and shape from depth, the rest learned.
+
+The footprint of a pixel on the surface is known once depth is: neighbouring points span it.
+The head only corrects that footprint and decides opacity and colour.
+"""
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from langflash_core.geometry.cameras import invert_rigid, unproject
+from langflash_core.geometry.harmonics import colour_to_sh
+from langflash_core.geometry.quaternions import matrices_to_quats
+from langflash_core.network.depth import DepthMaps, resize
+from langflash_core.network.dpt import DPT
+from langflash_core.network.encoder import Tokens
+from langflash_core.network.presets import Preset
+from langflash_core.types import Gaussians
+
+_COVER = 0.6  # standard deviation in pixel spacings: neighbours blend into a closed surface
+_THIN = 0.1  # thickness of a surface element over its pixel footprint
+_STRETCH = 5.0  # a surface seen edge-on is not stretched further than this many footprints
+_SCALE_RANGE = 1.0  # the head changes a scale by at most exp(+-1)
+_COLOUR_RANGE = 0.1  # and a colour by at most this
+CHANNELS = 1 + 3 + 3  # opacity, three scales, colour
+
+
+def footprints(depths: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Surface elements that cover one pixel each.
+
+    With tangents t_u, t_v (differences of neighbouring points, the nearer side of a depth jump)
+    the in-plane covariance is s^2 (t_u t_u^T + t_v t_v^T); its 2 x 2 eigenproblem is closed-form.
+
+    Args:
+        depths: (..., H, W), z > 0. Ks: (..., 3, 3) pixels.
+
+    Returns:
+        Points (..., H, W, 3) in the camera frame, rotations (..., H, W, 3, 3) whose columns are
+        the axes, scales (..., H, W, 3) > 0; the third axis is the surface normal.
+
+    Source: own derivation; twin: numpy eigh in tests/network.
+    """
+    pos_c = unproject(depths, Ks)
+    footprint = depths / Ks[..., 0, 0, None, None]  # one pixel at this depth, scene units
+    tangent_u = _difference(pos_c, -2, footprint)
+    tangent_v = _difference(pos_c, -3, footprint)
+    normal = F.normalize(torch.linalg.cross(tangent_u, tangent_v), dim=-1)
+    first = F.normalize(tangent_u, dim=-1)
+    second = torch.linalg.cross(normal, first)
+    # In the (first, second) plane t_u = (a, 0), t_v = (b, c).
+    a, b, c = tangent_u.norm(dim=-1), (tangent_v * first).sum(-1), (tangent_v * second).sum(-1)
+    mean, half = (a * a + b * b + c * c) / 2, (a * a + b * b - c * c) / 2
+    radius = torch.hypot(half, b * c)
+    angle = 0.5 * torch.atan2(b * c, half)
+    cosine, sine = angle.cos()[..., None], angle.sin()[..., None]
+    axes = torch.stack((cosine * first + sine * second, cosine * second - sine * first, normal), -1)
+    in_plane = torch.stack((mean + radius, (mean - radius).clamp_min(0)), -1).sqrt() * _COVER
+    thin = (_THIN * footprint)[..., None]
+    return pos_c, axes, torch.cat((torch.maximum(in_plane, thin), thin), -1)
+
+
+def _difference(pos_c: Tensor, dim: int, footprint: Tensor) -> Tensor:
+    """Tangent along an image axis: the shorter of the forward and backward differences."""
+    steps = pos_c.diff(dim=dim)
+    before = torch.cat((steps.narrow(dim, 0, 1), steps), dim) if steps.shape[dim] else torch.zeros_like(pos_c)
+    after = torch.cat((steps, steps.narrow(dim, -1, 1)), dim) if steps.shape[dim] else before
+    shorter = torch.where((before.norm(dim=-1) < after.norm(dim=-1))[..., None], before, after)
+    longest = shorter.norm(dim=-1, keepdim=True).clamp_min(1e-12)
+    return shorter * (_STRETCH * footprint[..., None] / longest).clamp_max(1)
+
+
+class GaussianHead(nn.Module):
+    """DPT with the RGB shortcut at half resolution -> raw parameters (B, V, 7, H, W)."""
+
+    def __init__(self, preset: Preset):
+        super().__init__()
+        e, d, f = preset.encoder_dim, preset.decoder_dim, preset.dpt_feature
+        self.patch = preset.patch
+        self.dpt = DPT((e, e, d, d), preset.dpt_dims, f)
+        self.shortcut = nn.Conv2d(3, f, 7, padding=3)
+        self.head = nn.Sequential(nn.Conv2d(f, f, 3, padding=1), nn.ReLU(), nn.Conv2d(f, CHANNELS, 1))
+        nn.init.zeros_(self.head[-1].weight)
+        nn.init.constant_(self.head[-1].bias, 0)
+
+    def forward(self, maps: tuple[Tensor, Tensor, Tensor, Tensor], images: Tensor) -> Tensor:
+        """Raw parameters from level maps (B*V, C_i, h, w) and images (B, V, 3, H, W) in [0, 1]."""
+        height, width = images.shape[-2:]
+        half = (height // 2, width // 2)
+        pictures = F.relu(self.shortcut(resize(images.flatten(0, 1), half) * 2 - 1))
+        raw = self.head(resize(self.dpt(maps).path_1, half) + pictures)
+        return resize(raw.float(), (height, width)).unflatten(0, images.shape[:2])
+
+
+def assemble_gaussians(raw: Tensor, images: Tensor, depth_maps: DepthMaps, viewmats: Tensor, Ks: Tensor) -> Gaussians:
+    """Gaussians of one scene, N = V*H*W in the order (v h w), world = view 0.
+
+    Args:
+        raw: (V, 7, H, W) of the head. images: (V, 3, H, W) in [0, 1].
+        depth_maps: (V, H, W). viewmats: (V, 4, 4). Ks: (V, 3, 3) pixels.
+    """
+    pos_c, axes, scales = footprints(depth_maps.depths, Ks)
+    poses = invert_rigid(viewmats)
+    means = torch.einsum("vij,vhwj->vhwi", poses[:, :3, :3], pos_c) + poses[:, None, None, :3, 3]
+    quats = matrices_to_quats(poses[:, None, None, :3, :3] @ axes)
+    raw = raw.movedim(1, -1)  # (V, H, W, 7)
+    # Starts at opacity 0.88; a pixel whose depth is not trusted starts fainter.
+    opacities = torch.sigmoid(raw[..., 0] + 2.0) * depth_maps.confidences.clamp(0.2, 1).sqrt()
+    scales = scales * torch.exp(_SCALE_RANGE * torch.tanh(raw[..., 1:4]))
+    colours = images.movedim(1, -1) + _COLOUR_RANGE * torch.tanh(raw[..., 4:])
+    return Gaussians(
+        means=means.reshape(-1, 3),
+        quats=quats.reshape(-1, 4),
+        scales=scales.reshape(-1, 3),
+        opacities=opacities.reshape(-1),
+        sh=colour_to_sh(colours).reshape(-1, 1, 3),
+    )

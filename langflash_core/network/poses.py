@@ -1,0 +1,153 @@
+"""Poses of V views: pairwise relative poses, chained along the best-connected tree from view 0."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from langflash_core.network.matching import Matches, RelativePose, detect, match_descriptors, relative_pose
+
+_MANY_VIEWS = 4  # beyond this, fewer features keep the V (V - 1) / 2 pairs affordable
+_MIN_SHARE = 0.25  # of the matches must agree with a pose
+_PATCH_MIN_COSINE = 0.5
+_PATCH_MAX_COST = 1.0  # unrelated rooms reach 1.6 and more: patches agree loosely with anything
+_WORKING_SIDE = 768  # pixels; sigma is one pixel at this size
+
+
+@dataclass(frozen=True)
+class PoseInput:
+    """What pose estimation reads of one view.
+
+    grey: (h, w) uint8, any size, the same crop as the network's image. K: (3, 3) pixels of the
+    network's image of `size` (width, height). depth: (H, W), z of the monocular map.
+    patches: (gh, gw, C) unit-norm encoder tokens for when key points fail.
+    """
+
+    grey: np.ndarray
+    K: np.ndarray
+    size: tuple[int, int]
+    depth: np.ndarray
+    patches: np.ndarray
+
+
+@dataclass(frozen=True)
+class Poses:
+    """viewmats (V, 4, 4), world = view 0; depth_scales (V,) that bring each view's depth map to
+    view 0's unit; guessed: views that no match supports."""
+
+    viewmats: np.ndarray
+    depth_scales: np.ndarray
+    guessed: tuple[int, ...]
+
+
+def estimate_poses(views: list[PoseInput]) -> Poses:
+    """Poses of all views, deterministic.
+
+    A view that matches nothing keeps view 0's pose and is reported in `guessed`.
+    """
+    num_views = len(views)
+    limit = 4000 if num_views <= _MANY_VIEWS else 1500
+    features = [detect(_working_size(view.grey), limit) for view in views]
+    pairs: dict[tuple[int, int], RelativePose] = {}
+    for i in range(num_views):
+        for j in range(i + 1, num_views):
+            pose = _pair_pose(views[i], views[j], _key_point_matches(views, features, i, j))
+            if pose is not None:
+                pairs[i, j] = pose
+    return _chain(num_views, pairs)
+
+
+def _pair_pose(view_i: PoseInput, view_j: PoseInput, matches: Matches) -> RelativePose | None:
+    """From key points, else from encoder patches."""
+    pose = _supported(view_i, view_j, matches)
+    if pose is not None:
+        return pose
+    pose = _supported(view_i, view_j, _patch_matches(view_i, view_j))
+    return pose if pose is not None and pose.cost < _PATCH_MAX_COST else None
+
+
+def _supported(view_i: PoseInput, view_j: PoseInput, matches: Matches) -> RelativePose | None:
+    """The pose of the matches, if enough of them agree with it."""
+    depth_i, depth_j = _depths_at(view_i, matches.x_i), _depths_at(view_j, matches.x_j)
+    pose = relative_pose(matches, depth_i, depth_j)
+    return pose if pose is not None and pose.num_inliers >= _MIN_SHARE * len(matches) else None
+
+
+def _working_size(grey: np.ndarray) -> np.ndarray:
+    """Small pictures are enlarged: SIFT needs pixels to find more than a handful of points."""
+    ratio = _WORKING_SIDE / max(grey.shape)
+    if ratio == 1:
+        return grey
+    method = cv2.INTER_CUBIC if ratio > 1 else cv2.INTER_AREA
+    return cv2.resize(grey, None, fx=ratio, fy=ratio, interpolation=method)
+
+
+def _key_point_matches(views: list[PoseInput], features: list, i: int, j: int) -> Matches:
+    pairs = match_descriptors(features[i][1], features[j][1])
+    x_i = _without_camera(features[i][0][pairs[:, 0]], views[i], _WORKING_SIDE)
+    x_j = _without_camera(features[j][0][pairs[:, 1]], views[j], _WORKING_SIDE)
+    return Matches(x_i, x_j, _sigma(views[j], 1.0))
+
+
+def _patch_matches(view_i: PoseInput, view_j: PoseInput) -> Matches:
+    """Mutual nearest encoder patches; sigma is a third of a patch."""
+    left, right = (v.patches.reshape(-1, v.patches.shape[-1]) for v in (view_i, view_j))
+    similarity = left @ right.T
+    best = similarity.argmax(1)
+    rows = np.arange(len(left))
+    keep = (similarity.argmax(0)[best] == rows) & (similarity[rows, best] > _PATCH_MIN_COSINE)
+    x_i = _without_camera(_patch_centres(view_i)[rows[keep]], view_i, max(view_i.size))
+    x_j = _without_camera(_patch_centres(view_j)[best[keep]], view_j, max(view_j.size))
+    patch = max(view_j.size) / max(view_j.patches.shape[:2])
+    return Matches(x_i, x_j, patch / 3 / view_j.K[0, 0])
+
+
+def _patch_centres(view: PoseInput) -> np.ndarray:
+    rows, columns = view.patches.shape[:2]
+    ys, xs = np.mgrid[0:rows, 0:columns]
+    cell = np.array([view.size[0] / columns, view.size[1] / rows])
+    return (np.stack((xs, ys), -1).reshape(-1, 2) + 0.5) * cell
+
+
+def _sigma(view: PoseInput, pixels: float) -> float:
+    """`pixels` at the working size, as normalised coordinates."""
+    return pixels * max(view.size) / _WORKING_SIDE / view.K[0, 0]
+
+
+def _without_camera(pixels: np.ndarray, view: PoseInput, side: int) -> np.ndarray:
+    """Pixels of a picture whose longer side is `side` -> normalised coordinates (n, 2)."""
+    own = pixels * (max(view.size) / side)
+    return (own - view.K[:2, 2]) / view.K.diagonal()[:2]
+
+
+def _depths_at(view: PoseInput, x: np.ndarray) -> np.ndarray:
+    pixels = x * view.K.diagonal()[:2] + view.K[:2, 2]
+    columns, rows = np.clip(pixels.astype(int), 0, np.array(view.size) - 1).T
+    return view.depth[rows, columns].astype(np.float64)
+
+
+def _chain(num_views: int, pairs: dict[tuple[int, int], RelativePose]) -> Poses:
+    """Prim's maximum spanning tree on inlier counts; scales and poses multiply along it."""
+    viewmats = np.repeat(np.eye(4)[None], num_views, 0)
+    scales = np.ones(num_views)
+    placed = {0}
+    while True:
+        reachable = [
+            (pose.num_inliers, -i, -j) for (i, j), pose in pairs.items() if (i in placed) != (j in placed)
+        ]
+        if not reachable:
+            break
+        _, i, j = max(reachable)
+        i, j = -i, -j
+        relative = pairs[i, j].matrix()
+        growth = np.exp(pairs[i, j].log_scale)  # view j's depths times this are in view i's unit
+        if i in placed:
+            relative[:3, 3] *= scales[i]
+            viewmats[j], scales[j] = relative @ viewmats[i], scales[i] * growth
+            placed.add(j)
+        else:
+            scales[i] = scales[j] / growth
+            relative[:3, 3] *= scales[i]
+            viewmats[i] = np.linalg.inv(relative) @ viewmats[j]
+            placed.add(i)
+    return Poses(viewmats, scales, tuple(v for v in range(num_views) if v not in placed))

@@ -1,0 +1,142 @@
+"""Guided depth and the per-pixel Gaussians against slow twins."""
+
+import numpy as np
+import pytest
+import torch
+from torch.nn import functional as F
+
+from langflash_core.geometry.cameras import invert_rigid, rays
+from langflash_core.geometry.quaternions import covariances, quats_to_matrices
+from langflash_core.network.depth import DepthMaps, sweep_correlation
+from langflash_core.network.gaussians import CHANNELS, assemble_gaussians, footprints
+
+K = torch.tensor([[40.0, 0, 16], [0, 40.0, 12], [0, 0, 1]], dtype=torch.float64)
+
+
+def _sweep_twin(features, log_depths, offsets, viewmats, Ks, view, other, plane, row, column):
+    """One entry of the volume for two views, from the definition."""
+    depth = float(torch.exp(log_depths[view, row, column] + offsets[plane]))
+    pixel = torch.tensor([column + 0.5, row + 0.5, 1.0], dtype=torch.float64)
+    pos = viewmats[other] @ torch.linalg.inv(viewmats[view])
+    pos = pos[:3, :3] @ (torch.linalg.inv(Ks[view]) @ pixel * depth) + pos[:3, 3]
+    x, y = (Ks[other] @ pos / pos[2])[:2].tolist()
+    height, width = features.shape[-2:]
+    if pos[2] <= 0 or not (0 <= x <= width and 0 <= y <= height):
+        return 0.0
+    total = torch.zeros(features.shape[1], dtype=torch.float64)
+    left, top = int(np.floor(x - 0.5)), int(np.floor(y - 0.5))
+    for r in (top, top + 1):
+        for c in (left, left + 1):
+            if 0 <= r < height and 0 <= c < width:
+                share = (1 - abs(x - 0.5 - c)) * (1 - abs(y - 0.5 - r))
+                total += share * features[other, :, r, c]
+    return float(total @ features[view, :, row, column])
+
+
+def test_sweep_equals_its_twin():
+    torch.manual_seed(0)
+    features = F.normalize(torch.randn(2, 6, 24, 32, dtype=torch.float64), dim=1)
+    log_depths = torch.rand(2, 24, 32, dtype=torch.float64) * 0.5 + 0.5
+    offsets = torch.linspace(-0.4, 0.4, 5, dtype=torch.float64)
+    viewmats = torch.eye(4, dtype=torch.float64).repeat(2, 1, 1)
+    viewmats[1, :3, 3] = torch.tensor([-0.3, 0.05, 0.1])
+    volume, _ = sweep_correlation(features, log_depths, offsets, viewmats, K.expand(2, 3, 3))
+    for plane, row, column in [(0, 3, 5), (2, 12, 20), (4, 23, 31), (1, 0, 0), (3, 20, 2)]:
+        expected = _sweep_twin(features, log_depths, offsets, viewmats, K.expand(2, 3, 3), 0, 1, plane, row, column)
+        assert volume[0, plane, row, column].item() == pytest.approx(expected, abs=1e-10)
+
+
+def test_sweep_peaks_at_the_true_depth():
+    """A textured wall at 2 m, prior too near by exp(-0.2): the hypothesis +0.2 matches exactly and wins."""
+    torch.manual_seed(0)
+    offsets = torch.linspace(-0.4, 0.4, 17, dtype=torch.float64)
+    viewmats = torch.eye(4, dtype=torch.float64).repeat(2, 1, 1)
+    viewmats[1, 0, 3] = -0.4  # shifts the wall by 8 pixels
+    texture = F.normalize(torch.randn(1, 8, 24, 40, dtype=torch.float64), dim=1)
+    features = torch.stack((texture[0, :, :, :32], texture[0, :, :, 8:]))
+    log_depths = torch.full((2, 24, 32), np.log(2.0) - 0.2, dtype=torch.float64)
+    volume, _ = sweep_correlation(features, log_depths, offsets, viewmats, K.expand(2, 3, 3))
+    best = offsets[volume[0, :, :, 8:].argmax(0)]  # the first 8 columns leave the other view
+    assert (best - 0.2).abs().max() < 1e-9
+
+
+def test_sweep_of_a_lonely_or_blind_view_is_zero():
+    features = F.normalize(torch.randn(2, 4, 6, 8), dim=1)
+    behind = torch.eye(4).repeat(2, 1, 1)
+    behind[1, :3, :3] = torch.diag(torch.tensor([-1.0, 1.0, -1.0]))
+    for count, viewmats in ((1, torch.eye(4)[None]), (2, behind)):
+        volume, seen = sweep_correlation(
+            features[:count], torch.zeros(count, 6, 8), torch.tensor([0.0]), viewmats, K.float().expand(count, 3, 3)
+        )
+        assert volume.abs().max() == 0 and seen.abs().max() == 0
+
+
+def test_refiner_stays_in_its_range_and_is_finite(untrained):
+    from langflash_core.network.encoder import Tokens
+
+    torch.manual_seed(0)
+    images = torch.rand(1, 2, 3, 56, 70)
+    tokens = Tokens(tuple(torch.randn(1, 2, 20, 384) for _ in range(4)), (4, 5))
+    prior = DepthMaps(torch.rand(1, 2, 56, 70), torch.zeros(1, 2, 56, 70))
+    viewmats = torch.eye(4).expand(1, 2, 4, 4)
+    Ks = torch.tensor([[60.0, 0, 35], [0, 60.0, 28], [0, 0, 1]]).expand(1, 2, 3, 3)
+    refined = untrained.refiner(images, tokens, prior, viewmats, Ks)
+    assert torch.isfinite(refined.depths).all()
+    assert (refined.log_depths - prior.log_depths).abs().max() <= untrained.preset.sweep_range + 1e-5  # float32
+
+
+def _plane(tilt: float) -> torch.Tensor:
+    """Depth of the plane z = 2 + tilt * x."""
+    slopes = rays(K, 32, 24)[..., 0]
+    return 2 / (1 - tilt * slopes)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.5, -1.0])
+def test_footprints_have_the_covariance_of_their_tangents(tilt):
+    """On a plane both differences agree up to perspective; numpy's eigh is the twin."""
+    depths = _plane(tilt)
+    pos, axes, scales = footprints(depths, K)
+    shift_u, shift_v = pos[:, 1:] - pos[:, :-1], pos[1:] - pos[:-1]
+    row, column = 12, 16
+    steps = lambda s, a, b: s[a] if s[a].norm() < s[b].norm() else s[b]  # noqa: E731
+    t_u = steps(shift_u, (row, column - 1), (row, column))
+    t_v = steps(shift_v, (row - 1, column), (row, column))
+    expected = 0.36 * (torch.outer(t_u, t_u) + torch.outer(t_v, t_v)).numpy()
+    values, vectors = np.linalg.eigh(expected)
+    own = axes[row, column].numpy()
+    assert np.sort(scales[row, column, :2].numpy() ** 2) == pytest.approx(values[1:], rel=1e-9)
+    assert abs(own[:, 2] @ vectors[:, 0]) == pytest.approx(1, abs=1e-9)
+    assert np.linalg.det(own) == pytest.approx(1, abs=1e-9)
+
+
+def test_footprints_at_a_depth_jump_stay_small():
+    depths = torch.full((24, 32), 2.0, dtype=torch.float64)
+    depths[:, 16:] = 20.0
+    _, axes, scales = footprints(depths, K)
+    assert torch.isfinite(axes).all()
+    assert scales[:, :15].max() < 2.0 / 40 * 0.61  # the near side never reaches across
+
+
+def test_one_pixel_gives_a_finite_element():
+    _, axes, scales = footprints(torch.full((1, 1), 2.0, dtype=torch.float64), K)
+    assert torch.isfinite(axes).all() and (scales > 0).all()
+
+
+def test_gaussians_land_on_the_surface_in_world_space():
+    torch.manual_seed(0)
+    viewmats = torch.eye(4, dtype=torch.float64).repeat(2, 1, 1)
+    angle = 0.3
+    viewmats[1, :3, :3] = quats_to_matrices(torch.tensor([np.cos(angle / 2), 0, np.sin(angle / 2), 0], dtype=torch.float64))
+    viewmats[1, :3, 3] = torch.tensor([0.2, -0.1, 0.3])
+    maps = DepthMaps(torch.stack((_plane(0.2), _plane(-0.3))).log(), torch.zeros(2, 24, 32, dtype=torch.float64))
+    images = torch.rand(2, 3, 24, 32, dtype=torch.float64)
+    raw = torch.zeros(2, CHANNELS, 24, 32, dtype=torch.float64)
+    gaussians = assemble_gaussians(raw, images, maps, viewmats, K.expand(2, 3, 3))
+    pixel = 24 * 32 + 10 * 32 + 7  # view 1, row 10, column 7
+    expected = rays(K, 32, 24)[10, 7] * maps.depths[1, 10, 7]
+    back = viewmats[1] @ torch.cat((gaussians.means[pixel], torch.ones(1, dtype=torch.float64)))
+    assert torch.allclose(back[:3], expected, atol=1e-12)
+    assert torch.allclose(invert_rigid(viewmats) @ viewmats, torch.eye(4, dtype=torch.float64).expand(2, 4, 4), atol=1e-12)
+    spread = covariances(gaussians.quats, gaussians.scales)
+    assert torch.linalg.eigvalsh(spread).min() > 0
+    assert torch.allclose(0.5 + 0.28209479177387814 * gaussians.sh[pixel, 0], images[1, :, 10, 7], atol=1e-12)
