@@ -20,7 +20,6 @@ def asset_path(name: str) -> Path:
 def _existing(path: Path) -> Path:
     if not path.exists():
         raise FileNotFoundError(
-            f"LangFlash was installed without {path.name}: expected it at {path}; "
-            "reinstall the package"
+            f"LangFlash was installed without {path.name}: expected it at {path}; reinstall the package"
         )
     return path

@@ -24,11 +24,11 @@ def sh_basis(directions: Tensor, degree: int) -> Tensor:
     Source: Kerbl et al. 2023, the constants and signs of the reference implementation.
     """
     x, y, z = directions.unbind(-1)
+    xx, yy, zz = x * x, y * y, z * z
     bases = [torch.full_like(x, SH_C0)]
     if degree >= 1:
         bases += [-_C1 * y, _C1 * z, -_C1 * x]
     if degree >= 2:
-        xx, yy, zz = x * x, y * y, z * z
         bases += [
             _C2[0] * x * y, _C2[1] * y * z, _C2[2] * (2 * zz - xx - yy), _C2[3] * x * z, _C2[4] * (xx - yy),
         ]  # fmt: skip

@@ -4,4 +4,13 @@ from langflash_core.network.checkpoints import initial_network, load_network, sa
 from langflash_core.network.model import STAGES, LangFlashNet
 from langflash_core.network.presets import MINI, PRESETS, Preset
 
-__all__ = ["MINI", "PRESETS", "STAGES", "LangFlashNet", "Preset", "initial_network", "load_network", "save_network"]
+__all__ = [
+    "MINI",
+    "PRESETS",
+    "STAGES",
+    "LangFlashNet",
+    "Preset",
+    "initial_network",
+    "load_network",
+    "save_network",
+]

@@ -40,7 +40,9 @@ class Attention(nn.Module):
         self.query, self.key, self.value = (nn.Linear(dim, dim) for _ in range(3))
         self.out = nn.Linear(dim, dim)
 
-    def forward(self, query: Tensor, key: Tensor, value: Tensor, codes: tuple[Tensor, Tensor] | None = None) -> Tensor:
+    def forward(
+        self, query: Tensor, key: Tensor, value: Tensor, codes: tuple[Tensor, Tensor] | None = None
+    ) -> Tensor:
         """(B, n, C) from queries (B, n, C), keys and values (B, m, C)."""
         q, k, v = (
             layer(x).unflatten(-1, (self.heads, -1)).transpose(1, 2)
@@ -99,7 +101,13 @@ class QueryBlock(nn.Module):
         self.norm1, self.norm2, self.norm3, self.norm_memory = (nn.LayerNorm(dim) for _ in range(4))
         self.attn, self.cross, self.mlp = Attention(dim, heads), Attention(dim, heads), MLP(dim, 4 * dim)
 
-    def forward(self, queries: Tensor, memory: Tensor, query_pos: Tensor | float = 0.0, memory_pos: Tensor | float = 0.0) -> Tensor:
+    def forward(
+        self,
+        queries: Tensor,
+        memory: Tensor,
+        query_pos: Tensor | float = 0.0,
+        memory_pos: Tensor | float = 0.0,
+    ) -> Tensor:
         x = self.norm1(queries)
         queries = queries + self.attn(x + query_pos, x + query_pos, x)
         m = self.norm_memory(memory)

@@ -6,7 +6,6 @@ A matrix or convolution is stored as int8 with one float16 scale per output row 
 
 import json
 import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -24,7 +23,9 @@ FORMAT = "langflash-weights-1"
 _MIN_QUANTISED = 4096  # numbers; smaller tensors are not worth a scale per row
 
 
-def load_network(preset: str = "mini", weights: Path | None = None, device: str | torch.device = "cpu") -> LangFlashNet:
+def load_network(
+    preset: str = "mini", weights: Path | None = None, device: str | torch.device = "cpu"
+) -> LangFlashNet:
     """The network of a preset with trained weights, in evaluation mode.
 
     Args:
@@ -39,7 +40,8 @@ def load_network(preset: str = "mini", weights: Path | None = None, device: str 
     tensors, metadata = read_weights(path)
     if metadata.get("preset") != preset:
         raise WeightsError(
-            f"{path.name} holds weights of preset '{metadata.get('preset')}', not '{preset}'; choose --preset to match"
+            f"{path.name} holds weights of preset '{metadata.get('preset')}', not '{preset}'; "
+            "choose --preset to match"
         )
     network = LangFlashNet(PRESETS[preset])
     _load_strictly(network, tensors, path)
@@ -67,15 +69,19 @@ def initial_network(preset: Preset, encoder: Path, seed: int = 0) -> LangFlashNe
 
 def save_network(network: LangFlashNet, path: Path, metadata: Mapping | None = None) -> None:
     """Write all weights atomically. `metadata` is plain JSON: data, steps, hours, metrics, calibration."""
-    header = {"format": FORMAT, "preset": network.preset.name, "calibration": network.calibration, **(metadata or {})}
+    header = {
+        "format": FORMAT,
+        "preset": network.preset.name,
+        "calibration": network.calibration,
+        **(metadata or {}),
+    }
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    os.close(handle)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         save_file(quantise(network.state_dict()), temporary, metadata={"langflash": json.dumps(header)})
         os.replace(temporary, path)
     except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         raise
 
 
@@ -86,7 +92,9 @@ def read_weights(path: Path) -> tuple[dict[str, Tensor], dict]:
             tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 (no mapping)
             header = json.loads((file.metadata() or {}).get("langflash", "{}"))
     except FileNotFoundError:
-        raise WeightsError(f"There is no weights file {path}; check the path or leave --weights out") from None
+        raise WeightsError(
+            f"There is no weights file {path}; check the path or leave --weights out"
+        ) from None
     except (SafetensorError, OSError, ValueError) as error:
         raise WeightsError(
             f"{path} is not a readable safetensors file ({error}); download or convert it again"
@@ -99,7 +107,11 @@ def quantise(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
     stored = {}
     for key, value in tensors.items():
         value = value.detach().float().cpu().contiguous()
-        if value.ndim < 2 or value.numel() < _MIN_QUANTISED or key.endswith(("pos_embed", "patterns", "positions")):
+        if (
+            value.ndim < 2
+            or value.numel() < _MIN_QUANTISED
+            or key.endswith(("pos_embed", "patterns", "positions"))
+        ):
             stored[key] = value.half()
             continue
         scale = (value.flatten(1).abs().amax(1) / 127).half()
@@ -127,11 +139,15 @@ def _load_strictly(module: torch.nn.Module, tensors: dict[str, Tensor], path: Pa
     problems = [f"missing {k}" for k in expected.keys() - found.keys()]
     problems += [f"surplus {k}" for k in found.keys() - expected.keys()]
     problems += [
-        f"{k} is {found[k]}, expected {expected[k]}" for k in expected.keys() & found.keys() if expected[k] != found[k]
+        f"{k} is {found[k]}, expected {expected[k]}"
+        for k in expected.keys() & found.keys()
+        if expected[k] != found[k]
     ]
     bad = [k for k, v in tensors.items() if not bool(torch.isfinite(v).all())]
     problems += [f"{k} holds NaN or Inf" for k in bad]
     if problems:
         shown = "; ".join(sorted(problems)[:5]) + ("; ..." if len(problems) > 5 else "")
-        raise WeightsError(f"{path} does not fit this network ({len(problems)} tensors: {shown}); choose another file")
+        raise WeightsError(
+            f"{path} does not fit this network ({len(problems)} tensors: {shown}); choose another file"
+        )
     module.load_state_dict(tensors)

@@ -41,6 +41,8 @@ class DepthMaps:
 def resize(maps: Tensor, size: tuple[int, int]) -> Tensor:
     """Bilinear (n, C, h, w) -> (n, C, *size), pixel centres aligned; averages when shrinking."""
     shrinking = maps.shape[-1] > size[1]
+    if shrinking:
+        maps = maps.float()  # a CPU has no antialiased resize in half precision
     return F.interpolate(maps, size=size, mode="bilinear", align_corners=False, antialias=shrinking)
 
 
@@ -65,7 +67,9 @@ class DepthHead(nn.Module):
         return DepthMaps(log_depths, (raw[:, :, 1] - 1.5).clamp(*_LOG_ERROR_RANGE))
 
 
-def sweep_correlation(features: Tensor, log_depths: Tensor, offsets: Tensor, viewmats: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor]:
+def sweep_correlation(
+    features: Tensor, log_depths: Tensor, offsets: Tensor, viewmats: Tensor, Ks: Tensor
+) -> tuple[Tensor, Tensor]:
     """Correlation of every view with the others over depth hypotheses.
 
     Args:
@@ -119,6 +123,8 @@ class DepthRefiner(nn.Module):
     other view (or none that sees a pixel) correlations are 0 and the prior speaks alone.
     """
 
+    offsets: Tensor  # (P,) log-depth hypotheses around the prior
+
     def __init__(self, preset: Preset):
         super().__init__()
         feature, planes = preset.sweep_feature, preset.sweep_planes
@@ -126,7 +132,9 @@ class DepthRefiner(nn.Module):
         offsets = torch.linspace(-preset.sweep_range, preset.sweep_range, planes)
         self.register_buffer("offsets", offsets, persistent=False)
         self.image = nn.Sequential(
-            nn.Conv2d(3, feature, 3, stride=2, padding=1), nn.ReLU(), nn.Conv2d(feature, feature, 3, padding=1)
+            nn.Conv2d(3, feature, 3, stride=2, padding=1),
+            nn.ReLU(),
+            nn.Conv2d(feature, feature, 3, padding=1),
         )
         self.tokens = nn.Conv2d(preset.encoder_dim, feature, 1)
         self.mix = nn.Conv2d(feature, feature, 3, padding=1)
@@ -146,14 +154,16 @@ class DepthRefiner(nn.Module):
         coarse = resize(self.tokens(tokens.maps(self.match_hook)), fine.shape[-2:])
         return F.normalize(self.mix(F.relu(fine + coarse)).float(), dim=1)
 
-    def forward(self, images: Tensor, tokens: Tokens, prior: DepthMaps, viewmats: Tensor, Ks: Tensor) -> DepthMaps:
+    def forward(
+        self, images: Tensor, tokens: Tokens, prior: DepthMaps, viewmats: Tensor, Ks: Tensor
+    ) -> DepthMaps:
         """Refined maps of the prior's size.
 
         Args:
             images: (B, V, 3, H, W). prior: (B, V, H, W), of the viewmats' length unit.
             viewmats: (B, V, 4, 4). Ks: (B, V, 3, 3), pixels of the images.
         """
-        size = prior.log_depths.shape[-2:]
+        size = (prior.log_depths.shape[-2], prior.log_depths.shape[-1])
         features = self.features(images, tokens).unflatten(0, tokens.shape)
         height, width = features.shape[-2:]
         small = resize(torch.stack((prior.log_depths, prior.log_errors), 2).flatten(0, 1), (height, width))
@@ -166,7 +176,12 @@ class DepthRefiner(nn.Module):
         volume = torch.stack(volumes).flatten(0, 1)  # (B*V, 2P, h, w)
         planes = len(self.offsets)
         flat = small.flatten(0, 1)
-        centred = flat - torch.stack((flat[:, 0].mean((1, 2)), torch.full_like(flat[:, 0, 0, 0], -1.5)), 1)[..., None, None]
+        centred = (
+            flat
+            - torch.stack((flat[:, 0].mean((1, 2)), torch.full_like(flat[:, 0, 0, 0], -1.5)), 1)[
+                ..., None, None
+            ]
+        )
         raw = self.regularise(torch.cat((volume, features.flatten(0, 1), centred), 1)).float()
         logits = raw[:, :planes] + self.sharpness * volume[:, :planes]
         shift = (logits.softmax(1) * self.offsets[:, None, None]).sum(1, keepdim=True)

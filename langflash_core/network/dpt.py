@@ -21,6 +21,8 @@ class Paths:
 
 
 class ResidualUnit(nn.Module):
+    """Two 3x3 convolutions with ReLU before each, added to their input."""
+
     def __init__(self, feature: int):
         super().__init__()
         self.conv1 = nn.Conv2d(feature, feature, 3, padding=1)
@@ -43,15 +45,19 @@ class Fusion(nn.Module):
         if self.lateral is not None and lateral is not None:
             coarse = coarse[..., : lateral.shape[-2], : lateral.shape[-1]] + self.lateral(lateral)
         # The 1x1 convolution commutes with the bilinear resize and is four times cheaper before it.
-        return F.interpolate(self.out(self.mix(coarse)), scale_factor=2.0, mode="bilinear", align_corners=False)
+        return F.interpolate(
+            self.out(self.mix(coarse)), scale_factor=2.0, mode="bilinear", align_corners=False
+        )
 
 
 class DPT(nn.Module):
     """Four token levels -> `Paths`."""
 
-    def __init__(self, token_dims: tuple[int, int, int, int], level_dims: tuple[int, int, int, int], feature: int):
+    def __init__(
+        self, token_dims: tuple[int, int, int, int], level_dims: tuple[int, int, int, int], feature: int
+    ):
         super().__init__()
-        a, b, c, d = level_dims
+        a, b, _, d = level_dims
         self.project = nn.ModuleList(nn.Conv2d(t, n, 1) for t, n in zip(token_dims, level_dims, strict=True))
         self.resize = nn.ModuleList(
             (

@@ -1,6 +1,7 @@
 """The shared image encoder: pictures in, tokens of four blocks out. Run once, read by all heads."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -37,13 +38,19 @@ def tokens_to_maps(tokens: Tensor, grid: tuple[int, int]) -> Tensor:
 class Encoder(nn.Module):
     """A plain ViT through timm, frozen: sides are multiples of the patch, any aspect ratio."""
 
+    mean: Tensor
+    std: Tensor
+
     def __init__(self, preset: Preset):
         super().__init__()
         ensure_torchvision()
         import timm  # heavy, and only importable after the line above
 
-        self.hook_blocks = preset.hooks
-        self.vit = timm.create_model(preset.encoder, pretrained=False, num_classes=0, dynamic_img_size=True)
+        self.patch = preset.patch
+        self.hook_blocks = list(preset.hooks)
+        self.vit: Any = timm.create_model(
+            preset.encoder, pretrained=False, num_classes=0, dynamic_img_size=True
+        )
         self.register_buffer("mean", torch.tensor(_MEAN)[:, None, None], persistent=False)
         self.register_buffer("std", torch.tensor(_STD)[:, None, None], persistent=False)
         self.requires_grad_(False).eval()
@@ -56,7 +63,7 @@ class Encoder(nn.Module):
     def forward(self, images: Tensor) -> Tokens:
         """Tokens of images (B, V, 3, H, W) in [0, 1]."""
         flat = (images.flatten(0, 1) - self.mean) / self.std
-        maps = self.vit.get_intermediate_layers(flat, n=list(self.hook_blocks), norm=True)
-        patch = self.vit.patch_embed.patch_size[0]
-        grid = (images.shape[-2] // patch, images.shape[-1] // patch)
-        return Tokens(tuple(m.unflatten(0, images.shape[:2]) for m in maps), grid)
+        maps = self.vit.get_intermediate_layers(flat, n=self.hook_blocks, norm=True)
+        batch, num_views, _, height, width = images.shape
+        hooks = tuple(m.unflatten(0, (batch, num_views)) for m in maps)
+        return Tokens(hooks, (height // self.patch, width // self.patch))

@@ -13,7 +13,6 @@ from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.geometry.quaternions import matrices_to_quats
 from langflash_core.network.depth import DepthMaps, resize
 from langflash_core.network.dpt import DPT
-from langflash_core.network.encoder import Tokens
 from langflash_core.network.presets import Preset
 from langflash_core.types import Gaussians
 
@@ -78,9 +77,10 @@ class GaussianHead(nn.Module):
         self.patch = preset.patch
         self.dpt = DPT((e, e, d, d), preset.dpt_dims, f)
         self.shortcut = nn.Conv2d(3, f, 7, padding=3)
-        self.head = nn.Sequential(nn.Conv2d(f, f, 3, padding=1), nn.ReLU(), nn.Conv2d(f, CHANNELS, 1))
-        nn.init.zeros_(self.head[-1].weight)
-        nn.init.constant_(self.head[-1].bias, 0)
+        last = nn.Conv2d(f, CHANNELS, 1)
+        for parameter in last.parameters():
+            nn.init.zeros_(parameter)  # starts as the plain footprint of each pixel
+        self.head = nn.Sequential(nn.Conv2d(f, f, 3, padding=1), nn.ReLU(), last)
 
     def forward(self, maps: tuple[Tensor, Tensor, Tensor, Tensor], images: Tensor) -> Tensor:
         """Raw parameters from level maps (B*V, C_i, h, w) and images (B, V, 3, H, W) in [0, 1]."""
@@ -91,7 +91,9 @@ class GaussianHead(nn.Module):
         return resize(raw.float(), (height, width)).unflatten(0, images.shape[:2])
 
 
-def assemble_gaussians(raw: Tensor, images: Tensor, depth_maps: DepthMaps, viewmats: Tensor, Ks: Tensor) -> Gaussians:
+def assemble_gaussians(
+    raw: Tensor, images: Tensor, depth_maps: DepthMaps, viewmats: Tensor, Ks: Tensor
+) -> Gaussians:
     """Gaussians of one scene, N = V*H*W in the order (v h w), world = view 0.
 
     Args:

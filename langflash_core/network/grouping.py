@@ -46,7 +46,9 @@ class ScratchHead(nn.Module):
         self.shortcut = nn.Conv2d(3, f, 7, padding=3)
         self.mix = nn.Conv2d(f, f, 3, padding=1)
 
-    def forward(self, tokens: Tokens, siamese: tuple[Tensor, Tensor], images: Tensor) -> tuple[tuple[Tensor, ...], Tensor]:
+    def forward(
+        self, tokens: Tokens, siamese: tuple[Tensor, Tensor], images: Tensor
+    ) -> tuple[tuple[Tensor, ...], Tensor]:
         """Memories (B*V, f, s*h, s*w) for s = 1, 2, 4, and the finest map (B*V, f, 8h, 8w)."""
         deep = tuple(tokens_to_maps(t.flatten(0, 1), tokens.grid) for t in siamese)
         paths = self.dpt((tokens.maps(0), tokens.maps(1), *deep))
@@ -64,7 +66,9 @@ class SemanticGrouping(nn.Module):
         self.patterns = nn.Parameter(torch.randn(preset.num_queries, dim))
         self.positions = nn.Parameter(torch.randn(preset.num_queries, dim))
         self.memories = nn.ModuleList(nn.Conv2d(f, dim, 1) for _ in range(3))
-        self.layers = nn.ModuleList(QueryBlock(dim, preset.grouping_heads) for _ in range(preset.grouping_layers))
+        self.layers = nn.ModuleList(
+            QueryBlock(dim, preset.grouping_heads) for _ in range(preset.grouping_layers)
+        )
         self.norm = nn.LayerNorm(dim)
         self.mask_mlp = MLP(dim, dim, f)
         self.existence = nn.Linear(dim, 1)

@@ -14,13 +14,14 @@ class LanguageHead(nn.Module):
     def __init__(self, preset: Preset):
         super().__init__()
         feature = preset.language_feature
-        self.dpt = DPT((preset.encoder_dim,) * 4, preset.dpt_dims, feature)
+        e = preset.encoder_dim
+        self.dpt = DPT((e, e, e, e), preset.dpt_dims, feature)
         self.mix = nn.Conv2d(feature, 2 * feature, 3, padding=1)
         self.out = nn.Conv2d(2 * feature, preset.language_dim, 1)
 
     def forward(self, tokens: Tokens) -> Tensor:
         """L(x), (B, V, C, 4h, 4w), unit channel norm."""
-        maps = tuple(tokens.maps(i) for i in range(4))
+        maps = (tokens.maps(0), tokens.maps(1), tokens.maps(2), tokens.maps(3))
         path = F.avg_pool2d(self.dpt(maps).path_1, 2)
         features = self.out(F.gelu(self.mix(path))).float()
         return F.normalize(features, dim=1).unflatten(0, tokens.shape)

@@ -64,7 +64,7 @@ def detect(grey: np.ndarray, num_features: int = _MAX_FEATURES) -> tuple[np.ndar
 
     Source: Lowe 2004; square-root normalisation of Arandjelovic and Zisserman 2012.
     """
-    sift = cv2.SIFT_create(nfeatures=num_features, contrastThreshold=_CONTRAST)
+    sift = cv2.SIFT.create(nfeatures=num_features, contrastThreshold=_CONTRAST)
     keypoints, descriptors = sift.detectAndCompute(grey, None)
     if descriptors is None or len(keypoints) < 2:
         return np.zeros((0, 2)), np.zeros((0, 128), np.float32)
@@ -132,7 +132,9 @@ def _five_point(matches: Matches, depth_i: np.ndarray) -> list[tuple[np.ndarray,
     return [(rotation, direction * length, keep), (rotation, np.zeros(3), keep)]
 
 
-def _triangulate(x_i: np.ndarray, x_j: np.ndarray, rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
+def _triangulate(
+    x_i: np.ndarray, x_j: np.ndarray, rotation: np.ndarray, translation: np.ndarray
+) -> np.ndarray:
     """z in view i (n,) from x_j ~ R z (x_i, 1) + t; least squares over both equations."""
     turned = _homogeneous(x_i) @ rotation.T
     slope = turned[:, :2] - x_j * turned[:, 2:]
@@ -152,7 +154,7 @@ def _pnp(matches: Matches, depth_i: np.ndarray) -> list[tuple[np.ndarray, np.nda
     if not found or inliers is None:
         return []
     keep = np.zeros(len(points), bool)
-    keep[inliers[:, 0]] = True
+    keep[inliers[:, 0].astype(int)] = True
     return [(cv2.Rodrigues(turn)[0], translation[:, 0], keep)]
 
 
@@ -190,11 +192,15 @@ def _score(matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray, pose: Rel
     parallax = np.linalg.norm(pose.translation) / np.maximum(depth_i, 1e-6)
     depths = np.where(parallax > 4 * matches.sigma, depths, depth_i)
     log_prior = np.log(depth_i)
-    state = _State(pose.rotation, pose.translation, pose.log_scale, np.clip(np.log(depths), log_prior - 1, log_prior + 1))
+    state = _State(
+        pose.rotation, pose.translation, pose.log_scale, np.clip(np.log(depths), log_prior - 1, log_prior + 1)
+    )
     residuals = _residuals(state, matches, (log_prior, np.log(depth_j)))
     inlier = (np.linalg.norm(residuals[:, :2], axis=1) < 3) & (np.abs(residuals[:, 2:]) < 4).all(1)
     costs = np.minimum(np.log1p((residuals / _CAUCHY) ** 2).sum(1), 6.0)
-    return RelativePose(pose.rotation, pose.translation, pose.log_scale, int(inlier.sum()), float(costs.mean()))
+    return RelativePose(
+        pose.rotation, pose.translation, pose.log_scale, int(inlier.sum()), float(costs.mean())
+    )
 
 
 @dataclass(frozen=True)
@@ -214,7 +220,9 @@ class _State:
 
 def _residuals(state: _State, matches: Matches, priors: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
     """(n, 4) in sigmas: reprojection x, y; log depth against view i's map; against view j's."""
-    pos_j = _homogeneous(matches.x_i) * np.exp(state.log_depths)[:, None] @ state.rotation.T + state.translation
+    pos_j = (
+        _homogeneous(matches.x_i) * np.exp(state.log_depths)[:, None] @ state.rotation.T + state.translation
+    )
     z = np.maximum(pos_j[:, 2], 1e-6)
     reprojection = (pos_j[:, :2] / z[:, None] - matches.x_j) / matches.sigma
     from_i = (state.log_depths - priors[0]) / _DEPTH_SIGMA
@@ -222,7 +230,9 @@ def _residuals(state: _State, matches: Matches, priors: tuple[np.ndarray, np.nda
     return np.column_stack((reprojection, from_i, from_j))
 
 
-def _linearise(state: _State, matches: Matches, priors: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _linearise(
+    state: _State, matches: Matches, priors: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Residuals (n, 4), their Jacobians to the pose and scale (n, 4, 7) and to the depth (n, 4)."""
     turned = _homogeneous(matches.x_i) * np.exp(state.log_depths)[:, None] @ state.rotation.T
     pos_j = turned + state.translation

@@ -91,7 +91,7 @@ class LangFlashNet(nn.Module):
             levels = self.levels(tokens, Ks)
             prior = self.depth_head(levels, tokens)
         with run.stage("poses"):
-            poses = estimate_poses(self._pose_inputs(views, tokens, prior))
+            poses = estimate_poses(self._pose_inputs(views, prior))
             viewmats = torch.from_numpy(poses.viewmats).to(images)[None]
         with run.stage("refinement"):
             maps = self._refine(images, tokens, prior, poses, viewmats, Ks)
@@ -134,15 +134,14 @@ class LangFlashNet(nn.Module):
         log_depths[keep], log_errors[keep] = refined.log_depths[0], refined.log_errors[0]
         return DepthMaps(log_depths, log_errors)
 
-    def _pose_inputs(self, views: Views, tokens: Tokens, prior: DepthMaps) -> list[PoseInput]:
-        patches = F.normalize(tokens.hooks[self.preset.match_hook][0], dim=-1).unflatten(1, tokens.grid)
+    @staticmethod
+    def _pose_inputs(views: Views, prior: DepthMaps) -> list[PoseInput]:
         return [
             PoseInput(
                 grey=_grey(views, v),
                 K=views.Ks[v].double().numpy(),
                 size=views.size,
                 depth=prior.depths[0, v].cpu().numpy(),
-                patches=patches[v].cpu().numpy(),
             )
             for v in range(views.num_views)
         ]
@@ -151,7 +150,9 @@ class LangFlashNet(nn.Module):
 def _grey(views: Views, view: int) -> np.ndarray:
     """The largest version of the photo at hand, as (h, w) uint8."""
     if views.sources:
-        return cv2.imdecode(np.frombuffer(views.sources[view], np.uint8), cv2.IMREAD_GRAYSCALE)
+        grey = cv2.imdecode(np.frombuffer(views.sources[view], np.uint8), cv2.IMREAD_GRAYSCALE)
+        assert grey is not None, "sources are JPEG bytes that images/ wrote"
+        return grey
     rgb = (views.images[view].movedim(0, -1).cpu().numpy() * 255).round().astype(np.uint8)
     return cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
 

@@ -9,8 +9,6 @@ from langflash_core.network.matching import Matches, RelativePose, detect, match
 
 _MANY_VIEWS = 4  # beyond this, fewer features keep the V (V - 1) / 2 pairs affordable
 _MIN_SHARE = 0.25  # of the matches must agree with a pose
-_PATCH_MIN_COSINE = 0.5
-_PATCH_MAX_COST = 1.0  # unrelated rooms reach 1.6 and more: patches agree loosely with anything
 _WORKING_SIDE = 768  # pixels; sigma is one pixel at this size
 
 
@@ -20,14 +18,12 @@ class PoseInput:
 
     grey: (h, w) uint8, any size, the same crop as the network's image. K: (3, 3) pixels of the
     network's image of `size` (width, height). depth: (H, W), z of the monocular map.
-    patches: (gh, gw, C) unit-norm encoder tokens for when key points fail.
     """
 
     grey: np.ndarray
     K: np.ndarray
     size: tuple[int, int]
     depth: np.ndarray
-    patches: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -58,18 +54,8 @@ def estimate_poses(views: list[PoseInput]) -> Poses:
 
 
 def _pair_pose(view_i: PoseInput, view_j: PoseInput, matches: Matches) -> RelativePose | None:
-    """From key points, else from encoder patches."""
-    pose = _supported(view_i, view_j, matches)
-    if pose is not None:
-        return pose
-    pose = _supported(view_i, view_j, _patch_matches(view_i, view_j))
-    return pose if pose is not None and pose.cost < _PATCH_MAX_COST else None
-
-
-def _supported(view_i: PoseInput, view_j: PoseInput, matches: Matches) -> RelativePose | None:
     """The pose of the matches, if enough of them agree with it."""
-    depth_i, depth_j = _depths_at(view_i, matches.x_i), _depths_at(view_j, matches.x_j)
-    pose = relative_pose(matches, depth_i, depth_j)
+    pose = relative_pose(matches, _depths_at(view_i, matches.x_i), _depths_at(view_j, matches.x_j))
     return pose if pose is not None and pose.num_inliers >= _MIN_SHARE * len(matches) else None
 
 
@@ -87,26 +73,6 @@ def _key_point_matches(views: list[PoseInput], features: list, i: int, j: int) -
     x_i = _without_camera(features[i][0][pairs[:, 0]], views[i], _WORKING_SIDE)
     x_j = _without_camera(features[j][0][pairs[:, 1]], views[j], _WORKING_SIDE)
     return Matches(x_i, x_j, _sigma(views[j], 1.0))
-
-
-def _patch_matches(view_i: PoseInput, view_j: PoseInput) -> Matches:
-    """Mutual nearest encoder patches; sigma is a third of a patch."""
-    left, right = (v.patches.reshape(-1, v.patches.shape[-1]) for v in (view_i, view_j))
-    similarity = left @ right.T
-    best = similarity.argmax(1)
-    rows = np.arange(len(left))
-    keep = (similarity.argmax(0)[best] == rows) & (similarity[rows, best] > _PATCH_MIN_COSINE)
-    x_i = _without_camera(_patch_centres(view_i)[rows[keep]], view_i, max(view_i.size))
-    x_j = _without_camera(_patch_centres(view_j)[best[keep]], view_j, max(view_j.size))
-    patch = max(view_j.size) / max(view_j.patches.shape[:2])
-    return Matches(x_i, x_j, patch / 3 / view_j.K[0, 0])
-
-
-def _patch_centres(view: PoseInput) -> np.ndarray:
-    rows, columns = view.patches.shape[:2]
-    ys, xs = np.mgrid[0:rows, 0:columns]
-    cell = np.array([view.size[0] / columns, view.size[1] / rows])
-    return (np.stack((xs, ys), -1).reshape(-1, 2) + 0.5) * cell
 
 
 def _sigma(view: PoseInput, pixels: float) -> float:

@@ -42,7 +42,9 @@ def test_sweep_equals_its_twin():
     viewmats[1, :3, 3] = torch.tensor([-0.3, 0.05, 0.1])
     volume, _ = sweep_correlation(features, log_depths, offsets, viewmats, K.expand(2, 3, 3))
     for plane, row, column in [(0, 3, 5), (2, 12, 20), (4, 23, 31), (1, 0, 0), (3, 20, 2)]:
-        expected = _sweep_twin(features, log_depths, offsets, viewmats, K.expand(2, 3, 3), 0, 1, plane, row, column)
+        expected = _sweep_twin(
+            features, log_depths, offsets, viewmats, K.expand(2, 3, 3), 0, 1, plane, row, column
+        )
         assert volume[0, plane, row, column].item() == pytest.approx(expected, abs=1e-10)
 
 
@@ -66,7 +68,11 @@ def test_sweep_of_a_lonely_or_blind_view_is_zero():
     behind[1, :3, :3] = torch.diag(torch.tensor([-1.0, 1.0, -1.0]))
     for count, viewmats in ((1, torch.eye(4)[None]), (2, behind)):
         volume, seen = sweep_correlation(
-            features[:count], torch.zeros(count, 6, 8), torch.tensor([0.0]), viewmats, K.float().expand(count, 3, 3)
+            features[:count],
+            torch.zeros(count, 6, 8),
+            torch.tensor([0.0]),
+            viewmats,
+            K.float().expand(count, 3, 3),
         )
         assert volume.abs().max() == 0 and seen.abs().max() == 0
 
@@ -82,7 +88,9 @@ def test_refiner_stays_in_its_range_and_is_finite(untrained):
     Ks = torch.tensor([[60.0, 0, 35], [0, 60.0, 28], [0, 0, 1]]).expand(1, 2, 3, 3)
     refined = untrained.refiner(images, tokens, prior, viewmats, Ks)
     assert torch.isfinite(refined.depths).all()
-    assert (refined.log_depths - prior.log_depths).abs().max() <= untrained.preset.sweep_range + 1e-5  # float32
+    assert (
+        refined.log_depths - prior.log_depths
+    ).abs().max() <= untrained.preset.sweep_range + 1e-5  # float32
 
 
 def _plane(tilt: float) -> torch.Tensor:
@@ -126,9 +134,13 @@ def test_gaussians_land_on_the_surface_in_world_space():
     torch.manual_seed(0)
     viewmats = torch.eye(4, dtype=torch.float64).repeat(2, 1, 1)
     angle = 0.3
-    viewmats[1, :3, :3] = quats_to_matrices(torch.tensor([np.cos(angle / 2), 0, np.sin(angle / 2), 0], dtype=torch.float64))
+    viewmats[1, :3, :3] = quats_to_matrices(
+        torch.tensor([np.cos(angle / 2), 0, np.sin(angle / 2), 0], dtype=torch.float64)
+    )
     viewmats[1, :3, 3] = torch.tensor([0.2, -0.1, 0.3])
-    maps = DepthMaps(torch.stack((_plane(0.2), _plane(-0.3))).log(), torch.zeros(2, 24, 32, dtype=torch.float64))
+    maps = DepthMaps(
+        torch.stack((_plane(0.2), _plane(-0.3))).log(), torch.zeros(2, 24, 32, dtype=torch.float64)
+    )
     images = torch.rand(2, 3, 24, 32, dtype=torch.float64)
     raw = torch.zeros(2, CHANNELS, 24, 32, dtype=torch.float64)
     gaussians = assemble_gaussians(raw, images, maps, viewmats, K.expand(2, 3, 3))
@@ -136,7 +148,9 @@ def test_gaussians_land_on_the_surface_in_world_space():
     expected = rays(K, 32, 24)[10, 7] * maps.depths[1, 10, 7]
     back = viewmats[1] @ torch.cat((gaussians.means[pixel], torch.ones(1, dtype=torch.float64)))
     assert torch.allclose(back[:3], expected, atol=1e-12)
-    assert torch.allclose(invert_rigid(viewmats) @ viewmats, torch.eye(4, dtype=torch.float64).expand(2, 4, 4), atol=1e-12)
+    assert torch.allclose(
+        invert_rigid(viewmats) @ viewmats, torch.eye(4, dtype=torch.float64).expand(2, 4, 4), atol=1e-12
+    )
     spread = covariances(gaussians.quats, gaussians.scales)
     assert torch.linalg.eigvalsh(spread).min() > 0
     assert torch.allclose(0.5 + 0.28209479177387814 * gaussians.sh[pixel, 0], images[1, :, 10, 7], atol=1e-12)

@@ -84,7 +84,9 @@ def test_intrinsics_are_normalised_by_the_picture():
 def test_dpt_paths_double_from_the_grid(grid):
     dpt = DPT((8, 8, 8, 8), (4, 6, 8, 10), 5)
     paths = dpt(tuple(torch.randn(2, 8, *grid) for _ in range(4)))
-    for scale, path in zip((1, 2, 4, 8), (paths.path_4, paths.path_3, paths.path_2, paths.path_1), strict=True):
+    for scale, path in zip(
+        (1, 2, 4, 8), (paths.path_4, paths.path_3, paths.path_2, paths.path_1), strict=True
+    ):
         assert path.shape == (2, 5, scale * grid[0], scale * grid[1])
 
 

@@ -20,7 +20,9 @@ def _views(images: torch.Tensor) -> Views:
 def _pattern(num_views: int, height: int = 84, width: int = 112) -> torch.Tensor:
     rng = np.random.default_rng(0)
     wide = torch.nn.functional.interpolate(
-        torch.from_numpy(rng.random((1, 3, height // 4, width // 2))).float(), size=(height, 2 * width), mode="bilinear"
+        torch.from_numpy(rng.random((1, 3, height // 4, width // 2))).float(),
+        size=(height, 2 * width),
+        mode="bilinear",
     )[0]
     return torch.stack([wide[:, :, 6 * v : 6 * v + width] for v in range(num_views)])
 
@@ -73,7 +75,9 @@ def test_the_same_photos_give_the_same_numbers(untrained):
 def test_cancelling_stops_between_stages(untrained):
     seen: list[str] = []
     with pytest.raises(Cancelled):
-        untrained.predict(_views(_pattern(1)), progress=lambda s, _: seen.append(s), cancelled=lambda: len(seen) == 2)
+        untrained.predict(
+            _views(_pattern(1)), progress=lambda s, _: seen.append(s), cancelled=lambda: len(seen) == 2
+        )
     assert tuple(seen) == STAGES[:2]
 
 
@@ -86,7 +90,9 @@ def test_weights_survive_a_round_trip(untrained, tmp_path):
     for key, value in untrained.state_dict().items():
         stored = loaded.state_dict()[key]
         step = value.abs().flatten(1).amax(1) / 127 if value.ndim > 1 else value.abs() / 1024
-        bound = (0.51 * step).reshape(-1, *[1] * (value.ndim - 1)) + 1e-3 * value.abs() + 1e-7  # float16 scale
+        bound = (
+            (0.51 * step).reshape(-1, *[1] * (value.ndim - 1)) + 1e-3 * value.abs() + 1e-7
+        )  # float16 scale
         assert ((value - stored).abs() <= bound).all(), key
         assert torch.allclose(stored, again.state_dict()[key], rtol=1e-3, atol=1e-7), key
 

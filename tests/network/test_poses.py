@@ -6,13 +6,21 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from langflash_core.network import matching
-from langflash_core.network.matching import Matches, RelativePose, match_descriptors, refine_pose, relative_pose
+from langflash_core.network.matching import (
+    Matches,
+    RelativePose,
+    match_descriptors,
+    refine_pose,
+    relative_pose,
+)
 from langflash_core.network.poses import _chain
 
 SIGMA = 1 / 600  # one pixel at a focal length of 600
 
 
-def _pair(seed, *, turn=(0.1, -0.2, 0.05), move=(0.4, -0.05, 0.1), n=200, noise=0.5, outliers=0.0, depth_noise=0.1):
+def _pair(
+    seed, *, turn=(0.1, -0.2, 0.05), move=(0.4, -0.05, 0.1), n=200, noise=0.5, outliers=0.0, depth_noise=0.1
+):
     """Matches of random points, true pose, and noisy monocular depths (view j's 20 % too small)."""
     rng = np.random.default_rng(seed)
     x_i = rng.uniform(-0.5, 0.5, (n, 2))

@@ -1,0 +1,230 @@
+"""The only composer: photos -> scene, and scene + phrases -> answer.
+
+images.load_views -> network.predict -> scene.assemble -> scene.prune
+render -> query.relevance_maps -> query.answer
+"""
+
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from langflash_core.errors import Cancelled, InputError, ViewError, WeightsError
+from langflash_core.images import load_views
+from langflash_core.network import PRESETS, LangFlashNet, load_network
+from langflash_core.query.answers import answer
+from langflash_core.query.relevance import Mode, compile_query, relevance_maps
+from langflash_core.query.spaces import language_space
+from langflash_core.scene import assemble, prune
+from langflash_core.splat import render as render_reference
+from langflash_core.types import Camera, Frame, Prediction, QueryResult, Scene
+
+Progress = Callable[[str, float], None]
+
+# Where each stage begins in the whole, from its measured share of the time on two CPU cores.
+STAGES = {"photos": 0.0, "weights": 0.1, "network": 0.2, "assemble": 0.85, "prune": 0.95}
+SIZES = (56, 1024)  # pixels: below, the encoder's grid is 4 patches; above, attention's memory runs away
+LARGEST_PICTURE = 8192
+
+
+def reconstruct(
+    photos: Sequence[Path | str],
+    *,
+    preset: str = "mini",
+    weights: Path | str | None = None,
+    fov: float | None = None,
+    intrinsics: tuple[float, float, float, float] | None = None,
+    size: int | None = None,
+    device: str = "auto",
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Scene:
+    """Photos of one room to a 3D scene that can be queried, in one forward pass.
+
+    Args:
+        photos: one or more files; the first one's camera becomes the world.
+        preset: size of the network. weights: its checkpoint, None for the shipped one.
+        fov: degrees, of the photos' longer side. intrinsics: (fx, fy, cx, cy) in pixels of the
+            photos as given, the same for all. Neither: EXIF, else an assumption with a warning.
+        size: the network sees about size x size pixels per photo, whatever their shape.
+        device: "auto" takes CUDA where there is one; "cpu"; "cuda".
+        progress: called with the stage and the fraction of the whole in [0, 1].
+        cancelled: asked between stages.
+
+    Returns:
+        A scene on the CPU; `metadata` holds seconds per stage, peak memory and warnings.
+
+    Raises:
+        ImageError: a photo cannot be used. InputError: an argument cannot.
+        WeightsError: the checkpoint is missing or does not fit.
+        Cancelled: `cancelled()` became true.
+    """
+    run = _Run(progress, cancelled)
+    if preset not in PRESETS:
+        raise WeightsError(f"There is no preset '{preset}': choose one of {', '.join(PRESETS)}.")
+    device = _device(device)
+    area = PRESETS[preset].native_area if size is None else _area(size)
+    with run.stage("photos"):
+        files = [Path(photo) for photo in photos]
+        views = load_views(files, fov=fov, intrinsics=intrinsics, area=area, multiple=PRESETS[preset].patch)
+    with run.stage("weights"):
+        network = _network(preset, weights, device)
+    with run.stage("network"):
+        prediction = _on_cpu(network.predict(views, run.within("network"), cancelled))
+    with run.stage("assemble"), torch.no_grad():
+        scene = assemble(prediction, views, preset=preset)
+    with run.stage("prune"), torch.no_grad():
+        scene = prune(scene)
+    run.check()
+    run.report("done", 1.0)
+    return _with_record(scene, network, run.timings)
+
+
+def query(
+    scene: Scene,
+    prompts: Sequence[str] | str,
+    *,
+    view: int = 0,
+    camera: Camera | None = None,
+    size: tuple[int, int] | None = None,
+    mode: Mode = "relevancy",
+    negatives: Sequence[str] | None = None,
+    threshold: float | None = None,
+    render: Callable[[Scene, Camera], Frame] | None = None,
+) -> QueryResult:
+    """Where in one view of a scene are these phrases?
+
+    Args:
+        prompts: phrases, or one.
+        view: input photo whose camera is used, from 0; not asked for where `camera` is given.
+        size: (width, height) in pixels; None: the camera's own.
+        mode: "relevancy" in (0, 1) or "cosine" in [-1, 1].
+        negatives, threshold: instead of the scene's calibration.
+        render: draws colour, depth and weight maps; None: the reference in torch.
+
+    Raises:
+        ViewError: there is no such view, or the size cannot be drawn.
+        PromptError: a prompt or the threshold cannot be used.
+        WeightsError: the language space has no text weights.
+    """
+    chosen = _camera(scene, view, camera, size)
+    phrases = [prompts] if isinstance(prompts, str) else list(prompts)
+    space = language_space(scene.semantics.space)
+    compiled = compile_query(scene, space, phrases, negatives=negatives, mode=mode)
+    with torch.no_grad():
+        frame = (render or render_reference)(scene, chosen)
+        if frame.weight_maps is None:
+            raise ValueError("render: expected a frame with weight maps, received one without")
+        relevance = relevance_maps(frame.weight_maps, compiled)
+        return answer(relevance, frame, chosen, compiled, threshold)
+
+
+@dataclass
+class _Run:
+    """One reconstruction under way: times its stages, reports them, stops between them."""
+
+    progress: Progress | None
+    cancelled: Callable[[], bool] | None
+    timings: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        self.check()
+        self.report(name, STAGES[name])
+        start = time.perf_counter()
+        yield
+        self.timings[name] = time.perf_counter() - start
+
+    def check(self) -> None:
+        if self.cancelled is not None and self.cancelled():
+            raise Cancelled("The reconstruction was cancelled; nothing was written.")
+
+    def report(self, name: str, fraction: float) -> None:
+        if self.progress is not None:
+            self.progress(name, fraction)
+
+    def within(self, name: str) -> Progress:
+        """Progress of a stage's own steps, as a part of the whole."""
+        begins = list(STAGES.values())
+        start = STAGES[name]
+        end = next((begin for begin in begins if begin > start), 1.0)
+        return lambda step, fraction: self.report(step, start + (end - start) * fraction)
+
+
+def _with_record(scene: Scene, network: LangFlashNet, timings: dict[str, float]) -> Scene:
+    """The scene with the cost of its making, and the network's calibration, in its metadata.
+
+    `timings` stay disjoint seconds in order (the network's and the scene's own steps are in the
+    scene already); `seconds` sums them up for the network and for all.
+    """
+    before = {name: timings[name] for name in ("photos", "weights")}
+    record = {
+        "timings": {**before, **scene.metadata.get("timings", {})},
+        "seconds": {"network": timings["network"], "total": sum(timings.values())},
+        "peak_memory_mb": peak_memory_mb(),
+    }
+    if network.calibration:
+        record["calibration"] = dict(network.calibration)
+    return scene.with_metadata(**record)
+
+
+def peak_memory_mb() -> int | None:
+    """The most memory that this process has held so far, in MB; None where it cannot be asked."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    unit = 1 if sys.platform == "darwin" else 1024  # bytes there, KiB on Linux
+    return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6)
+
+
+def _network(preset: str, weights: Path | str | None, device: str) -> LangFlashNet:
+    """The network, read once; a checkpoint that changed on disk is read again."""
+    path = None if weights is None else Path(weights).resolve()
+    changed = path.stat().st_mtime_ns if path is not None and path.is_file() else 0
+    return _read_network(preset, path, device, changed)
+
+
+@lru_cache(maxsize=1)
+def _read_network(preset: str, path: Path | None, device: str, changed: int) -> LangFlashNet:
+    """`changed` is only part of the key."""
+    return load_network(preset, path, device)
+
+
+def _on_cpu(prediction: Prediction) -> Prediction:
+    tensors = {name: value.cpu() for name, value in vars(prediction).items() if isinstance(value, Tensor)}
+    return replace(prediction, gaussians=prediction.gaussians.map(Tensor.cpu), **tensors)
+
+
+def _device(name: str) -> str:
+    if name not in ("auto", "cpu", "cuda"):
+        raise InputError(f"The device '{name}' is unknown: choose auto, cpu or cuda.")
+    if name == "cuda" and not torch.cuda.is_available():
+        raise InputError("There is no CUDA device that torch can use: choose --device cpu or auto.")
+    return ("cuda" if torch.cuda.is_available() else "cpu") if name == "auto" else name
+
+
+def _area(size: int) -> int:
+    low, high = SIZES
+    if not low <= size <= high:
+        raise InputError(f"The size {size} is out of range: choose {low} to {high} pixels.")
+    return int(size) ** 2
+
+
+def _camera(scene: Scene, view: int, camera: Camera | None, size: tuple[int, int] | None) -> Camera:
+    """The camera asked for, at the size asked for."""
+    if size is not None and not all(1 <= side <= LARGEST_PICTURE for side in size):
+        raise ViewError(
+            f"A picture of {size[0]}x{size[1]} cannot be drawn: choose 1 to {LARGEST_PICTURE} pixels."
+        )
+    if camera is None:
+        if not 0 <= view < scene.num_views:
+            raise ViewError(f"There is no view {view}: the scene has views 0 to {scene.num_views - 1}.")
+        camera = scene.camera(view)
+    return camera if size is None else camera.resized(*size)

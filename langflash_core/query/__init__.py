@@ -1,0 +1,1 @@
+"""From phrases to answers: text towers, relevance, prompt algebra, masks and boxes."""

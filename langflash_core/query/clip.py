@@ -1,0 +1,125 @@
+"""CLIP ViT-B/32's text tower, the space of LSeg and of the `full` preset. C = 512.
+
+The architecture and tokenizer are open_clip's, imported only here and only when asked for.
+The weights are not shipped. They are searched, in this order:
+
+1. the `source` argument,
+2. the environment variable LANGFLASH_CLIP,
+   both a file (open_clip or plain state dict, .safetensors or .pt; image weights are ignored)
+   or a tag that open_clip downloads ("openai"),
+3. `weights/clip_vitb32.safetensors` (or .pt) under LANGFLASH_HOME, by default ~/.langflash.
+
+LSeg was trained with OpenAI's weights and plain phrases: "openai", and no prompt template.
+"""
+
+import importlib
+import os
+import pickle
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError
+from torch import Tensor
+from torch.nn.functional import normalize
+
+from langflash_core.errors import PromptError, WeightsError
+from langflash_core.torchvision_fix import ensure_torchvision
+
+DIMENSION = 512
+ARCHITECTURE = "ViT-B-32-quickgelu"  # OpenAI's weights were trained with the approximate GELU
+_FILES = ("clip_vitb32.safetensors", "clip_vitb32.pt")
+# A small image tower costs nothing to build; it is thrown away at once.
+_TINY_VISION = {"image_size": 32, "patch_size": 32, "width": 64, "layers": 1}
+_REMEDY = (
+    "put OpenAI's ViT-B/32 at {place}, or set LANGFLASH_CLIP to such a file or to the open_clip tag 'openai'"
+)
+
+
+class ClipText:
+    """open_clip's ViT-B/32 text tower behind the same `encode` as MiniLM."""
+
+    def __init__(self, model: Any, tokenizer: Callable[[list[str]], Tensor]) -> None:
+        self.model = model.requires_grad_(False).eval()
+        self.tokenizer = tokenizer
+
+    def encode(self, texts: Sequence[str]) -> Tensor:
+        """Unit embeddings (P, 512) float32; phrases are cut at 77 tokens.
+
+        Raises:
+            PromptError: a phrase is empty.
+        """
+        if any(not text.strip() for text in texts):
+            raise PromptError("A prompt is empty: describe what to look for in a word or a short phrase.")
+        if not texts:
+            return torch.zeros(0, DIMENSION)
+        tokens = self.tokenizer([text.encode("utf-8", "replace").decode("utf-8") for text in texts])
+        with torch.no_grad():
+            return normalize(self.model.encode_text(tokens).float(), dim=-1)
+
+
+def build_clip() -> ClipText:
+    """The tower as open_clip initialises it (random), without its image half."""
+    ensure_torchvision()
+    open_clip = importlib.import_module("open_clip")
+    config = open_clip.get_model_config(ARCHITECTURE)
+    model = open_clip.CLIP(**{**config, "vision_cfg": _TINY_VISION})
+    del model.visual
+    return ClipText(model, open_clip.get_tokenizer(ARCHITECTURE))
+
+
+@lru_cache(maxsize=1)
+def load_clip(source: str | None = None) -> ClipText:
+    """The tower with its weights, read once per `source` (module docstring).
+
+    Raises:
+        WeightsError: no weights are there, or they do not fit; says where to put them.
+    """
+    path = _locate(source or os.environ.get("LANGFLASH_CLIP"))
+    tower = build_clip()
+    state = {name: tensor for name, tensor in _read(path).items() if not name.startswith("visual.")}
+    try:
+        tower.model.load_state_dict(state)
+    except (RuntimeError, AttributeError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise WeightsError(f"{path} does not hold CLIP ViT-B/32 ({reason}): {_remedy()}.") from error
+    return tower
+
+
+def _home() -> Path:
+    return Path(os.environ.get("LANGFLASH_HOME") or Path.home() / ".langflash") / "weights"
+
+
+def _remedy() -> str:
+    return _REMEDY.format(place=_home() / _FILES[0])
+
+
+def _locate(source: str | None) -> Path:
+    """The file that `source` names, downloaded where it is an open_clip tag."""
+    if source is None:
+        found = [_home() / name for name in _FILES if (_home() / name).is_file()]
+        if not found:
+            raise WeightsError(f"The 'clip' language space needs CLIP's text weights: {_remedy()}.")
+        return found[0]
+    if Path(source).is_file():
+        return Path(source)
+    ensure_torchvision()
+    open_clip = importlib.import_module("open_clip")
+    config = open_clip.get_pretrained_cfg(ARCHITECTURE, source)
+    if not config:
+        raise WeightsError(f"CLIP weights '{source}' are neither a file nor a tag of open_clip: {_remedy()}.")
+    try:
+        return Path(open_clip.download_pretrained(config))
+    except (OSError, RuntimeError, ValueError) as error:  # no network, no such file on the hub
+        raise WeightsError(f"CLIP weights '{source}' could not be downloaded: {_remedy()}.") from error
+
+
+def _read(path: Path) -> dict[str, Tensor]:
+    """A state dict, never running code from the file."""
+    open_clip = importlib.import_module("open_clip.factory")
+    try:
+        return open_clip.load_state_dict(str(path), device="cpu", weights_only=True)
+    except (OSError, RuntimeError, ValueError, SafetensorError, pickle.UnpicklingError, EOFError) as error:
+        raise WeightsError(f"{path} is damaged or is no plain state dict: {_remedy()}.") from error
