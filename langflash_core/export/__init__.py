@@ -1,0 +1,70 @@
+"""Scenes and answers out: one table from a file's suffix to what writes (or reads) it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from langflash_core.errors import OutputError, SceneFileError
+from langflash_core.export import npz, png
+from langflash_core.scene.file import load, save
+from langflash_core.types import Frame, QueryResult, Scene
+
+__all__ = ["READERS", "WRITERS", "Writer", "export", "read"]
+
+
+@dataclass(frozen=True)
+class Writer:
+    """`write(subject, path)` for subjects of one type; `what` names that type for people."""
+
+    subject: type
+    what: str
+    write: Callable[..., None]
+
+
+WRITERS: dict[str, tuple[Writer, ...]] = {
+    ".langflash": (Writer(Scene, "a scene", save),),
+    ".png": (
+        Writer(Frame, "a rendered view", png.write_frame),
+        Writer(QueryResult, "an answer", png.write_answer),
+    ),
+    ".npz": (Writer(QueryResult, "an answer", npz.write_npz),),
+}
+READERS: dict[str, Callable[[Path], Scene]] = {".langflash": load}
+
+
+def export(subject: Scene | Frame | QueryResult, path: Path | str) -> None:
+    """Write `subject` in the format that the suffix of `path` names.
+
+    Raises:
+        OutputError: unknown suffix, a suffix that cannot hold this subject, or an unwritable path.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    writers = WRITERS.get(suffix)
+    if writers is None:
+        known = ", ".join(sorted(WRITERS))
+        raise OutputError(
+            f"cannot write {path.name}: the suffix {suffix or '(none)'} is unknown; use {known}"
+        )
+    for writer in writers:
+        if isinstance(subject, writer.subject):
+            return writer.write(subject, path)
+    holds = " or ".join(writer.what for writer in writers)
+    fitting = ", ".join(
+        s for s, ws in sorted(WRITERS.items()) if any(isinstance(subject, w.subject) for w in ws)
+    )
+    raise OutputError(f"cannot write {path.name}: a {suffix} file holds {holds}; use {fitting}")
+
+
+def read(path: Path | str) -> Scene:
+    """Read a scene in the format that the suffix of `path` names.
+
+    Raises:
+        SceneFileError: unknown suffix, or what the reader finds wrong.
+    """
+    path = Path(path)
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        known = ", ".join(sorted(READERS))
+        raise SceneFileError(f"{path.name} is not a scene this program reads; name a file ending in {known}")
+    return reader(path)

@@ -1,0 +1,33 @@
+"""Colours of pictures: a heat scale of rising brightness, and hues that tell labels apart."""
+
+import colorsys
+
+import numpy as np
+import torch
+from torch import Tensor
+
+# Own scale: night blue, violet, red, orange, pale yellow; its luma rises all along, so that it
+# also reads in grey and for colour-blind eyes.
+HEAT_STOPS = (
+    (0.05, 0.05, 0.20), (0.33, 0.07, 0.47), (0.74, 0.15, 0.38), (0.96, 0.47, 0.14), (1.00, 0.80, 0.25),
+    (1.00, 0.98, 0.80),
+)  # fmt: skip
+_GOLDEN = 0.61803398875  # successive hues stay far apart for any number of labels
+
+
+def heat(values: Tensor) -> Tensor:
+    """Colours (..., 3) in [0, 1] of values (...) in [0, 1]; outside is clamped, NaN is 0."""
+    stops = torch.tensor(HEAT_STOPS, dtype=torch.float32, device=values.device)
+    position = torch.nan_to_num(values.float(), nan=0.0).clamp(0, 1) * (len(stops) - 1)
+    lower = position.floor().clamp_max(len(stops) - 2).long()
+    share = (position - lower)[..., None]
+    return stops[lower] * (1 - share) + stops[lower + 1] * share
+
+
+def label_colours(count: int) -> np.ndarray:
+    """(count, 3) uint8, distinct from each other and from black."""
+    # Five shades, because hues come near each other again after 8, 13 and 21 labels.
+    shades = [(0.7, 1.0), (0.65, 0.75), (0.4, 1.0), (0.85, 0.95), (0.4, 0.7)]
+    hues = [(0.08 + index * _GOLDEN) % 1 for index in range(count)]
+    colours = [colorsys.hsv_to_rgb(hue, *shades[index % 5]) for index, hue in enumerate(hues)]
+    return np.round(np.array(colours).reshape(count, 3) * 255).astype(np.uint8)

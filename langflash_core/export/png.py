@@ -1,0 +1,162 @@
+"""PNG pictures of views and answers. Every file is whole or absent (`scene.atomic`)."""
+
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import torch
+from PIL import Image
+from torch import Tensor
+
+from langflash_core.export.colours import heat, label_colours
+from langflash_core.scene.atomic import write_atomically
+from langflash_core.types import Frame, QueryResult
+
+RANGES = {"cosine": (-1.0, 1.0), "relevancy": (0.0, 1.0)}
+_LUMA = (0.299, 0.587, 0.114)
+_GLOW = 0.85  # share of the heat colour where relevance is highest
+_DIM = 0.6  # brightness of the photo where nothing was found
+
+
+def write_rgb(path: Path, rgb: Tensor) -> None:
+    """Colours (H, W, 3): uint8 as they are, floats in [0, 1] rounded to 8 bits.
+
+    Raises:
+        OutputError: the path cannot be written (all writers here). ValueError: another shape.
+    """
+    write_atomically(path, _encoded(Image.fromarray(to_8bit(rgb))))
+
+
+def write_mask(path: Path, mask: Tensor) -> None:
+    """A mask (H, W) bool: 255 inside, 0 outside."""
+    _check_map("mask", mask)
+    write_atomically(path, _encoded(Image.fromarray(mask.cpu().numpy().astype(np.uint8) * 255)))
+
+
+def write_grey(path: Path, values: Tensor, low: float, high: float, bits: int = 16) -> None:
+    """A map (H, W) as grey: `low` is black, `high` is white, `bits` 8 or 16; NaN is black.
+
+    Raises:
+        ValueError: bits is neither 8 nor 16, or low >= high.
+    """
+    _check_map("values", values)
+    if bits not in (8, 16) or not low < high:
+        raise ValueError(f"bits, low, high: expected 8 or 16 and low < high, received {bits}, {low}, {high}")
+    top = 2**bits - 1
+    share = torch.nan_to_num((values.detach().cpu().double() - low) / (high - low), nan=0.0).clamp(0, 1)
+    counts = (share * top).round().numpy().astype(np.uint16 if bits == 16 else np.uint8)
+    write_atomically(path, _encoded(Image.fromarray(counts)))
+
+
+def write_relevance(path: Path, relevance: Tensor, mode: str, bits: int = 16) -> None:
+    """Relevance (H, W) over the whole range of its mode: cosine -1 to 1, relevancy 0 to 1."""
+    write_grey(path, relevance, *RANGES[mode], bits)
+
+
+def write_heat(path: Path, relevance: Tensor, rgb: Tensor, threshold: float, mode: str) -> None:
+    """Relevance glowing over the view (`heat_over`)."""
+    write_rgb(path, heat_over(relevance, rgb, threshold, mode))
+
+
+def heat_over(relevance: Tensor, rgb: Tensor, threshold: float, mode: str) -> Tensor:
+    """The view dimmed and grey where relevance is low, and in heat colours from the threshold on.
+
+    The scale is fixed by the threshold and the mode's range, never by the map's own maximum: a
+    phrase that is not in the scene stays dark. The glow starts halfway to the threshold.
+
+    Args:
+        relevance: (H, W). rgb: (H, W, 3) in [0, 1]. threshold: of presence.
+
+    Returns:
+        (H, W, 3) in [0, 1].
+    """
+    low, high = RANGES[mode]
+    neutral = 0.5 * (low + high)  # cosine 0, relevancy 0.5: nothing speaks for the phrase
+    neutral = min(neutral, threshold - 0.02 * (high - low))
+    view = rgb.float().clamp(0, 1)
+    grey = (view * view.new_tensor(_LUMA)).sum(-1, keepdim=True)
+    strength = torch.nan_to_num(relevance.float(), nan=low)
+    glow = ((strength - (neutral + threshold) / 2) / (threshold - neutral)).clamp(0, 1)[..., None]
+    colours = heat(0.4 + 1.2 * (strength - threshold) / max(high - threshold, 1e-6))
+    dimmed = _DIM * (0.7 * grey + 0.3 * view)
+    lit = _GLOW * colours * (0.35 + 0.65 * grey) + (1 - _GLOW) * view
+    return dimmed * (1 - glow) + lit * glow
+
+
+def write_labels(path: Path, labels: Tensor, names: Sequence[str]) -> None:
+    """A label map as a palette PNG, and its legend beside it as `<name>.json`.
+
+    Args:
+        labels: (H, W) integers; 0 is nothing, i is `names[i - 1]`. At most 255 names.
+
+    Raises:
+        ValueError: too many names, or a label without a name.
+    """
+    _check_map("labels", labels)
+    if len(names) > 255 or (labels.numel() and not 0 <= int(labels.min()) <= int(labels.max()) <= len(names)):
+        raise ValueError(f"labels: expected 0 to {len(names)}, at most 255, received others")
+    colours = np.concatenate((np.zeros((1, 3), np.uint8), label_colours(len(names))))
+    image = Image.fromarray(labels.cpu().numpy().astype(np.uint8))
+    image.putpalette(colours.flatten().tolist())
+    counts = torch.bincount(labels.flatten().long().cpu(), minlength=len(names) + 1)
+    legend = [
+        {
+            "id": index,
+            "label": name,
+            "colour": "#" + bytes(colours[index].tolist()).hex(),
+            "area": float(counts[index]) / max(1, labels.numel()),
+        }
+        for index, name in enumerate(["", *names])
+    ]
+    write_atomically(path.with_suffix(".json"), json.dumps(legend, indent=2, ensure_ascii=False).encode())
+    write_atomically(path, _encoded(image))
+
+
+def label_map(result: QueryResult) -> Tensor:
+    """(H, W) int64: 1 + the prompt of highest relevance among those found there, 0 where none."""
+    inside = torch.where(result.masks, result.relevance, -torch.inf)
+    best, which = inside.max(0)
+    return torch.where(torch.isfinite(best), which + 1, 0)
+
+
+def write_frame(frame: Frame, path: Path) -> None:
+    """A rendered view as RGB."""
+    write_rgb(path, frame.rgb)
+
+
+def write_answer(result: QueryResult, path: Path) -> None:
+    """One picture of an answer: heat for one prompt, the view under label colours for more."""
+    if len(result.answers) == 1:
+        threshold = result.answers[0].threshold
+        write_heat(path, result.relevance[0], result.frame.rgb, threshold, result.mode)
+        return
+    labels = label_map(result).cpu()
+    colours = torch.from_numpy(
+        np.concatenate((np.zeros((1, 3), np.uint8), label_colours(len(result.answers))))
+    )
+    view = result.frame.rgb.float().cpu().clamp(0, 1)
+    grey = (view * view.new_tensor(_LUMA)).sum(-1, keepdim=True)
+    lit = colours[labels].float() / 255 * (0.45 + 0.55 * grey)
+    write_rgb(path, torch.where((labels > 0)[..., None], lit, _DIM * grey.expand_as(view)))
+
+
+def to_8bit(rgb: Tensor) -> np.ndarray:
+    """(H, W, 3) uint8; floats in [0, 1] are clamped and rounded, NaN is black."""
+    if rgb.ndim != 3 or rgb.shape[-1] != 3:
+        raise ValueError(f"rgb: expected (H, W, 3), received {tuple(rgb.shape)}")
+    if rgb.dtype == torch.uint8:
+        return rgb.cpu().numpy()
+    return (torch.nan_to_num(rgb.detach().cpu().float(), nan=0.0).clamp(0, 1) * 255).round().byte().numpy()
+
+
+def _check_map(name: str, values: Tensor) -> None:
+    if values.ndim != 2:
+        raise ValueError(f"{name}: expected (H, W), received {tuple(values.shape)}")
+
+
+def _encoded(image: Image.Image) -> bytes:
+    stream = io.BytesIO()
+    image.save(stream, "PNG")
+    return stream.getvalue()

@@ -1,0 +1,5 @@
+"""Photos in: decode, orient, read the lens from EXIF, crop and resize to one shape, triage."""
+
+from langflash_core.images.views import load_views
+
+__all__ = ["load_views"]

@@ -1,0 +1,108 @@
+"""Intrinsics of a photo: given by the user, read from EXIF, or assumed.
+
+K (3, 3) in pixels of the upright photo, square pixels, centre of the top-left pixel (0.5, 0.5).
+"""
+
+import math
+
+import torch
+from torch import Tensor
+
+from langflash_core.errors import InputError
+from langflash_core.geometry.cameras import intrinsics_from_fov
+from langflash_core.images.decode import Photo
+
+ASSUMED_FOV = 65.0  # degrees on the longer side: a phone's main camera (24-28 mm equivalent)
+PLAUSIBLE_FOV = (5.0, 150.0)  # degrees; EXIF that says otherwise is wrong
+FILM_DIAGONAL = math.hypot(36.0, 24.0)  # mm
+_FOCAL_35MM, _FOCAL, _PLANE_X, _PLANE_UNIT = 0xA405, 0x920A, 0xA20E, 0xA210
+_PIXEL_X, _PIXEL_Y = 0xA002, 0xA003
+_UNIT_MM = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}
+
+
+def check_lens(fov: float | None, intrinsics: tuple[float, ...] | None) -> None:
+    """Refuse what cannot describe a lens, before any photo is read.
+
+    Raises:
+        InputError: both given, a field of view outside 1-179 degrees, or not four finite numbers
+            with positive focal lengths.
+    """
+    if fov is not None and intrinsics is not None:
+        raise InputError("both a field of view and intrinsics were given; give only one of them")
+    if fov is not None and not 1.0 < fov < 179.0:
+        raise InputError(f"a field of view of {fov:g} degrees is impossible; give 1 to 179")
+    if intrinsics is None:
+        return
+    if len(intrinsics) != 4 or not all(math.isfinite(v) for v in intrinsics) or min(intrinsics[:2]) <= 0:
+        received = ",".join(f"{v:g}" for v in intrinsics)
+        raise InputError(
+            f"intrinsics {received} are not usable; give FX,FY,CX,CY in pixels, FX and FY above 0"
+        )
+
+
+def photo_intrinsics(
+    photo: Photo, fov: float | None = None, intrinsics: tuple[float, ...] | None = None
+) -> tuple[Tensor, bool]:
+    """K (3, 3) float32 of the upright photo, and whether it had to be assumed.
+
+    Args:
+        fov: degrees of the longer side. intrinsics: (fx, fy, cx, cy) pixels. Checked by
+            `check_lens`; without either, EXIF decides, and without EXIF 65 degrees.
+
+    Raises:
+        InputError: the principal point lies outside the photo.
+    """
+    if intrinsics is not None:
+        fx, fy, cx, cy = intrinsics
+        if not (0 <= cx <= photo.width and 0 <= cy <= photo.height):
+            size = f"{photo.width} x {photo.height}"
+            raise InputError(
+                f"the principal point {cx:g},{cy:g} lies outside {photo.name} ({size} pixels); "
+                "give intrinsics in pixels of the photos as they are"
+            )
+        return torch.tensor([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]), False
+    if fov is not None:
+        return intrinsics_from_fov(fov, photo.width, photo.height), False
+    focal = exif_focal(photo)
+    if focal is None:
+        return intrinsics_from_fov(ASSUMED_FOV, photo.width, photo.height), True
+    centre_x, centre_y = photo.width / 2, photo.height / 2
+    return torch.tensor([[focal, 0.0, centre_x], [0.0, focal, centre_y], [0.0, 0.0, 1.0]]), False
+
+
+def exif_focal(photo: Photo) -> float | None:
+    """Focal length in pixels of the photo, or None where EXIF does not say or cannot be right.
+
+    The 35 mm equivalent compares diagonals (CIPA DCG-001-2005, section 2.4). Without it, the
+    focal length in mm times the pixels per mm of the focal plane; those are pixels of the
+    picture as taken, so a photo scaled later is followed by its recorded size.
+    """
+    focal = _focal_from_35mm(photo) or _focal_from_plane(photo)
+    if focal is None:
+        return None
+    fov = 2 * math.degrees(math.atan(max(photo.width, photo.height) / (2 * focal)))
+    return focal if PLAUSIBLE_FOV[0] <= fov <= PLAUSIBLE_FOV[1] else None
+
+
+def _focal_from_35mm(photo: Photo) -> float | None:
+    equivalent = _number(photo.exif.get(_FOCAL_35MM))
+    return equivalent and equivalent / FILM_DIAGONAL * math.hypot(photo.width, photo.height)
+
+
+def _focal_from_plane(photo: Photo) -> float | None:
+    focal_mm, density = _number(photo.exif.get(_FOCAL)), _number(photo.exif.get(_PLANE_X))
+    unit_mm = _UNIT_MM.get(photo.exif.get(_PLANE_UNIT, 2))
+    if focal_mm is None or density is None or unit_mm is None:
+        return None
+    recorded = [_number(photo.exif.get(tag)) for tag in (_PIXEL_X, _PIXEL_Y)]
+    taken = max((side for side in recorded if side), default=max(photo.width, photo.height))
+    return focal_mm * density / unit_mm * max(photo.width, photo.height) / taken
+
+
+def _number(value: object) -> float | None:
+    """A positive finite float, or None (0 means unknown in EXIF)."""
+    try:
+        number = float(value)  # pyright: ignore[reportArgumentType]
+    except (TypeError, ValueError, ZeroDivisionError):
+        return None
+    return number if math.isfinite(number) and number > 0 else None

@@ -1,0 +1,132 @@
+"""Triage: what about a photo will hurt the scene, one plain sentence each.
+
+Measured on the photo scaled to one size, so that the same scene judged from 1 or 12 megapixels
+gets the same answer. `luma` is (H, W) in [0, 1], sRGB values.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from PIL import Image
+from torch import Tensor
+from torch.nn.functional import max_pool2d
+
+from langflash_core.geometry.cameras import fov_degrees
+from langflash_core.images.decode import Photo
+
+SMALL_SIDE = 200  # pixels of the short side
+DARK_LIGHTS = 0.22  # a photo whose brightest 10 % stay below this is too dark
+BURNT_SHARE = 0.5  # share of pixels at the top of the range
+JUDGED_SIDE = 360  # pixels of the short side at which light and sharpness are judged
+BLUR_WIDTH = 4.0  # pixels at that size over which even the sharpest edges rise
+EDGE_CONTRAST = 0.12  # an edge weaker than this says nothing about sharpness
+EDGE_BLOCKS = 40  # fewer stretches with an edge: a plain wall, not judged
+SAME_DIFFERENCE = 1.5 / 255  # mean absolute difference of two views of the same picture
+LOST_SHARE = 0.25  # of a photo's area that the crop may cut off without a note
+FOV_RANGE = (25.0, 110.0)  # degrees of the longer side
+_BLOCK, _WINDOW = 12, 25  # pixels along an edge's rise
+
+
+def photo_notes(photo: Photo, image: Tensor) -> list[str]:
+    """Size, light, and sharpness of one photo. image: (3, H, W) as the network sees it."""
+    notes = []
+    if min(photo.width, photo.height) < SMALL_SIDE:
+        notes.append(
+            f"{photo.name} is small ({photo.width} x {photo.height} pixels), expect little detail; "
+            f"use a photo of at least {SMALL_SIDE} pixels a side"
+        )
+    luma = _judged_luma(photo)
+    if float(torch.quantile(image.mean(0).flatten(), 0.9)) < DARK_LIGHTS:
+        notes.append(f"{photo.name} is very dark; take it again with more light")
+    elif float((luma > 250 / 255).float().mean()) > BURNT_SHARE:
+        notes.append(f"{photo.name} is over-exposed, more than half of it is pure white; expose it less")
+    elif is_blurred(luma):
+        notes.append(f"{photo.name} is blurred; hold the camera still and take it again")
+    return notes
+
+
+def crop_notes(photo: Photo, box: tuple[float, float, float, float], first: str) -> list[str]:
+    """A panorama, or a photo whose shape differs so much from the first that much is cut off."""
+    aspect = max(photo.width / photo.height, photo.height / photo.width)
+    if aspect > 2.0:
+        return [
+            f"{photo.name} is {aspect:.1f} times as long as it is wide, only its centre is used; "
+            "panoramas do not follow one lens, use plain photos"
+        ]
+    kept = (box[2] - box[0]) * (box[3] - box[1]) / (photo.width * photo.height)
+    if 1 - kept > LOST_SHARE:
+        return [
+            f"{photo.name} has another shape than {first}, {1 - kept:.0%} of it was cut off; "
+            "take all photos upright or all lengthwise"
+        ]
+    return []
+
+
+def fov_notes(name: str, K: Tensor, width: int, height: int) -> list[str]:
+    """A field of view on the longer side below 25 or above 110 degrees."""
+    horizontal, vertical = fov_degrees(K, width, height)
+    fov = horizontal if width >= height else vertical
+    if FOV_RANGE[0] <= round(fov, 2) <= FOV_RANGE[1]:
+        return []
+    kind = "narrow" if fov < FOV_RANGE[0] else "wide"
+    return [
+        f"{name} has a very {kind} field of view ({fov:.0f} degrees), depth will be poor; use a normal lens"
+    ]
+
+
+def identical_notes(names: Sequence[str], images: Sequence[Tensor]) -> list[str]:
+    """Photos that show the same picture as an earlier one: they carry no parallax."""
+    notes = []
+    for later in range(1, len(images)):
+        for earlier in range(later):
+            if float((images[later] - images[earlier]).abs().mean()) < SAME_DIFFERENCE:
+                notes.append(
+                    f"photos {earlier + 1} ({names[earlier]}) and {later + 1} ({names[later]}) show the same "
+                    "picture; take them from places a step apart"
+                )
+                break
+    return notes
+
+
+def is_blurred(luma: Tensor) -> bool:
+    """Whether, along x or along y, even the sharpest edges of `luma` (H, W) rise over many pixels.
+
+    An edge of contrast A under Gaussian blur sigma has the steepest slope A / (sigma sqrt(2 pi)),
+    so A / slope is its width whatever its strength: a plain wall with one sharp edge is sharp,
+    and shallow focus with one sharp subject is too. Judged on the blocks that hold an edge, by
+    the sharpest fifth of them; with too few such blocks there is nothing to judge. The two
+    directions apart, because a moving camera smears one and leaves the other sharp.
+    """
+    return any(
+        len(widths) >= EDGE_BLOCKS and float(torch.quantile(widths, 0.2)) > BLUR_WIDTH
+        for widths in (edge_widths(luma), edge_widths(luma.T))
+    )
+
+
+def edge_widths(luma: Tensor) -> Tensor:
+    """Contrast / steepest slope along x in pixels, one per stretch of a row that crosses an edge.
+
+    Stretches that run nearly along an edge are left out: they see it rise slowly at any sharpness.
+    """
+    slope_x = (luma[1:-1, 2:] - luma[1:-1, :-2])[None].abs() / 2
+    slope_y = (luma[2:, 1:-1] - luma[:-2, 1:-1])[None].abs() / 2
+    inner = luma[None, 1:-1, 1:-1]
+
+    def highest(values: Tensor) -> Tensor:
+        return max_pool2d(values, (1, _WINDOW), stride=(4, _BLOCK), padding=(0, _WINDOW // 2)).flatten()
+
+    contrast = highest(inner) + highest(-inner)
+    steepest = highest(slope_x)
+    crossing = highest(torch.where(slope_x >= slope_y, slope_x, 0.0)) >= 0.99 * steepest
+    edges = (contrast > EDGE_CONTRAST) & crossing
+    return contrast[edges] / steepest[edges].clamp_min(1e-6)
+
+
+def _judged_luma(photo: Photo) -> Tensor:
+    """(H, W) of the whole photo, its short side at most 360 pixels."""
+    image = photo.image
+    ratio = min(1.0, JUDGED_SIDE / min(image.size))
+    size = max(3, round(image.width * ratio)), max(3, round(image.height * ratio))
+    grey = image.convert("L").resize(size, Image.Resampling.LANCZOS, reducing_gap=3.0)
+    return torch.from_numpy(np.array(grey, dtype=np.float32)) / 255

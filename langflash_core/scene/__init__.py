@@ -1,0 +1,8 @@
+"""A prediction becomes a scene: assembled, pruned to what it needs, kept in one file."""
+
+from langflash_core.scene.assemble import assemble
+from langflash_core.scene.file import load, save
+from langflash_core.scene.prune import prune
+from langflash_core.scene.report import describe
+
+__all__ = ["assemble", "describe", "load", "prune", "save"]

@@ -1,0 +1,133 @@
+"""From a network's `Prediction` to a `Scene`: one unit of length, sparse weights, no bad numbers."""
+
+import time
+
+import torch
+from torch import Tensor
+from torch.nn.functional import normalize
+
+from langflash_core.errors import InputError
+from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.types import Gaussians, Prediction, Scene, Semantics, Views
+
+MIN_SCALE = 1e-7  # scene units; below it a covariance is singular in float32
+
+
+def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: str = "mini") -> Scene:
+    """A scene in scene units: the mean distance of view 0's points from its camera is 1.
+
+    Args:
+        prediction: N = V*H*W Gaussians in the order (v h w); may hold non-finite ones.
+        views: what it was predicted from. top_m: weights kept per Gaussian, renormalised.
+        preset: recorded in the metadata.
+
+    Returns:
+        Scene whose metadata has `preset`, `photos` (names), `warnings`, `timings` (seconds),
+        `counts`, `gaussians_per_view` (their order is kept), and `network_unit`, the network's
+        length units per scene unit.
+
+    Raises:
+        InputError: not one usable point in view 0.
+        ValueError: the prediction's sizes disagree, or its poses are not finite.
+    """
+    start = time.perf_counter()
+    num_views, num_atoms, height, width = prediction.weights.shape
+    num_predicted = len(prediction.gaussians)
+    if num_predicted != num_views * height * width or num_views != views.num_views:
+        raise ValueError(
+            f"gaussians: expected {num_views * height * width} of {views.num_views} views, "
+            f"received {num_predicted} of {num_views}"
+        )
+    if not bool(torch.isfinite(prediction.viewmats).all()):
+        raise ValueError("viewmats: expected finite poses, received others")
+    unit = mean_distance(prediction.gaussians.means[: height * width], prediction.viewmats[0])
+    keep = _usable(prediction.gaussians)
+    per_view = keep.view(num_views, -1).sum(1).tolist()
+    dense = prediction.weights.permute(0, 2, 3, 1).reshape(num_predicted, num_atoms)[keep]
+    metadata = {
+        "preset": preset,
+        "photos": list(views.names),
+        "warnings": [*views.warnings, *prediction.warnings],
+        "counts": {"predicted": num_predicted, "unusable": num_predicted - sum(per_view)},
+        "gaussians_per_view": per_view,
+        "network_unit": unit,
+    }
+    scene = Scene(
+        gaussians=_normalised(prediction.gaussians.map(lambda values: values[keep]), unit),
+        semantics=_semantics(dense, prediction.dictionary, prediction.space, top_m),
+        viewmats=_scaled_poses(prediction.viewmats, unit),
+        Ks=views.Ks.to(prediction.viewmats).clone(),
+        view_size=views.size,
+        photos=views.sources,
+        metadata=metadata,
+    )
+    timings = {**prediction.timings, "assembly": time.perf_counter() - start}
+    return scene.with_metadata(timings=timings)
+
+
+def mean_distance(means: Tensor, viewmat: Tensor) -> float:
+    """Mean distance of points (n, 3) from the camera, over those that are finite.
+
+    Raises:
+        InputError: none is finite, or all sit in the camera.
+    """
+    centre = invert_rigid(viewmat)[:3, 3]
+    distances = (means - centre).double().norm(dim=-1)
+    distances = distances[torch.isfinite(distances)]
+    mean = float(distances.mean()) if len(distances) else 0.0
+    if not mean > 0:
+        raise InputError(
+            "no depth could be found in the first photo; use a sharper, brighter photo of a room"
+        )
+    return mean
+
+
+def sparse_weights(dense: Tensor, top_m: int) -> tuple[Tensor, Tensor]:
+    """The `top_m` largest of w_ik (n, K), renormalised: ids (n, m) int64 and values (n, m).
+
+    m = min(top_m, K). Rows without weight, or with values that are not finite, become 0.
+    """
+    clean = dense.float()
+    clean = torch.where(torch.isfinite(clean).all(-1, keepdim=True), clean, 0.0).clamp_min(0)
+    values, ids = clean.topk(min(top_m, dense.shape[1]), dim=-1)
+    return ids, renormalised(values)
+
+
+def renormalised(values: Tensor) -> Tensor:
+    """Rows (n, m) >= 0 scaled to sum 1; rows of zeros stay."""
+    sums = values.sum(-1, keepdim=True)
+    return torch.where(sums > 0, values / sums.clamp_min(1e-12), 0.0)
+
+
+def _usable(gaussians: Gaussians) -> Tensor:
+    """(N,) bool: every number of the Gaussian is finite."""
+    keep = torch.isfinite(gaussians.opacities)
+    for values in (gaussians.means, gaussians.quats, gaussians.scales, gaussians.sh.flatten(1)):
+        keep = keep & torch.isfinite(values).all(-1)
+    return keep
+
+
+def _normalised(gaussians: Gaussians, unit: float) -> Gaussians:
+    norms = gaussians.quats.float().norm(dim=-1, keepdim=True)
+    identity = torch.tensor([1.0, 0, 0, 0], device=norms.device)
+    quats = torch.where(norms > 1e-6, gaussians.quats.float() / norms.clamp_min(1e-6), identity)
+    return Gaussians(
+        means=gaussians.means.float() / unit,
+        quats=quats,
+        scales=(gaussians.scales.float() / unit).clamp_min(MIN_SCALE),
+        opacities=gaussians.opacities.float().clamp(0, 1),
+        sh=gaussians.sh.float(),
+    )
+
+
+def _semantics(dense: Tensor, dictionary: Tensor, space: str, top_m: int) -> Semantics:
+    """Atoms without direction are turned off; the rest become unit rows."""
+    finite = torch.isfinite(dictionary).all(-1) & (dictionary.norm(dim=-1) > 1e-6)
+    ids, values = sparse_weights(dense[:, finite], top_m)
+    return Semantics(ids, values, normalize(dictionary[finite].float(), dim=-1), space)
+
+
+def _scaled_poses(viewmats: Tensor, unit: float) -> Tensor:
+    scaled = viewmats.float().clone()
+    scaled[:, :3, 3] = viewmats[:, :3, 3].float() / unit
+    return scaled

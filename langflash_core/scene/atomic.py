@@ -1,0 +1,54 @@
+"""Files that are whole or absent: written beside their place, then moved onto it."""
+
+import os
+import secrets
+from pathlib import Path
+
+from langflash_core.errors import OutputError
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write `content` to `path`; whatever stops it, the old file or none is there, never half.
+
+    Raises:
+        OutputError: the folder is missing, is a file, or cannot be written.
+    """
+    folder = path.parent
+    if path.is_dir():
+        raise OutputError(f"cannot write {path}: it is a folder; name a file in it")
+    if not folder.is_dir():
+        state = "is a file" if folder.exists() else "does not exist"
+        raise OutputError(f"cannot write {path}: {folder} {state}; create that folder first")
+    temporary = folder / f".{path.name[:100]}.{secrets.token_hex(6)}.part"
+    try:
+        with temporary.open("xb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(temporary, path)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(f"cannot write {path}: {reason}; choose another place for it") from error
+    finally:
+        _remove(temporary)
+
+
+def make_folder(folder: Path) -> None:
+    """Create `folder` and its parents where missing.
+
+    Raises:
+        OutputError: something in the way is a file, or cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = "a file of that name is in the way" if isinstance(error, FileExistsError) else error.strerror
+        raise OutputError(f"cannot create the folder {folder}: {reason}; choose another place") from error
+
+
+def _remove(temporary: Path) -> None:
+    """Best effort: the error that led here matters more."""
+    try:
+        temporary.unlink(missing_ok=True)
+    except OSError:
+        return

@@ -1,0 +1,291 @@
+"""The scene file: what is saved comes back, and what is not whole is refused in one sentence."""
+
+import json
+import os
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import safetensors.torch
+import torch
+
+from langflash_core.errors import OutputError, SceneFileError
+from langflash_core.scene import assemble, describe, load, prune, save
+from langflash_core.scene.fields import REQUIRED
+from langflash_core.splat.reference import render
+from langflash_core.types import Scene
+from tests.scene.plane import wall_prediction
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return prune(assemble(*wall_prediction(width=42, height=28))).with_metadata(
+        note="grüße", metric_scale=2.5
+    )
+
+
+@pytest.fixture
+def path(scene, tmp_path):
+    save(scene, tmp_path / "a.langflash")
+    return tmp_path / "a.langflash"
+
+
+def tensors_of(scene: Scene) -> dict[str, torch.Tensor]:
+    gaussians, semantics = scene.gaussians, scene.semantics
+    return {
+        **{name: getattr(gaussians, name) for name in ("means", "quats", "scales", "opacities", "sh")},
+        "weights": semantics.dense_weights(),
+        "dictionary": semantics.dictionary,
+        "viewmats": scene.viewmats,
+        "Ks": scene.Ks,
+    }
+
+
+def same(first: Scene, second: Scene) -> bool:
+    pairs = zip(tensors_of(first).values(), tensors_of(second).values(), strict=True)
+    return (
+        all(torch.equal(a, b) for a, b in pairs)
+        and first.photos == second.photos
+        and first.view_size == second.view_size
+        and first.metadata == second.metadata
+        and first.semantics.space == second.semantics.space
+    )
+
+
+def test_what_is_saved_comes_back(scene, path):
+    read = load(path)
+    assert read.photos == scene.photos and read.view_size == scene.view_size
+    assert read.metadata == json.loads(json.dumps(scene.metadata))
+    assert read.semantics.space == "minilm"
+    exact = ("means", "dictionary", "viewmats", "Ks")
+    for name, values in tensors_of(scene).items():
+        found = tensors_of(read)[name]
+        assert found.dtype == torch.float32 and found.shape == values.shape
+        if name in exact:
+            assert torch.equal(found, values)
+        else:
+            # float16 keeps 11 bits; below its normal range (6.1e-5) an absolute 3e-8.
+            assert torch.allclose(found, values, rtol=2**-10, atol=3e-8), name
+    for _ in range(5):
+        save(load(path), path)
+    for name, values in tensors_of(scene).items():
+        # Rows are renormalised on every load, which may move a weight by one step of 2^-11 each.
+        assert torch.allclose(tensors_of(load(path))[name], values, rtol=2**-8, atol=3e-8), name
+
+
+def test_half_precision_does_not_show(scene, path):
+    """The figures that fields.py states."""
+    read = load(path)
+    for view in (0, 1):
+        before, after = (render(s, s.camera(view)) for s in (scene, read))
+        error = (before.rgb - after.rgb).square().mean().sqrt()
+        assert float(error) < 10 ** (-75 / 20)
+        assert before.weight_maps is not None and after.weight_maps is not None
+        gaps = (before.weight_maps - after.weight_maps).abs()
+        # One splat that rounding moves across the 1/255 cut changes a pixel by that much at most.
+        assert float(gaps.mean()) < 0.0001 and float(gaps.max()) < 1 / 255
+
+
+def test_a_scene_without_atoms_photos_or_gaussians(tmp_path, scene):
+    prediction, views = wall_prediction(width=14, height=14)
+    bare = replace(prediction, weights=prediction.weights[:, :0], dictionary=prediction.dictionary[:0])
+    plain = replace(assemble(bare, views), photos=(), metadata={})
+    empty = prune(replace(scene, gaussians=replace(scene.gaussians, opacities=scene.gaussians.opacities * 0)))
+    for case in (plain, empty):
+        save(case, tmp_path / "b.langflash")
+        read = load(tmp_path / "b.langflash")
+        assert len(read.gaussians) == len(case.gaussians) and read.semantics.num_atoms == 0
+        describe(read)
+
+
+def test_many_atoms_need_wider_ids(tmp_path, scene):
+    generator = torch.Generator().manual_seed(0)
+    for num_atoms in (1, 256, 257, 40_000):
+        dictionary = torch.nn.functional.normalize(torch.randn(num_atoms, 4, generator=generator), dim=-1)
+        ids = torch.randint(0, num_atoms, scene.semantics.weight_ids.shape, generator=generator)
+        ids[0, 0] = num_atoms - 1
+        wide = replace(scene, semantics=replace(scene.semantics, weight_ids=ids, dictionary=dictionary))
+        save(wide, tmp_path / "c.langflash")
+        assert torch.equal(load(tmp_path / "c.langflash").semantics.weight_ids, ids)
+
+
+def test_a_save_that_fails_leaves_nothing_and_keeps_the_old_file(tmp_path, scene, path, monkeypatch):
+    whole = path.read_bytes()
+    monkeypatch.setattr(
+        os, "replace", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device"))
+    )
+    with pytest.raises(OutputError, match="No space left"):
+        save(scene, path)
+    monkeypatch.setattr(os, "replace", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt()))
+    with pytest.raises(KeyboardInterrupt):
+        save(scene, path)
+    assert path.read_bytes() == whole
+    assert os.listdir(tmp_path) == ["a.langflash"]
+
+
+def test_places_that_cannot_be_written(tmp_path, scene, path):
+    for place, words in (
+        (tmp_path, "is a folder"),
+        (path / "b.langflash", "is a file"),
+        (tmp_path / "nowhere" / "b.langflash", "does not exist"),
+    ):
+        with pytest.raises(OutputError, match=words):
+            save(scene, place)
+    assert os.listdir(tmp_path) == ["a.langflash"]
+
+
+def test_a_scene_that_is_not_whole_is_not_saved(tmp_path, scene):
+    def gaussians(**changes):
+        return replace(scene, gaussians=replace(scene.gaussians, **changes))
+
+    def semantics(**changes):
+        return replace(scene, semantics=replace(scene.semantics, **changes))
+
+    cases = {
+        "means": gaussians(means=scene.gaussians.means[1:] * 1),
+        "scales": gaussians(scales=scene.gaussians.scales * 0),
+        "opacities": gaussians(opacities=scene.gaussians.opacities + 1),
+        "quats": gaussians(quats=scene.gaussians.quats * 2),
+        "sh": gaussians(sh=scene.gaussians.sh * torch.nan),
+        "weight_values": semantics(weight_values=scene.semantics.weight_values * 0.5),
+        "weight_ids": semantics(weight_ids=scene.semantics.weight_ids + 100),
+        "dictionary": semantics(dictionary=scene.semantics.dictionary * 3),
+        "Ks": replace(scene, Ks=-scene.Ks),
+        "viewmats": replace(scene, viewmats=scene.viewmats * 2),
+        "photos": replace(scene, photos=scene.photos[:1]),
+        "JSON": scene.with_metadata(bad=float("nan")),
+    }
+    for name, case in cases.items():
+        with pytest.raises(ValueError, match=name if name != "means" else "quats|means"):
+            save(case, tmp_path / "bad.langflash")
+    assert not os.listdir(tmp_path)
+
+
+def refused(path) -> str:
+    with pytest.raises(SceneFileError) as caught:
+        load(path)
+    message = str(caught.value)
+    assert path.name in message and ";" in message and "\n" not in message
+    assert caught.value.exit_code == 2
+    return message
+
+
+def test_missing_folders_and_foreign_files(tmp_path):
+    assert "does not exist" in refused(tmp_path / "nowhere.langflash")
+    assert "is a folder" in refused(tmp_path)
+    foreign = tmp_path / "foreign.langflash"
+    for content, words in (
+        (b"", "empty file"),
+        (b"x", "expected a langflash-scene file, found something else"),
+        (b"\xff\xd8\xff\xe0 and so on " * 20, "found a JPEG photo"),
+        (b"ply\nformat binary_little_endian 1.0\n", "found a PLY file"),
+        (safetensors.torch.save({"weight": torch.zeros(3)}), "found another safetensors file"),
+        (
+            safetensors.torch.save({"weight": torch.zeros(3)}, {"format": "pt"}),
+            "found another safetensors file",
+        ),
+        (struct.pack("<Q", 2**63) + b"{}" * 50, "found something else"),
+        (struct.pack("<Q", 40_000) + b"[" * 40_000, "found something else"),
+    ):
+        foreign.write_bytes(content)
+        assert words in refused(foreign)
+
+
+def _resaved(path, **changes) -> None:
+    """The same tensors under another header, as another program would write it."""
+    content = path.read_bytes()
+    length = struct.unpack("<Q", content[:8])[0]
+    strings = json.loads(content[8 : 8 + length])["__metadata__"]
+    path.write_bytes(safetensors.torch.save(safetensors.torch.load(content), {**strings, **changes}))
+
+
+def test_newer_and_nonsense_versions(path):
+    _resaved(path, version="2")
+    assert "format 2, this program reads format 1" in refused(path)
+    _resaved(path, version="one")
+    assert "version reads 'one'" in refused(path)
+
+
+def test_a_cut_file_says_how_much_is_there(path):
+    whole = path.read_bytes()
+    length = struct.unpack("<Q", whole[:8])[0]
+    path.write_bytes(whole[:-10])
+    assert f"expected {len(whole)} bytes, found {len(whole) - 10}" in refused(path)
+    path.write_bytes(whole + b"more")
+    assert f"expected {len(whole)} bytes, found {len(whole) + 4}" in refused(path)
+    path.write_bytes(whole[: 8 + length // 2])
+    refused(path)
+    for cut in (1, 7, 8, 9, 100, 8 + length - 1, 8 + length, 8 + length + 1):
+        path.write_bytes(whole[:cut])
+        refused(path)
+
+
+def test_a_file_with_a_field_missing_or_of_a_wrong_type_is_refused_even_with_a_right_checksum(path, scene):
+    from langflash_core.scene.file import _digest
+
+    content = path.read_bytes()
+    length = struct.unpack("<Q", content[:8])[0]
+    strings = json.loads(content[8 : 8 + length])["__metadata__"]
+    fields = safetensors.torch.load(content)
+
+    def rewrite(changed: dict) -> str:
+        digest = _digest(strings["scene"], changed)
+        path.write_bytes(safetensors.torch.save(changed, {**strings, "digest": digest}))
+        return refused(path)
+
+    for name in REQUIRED:
+        rewrite({key: value for key, value in fields.items() if key != name})
+        rewrite({**fields, name: fields[name].to(torch.float64)})
+        rewrite({**fields, name: fields[name][:-1].clone()})
+    assert "scales" in rewrite({**fields, "scales": -fields["scales"]})
+    assert "means" in rewrite({**fields, "means": fields["means"] * torch.nan})
+    assert "weight_ids" in rewrite({**fields, "weight_ids": fields["weight_ids"] + 100})
+    assert "fields" in rewrite({**fields, "stranger": torch.zeros(2)})
+
+
+def test_random_damage_gives_a_refusal_or_an_equal_scene(path):
+    """Flips of bits and bytes, in the header more often than chance would; cuts; joined pieces."""
+    whole = path.read_bytes()
+    truth = load(path)
+    header_end = 8 + struct.unpack("<Q", whole[:8])[0]
+    rng = np.random.default_rng(11)
+    refusals = 0
+    for round_number in range(400):
+        damaged = bytearray(whole)
+        limit = (8, header_end, len(whole))[round_number % 3]
+        for _ in range(int(rng.integers(1, 4))):
+            place = int(rng.integers(0, limit))
+            damaged[place] = (
+                int(rng.integers(0, 256))
+                if rng.random() < 0.5
+                else damaged[place] ^ (1 << int(rng.integers(8)))
+            )
+        if round_number % 10 == 9:
+            damaged = damaged[: int(rng.integers(0, len(whole)))]
+        path.write_bytes(bytes(damaged))
+        try:
+            read = load(path)
+        except SceneFileError as error:
+            assert "\n" not in str(error)
+            refusals += 1
+            continue
+        assert same(read, truth)
+    assert refusals > 300
+
+
+def test_the_report_is_plain_json_with_the_figures(scene):
+    report = describe(scene)
+    assert json.loads(json.dumps(report, allow_nan=False)) == report
+    assert report["gaussians"] == len(scene.gaussians)
+    assert report["pruning"]["gaussians_before"] > report["gaussians"]
+    assert report["bytes"]["means"] == 12 * report["gaussians"]
+    assert report["bytes"]["total"] == report["pruning"]["bytes_after"]
+    assert report["bytes"]["photos"] == sum(len(photo) for photo in scene.photos)
+    assert report["timings"]["total"] == pytest.approx(sum(scene.metadata["timings"].values()))
+    assert report["warnings"] == ["a note of triage", "a note of the network"]
+    box, core = report["bounding_box"], report["core_box"]
+    assert all(
+        a <= b < c <= d for a, b, c, d in zip(box["min"], core["min"], core["max"], box["max"], strict=True)
+    )
+    assert report["metric_scale"] == 2.5 and report["space"] == "minilm" and report["sh_degree"] == 0
