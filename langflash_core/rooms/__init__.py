@@ -1,0 +1,35 @@
+"""Furnished rooms: training and test data, made from furniture catalogues and drawn offscreen.
+
+World of a room: metres, y up. World of a sample: its first camera, OpenCV axes.
+"""
+
+from langflash_core.rooms.catalogue import (
+    HELD_OUT_LIBRARIES,
+    TRAIN_LIBRARIES,
+    Catalogue,
+    Item,
+    load_catalogue,
+)
+from langflash_core.rooms.layout import Instance, Room, make_room
+from langflash_core.rooms.pack import Pack, build_pack, load_pack
+from langflash_core.rooms.preview import contact_sheet
+from langflash_core.rooms.render import RoomRenderer
+from langflash_core.rooms.sample import RoomViews, render_room
+
+__all__ = [
+    "HELD_OUT_LIBRARIES",
+    "TRAIN_LIBRARIES",
+    "Catalogue",
+    "Instance",
+    "Item",
+    "Pack",
+    "Room",
+    "RoomRenderer",
+    "RoomViews",
+    "build_pack",
+    "contact_sheet",
+    "load_catalogue",
+    "load_pack",
+    "make_room",
+    "render_room",
+]

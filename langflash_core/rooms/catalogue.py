@@ -40,6 +40,7 @@ class Item:
         elevation: usual height of its foot above the floor, m.
         surface: height of the top on which things stand, m; below 0 when there is none.
         opening: True for doors and windows.
+        wall_front: openings only: where the wall's inner face cuts the depth, as a fraction from the back.
         light: True for lamps that shine.
         rotation: row-major 3x3 model rotation.
         creator: author, for attribution.
@@ -56,6 +57,7 @@ class Item:
     elevation: float
     surface: float
     opening: bool
+    wall_front: float
     light: bool
     rotation: tuple[float, ...]
     creator: str
@@ -77,7 +79,10 @@ class Archive:
         """Lower-case member name -> true name; models refer to files in any case."""
         if self.path.is_dir():
             files = (p for p in self.path.rglob("*") if p.is_file())
-            return {p.relative_to(self.path).as_posix().lower(): p.relative_to(self.path).as_posix() for p in files}
+            return {
+                p.relative_to(self.path).as_posix().lower(): p.relative_to(self.path).as_posix()
+                for p in files
+            }
         with zipfile.ZipFile(self.path) as archive:
             return {name.lower(): name for name in archive.namelist()}
 
@@ -133,9 +138,11 @@ def parse_properties(text: str) -> dict[str, str]:
 
 def clean_name(name: str) -> str:
     """Plain lower-case words: "Bed 140x190" -> "bed"."""
-    fixed = labels()["name_fixes"].get(name, name)
-    fixed = re.sub(r"\b\d+(x\d+)?\b|[&:,()]", " ", fixed)
-    return " ".join(fixed.lower().split())
+    return _plain(labels()["name_fixes"].get(name, name))
+
+
+def _plain(words: str) -> str:
+    return " ".join(re.sub(r"\b\d+(x\d+)?\b|[&:,()]", " ", words).lower().split())
 
 
 @cache
@@ -164,7 +171,9 @@ def _find_archives(root: Path) -> dict[str, Archive]:
         found["default"] = Archive(path)
     for path in sorted(root.rglob(Path(_DEFAULT).name)):
         found["default"] = Archive(path.parents[4])
-    return {library: found[library] for library in (*TRAIN_LIBRARIES, *HELD_OUT_LIBRARIES) if library in found}
+    return {
+        library: found[library] for library in (*TRAIN_LIBRARIES, *HELD_OUT_LIBRARIES) if library in found
+    }
 
 
 def _library_items(library: str, archive: Archive) -> Iterator[Item]:
@@ -187,8 +196,11 @@ def _group_of(fields: dict[str, str], library: str) -> str:
     outside = fields["category"] in _OUTSIDE
     if outside and name not in table["exterior_indoors"] and name not in table["misc_indoors"]:
         return ""
-    group = table["name_groups"].get(name) or _id_groups().get(f"{fields['id']}|{library}") or ""
-    return table["group_words"].get(group, group)
+    group = table["name_groups"].get(name) or _id_groups().get(f"{fields['id']}|{library}")
+    if group is None and f"{fields['id']}|{library}" not in _id_groups():
+        last = clean_name(name).split(" ")[-1]  # a model newer than our table
+        group = last if last in _id_groups().values() else None
+    return table["group_words"].get(group, group) if group else ""
 
 
 def _item(fields: dict[str, str], library: str, group: str) -> Item:
@@ -206,6 +218,7 @@ def _item(fields: dict[str, str], library: str, group: str) -> Item:
         elevation=float(fields.get("elevation", 0.0)) * _CM,
         surface=top,
         opening=fields.get("doorOrWindow") == "true",
+        wall_front=_wall_front(fields),
         light="lightSourceX" in fields,
         rotation=rotation if len(rotation) == 9 else tuple(np.eye(3).ravel()),
         creator=fields.get("creator", "unknown"),
@@ -213,7 +226,14 @@ def _item(fields: dict[str, str], library: str, group: str) -> Item:
     )
 
 
+def _wall_front(fields: dict[str, str]) -> float:
+    if "doorOrWindowWallThickness" not in fields:
+        return 0.8
+    front = float(fields["doorOrWindowWallThickness"]) + float(fields.get("doorOrWindowWallDistance", 0.0))
+    return min(front / max(float(fields["depth"]), 1e-6), 1.0)
+
+
 def _clean_tags(tags: str) -> tuple[str, ...]:
-    words = (clean_name(tag.strip()) for tag in tags.split(","))
+    words = (_plain(tag) for tag in tags.split(","))
     stop = labels()["tag_stopwords"]
     return tuple(dict.fromkeys(w for w in words if w and w not in stop and len(w) > 1))

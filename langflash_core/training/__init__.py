@@ -1,0 +1,1 @@
+"""Training of the embedded network: cached rooms, losses, stages, the loop."""

@@ -1,0 +1,214 @@
+"""`langflash train ...`: cache rooms, train stages, export weights. Plain functions; the command
+line only parses arguments. Text embeddings come in as a function, because training does not
+import the query stage."""
+
+import json
+import logging
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from langflash_core.errors import InputError
+from langflash_core.network.checkpoints import initial_network, save_network
+from langflash_core.network.model import LangFlashNet
+from langflash_core.network.presets import PRESETS
+from langflash_core.rooms import RoomRenderer, load_pack
+from langflash_core.training.batches import RoomSet
+from langflash_core.training.cache import (
+    HELD_OUT_SEED,
+    VALIDATION_SEED,
+    CachePlan,
+    fill_cache,
+    rooms_renderer,
+)
+from langflash_core.training.loop import LoopOptions, load_averaged, train_stage
+from langflash_core.training.stages import STAGES, Words
+from langflash_core.training.validation import MEASURES, Validator
+from langflash_core.training.words import PhraseSampler, PhraseTable, build_table
+
+log = logging.getLogger(__name__)
+
+Encode = Callable[[Sequence[str]], Tensor]
+SETS = ("train", "validation", "held_out")
+VALIDATION_SCENES = 48
+"""Judged while training, every few minutes; more would cost more time than they tell."""
+
+
+def cache_plan(kind: str, scenes: int, first_seed: int | None = None) -> CachePlan:
+    """The plan of one set: train (tokens, augmented), validation (tokens, unseen seeds), held_out
+    (pictures only, furniture that no training sees; two views, seeds from 900000000).
+
+    Raises:
+        InputError: there is no such set.
+    """
+    if kind == "train":
+        return CachePlan(first_seed or 0, scenes)
+    if kind == "validation":
+        return CachePlan(first_seed or VALIDATION_SEED, scenes, augment=False, three_view_every=1)
+    if kind == "held_out":
+        seed = first_seed or HELD_OUT_SEED
+        return CachePlan(seed, scenes, held_out=True, with_tokens=False, augment=False, three_view_every=1)
+    raise InputError(f"There is no set '{kind}'; choose one of {', '.join(SETS)}")
+
+
+def run_cache(
+    out: Path,
+    pack: Path,
+    encoder: Path,
+    *,
+    kind: str = "train",
+    scenes: int = 4096,
+    first_seed: int | None = None,
+    part: tuple[int, int] = (0, 1),
+    preset: str = "mini",
+) -> int:
+    """Render and encode one set into `out/<kind>`; returns the number of scenes written.
+
+    Single-threaded: run one process per core with `part` (i, n). Interrupted runs continue.
+
+    Args:
+        pack: furniture (`langflash rooms pack`).
+        encoder: weights of the frozen encoder, or any weights file of the preset.
+    """
+    torch.set_num_threads(1)
+    plan = cache_plan(kind, scenes, first_seed)
+    network = initial_network(PRESETS[preset], encoder) if plan.with_tokens else None
+    furniture = load_pack(pack)
+    start = time.perf_counter()
+    with RoomRenderer(furniture) as renderer:
+        render = rooms_renderer(furniture, renderer, held_out=plan.held_out)
+        written = fill_cache(out / kind, plan, render, network.encoder if network else None, part)
+    log.info("%d scenes in %.0f s", written, time.perf_counter() - start)
+    return written
+
+
+def run_train(
+    stages: Sequence[str],
+    folder: Path,
+    run_dir: Path,
+    encoder: Path,
+    encode: Encode,
+    minutes: Sequence[float],
+    *,
+    preset: str = "mini",
+    options: LoopOptions | None = None,
+) -> LangFlashNet:
+    """Train stages one after the other, each for its minutes, on the cached sets in `folder`.
+
+    Earlier stages are read from `run_dir`; a stage found there continues unless
+    `options.resume` is False. Returns the network with every stage trained so far.
+
+    Raises:
+        InputError: an unknown stage, a stage whose needs have not been trained, or no cache.
+    """
+    if len(stages) != len(minutes):
+        raise InputError(
+            f"{len(stages)} stages need as many minutes, received {len(minutes)}; give one number per stage"
+        )
+    for name in stages:
+        if name not in STAGES:
+            raise InputError(f"There is no stage '{name}'; choose among {', '.join(STAGES)}")
+    options = options or LoopOptions(minutes=0)
+    rooms = _open(folder / "train")
+    table = phrase_table(folder, encode)
+    network = initial_network(PRESETS[preset], encoder, options.seed)
+    done = _load_trained(network, run_dir)
+    for name, budget in zip(stages, minutes, strict=True):
+        stage = STAGES[name]
+        missing = [need for need in stage.needs if need not in done]
+        if missing:
+            raise InputError(
+                f"Stage '{name}' reads {', '.join(missing)}; train that first with the same run folder"
+            )
+        seed = options.seed + 1000 * list(STAGES).index(name) + done.get(name, 0)
+        words = Words(PhraseSampler(table), torch.Generator().manual_seed(seed))
+        own = LoopOptions(**{**options.__dict__, "minutes": budget})
+        state = train_stage(network, stage, rooms, words, run_dir, own, _validator(name, folder, table, own))
+        done[name] = state.step
+    return network.eval()
+
+
+def _open(folder: Path, limit: int | None = None) -> RoomSet:
+    try:
+        return RoomSet(folder, limit=limit)
+    except ValueError as error:
+        raise InputError(str(error)) from None
+
+
+def _validator(name: str, folder: Path, table: PhraseTable, options: LoopOptions) -> Validator | None:
+    if not (folder / "validation").is_dir():
+        return None
+    measure, views = MEASURES[name]
+    words = Words(PhraseSampler(table), torch.Generator().manual_seed(1))
+    return Validator(_open(folder / "validation", VALIDATION_SCENES), words, measure, views, options.device)
+
+
+def phrase_table(folder: Path, encode: Encode) -> PhraseTable:
+    """Every phrase of the training and validation rooms; embedded once, kept beside the shards."""
+    labels = _open(folder / "train").labels()
+    extra = _open(folder / "validation").labels() if (folder / "validation").is_dir() else []
+    path = folder / "phrases.pt"
+    known: dict[str, Tensor] = {}
+    if path.exists():
+        saved = torch.load(path, weights_only=True)
+        known = dict(zip(saved["phrases"], saved["embeddings"], strict=True))
+
+    def remembered(phrases: Sequence[str]) -> Tensor:
+        fresh = [phrase for phrase in phrases if phrase not in known]
+        if fresh:
+            known.update(zip(fresh, encode(fresh), strict=True))
+        return torch.stack([known[phrase] for phrase in phrases])
+
+    table = build_table([*labels, *extra], remembered)
+    temporary = path.with_suffix(f".{time.time_ns()}.part")
+    torch.save({"phrases": list(table.phrases), "embeddings": table.embeddings}, temporary)
+    temporary.replace(path)
+    return table
+
+
+def _load_trained(network: LangFlashNet, run_dir: Path) -> dict[str, int]:
+    found = {name: load_averaged(network, run_dir, name) for name in STAGES}
+    return {name: counts[0] for name, counts in found.items() if counts is not None}
+
+
+def run_export(
+    run_dir: Path, out: Path, encoder: Path, *, preset: str = "mini", metadata: dict | None = None
+) -> Path:
+    """Join the averaged weights of every stage in `run_dir` into one weights file.
+
+    The header says how long each stage trained, its last validation, and `metadata` (data,
+    metrics, calibration: `calibration` is what queries read).
+
+    Raises:
+        InputError: no stage has been trained.
+    """
+    network = initial_network(PRESETS[preset], encoder)
+    trained = {name: load_averaged(network, run_dir, name) for name in STAGES}
+    report = {
+        name: {
+            "steps": counts[0],
+            "hours": round(counts[1] / 3600, 3),
+            "validation": last_validation(run_dir, name),
+        }
+        for name, counts in trained.items()
+        if counts is not None
+    }
+    if not report:
+        raise InputError(f"{run_dir} holds no trained stage; run `langflash train run` first")
+    details = dict(metadata or {})
+    network.calibration = details.pop("calibration", {})
+    save_network(network, out, {"training": report, **details})
+    return out
+
+
+def last_validation(run_dir: Path, stage: str) -> dict:
+    """The newest validation row of a stage's log; {} if it has none."""
+    path = run_dir / f"{stage}.jsonl"
+    if not path.exists():
+        return {}
+    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
+    kept = [row for row in rows if row["kind"] == "validation"]
+    return {k: v for k, v in kept[-1].items() if k not in ("stage", "kind")} if kept else {}

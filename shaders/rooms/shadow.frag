@@ -1,0 +1,4 @@
+#version 330 core
+// Purpose: depth only.
+
+void main() {}
