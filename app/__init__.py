@@ -1,0 +1,1 @@
+"""The desktop program: the window, the GL renderer, and the command line."""

@@ -1,0 +1,60 @@
+"""What a person drops on the window, sorted: photos, folders of photos, scenes, the rest."""
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+PHOTO_SUFFIXES = frozenset(
+    {".jpg", ".jpeg", ".png", ".webp", ".heic", ".heif", ".tif", ".tiff", ".bmp", ".avif"}
+)
+SCENE_SUFFIX = ".langflash"
+MAX_PHOTOS = 8  # what the network was shaped for
+
+
+@dataclass(frozen=True)
+class Drop:
+    """Sorted paths; `rejected` holds one sentence with a remedy per path that is neither."""
+
+    photos: tuple[Path, ...] = ()
+    scenes: tuple[Path, ...] = ()
+    rejected: tuple[str, ...] = ()
+
+
+def typed_path(text: str) -> Path:
+    """The path a person typed, with `~` spelled out; an unknown user's stays as it is."""
+    return Path(os.path.expanduser(text.strip()))
+
+
+def typed_scene(text: str) -> Path | None:
+    """Where to write the scene that a person typed a name for; None while it names no file."""
+    path = typed_path(text)
+    if not text.strip() or not path.name or path.is_dir():
+        return None
+    return path if path.suffix else path.with_suffix(SCENE_SUFFIX)
+
+
+def sort_drop(paths: Iterable[str | Path]) -> Drop:
+    """Sort paths by what they are; a folder stands for the photos and scenes directly in it."""
+    photos: list[Path] = []
+    scenes: list[Path] = []
+    rejected: list[str] = []
+    for path in map(Path, paths):
+        if path.is_dir():
+            inside = sorted(p for p in path.iterdir() if p.is_file() and not p.name.startswith("."))
+            found = [p for p in inside if p.suffix.lower() in PHOTO_SUFFIXES]
+            kept = [p for p in inside if p.suffix.lower() == SCENE_SUFFIX]
+            if not found and not kept:
+                rejected.append(f"The folder {path.name} holds no photo; drop a folder of JPEG or PNG files.")
+            photos += found
+            scenes += [] if found else kept
+        elif not path.exists():
+            rejected.append(f"{path} does not exist; check the path.")
+        elif path.suffix.lower() == SCENE_SUFFIX:
+            scenes.append(path)
+        elif path.suffix.lower() in PHOTO_SUFFIXES:
+            photos.append(path)
+        else:
+            rejected.append(f"{path.name} is no photo and no scene; drop JPEG, PNG or .langflash files.")
+    unique = tuple(dict.fromkeys(p.resolve() for p in photos))
+    return Drop(unique, tuple(dict.fromkeys(p.resolve() for p in scenes)), tuple(rejected))

@@ -1,0 +1,147 @@
+"""What the window asks of the worker and what it hears back: frozen snapshots, nothing shared.
+
+Imports nothing heavy: the window builds these before torch is loaded.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.window.state import SceneInfo
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from langflash_core.query.relevance import CompiledQuery
+    from langflash_core.types import Camera, Frame, Scene
+
+
+# Requests: jobs, of which the latest wins and cancels the one under way
+
+
+@dataclass(frozen=True)
+class ReconstructPhotos:
+    """Make a scene of photos."""
+
+    paths: tuple[Path, ...]
+
+
+@dataclass(frozen=True)
+class LoadScene:
+    """Read a scene file."""
+
+    path: Path
+
+
+# Requests: small ones, answered between the stages of a job
+
+
+@dataclass(frozen=True)
+class WriteScene:
+    """Write a scene file."""
+
+    scene: "Scene"
+    path: Path
+
+
+@dataclass(frozen=True)
+class Encode:
+    """Compile prompts against a scene; only the newest one counts."""
+
+    serial: int
+    scene: "Scene"
+    keys: tuple[int, ...]
+    texts: tuple[str, ...]
+    negatives: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Score prompts in one view; only the newest one counts."""
+
+    serial: int
+    keys: tuple[int, ...]
+    relevance: "Tensor"
+    frame: "Frame"
+    camera: "Camera"
+    query: "CompiledQuery"
+
+
+@dataclass(frozen=True)
+class MakeThumbnails:
+    """Decode photos small."""
+
+    paths: tuple[Path, ...]
+
+
+Job = ReconstructPhotos | LoadScene
+Errand = WriteScene | Encode | Answer | MakeThumbnails
+
+
+# Results
+
+
+@dataclass(frozen=True)
+class Progress:
+    """A stage of the job and how far it is, 0 to 1."""
+
+    stage: str
+    fraction: float
+
+
+@dataclass(frozen=True)
+class SceneReady:
+    """The job's scene."""
+
+    info: SceneInfo
+
+
+@dataclass(frozen=True)
+class SceneWritten:
+    """A scene file is complete."""
+
+    path: Path
+
+
+@dataclass(frozen=True)
+class Failed:
+    """`job` tells whether the job under way is over; otherwise an errand failed."""
+
+    sentence: str
+    job: bool
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """The job was cancelled by the person."""
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """Prompts ready to be asked; `keys` in the order of `query`."""
+
+    serial: int
+    keys: tuple[int, ...]
+    query: "CompiledQuery"
+
+
+@dataclass(frozen=True)
+class Scored:
+    """(key, text, score) per prompt."""
+
+    serial: int
+    scores: tuple[tuple[int, str, float], ...]
+
+
+@dataclass(frozen=True)
+class Thumbnail:
+    """rgb (h, w, 3) uint8, or None with the reason; `key` names the texture."""
+
+    key: str
+    rgb: np.ndarray | None
+    problem: str = ""
+
+
+Result = Progress | SceneReady | SceneWritten | Failed | Stopped | Compiled | Scored | Thumbnail

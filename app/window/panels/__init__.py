@@ -1,0 +1,59 @@
+"""Panels: each reads the state and returns the commands that the person's hands issued."""
+
+from imgui_bundle import ImVec2, imgui
+
+from app.window import commands as do
+from app.window import theme
+from app.window.panels import canvas, overlays, photos, prompts, status, toolbar, widgets
+from app.window.panels.look import Look
+from app.window.state import State
+
+__all__ = ["Look", "draw_all"]
+
+CANVAS_TOP = 52.0  # design pixels
+_VIEWS = 88.0
+
+
+def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int]]:
+    """Every panel of one frame.
+
+    Returns:
+        What was issued, and the size of the picture's place in framebuffer pixels.
+    """
+    io = imgui.get_io()
+    width, height = io.display_size.x, io.display_size.y
+    left, bar, top = look.px(theme.PANEL_WIDTH), look.px(theme.STATUS_HEIGHT), look.px(CANVAS_TOP)
+    place, size = ImVec2(left, top), ImVec2(max(width - left, 1), max(height - bar - top, 1))
+    issued = _picture(state, look, place, size)
+    with widgets.window("##panel", ImVec2(0, 0), ImVec2(left, height - bar)):
+        issued += photos.draw(state, look)
+        widgets.gap(look.px(6))
+        imgui.separator()
+        widgets.gap(look.px(6))
+        issued += prompts.draw(state, look)
+    with widgets.window("##toolbar", ImVec2(left, 0), ImVec2(size.x, top)):
+        imgui.set_cursor_pos_y((top - imgui.get_frame_height()) / 2)
+        issued += toolbar.draw(state, look)
+    with widgets.window("##status", ImVec2(0, height - bar), ImVec2(width, bar)):
+        imgui.set_cursor_pos_y((bar - imgui.get_text_line_height()) / 2)
+        status.draw(state, look)
+    issued += overlays.draw_toasts(state, look, ImVec2(width, height - bar))
+    issued += overlays.draw_dialog(state, look)
+    issued += canvas.keys(state)
+    pixels = io.display_framebuffer_scale
+    return issued, (round(size.x * pixels.x), round(size.y * pixels.y))
+
+
+def _picture(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
+    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
+    with widgets.window("##picture", place, size, imgui.WindowFlags_.no_background):
+        imgui.pop_style_var()
+        issued = canvas.draw(state, look)
+    if state.info is not None and state.info.views:
+        corner = ImVec2(place.x, place.y + size.y - look.px(_VIEWS))
+        flags = imgui.WindowFlags_.no_background | imgui.WindowFlags_.always_auto_resize
+        imgui.set_next_window_pos(corner)
+        imgui.begin("##views", None, widgets.PLAIN | flags)
+        issued += toolbar.draw_views(state, look)
+        imgui.end()
+    return issued

@@ -1,0 +1,113 @@
+"""The picture and the hands on it: orbit, pan, zoom, fly. Also the keys that work everywhere."""
+
+import math
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
+
+from app.window import commands as do
+from app.window import poses, theme
+from app.window.panels import widgets
+from app.window.panels.look import Look
+from app.window.poses import Pose
+from app.window.state import Mode, State
+
+TURN = math.radians(0.3)  # per pixel at scale 1
+ZOOM = 0.9  # of the distance, per notch of the wheel
+SPEED = 0.9  # of the distance to the pivot, per second
+FAST = 3.0  # with shift
+LONGEST_STEP = 0.25  # seconds of flight a slow frame may count for
+
+_FLY_KEYS = (
+    (imgui.Key.w, (0, 0, 1)), (imgui.Key.s, (0, 0, -1)), (imgui.Key.a, (-1, 0, 0)),
+    (imgui.Key.d, (1, 0, 0)), (imgui.Key.q, (0, 1, 0)), (imgui.Key.e, (0, -1, 0)),
+)  # fmt: skip
+_MODE_KEYS = tuple(
+    zip((imgui.Key._1, imgui.Key._2, imgui.Key._3, imgui.Key._4, imgui.Key._5), Mode, strict=True)
+)
+
+# Taken from the event itself: on a slow machine S and the release of Ctrl share a frame.
+SHORTCUTS = {"s": do.ShowDialog("save"), "o": do.ShowDialog("open"), "q": do.Leave()}
+
+
+def draw(state: State, look: Look) -> list[do.Command]:
+    """The picture filling the present window, and what the pointer does on it."""
+    size = imgui.get_content_region_avail()
+    corner = imgui.get_cursor_screen_pos()
+    end = ImVec2(corner.x + size.x, corner.y + size.y)
+    if look.picture is not None:
+        imgui.get_window_draw_list().add_image(imgui.ImTextureRef(look.picture.glo), corner, end)
+    else:
+        _welcome(state, corner, size)
+    buttons = imgui.ButtonFlags_
+    flags = buttons.mouse_button_left | buttons.mouse_button_right | buttons.mouse_button_middle
+    imgui.invisible_button("picture", ImVec2(max(size.x, 1), max(size.y, 1)), flags)
+    if state.info is None:
+        return []
+    pose = _pointed(state.pose, look, size)
+    pose = _flown(pose)
+    return [do.MoveTo(pose)] if pose != state.pose else []
+
+
+def keys(state: State) -> list[do.Command]:
+    """Keys that work wherever the pointer is; those with Ctrl are in `SHORTCUTS`."""
+    io = imgui.get_io()
+    issued: list[do.Command] = []
+    if imgui.is_key_pressed(imgui.Key.f1, False):
+        issued.append(do.ShowDialog("help"))
+    if imgui.is_key_pressed(imgui.Key.escape, False) and not io.want_text_input:
+        issued.append(do.ShowDialog(None) if state.dialog else do.Leave())
+    if io.want_text_input or io.key_ctrl or state.dialog or state.info is None:
+        return issued
+    if imgui.is_key_pressed(imgui.Key.h, False) or imgui.is_key_pressed(imgui.Key.home, False):
+        issued.append(do.Home())
+    issued += [do.SetMode(mode) for key, mode in _MODE_KEYS if imgui.is_key_pressed(key, False)]
+    return issued
+
+
+def _pointed(pose: Pose, look: Look, size: ImVec2) -> Pose:
+    """The pose after this frame's dragging and wheel."""
+    io = imgui.get_io()
+    dx, dy = io.mouse_delta.x, io.mouse_delta.y
+    if (imgui.is_item_active() or imgui.is_item_deactivated()) and (dx or dy):
+        turn = TURN / look.scale
+        if _held(1):
+            pose = poses.look(pose, -dx * turn, -dy * turn)
+        elif _held(2) or io.key_shift:
+            unit = poses.units_per_pixel(pose, round(size.x), round(size.y))
+            pose = poses.pan(pose, -dx * unit, -dy * unit)
+        else:
+            pose = poses.orbit(pose, -dx * turn, -dy * turn)
+    if imgui.is_item_hovered() and io.mouse_wheel:
+        pose = poses.zoom(pose, ZOOM**io.mouse_wheel)
+    return pose
+
+
+def _held(button: int) -> bool:
+    """Down, or let go in this very frame: a quick drag on a slow machine is over within one."""
+    return imgui.is_mouse_down(button) or imgui.is_mouse_released(button)
+
+
+def _flown(pose: Pose) -> Pose:
+    """The pose after this frame's WASD, Q down and E up."""
+    io = imgui.get_io()
+    if io.want_text_input or io.key_ctrl or imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
+        return pose
+    step = SPEED * pose.reach * min(io.delta_time, LONGEST_STEP) * (FAST if io.key_shift else 1.0)
+    held = [axis for key, axis in _FLY_KEYS if imgui.is_key_down(key)]
+    right, down, forward = (step * sum(axis[i] for axis in held) for i in range(3))
+    return poses.fly(pose, right, down, forward) if held else pose
+
+
+def _welcome(state: State, corner: ImVec2, size: ImVec2) -> None:
+    """What to do first, in the middle of the empty canvas."""
+    text = f"{state.job.title}: {state.job.stage}" if state.job else "Drop photos of a room here"
+    lines = ((fa.ICON_FA_CUBES, theme.LINE, 3.0), (text, theme.MUTED, 1.25))
+    top = corner.y + size.y / 2
+    canvas = imgui.get_window_draw_list()
+    for line, colour, factor in lines:
+        imgui.push_font(None, theme.FONT_SIZE * factor)
+        extent = imgui.calc_text_size(line)
+        canvas.add_text(ImVec2(corner.x + (size.x - extent.x) / 2, top - extent.y), widgets.u32(colour), line)
+        top += extent.y * 1.4
+        imgui.pop_font()

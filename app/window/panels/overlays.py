@@ -1,0 +1,145 @@
+"""Over everything: toasts with a remedy, and the few dialogs."""
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
+
+from app.window import commands as do
+from app.window import theme
+from app.window.drops import typed_path, typed_scene
+from app.window.panels import widgets
+from app.window.panels.look import Look
+from app.window.state import State, Toast
+
+TITLES = {"save": "Save the scene", "open": "Open", "help": "Mouse and keys", "leave": "Leave?"}
+HELP = (
+    ("Left drag", "orbit"),
+    ("Middle drag, Shift + left drag", "pan"),
+    ("Wheel", "zoom"),
+    ("Right drag", "look around"),
+    ("W A S D, Q E", "fly, down and up; Shift is faster"),
+    ("H or Home", "back to the first photo's view"),
+    ("1 to 5", "colour, heat-map, labels, atoms, depth"),
+    ("Ctrl + O, Ctrl + S", "open, save"),
+    ("Ctrl + Q", "leave"),
+)
+
+
+def draw_toasts(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
+    """Messages stacked upwards from `corner`, the lower right of the picture."""
+    issued: list[do.Command] = []
+    bottom = corner.y - look.px(14)
+    for toast in reversed(state.toasts):
+        imgui.set_next_window_pos(ImVec2(corner.x - look.px(14), bottom), 0, ImVec2(1, 1))
+        imgui.set_next_window_size(ImVec2(look.px(400), 0))
+        imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
+        imgui.push_style_color(imgui.Col_.window_bg, imgui.get_style().color_(imgui.Col_.popup_bg))
+        imgui.begin(f"##toast{toast.key}", None, widgets.PLAIN | imgui.WindowFlags_.no_focus_on_appearing)
+        issued += _toast(toast, look)
+        bottom -= imgui.get_window_height() + look.px(8)
+        imgui.end()
+        imgui.pop_style_color()
+        imgui.pop_style_var()
+    return issued
+
+
+def _toast(toast: Toast, look: Look) -> list[do.Command]:
+    issued: list[do.Command] = []
+    error = toast.kind == "error"
+    icon = fa.ICON_FA_CIRCLE_EXCLAMATION if error else fa.ICON_FA_CHECK
+    imgui.text_colored(theme.BAD if error else theme.GOOD, icon)
+    imgui.same_line()
+    imgui.push_text_wrap_pos(look.px(400 - 16 - (70 if error else 40)))
+    imgui.text_unformatted(toast.text)
+    imgui.pop_text_wrap_pos()
+    right, top = look.px(400 - 16 - 30), imgui.get_style().window_padding.y - look.px(6)
+    if error:
+        imgui.set_cursor_pos(ImVec2(right - look.px(32), top))
+        if widgets.quiet_button(f"{fa.ICON_FA_COPY}##copy", "Copy"):
+            issued.append(do.CopyText(toast.text))
+    imgui.set_cursor_pos(ImVec2(right, top))
+    if widgets.quiet_button(f"{fa.ICON_FA_XMARK}##close", "Close"):
+        issued.append(do.DismissToast(toast.key))
+    return issued
+
+
+def draw_dialog(state: State, look: Look) -> list[do.Command]:
+    """The dialog that is open, if any."""
+    if state.dialog is None:
+        return []
+    title = TITLES[state.dialog]
+    if not imgui.is_popup_open(title):
+        imgui.open_popup(title)
+    middle = imgui.get_main_viewport().get_center()
+    imgui.set_next_window_pos(middle, imgui.Cond_.appearing, ImVec2(0.5, 0.5))
+    imgui.set_next_window_size(ImVec2(look.px(520), 0))
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
+    opened, kept = imgui.begin_popup_modal(title, True, imgui.WindowFlags_.no_resize)
+    issued: list[do.Command] = []
+    if opened:
+        body = {"save": _save, "open": _open, "help": _help, "leave": _leave}[state.dialog]
+        issued = body(state, look)
+        if not kept:
+            issued.append(do.ShowDialog(None))
+        if any(isinstance(c, do.ShowDialog | do.SaveScene | do.OpenPaths) for c in issued):
+            imgui.close_current_popup()
+        imgui.end_popup()
+    imgui.pop_style_var()
+    return issued
+
+
+def _save(state: State, look: Look) -> list[do.Command]:
+    issued, confirmed = _path_field(state, "Where to write it")
+    path = typed_scene(state.dialog_path)
+    exists = path is not None and path.is_file()
+    consequence = f"{path} will be replaced." if exists else f"Writes {path}"
+    widgets.muted("Type a file name." if path is None else consequence)
+    imgui.begin_disabled(path is None)
+    pressed = widgets.primary_button("Replace" if exists else "Save", look.vec(120, 0))
+    imgui.end_disabled()
+    if path is not None and (pressed or confirmed):
+        issued.append(do.SaveScene(path))
+    return issued
+
+
+def _open(state: State, look: Look) -> list[do.Command]:
+    issued, confirmed = _path_field(state, "A scene, a photo, or a folder of photos")
+    text = state.dialog_path.strip()
+    imgui.begin_disabled(not text)
+    pressed = widgets.primary_button("Open", look.vec(120, 0))
+    imgui.end_disabled()
+    if text and (pressed or confirmed):
+        issued.append(do.OpenPaths((str(typed_path(text)),)))
+    return issued
+
+
+def _path_field(state: State, label: str) -> tuple[list[do.Command], bool]:
+    """A path to edit; the second value tells whether Enter was pressed."""
+    imgui.text(label)
+    imgui.set_next_item_width(-1)
+    if imgui.is_window_appearing():
+        imgui.set_keyboard_focus_here()
+    changed, path = imgui.input_text("##path", state.dialog_path)
+    confirmed = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
+    return ([do.EditDialogPath(path)] if changed else []), confirmed
+
+
+def _help(state: State, look: Look) -> list[do.Command]:
+    for gesture, meaning in HELP:
+        imgui.text(gesture)
+        imgui.same_line(look.px(250))
+        imgui.text_colored(theme.MUTED, meaning)
+    return []
+
+
+def _leave(state: State, look: Look) -> list[do.Command]:
+    imgui.text_wrapped("The scene is not saved.")
+    issued: list[do.Command] = []
+    if widgets.primary_button("Save first", look.vec(120, 0)):
+        issued.append(do.ShowDialog("save"))
+    imgui.same_line()
+    if imgui.button("Leave", look.vec(120, 0)) or imgui.is_key_pressed(imgui.Key.enter):
+        issued.append(do.Leave(sure=True))
+    imgui.same_line()
+    if imgui.button("Stay", look.vec(120, 0)):
+        issued.append(do.ShowDialog(None))
+    return issued

@@ -1,0 +1,257 @@
+"""Where the person stands: a pose to orbit, pan, zoom and fly with, as pure functions.
+
+Conventions of the core: OpenCV axes, world = camera of view 0, quaternions wxyz. World up is
+-y, because view 0 was held roughly level. A pose frames a *box* with the shape of the photos
+inside a panel of any shape: the box always fits, so an input view shows all of its photo.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from langflash_core.types import Camera
+
+UP = np.array([0.0, -1.0, 0.0])
+MIN_REACH = 0.02  # scene units; nearer than this the pivot is inside the lens
+MIN_POLE_DEGREES = 4.0  # how near to straight up or down an orbit may come
+FOV_RANGE = (15.0, 120.0)
+
+
+class Vector(NamedTuple):
+    """A point or direction, world axes, scene units."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Rotation(NamedTuple):
+    """A unit quaternion."""
+
+    w: float
+    x: float
+    y: float
+    z: float
+
+
+ORIGIN = Vector(0.0, 0.0, 0.0)
+UNTURNED = Rotation(1.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A camera a person can move.
+
+    centre: scene units. rotation: camera to world. reach: distance to the pivot along the
+    viewing direction, scene units. fov: degrees over the longer side of the photo box.
+    aspect: width / height of the box. shift: principal point minus the box's middle, in box
+    widths and heights.
+    """
+
+    centre: Vector = ORIGIN
+    rotation: Rotation = UNTURNED
+    reach: float = 1.0
+    fov: float = 60.0
+    aspect: float = 4 / 3
+    shift: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def axes(self) -> np.ndarray:
+        """Camera to world rotation (3, 3); its columns are right, down, forward."""
+        return _matrix(self.rotation)
+
+    @property
+    def pivot(self) -> np.ndarray:
+        """The point (3,) that orbits turn around."""
+        return np.array(self.centre) + self.reach * self.axes[:, 2]
+
+
+START = Pose()  # of an empty window
+
+
+def from_view(viewmat: np.ndarray, K: np.ndarray, size: tuple[int, int], reach: float) -> Pose:
+    """The pose of an input view: viewmat (4, 4) world to camera, K (3, 3), size (width, height)."""
+    width, height = size
+    axes = viewmat[:3, :3].T
+    focal = K[0, 0] if width >= height else K[1, 1]
+    return Pose(
+        centre=Vector(*(-axes @ viewmat[:3, 3]).tolist()),
+        rotation=_quaternion(axes),
+        reach=max(float(reach), MIN_REACH),
+        fov=math.degrees(2 * math.atan(0.5 * max(width, height) / float(focal))),
+        aspect=width / height,
+        shift=(float(K[0, 2]) / width - 0.5, float(K[1, 2]) / height - 0.5),
+    )
+
+
+def intrinsics(pose: Pose, width: int, height: int) -> np.ndarray:
+    """K (3, 3) in pixels of a width x height picture that holds the pose's whole box."""
+    box_width = min(width, height * pose.aspect)
+    box_height = box_width / pose.aspect
+    focal = 0.5 * max(box_width, box_height) / math.tan(math.radians(pose.fov) / 2)
+    centre_x = width / 2 + pose.shift[0] * box_width
+    centre_y = height / 2 + pose.shift[1] * box_height
+    return np.array([[focal, 0.0, centre_x], [0.0, focal, centre_y], [0.0, 0.0, 1.0]])
+
+
+def viewmat(pose: Pose) -> np.ndarray:
+    """World to camera (4, 4)."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = pose.axes.T
+    matrix[:3, 3] = -pose.axes.T @ np.array(pose.centre)
+    return matrix
+
+
+def to_camera(pose: Pose, width: int, height: int) -> "Camera":
+    """The core's camera, float32, for a picture of width x height pixels."""
+    import torch  # the first frame is drawn before torch is needed
+
+    from langflash_core.types import Camera
+
+    return Camera(
+        torch.tensor(viewmat(pose), dtype=torch.float32),
+        torch.tensor(intrinsics(pose, width, height), dtype=torch.float32),
+        width,
+        height,
+    )
+
+
+def orbit(pose: Pose, yaw: float, pitch: float) -> Pose:
+    """Turn around the pivot, radians: yaw about world up, pitch about the camera's x axis."""
+    turned = look(pose, yaw, pitch)
+    centre = pose.pivot - pose.reach * turned.axes[:, 2]
+    return replace(turned, centre=Vector(*centre.tolist()))
+
+
+def look(pose: Pose, yaw: float, pitch: float) -> Pose:
+    """Turn on the spot, radians; stops short of the poles so that up stays up."""
+    axes = _about(UP, yaw) @ pose.axes
+    from_pole = math.acos(float(np.clip(axes[:, 2] @ UP, -1.0, 1.0)))
+    floor = math.radians(MIN_POLE_DEGREES)
+    # Looking up shrinks the angle to the pole: a positive pitch turns the view upwards.
+    lowest, highest = min(floor - from_pole, 0.0), max(math.pi - floor - from_pole, 0.0)
+    pitch = -float(np.clip(-pitch, lowest, highest))
+    return replace(pose, rotation=_quaternion(_about(axes[:, 0], pitch) @ axes))
+
+
+def pan(pose: Pose, right: float, down: float) -> Pose:
+    """Slide in the picture plane, scene units; the pivot moves along."""
+    return fly(pose, right, down, 0.0)
+
+
+def fly(pose: Pose, right: float, down: float, forward: float) -> Pose:
+    """Move along the camera's own axes, scene units."""
+    step = pose.axes @ np.array([right, down, forward])
+    return replace(pose, centre=Vector(*(np.array(pose.centre) + step).tolist()))
+
+
+def zoom(pose: Pose, factor: float) -> Pose:
+    """Scale the distance to the pivot; a factor below 1 comes nearer."""
+    reach = max(pose.reach * factor, MIN_REACH)
+    centre = pose.pivot - reach * pose.axes[:, 2]
+    return replace(pose, centre=Vector(*centre.tolist()), reach=reach)
+
+
+def with_fov(pose: Pose, degrees: float) -> Pose:
+    """Another field of view, clamped to `FOV_RANGE`."""
+    return replace(pose, fov=float(np.clip(degrees, *FOV_RANGE)))
+
+
+def units_per_pixel(pose: Pose, width: int, height: int) -> float:
+    """Scene units that one pixel spans at the pivot's depth."""
+    return pose.reach / float(intrinsics(pose, width, height)[0, 0])
+
+
+def blend(start: Pose, end: Pose, fraction: float) -> Pose:
+    """Between two poses: slerp of the rotations, smooth start and stop; exact at both ends."""
+    if fraction <= 0.0:
+        return start
+    if fraction >= 1.0:
+        return end
+    t = fraction * fraction * (3.0 - 2.0 * fraction)
+
+    def mix(a: float, b: float) -> float:
+        return a + t * (b - a)
+
+    return Pose(
+        centre=Vector(*(mix(a, b) for a, b in zip(start.centre, end.centre, strict=True))),
+        rotation=slerp(start.rotation, end.rotation, t),
+        reach=mix(start.reach, end.reach),
+        fov=mix(start.fov, end.fov),
+        aspect=mix(start.aspect, end.aspect),
+        shift=(mix(start.shift[0], end.shift[0]), mix(start.shift[1], end.shift[1])),
+    )
+
+
+def slerp(start: Rotation, end: Rotation, t: float) -> Rotation:
+    """Constant angular speed along the shorter arc. Source: Shoemake, SIGGRAPH 1985."""
+    a, b = np.array(start), np.array(end)
+    dot = float(a @ b)
+    if dot < 0:
+        b, dot = -b, -dot
+    angle = math.acos(min(dot, 1.0))
+    if angle < 1e-6:  # sin(angle) would divide by nothing; a straight line is exact enough
+        mixed = a + t * (b - a)
+    else:
+        mixed = (math.sin((1 - t) * angle) * a + math.sin(t * angle) * b) / math.sin(angle)
+    return Rotation(*(mixed / np.linalg.norm(mixed)).tolist())
+
+
+def median_reach(means: np.ndarray, viewmat: np.ndarray, K: np.ndarray, size: tuple[int, int]) -> float:
+    """Median depth of what lies in the middle half of a view: the distance to orbit at.
+
+    Args:
+        means: (N, 3) world. viewmat: (4, 4) world to camera. K: (3, 3). size: (width, height).
+
+    Returns:
+        Depth in scene units; 1, the scene's own unit, when nothing is in front.
+    """
+    pos_c = means @ viewmat[:3, :3].T + viewmat[:3, 3]
+    depths = pos_c[:, 2]
+    safe = np.where(depths > MIN_REACH, depths, np.inf)
+    x = pos_c[:, 0] / safe * K[0, 0] + K[0, 2]
+    y = pos_c[:, 1] / safe * K[1, 1] + K[1, 2]
+    middle = (abs(x / size[0] - 0.5) < 0.25) & (abs(y / size[1] - 0.5) < 0.25) & (depths > MIN_REACH)
+    return float(np.median(depths[middle])) if middle.any() else 1.0
+
+
+def _about(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Rotation (3, 3) by `angle` radians about a unit axis. Source: Rodrigues' formula."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+
+
+def _matrix(rotation: Rotation) -> np.ndarray:
+    """Rotation matrix (3, 3) of a unit quaternion; twin of geometry.quats_to_matrices, no torch."""
+    w, x, y, z = rotation
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _quaternion(matrix: np.ndarray) -> Rotation:
+    """Unit quaternion of a rotation (3, 3): the eigenvector of Bar-Itzhack's symmetric matrix.
+
+    Tolerates the rounding of float32 poses. Source: Bar-Itzhack, "New method for extracting
+    the quaternion from a rotation matrix", 2000.
+    """
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    symmetric = np.array(
+        [
+            [a - e - i, d + b, g + c, h - f],
+            [d + b, e - a - i, h + f, c - g],
+            [g + c, h + f, i - a - e, d - b],
+            [h - f, c - g, d - b, a + e + i],
+        ]
+    )
+    x, y, z, w = np.linalg.eigh(symmetric)[1][:, -1].tolist()
+    sign = -1.0 if w < 0 else 1.0
+    return Rotation(sign * w, sign * x, sign * y, sign * z)

@@ -1,0 +1,191 @@
+"""The picture in the middle: which splat passes to run, and which texture shows the result.
+
+Owns the `SplatRenderer`. Draws a new picture only when the pose, the panel, the scene or what
+is asked for has changed; a new phrase on a resting picture is a query pass and no splat pass.
+"""
+
+import time
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import moderngl
+import numpy as np
+
+from app.window.pace import SETTLE_AFTER, Pace, Plan
+from app.window.poses import START, Pose, to_camera
+from app.window.state import Mode, State
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from app.gl import SplatRenderer
+    from langflash_core.query.relevance import CompiledQuery
+    from langflash_core.types import Camera, Frame, Scene
+
+BACKGROUND = (0.055, 0.06, 0.07)  # the theme's canvas
+COLORMAP = "turbo"
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """What the renderer's buffers hold."""
+
+    serial: int
+    pose: Pose
+    size: tuple[int, int]  # of the panel, pixels
+    plan: Plan
+
+
+@dataclass(frozen=True)
+class View:
+    """A picture at rest, read back for the worker to score."""
+
+    serial: int
+    keys: tuple[int, ...]
+    frame: "Frame"
+    relevance: "Tensor"
+    camera: "Camera"
+    query: "CompiledQuery"
+
+
+class Viewport:
+    """Draws the scene into textures of `ctx`. Main thread only; `release` may be called twice."""
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self._ctx = ctx
+        self._renderer: SplatRenderer | None = None
+        self._serial = 0
+        self._query: CompiledQuery | None = None
+        self._keys: tuple[int, ...] = ()
+        self._drawn: _Drawn | None = None
+        self._camera: Camera | None = None
+        self._pose = START
+        self._size = (0, 0)  # of the panel, pixels
+        self._moved = 0.0
+        self._answered: tuple | None = None
+        self._colouring: tuple | None = None
+        self._texture: moderngl.Texture | None = None
+        self.pace = Pace()
+        self.picture_seconds = 0.0
+        self.picture_size = (0, 0)
+
+    @property
+    def texture(self) -> moderngl.Texture | None:
+        """The picture to show, or None before the first scene."""
+        return self._texture
+
+    @property
+    def passes(self) -> tuple[tuple[str, int], ...]:
+        """Passes run so far, by kind."""
+        return () if self._renderer is None else tuple(sorted(self._renderer.passes.items()))
+
+    def set_scene(self, serial: int, scene: "Scene") -> None:
+        """Upload a scene; the first one builds the renderer.
+
+        Raises:
+            GraphicsError: the OpenGL here cannot do it.
+        """
+        if self._renderer is None:
+            from app.gl import SplatRenderer  # loads torch; the worker has by now
+
+            self._renderer = SplatRenderer(self._ctx)
+        renderer = self._renderer
+        renderer.set_scene(scene)
+        renderer.ask(None)
+        self._serial, self._query, self._keys = serial, None, ()
+        self._drawn = self._texture = self._colouring = self._answered = None
+        self.pace = Pace()
+
+    def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None") -> None:
+        """Ask the prompts `keys`, in the order of `query`; None asks nothing."""
+        self._keys, self._query = keys, query
+        self._colouring = self._answered = None
+        if self._renderer is not None:
+            self._renderer.ask(query)
+
+    def update(self, state: State, size: tuple[int, int], touched: float) -> float:
+        """Bring the picture up to date; returns seconds until it wants to be called again.
+
+        size: of the panel in framebuffer pixels. touched: when the last key or pointer event came,
+        on the clock of `state.now`.
+        """
+        if self._renderer is None or state.info is None or min(size) < 8:
+            return float("inf")
+        if (state.pose, size) != (self._pose, self._size):
+            self._pose, self._size, self._moved = state.pose, size, state.now
+        still = state.now - max(self._moved, touched)
+        wants_maps = state.wants_maps and state.info.num_atoms > 0
+        plan = self.pace.resting(wants_maps, still) or self.pace.moving(wants_maps)
+        wanted = _Drawn(self._serial, state.pose, size, plan)
+        if not self._covers(wanted):
+            self._draw(wanted)
+        self._colour(state)
+        return self.pace.next_rest(still)
+
+    def view(self, state: State) -> View | None:
+        """The resting view to score, once per picture and query; None when there is nothing new."""
+        drawn = self._drawn
+        if self._renderer is None or self._query is None or drawn is None or self._camera is None:
+            return None
+        if not drawn.plan.maps or state.now - self._moved < SETTLE_AFTER:
+            return None
+        key = (drawn, id(self._query))
+        if key == self._answered:
+            return None
+        self._answered = key
+        frame = self._renderer.frame()
+        return View(drawn.serial, self._keys, frame, self._renderer.relevance(), self._camera, self._query)
+
+    def release(self) -> None:
+        """Free what the renderer holds."""
+        if self._renderer is not None:
+            self._renderer.release()
+            self._renderer = None
+        self._texture = None
+
+    def _covers(self, wanted: _Drawn) -> bool:
+        """Whether the buffers already hold at least what is wanted."""
+        drawn = self._drawn
+        if drawn is None or drawn != replace(wanted, plan=drawn.plan):
+            return False
+        return drawn.plan.scale >= wanted.plan.scale and drawn.plan.maps >= wanted.plan.maps
+
+    def _draw(self, wanted: _Drawn) -> None:
+        assert self._renderer is not None
+        width, height = (max(8, round(side * wanted.plan.scale)) for side in wanted.size)
+        self._camera = to_camera(wanted.pose, width, height)
+        start = time.perf_counter()
+        self._renderer.draw(self._camera, background=BACKGROUND, weight_maps=wanted.plan.maps)
+        self._ctx.finish()  # software and hardware alike: the time of the picture, not of the call
+        seconds = time.perf_counter() - start
+        self.pace = self.pace.learn(wanted.plan, seconds)
+        self.picture_seconds, self.picture_size = seconds, (width, height)
+        self._drawn, self._colouring = wanted, None
+
+    def _colour(self, state: State) -> None:
+        """Choose the texture for the mode; repaint it only when something it shows has changed."""
+        renderer, drawn = self._renderer, self._drawn
+        if renderer is None or drawn is None:
+            return
+        shown = {p.key: p for p in state.prompts}
+        asked = [shown[key] for key in self._keys if key in shown]
+        mode = state.mode if drawn.plan.maps or state.mode is Mode.DEPTH else Mode.RGB
+        if mode in (Mode.HEAT, Mode.LABELS) and (not asked or len(asked) != len(self._keys)):
+            mode = Mode.RGB
+        active = next((i for i, p in enumerate(asked) if p.key == state.active), 0)
+        colouring = (mode, active, tuple((p.colour, p.cut) for p in asked))
+        if colouring == self._colouring:
+            return
+        self._colouring = colouring
+        if mode is Mode.HEAT:
+            self._texture = renderer.heat_texture(active, COLORMAP, asked[active].cut, True)
+        elif mode is Mode.LABELS:
+            self._texture = renderer.label_texture(
+                np.array([p.colour for p in asked], np.float32), min(p.cut for p in asked)
+            )
+        elif mode is Mode.ATOMS:
+            self._texture = renderer.atom_texture()
+        elif mode is Mode.DEPTH:
+            self._texture = renderer.depth_texture()
+        else:
+            self._texture = renderer.rgb_texture

@@ -1,0 +1,265 @@
+"""The one worker thread: everything slow or heavy, and neither OpenGL nor ImGui.
+
+A *job* makes a scene; the newest replaces and cancels the one before, which then falls silent.
+*Errands* are short and run between jobs and, so that typing works during a reconstruction,
+between the stages of one. Of `Encode` and `Answer` only the newest is ever run.
+"""
+
+import logging
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from queue import Empty, SimpleQueue
+
+import numpy as np
+
+from app.window.messages import (
+    Answer,
+    Compiled,
+    Encode,
+    Errand,
+    Failed,
+    Job,
+    LoadScene,
+    MakeThumbnails,
+    Progress,
+    ReconstructPhotos,
+    Result,
+    SceneReady,
+    SceneWritten,
+    Scored,
+    Stopped,
+    Thumbnail,
+    WriteScene,
+)
+from langflash_core.errors import Cancelled, ImageError, LangFlashError
+
+log = logging.getLogger(__name__)
+
+THUMBNAIL_SIDE = 320  # pixels of the longer side
+_ANSWERS_REPLACE = (Encode, Answer)  # a newer one of these makes an older one pointless
+
+
+class Worker:
+    """A thread with a mailbox. `notify` is called, from the thread, after each result.
+
+    `submit` and `cancel` return at once. `stop` cancels, waits at most `patience` seconds, and
+    may be called twice.
+    """
+
+    def __init__(self, notify: Callable[[], None] = lambda: None) -> None:
+        self._notify = notify
+        self._changed = threading.Condition()
+        self._errands: list[Errand] = []
+        self._job: Job | None = None
+        self._token = 0  # of the newest job; an older one is silent
+        self._cancelled = False
+        self._stopping = False
+        self._results: SimpleQueue[Result] = SimpleQueue()
+        self._serial = 0
+        self._thread = threading.Thread(target=self._run, name="langflash-worker", daemon=True)
+        self._thread.start()
+
+    def submit(self, request: Job | Errand) -> None:
+        """Queue a request; a job cancels the job under way."""
+        with self._changed:
+            if isinstance(request, ReconstructPhotos | LoadScene):
+                self._job = request
+                self._token += 1
+                self._cancelled = False
+            else:
+                kept = self._errands
+                if isinstance(request, _ANSWERS_REPLACE):
+                    kept = [e for e in kept if type(e) is not type(request)]
+                self._errands = [*kept, request]
+            self._changed.notify()
+
+    def cancel(self) -> None:
+        """Stop the job, at the latest after its present stage; `Stopped` follows."""
+        with self._changed:
+            self._cancelled = True
+
+    def poll(self) -> list[Result]:
+        """Results that have arrived since the last call, oldest first."""
+        results: list[Result] = []
+        while True:
+            try:
+                results.append(self._results.get_nowait())
+            except Empty:
+                return results
+
+    def stop(self, patience: float = 2.0) -> None:
+        """End the thread. A stage that takes longer than `patience` dies with the process."""
+        with self._changed:
+            self._stopping = True
+            self._cancelled = True
+            self._changed.notify()
+        self._thread.join(patience)
+
+    def _put(self, result: Result) -> None:
+        self._results.put(result)
+        self._notify()
+
+    def _run(self) -> None:
+        try:
+            _import_heavy()
+        except Exception as error:  # a broken installation: say so, and let each request say it again
+            self._put(Failed(_unexpected(error), job=False))
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._stopping or self._errands or self._job)
+                if self._stopping:
+                    return
+                job, token = self._job, self._token
+                if not self._errands:
+                    self._job = None
+            if self._errands:
+                self._run_errands()
+            elif job is not None:
+                self._run_job(job, token)
+
+    def _run_errands(self) -> None:
+        """Run what is queued now, oldest first."""
+        while True:
+            with self._changed:
+                if self._stopping or not self._errands:
+                    return
+                errand, *self._errands = self._errands
+            try:
+                self._put_all(errand)
+            except LangFlashError as error:
+                self._put(Failed(str(error), job=False))
+            except Exception as error:
+                self._put(Failed(_unexpected(error), job=False))
+
+    def _put_all(self, errand: Errand) -> None:
+        match errand:
+            case Encode():
+                self._put(compile_prompts(errand))
+            case Answer():
+                self._put(score_prompts(errand))
+            case WriteScene(scene, path):
+                from langflash_core.scene import save
+
+                save(scene, path)
+                self._put(SceneWritten(path))
+            case MakeThumbnails(paths):
+                for path in paths:
+                    self._put(make_thumbnail(path))
+
+    def _run_job(self, job: Job, token: int) -> None:
+        def stale() -> bool:
+            return self._token != token
+
+        def cancelled() -> bool:
+            return self._cancelled or self._stopping or stale()
+
+        def progress(stage: str, fraction: float) -> None:
+            if not stale():
+                self._put(Progress(stage, fraction))
+            self._run_errands()
+
+        self._serial += 1
+        try:
+            ready = make_scene(job, self._serial, progress, cancelled)
+            outcome: Result = Stopped() if self._cancelled else ready
+        except Cancelled:
+            outcome = Stopped()
+        except LangFlashError as error:
+            outcome = Failed(str(error), job=True)
+        except Exception as error:
+            outcome = Failed(_unexpected(error), job=True)
+        if not stale():
+            self._put(outcome)
+
+
+def make_scene(
+    job: Job, serial: int, progress: Callable[[str, float], None], cancelled: Callable[[], bool]
+) -> SceneReady:
+    """Reconstruct or load, and look the scene over for the window.
+
+    Raises:
+        LangFlashError: what `reconstruct` and `load` raise; Cancelled among them.
+    """
+    if isinstance(job, LoadScene):
+        from langflash_core.scene import load
+
+        scene = load(job.path)
+        return SceneReady(describe_scene(scene, serial, job.path.name, job.path))
+    from langflash_core.pipeline import reconstruct
+
+    scene = reconstruct(job.paths, progress=progress, cancelled=cancelled)
+    name = " + ".join(path.stem for path in job.paths[:3]) + (" ..." if len(job.paths) > 3 else "")
+    return SceneReady(describe_scene(scene, serial, name))
+
+
+def describe_scene(scene, serial: int, name: str, path: Path | None = None):
+    """`SceneInfo` of a `Scene`: counts, warnings, and a pose per input view."""
+    from app.window.poses import from_view, median_reach
+    from app.window.state import SceneInfo
+
+    means = scene.gaussians.means.double().numpy()
+    views = []
+    for viewmat, K in zip(scene.viewmats.double().numpy(), scene.Ks.double().numpy(), strict=True):
+        views.append(from_view(viewmat, K, scene.view_size, median_reach(means, viewmat, K, scene.view_size)))
+    return SceneInfo(
+        serial=serial,
+        name=name,
+        scene=scene,
+        views=tuple(views),
+        num_gaussians=len(scene.gaussians),
+        num_atoms=scene.semantics.num_atoms,
+        space=scene.semantics.space,
+        warnings=tuple(str(w) for w in scene.metadata.get("warnings", ())),
+        path=path,
+    )
+
+
+def compile_prompts(request: Encode) -> Compiled:
+    """Text towers and the reduced dictionary; milliseconds once the tower is loaded."""
+    from langflash_core.query.relevance import compile_query
+    from langflash_core.query.spaces import language_space
+
+    space = language_space(request.scene.semantics.space)
+    query = compile_query(
+        request.scene, space, list(request.texts), negatives=list(request.negatives) or None
+    )
+    return Compiled(request.serial, request.keys, query)
+
+
+def score_prompts(request: Answer) -> Scored:
+    """Scores of the prompts in the view on show."""
+    from langflash_core.query.answers import answer
+
+    result = answer(request.relevance, request.frame, request.camera, request.query)
+    scores = tuple(
+        (key, a.prompt, float(a.score)) for key, a in zip(request.keys, result.answers, strict=True)
+    )
+    return Scored(request.serial, scores)
+
+
+def make_thumbnail(path: Path) -> Thumbnail:
+    """A small upright picture of a photo; an unreadable one gives its problem instead."""
+    from langflash_core.images.decode import read_photo
+
+    try:
+        small = read_photo(path).image.copy()
+    except ImageError as error:
+        return Thumbnail(str(path), None, str(error))
+    small.thumbnail((THUMBNAIL_SIDE, THUMBNAIL_SIDE))
+    return Thumbnail(str(path), np.asarray(small.convert("RGB")))
+
+
+def _import_heavy() -> None:
+    """Load torch and the renderer's module here, while the window is already up."""
+    import torch  # noqa: F401
+
+    import app.gl
+    import langflash_core.query.spaces  # noqa: F401
+
+    log.debug("loaded %s", app.gl.__name__)
+
+
+def _unexpected(error: Exception) -> str:
+    log.exception("the worker met an unexpected error")
+    return f"Something unexpected went wrong ({type(error).__name__}: {error}); please report it."

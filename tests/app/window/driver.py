@@ -1,0 +1,54 @@
+"""Runs the window for a test: steps it until it is closed and prints its state as JSON lines.
+
+    python driver.py WIDTH HEIGHT [PATHS...]
+
+A line is printed when anything a test may wait for has changed. The last one has "closed".
+"""
+
+import json
+import sys
+
+from app.window.session import Session
+
+
+def summary(session: Session) -> dict:
+    state = session.state
+    return {
+        "scene": None if state.info is None else state.info.name,
+        "photos": [photo.path.name for photo in state.photos],
+        "mode": state.mode.name,
+        "pose": [*state.pose.centre, *state.pose.rotation],
+        "view": state.view,
+        "flying": state.flight is not None,
+        "job": None if state.job is None else state.job.stage,
+        "prompts": [[p.text, p.score, p.found] for p in state.prompts],
+        "toasts": [toast.text for toast in state.toasts],
+        "dialog": state.dialog,
+        "maps": dict(state.stats.passes).get("weights", 0),
+        "picture": list(state.stats.picture_size),
+        "splats": sum(n for kind, n in state.stats.passes if kind in ("colour", "weights")),
+        "gl_errors": session.gl_errors,
+        "closed": session.should_close,
+    }
+
+
+def main() -> int:
+    width, height, *paths = sys.argv[1:]
+    session = Session(paths, (int(width), int(height)))
+    last = None
+    frames = 0
+    try:
+        while not session.should_close:
+            frames += session.step()
+            now = summary(session)
+            if now != last:
+                last = now
+                sys.stdout.write(json.dumps({**now, "frames": frames}) + "\n")
+                sys.stdout.flush()
+    finally:
+        session.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

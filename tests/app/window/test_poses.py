@@ -1,0 +1,120 @@
+"""Camera control: pure functions against hand-made cases and the core's own geometry."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from app.window import poses
+from app.window.poses import FOV_RANGE, Pose, Rotation, Vector
+from langflash_core.geometry.cameras import project, transform
+from langflash_core.geometry.quaternions import quats_to_matrices
+
+# Poses are float64 and a few operations long; float32 enters only where a Camera is made.
+EXACT, SINGLE = 1e-9, 1e-5
+
+
+def some_pose() -> Pose:
+    turned = poses.look(Pose(reach=2.0, aspect=4 / 3), 0.4, -0.3)
+    return poses.fly(turned, 0.3, -0.2, 0.5)
+
+
+@pytest.mark.parametrize(("yaw", "pitch"), [(0.3, 0.0), (0.0, 0.25), (-1.2, -0.4), (3.0, 0.1)])
+def test_orbit_keeps_the_pivot_and_its_distance(yaw: float, pitch: float) -> None:
+    before = some_pose()
+    after = poses.orbit(before, yaw, pitch)
+    np.testing.assert_allclose(after.pivot, before.pivot, atol=EXACT)
+    assert after.reach == before.reach
+    assert np.linalg.norm(np.array(after.centre) - before.pivot) == pytest.approx(before.reach, abs=EXACT)
+
+
+def test_orbit_never_rolls_or_passes_a_pole() -> None:
+    pose = Pose()
+    for _ in range(200):
+        pose = poses.orbit(pose, 0.05, 0.2)
+        assert abs(pose.axes[1, 0]) < EXACT  # the picture's x axis stays level
+    up = math.degrees(math.acos(float(np.clip(pose.axes[:, 2] @ poses.UP, -1, 1))))
+    assert up == pytest.approx(poses.MIN_POLE_DEGREES, abs=1e-6)
+
+
+def test_signs_are_those_of_the_hand() -> None:
+    assert poses.look(Pose(), -0.1, 0.0).axes[0, 2] > 0  # a drag to the right looks right
+    assert poses.look(Pose(), 0.0, 0.1).axes[1, 2] < 0  # up is -y
+    assert poses.pan(Pose(), 0.5, 0.0).centre == Vector(0.5, 0.0, 0.0)
+    assert poses.fly(Pose(), 0.0, 0.0, 0.5).centre == Vector(0.0, 0.0, 0.5)
+
+
+def test_zoom_moves_along_the_view_to_the_same_pivot() -> None:
+    before = some_pose()
+    after = poses.zoom(before, 0.5)
+    assert after.reach == before.reach / 2
+    np.testing.assert_allclose(after.pivot, before.pivot, atol=EXACT)
+    for _ in range(100):
+        after = poses.zoom(after, 0.5)
+    assert after.reach == poses.MIN_REACH
+
+
+def test_a_view_comes_back_as_its_own_camera() -> None:
+    quat = torch.nn.functional.normalize(torch.tensor([0.9, 0.2, -0.3, 0.1]), dim=0)
+    viewmat = torch.eye(4)
+    viewmat[:3, :3] = quats_to_matrices(quat)
+    viewmat[:3, 3] = torch.tensor([0.1, -0.4, 0.7])
+    K = torch.tensor([[200.0, 0, 118.0], [0, 200.0, 80.0], [0, 0, 1]])
+    pose = poses.from_view(viewmat.double().numpy(), K.double().numpy(), (224, 168), 1.5)
+    camera = poses.to_camera(pose, 224, 168)
+    torch.testing.assert_close(camera.viewmat, viewmat, atol=SINGLE, rtol=0)
+    torch.testing.assert_close(camera.K, K, atol=1e-3, rtol=0)  # a thousandth of a pixel
+
+
+@pytest.mark.parametrize("size", [(900, 300), (300, 900), (640, 480)])
+@pytest.mark.parametrize("photo", [(224, 168), (168, 224)])
+def test_the_whole_photo_fits_any_panel(size: tuple[int, int], photo: tuple[int, int]) -> None:
+    """The photo's corners lie inside the panel, and touch it on one axis."""
+    K = np.array([[190.0, 0, photo[0] / 2], [0, 190.0, photo[1] / 2], [0, 0, 1]])
+    pose = poses.from_view(np.eye(4), K, photo, 1.0)
+    camera = poses.to_camera(pose, *size)
+    half = torch.tensor([photo[0] / 380.0, photo[1] / 380.0])  # tangents of the half angles
+    corners = torch.tensor([[-half[0], -half[1], 1.0], [half[0], half[1], 1.0]])
+    pixels = project(transform(camera.viewmat, corners), camera.K)
+    (left, top), (right, bottom) = pixels.tolist()
+    slack = 1e-2  # pixels; float32 at 900 pixels
+    assert left >= -slack and top >= -slack and right <= size[0] + slack and bottom <= size[1] + slack
+    assert abs(left) < slack or abs(top) < slack
+
+
+def test_blend_is_exact_at_the_ends_and_steady_between() -> None:
+    start, end = Pose(), poses.with_fov(some_pose(), 90)
+    assert poses.blend(start, end, 0.0) is start
+    assert poses.blend(start, end, 1.0) is end
+    middle = poses.blend(start, end, 0.5)
+    np.testing.assert_allclose(np.array(middle.centre), np.array(end.centre) / 2, atol=EXACT)
+    assert middle.fov == pytest.approx((start.fov + end.fov) / 2)
+    total = _angle(start.rotation, end.rotation)
+    assert _angle(start.rotation, middle.rotation) == pytest.approx(total / 2, abs=1e-7)
+
+
+def test_slerp_takes_the_shorter_arc() -> None:
+    turned = Rotation(math.cos(0.2), 0.0, math.sin(0.2), 0.0)
+    negated = Rotation(*(-v for v in turned))
+    half = Rotation(math.cos(0.1), 0.0, math.sin(0.1), 0.0)
+    for end in (turned, negated):
+        np.testing.assert_allclose(poses.slerp(Rotation(1, 0, 0, 0), end, 0.5), half, atol=EXACT)
+    same = poses.slerp(turned, turned, 0.3)
+    np.testing.assert_allclose(same, turned, atol=EXACT)
+
+
+def test_fov_is_clamped() -> None:
+    assert poses.with_fov(Pose(), 500).fov == FOV_RANGE[1]
+    assert poses.with_fov(Pose(), 0).fov == FOV_RANGE[0]
+
+
+def test_median_reach_looks_only_at_the_middle_and_the_front() -> None:
+    K = np.array([[100.0, 0, 50], [0, 100.0, 50], [0, 0, 1]])
+    means = np.array([[0, 0, 2.0], [0, 0.1, 3.0], [0.1, 0, 4.0], [9, 0, 10.0], [0, 0, -5.0]])
+    assert poses.median_reach(means, np.eye(4), K, (100, 100)) == 3.0
+    assert poses.median_reach(np.zeros((0, 3)), np.eye(4), K, (100, 100)) == 1.0
+
+
+def _angle(a: Rotation, b: Rotation) -> float:
+    return math.acos(min(abs(float(np.dot(a, b))), 1.0))

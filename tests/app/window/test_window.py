@@ -1,0 +1,334 @@
+"""The window as a person meets it: a real X server, real keys, wheel, drags and drops.
+
+Xvfb shows it, xdotool types and points, a second X client drops files and takes the pictures.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from app.window import theme
+from app.window.panels import CANVAS_TOP
+from langflash_core.query.spaces import language_space
+from langflash_core.scene import save
+from tests.app.window.scenes import PHRASES, room
+from tests.app.window.x11 import Client
+
+SIZE = (900, 600)
+PATIENCE = 60.0  # seconds; an upper bound for a busy machine, never waited for in full
+ROOT = Path(__file__).parents[3]
+LEFT, TOP = int(theme.PANEL_WIDTH), int(CANVAS_TOP)
+CANVAS = (slice(TOP, SIZE[1] - int(theme.STATUS_HEIGHT)), slice(LEFT, SIZE[0]))
+MIDDLE = ((LEFT + SIZE[0]) // 2, (TOP + SIZE[1]) // 2)
+
+pytestmark = pytest.mark.skipif(
+    not (shutil.which("Xvfb") and shutil.which("xdotool")), reason="needs Xvfb and xdotool"
+)
+
+
+@pytest.fixture(scope="module")
+def display() -> Iterator[str]:
+    """An X server of our own; it picks a free number itself."""
+    reader, writer = os.pipe()
+    command = [
+        "Xvfb",
+        "-displayfd",
+        str(writer),
+        "-screen",
+        "0",
+        f"{SIZE[0]}x{SIZE[1]}x24",
+        "-nolisten",
+        "tcp",
+    ]
+    server = subprocess.Popen(command, pass_fds=[writer], stderr=subprocess.DEVNULL)
+    os.close(writer)
+    with os.fdopen(reader) as numbers:
+        number = numbers.readline().strip()
+    assert number, "Xvfb did not start"
+    yield f":{number}"
+    server.terminate()
+    server.wait(PATIENCE)
+
+
+@pytest.fixture(scope="module")
+def scene_file(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("my scenes") / "room.langflash"  # with a space, as people have
+    save(room(language_space("minilm").encode(list(PHRASES))), path)
+    return path
+
+
+class Program:
+    """The window in a process of its own, and the hands on it."""
+
+    def __init__(self, display: str, *paths: Path) -> None:
+        self._environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}
+        self._environment.pop("WAYLAND_DISPLAY", None)
+        driver = Path(__file__).with_name("driver.py")
+        command = [sys.executable, str(driver), *map(str, SIZE), *map(str, paths)]
+        self._process = subprocess.Popen(command, env=self._environment, stdout=subprocess.PIPE, text=True)
+        self._lines: list[dict] = []
+        self._changed = threading.Condition()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        self.client = Client(display)
+        self.until(lambda s: True, "the first frame")
+        self.window = int(self.xdotool("search", "--name", "LangFlash").split()[0])
+        # Without a window manager nothing else gives the window the keyboard.
+        self.xdotool("windowmove", str(self.window), "0", "0", "windowfocus", "--sync", str(self.window))
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            with self._changed:
+                self._lines.append(json.loads(line))
+                self._changed.notify_all()
+
+    @property
+    def state(self) -> dict:
+        with self._changed:
+            return self._lines[-1]
+
+    def until(self, holds: Callable[[dict], bool], what: str) -> dict:
+        """Wait for the state to satisfy `holds`."""
+        with self._changed:
+            reached = self._changed.wait_for(lambda: bool(self._lines) and holds(self._lines[-1]), PATIENCE)
+            assert reached, f"waited for {what}; last state {self._lines[-1:]}"
+            return self._lines[-1]
+
+    def at_rest(self) -> dict:
+        """Wait until the picture is full and nothing moves: no news for a while."""
+        full = [SIZE[0] - LEFT, CANVAS[0].stop - TOP]
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end:
+            seen = self.state
+            time.sleep(1.2)  # FULL_AFTER and a full picture of this small room
+            if self.state == seen and seen["picture"] == full:
+                return seen
+        raise AssertionError(f"no rest; last state {self.state}")
+
+    def xdotool(self, *words: str) -> str:
+        done = subprocess.run(["xdotool", *words], env=self._environment, capture_output=True, text=True)
+        return done.stdout
+
+    def picture(self) -> np.ndarray:
+        """The canvas (h, w, 3) as shown, float in [0, 255]."""
+        return self.client.picture(*SIZE)[CANVAS].astype(np.float64)
+
+    def type_prompt(self, text: str) -> None:
+        """Click the first prompt's field and type."""
+        x, y = self.field
+        self.xdotool("mousemove", str(x), str(y), "click", "1")
+        time.sleep(0.3)
+        self.xdotool("type", "--delay", "30", text)
+
+    @property
+    def field(self) -> tuple[int, int]:
+        """Where the first prompt's field is, found by its colour swatch's accent in the panel."""
+        panel = self.client.picture(LEFT, SIZE[1] - 40).astype(int)
+        accent = np.array([255 * c for c in (0.96, 0.62, 0.16)])
+        swatch = np.argwhere(abs(panel[:, 18:40] - accent).max((1, 2)) < 6)
+        return 140, int(swatch.mean())
+
+    def leave(self) -> int:
+        self.client.close()
+        if self._process.poll() is None:
+            self._process.terminate()
+        self._reader.join(PATIENCE)
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+        return self._process.wait(PATIENCE)
+
+
+@pytest.fixture(scope="module")
+def program(display: str, scene_file: Path) -> Iterator[Program]:
+    """A window with the room open and at rest."""
+    running = Program(display, scene_file)
+    running.until(lambda s: s["scene"] == "room.langflash", "the scene")
+    running.at_rest()
+    yield running
+    running.leave()
+
+
+def change(before: np.ndarray, after: np.ndarray) -> float:
+    """Mean absolute difference in 0..255."""
+    return float(abs(before - after).mean())
+
+
+def test_the_scene_is_drawn(program: Program) -> None:
+    picture = program.picture()
+    # The block is red, its left edge is left of the middle; the wall above it is grey.
+    block = picture[picture.shape[0] * 6 // 10, picture.shape[1] * 3 // 10]
+    wall = picture[picture.shape[0] // 10, picture.shape[1] * 8 // 10]
+    assert block[0] > 2 * block[1] > 0
+    assert abs(wall - wall.mean()).max() < 25
+    assert program.state["toasts"] == [] and program.state["gl_errors"] == []
+
+
+def test_a_typed_phrase_lights_up_where_it_is(program: Program) -> None:
+    plain = program.picture()
+    program.type_prompt("armchair")
+    state = program.until(lambda s: s["prompts"][0][1] is not None, "a score")
+    assert state["prompts"][0][0] == "armchair" and state["prompts"][0][2] and state["mode"] == "HEAT"
+    program.at_rest()
+    heat = program.picture()
+    difference = abs(heat - plain).mean(-1)
+    height, width = difference.shape
+    spot = heat[height * 6 // 10 - 20 : height * 6 // 10 + 20, width * 3 // 10 - 20 : width * 3 // 10 + 20]
+    # Turbo ends in dark red; over the block's own red at 0.7 opacity nearly no green is left.
+    assert difference[height * 6 // 10, width * 3 // 10] > 10
+    assert spot[..., 0].mean() > 90 and spot[..., 1].mean() < 40
+    # The wall is dimmed, and stays grey.
+    wall, before = heat[height // 10, width * 8 // 10], plain[height // 10, width * 8 // 10]
+    assert wall.sum() < 0.95 * before.sum() and np.ptp(wall) < 25
+
+
+def test_a_new_phrase_at_rest_costs_no_splat_pass(program: Program) -> None:
+    before = program.at_rest()
+    program.xdotool("type", "--delay", "30", " with a cushion")
+    state = program.until(
+        lambda s: s["prompts"][0][0] == "armchair with a cushion" and s["prompts"][0][1] is not None,
+        "a score",
+    )
+    assert state["splats"] == before["splats"]
+
+
+def test_what_is_not_there_is_not_found(program: Program) -> None:
+    program.type_prompt("")
+    program.xdotool("key", "ctrl+a")
+    program.xdotool("type", "--delay", "30", "elephant")
+    state = program.until(
+        lambda s: s["prompts"][0][0] == "elephant" and s["prompts"][0][1] is not None, "a score"
+    )
+    assert state["prompts"][0][2] is False
+
+
+@pytest.mark.parametrize(
+    "gesture",
+    [
+        ["click", "4"],
+        ["mousedown", "1", "mousemove_relative", "60", "0", "mouseup", "1"],
+        ["mousedown", "2", "mousemove_relative", "--", "-40", "20", "mouseup", "2"],
+        ["mousedown", "3", "mousemove_relative", "30", "10", "mouseup", "3"],
+    ],
+    ids=["zoom", "orbit", "pan", "look"],
+)
+def test_wheel_and_drags_move_the_camera(program: Program, gesture: list[str]) -> None:
+    program.xdotool("mousemove", *map(str, MIDDLE))
+    before, picture = program.at_rest(), program.picture()
+    program.xdotool(*gesture)
+    program.until(lambda s: s["pose"] != before["pose"], "a moved camera")
+    program.at_rest()
+    # A step of a few degrees shifts the wall's checks: whole areas change by their contrast.
+    assert change(picture, program.picture()) > 1.0
+    assert program.state["gl_errors"] == []
+
+
+def test_keys_fly_and_go_home(program: Program) -> None:
+    before = program.at_rest()
+    program.xdotool("keydown", "w", "sleep", "0.4", "keyup", "w")
+    program.until(lambda s: s["pose"] != before["pose"], "a flight")
+    program.xdotool("key", "h")
+    home = program.until(lambda s: s["view"] == 0 and not s["flying"], "home")
+    assert home["pose"][:3] == [0, 0, 0]
+
+
+def test_keys_change_the_mode(program: Program) -> None:
+    program.at_rest()
+    for key, mode in (("5", "DEPTH"), ("4", "ATOMS"), ("1", "RGB")):
+        picture = program.picture()
+        program.xdotool("key", key)
+        program.until(lambda s, wanted=mode: s["mode"] == wanted, mode)
+        program.at_rest()
+        assert change(picture, program.picture()) > 5.0  # other colours altogether
+
+
+def test_an_idle_window_draws_nothing(program: Program) -> None:
+    program.xdotool("mousemove", *map(str, MIDDLE))
+    program.at_rest()
+    process = Path(f"/proc/{program._process.pid}/stat")
+
+    def ticks() -> int:
+        return sum(map(int, process.read_text().rpartition(")")[2].split()[11:13]))
+
+    start = ticks()
+    time.sleep(2.0)
+    # 100 ticks a second: at most 3 % of one core, where drawing even the panels takes over 10 %.
+    assert ticks() - start <= 6
+
+
+def test_saving_through_the_dialog(program: Program, tmp_path: Path) -> None:
+    program.xdotool("key", "ctrl+s")
+    program.until(lambda s: s["dialog"] == "save", "the dialog")
+    time.sleep(0.3)
+    program.xdotool("key", "ctrl+a")
+    program.xdotool("type", "--delay", "10", str(tmp_path / "copy"))
+    program.xdotool("key", "Return")
+    program.until(lambda s: s["scene"] == "copy.langflash", "the saved scene")
+    assert (tmp_path / "copy.langflash").stat().st_size > 1000
+
+
+def test_drops_a_real_drop_and_escape(program: Program, scene_file: Path, tmp_path: Path) -> None:
+    notes = tmp_path / "my notes.txt"
+    notes.write_text("not a photo")
+    program.client.drop(program.window, [notes], MIDDLE)
+    program.until(lambda s: any("my notes.txt is no photo" in t for t in s["toasts"]), "a toast")
+    program.client.drop(program.window, [scene_file], MIDDLE)
+    program.until(lambda s: s["scene"] == "room.langflash", "the dropped scene")
+    broken = tmp_path / "broken photo.jpg"
+    broken.write_bytes(b"\xff\xd8\xff\xe0 cut short")
+    program.client.drop(program.window, [broken], MIDDLE)
+    state = program.until(lambda s: s["job"] is None and s["photos"] == [broken.name], "the end of the job")
+    assert any(broken.name in toast for toast in state["toasts"])
+    assert state["scene"] == "room.langflash"  # the old scene is still there
+    program.xdotool("key", "Escape")
+    state = program.until(lambda s: s["closed"], "the end")
+    assert state["gl_errors"] == []
+    assert program._process.wait(PATIENCE) == 0
+
+
+def test_the_close_button_ends_with_0(display: str) -> None:
+    empty = Program(display)
+    empty.client.ask_to_close(empty.window)
+    assert empty._process.wait(PATIENCE) == 0
+    empty.leave()
+
+
+def test_without_a_display_there_is_one_sentence() -> None:
+    code = (
+        "from app.window import run\n"
+        "from langflash_core.errors import GraphicsError\n"
+        "try:\n    run()\nexcept GraphicsError as error:\n    raise SystemExit(f'said: {error}')\n"
+    )
+    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**environment, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+    )
+    assert done.stderr.strip() == (
+        "said: There is no display to open a window on; use langflash render or query, or make run."
+    )
+
+
+def test_a_dropped_folder_of_photos_starts_a_reconstruction(display: str, tmp_path: Path) -> None:
+    folder = tmp_path / "photos of a room"
+    folder.mkdir()
+    Image.new("RGB", (40, 30), (90, 60, 30)).save(folder / "tiny.png")
+    running = Program(display)
+    running.client.drop(running.window, [folder], MIDDLE)
+    running.until(lambda s: s["photos"] == ["tiny.png"], "the photo")
+    # 30 pixels a side are too few for any network: the job ends with a sentence about the photo.
+    state = running.until(lambda s: s["job"] is None and s["toasts"], "the end of the job")
+    assert "tiny.png" in state["toasts"][0] and state["gl_errors"] == []
+    running.leave()
