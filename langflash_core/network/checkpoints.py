@@ -36,7 +36,7 @@ def load_network(
     """
     if preset not in PRESETS:
         raise WeightsError(f"There is no preset '{preset}'; choose one of {', '.join(PRESETS)}")
-    path = asset_path(f"weights/{preset}.safetensors") if weights is None else Path(weights)
+    path = _embedded(preset) if weights is None else Path(weights)
     tensors, metadata = read_weights(path)
     if metadata.get("preset") != preset:
         raise WeightsError(
@@ -47,6 +47,13 @@ def load_network(
     _load_strictly(network, tensors, path)
     network.calibration = metadata.get("calibration", {})
     return network.eval().to(device)
+
+
+def _embedded(preset: str) -> Path:
+    try:
+        return asset_path(f"weights/{preset}.safetensors")
+    except FileNotFoundError as error:
+        raise WeightsError(f"{error}, or name a checkpoint with --weights") from None
 
 
 def initial_network(preset: Preset, encoder: Path, seed: int = 0) -> LangFlashNet:
