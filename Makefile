@@ -1,0 +1,106 @@
+# make run    set up what is missing, then open the window on the demo photos
+# make test   set up what is missing, then every check and every test
+#
+# Set-up is a virtual environment in .venv, this package in it, and (Debian, Ubuntu) the system's
+# OpenGL libraries where they are missing. Finished steps leave a stamp in .venv and are not
+# repeated until pyproject.toml changes.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+
+BIN := .venv/bin
+STAMP := .venv/.langflash
+PHOTOS := assets/photos/books_left.jpg assets/photos/books_right.jpg
+GL_PACKAGES := libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri libglx-mesa0
+WINDOW_PACKAGES := xvfb xdotool
+TRY_GL := $(BIN)/python -c 'import moderngl; moderngl.create_standalone_context(backend="egl", require=330).release()'
+
+# `install PACKAGE...` with apt, as root or through a sudo that asks for no password.
+APT := install() { \
+	command -v apt-get >/dev/null || return 1; \
+	local as=""; \
+	if [ "$$(id -u)" != 0 ]; then sudo -n true 2>/dev/null || return 1; as="sudo -n"; fi; \
+	local get="$$as env DEBIAN_FRONTEND=noninteractive apt-get -qq"; \
+	local add="$$get install -y --no-install-recommends"; \
+	echo "Installing $$*"; \
+	$$add "$$@" >/dev/null 2>&1 || { $$get update >/dev/null && $$add "$$@" >/dev/null; }; }
+
+.PHONY: help run test
+help:
+	@sed -n '1,2s/^# //p' Makefile
+
+run: $(STAMP)-package $(STAMP)-gl
+	@if $(BIN)/python -c 'import glfw, sys; sys.exit(not glfw.init())' 2>/dev/null; then \
+		exec $(BIN)/langflash view $(PHOTOS); \
+	fi; \
+	echo "No display here: the same job without a window."; \
+	mkdir -p out; \
+	$(BIN)/langflash reconstruct $(PHOTOS) -o out/books.langflash; \
+	for what in rgb depth atoms; do \
+		$(BIN)/langflash render out/books.langflash --size 798x588 --what $$what -o out/$$what.png; \
+	done; \
+	$(BIN)/langflash query out/books.langflash book floor --size 798x588 -o out/query; \
+	echo "The pictures are in $(CURDIR)/out and $(CURDIR)/out/query."
+
+test: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window
+	$(BIN)/ruff check .
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+	$(BIN)/python -m pytest
+
+# The newest Python from 3.11 that can make a virtual environment.
+$(BIN)/python:
+	@$(APT); \
+	able() { "$$1" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 15))' >/dev/null 2>&1; }; \
+	whole() { "$$1" -c 'import ensurepip, venv' >/dev/null 2>&1; }; \
+	names="python3.14 python3.13 python3.12 python3.11 python3 python"; \
+	any=""; chosen=""; \
+	for name in $$names; do \
+		if able $$name; then any=$${any:-$$name}; if whole $$name; then chosen=$$name; break; fi; fi; \
+	done; \
+	if [ -z "$$any" ]; then \
+		echo "LangFlash needs Python 3.11 or newer: install it (for example the packages python3 and python3-venv), then make again." >&2; \
+		exit 1; \
+	fi; \
+	if [ -z "$$chosen" ]; then \
+		venv="python$$($$any -c 'import sys; print("%d.%d" % sys.version_info[:2])')-venv"; \
+		install $$venv && whole $$any || { \
+			echo "This Python cannot make virtual environments: ask for the package $$venv (apt-get install $$venv), then make again." >&2; \
+			exit 1; }; \
+		chosen=$$any; \
+	fi; \
+	echo "Making .venv with $$($$chosen --version)"; \
+	$$chosen -m venv .venv
+
+# torch first and alone: its pin decides which build of the rest fits.
+$(STAMP)-package: pyproject.toml | $(BIN)/python
+	@echo "Installing LangFlash and what it needs into .venv (the first time takes minutes)"
+	@$(BIN)/python -m pip --version >/dev/null 2>&1 || $(BIN)/python -m ensurepip >/dev/null
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check torch==2.13.0
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(STAMP)-dev: $(STAMP)-package
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+# OpenGL without a screen; macOS brings its own.
+$(STAMP)-gl: | $(STAMP)-package
+	@$(APT); \
+	if [ "$$(uname)" = Linux ] && ! $(TRY_GL) >/dev/null 2>&1; then \
+		install $(GL_PACKAGES) && $(TRY_GL) >/dev/null 2>&1 || { \
+			echo "OpenGL is missing: ask an administrator to run 'apt-get install $(GL_PACKAGES)', then make again." >&2; \
+			exit 1; }; \
+	fi
+	@touch $@
+
+# A screen for the tests of the window; without it those tests are skipped.
+$(STAMP)-window: | $(STAMP)-package
+	@$(APT); \
+	if [ "$$(uname)" = Linux ] && ! { command -v Xvfb && command -v xdotool; } >/dev/null; then \
+		install $(WINDOW_PACKAGES) || { \
+			echo "The window's tests will be skipped: they need the packages $(WINDOW_PACKAGES)." >&2; \
+			exit 0; }; \
+	fi; \
+	touch $@

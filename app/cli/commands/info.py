@@ -1,0 +1,52 @@
+"""`langflash info`: what a scene file holds."""
+
+from argparse import Namespace
+from typing import Any, TextIO
+
+from app.cli.files import readable_file
+from app.cli.report import write_json
+from langflash_core.errors import SceneFileError
+
+
+def run(args: Namespace, out: TextIO) -> None:
+    """Print counts, sizes, timings, and what pruning saved.
+
+    Raises:
+        SceneFileError: missing, truncated or foreign.
+    """
+    readable_file(args.scene, "scene", SceneFileError)
+    from langflash_core.scene import describe, load
+
+    document = {
+        "scene": str(args.scene),
+        **describe(load(args.scene)),
+        "file_bytes": args.scene.stat().st_size,
+    }
+    if args.json:
+        write_json(document, out)
+    else:
+        print("\n".join(_lines(document)), file=out)
+
+
+def _lines(fields: dict[str, Any], indent: str = "") -> list[str]:
+    """`name: value` lines; a dictionary is indented under its name."""
+    lines = []
+    for name, value in fields.items():
+        label = f"{indent}{name.replace('_', ' ')}:"
+        if isinstance(value, dict):
+            lines += [label, *_lines(value, indent + "  ")] if value else []
+        else:
+            lines.append(f"{label} {_plain(value)}")
+    return lines
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, bool) or value is None:
+        return {True: "yes", False: "no", None: "-"}[value]
+    if isinstance(value, int):
+        return f"{value:,}"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, (list, tuple)):
+        return ", ".join(map(_plain, value)) or "-"
+    return str(value)

@@ -1,0 +1,59 @@
+"""`langflash reconstruct`: photos to a scene file."""
+
+import time
+from argparse import Namespace
+from pathlib import Path
+from typing import TextIO
+
+from app.cli.files import check_output_file, readable_file
+from app.cli.report import ProgressBar, say_warnings, write_json
+from langflash_core.errors import ImageError, WeightsError
+
+
+def run(args: Namespace, out: TextIO) -> None:
+    """Check everything that can be checked, then predict, assemble, and write one file.
+
+    Raises:
+        LangFlashError: a photo, the weights, the device or the output cannot be used.
+    """
+    start = time.perf_counter()
+    for photo in args.photos:
+        readable_file(photo, "photo", ImageError)
+    if args.weights is not None:
+        readable_file(args.weights, "checkpoint", WeightsError)
+    check_output_file(args.output, inputs=args.photos)
+    from langflash_core import pipeline
+    from langflash_core.scene import describe, save
+
+    with ProgressBar() as progress:
+        scene = pipeline.reconstruct(
+            args.photos,
+            preset=args.preset,
+            weights=args.weights,
+            fov=args.fov,
+            intrinsics=args.intrinsics,
+            size=args.size,
+            device=args.device,
+            progress=progress,
+        )
+        progress("writing", 1.0)
+        args.output.parent.mkdir(parents=True, exist_ok=True)
+        save(scene, args.output)
+    say_warnings(scene.metadata.get("warnings", ()))
+    document = {
+        "scene": str(args.output),
+        **describe(scene),
+        "file_bytes": args.output.stat().st_size,
+        "seconds": round(time.perf_counter() - start, 3),
+    }
+    if args.json:
+        write_json(document, out)
+    else:
+        print(_sentence(args.output, scene, document), file=out)
+
+
+def _sentence(path: Path, scene, document: dict) -> str:
+    return (
+        f"{path}: {len(scene.gaussians):,} Gaussians in {scene.semantics.num_atoms} groups from "
+        f"{scene.num_views} views, {document['file_bytes'] / 1e6:.1f} MB, {document['seconds']:.1f} s"
+    )

@@ -1,0 +1,87 @@
+"""`langflash train`: render and encode rooms, train stages, join them into one checkpoint."""
+
+import json
+import logging
+import sys
+from argparse import Namespace
+from pathlib import Path
+from typing import Any, TextIO
+
+from app.cli.files import check_folder, check_output_file, readable_file
+from langflash_core.errors import InputError, WeightsError
+from langflash_core.network import PRESETS
+from langflash_core.query.spaces import language_space
+from langflash_core.resources import asset_path
+from langflash_core.training.commands import run_cache, run_export, run_train
+from langflash_core.training.loop import LoopOptions
+
+
+def run(args: Namespace, out: TextIO) -> None:
+    """Run one step of training; what it measures goes to stderr, line by line.
+
+    Raises:
+        LangFlashError: the furniture, the encoder, the cache or the output cannot be used.
+    """
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s", stream=sys.stderr)
+    {"cache": _cache, "run": _run, "export": _export}[args.action](args, out)
+
+
+def _cache(args: Namespace, out: TextIO) -> None:
+    readable_file(args.pack, "furniture pack", InputError)
+    check_folder(args.output)
+    count = run_cache(
+        args.output,
+        args.pack,
+        _encoder(args),
+        kind=args.set,
+        scenes=args.scenes,
+        first_seed=args.first_seed,
+        part=args.part,
+        preset=args.preset,
+    )
+    print(f"{args.output / args.set}: {count} new rooms", file=out)
+
+
+def _run(args: Namespace, out: TextIO) -> None:
+    if not args.cache.is_dir():
+        raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
+    check_folder(args.output)
+    space = language_space(PRESETS[args.preset].space)
+    run_train(
+        args.stages,
+        args.cache,
+        args.output,
+        _encoder(args),
+        space.encode,
+        args.minutes,
+        preset=args.preset,
+        options=LoopOptions(
+            minutes=0, device=args.device, seed=args.seed, max_steps=args.max_steps, resume=not args.restart
+        ),
+    )
+    print(f"{args.output}: trained {', '.join(args.stages)}", file=out)
+
+
+def _export(args: Namespace, out: TextIO) -> None:
+    if not args.run.is_dir():
+        raise InputError(f"there is no folder {args.run}; make it with langflash train run")
+    check_output_file(args.output, (".safetensors",))
+    details = None if args.metadata is None else _details(args.metadata)
+    path = run_export(args.run, args.output, _encoder(args), preset=args.preset, metadata=details)
+    print(f"{path}: {path.stat().st_size / 1e6:.1f} MB", file=out)
+
+
+def _encoder(args: Namespace) -> Path:
+    path = args.encoder or asset_path(f"weights/{args.preset}.safetensors")
+    return readable_file(path, "encoder checkpoint", WeightsError)
+
+
+def _details(path: Path) -> dict[str, Any]:
+    readable_file(path, "metadata file", InputError)
+    try:
+        details = json.loads(path.read_bytes())
+    except ValueError as problem:
+        raise InputError(f"{path} is not JSON: {problem}; it holds an object for the model card") from None
+    if not isinstance(details, dict):
+        raise InputError(f"{path} must hold one JSON object, for the model card")
+    return details

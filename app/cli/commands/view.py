@@ -1,0 +1,20 @@
+"""`langflash view`: the window."""
+
+from argparse import Namespace
+from typing import TextIO
+
+from app.cli.files import readable_file
+from langflash_core.errors import ImageError
+
+
+def run(args: Namespace, out: TextIO) -> int:
+    """Open the window on photos, a scene, or nothing; returns when it is closed.
+
+    Raises:
+        ImageError: a path leads nowhere. GraphicsError: there is no display or no OpenGL.
+    """
+    for path in args.paths:
+        readable_file(path, "photo or scene", ImageError)
+    from app.window import run as open_window
+
+    return open_window(args.paths)

@@ -1,0 +1,283 @@
+"""The words of the command line. Only the standard library is imported here."""
+
+import argparse
+from pathlib import Path
+from typing import NoReturn
+
+import langflash_core
+from app.cli.values import (
+    intrinsics,
+    kept_fraction,
+    minutes,
+    open_fov,
+    part,
+    pixel_side,
+    seed,
+    size,
+    view_index,
+    what,
+    whole_count,
+)
+from langflash_core.errors import InputError
+
+
+class UsageError(InputError):
+    """The command line itself cannot be understood."""
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse that reports a mistake as one sentence instead of a page."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise `message` as a `UsageError`.
+
+        Raises:
+            UsageError: always.
+        """
+        raise UsageError(f"{message}; see {self.prog} --help")
+
+
+def build_parser() -> Parser:
+    """Every command this version has."""
+    parser = Parser(
+        prog="langflash",
+        description="Unposed photos to a 3D Gaussian scene that answers words.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"langflash {langflash_core.__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for add in (
+        _add_view,
+        _add_reconstruct,
+        _add_query,
+        _add_render,
+        _add_export,
+        _add_info,
+        _add_rooms,
+        _add_train,
+        _add_eval,
+        _add_weights,
+    ):
+        add(commands)
+    return parser
+
+
+def _command(commands, name: str, purpose: str, **more) -> argparse.ArgumentParser:
+    return commands.add_parser(name, help=purpose, description=purpose, allow_abbrev=False, **more)
+
+
+def _actions(commands, name: str, purpose: str):
+    command = _command(commands, name, purpose)
+    return command.add_subparsers(dest="action", metavar="ACTION", required=True)
+
+
+def _add_output(command: argparse.ArgumentParser, metavar: str, purpose: str) -> None:
+    command.add_argument("-o", "--output", required=True, type=Path, metavar=metavar, help=purpose)
+
+
+def _add_view(commands) -> None:
+    view = _command(commands, "view", "open the window; photos and scenes can be dropped on it")
+    view.add_argument("paths", nargs="*", type=Path, metavar="PHOTO|SCENE", help="photos, or one scene")
+
+
+def _add_reconstruct(commands) -> None:
+    command = _command(commands, "reconstruct", "photos of one place to a scene file")
+    command.add_argument("photos", nargs="+", type=Path, metavar="PHOTO")
+    _add_output(command, "SCENE", "the scene to write")
+    command.add_argument("--preset", choices=("mini",), default="mini", help="which network (default: mini)")
+    command.add_argument(
+        "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped one"
+    )
+    lens = command.add_mutually_exclusive_group()
+    lens.add_argument("--fov", type=open_fov, metavar="DEG", help="field of view of the photos' longer side")
+    lens.add_argument(
+        "--intrinsics",
+        type=intrinsics,
+        metavar="FX,FY,CX,CY",
+        help="in pixels of the photos as given, after EXIF orientation",
+    )
+    command.add_argument(
+        "--size", type=pixel_side, metavar="PX", help="the network sees about PX x PX pixels (default: 224)"
+    )
+    command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
+    _add_json(command)
+
+
+def _add_query(commands) -> None:
+    command = _command(commands, "query", "where in a scene is each phrase? heat-maps, masks and numbers")
+    command.add_argument("scene", type=Path, metavar="SCENE")
+    command.add_argument("prompts", nargs="+", metavar="PROMPT", help='a phrase, e.g. "armchair"')
+    _add_camera(command)
+    command.add_argument(
+        "--mode", choices=("relevancy", "cosine"), default="relevancy", help="(default: relevancy)"
+    )
+    command.add_argument(
+        "--negatives",
+        nargs="+",
+        metavar="PHRASE",
+        help="what relevancy compares with (default: the language space's own)",
+    )
+    _add_backend(command)
+    _add_output(command, "DIR", "folder for the pictures")
+    _add_json(command)
+    command.add_argument(
+        "--npz", action="store_true", help="also write relevance, masks, depth and rgb as arrays"
+    )
+
+
+def _add_render(commands) -> None:
+    command = _command(commands, "render", "one picture of a scene")
+    command.add_argument("scene", type=Path, metavar="SCENE")
+    _add_output(command, "IMG", "the .png to write")
+    _add_camera(command)
+    command.add_argument(
+        "--what",
+        type=what,
+        default=("rgb", None),
+        metavar="rgb|depth|relevance|labels|atoms|weights:K",
+        help="(default: rgb)",
+    )
+    command.add_argument(
+        "--prompt", nargs="+", metavar="PHRASE", help="for relevance (one) and labels (any number)"
+    )
+    _add_backend(command)
+    _add_json(command)
+
+
+def _add_export(commands) -> None:
+    command = _command(commands, "export", "a scene, or what answers a phrase, as a file: .png")
+    command.add_argument("scene", type=Path, metavar="SCENE")
+    _add_output(command, "FILE", ".png: a picture, or a cut-out with --prompt")
+    command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="keep only what answers one of these")
+    command.add_argument(
+        "--threshold", type=kept_fraction, metavar="T", help="relevancy to keep, between 0 and 1"
+    )
+    _add_camera(command)
+    _add_backend(command)
+
+
+def _add_info(commands) -> None:
+    command = _command(commands, "info", "what a scene file holds, and what pruning saved")
+    command.add_argument("scene", type=Path, metavar="SCENE")
+    _add_json(command)
+
+
+def _add_rooms(commands) -> None:
+    actions = _actions(commands, "rooms", "furnished rooms for training and tests")
+    pack = _command(actions, "pack", "furniture libraries (.sh3f) to one pack")
+    pack.add_argument("folder", type=Path, metavar="FOLDER")
+    _add_output(pack, "PACK", "the pack to write")
+    preview = _command(actions, "preview", "a contact sheet of rooms")
+    preview.add_argument("pack", type=Path, metavar="PACK")
+    _add_output(preview, "IMG", "the .png to write")
+    _add_seeds(preview, count=9)
+    render = _command(actions, "render", "rooms with depth, instances and names, one .npz each")
+    render.add_argument("pack", type=Path, metavar="PACK")
+    _add_output(render, "DIR", "folder to fill; rooms that are there are kept")
+    _add_seeds(render, count=100)
+    render.add_argument("--views", type=whole_count, default=2, metavar="V", help="(default: 2)")
+    render.add_argument("--size", type=size, default=(224, 224), metavar="WxH", help="(default: 224x224)")
+
+
+def _add_seeds(command: argparse.ArgumentParser, *, count: int) -> None:
+    command.add_argument("--seed", type=seed, default=0, metavar="N", help="the first room (default: 0)")
+    command.add_argument(
+        "--count", type=whole_count, default=count, metavar="N", help=f"rooms (default: {count})"
+    )
+    command.add_argument("--held-out", action="store_true", help="furniture that training never sees")
+
+
+def _add_train(commands) -> None:
+    actions = _actions(commands, "train", "train the network on rendered rooms")
+    cache = _command(actions, "cache", "render and encode one set of rooms; an interrupted run continues")
+    cache.add_argument("pack", type=Path, metavar="PACK", help="made by rooms pack")
+    _add_output(cache, "CACHE", "folder to fill")
+    cache.add_argument("--set", choices=("train", "validation", "held_out"), default="train")
+    cache.add_argument("--scenes", type=whole_count, default=4096, metavar="N", help="(default: 4096)")
+    cache.add_argument("--first-seed", type=seed, metavar="N", help="(default: the set's own range)")
+    cache.add_argument(
+        "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
+    )
+    _add_encoder(cache)
+    run = _command(actions, "run", "train stages, one after the other; continues where a run stopped")
+    run.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
+    _add_output(run, "RUN", "folder of checkpoints and logs")
+    run.add_argument(
+        "--stages", nargs="+", required=True, metavar="STAGE", help="such as depth refine gaussians"
+    )
+    run.add_argument("--minutes", nargs="+", required=True, type=minutes, metavar="M", help="one per stage")
+    run.add_argument("--max-steps", type=whole_count, metavar="N", help="stop each stage earlier")
+    run.add_argument("--device", choices=("cpu", "cuda"), default="cpu")
+    run.add_argument("--seed", type=seed, default=0, metavar="N")
+    run.add_argument(
+        "--restart", action="store_true", help="forget what the run folder holds of these stages"
+    )
+    _add_encoder(run)
+    export = _command(actions, "export", "all stages of a run to one checkpoint")
+    export.add_argument("run", type=Path, metavar="RUN")
+    _add_output(export, "FILE", "the .safetensors to write")
+    export.add_argument("--metadata", type=Path, metavar="JSON", help="an object to add to the model card")
+    _add_encoder(export)
+
+
+def _add_eval(commands) -> None:
+    actions = _actions(commands, "eval", "how good a checkpoint is on rooms it has never seen")
+    rooms = _command(actions, "rooms", "geometry, pictures, labels and phrases, with trivial answers beside")
+    rooms.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="also write the tables as .md (default: only print them)",
+    )
+    _add_json(rooms)
+    calibrate = _command(actions, "calibrate", "presence threshold, as JSON for train export --metadata")
+    for command in (rooms, calibrate):
+        command.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
+        command.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
+        command.add_argument("--weights", type=Path, metavar="PATH", help="(default: the shipped ones)")
+        command.add_argument("--limit", type=whole_count, metavar="N", help="only the first N scenes")
+
+
+def _add_encoder(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
+    command.add_argument(
+        "--encoder",
+        type=Path,
+        metavar="PATH",
+        help="weights of the frozen encoder (default: the shipped ones)",
+    )
+
+
+def _add_weights(commands) -> None:
+    actions = _actions(commands, "weights", "the checkpoints this installation holds")
+    listing = _command(actions, "list", "name, size and origin of each checkpoint")
+    _add_json(listing)
+    verify = _command(actions, "verify", "read every number and check that it fits its network")
+    verify.add_argument(
+        "paths", nargs="*", type=Path, metavar="PATH", help="checkpoints (default: the shipped ones)"
+    )
+    _add_json(verify)
+
+
+def _add_camera(command: argparse.ArgumentParser) -> None:
+    camera = command.add_mutually_exclusive_group()
+    camera.add_argument("--view", type=view_index, metavar="N", help="that photo's pose, from 0 (default: 0)")
+    camera.add_argument(
+        "--camera", type=Path, metavar="FILE", help="JSON with viewmat (4 x 4), K (3 x 3), width and height"
+    )
+    command.add_argument(
+        "--size", type=size, metavar="WxH", help="pixels to draw (default: as the network saw it)"
+    )
+
+
+def _add_backend(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--backend",
+        choices=("gl", "torch"),
+        help="gl: the window's renderer; torch: the slow reference (default: gl if there is OpenGL)",
+    )
+
+
+def _add_json(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--json", action="store_true", help="one JSON document on stdout, nothing else")

@@ -1,0 +1,83 @@
+"""Pictures that only the command line makes: arrays of uint8 from a frame.
+
+Colours, heat-maps and label maps are the core's own (langflash_core.export).
+"""
+
+import io
+from pathlib import Path
+
+import numpy as np
+import torch
+from PIL import Image
+from torch import Tensor
+
+from app.gl.display import atom_colours
+from langflash_core.export.colours import heat, label_colours
+from langflash_core.export.png import label_map, to_8bit
+from langflash_core.scene.atomic import make_folder, write_atomically
+from langflash_core.types import Frame, QueryResult
+
+LABEL_OPACITY = 0.6
+
+
+def write_picture(path: Path, pixels: np.ndarray) -> None:
+    """Pixels (H, W) or (H, W, 3 or 4) uint8 as a PNG, whole or not at all.
+
+    Raises:
+        OutputError: the folder cannot be made or written.
+    """
+    stream = io.BytesIO()
+    Image.fromarray(np.ascontiguousarray(pixels)).save(stream, "PNG")
+    make_folder(path.parent)
+    write_atomically(path, stream.getvalue())
+
+
+def label_picture(result: QueryResult) -> np.ndarray:
+    """(H, W, 3): each pixel in the colour of the phrase that fits best, dimmed where none does."""
+    labels = label_map(result).cpu()  # (H, W), 0 is none
+    colours = np.concatenate((np.zeros((1, 3)), label_colours(len(result.answers)) / 255))
+    rgb = result.frame.rgb.detach().cpu().float().clamp(0, 1)
+    coloured = (1 - LABEL_OPACITY) * rgb + LABEL_OPACITY * torch.from_numpy(colours).float()[labels]
+    return to_8bit(torch.where((labels > 0)[..., None], coloured, 0.4 * rgb))
+
+
+def atom_picture(frame: Frame, dictionary: Tensor) -> np.ndarray:
+    """(H, W, 3): every atom of the dictionary (K, C) its own colour, mixed as the splats mix them."""
+    colours = atom_colours(dictionary.detach().cpu().double().numpy())
+    return to_8bit(_weights(frame) @ torch.from_numpy(colours))
+
+
+def weight_picture(frame: Frame, atom: int) -> np.ndarray:
+    """(H, W): W_k of one atom, black 0 to white 1."""
+    return to_8bit(_weights(frame)[..., atom, None].expand(-1, -1, 3))[..., 0]
+
+
+def depth_picture(frame: Frame) -> np.ndarray:
+    """(H, W, 3): near bright, far dark, linear in 1/z so that near things keep contrast; empty black.
+
+    The range is that of the middle 96 % of the pixels that show something.
+    """
+    depths = frame.depths.detach().cpu().float()
+    seen = depths > 0
+    if not seen.any():
+        return np.zeros((*depths.shape, 3), np.uint8)
+    near, far = np.percentile(depths[seen].numpy(), [2, 98])
+    span = max(1 / near - 1 / max(far, near * 1.001), 1e-9)
+    levels = (1 / torch.where(seen, depths, torch.tensor(far)) - 1 / far) / span
+    return to_8bit(heat(levels) * seen[..., None])
+
+
+def cut_out(frame: Frame, masks: Tensor) -> np.ndarray:
+    """(H, W, 4): the picture where any mask (P, H, W) holds, transparent elsewhere."""
+    kept = masks.any(0).cpu()[..., None]
+    alphas = frame.alphas.detach().cpu().float()[..., None]
+    # The frame is premultiplied over black; PNG wants straight colour.
+    straight = frame.rgb.detach().cpu().float() / alphas.clamp_min(1 / 255)
+    opaque = to_8bit((alphas * kept).expand(-1, -1, 3))[..., :1]
+    return np.concatenate([to_8bit(straight * kept), opaque], -1)
+
+
+def _weights(frame: Frame) -> Tensor:
+    if frame.weight_maps is None:
+        raise ValueError("frame: expected weight maps, received none")
+    return frame.weight_maps.detach().cpu().float()

@@ -1,0 +1,67 @@
+"""`main`: parse, run one command, turn every failure into one sentence and an exit code."""
+
+import contextlib
+import importlib
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Sequence
+
+from app.cli.parser import build_parser
+from app.cli.report import say_error
+from langflash_core.errors import LangFlashError
+
+INTERRUPTED = 128 + signal.SIGINT  # what a shell reports for a program that Ctrl-C ended
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Args:
+        argv: the words after `langflash`; `sys.argv[1:]` when None.
+
+    Returns:
+        0 done; 1 it failed; 2 bad input; 130 stopped by Ctrl-C.
+    """
+    try:
+        return _run(argv)
+    except LangFlashError as error:
+        say_error(str(error))
+        return error.exit_code
+    except KeyboardInterrupt:
+        say_error("stopped; nothing was written")
+        return INTERRUPTED
+    except BrokenPipeError:
+        # The reader of a pipe (`| head`) went away: not an error. Python would complain once
+        # more when it flushes at exit, so stdout now leads nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except OSError as error:
+        say_error(f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error))
+        return 1
+    except MemoryError:
+        say_error("out of memory; try a smaller --size or fewer photos")
+        return 1
+    except Exception as error:
+        if os.environ.get("LANGFLASH_DEBUG"):
+            traceback.print_exc()
+        say_error(
+            f"a bug in LangFlash, {type(error).__name__}: {error}; "
+            "run again with LANGFLASH_DEBUG=1 in the environment and report what it prints"
+        )
+        return 1
+
+
+def _run(argv: Sequence[str] | None) -> int:
+    try:
+        args = build_parser().parse_args(argv)
+    except SystemExit as done:  # --help and --version
+        return int(done.code or 0)
+    command = importlib.import_module(f"app.cli.commands.{args.command.replace('-', '_')}")
+    if not getattr(args, "json", False):
+        return command.run(args, sys.stdout) or 0
+    # stdout carries one document and nothing else, whatever a library prints.
+    document_stream = sys.stdout
+    with contextlib.redirect_stdout(sys.stderr):
+        return command.run(args, document_stream) or 0

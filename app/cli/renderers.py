@@ -1,0 +1,84 @@
+"""The two ways to draw a frame: the window's own GL renderer, and the torch reference."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Protocol
+
+from app.cli.report import say_warnings
+from langflash_core.errors import GraphicsError
+from langflash_core.types import Camera, Frame, Scene
+
+
+class Renderer(Protocol):
+    """Draws scenes. `backend` is "gl" or "torch"."""
+
+    backend: str
+
+    def __call__(self, scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame: ...
+
+
+class TorchRenderer:
+    """The reference rasteriser: slow, exact."""
+
+    backend = "torch"
+
+    def __call__(self, scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame:
+        from langflash_core.splat import render
+
+        return render(scene, camera, weight_maps=weight_maps)
+
+
+class GlRenderer:
+    """The window's renderer on an offscreen context; `release()` gives both back.
+
+    Raises:
+        GraphicsError: there is no OpenGL 3.3 on this machine.
+    """
+
+    backend = "gl"
+
+    def __init__(self) -> None:
+        from app.gl import SplatRenderer, offscreen_context
+
+        self._context = offscreen_context()
+        self._splats = SplatRenderer(self._context)
+        self._scene: Scene | None = None
+
+    def __call__(self, scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame:
+        if scene is not self._scene:
+            self._splats.set_scene(scene)
+            self._scene = scene
+        self._splats.draw(camera, weight_maps=weight_maps)
+        return self._splats.frame(weight_maps=weight_maps)
+
+    def release(self) -> None:
+        """Give the context back."""
+        self._splats.release()
+        self._context.release()
+
+
+@contextmanager
+def open_renderer(backend: str | None) -> Iterator[Renderer]:
+    """A renderer for the length of a command.
+
+    Args:
+        backend: "gl", "torch", or None: gl, and torch with a warning where OpenGL is missing.
+
+    Raises:
+        GraphicsError: "gl" was asked for and is not there.
+    """
+    if backend == "torch":
+        yield TorchRenderer()
+        return
+    try:
+        renderer = GlRenderer()
+    except GraphicsError as problem:
+        if backend == "gl":
+            raise
+        say_warnings([f"{str(problem).rstrip('.')}; drawing with the slow torch reference instead"])
+        yield TorchRenderer()
+        return
+    try:
+        yield renderer
+    finally:
+        renderer.release()

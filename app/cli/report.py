@@ -1,0 +1,68 @@
+"""What a command says: one sentence for an error, warnings, one JSON document, a progress bar."""
+
+import json
+import sys
+import time
+from collections.abc import Iterable
+from typing import Any, TextIO
+
+
+def one_sentence(text: str) -> str:
+    """`text` on one line, whatever line breaks it came with."""
+    return " ".join(text.split())
+
+
+def say_error(text: str) -> None:
+    """`langflash: <sentence>` on stderr."""
+    print(f"langflash: {one_sentence(text)}", file=sys.stderr)
+
+
+def say_warnings(warnings: Iterable[str]) -> None:
+    """`warning: <sentence>` on stderr, one line each."""
+    for warning in warnings:
+        print(f"warning: {one_sentence(warning)}", file=sys.stderr)
+
+
+def write_json(document: dict[str, Any], stream: TextIO) -> None:
+    """One JSON document, ASCII (any terminal encoding carries it).
+
+    Raises:
+        ValueError: a number is not finite, which JSON cannot hold.
+    """
+    json.dump(document, stream, indent=2, allow_nan=False)
+    stream.write("\n")
+    stream.flush()
+
+
+class ProgressBar:
+    """A bar on stderr where stderr is a terminal, silence otherwise.
+
+    Call it with a stage's name and the fraction in [0, 1] that is done; as a context manager
+    it leaves a clean line behind, also after an error.
+    """
+
+    WIDTH = 30
+
+    def __init__(self, stream: TextIO | None = None):
+        self.stream = sys.stderr if stream is None else stream
+        self.live = self.stream.isatty()
+        self.start = time.monotonic()
+        self.drawn = 0  # characters on the line now
+
+    def __call__(self, stage: str, fraction: float) -> None:
+        if not self.live:
+            return
+        done = round(self.WIDTH * min(max(fraction, 0.0), 1.0))
+        bar = "#" * done + "." * (self.WIDTH - done)
+        line = f"[{bar}] {time.monotonic() - self.start:5.1f} s  {stage}"
+        self.stream.write("\r" + line.ljust(self.drawn))
+        self.stream.flush()
+        self.drawn = len(line)
+
+    def __enter__(self) -> "ProgressBar":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.live and self.drawn:
+            self.stream.write("\r" + " " * self.drawn + "\r")
+            self.stream.flush()

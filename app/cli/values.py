@@ -1,0 +1,109 @@
+"""Options that are more than a word: text to checked values, for argparse's `type=`."""
+
+import math
+import re
+from argparse import ArgumentTypeError
+
+LARGEST_SIDE = 8192  # pixels; GL 3.3 promises no larger texture on most drivers
+PICTURES = ("rgb", "depth", "relevance", "labels", "atoms", "weights")
+
+
+def size(text: str) -> tuple[int, int]:
+    """`WxH` to (width, height) in pixels, each 1 to 8192."""
+    match = re.fullmatch(r"(\d{1,5})[xX×](\d{1,5})", text)
+    if not match:
+        raise ArgumentTypeError(f"expected WIDTHxHEIGHT such as 640x480, received {text!r}")
+    width, height = int(match[1]), int(match[2])
+    if not (1 <= width <= LARGEST_SIDE and 1 <= height <= LARGEST_SIDE):
+        raise ArgumentTypeError(f"expected sides of 1 to {LARGEST_SIDE} pixels, received {text}")
+    return width, height
+
+
+def pixel_side(text: str) -> int:
+    """Side of the square that has as many pixels as the network is to see, 56 to 1024."""
+    return _whole(text, 56, 1024)
+
+
+def view_index(text: str) -> int:
+    """Index of a photo, from 0."""
+    return _whole(text, 0, 10**6)
+
+
+def seed(text: str) -> int:
+    """Number of a room, or of a run."""
+    return _whole(text, 0, 2**31 - 1)
+
+
+def whole_count(text: str) -> int:
+    """How many, at least 1."""
+    return _whole(text, 1, 10**9)
+
+
+def part(text: str) -> tuple[int, int]:
+    """`I/N`: the I-th of N parts, from 0."""
+    index, slash, count = text.partition("/")
+    if not slash:
+        raise ArgumentTypeError(f"expected I/N such as 0/2, received {text!r}")
+    parts = _whole(count, 1, 1000)
+    return _whole(index, 0, parts - 1), parts
+
+
+def minutes(text: str) -> float:
+    """A time above 0."""
+    value = _number(text)
+    if value <= 0:
+        raise ArgumentTypeError(f"expected minutes above 0, received {text}")
+    return value
+
+
+def open_fov(text: str) -> float:
+    """Degrees, between 1 and 179."""
+    value = _number(text)
+    if not 1.0 < value < 179.0:
+        raise ArgumentTypeError(f"expected degrees between 1 and 179, received {text}")
+    return value
+
+
+def kept_fraction(text: str) -> float:
+    """A relevancy threshold, strictly between 0 and 1."""
+    value = _number(text)
+    if not 0.0 < value < 1.0:
+        raise ArgumentTypeError(f"expected a number between 0 and 1, received {text}")
+    return value
+
+
+def intrinsics(text: str) -> tuple[float, float, float, float]:
+    """`FX,FY,CX,CY` in pixels; focal lengths above 0."""
+    words = text.split(",")
+    if len(words) != 4:
+        raise ArgumentTypeError(f"expected four numbers FX,FY,CX,CY, received {text!r}")
+    fx, fy, cx, cy = (_number(word) for word in words)
+    if fx <= 0 or fy <= 0:
+        raise ArgumentTypeError(f"expected focal lengths above 0, received {text}")
+    return fx, fy, cx, cy
+
+
+def what(text: str) -> tuple[str, int | None]:
+    """A picture's kind, and for `weights:K` the atom K."""
+    kind, colon, atom = text.partition(":")
+    if kind not in PICTURES or bool(colon) != (kind == "weights"):
+        raise ArgumentTypeError(
+            f"expected rgb, depth, relevance, labels, atoms or weights:K, received {text!r}"
+        )
+    return kind, _whole(atom, 0, 10**6) if colon else None
+
+
+def _number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise ArgumentTypeError(f"expected a number, received {text!r}") from None
+    if not math.isfinite(value):
+        raise ArgumentTypeError(f"expected a finite number, received {text}")
+    return value
+
+
+def _whole(text: str, smallest: int, largest: int) -> int:
+    if not re.fullmatch(r"[+-]?\d+", text) or not smallest <= int(text) <= largest:
+        raise ArgumentTypeError(f"expected a whole number from {smallest} to {largest}, received {text!r}")
+    return int(text)

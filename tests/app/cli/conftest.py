@@ -1,0 +1,75 @@
+"""A small scene on disk whose dictionary holds real text embeddings, and a way to run commands."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import torch
+
+from app.cli import main
+from langflash_core.query.spaces import language_space
+from langflash_core.scene import save
+from langflash_core.types import Gaussians, Scene, Semantics
+
+WORDS = ("armchair", "floor lamp", "wooden floor")
+WIDTH, HEIGHT = 56, 42
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one command did."""
+
+    code: int
+    out: str
+    err: str
+
+    def json(self) -> dict:
+        return json.loads(self.out)
+
+
+@pytest.fixture
+def run(capsys):
+    """`run("query", scene, "armchair", ...)` in this process."""
+
+    def command(*words) -> Outcome:
+        code = main([str(word) for word in words])
+        captured = capsys.readouterr()
+        return Outcome(code, captured.out, captured.err)
+
+    return command
+
+
+def stripes() -> Scene:
+    """A wall one unit ahead: left third one word, middle the next, right the last."""
+    ys, xs = torch.meshgrid(torch.linspace(-0.6, 0.6, 42), torch.linspace(-0.8, 0.8, 56), indexing="ij")
+    means = torch.stack((xs, ys, torch.ones_like(xs)), -1).reshape(-1, 3)
+    count = len(means)
+    atoms = ((means[:, 0] + 0.8) / 1.6 * len(WORDS)).long().clamp(0, len(WORDS) - 1)
+    gaussians = Gaussians(
+        means=means,
+        quats=torch.tensor([1.0, 0.0, 0.0, 0.0]).repeat(count, 1),
+        scales=torch.full((count, 3), 0.02),
+        opacities=torch.full((count,), 0.95),
+        sh=torch.eye(3)[atoms][:, None, :] * 1.5,
+    )
+    dictionary = language_space("minilm").encode(WORDS)
+    semantics = Semantics(atoms[:, None], torch.ones(count, 1), dictionary, "minilm")
+    K = torch.tensor([[35.0, 0.0, WIDTH / 2], [0.0, 35.0, HEIGHT / 2], [0.0, 0.0, 1.0]])
+    second = torch.eye(4)
+    second[0, 3] = -0.1
+    return Scene(
+        gaussians,
+        semantics,
+        viewmats=torch.stack((torch.eye(4), second)),
+        Ks=torch.stack((K, K)),
+        view_size=(WIDTH, HEIGHT),
+        metadata={"preset": "mini", "warnings": []},
+    )
+
+
+@pytest.fixture(scope="session")
+def scene_file(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("scene") / "stripes.langflash"
+    save(stripes(), path)
+    return path

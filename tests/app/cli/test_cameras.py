@@ -1,0 +1,47 @@
+import json
+import math
+from argparse import Namespace
+
+import pytest
+import torch
+
+from app.cli.cameras import chosen_camera, read_camera
+from langflash_core.errors import ViewError
+from tests.app.cli.conftest import HEIGHT, WIDTH, stripes
+
+
+def choice(**given):
+    return chosen_camera(Namespace(**{"view": None, "camera": None, "size": None, **given}))
+
+
+def test_view_defaults_to_the_first():
+    camera = choice().of(stripes())
+    assert torch.equal(camera.viewmat, torch.eye(4))
+    assert (camera.width, camera.height) == (WIDTH, HEIGHT)
+
+
+def test_size_keeps_the_field_of_view():
+    scene = stripes()
+    camera = choice(view=1, size=(2 * WIDTH, 3 * HEIGHT)).of(scene)
+    assert (camera.width, camera.height) == (2 * WIDTH, 3 * HEIGHT)
+    scale = torch.tensor([2.0, 3.0, 1.0])[:, None]
+    assert torch.equal(camera.K, scene.Ks[1] * scale)
+
+
+def test_unknown_view_names_the_range():
+    with pytest.raises(ViewError, match="--view 0 to 1"):
+        choice(view=2).of(stripes())
+
+
+def test_file_round_trip(tmp_path):
+    turn = math.radians(30)
+    viewmat = torch.eye(4)
+    viewmat[0, 0] = viewmat[2, 2] = math.cos(turn)
+    viewmat[0, 2], viewmat[2, 0] = math.sin(turn), -math.sin(turn)
+    K = [[300.0, 0.0, 160.0], [0.0, 310.0, 120.0], [0.0, 0.0, 1.0]]
+    path = tmp_path / "camera.json"
+    path.write_text(json.dumps({"viewmat": viewmat.tolist(), "K": K, "width": 320, "height": 240}))
+    camera = read_camera(path)
+    assert torch.equal(camera.viewmat, viewmat) and camera.K.tolist() == K
+    drawn = choice(camera=path, size=(160, 120)).of(stripes())
+    assert drawn.K[0].tolist() == [150.0, 0.0, 80.0]

@@ -1,0 +1,276 @@
+"""Commands on a small scene: what they print, what they write, and that both backends agree."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS
+
+TORCH = ("--backend", "torch")
+
+
+def pixels(path: Path) -> np.ndarray:
+    return np.asarray(Image.open(path))
+
+
+@pytest.mark.parametrize("backend", ["torch", "gl"])
+def test_query(run, scene_file, tmp_path, backend):
+    out = tmp_path / "deep" / "out"
+    outcome = run(
+        "query", scene_file, "armchair", "submarine", "-o", out, "--json", "--npz", "--backend", backend
+    )
+    assert outcome.code == 0, outcome.err
+    document = outcome.json()
+    assert document["backend"] == backend and document["view"] == 0 and document["mode"] == "relevancy"
+    assert document["size"] == [WIDTH, HEIGHT] and document["unit"] == "scene"
+    chair, submarine = document["prompts"]
+    assert chair["prompt"] == "armchair" and chair["found"] and chair["score"] >= chair["threshold"]
+    assert not submarine["found"] and submarine["area"] == 0
+    assert submarine["centroid"] is None and submarine["box"] is None
+    # The armchair is the left third of a wall 1.6 wide, one unit ahead.
+    assert 0.2 < chair["area"] < 0.4
+    assert np.allclose(chair["centroid"], [-0.53, 0.0, 1.0], atol=0.1)  # a tenth: the stripe's soft edge
+    assert set(chair["box"]) == {"center", "axes", "size"}
+    assert {"rgb.png", "query.npz"} <= set(os.listdir(out))
+    assert chair["files"]["heat"] == str(out / "armchair_heat.png")
+    assert submarine["files"]["mask"] == str(out / "submarine_mask.png")
+    named = {Path(path).name for entry in document["prompts"] for path in entry["files"].values()}
+    assert named == set(os.listdir(out))
+    assert pixels(out / "armchair_mask.png")[:, : WIDTH // 4].mean() > 200
+    assert pixels(out / "submarine_mask.png").max() == 0
+    arrays = np.load(chair["files"]["npz"])
+    kinds = {name: (arrays[name].shape, str(arrays[name].dtype)) for name in arrays}
+    assert (
+        kinds.items()
+        >= {
+            "relevance": ((2, HEIGHT, WIDTH), "float32"),
+            "mask": ((2, HEIGHT, WIDTH), "bool"),
+            "depth": ((HEIGHT, WIDTH), "float32"),
+            "rgb": ((HEIGHT, WIDTH, 3), "uint8"),
+        }.items()
+    )
+    assert np.array_equal(arrays["mask"][0] * 255, pixels(out / "armchair_mask.png"))
+
+
+def test_backends_agree(run, scene_file, tmp_path):
+    arrays = {}
+    for backend in ("torch", "gl"):
+        run(
+            "query",
+            scene_file,
+            *WORDS,
+            "-o",
+            tmp_path / backend,
+            "--npz",
+            "--backend",
+            backend,
+            "--view",
+            "1",
+        )
+        arrays[backend] = np.load(tmp_path / backend / "query.npz")
+    exact, drawn = arrays["torch"], arrays["gl"]
+    # The project's own promise: relevance within 0.005 on average, colours within 45 dB.
+    assert np.abs(exact["relevance"] - drawn["relevance"]).mean() <= 0.005
+    error = ((exact["rgb"].astype(float) - drawn["rgb"]) / 255) ** 2
+    assert -10 * np.log10(max(error.mean(), 1e-10)) >= 45
+
+
+def test_query_for_people(run, scene_file, tmp_path):
+    outcome = run("query", scene_file, "armchair", "submarine", "-o", tmp_path, *TORCH)
+    first, second = outcome.out.splitlines()
+    assert first.startswith("found") and "armchair" in first and "armchair_heat.png" in first
+    assert second.startswith("not found") and "submarine" in second
+    assert outcome.err == ""  # no bar, no warning
+
+
+def test_query_by_cosine_with_own_negatives(run, scene_file, tmp_path):
+    cosine = run("query", scene_file, "armchair", "-o", tmp_path, "--mode", "cosine", "--json", *TORCH).json()
+    assert cosine["mode"] == "cosine"
+    assert cosine["prompts"][0]["score"] == pytest.approx(1.0, abs=1e-3)  # the atom is that very phrase
+    scores = [
+        run("query", scene_file, "armchair", "-o", tmp_path, "--json", *TORCH, "--negatives", word).json()[
+            "prompts"
+        ][0]["score"]
+        for word in ("sofa", "moon")
+    ]
+    assert scores[0] < scores[1]  # a close rival leaves less
+
+
+def test_size_and_camera_file(run, scene_file, tmp_path):
+    camera = tmp_path / "camera.json"
+    viewmat = np.eye(4).tolist()
+    viewmat[2][3] = 0.5  # half a unit back
+    K = [[35.0, 0.0, 28.0], [0.0, 35.0, 21.0], [0.0, 0.0, 1.0]]
+    camera.write_text(json.dumps({"viewmat": viewmat, "K": K, "width": 56, "height": 42}))
+    near, far = tmp_path / "near.png", tmp_path / "far.png"
+    assert run("render", scene_file, "-o", near, "--size", "80x60", *TORCH).code == 0
+    assert run("render", scene_file, "-o", far, "--camera", camera, "--size", "80x60", *TORCH).code == 0
+    assert pixels(near).shape == pixels(far).shape == (60, 80, 3)
+    assert (pixels(far).sum(-1) > 0).mean() < (pixels(near).sum(-1) > 0).mean()  # smaller from further away
+
+
+@pytest.mark.parametrize("backend", ["torch", "gl"])
+@pytest.mark.parametrize(
+    "what",
+    ["rgb", "depth", "atoms", "weights:1", "relevance --prompt armchair", "labels --prompt armchair lamp"],
+)
+def test_render(run, scene_file, tmp_path, what, backend):
+    path = tmp_path / "new" / "a.png"
+    words = ("render", scene_file, "-o", path, "--what", *what.split(), "--backend", backend, "--json")
+    outcome = run(*words)
+    assert outcome.code == 0, outcome.err
+    document = outcome.json()
+    assert document["file"] == str(path) and document["size"] == [WIDTH, HEIGHT]
+    assert pixels(path).shape[:2] == (HEIGHT, WIDTH)
+    assert np.ptp(pixels(path)) > 20  # it shows something
+    assert os.listdir(path.parent) == ["a.png"]
+
+
+def test_rendered_weights_are_the_stripe(run, scene_file, tmp_path):
+    run("render", scene_file, "-o", tmp_path / "a.png", "--what", "weights:1", *TORCH)
+    picture = pixels(tmp_path / "a.png")
+    third = WIDTH // 3
+    assert picture[:, third + 3 : 2 * third - 3].mean() > 240
+    assert picture[:, : third - 3].mean() < 5 and picture[:, 2 * third + 4 :].mean() < 5
+
+
+def test_labels_for_people(run, scene_file, tmp_path):
+    out = run(
+        "render",
+        scene_file,
+        "-o",
+        tmp_path / "a.png",
+        "--what",
+        "labels",
+        "--prompt",
+        "armchair",
+        "moon",
+        *TORCH,
+    ).out
+    assert "armchair #" in out and "moon #" in out and "(not found)" in out
+
+
+def test_export_picture_and_cut_out(run, scene_file, tmp_path):
+    assert run("export", scene_file, "-o", tmp_path / "a.png", *TORCH).code == 0
+    assert pixels(tmp_path / "a.png").shape == (HEIGHT, WIDTH, 3)
+    words = ("--prompt", "armchair", "submarine", "--threshold", "0.8")
+    outcome = run("export", scene_file, "-o", tmp_path / "b.png", *words, *TORCH)
+    assert outcome.code == 0, outcome.err
+    alphas = pixels(tmp_path / "b.png")[..., 3]
+    assert alphas[:, : WIDTH // 4].mean() > 200 and alphas[:, WIDTH // 2 :].max() == 0
+
+
+def test_info(run, scene_file):
+    document = run("info", scene_file, "--json").json()
+    assert document["gaussians"] == WIDTH * HEIGHT and document["atoms"] == len(WORDS)
+    assert document["views"] == 2 and document["file_bytes"] == scene_file.stat().st_size
+    text = run("info", scene_file).out
+    assert f"gaussians: {WIDTH * HEIGHT:,}" in text and "space: minilm" in text
+
+
+def test_json_is_all_of_stdout(scene_file, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "app", "query", scene_file, "armchair", "-o", tmp_path / "o", "--json"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["prompts"][0]["found"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="EGL is Linux's")
+def test_without_opengl(scene_file, tmp_path):
+    """Hide every EGL driver: gl by default gives way with a warning, gl by choice is an error."""
+    words = [sys.executable, "-m", "app", "render", scene_file, "-o", tmp_path / "a.png"]
+    hidden = {**os.environ, "__EGL_VENDOR_LIBRARY_FILENAMES": "/dev/null"}
+    given_way = subprocess.run(words, capture_output=True, text=True, env=hidden, timeout=60)
+    assert given_way.returncode == 0
+    assert given_way.stderr.startswith("warning: ") and "torch" in given_way.stderr
+    (tmp_path / "a.png").unlink()
+    asked = subprocess.run(
+        [*words, "--backend", "gl"], capture_output=True, text=True, env=hidden, timeout=60
+    )
+    assert asked.returncode == 1
+    assert asked.stderr.startswith("langflash: ") and asked.stderr.count("\n") == 1
+    assert not os.listdir(tmp_path)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="terminals of POSIX")
+def test_interrupted_at_a_terminal(scene_file, tmp_path):
+    """Ctrl-C once the bar says the drawing has begun: exit code 130, nothing written."""
+    import pty
+
+    terminal, side = pty.openpty()
+    words = [
+        "query",
+        scene_file,
+        "armchair",
+        "-o",
+        tmp_path / "out",
+        "--backend",
+        "torch",
+        "--size",
+        "8192x8192",
+    ]
+    child = subprocess.Popen(
+        [sys.executable, "-m", "app", *map(str, words)], stderr=side, start_new_session=True
+    )
+    try:
+        os.close(side)
+        shown, patience = b"", time.monotonic() + 60
+        while b"drawing" not in shown and time.monotonic() < patience:
+            shown += os.read(terminal, 1024)
+        assert b"drawing" in shown
+        child.send_signal(signal.SIGINT)
+        assert child.wait(60) == 130
+        assert b"stopped" in os.read(terminal, 4096)
+    finally:
+        child.kill()
+        os.close(terminal)
+    assert not os.listdir(tmp_path)
+
+
+def test_help_and_version_answer_at_once():
+    """No torch, no OpenGL: 0.3 s are promised; three times that on a machine busy with other tests."""
+    for words in (["--help"], ["--version"], ["query", "--size"]):
+        start = time.perf_counter()
+        done = subprocess.run([sys.executable, "-m", "app", *words], capture_output=True, timeout=60)
+        assert time.perf_counter() - start < 0.9
+        assert done.returncode == (2 if "query" in words else 0)
+    code = "import sys, app.cli.parser; sys.exit(bool({'torch', 'numpy', 'moderngl'} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
+
+
+def test_nothing_found_is_an_answer(run, scene_file, tmp_path):
+    outcome = run("query", scene_file, "submarine", "-o", tmp_path, "--json", *TORCH)
+    assert outcome.code == 0
+    assert [entry["found"] for entry in outcome.json()["prompts"]] == [False]
+
+
+def test_prompts_that_collide_get_their_own_files(run, scene_file, tmp_path):
+    prompts = ("chair", "Chair 2", "chair!", "chair", "../chair", "!?", "椅子")
+    entries = run("query", scene_file, *prompts, "-o", tmp_path / "o", "--json", *TORCH).json()["prompts"]
+    paths = [Path(entry["files"][kind]) for entry in entries for kind in ("heat", "mask")]
+    assert len(set(paths)) == 2 * len(prompts)
+    assert all(path.is_file() and path.parent == tmp_path / "o" for path in paths)
+
+
+def test_window_needs_a_display(scene_file, tmp_path):
+    if sys.platform != "linux":
+        pytest.skip("elsewhere there is always a screen")
+    hidden = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    words = [sys.executable, "-m", "app", "view"]
+    done = subprocess.run([*words, scene_file], capture_output=True, text=True, env=hidden, timeout=60)
+    assert done.returncode == 1, done.stderr
+    assert done.stderr.startswith("langflash: ") and done.stderr.count("\n") == 1
+    missing = subprocess.run([*words, "gone.jpg"], capture_output=True, text=True, env=hidden, timeout=60)
+    assert missing.returncode == 2 and "gone.jpg" in missing.stderr
