@@ -1,5 +1,6 @@
 """The folder that `query -o DIR` fills: one view, and per prompt its mask, heat, and relevance."""
 
+import itertools
 import unicodedata
 from collections.abc import Sequence
 from pathlib import Path
@@ -56,5 +57,6 @@ def file_names(prompts: Sequence[str]) -> list[str]:
         plain = unicodedata.normalize("NFKC", prompt.casefold())
         words = "".join(sign if sign.isalnum() else " " for sign in plain).split()
         name = "_".join(words).encode()[:_MAX_NAME].decode(errors="ignore") or f"prompt_{index}"
-        names.append(name if name not in names else f"{name}_{index}")
+        others = (f"{name}_{number}" for number in itertools.count(2))
+        names.append(name if name not in names else next(other for other in others if other not in names))
     return names

@@ -23,7 +23,7 @@ K = torch.tensor([[55.0, 0, 18.5], [0, 60.0, 11.25], [0, 0, 1]], dtype=torch.flo
 
 def _pose(seed: int) -> torch.Tensor:
     pose = torch.eye(4, dtype=torch.float64)
-    pose[:3, :3] = torch.from_numpy(Rotation.random(rng=seed).as_matrix())
+    pose[:3, :3] = torch.from_numpy(Rotation.random(rng=np.random.default_rng(seed)).as_matrix())
     pose[:3, 3] = torch.randn(3, dtype=torch.float64, generator=torch.manual_seed(seed))
     return pose
 

@@ -1,5 +1,6 @@
 """Rotations against scipy, and the degenerate quaternions that files contain."""
 
+import numpy as np
 import pytest
 import torch
 from scipy.spatial.transform import Rotation
@@ -13,7 +14,7 @@ from langflash_core.geometry.quaternions import (
 
 
 def _rotations(count: int = 300) -> tuple[torch.Tensor, torch.Tensor]:
-    rotations = Rotation.random(count, rng=0)
+    rotations = Rotation.random(count, rng=np.random.default_rng(0))
     quats = torch.from_numpy(rotations.as_quat(scalar_first=True))
     return quats, torch.from_numpy(rotations.as_matrix())
 

@@ -35,6 +35,12 @@ def _pair(
     return Matches(x_i, x_j, SIGMA), mono_i, mono_j, rotation, translation
 
 
+def _pose(matches, depth_i, depth_j) -> RelativePose:
+    pose = relative_pose(matches, depth_i, depth_j)
+    assert pose is not None
+    return pose
+
+
 def _degrees(rotation, truth):
     return np.degrees(np.linalg.norm(Rotation.from_matrix(rotation.T @ truth).as_rotvec()))
 
@@ -43,7 +49,7 @@ def _degrees(rotation, truth):
 @pytest.mark.parametrize("outliers", [0.0, 0.3])
 def test_pose_and_scale_are_found(seed, outliers):
     matches, depth_i, depth_j, rotation, translation = _pair(seed, outliers=outliers)
-    pose = relative_pose(matches, depth_i, depth_j)
+    pose = _pose(matches, depth_i, depth_j)
     # Half a pixel of noise over 140 matches or more: well under a tenth of a degree.
     assert _degrees(pose.rotation, rotation) < 0.15
     # The length rests on 10 % depth noise averaged over the matches: 1 %, times 3 sigma.
@@ -54,14 +60,14 @@ def test_pose_and_scale_are_found(seed, outliers):
 
 def test_pure_rotation_gives_no_translation():
     matches, depth_i, depth_j, rotation, _ = _pair(1, turn=(0, 0.3, 0), move=(0, 0, 0))
-    pose = relative_pose(matches, depth_i, depth_j)
+    pose = _pose(matches, depth_i, depth_j)
     assert _degrees(pose.rotation, rotation) < 0.15
     assert np.linalg.norm(pose.translation) < 0.02  # a pixel of noise at 3 m is 0.005
 
 
 def test_the_same_photo_twice_is_the_identity():
     matches, depth_i, _, _, _ = _pair(2, turn=(0, 0, 0), move=(0, 0, 0), noise=0)
-    pose = relative_pose(matches, depth_i, depth_i)
+    pose = _pose(matches, depth_i, depth_i)
     assert _degrees(pose.rotation, np.eye(3)) < 1e-3
     assert np.linalg.norm(pose.translation) < 1e-4
     assert abs(pose.log_scale) < 1e-4
@@ -74,7 +80,7 @@ def test_a_single_plane_is_not_misread():
     depth = 3 / (1 - 0.3 * matches.x_i[:, 0])
     pos_j = np.column_stack((matches.x_i, np.ones(200))) * depth[:, None] @ rotation.T + translation
     flat = Matches(matches.x_i, pos_j[:, :2] / pos_j[:, 2:] + rng.normal(0, 0.3 * SIGMA, (200, 2)), SIGMA)
-    pose = relative_pose(flat, depth, pos_j[:, 2])
+    pose = _pose(flat, depth, pos_j[:, 2])
     assert _degrees(pose.rotation, rotation) < 0.5
     assert np.linalg.norm(pose.translation - translation) < 0.05 * np.linalg.norm(translation)
 

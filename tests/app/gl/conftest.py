@@ -1,0 +1,30 @@
+import pytest
+
+from app.gl import SplatRenderer, offscreen_context
+from langflash_core.errors import GraphicsError
+
+
+@pytest.fixture(scope="session")
+def context():
+    """One OpenGL context without a window for all tests; they are skipped where there is none."""
+    try:
+        made = offscreen_context()
+    except GraphicsError as problem:
+        pytest.skip(str(problem))
+    yield made
+    made.release()
+
+
+@pytest.fixture
+def gl(context):
+    """The context, free of errors before and after each test."""
+    assert context.error == "GL_NO_ERROR"
+    yield context
+    assert context.error == "GL_NO_ERROR"
+
+
+@pytest.fixture(params=["float16", "float32"])
+def renderer(gl, request):
+    made = SplatRenderer(gl, request.param)
+    yield made
+    made.release()

@@ -1,0 +1,228 @@
+"""OpenGL against the float64 reference: pictures, weight maps, relevance, and hard cases."""
+
+import dataclasses
+import math
+
+import pytest
+import torch
+
+from app.gl import SplatRenderer
+from langflash_core.query.relevance import relevance_maps
+from langflash_core.splat import render
+from langflash_core.types import Camera
+from tests.app.gl.questions import full_relevance, psnr, question
+from tests.splat.scenes import camera, cloud, maps_of, scene_of, splats, turned
+
+# float16 keeps 11 bits, 5e-4 of a value, and back-to-front blending rounds once a layer while
+# later layers shrink earlier errors: about 60 dB. float32 is limited by the few pixels where
+# rounding moves an alpha across 1/255: about 100 dB.
+PSNR = {"float16": 50.0, "float32": 80.0}
+# Mean. A software rasteriser may truncate where a graphics card rounds: up to 2^-10 of the value.
+WEIGHT_ERROR = {"float16": 2e-3, "float32": 2e-5}
+RELEVANCE_ERROR = {"float16": 2e-3, "float32": 1e-4}  # mean; ten times the slope of the sigmoid / 4
+
+
+@pytest.fixture(params=["float16", "float32"])
+def precision(request):
+    return request.param
+
+
+def draw(gl, precision, scene, seen, **options):
+    renderer = SplatRenderer(gl, precision)
+    renderer.set_scene(scene)
+    renderer.draw(seen, **options)
+    frame = renderer.frame(weight_maps=True)
+    renderer.release()
+    return frame
+
+
+def assert_agrees(frame, expected, precision):
+    assert psnr(frame.rgb, expected.rgb) >= PSNR[precision]
+    assert psnr(frame.alphas, expected.alphas) >= PSNR[precision]
+    assert all(torch.isfinite(m).all() for m in (frame.rgb, frame.alphas, frame.depths, maps_of(frame)))
+    solid = expected.alphas > 0.5
+    if solid.any():
+        relative = (frame.depths - expected.depths).abs()[solid] / expected.depths[solid]
+        assert relative.mean() <= 1e-5  # both sums are float32 at either precision
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2, 3, 4])
+def test_colour_depth_and_transmittance(gl, precision, degree):
+    scene = cloud(2000, degree=degree, dtype=torch.float32)
+    seen = camera(96, 80, 80.0, turned(0.15, (0.1, 0.0, 0.1)))
+    frame = draw(gl, precision, scene, seen, background=(0.2, 0.4, 0.9))
+    expected = render(scene, seen, background=(0.2, 0.4, 0.9))
+    assert expected.alphas.mean() > 0.5, "the scene must cover something"
+    assert_agrees(frame, expected, precision)
+
+
+@pytest.mark.parametrize("num_atoms", [0, 1, 23, 24, 25, 130])
+@pytest.mark.parametrize("kept", [1, 8])
+def test_weight_maps_and_relevance(gl, precision, num_atoms, kept):
+    scene = cloud(1500, num_atoms, kept, dtype=torch.float32)
+    seen = camera(64, 48, 50.0)
+    expected = render(scene, seen)
+    renderer = SplatRenderer(gl, precision)
+    renderer.set_scene(scene)
+    renderer.draw(seen)
+    assert renderer.passes["weights"] == math.ceil(num_atoms / 24)
+    maps = maps_of(renderer.frame(weight_maps=True))
+    assert maps is not None and maps.shape == (48, 64, num_atoms)
+    if num_atoms:
+        assert (maps - maps_of(expected)).abs().mean() <= WEIGHT_ERROR[precision]
+        assert (maps.sum(-1) - expected.alphas).abs().mean() <= 10 * WEIGHT_ERROR[precision]  # adds K errors
+    for mode in ("relevancy", "cosine"):
+        compiled = question(scene, 5, mode)
+        renderer.ask(compiled)
+        relevance = renderer.relevance()
+        truth = full_relevance(scene, compiled, maps_of(expected))
+        assert relevance.shape == (5, 48, 64)
+        assert (relevance - truth).abs().mean() <= RELEVANCE_ERROR[precision]
+        twin = relevance_maps(maps.double(), compiled)
+        # The same maps: only float32 sums differ, times the temperature.
+        assert (relevance - twin).abs().max() <= 5e-5
+    renderer.release()
+
+
+@pytest.mark.parametrize("num_prompts", [1, 4, 16, 17])
+@pytest.mark.parametrize("num_negatives", [1, 4, 7])
+def test_any_number_of_phrases(gl, num_prompts, num_negatives):
+    scene = cloud(500, 24, dtype=torch.float32)
+    seen = camera()
+    renderer = SplatRenderer(gl, "float32")
+    renderer.set_scene(scene)
+    renderer.draw(seen)
+    compiled = question(scene, num_prompts, num_negatives=num_negatives)
+    renderer.ask(compiled)
+    truth = full_relevance(scene, compiled, maps_of(render(scene, seen)))
+    assert (renderer.relevance() - truth).abs().mean() <= RELEVANCE_ERROR["float32"]
+    renderer.release()
+
+
+def test_only_atoms_in_view_are_drawn(gl):
+    scene = cloud(300, 130, dtype=torch.float32)
+    ids = scene.semantics.weight_ids % 5 + 100  # five of 130
+    scene = dataclasses.replace(scene, semantics=dataclasses.replace(scene.semantics, weight_ids=ids))
+    renderer = SplatRenderer(gl)
+    renderer.set_scene(scene)
+    renderer.draw(camera())
+    assert renderer.passes["weights"] == 1
+    maps = maps_of(renderer.frame(weight_maps=True))
+    assert maps[..., :100].abs().max() == 0 and maps[..., 100:105].amax((0, 1)).min() > 0
+    renderer.release()
+
+
+def test_splitting_and_permuting_atoms_changes_no_relevance(renderer):
+    scene = cloud(800, 6, dtype=torch.float32)
+    semantics = scene.semantics
+    order = torch.tensor([3, 0, 5, 1, 4, 2])
+    halves = semantics.weight_values / 2
+    variants = [
+        semantics,
+        dataclasses.replace(
+            semantics,
+            weight_ids=order.argsort()[semantics.weight_ids],
+            dictionary=semantics.dictionary[order],
+        ),
+        dataclasses.replace(
+            semantics,
+            weight_ids=torch.cat((semantics.weight_ids, semantics.weight_ids + 6), 1),
+            weight_values=torch.cat((halves, halves), 1),
+            dictionary=semantics.dictionary.repeat(2, 1),
+        ),
+    ]
+    g = torch.Generator().manual_seed(4)
+    phrases = torch.nn.functional.normalize(torch.randn(7, 16, generator=g, dtype=torch.float64), dim=-1)
+    relevances = []
+    for variant in variants:
+        changed = dataclasses.replace(scene, semantics=variant)
+        compiled = question(changed, 3)
+        basis = torch.linalg.pinv(compiled.factor) @ variant.dictionary.double()  # Q, up to a null space
+        compiled = dataclasses.replace(
+            compiled, prompts=phrases[:3] @ basis.T, negatives=phrases[3:] @ basis.T
+        )
+        renderer.set_scene(changed)
+        renderer.draw(camera())
+        renderer.ask(compiled)
+        relevances.append(renderer.relevance())
+    # Halved weights round alike in floating point; permuted ones add up in another order.
+    assert (relevances[1] - relevances[0]).abs().max() <= 2e-5
+    assert (relevances[2] - relevances[0]).abs().max() <= 2e-5
+
+
+def test_empty_pixels_are_zero(renderer):
+    scene = cloud(0, 3, dtype=torch.float32)
+    renderer.set_scene(scene)
+    renderer.draw(camera())
+    renderer.ask(question(scene))
+    frame = renderer.frame(weight_maps=True)
+    for values in (frame.rgb, frame.alphas, frame.depths, maps_of(frame), renderer.relevance()):
+        assert values.abs().max() == 0
+    corner = scene_of(splats([(0.0, 0.0, 2.0)], dtype=torch.float32))
+    renderer.set_scene(corner)
+    renderer.draw(camera())
+    assert renderer.frame().alphas[0, 0] == 0 and renderer.frame().depths[0, 0] == 0
+
+
+HARD = {
+    "needle": splats([(0.0, 0.0, 2.0)], [(2.0, 2e-6, 2e-6)]),
+    "disc": splats([(0.1, 0.0, 2.0)], [(0.5, 0.5, 1e-7)]),
+    "sub-pixel": splats([(0.01, 0.02, 3.0)], 1e-7),
+    "huge, from inside": splats([(0.5, 0.2, 0.5)], 50.0),
+    "beyond 1.3 tan": splats([(2.5, 0.3, 1.0)], 1.0),
+    "at the near plane": splats([(0.0, 0.0, 0.01), (0.0, 0.0, 0.0099)], 0.001),
+    "behind and at the camera": splats([(0.0, 0.0, -1.0), (0.0, 0.0, 0.0), (0.2, 0.0, 2.0)]),
+    "opacity 0 and 1": splats([(0.0, 0.0, 2.0), (0.3, 0.0, 2.0)], opacities=[0.0, 1.0]),
+    "equal depths": splats(
+        [(0.0, 0.0, 2.0)] * 3, opacities=0.5, colours=[(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+    ),
+    "200 opaque layers": splats([(0.0, 0.0, 1 + 0.01 * i) for i in range(200)], 0.2, 1.0),
+    "far and near": splats([(0.0, 0.0, 0.05), (1e4, 0.0, 1e6), (0.0, 0.1, 3.0)], [0.002, 3e4, 0.3]),
+    "colours out of range": splats([(0.0, 0.0, 2.0)], colours=[(1.8, -0.7, 0.5)]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", HARD)
+def test_hard_cases(gl, precision, name):
+    gaussians = HARD[name].map(lambda v: v.float())
+    if name in ("needle", "disc"):  # along no axis of the image
+        quats = torch.tensor([[0.9, 0.1, 0.2, 0.3]])
+        gaussians = dataclasses.replace(gaussians, quats=quats)
+    scene = scene_of(gaussians)
+    frame = draw(gl, precision, scene, camera())
+    expected = render(scene, camera())
+    assert_agrees(frame, expected, precision)
+    assert (expected.alphas.max() > 0.1) == (frame.alphas.max() > 0.1)
+
+
+@pytest.mark.parametrize("quat", [(0.0, 0.0, 0.0, 0.0), (0.2, 0.4, 0.0, 0.0), (-0.1, -0.2, 0.3, 0.0)])
+def test_quaternions_of_any_norm(gl, precision, quat):
+    gaussians = splats([(0.1, 0.0, 2.0)], [(0.4, 0.05, 0.1)], dtype=torch.float32)
+    scene = scene_of(dataclasses.replace(gaussians, quats=torch.tensor([quat])))
+    assert_agrees(draw(gl, precision, scene, camera()), render(scene, camera()), precision)
+
+
+def test_not_finite_is_dropped_and_counted(renderer):
+    scene = cloud(60, dtype=torch.float32)
+    broken = scene.gaussians.scales.clone()
+    broken[::10, 1] = math.nan
+    scene = dataclasses.replace(scene, gaussians=dataclasses.replace(scene.gaussians, scales=broken))
+    renderer.set_scene(scene)
+    renderer.draw(camera())
+    assert renderer.num_dropped == 6
+    assert torch.isfinite(renderer.frame().rgb).all()
+    assert psnr(renderer.frame().rgb, render(scene, camera()).rgb) >= 50
+
+
+@pytest.mark.parametrize("size", [(1, 1), (300, 2), (1000, 16)])
+def test_odd_sizes(gl, precision, size):
+    scene = cloud(300, dtype=torch.float32)
+    seen = camera(*size, focal=60.0)
+    assert_agrees(draw(gl, precision, scene, seen), render(scene, seen), precision)
+
+
+def test_off_centre_and_not_square(gl, precision):
+    scene = cloud(800, dtype=torch.float32)
+    K = torch.tensor([[45.0, 0.0, 5.0], [0.0, 30.0, 60.0], [0.0, 0.0, 1.0]])
+    seen = Camera(torch.eye(4), K, 64, 48)
+    assert_agrees(draw(gl, precision, scene, seen), render(scene, seen), precision)

@@ -1,0 +1,132 @@
+"""Objects, errors, state: what is left behind when the renderer has been and gone."""
+
+import ctypes
+import random
+
+import numpy as np
+import pytest
+
+from app.gl import SplatRenderer, offscreen_context
+from app.gl.splats import atom_bits, stable_order
+from app.gl.targets import gl_function
+from langflash_core.errors import GraphicsError
+from tests.app.gl.questions import question
+from tests.splat.scenes import camera, cloud, maps_of
+
+KINDS = ("Texture", "Buffer", "Framebuffer", "Program", "VertexArray", "Shader")
+
+
+def living(gl) -> dict[str, int]:
+    """How many names of each kind OpenGL itself calls objects."""
+    counts = {}
+    for kind in KINDS:
+        is_object = gl_function(gl, f"glIs{kind}", ctypes.c_ubyte, ctypes.c_uint)
+        counts[kind] = sum(bool(is_object(name)) for name in range(1, 5000))
+    return counts
+
+
+def test_nothing_leaks(gl):
+    bystander = gl.program(
+        vertex_shader="#version 330 core\nout float x; void main() { x = 1.0; }", varyings=["x"]
+    )
+    room, draws = gl.buffer(reserve=4), gl.vertex_array(bystander, [])
+    draws.transform(room, vertices=1)  # a program in use outlives its deletion: use this one before counting
+    before = living(gl)
+    renderer = SplatRenderer(gl)
+    shake = random.Random(0)
+    scenes = [cloud(count, atoms) for count, atoms in ((200, 0), (0, 3), (150, 5), (100, 70))]
+    for _ in range(40):
+        scene = shake.choice(scenes)
+        renderer.set_scene(scene)
+        renderer.draw(
+            camera(shake.randrange(1, 60), shake.randrange(1, 60)), weight_maps=shake.random() < 0.5
+        )
+        renderer.ask(question(scene, shake.randrange(1, 9)))
+        renderer.heat_texture(0)
+        shake.choice(
+            [renderer.label_texture, renderer.atom_texture, renderer.depth_texture, renderer.frame]
+        )()
+        assert gl.error == "GL_NO_ERROR"
+    assert living(gl) != before
+    renderer.release()
+    renderer.release()
+    draws.transform(room, vertices=1)
+    assert living(gl) == before
+    for owned in (draws, room, bystander):
+        owned.release()
+
+
+def test_a_released_renderer_draws_again(gl):
+    scene = cloud(100, 3)
+    renderer = SplatRenderer(gl)
+    renderer.set_scene(scene)
+    renderer.draw(camera())
+    first = renderer.frame(True)
+    renderer.release()
+    renderer.set_scene(scene)
+    renderer.draw(camera())
+    again = renderer.frame(True)
+    assert (first.rgb - again.rgb).abs().max() == 0 and (maps_of(first) - maps_of(again)).abs().max() == 0
+    renderer.release()
+
+
+def test_the_callers_state_survives(gl, renderer):
+    """As in a window: its framebuffer and viewport stay bound, and drawing does not blend."""
+    home = gl.fbo
+    mine = gl.simple_framebuffer((20, 10), components=4)
+    mine.use()
+    mine.viewport = (3, 2, 7, 5)
+    scene = cloud(200, 30)
+    renderer.set_scene(scene)
+    renderer.draw(camera())
+    renderer.ask(question(scene))
+    renderer.heat_texture(0)
+    renderer.label_texture()
+    renderer.relevance()
+    assert gl.fbo is mine and mine.viewport == (3, 2, 7, 5)
+    read = gl_function(gl, "glGetIntegerv", None, ctypes.c_uint, ctypes.POINTER(ctypes.c_int * 4))
+    values = (ctypes.c_int * 4)()
+    read(0x0BA2, values)  # GL_VIEWPORT
+    assert tuple(values) == (3, 2, 7, 5)
+    read(0x8CA6, values)  # GL_DRAW_FRAMEBUFFER_BINDING
+    assert values[0] == mine.glo
+    read(0x0BE2, values)  # GL_BLEND
+    assert values[0] == 0
+    home.use()  # moderngl must not be left bound to what is released
+    for attachment in mine.color_attachments:
+        attachment.release()
+    mine.release()
+
+
+def test_too_large_an_image_is_one_sentence(renderer):
+    renderer.set_scene(cloud(3))
+    with pytest.raises(GraphicsError, match="choose a smaller size"):
+        renderer.draw(camera(10_000_000, 4))
+
+
+def test_without_egl_the_packages_are_named(monkeypatch):
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.setenv("GLCONTEXT_LINUX_LIBEGL", "libnothing.so")
+    with pytest.raises(GraphicsError, match=r"libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri.*--backend torch"):
+        offscreen_context()
+
+
+def test_precision_has_two_names(gl):
+    with pytest.raises(ValueError, match="float16 or float32"):
+        SplatRenderer(gl, "float8")  # pyright: ignore[reportArgumentType]
+
+
+def test_the_fast_sort_is_stable():
+    rng = np.random.default_rng(0)
+    keys = rng.integers(0, 50, 5000).astype(np.float64)
+    np.testing.assert_array_equal(stable_order(keys), np.argsort(keys, kind="stable"))
+    for few in ([], [1.0], [2.0, 1.0], [-0.0, 0.0, -0.0]):
+        np.testing.assert_array_equal(stable_order(np.array(few)), np.argsort(np.array(few), kind="stable"))
+
+
+def test_atom_bits():
+    ids = np.array([[0, 63, 64], [129, 5, 5], [7, 8, 9]])
+    values = np.array([[0.5, 0.5, 0.0], [0.2, 0.4, 0.4], [0.0, 0.0, 0.0]])
+    bits = atom_bits(ids, values, 130)
+    carried = [[k for k in range(192) if int(row[k // 64]) >> (k % 64) & 1] for row in bits]
+    assert carried == [[0, 63], [5, 129], []]

@@ -1,0 +1,148 @@
+"""Heat-maps, labels, atoms, depth: what a person sees."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+
+from tests.app.gl.questions import question
+from tests.splat.scenes import camera, cloud, maps_of, scene_of, splats
+
+
+def pixels(texture) -> np.ndarray:
+    """(H, W, 4) in [0, 1], top row first."""
+    return np.frombuffer(texture.read(), np.uint8).reshape(texture.height, texture.width, 4) / 255
+
+
+@pytest.fixture
+def asked(renderer):
+    scene = cloud(1500, 12, dtype=torch.float32)
+    renderer.set_scene(scene)
+    renderer.draw(camera(), background=(0.0, 0.5, 1.0))
+    renderer.ask(question(scene, 5))
+    return renderer
+
+
+def test_rgb_is_the_frame(asked):
+    shown = pixels(asked.rgb_texture)
+    # Eight bits: half a step.
+    np.testing.assert_allclose(shown[..., :3], asked.frame().rgb.clamp(0, 1).numpy(), atol=0.51 / 255)
+    assert (shown[..., 3] == 1).all()
+
+
+def test_top_of_the_image_is_the_first_row(renderer):
+    renderer.set_scene(scene_of(splats([(0.0, -0.7, 2.0)], 0.1, dtype=torch.float32)))  # up is -y
+    renderer.draw(camera())
+    shown = pixels(renderer.rgb_texture)[..., 0]
+    assert shown[:20].sum() > 1 and shown[20:].sum() == 0
+
+
+def test_grey_heat_is_relevance(asked):
+    frame, relevance = asked.frame(), asked.relevance()
+    heat = pixels(asked.heat_texture(2, "grey", threshold=0.3, over_rgb=False, span=(0.3, 0.8)))
+    values = relevance[2].numpy()
+    expected = np.where(values >= 0.3, np.clip((values - 0.3) / 0.5, 0, 1), 0)
+    covered = frame.alphas.numpy() >= 0.5
+    assert covered.any() and not covered.all()
+    np.testing.assert_allclose(heat[..., 0], np.where(covered, expected, 0), atol=0.51 / 255)
+
+
+def test_heat_over_the_photo_shows_only_what_passes(asked):
+    nothing = pixels(asked.heat_texture(0, threshold=1.0))
+    everything = pixels(asked.heat_texture(0, threshold=0.0, span=(0.0, 1.0)))
+    assert np.ptp(nothing[..., :3], axis=-1).max() < np.ptp(everything[..., :3], axis=-1).max()
+    assert not np.array_equal(nothing, everything)
+
+
+def test_labels_are_the_argmax_or_none(asked):
+    relevance, frame = asked.relevance(), asked.frame()
+    limit = float(relevance.amax(0).median())
+    best = torch.where((relevance.amax(0) >= limit) & (frame.alphas >= 0.5), relevance.argmax(0), -1)
+    labels = asked.labels(threshold=limit)
+    assert torch.equal(labels, best) and (labels == -1).any() and (labels >= 0).any()
+    colours = np.eye(5, 3, dtype=np.float32)
+    shown = pixels(asked.label_texture(colours, limit))
+    first = (labels == 0).numpy()
+    rgb = frame.rgb.clamp(0, 1).numpy()
+    expected = 0.4 * rgb + 0.6 * np.array([1.0, 0.0, 0.0])
+    # Labels lie over the premultiplied colour; the background adds nothing there.
+    under = (1 - frame.alphas.numpy())[..., None] * np.array([0.0, 0.5, 1.0]) * 0.4
+    np.testing.assert_allclose(shown[first][:, :3], (expected - under)[first], atol=2 / 255)
+
+
+def test_atoms_have_one_colour_each(renderer):
+    scene = cloud(1000, 3, kept=1, size=0.1, dtype=torch.float32)
+    solid = dataclasses.replace(scene.gaussians, opacities=torch.ones(1000))
+    scene = dataclasses.replace(scene, gaussians=solid)
+    renderer.set_scene(scene)
+    renderer.draw(camera())
+    shown = pixels(renderer.atom_texture())
+    maps = maps_of(renderer.frame(weight_maps=True)).numpy()
+    pure = [maps[..., k] > 0.97 for k in range(3)]
+    means = np.stack([shown[mask][:, :3].mean(0) for mask in pure])
+    assert all(mask.any() for mask in pure)
+    assert min(np.abs(means[a] - means[b]).max() for a, b in ((0, 1), (0, 2), (1, 2))) > 0.2
+
+
+def test_near_and_far_have_other_colours(renderer):
+    gaussians = splats([(-0.4, 0.0, 1.5), (0.8, 0.0, 3.0)], [0.1, 0.2], 1.0, dtype=torch.float32)
+    renderer.set_scene(scene_of(gaussians))
+    renderer.draw(camera())
+    shown = pixels(renderer.depth_texture("grey"))[..., 0]
+    assert shown[20, 13] > 0.95 and shown[20, 34] < 0.05 and shown[0, 0] == 0
+
+
+def test_a_still_camera_costs_no_splat_pass(asked):
+    def touched() -> tuple[int, int]:
+        return asked.passes["colour"], asked.passes["weights"]
+
+    asked.relevance()
+    before = touched()
+    assert before == (1, 1)
+    scene = cloud(1500, 12, dtype=torch.float32)
+    norms = asked.passes["norm"]
+    for seed in range(3):
+        asked.ask(question(scene, 2, seed=seed))
+        asked.relevance()
+        asked.heat_texture(1, "inferno", threshold=0.1 * seed)
+        asked.label_texture()
+        asked.draw(camera(), background=(float(seed), 0.0, 0.0))
+    assert touched() == before and asked.passes["norm"] == norms
+    shows, queries = asked.passes["show"], asked.passes["query"]
+    asked.heat_texture(1, "inferno", threshold=0.2)
+    asked.relevance()
+    assert (asked.passes["show"], asked.passes["query"]) == (shows, queries)
+    asked.draw(camera(focal=41.0))
+    assert touched() == (2, 2)
+
+
+def test_weight_maps_wait_until_they_are_needed(renderer):
+    scene = cloud(300, 5, dtype=torch.float32)
+    renderer.set_scene(scene)
+    renderer.draw(camera(), weight_maps=False)
+    assert renderer.passes["weights"] == 0
+    renderer.ask(question(scene))
+    renderer.relevance()
+    assert renderer.passes["weights"] == 1
+
+
+def test_what_is_missing_is_named(renderer):
+    scene = cloud(10, 3, dtype=torch.float32)
+    with pytest.raises(ValueError, match="set_scene"):
+        renderer.draw(camera())
+    renderer.set_scene(scene)
+    with pytest.raises(ValueError, match="draw"):
+        renderer.frame()
+    renderer.draw(camera())
+    with pytest.raises(ValueError, match="ask"):
+        renderer.relevance()
+    with pytest.raises(ValueError, match="expected 3 atoms, received 4"):
+        renderer.ask(question(cloud(10, 4)))
+    renderer.ask(question(scene, 2))
+    with pytest.raises(ValueError, match="prompt: expected 0 to 1, received 2"):
+        renderer.heat_texture(2)
+    with pytest.raises(ValueError, match="colormap"):
+        renderer.heat_texture(0, "jet")
+    with pytest.raises(ValueError, match="1 x 1"):
+        renderer.draw(dataclasses.replace(camera(), width=0))

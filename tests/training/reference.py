@@ -1,0 +1,102 @@
+"""Slow twins of the losses: float64, loops, one number at a time."""
+
+import math
+
+import numpy as np
+
+
+def depth_loss_twin(logs, targets, absolute):
+    """`losses.depth_loss` by loops over pictures and pixels."""
+    shapes, count, offsets = 0.0, 0, []
+    for picture, truth in zip(logs, targets, strict=True):
+        valid = np.isfinite(truth) & (truth > 0)
+        residuals = picture[valid] - np.log(truth[valid])
+        if not len(residuals):
+            continue
+        offsets.append(residuals.mean())
+        shapes += np.abs(residuals - residuals.mean()).sum()
+        count += len(residuals)
+    return shapes / max(count, 1) + absolute * (np.abs(offsets).mean() if offsets else 0.0)
+
+
+def gradient_loss_twin(logs, targets, scales):
+    """`losses.gradient_loss` by loops over scales, pictures and neighbours."""
+    total = 0.0
+    for level in range(scales):
+        step = 2**level
+        sums, counts = [0.0, 0.0], [0, 0]
+        for picture, truth in zip(logs[:, ::step, ::step], targets[:, ::step, ::step], strict=True):
+            rows, columns = picture.shape
+            for y in range(rows):
+                for x in range(columns):
+                    for axis, (dy, dx) in enumerate(((0, 1), (1, 0))):
+                        if y + dy >= rows or x + dx >= columns:
+                            continue
+                        here, there = truth[y, x], truth[y + dy, x + dx]
+                        if not (here > 0 and there > 0):
+                            continue
+                        slope = picture[y + dy, x + dx] - picture[y, x]
+                        sums[axis] += abs(slope - math.log(there / here))
+                        counts[axis] += 1
+        total += sum(s / max(c, 1) for s, c in zip(sums, counts, strict=True))
+    return total / scales
+
+
+def language_loss_twin(features, targets, bank, temperature, synonym, attract):
+    """`losses.language_loss`, pixel by pixel."""
+    total = 0.0
+    for feature, target in zip(features, targets, strict=True):
+        unit = feature / np.linalg.norm(feature)
+        positive = temperature * unit @ target
+        rivals = [temperature * unit @ phrase for phrase in bank if target @ phrase <= synonym]
+        total += math.log(sum(math.exp(r) for r in (positive, *rivals))) - positive
+        total += attract * (1 - unit @ target)
+    return total / len(features)
+
+
+def focal_twin(logits, mask, alpha=0.25, gamma=2.0):
+    """Mean focal loss of one mask, pixel by pixel."""
+    total = 0.0
+    for logit, inside in zip(logits, mask, strict=True):
+        p = 1 / (1 + math.exp(-logit))
+        total += (
+            -alpha * (1 - p) ** gamma * math.log(p) if inside else -(1 - alpha) * p**gamma * math.log(1 - p)
+        )
+    return total / len(logits)
+
+
+def dice_twin(logits, mask):
+    """Dice loss of one mask."""
+    p = 1 / (1 + np.exp(-logits))
+    return 1 - (2 * (p * mask).sum() + 1) / (p.sum() + mask.sum() + 1)
+
+
+def contrast_twin(features, ids, temperature):
+    """`losses.instance_contrast` by loops."""
+    units = features / np.linalg.norm(features, axis=1, keepdims=True)
+    terms = []
+    for p in range(len(ids)):
+        others = [j for j in range(len(ids)) if j != p]
+        partners = [j for j in others if ids[j] == ids[p]]
+        if partners:
+            every = sum(math.exp(temperature * units[p] @ units[j]) for j in others)
+            same = sum(math.exp(temperature * units[p] @ units[j]) for j in partners)
+            terms.append(math.log(every / same))
+    return sum(terms) / len(terms)
+
+
+def ssim_twin(left, right, window=7):
+    """SSIM per pixel and channel with reflected edges, window by window."""
+    pad = window // 2
+    a = np.pad(left, ((pad, pad), (pad, pad), (0, 0)), mode="reflect")
+    b = np.pad(right, ((pad, pad), (pad, pad), (0, 0)), mode="reflect")
+    result = np.zeros_like(left)
+    for y in range(left.shape[0]):
+        for x in range(left.shape[1]):
+            for c in range(3):
+                p, q = a[y : y + window, x : x + window, c], b[y : y + window, x : x + window, c]
+                covariance = (p * q).mean() - p.mean() * q.mean()
+                top = (2 * p.mean() * q.mean() + 1e-4) * (2 * covariance + 9e-4)
+                bottom = (p.mean() ** 2 + q.mean() ** 2 + 1e-4) * (p.var() + q.var() + 9e-4)
+                result[y, x, c] = top / bottom
+    return result
