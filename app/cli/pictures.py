@@ -14,7 +14,7 @@ from torch import Tensor
 from app.gl.display import atom_colours
 from langflash_core.export.colours import heat, label_colours
 from langflash_core.export.png import label_map, to_8bit
-from langflash_core.scene.atomic import make_folder, write_atomically
+from langflash_core.files import make_folder, write_atomically
 from langflash_core.types import Frame, QueryResult
 
 LABEL_OPACITY = 0.6

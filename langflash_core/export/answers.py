@@ -14,7 +14,7 @@ from langflash_core.export.png import (
     write_relevance,
     write_rgb,
 )
-from langflash_core.scene.atomic import make_folder
+from langflash_core.files import make_folder
 from langflash_core.types import QueryResult
 
 _MAX_NAME = 60

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from langflash_core.export.png import to_8bit
-from langflash_core.scene.atomic import write_atomically
+from langflash_core.files import write_atomically
 from langflash_core.types import QueryResult
 
 

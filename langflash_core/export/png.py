@@ -1,4 +1,4 @@
-"""PNG pictures of views and answers. Every file is whole or absent (`scene.atomic`)."""
+"""PNG pictures of views and answers. Every file is whole or absent (`files.py`)."""
 
 import io
 import json
@@ -11,7 +11,7 @@ from PIL import Image
 from torch import Tensor
 
 from langflash_core.export.colours import heat, label_colours
-from langflash_core.scene.atomic import write_atomically
+from langflash_core.files import write_atomically
 from langflash_core.types import Frame, QueryResult
 
 RANGES = {"cosine": (-1.0, 1.0), "relevancy": (0.0, 1.0)}

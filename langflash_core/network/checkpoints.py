@@ -5,16 +5,16 @@ A matrix or convolution is stored as int8 with one float16 scale per output row 
 """
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 from torch import Tensor
 
 from langflash_core.errors import WeightsError
+from langflash_core.files import make_folder, write_atomically
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.presets import PRESETS, Preset
 from langflash_core.resources import asset_path
@@ -82,14 +82,8 @@ def save_network(network: LangFlashNet, path: Path, metadata: Mapping | None = N
         "calibration": network.calibration,
         **(metadata or {}),
     }
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        save_file(quantise(network.state_dict()), temporary, metadata={"langflash": json.dumps(header)})
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+    make_folder(path.parent)
+    write_atomically(path, save(quantise(network.state_dict()), {"langflash": json.dumps(header)}))
 
 
 def read_weights(path: Path) -> tuple[dict[str, Tensor], dict]:

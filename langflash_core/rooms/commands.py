@@ -1,12 +1,13 @@
 """What `langflash rooms pack | preview | render` do. Files are written whole or not at all."""
 
-import os
+import io
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from langflash_core.errors import InputError, OutputError
+from langflash_core.errors import InputError
+from langflash_core.files import make_folder, write_atomically
 from langflash_core.rooms.catalogue import HELD_OUT_LIBRARIES, TRAIN_LIBRARIES
 from langflash_core.rooms.pack import build_pack, load_pack
 from langflash_core.rooms.preview import contact_sheet
@@ -31,13 +32,9 @@ def run_pack(root: Path, out: Path) -> int:
 def run_preview(pack: Path, out_png: Path, seed: int = 0, count: int = 9, held_out: bool = False) -> Path:
     """Write a contact sheet of `count` rooms; returns its path."""
     sheet = contact_sheet(load_pack(Path(pack)), range(seed, seed + count), _libraries(held_out))
-    partial = Path(out_png).with_name(f".{Path(out_png).name}.{os.getpid()}")
-    try:
-        sheet.save(partial, "PNG")
-        os.replace(partial, out_png)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise OutputError(f"Cannot write {out_png}: choose another place.") from error
+    stream = io.BytesIO()
+    sheet.save(stream, "PNG")
+    write_atomically(Path(out_png), stream.getvalue())
     return Path(out_png)
 
 
@@ -67,7 +64,7 @@ def run_render(
     """
     folder, libraries = Path(out_dir), _libraries(held_out)
     furniture = load_pack(Path(pack))
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     with RoomRenderer(furniture) as renderer:
         for number in range(seed, seed + count):
             path = folder / f"room_{number:08d}.npz"
@@ -81,21 +78,20 @@ def run_render(
 
 def save_views(views: RoomViews, path: Path) -> None:
     """Write one sample, atomically. Names are joined by "|", one string per instance."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}")
-    with partial.open("wb") as stream:
-        np.savez_compressed(
-            stream,
-            images=views.images,
-            depths=views.depths.astype(np.float16),
-            instances=views.instances,
-            names=np.array(["|".join(words) for words in views.names]),
-            groups=np.array(views.groups),
-            viewmats=views.viewmats,
-            Ks=views.Ks,
-            overlap=np.float32(views.overlap),
-            seed=np.int64(views.seed),
-        )
-    os.replace(partial, path)
+    stream = io.BytesIO()
+    np.savez_compressed(
+        stream,
+        images=views.images,
+        depths=views.depths.astype(np.float16),
+        instances=views.instances,
+        names=np.array(["|".join(words) for words in views.names]),
+        groups=np.array(views.groups),
+        viewmats=views.viewmats,
+        Ks=views.Ks,
+        overlap=np.float32(views.overlap),
+        seed=np.int64(views.seed),
+    )
+    write_atomically(path, stream.getvalue())
 
 
 def load_views(path: Path) -> RoomViews:

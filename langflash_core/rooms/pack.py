@@ -6,7 +6,6 @@ Built once (minutes), loaded in a second, drawn from one vertex buffer.
 
 import io
 import json
-import os
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -17,6 +16,7 @@ from jaxtyping import Float, Int
 from PIL import Image
 
 from langflash_core.errors import InputError
+from langflash_core.files import make_folder, write_atomically
 from langflash_core.rooms.builtin import KIND_PLAIN, LIBRARY, builtin_models
 from langflash_core.rooms.catalogue import Archive, Item, default_materials, load_catalogue
 from langflash_core.rooms.mesh import Mesh, index, pose
@@ -214,11 +214,10 @@ def _write(draft: _Draft, out: Path) -> None:
         "texture_sizes": np.array([len(t) for t in draft.textures], dtype=np.int32),
         "heights": np.stack([m.heights for m in meshes]).astype(np.float16),
     }
-    out.parent.mkdir(parents=True, exist_ok=True)
-    partial = out.with_name(f".{out.name}.{os.getpid()}")
-    with partial.open("wb") as stream:
-        np.savez_compressed(stream, **arrays)
-    os.replace(partial, out)
+    stream = io.BytesIO()
+    np.savez_compressed(stream, **arrays)
+    make_folder(out.parent)
+    write_atomically(out, stream.getvalue())
 
 
 def _wrap(uvs: Float[np.ndarray, "N 2"]) -> Float[np.ndarray, "N 2"]:

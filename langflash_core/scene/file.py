@@ -16,7 +16,7 @@ from safetensors import SafetensorError
 from torch import Tensor
 
 from langflash_core.errors import SceneFileError
-from langflash_core.scene.atomic import write_atomically
+from langflash_core.files import write_atomically
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.fields import from_fields, to_fields
 from langflash_core.types import Scene

@@ -10,7 +10,8 @@ No tiles, no early stop at low transmittance, no approximation. Work is a flat l
 (pixel, Gaussian) pairs, sorted by pixel and then depth, made for one rectangle of pixels at a
 time so that the list stays short; a Gaussian's pairs are the pixels of its bounding box, and
 the alpha cut decides. Transmittance is an exclusive running sum of log(1 - alpha), in float64
-whatever the input, restarted at each pixel.
+whatever the input, restarted at each pixel. 100,000 Gaussians with 24
+atoms at 224 x 224 take 1.3 s on one core where they are 1.2 px wide, 15 s at 4.5 px, below 1 GB.
 """
 
 import torch
@@ -20,7 +21,7 @@ from langflash_core.types import Camera, Frame, Gaussians, Scene
 
 from .projection import ALPHA_MAX, ALPHA_MIN, NEAR, Footprints, project, view_colours, view_depths
 
-_MAX_PAIRS = 1 << 19  # pairs held at once: tens of MB at a few channels
+_MAX_PAIRS = 1 << 17  # held at once: 30 MB at 28 channels; more leave the processor's caches
 _Box = tuple[int, int, int, int]  # x0, y0, x1, y1 in pixels, half open
 
 
@@ -81,17 +82,17 @@ def rasterize(
     if features.shape[0] != len(gaussians):
         raise ValueError(f"features: expected {len(gaussians)} rows, received {features.shape[0]}")
     footprints = project(gaussians, camera, near)
-    boxes = footprints.boxes()
+    everyone = torch.arange(len(footprints.ids), device=footprints.ids.device)
     pixels, parts = [], []
-    queue: list[_Box] = [(0, 0, camera.width, camera.height)]
+    queue = [((0, 0, camera.width, camera.height), everyone, footprints.boxes())]
     while queue:
-        box = queue.pop()
-        clipped, num_pairs = _clip(boxes, box)
+        box, rows, boxes = queue.pop()
+        rows, clipped, num_pairs = _clip(rows, boxes, box)
         halves = _halves(box) if num_pairs > _MAX_PAIRS else []
         if halves:
-            queue.extend(halves)
+            queue.extend((half, rows, clipped) for half in halves)
         elif num_pairs:
-            index, part = _composite(footprints, features, clipped, box, camera.width)
+            index, part = _composite(footprints, features, rows, clipped, box, camera.width)
             pixels.append(index)
             parts.append(part)
     return _assemble(pixels, parts, features, camera)
@@ -121,18 +122,20 @@ def _halves(box: _Box) -> list[_Box]:
     return []
 
 
-def _clip(boxes: Tensor, box: _Box) -> tuple[Tensor, int]:
-    """Gaussian boxes (n, 4) inside a rectangle, possibly empty, and how many pixels they hold."""
+def _clip(rows: Tensor, boxes: Tensor, box: _Box) -> tuple[Tensor, Tensor, int]:
+    """Rows (k,) of footprints that reach a rectangle, their boxes (k, 4) inside it, and its pairs."""
     x0, y0, x1, y1 = box
     low = boxes.new_tensor((x0, y0, x0, y0))
     high = boxes.new_tensor((x1, y1, x1, y1))
     clipped = boxes.maximum(low).minimum(high)
     sides = clipped[:, 2:] - clipped[:, :2]
-    return clipped, int((sides[:, 0] * sides[:, 1]).sum())
+    areas = sides[:, 0].clamp_min(0) * sides[:, 1].clamp_min(0)
+    inside = areas > 0
+    return rows[inside], clipped[inside], int(areas.sum())
 
 
 def _pairs(clipped: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """Every (Gaussian, x, y) of boxes (n, 4), three (M,) tensors, Gaussian by Gaussian."""
+    """Every (box, x, y) of boxes (k, 4), three (M,) tensors, box by box."""
     sides = clipped[:, 2:] - clipped[:, :2]
     counts = sides[:, 0] * sides[:, 1]
     rows = torch.repeat_interleave(torch.arange(len(counts), device=counts.device), counts)
@@ -150,11 +153,12 @@ def _alphas(footprints: Footprints, rows: Tensor, xs: Tensor, ys: Tensor) -> Ten
 
 
 def _composite(
-    footprints: Footprints, features: Tensor, clipped: Tensor, box: _Box, width: int
+    footprints: Footprints, features: Tensor, reaching: Tensor, clipped: Tensor, box: _Box, width: int
 ) -> tuple[Tensor, Tensor]:
     """The pixels of one rectangle: flat indices (P,) and values (P, F + 1), alpha last."""
     x0, y0, x1, y1 = box
-    rows, xs, ys = _pairs(clipped)
+    boxes, xs, ys = _pairs(clipped)
+    rows = reaching[boxes]
     with torch.no_grad():
         kept = (_alphas(footprints, rows, xs, ys) >= ALPHA_MIN).nonzero().squeeze(-1)
         local = ((ys - y0) * (x1 - x0) + (xs - x0))[kept].int()

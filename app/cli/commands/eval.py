@@ -10,8 +10,8 @@ from app.cli.report import write_json
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.evaluation.rooms import calibrate, run_eval
 from langflash_core.evaluation.tables import markdown
+from langflash_core.files import make_folder, write_atomically
 from langflash_core.network import load_network
-from langflash_core.scene.atomic import make_folder, write_atomically
 
 
 def run(args: Namespace, out: TextIO) -> None:

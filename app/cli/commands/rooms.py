@@ -6,8 +6,8 @@ from typing import TextIO
 from app.cli.files import check_folder, check_output_file, readable_file
 from app.cli.report import ProgressBar
 from langflash_core.errors import InputError
+from langflash_core.files import make_folder
 from langflash_core.rooms.commands import run_pack, run_preview, run_render
-from langflash_core.scene.atomic import make_folder
 
 
 def run(args: Namespace, out: TextIO) -> None:

@@ -1,0 +1,229 @@
+"""One scene's Gaussians on the GPU: sorted, projected, and their weights expanded, per camera."""
+
+import math
+
+import moderngl
+import numpy as np
+
+from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
+from langflash_core.splat.projection import ALPHA_MIN, DILATION, NEAR, TAN_MARGIN, finite_rows
+from langflash_core.types import Camera, Scene
+
+from .programs import Programs, set_uniforms
+
+_ROW_TEXELS = 4096
+_PLACE_FLOATS = 11  # place (4), shape (4), colour (3)
+
+
+class SplatBuffers:
+    """Owns the vertex data of a scene; `sort` chooses and orders, `project` and `expand` fill.
+
+    Gaussians with a value that is not finite are left out (`num_dropped`), and those below
+    opacity 1/255, which no pixel can show.
+    """
+
+    def __init__(self, ctx: moderngl.Context, programs: Programs, scene: Scene):
+        self._ctx = ctx
+        self._programs = programs
+        self._owned: list = []
+        gaussians = scene.gaussians.map(lambda v: v.detach().cpu().float())
+        finite = finite_rows(gaussians)
+        kept = finite & (gaussians.opacities >= ALPHA_MIN)
+        gaussians = gaussians.map(lambda v: v[kept])
+        self.num_dropped = int((~finite).sum())
+        self.num_gaussians = len(gaussians)
+        self.order = np.zeros(0, np.uint32)
+        self.depth_range = (NEAR, 1.0)
+        self._means = gaussians.means.numpy()
+        self._means64 = self._means.astype(np.float64)
+        self._widest = gaussians.scales.amax(-1).numpy() if self.num_gaussians else np.zeros(0, np.float32)
+        self._ids = scene.semantics.weight_ids.cpu()[kept].numpy()
+        self._values = scene.semantics.weight_values.detach().cpu().float()[kept].numpy()
+        self._num_atoms = scene.semantics.num_atoms
+        self._carried = atom_bits(self._ids, self._values, self._num_atoms)
+        if self.num_gaussians:
+            self._upload(gaussians)
+
+    def _upload(self, gaussians) -> None:
+        count = self.num_gaussians
+        place = np.concatenate((self._means, gaussians.opacities.numpy()[:, None]), 1)
+        self.sh_degree = min(math.isqrt(gaussians.sh.shape[1]) - 1, MAX_SHOWN_DEGREE)
+        num_bases = (self.sh_degree + 1) ** 2
+        self._sh_vec4s = (3 * num_bases + 3) // 4
+        sh = np.zeros((count, 4 * self._sh_vec4s), np.float32)
+        sh[:, : 3 * num_bases] = gaussians.sh[:, :num_bases].flatten(1).numpy()
+        fields = (place, gaussians.quats.numpy(), gaussians.scales.numpy(), sh)
+        self._vertex_buffers = [
+            self._own(self._ctx.buffer(np.ascontiguousarray(f).tobytes())) for f in fields
+        ]
+        self._order_buffer = self._own(self._ctx.buffer(reserve=4 * count))
+        self.places = self._own(self._ctx.buffer(reserve=4 * _PLACE_FLOATS * count))
+        self._sparse = self._upload_weights() if self._num_atoms and self._ids.shape[1] else None
+        self._slots = (
+            self._own(self._ctx.texture((self._num_atoms, 1), 1, dtype="f4")) if self._sparse else None
+        )
+        self._weights: moderngl.Buffer | None = None
+        self._vaos: dict[tuple, moderngl.VertexArray] = {}
+
+    def _upload_weights(self) -> moderngl.Texture:
+        pairs = np.stack((self._ids.astype(np.float32), self._values), -1).reshape(-1, 2)
+        rows = -(-len(pairs) // _ROW_TEXELS)
+        padded = np.zeros((rows * _ROW_TEXELS, 2), np.float32)
+        padded[: len(pairs)] = pairs
+        texture = self._own(self._ctx.texture((_ROW_TEXELS, rows), 2, padded.tobytes(), dtype="f4"))
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        return texture
+
+    def _own(self, created):
+        self._owned.append(created)
+        return created
+
+    def sort(self, camera: Camera) -> None:
+        """Choose the Gaussians that may touch the image and order them back to front.
+
+        z is computed in float64, as in the reference, so that both agree on near ties; of equal
+        depths the first Gaussian is in front.
+        """
+        viewmat = camera.viewmat.detach().cpu().double().numpy()
+        z = self._means64 @ viewmat[2, :3] + viewmat[2, 3]
+        rows = np.flatnonzero(self._may_touch(camera, viewmat, z))
+        depths = z[rows]
+        nearest_first = rows[stable_order(depths)]
+        self.order = nearest_first[::-1].astype(np.uint32)
+        if len(rows):
+            margin = len(rows) // 50
+            near, far = z[nearest_first[margin]], z[nearest_first[len(rows) - 1 - margin]]
+            self.depth_range = (float(near), float(far))
+            self._order_buffer.write(self.order.tobytes())
+
+    def _may_touch(self, camera: Camera, viewmat: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """(N,) bool, conservative: the Frobenius norm of the Jacobian bounds the footprint."""
+        K = camera.K.detach().cpu().double().numpy()
+        seen = z >= NEAR
+        inverse = 1 / np.where(seen, z, 1.0).astype(np.float32)
+        sizes = (camera.width, camera.height)
+        bound = 0.0  # |J|_F^2 z^2 <= sum over axes of focal^2 (1 + steepest slope^2)
+        for axis, extent in enumerate(sizes):
+            focal, principal = K[axis, axis], K[axis, 2]
+            steepest = (max(principal, extent - principal) + TAN_MARGIN * 0.5 * extent) / focal
+            bound += focal * focal * (1 + steepest * steepest)
+        deviations = np.sqrt(np.square(self._widest * inverse) * np.float32(bound) + np.float32(DILATION))
+        radius = np.float32(math.sqrt(2 * math.log(1 / ALPHA_MIN))) * deviations + np.float32(1)
+        for axis, extent in enumerate(sizes):
+            pos_c = self._means @ viewmat[axis, :3].astype(np.float32) + np.float32(viewmat[axis, 3])
+            place = pos_c * inverse * np.float32(K[axis, axis]) + np.float32(K[axis, 2])
+            seen &= (place + radius > 0) & (place - radius < extent)
+        return seen
+
+    def active_atoms(self) -> np.ndarray:
+        """Atoms (Ka,) that the chosen Gaussians carry with a weight above 0, ascending."""
+        if not (self._num_atoms and len(self.order)):
+            return np.zeros(0, np.int64)
+        carried = np.bitwise_or.reduce(self._carried[self.order], axis=0)  # (words,) uint64
+        bits = np.unpackbits(carried.astype("<u8").view(np.uint8), bitorder="little")
+        return np.flatnonzero(bits[: self._num_atoms])
+
+    def project(self, camera: Camera) -> None:
+        """Footprints and colours of the chosen Gaussians into `places`, in draw order."""
+        program = self._programs.get(
+            "project.vert",
+            defines={"SH_DEGREE": self.sh_degree, "SH_VEC4S": self._sh_vec4s},
+            varyings=("out_place", "out_shape", "out_colour"),
+        )
+        viewmat = camera.viewmat.detach().cpu().double().numpy()
+        K = camera.K.detach().cpu().double().numpy()
+        set_uniforms(
+            program,
+            viewmat=viewmat.T,
+            eye=-viewmat[:3, :3].T @ viewmat[:3, 3],
+            pinhole=np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2]]),
+            image_size=(float(camera.width), float(camera.height)),
+        )
+        formats = ("4f", "4f", "3f", f"{4 * self._sh_vec4s}f")
+        names = ("in_mean", "in_quat", "in_scale", "in_sh")
+        content = [(b, f, n) for b, f, n in zip(self._vertex_buffers, formats, names, strict=True)]
+        self._transform(program, content, self.places)
+
+    def expand(self, atoms: np.ndarray, first: int, num_layers: int) -> moderngl.Buffer:
+        """Dense weights for atoms[first : first + 3 * num_layers], in draw order, 3 a layer."""
+        assert self._sparse is not None and self._slots is not None, "expand without atoms"
+        program = self._programs.get(
+            "expand.vert",
+            defines={"LAYERS": num_layers, "ROW_TEXELS": _ROW_TEXELS},
+            varyings=("out_weights",),
+        )
+        slots = np.full(self._num_atoms, -1, np.float32)
+        slots[atoms] = np.arange(len(atoms))
+        self._slots.write(slots.tobytes())
+        self._sparse.use(0)
+        self._slots.use(1)
+        set_uniforms(
+            program, sparse_weights=0, slots=1, weights_per_gaussian=self._ids.shape[1], first_slot=first
+        )
+        needed = 4 * 3 * num_layers * self.num_gaussians
+        if self._weights is None:
+            self._weights = self._own(self._ctx.buffer(reserve=needed))
+        elif self._weights.size < needed:
+            self._weights.orphan(needed)
+        self._transform(program, [], self._weights)
+        return self._weights
+
+    def _transform(self, program: moderngl.Program, content: list, out: moderngl.Buffer) -> None:
+        key = ("transform", program.glo)
+        if key not in self._vaos:
+            self._vaos[key] = self._ctx.vertex_array(
+                program, content, index_buffer=self._order_buffer, index_element_size=4
+            )
+        self._vaos[key].transform(out, mode=moderngl.POINTS, vertices=len(self.order))
+
+    def draw(
+        self, program: moderngl.Program, weights: moderngl.Buffer | None = None, num_layers: int = 0
+    ) -> None:
+        """One instanced quad per chosen Gaussian, with its colour or with `num_layers` of weights."""
+        key = ("draw", program.glo)
+        if key not in self._vaos:
+            if weights is None:
+                content = [(self.places, "4f 4f 3f/i", "in_place", "in_shape", "in_colour")]
+            else:
+                content = [
+                    (self.places, "4f 4f 12x/i", "in_place", "in_shape"),
+                    (weights, f"{3 * num_layers}f/i", "in_weights"),
+                ]
+            self._vaos[key] = self._ctx.vertex_array(program, content)
+        self._vaos[key].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(self.order))
+
+    def _drop_vaos(self) -> None:
+        for vao in self._vaos.values():
+            vao.release()
+        self._vaos.clear()
+
+    def release(self) -> None:
+        if self._owned:
+            self._drop_vaos()
+        for owned in reversed(self._owned):
+            owned.release()
+        self._owned.clear()
+        self.num_gaussians = 0
+
+
+def stable_order(keys: np.ndarray) -> np.ndarray:
+    """np.argsort(keys, kind="stable") by the several times faster unstable sort, ties put right."""
+    order = np.argsort(keys)
+    ordered = keys[order]
+    same = ordered[1:] == ordered[:-1]
+    if same.any():
+        tied = np.append(same, False) | np.insert(same, 0, False)
+        runs = np.cumsum(np.insert(~same, 0, True))[tied]
+        rows = order[tied]
+        order[tied] = rows[np.lexsort((rows, runs))]
+    return order
+
+
+def atom_bits(ids: np.ndarray, values: np.ndarray, num_atoms: int) -> np.ndarray:
+    """(N, ceil(K / 64)) uint64: which atoms each Gaussian carries with a weight above 0."""
+    bits = np.zeros((len(ids), max(1, -(-num_atoms // 64))), np.uint64)
+    rows = np.arange(len(ids))
+    for column in range(ids.shape[1]):
+        masks = np.uint64(1) << (ids[:, column] % 64).astype(np.uint64)
+        bits[rows, ids[:, column] // 64] |= np.where(values[:, column] > 0, masks, np.uint64(0))
+    return bits

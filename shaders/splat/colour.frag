@@ -1,0 +1,19 @@
+#version 330 core
+// Purpose: colour, transmittance and depth of one splat, premultiplied, drawn back to front.
+// Source: blueprint section 6. Frames: gl_FragCoord is the pixel centre, y down.
+
+#include "footprint.glsl"
+
+flat in vec2 centre;
+flat in vec4 whitening;
+flat in vec4 colour_depth;
+
+layout(location = 0) out vec4 out_colour;
+layout(location = 1) out vec4 out_depth;  // two channels are kept; alpha drives the blending
+
+void main() {
+    float alpha = splat_alpha(gl_FragCoord.xy - centre, whitening);
+    if (alpha < ALPHA_MIN) discard;
+    out_colour = vec4(colour_depth.rgb * alpha, alpha);
+    out_depth = vec4(colour_depth.a * alpha, alpha, 0.0, alpha);
+}

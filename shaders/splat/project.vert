@@ -1,0 +1,31 @@
+#version 330 core
+// Purpose: one Gaussian to its footprint and colour, written by transform feedback in draw order.
+// Source: langflash_core/splat/projection.py is the twin.
+// Frames: in world, out pixels.
+
+#include "footprint.glsl"
+#include "harmonics.glsl"
+
+in vec4 in_mean;   // xyz world, w opacity
+in vec4 in_quat;   // wxyz, any norm
+in vec3 in_scale;  // standard deviations, world
+
+uniform mat4 viewmat;      // world to camera
+uniform vec3 eye;          // camera centre, world
+uniform vec4 pinhole;      // fx, fy, cx, cy in pixels
+uniform vec2 image_size;   // pixels
+
+out vec4 out_place;   // centre (pixels), opacity, z-depth
+out vec4 out_shape;   // l11, l21, l22 (pixels), radius of the alpha cut in deviations
+out vec3 out_colour;
+
+void main() {
+    vec3 pos_c = (viewmat * vec4(in_mean.xyz, 1.0)).xyz;
+    mat3 axes_w = rotation_of(in_quat);
+    axes_w = mat3(axes_w[0] * in_scale.x, axes_w[1] * in_scale.y, axes_w[2] * in_scale.z);
+    vec3 root = footprint_root(pos_c, mat3(viewmat) * axes_w, pinhole, image_size);
+    float opacity = in_mean.w;
+    out_place = vec4(pos_c.xy / pos_c.z * pinhole.xy + pinhole.zw, opacity, pos_c.z);
+    out_shape = vec4(root, sqrt(2.0 * log(max(opacity / ALPHA_MIN, 1.0))));
+    out_colour = sh_colour(normalize(in_mean.xyz - eye));
+}

@@ -1,0 +1,17 @@
+#version 330 core
+// Purpose: 3 atoms + alpha per attachment, LAYERS attachments, premultiplied, drawn back to front.
+// Source: blueprint section 6. Frames: gl_FragCoord is the pixel centre, y down.
+
+#include "footprint.glsl"
+
+flat in vec2 centre;
+flat in vec4 whitening;
+flat in vec3 weights[LAYERS];
+
+out vec4 out_layers[LAYERS];
+
+void main() {
+    float alpha = splat_alpha(gl_FragCoord.xy - centre, whitening);
+    if (alpha < ALPHA_MIN) discard;
+    for (int layer = 0; layer < LAYERS; ++layer) out_layers[layer] = vec4(weights[layer] * alpha, alpha);
+}
