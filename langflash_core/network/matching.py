@@ -17,6 +17,7 @@ _RATIO = 0.8  # Lowe's test
 _MIN_INLIERS = 15
 _DEPTH_SIGMA = 0.25  # log-depth error expected of a monocular map
 _SCALE_SIGMA = 0.3  # log ratio expected between the scales of two monocular maps
+_INLIER = 3.0  # sigmas of reprojection
 _CAUCHY = 2.0  # residuals beyond this many sigma lose weight
 _ITERATIONS = 40
 
@@ -41,14 +42,19 @@ class RelativePose:
     """pos_j = R pos_i + t in the length unit of view i's depth map.
 
     log_scale: view j's depths must be multiplied by exp(log_scale) to be in that unit.
-    num_inliers: matches that agree to 3 sigma. cost: mean robust cost, for choosing.
+    inliers: (n,) bool, matches that agree to 3 sigma. cost: mean robust cost, for choosing.
     """
 
     rotation: np.ndarray
     translation: np.ndarray
     log_scale: float
-    num_inliers: int
+    inliers: np.ndarray
     cost: float
+
+    @property
+    def num_inliers(self) -> int:
+        """How many matches agree."""
+        return int(self.inliers.sum())
 
     def matrix(self) -> np.ndarray:
         pose = np.eye(4)
@@ -124,7 +130,7 @@ def _five_point(matches: Matches, depth_i: np.ndarray) -> list[tuple[np.ndarray,
     keep = inliers[:, 0].astype(bool)
     _, rotation, direction, _ = cv2.recoverPose(essential, matches.x_i[keep], matches.x_j[keep], np.eye(3))
     direction = direction[:, 0]
-    depths = _triangulate(matches.x_i[keep], matches.x_j[keep], rotation, direction)
+    depths = triangulate(matches.x_i[keep], matches.x_j[keep], rotation, direction)
     usable = np.isfinite(depths) & (depths > 0)
     if usable.sum() < _MIN_INLIERS // 2:
         return [(rotation, np.zeros(3), keep)]
@@ -132,7 +138,7 @@ def _five_point(matches: Matches, depth_i: np.ndarray) -> list[tuple[np.ndarray,
     return [(rotation, direction * length, keep), (rotation, np.zeros(3), keep)]
 
 
-def _triangulate(
+def triangulate(
     x_i: np.ndarray, x_j: np.ndarray, rotation: np.ndarray, translation: np.ndarray
 ) -> np.ndarray:
     """z in view i (n,) from x_j ~ R z (x_i, 1) + t; least squares over both equations."""
@@ -183,12 +189,13 @@ def refine_pose(
             damping *= 8
         if np.abs(step[0]).max() < 1e-8 or damping > 1e8:
             break
-    return RelativePose(state.rotation, state.translation, state.log_scale, 0, cost)
+    agrees = np.linalg.norm(_residuals(state, matches, priors)[:, :2], axis=1) < _INLIER
+    return RelativePose(state.rotation, state.translation, state.log_scale, agrees, cost)
 
 
 def _score(matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray, pose: RelativePose) -> RelativePose:
     """Inliers and cost of a pose over *all* matches, each at its own best depth."""
-    depths = np.clip(_triangulate(matches.x_i, matches.x_j, pose.rotation, pose.translation), 1e-3, 1e4)
+    depths = np.clip(triangulate(matches.x_i, matches.x_j, pose.rotation, pose.translation), 1e-3, 1e4)
     parallax = np.linalg.norm(pose.translation) / np.maximum(depth_i, 1e-6)
     depths = np.where(parallax > 4 * matches.sigma, depths, depth_i)
     log_prior = np.log(depth_i)
@@ -196,11 +203,9 @@ def _score(matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray, pose: Rel
         pose.rotation, pose.translation, pose.log_scale, np.clip(np.log(depths), log_prior - 1, log_prior + 1)
     )
     residuals = _residuals(state, matches, (log_prior, np.log(depth_j)))
-    inlier = (np.linalg.norm(residuals[:, :2], axis=1) < 3) & (np.abs(residuals[:, 2:]) < 4).all(1)
+    agrees = (np.linalg.norm(residuals[:, :2], axis=1) < _INLIER) & (np.abs(residuals[:, 2:]) < 4).all(1)
     costs = np.minimum(np.log1p((residuals / _CAUCHY) ** 2).sum(1), 6.0)
-    return RelativePose(
-        pose.rotation, pose.translation, pose.log_scale, int(inlier.sum()), float(costs.mean())
-    )
+    return RelativePose(pose.rotation, pose.translation, pose.log_scale, agrees, float(costs.mean()))
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """The whole network: photos in, `Prediction` out. Stages run once, in order, and are timed."""
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,7 +13,9 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from langflash_core.errors import Cancelled
+from langflash_core.geometry.cameras import rays
 from langflash_core.network.aggregation import Aggregation
+from langflash_core.network.alignment import Correction
 from langflash_core.network.decoder import SiameseDecoder, TwoStackDecoder
 from langflash_core.network.depth import DepthHead, DepthMaps, DepthRefiner
 from langflash_core.network.encoder import Encoder, Tokens, tokens_to_maps
@@ -121,8 +124,13 @@ class LangFlashNet(nn.Module):
 
     def _refine(self, images, tokens, prior: DepthMaps, poses: Poses, viewmats, Ks) -> DepthMaps:
         """Refined maps (V, H, W), in view 0's unit; a view of unknown pose keeps its prior."""
-        scales = torch.from_numpy(poses.depth_scales).to(images)
-        scaled = DepthMaps(prior.log_depths + scales.log()[:, None, None], prior.log_errors)
+        logs = [
+            _corrected(prior.log_depths[0, v], K, correction) + math.log(scale)
+            for v, (K, scale, correction) in enumerate(
+                zip(Ks[0], poses.depth_scales, poses.corrections, strict=True)
+            )
+        ]
+        scaled = DepthMaps(torch.stack(logs)[None], prior.log_errors)
         keep = [v for v in range(images.shape[1]) if v not in poses.guessed]
         maps = DepthMaps(scaled.log_depths[0], scaled.log_errors[0])
         if len(keep) < 2:
@@ -145,6 +153,14 @@ class LangFlashNet(nn.Module):
             )
             for v in range(views.num_views)
         ]
+
+
+def _corrected(log_depths: Tensor, K: Tensor, correction: Correction) -> Tensor:
+    """Log depths (H, W) straightened by the matches."""
+    height, width = log_depths.shape
+    x = rays(K, width, height)[..., :2].cpu().numpy()
+    change = correction.at(x, log_depths.cpu().numpy())
+    return log_depths + torch.from_numpy(change).to(log_depths)
 
 
 def _grey(views: Views, view: int) -> np.ndarray:

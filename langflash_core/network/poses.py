@@ -5,10 +5,20 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from langflash_core.network.matching import Matches, RelativePose, detect, match_descriptors, relative_pose
+from langflash_core.network.alignment import NO_CORRECTION, Correction, fit_correction
+from langflash_core.network.matching import (
+    Matches,
+    RelativePose,
+    detect,
+    match_descriptors,
+    relative_pose,
+    triangulate,
+)
 
 _MANY_VIEWS = 4  # beyond this, fewer features keep the V (V - 1) / 2 pairs affordable
 _MIN_SHARE = 0.25  # of the matches must agree with a pose
+_MAX_DEPTH_SIGMA = 0.2  # log-depth error beyond which a triangulated match says too little
+_MIN_POINTS = 10  # matches needed to correct a map
 _WORKING_SIDE = 768  # pixels; sigma is one pixel at this size
 
 
@@ -29,10 +39,12 @@ class PoseInput:
 @dataclass(frozen=True)
 class Poses:
     """viewmats (V, 4, 4), world = view 0; depth_scales (V,) that bring each view's depth map to
-    view 0's unit; guessed: views that no match supports."""
+    view 0's unit; corrections: what matches say of each map beyond its scale, on the log depths
+    before scaling; guessed: views that no match supports."""
 
     viewmats: np.ndarray
     depth_scales: np.ndarray
+    corrections: tuple[Correction, ...]
     guessed: tuple[int, ...]
 
 
@@ -45,12 +57,16 @@ def estimate_poses(views: list[PoseInput]) -> Poses:
     limit = 4000 if num_views <= _MANY_VIEWS else 1500
     features = [detect(_working_size(view.grey), limit) for view in views]
     pairs: dict[tuple[int, int], RelativePose] = {}
+    agreed: dict[tuple[int, int], Matches] = {}
     for i in range(num_views):
         for j in range(i + 1, num_views):
-            pose = _pair_pose(views[i], views[j], _key_point_matches(views, features, i, j))
+            matches = _key_point_matches(views, features, i, j)
+            pose = _pair_pose(views[i], views[j], matches)
             if pose is not None:
-                pairs[i, j] = pose
-    return _chain(num_views, pairs)
+                pairs[i, j], agreed[i, j] = pose, matches.subset(pose.inliers)
+    viewmats, scales, guessed = _chain(num_views, pairs)
+    corrections = [_correction(v, views[v], viewmats, scales[v], agreed) for v in range(num_views)]
+    return Poses(viewmats, scales, tuple(corrections), guessed)
 
 
 def _pair_pose(view_i: PoseInput, view_j: PoseInput, matches: Matches) -> RelativePose | None:
@@ -92,7 +108,31 @@ def _depths_at(view: PoseInput, x: np.ndarray) -> np.ndarray:
     return view.depth[rows, columns].astype(np.float64)
 
 
-def _chain(num_views: int, pairs: dict[tuple[int, int], RelativePose]) -> Poses:
+def _correction(
+    view: int, own: PoseInput, viewmats: np.ndarray, scale: float, agreed: dict[tuple[int, int], Matches]
+) -> Correction:
+    """What the matches with all other views say of one depth map."""
+    points, targets, sigmas = [], [], []
+    for (i, j), matches in agreed.items():
+        if view not in (i, j):
+            continue
+        mine, theirs = (matches.x_i, matches.x_j) if view == i else (matches.x_j, matches.x_i)
+        relative = viewmats[j if view == i else i] @ np.linalg.inv(viewmats[view])
+        depths = triangulate(mine, theirs, relative[:3, :3], relative[:3, 3])
+        baseline = np.linalg.norm(relative[:3, 3])
+        usable = (depths > 0.05 * baseline) & (depths * matches.sigma < _MAX_DEPTH_SIGMA * baseline)
+        points.append(mine[usable])
+        targets.append(np.log(depths[usable] / scale))
+        sigmas.append(depths[usable] * matches.sigma / baseline)  # one pixel over the parallax
+    if sum(map(len, points)) < _MIN_POINTS:
+        return NO_CORRECTION
+    x = np.concatenate(points)
+    return fit_correction(x, np.log(_depths_at(own, x)), np.concatenate(targets), np.concatenate(sigmas))
+
+
+def _chain(
+    num_views: int, pairs: dict[tuple[int, int], RelativePose]
+) -> tuple[np.ndarray, np.ndarray, tuple[int, ...]]:
     """Prim's maximum spanning tree on inlier counts; scales and poses multiply along it."""
     viewmats = np.repeat(np.eye(4)[None], num_views, 0)
     scales = np.ones(num_views)
@@ -116,4 +156,4 @@ def _chain(num_views: int, pairs: dict[tuple[int, int], RelativePose]) -> Poses:
             relative[:3, 3] *= scales[i]
             viewmats[i] = np.linalg.inv(relative) @ viewmats[j]
             placed.add(i)
-    return Poses(viewmats, scales, tuple(v for v in range(num_views) if v not in placed))
+    return viewmats, scales, tuple(v for v in range(num_views) if v not in placed)

@@ -8,6 +8,7 @@ from torch.nn.functional import normalize
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.scene.consistency import seen_through
 from langflash_core.types import Gaussians, Prediction, Scene, Semantics, Views
 
 MIN_SCALE = 1e-7  # scene units; below it a covariance is singular in float32
@@ -41,14 +42,22 @@ def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: st
     if not bool(torch.isfinite(prediction.viewmats).all()):
         raise ValueError("viewmats: expected finite poses, received others")
     unit = mean_distance(prediction.gaussians.means[: height * width], prediction.viewmats[0])
-    keep = _usable(prediction.gaussians)
+    usable = _usable(prediction.gaussians)
+    keep = usable & ~seen_through(
+        prediction.gaussians.means, prediction.viewmats, views.Ks.to(prediction.viewmats),
+        prediction.depths, prediction.confidences,
+    )  # fmt: skip
     per_view = keep.view(num_views, -1).sum(1).tolist()
     dense = prediction.weights.permute(0, 2, 3, 1).reshape(num_predicted, num_atoms)[keep]
     metadata = {
         "preset": preset,
         "photos": list(views.names),
         "warnings": [*views.warnings, *prediction.warnings],
-        "counts": {"predicted": num_predicted, "unusable": num_predicted - sum(per_view)},
+        "counts": {
+            "predicted": num_predicted,
+            "unusable": num_predicted - int(usable.sum()),
+            "seen_through": int(usable.sum()) - sum(per_view),
+        },
         "gaussians_per_view": per_view,
         "network_unit": unit,
     }

@@ -55,7 +55,7 @@ def test_metadata_tells_where_the_scene_came_from():
     assert metadata["photos"] == ["0.jpg", "1.jpg"]
     assert metadata["warnings"] == ["a note of triage", "a note of the network"]
     assert list(metadata["timings"]) == ["encoder", "assembly"]
-    assert metadata["counts"] == {"predicted": 2 * 56 * 42, "unusable": 0}
+    assert metadata["counts"] == {"predicted": 2 * 56 * 42, "unusable": 0, "seen_through": 0}
 
 
 @pytest.mark.parametrize("field", ["means", "quats", "scales", "opacities", "sh"])

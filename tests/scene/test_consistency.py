@@ -1,0 +1,69 @@
+"""Free space: what a photo sees through goes, and never both sides of a conflict."""
+
+import pytest
+import torch
+
+from langflash_core.geometry.cameras import invert_rigid, transform, unproject
+from langflash_core.scene.consistency import seen_through
+
+K = torch.tensor([[30.0, 0, 16], [0, 30.0, 12], [0, 0, 1]])
+
+
+def _two_views(depths_0: float, depths_1: float, confidence_0: float = 0.5, confidence_1: float = 0.5):
+    """Two cameras side by side look at a wall; each has its own idea of how far it is."""
+    viewmats = torch.eye(4).repeat(2, 1, 1)
+    viewmats[1, 0, 3] = -0.2
+    depths = torch.stack((torch.full((24, 32), depths_0), torch.full((24, 32), depths_1)))
+    points = unproject(depths, K.expand(2, 3, 3)).flatten(1, 2)
+    means = torch.cat([transform(invert_rigid(m), p) for m, p in zip(viewmats, points, strict=True)])
+    confidences = torch.stack((torch.full((24, 32), confidence_0), torch.full((24, 32), confidence_1)))
+    blocked = seen_through(means, viewmats, K.expand(2, 3, 3), depths, confidences)
+    return blocked.view(2, 24, 32)
+
+
+def test_agreeing_views_keep_everything():
+    assert not _two_views(2.0, 2.0).any()
+    assert not _two_views(2.0, 1.9).any()  # 5 %: within the tolerance
+
+
+@pytest.mark.parametrize("confidences", [(0.6, 0.5), (0.5, 0.5)])
+def test_the_nearer_wall_goes_where_it_is_less_trusted(confidences):
+    blocked = _two_views(2.0, 1.0, *confidences)
+    assert not blocked[0].any()
+    assert blocked[1, :, 8:24].all()  # what view 0 sees of it
+    assert not blocked[1].all()  # what view 0 cannot see stays
+
+
+def test_a_trusted_near_wall_stays():
+    assert not _two_views(2.0, 1.0, 0.4, 0.6).any()
+
+
+def test_a_conflict_never_takes_both():
+    """Whatever the depths and confidences, a point of view 0 and its rival are not both dropped."""
+    torch.manual_seed(0)
+    viewmats = torch.eye(4).repeat(2, 1, 1)
+    depths = torch.rand(2, 24, 32) * 3 + 0.5
+    points = unproject(depths, K.expand(2, 3, 3)).flatten(0, 2)
+    confidences = torch.randint(0, 3, (2, 24, 32)) / 2
+    blocked = seen_through(points, viewmats, K.expand(2, 3, 3), depths, confidences).view(2, 24, 32)
+    assert blocked.any()
+    assert not (blocked[0] & blocked[1]).any()  # the same cameras: rivals share a pixel
+
+
+def test_one_view_and_points_behind_are_left_alone():
+    depths = torch.full((1, 24, 32), 2.0)
+    means = unproject(depths, K[None]).flatten(0, 2)
+    assert not seen_through(means, torch.eye(4)[None], K[None], depths, torch.ones(1, 24, 32)).any()
+    turned = torch.eye(4).repeat(2, 1, 1)
+    turned[1, :3, :3] = torch.diag(torch.tensor([-1.0, 1.0, -1.0]))
+    both = torch.full((2, 24, 32), 2.0)
+    points = unproject(both, K.expand(2, 3, 3)).flatten(1, 2)
+    world = torch.cat([transform(invert_rigid(m), p) for m, p in zip(turned, points, strict=True)])
+    assert not seen_through(world, turned, K.expand(2, 3, 3), both, torch.ones(2, 24, 32)).any()
+
+
+def test_numbers_that_are_not_finite_do_not_raise():
+    depths = torch.full((2, 24, 32), 2.0)
+    means = torch.full((2 * 24 * 32, 3), float("nan"))
+    viewmats = torch.eye(4).repeat(2, 1, 1)
+    assert not seen_through(means, viewmats, K.expand(2, 3, 3), depths, torch.ones(2, 24, 32)).any()
