@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import pyrr
 
 if TYPE_CHECKING:
     from langflash_core.types import Camera
@@ -187,17 +188,12 @@ def blend(start: Pose, end: Pose, fraction: float) -> Pose:
 
 
 def slerp(start: Rotation, end: Rotation, t: float) -> Rotation:
-    """Constant angular speed along the shorter arc. Source: Shoemake, SIGGRAPH 1985."""
-    a, b = np.array(start), np.array(end)
-    dot = float(a @ b)
-    if dot < 0:
-        b, dot = -b, -dot
-    angle = math.acos(min(dot, 1.0))
-    if angle < 1e-6:  # sin(angle) would divide by nothing; a straight line is exact enough
-        mixed = a + t * (b - a)
-    else:
-        mixed = (math.sin((1 - t) * angle) * a + math.sin(t * angle) * b) / math.sin(angle)
-    return Rotation(*(mixed / np.linalg.norm(mixed)).tolist())
+    """Along the shorter arc, from `start` (0) to `end` (1). Source: Shoemake, SIGGRAPH 1985.
+
+    The sign is settled here, because pyrr's short cut for small angles forgets it.
+    """
+    a, b = _xyzw(start), _xyzw(end)
+    return _rotation(pyrr.quaternion.slerp(a, b if a @ b >= 0 else -b, t))
 
 
 def median_reach(means: np.ndarray, viewmat: np.ndarray, K: np.ndarray, size: tuple[int, int]) -> float:
@@ -219,39 +215,26 @@ def median_reach(means: np.ndarray, viewmat: np.ndarray, K: np.ndarray, size: tu
 
 
 def _about(axis: np.ndarray, angle: float) -> np.ndarray:
-    """Rotation (3, 3) by `angle` radians about a unit axis. Source: Rodrigues' formula."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+    """Rotation (3, 3) by `angle` radians about a unit axis; pyrr's acts on row vectors."""
+    return pyrr.matrix33.create_from_axis_rotation(axis, angle).T
 
 
 def _matrix(rotation: Rotation) -> np.ndarray:
-    """Rotation matrix (3, 3) of a unit quaternion; twin of geometry.quats_to_matrices, no torch."""
-    w, x, y, z = rotation
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    """Rotation matrix (3, 3) of a unit quaternion; no torch, unlike geometry.quats_to_matrices."""
+    return pyrr.matrix33.create_from_quaternion(_xyzw(rotation))
 
 
 def _quaternion(matrix: np.ndarray) -> Rotation:
-    """Unit quaternion of a rotation (3, 3): the eigenvector of Bar-Itzhack's symmetric matrix.
+    """Unit quaternion, w >= 0, of a rotation (3, 3) that may carry the rounding of float32."""
+    return _rotation(pyrr.quaternion.create_from_matrix(matrix))
 
-    Tolerates the rounding of float32 poses. Source: Bar-Itzhack, "New method for extracting
-    the quaternion from a rotation matrix", 2000.
-    """
-    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
-    symmetric = np.array(
-        [
-            [a - e - i, d + b, g + c, h - f],
-            [d + b, e - a - i, h + f, c - g],
-            [g + c, h + f, i - a - e, d - b],
-            [h - f, c - g, d - b, a + e + i],
-        ]
-    )
-    x, y, z, w = np.linalg.eigh(symmetric)[1][:, -1].tolist()
-    sign = -1.0 if w < 0 else 1.0
-    return Rotation(sign * w, sign * x, sign * y, sign * z)
+
+def _xyzw(rotation: Rotation) -> np.ndarray:
+    """In pyrr's order."""
+    return np.array([rotation.x, rotation.y, rotation.z, rotation.w])
+
+
+def _rotation(quat_xyzw: np.ndarray) -> Rotation:
+    sign = -1.0 if quat_xyzw[3] < 0 else 1.0
+    x, y, z, w = (sign * quat_xyzw / np.linalg.norm(quat_xyzw)).tolist()
+    return Rotation(w, x, y, z)
