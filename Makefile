@@ -11,7 +11,7 @@ SHELL := /bin/bash
 
 BIN := .venv/bin
 STAMP := .venv/.langflash
-PHOTOS := assets/photos/books_left.jpg assets/photos/books_right.jpg
+PHOTOS := assets/photos/living_room_left.png assets/photos/living_room_right.png
 GL_PACKAGES := libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri libglx-mesa0
 WINDOW_PACKAGES := xvfb xdotool
 TRY_GL := $(BIN)/python -c 'import moderngl; moderngl.create_standalone_context(backend="egl", require=330).release()'
@@ -36,11 +36,11 @@ run: $(STAMP)-package $(STAMP)-gl
 	fi; \
 	echo "No display here: the same job without a window."; \
 	mkdir -p out; \
-	$(BIN)/langflash reconstruct $(PHOTOS) -o out/books.langflash; \
+	$(BIN)/langflash reconstruct $(PHOTOS) -o out/living_room.langflash; \
 	for what in rgb depth atoms; do \
-		$(BIN)/langflash render out/books.langflash --size 798x588 --what $$what -o out/$$what.png; \
+		$(BIN)/langflash render out/living_room.langflash --size 798x588 --what $$what -o out/$$what.png; \
 	done; \
-	$(BIN)/langflash query out/books.langflash book floor --size 798x588 -o out/query; \
+	$(BIN)/langflash query out/living_room.langflash plant floor window --size 798x588 -o out/query; \
 	echo "The pictures are in $(CURDIR)/out and $(CURDIR)/out/query."
 
 test: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window

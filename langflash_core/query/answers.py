@@ -14,7 +14,7 @@ from langflash_core.query.relevance import CompiledQuery
 from langflash_core.types import Camera, Frame, PromptAnswer, QueryResult
 
 COVERED_ALPHA = 0.5  # a pixel shows the scene, rather than the background, from here on
-TOP_FRACTION = 0.005  # of the covered pixels: their mean is the score, so no stray pixel decides
+TOP_FRACTION = 0.001  # of the covered pixels: their mean is the score, so no stray pixel decides
 MIN_AREA = 0.0005  # of all pixels: a smaller mask is noise (154 pixels at 640 x 480)
 BOX_QUANTILES = (0.02, 0.98)  # of the mask's points along each axis: drops edges that bleed in depth
 _PRINCIPAL_GAIN = 0.9  # of the world-axes box's volume, which the principal one must stay below
@@ -30,7 +30,7 @@ def answer(
 ) -> QueryResult:
     """Answer P prompts in one view.
 
-    score = mean of the highest 0.5 % of the covered pixels (alpha >= 0.5), at least one;
+    score = mean of the highest 0.1 % of the covered pixels (alpha >= 0.5), at least one;
     mask = relevance >= threshold at covered pixels; found = score >= threshold and the mask
     covers at least 0.05 % of the image. The mask of a phrase that is not found is empty.
 
@@ -61,7 +61,7 @@ def answer(
 
 
 def presence_scores(relevance: Tensor, covered: Tensor) -> Tensor:
-    """Scores (P,) of maps (P, H, W): mean of the highest 0.5 % where `covered` (H, W); 0 if nowhere."""
+    """Scores (P,) of maps (P, H, W): mean of the highest 0.1 % where `covered` (H, W); 0 if nowhere."""
     inside = relevance[:, covered]  # (P, n)
     count = inside.shape[1]
     if count == 0:
