@@ -30,6 +30,7 @@ from langflash_core.network.grouping import (
 from langflash_core.network.language import LanguageHead
 from langflash_core.network.poses import PoseInput, Poses, estimate_poses
 from langflash_core.network.presets import Preset
+from langflash_core.network.splitting import split_groups
 from langflash_core.types import Prediction, Views
 
 Progress = Callable[[str, float], None]
@@ -106,7 +107,8 @@ class LangFlashNet(nn.Module):
         with run.stage("grouping"):
             groups = self.group(tokens, images)[-1]
             survivors = surviving(groups, self.preset.tau_exist)
-            weights = group_weights(groups, survivors, (images.shape[-2], images.shape[-1]))
+            whole = group_weights(groups, survivors, (images.shape[-2], images.shape[-1]))
+            weights = split_groups(whole, features[0], self.preset.splitting)
         with run.stage("aggregation"):
             pooled = F.adaptive_avg_pool2d(weights, (features.shape[-2], features.shape[-1]))
             dictionary = self.aggregation(pooled[None], features)[0]

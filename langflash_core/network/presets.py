@@ -8,6 +8,20 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
+class Splitting:
+    """When groups are split, and how softly.
+
+    max_cosine: clusters closer than this stay together. min_area: of all pixels, for a cluster.
+    sharpness: of the softmax that shares a pixel among its group's clusters.
+    """
+
+    max_cosine: float = 0.85
+    min_area: float = 0.006
+    max_clusters: int = 4
+    sharpness: float = 20.0
+
+
+@dataclass(frozen=True)
 class Preset:
     """Everything that fixes shapes, and what the paper leaves open (blueprint section 3)."""
 
@@ -50,6 +64,7 @@ class Preset:
     aggregation_heads: int
 
     tau_exist: float = 0.5
+    splitting: Splitting = Splitting()
     eps: float = 1e-6
 
 
