@@ -177,8 +177,8 @@ def test_the_scene_is_drawn(program: Program) -> None:
 def test_a_typed_phrase_lights_up_where_it_is(program: Program) -> None:
     plain = program.picture()
     program.type_prompt("armchair")
-    state = program.until(lambda s: s["prompts"][0][1] is not None, "a score")
-    assert state["prompts"][0][0] == "armchair" and state["prompts"][0][2] and state["mode"] == "HEAT"
+    state = program.until(lambda s: s["prompts"][0][0] == "armchair" and s["prompts"][0][2], "the armchair")
+    assert state["mode"] == "HEAT"
     program.at_rest()
     heat = program.picture()
     difference = abs(heat - plain).mean(-1)
@@ -206,10 +206,8 @@ def test_what_is_not_there_is_not_found(program: Program) -> None:
     program.type_prompt("")
     program.xdotool("key", "ctrl+a")
     program.xdotool("type", "--delay", "30", "elephant")
-    state = program.until(
-        lambda s: s["prompts"][0][0] == "elephant" and s["prompts"][0][1] is not None, "a score"
-    )
-    assert state["prompts"][0][2] is False
+    # Until the words are encoded, the row still shows the answer to the prompt before.
+    program.until(lambda s: s["prompts"][0][0] == "elephant" and s["prompts"][0][2] is False, "not found")
 
 
 @pytest.mark.parametrize(
