@@ -21,11 +21,11 @@ from langflash_core.training.validation import MEASURES, Validator
 # Steps, learning rate, and the share of the first loss that must be left: about twice what was seen.
 OVERFIT = {
     "depth": (20, 2e-3, 0.6),
-    "refine": (20, 2e-3, 0.85),
+    "refine": (40, 2e-3, 0.85),
     "gaussians": (10, 2e-2, 0.9),
     "language": (20, 2e-3, 0.5),
     "grouping": (20, 2e-3, 0.85),
-    "aggregation": (14, 1e-2, 0.8),
+    "aggregation": (40, 1e-2, 0.8),
 }
 
 
