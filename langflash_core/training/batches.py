@@ -4,7 +4,7 @@ Sizes as in `shards`: B scenes, V views, H W pixels.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
@@ -41,8 +41,15 @@ class SceneBatch:
         tokens = self.tokens
         if tokens is not None:
             tokens = Tokens(tuple(hook.to(device) for hook in tokens.hooks), tokens.grid)
-        moved = (t.to(device) for t in (self.images, self.depths, self.instances, self.viewmats, self.Ks))
-        return SceneBatch(*moved, tokens, self.labels, self.seeds)
+        return replace(
+            self,
+            images=self.images.to(device),
+            depths=self.depths.to(device),
+            instances=self.instances.to(device),
+            viewmats=self.viewmats.to(device),
+            Ks=self.Ks.to(device),
+            tokens=tokens,
+        )
 
 
 def collate(records: Sequence[RoomRecord]) -> SceneBatch:

@@ -165,8 +165,9 @@ def fill_panes(ids: np.ndarray, openings: list[int]) -> np.ndarray:
     empty, frames = ids == NOTHING, np.isin(ids, openings)
     if not empty.any() or not frames.any():
         return ids
-    rows, columns = distance_transform_edt(~frames, return_distances=False, return_indices=True)
-    return np.where(empty, ids[rows, columns], ids)
+    nearest = np.empty((2, *ids.shape), dtype=np.int32)
+    distance_transform_edt(~frames, return_distances=False, return_indices=True, indices=nearest)
+    return np.where(empty, ids[nearest[0], nearest[1]], ids)
 
 
 def record_of(sample: RoomViews) -> RoomRecord:

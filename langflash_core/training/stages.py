@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.network.depth import DepthMaps, resize
+from langflash_core.network.depth import DepthMaps, DepthRefiner, resize, sweep_correlation
 from langflash_core.network.encoder import Tokens
 from langflash_core.network.gaussians import assemble_gaussians
 from langflash_core.network.language import LanguageHead
@@ -97,7 +97,11 @@ def depth_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
 
 
 def refine_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
-    """Plane-sweep refinement of the frozen prior, with the small errors that poses will have."""
+    """Plane-sweep refinement of the frozen prior, with the small errors that poses will have.
+
+    Beside the depth losses the correlation itself is told which hypothesis is right
+    (`match_loss`): through the soft-argmax alone, features that do not match yet learn slowly.
+    """
     with torch.no_grad():
         prior = scaled_prior(network, batch)
         prior = replace(prior, log_depths=prior.log_depths + 0.05 * _noise(batch, (1, 1), words.generator))
@@ -106,7 +110,37 @@ def refine_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss
     logs, errors, truth = (t.flatten(0, 1).float() for t in (maps.log_depths, maps.log_errors, batch.depths))
     shape, slope = depth_loss(logs, truth, absolute=1.0), gradient_loss(logs, truth)
     error = error_loss(logs, errors, truth, shared_offset=False)
-    return Loss(shape + slope + 0.05 * error, _numbers(shape=shape, slope=slope, error=error))
+    matching = match_loss(network.refiner, batch, prior, viewmats)
+    total = shape + slope + 0.05 * error + 0.2 * matching
+    return Loss(total, _numbers(shape=shape, slope=slope, error=error, matching=matching))
+
+
+def match_loss(refiner: DepthRefiner, batch: SceneBatch, prior: DepthMaps, viewmats: Tensor) -> Tensor:
+    """Cross-entropy of the sweep's correlations against the hypothesis next to the true depth.
+
+    The target is shared linearly between the two neighbouring hypotheses. Only pixels count whose
+    true depth lies within the sweep's range and that another view sees there; 0 with one view.
+    """
+    features = refiner.features(batch.images, _tokens(batch)).unflatten(0, batch.images.shape[:2])
+    size = (features.shape[-2], features.shape[-1])
+    ratio = torch.tensor([size[1] / batch.size[1], size[0] / batch.size[0], 1.0]).to(batch.Ks)[:, None]
+    offsets = refiner.offsets
+    step = offsets[1] - offsets[0]
+    entropies, counts = [], []
+    for i in range(batch.images.shape[0]):
+        logs = _shrink(prior.log_depths[i], size)
+        wanted, valid = log_residual(-logs, 1 / _shrink(batch.depths[i], size).clamp_min(1e-6))
+        place = ((wanted - offsets[0]) / step).clamp(0, len(offsets) - 1)
+        volume, seen = sweep_correlation(features[i], logs, offsets, viewmats[i], batch.Ks[i] * ratio)
+        share = (1 - (place[:, None] - torch.arange(len(offsets)).to(place)[:, None, None]).abs()).clamp_min(
+            0
+        )
+        known = _shrink(batch.depths[i], size) > 0
+        valid = valid & known & (wanted.abs() <= offsets[-1]) & ((share * seen).sum(1) > 0.99)
+        entropy = -(share * (refiner.sharpness * volume).log_softmax(1)).sum(1)
+        entropies.append((entropy * valid).sum())
+        counts.append(valid.sum())
+    return torch.stack(entropies).sum() / torch.stack(counts).sum().clamp_min(1)
 
 
 def scaled_prior(network: LangFlashNet, batch: SceneBatch) -> DepthMaps:

@@ -1,0 +1,1 @@
+"""Protocols and tables: how good the network is on rooms it has never seen."""

@@ -1,0 +1,116 @@
+"""Measures of poses, points, pictures and presence; those of depth and classes are in
+`training.measures`. Every measure is NaN where nothing can be measured."""
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from langflash_core.geometry.cameras import invert_rigid, rotation_angle_degrees, transform, unproject
+from langflash_core.training.losses import ssim_map
+
+
+@dataclass(frozen=True)
+class PoseError:
+    """Degrees: rotation, and direction of the translation (0 to 180; NaN for a still camera)."""
+
+    rotation: float
+    direction: float
+
+    def right(self, rotation: float = 5.0, direction: float = 15.0) -> bool:
+        """Both errors within limits; a still camera is judged by its rotation alone."""
+        near = math.isnan(self.direction) or self.direction <= direction
+        return self.rotation <= rotation and near
+
+
+def pose_error(predicted: Tensor, truth: Tensor) -> PoseError:
+    """Between two world-to-camera matrices (4, 4) of one world; lengths do not matter."""
+    rotation = float(rotation_angle_degrees(predicted[:3, :3].double(), truth[:3, :3].double()))
+    left, right = (-(m[:3, :3].double().T @ m[:3, 3].double()) for m in (predicted, truth))
+    if float(left.norm()) < 1e-9 or float(right.norm()) < 1e-9:
+        return PoseError(rotation, math.nan)
+    sine = torch.linalg.cross(left, right).norm()
+    return PoseError(rotation, float(torch.rad2deg(torch.atan2(sine, left @ right))))
+
+
+def point_error(points: Tensor, depths: Tensor, K: Tensor, viewmat: Tensor, scale: float) -> float:
+    """Mean |X - X*| / |X*| of one view's points in the first camera's frame.
+
+    Args:
+        points: (H, W, 3) predicted, world = first camera. depths: (H, W) true z, 0 unknown.
+        K, viewmat: true camera of this view. scale: true lengths per predicted length, from view 0.
+    """
+    valid = depths > 0
+    if not bool(valid.any()):
+        return math.nan
+    truth = transform(invert_rigid(viewmat), unproject(depths, K).flatten(0, 1)).unflatten(0, depths.shape)
+    error = (points * scale - truth).norm(dim=-1)[valid] / truth.norm(dim=-1)[valid].clamp_min(1e-6)
+    return float(error.mean())
+
+
+def ssim(rendered: Tensor, photo: Tensor) -> float:
+    """Mean structural similarity of pictures (H, W, 3) in [0, 1]."""
+    return float(ssim_map(rendered.clamp(0, 1), photo).mean())
+
+
+@dataclass(frozen=True)
+class Presence:
+    """Counts of "found" against the truth."""
+
+    hits: int = 0
+    false_alarms: int = 0
+    misses: int = 0
+    rejections: int = 0
+
+    def __add__(self, other: "Presence") -> "Presence":
+        return Presence(
+            self.hits + other.hits,
+            self.false_alarms + other.false_alarms,
+            self.misses + other.misses,
+            self.rejections + other.rejections,
+        )
+
+    @property
+    def precision(self) -> float:
+        found = self.hits + self.false_alarms
+        return self.hits / found if found else math.nan
+
+    @property
+    def recall(self) -> float:
+        present = self.hits + self.misses
+        return self.hits / present if present else math.nan
+
+    @property
+    def f1(self) -> float:
+        total = 2 * self.hits + self.false_alarms + self.misses
+        return 2 * self.hits / total if total else math.nan
+
+
+def presence(scores: Tensor, present: Tensor, threshold: float) -> Presence:
+    """Phrases with score >= threshold count as found; scores (P,), present (P,) bool."""
+    found = scores >= threshold
+    return Presence(
+        int((found & present).sum()),
+        int((found & ~present).sum()),
+        int((~found & present).sum()),
+        int((~found & ~present).sum()),
+    )
+
+
+def best_threshold(scores: Tensor, present: Tensor) -> tuple[float, Presence]:
+    """The threshold with the highest F1, midway between neighbouring scores; scores (P,).
+
+    Raises:
+        ValueError: there is no phrase that is present, or none that is absent.
+    """
+    if not bool(present.any()) or bool(present.all()):
+        raise ValueError("present: expected both present and absent phrases")
+    order = scores.argsort(descending=True)
+    ranked, truth = scores[order].double(), present[order]
+    hits = truth.cumsum(0)
+    f1 = 2 * hits / (torch.arange(1, len(ranked) + 1) + int(truth.sum()))
+    last = int(f1.argmax())
+    following = ranked[last + 1] if last + 1 < len(ranked) else ranked[last]
+    threshold = float((ranked[last] + following) / 2)
+    return threshold, presence(scores, present, threshold)

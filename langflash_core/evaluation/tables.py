@@ -1,0 +1,53 @@
+"""Results as markdown: one table of measures with their trivial rivals, one of labels by method."""
+
+_MEASURES = (
+    ("Depth AbsRel, view 1", "depth_abs_rel", "constant depth", "depth_abs_rel_constant"),
+    ("Depth AbsRel, fed view 1 twice", "depth_abs_rel_view_0_twice", "", ""),
+    ("Depth delta < 1.25, view 1", "depth_delta1", "", ""),
+    ("Depth AbsRel in metres, no alignment", "depth_abs_rel_metric", "", ""),
+    ("View-2 points in frame 1, relative", "points_view_1", "true depth, identity pose",
+     "points_view_1_true_depth_identity_pose"),
+    ("Rotation error, median (degrees)", "pose_rotation_median", "", ""),
+    ("Direction error, median (degrees)", "pose_direction_median", "", ""),
+    ("Right pose (5 / 15 degrees), overlap >= 30 %", "pose_right_share", "", ""),
+    ("Novel view PSNR (dB)", "psnr", "mean colour", "psnr_mean_colour"),
+    ("Novel view SSIM", "ssim", "", ""),
+    ("Presence precision", "presence_precision", "", ""),
+    ("Presence recall", "presence_recall", "", ""),
+    ("Presence F1", "presence_f1", "always found", "presence_f1_always_found"),
+    ("IoU of plain names", "name_iou", "", ""),
+    ("IoU of other words for them", "paraphrase_iou", "", ""),
+    ("Network, seconds for two photos", "seconds", "", ""),
+)  # fmt: skip
+_METHODS = {
+    "features": "2D features per view, no 3D",
+    "averaged": "averaged atoms",
+    "lfa": "aggregated atoms (LFA)",
+    "true_masks_lfa": "true masks + LFA",
+    "majority": 'always "wall"',
+}
+_COLUMNS = (
+    "source_groups_accuracy", "source_groups_miou", "source_objects_miou", "source_paper_miou",
+    "target_groups_accuracy", "target_groups_miou", "target_objects_miou", "target_paper_miou",
+)  # fmt: skip
+
+
+def markdown(result: dict) -> str:
+    """The two tables of a `run_eval` result."""
+    measures = result["measures"]
+    lines = ["| measure | value | trivial |", "|---|---|---|"]
+    for title, key, rival, rival_key in _MEASURES:
+        if key in measures:
+            other = f"{_number(measures[rival_key])} ({rival})" if rival_key in measures else ""
+            lines.append(f"| {title} | {_number(measures[key])} | {other} |")
+    lines += ["", "| labels | " + " | ".join(c.replace("_", " ") for c in _COLUMNS) + " |"]
+    lines.append("|---" * (len(_COLUMNS) + 1) + "|")
+    for method, title in _METHODS.items():
+        if method in result["labels"]:
+            row = result["labels"][method]
+            lines.append(f"| {title} | " + " | ".join(_number(row.get(c)) for c in _COLUMNS) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"
