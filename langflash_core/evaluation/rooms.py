@@ -57,6 +57,7 @@ log = logging.getLogger(__name__)
 
 PHRASES = 20
 """Asked per scene: half of them things that are there, half things that are not."""
+MASK_THRESHOLDS = tuple(round(0.3 + 0.025 * step, 3) for step in range(28))
 MIN_SHARE = 0.004
 """Of view 0: a thing counts as there from this share of its pixels on (200 of 224 x 224)."""
 
@@ -64,13 +65,14 @@ MIN_SHARE = 0.004
 @dataclass
 class Tally:
     """What a run collects: numbers per scene by name, confusion counts by (row, view, label set),
-    presence scores."""
+    presence scores, and per present phrase its mask's IoU at each of `MASK_THRESHOLDS`."""
 
     numbers: dict[str, list[float]] = field(default_factory=dict)
     counts: dict[tuple[str, str, str], Tensor] = field(default_factory=dict)
     scores: list[Tensor] = field(default_factory=list)
     truths: list[Tensor] = field(default_factory=list)
     poses: list[tuple[PoseError, float]] = field(default_factory=list)
+    mask_ious: list[Tensor] = field(default_factory=list)
 
     def note(self, **values: float) -> None:
         for name, value in values.items():
@@ -154,7 +156,8 @@ def calibrate(network: LangFlashNet, data: Path, *, limit: int | None = None) ->
     "not there" are those of `judge_scene`, on rooms of training furniture with unseen seeds.
 
     Returns:
-        {"temperature", "threshold", "negatives", "validation": precision, recall, f1, phrases}.
+        {"temperature", "threshold", "negatives", "validation": precision, recall, f1, phrases, and
+        the IoU of masks cut at the same threshold and at the one that would suit masks best}.
     """
     rooms = _rooms(data / "validation", limit)
     groups = sorted({label.group for label in rooms.labels()})
@@ -173,7 +176,20 @@ def calibrate(network: LangFlashNet, data: Path, *, limit: int | None = None) ->
             "recall": round(counts.recall, 3),
             "f1": round(counts.f1, 3),
             "phrases": sum(len(s) for s in tally.scores),
+            **_mask_report(tally, threshold),
         },
+    }
+
+
+def _mask_report(tally: Tally, threshold: float) -> dict[str, float]:
+    """Mean IoU of masks of present phrases at the presence threshold, and where it would be best."""
+    ious = torch.stack(tally.mask_ious).mean(0)
+    nearest_step = min(range(len(MASK_THRESHOLDS)), key=lambda i: abs(MASK_THRESHOLDS[i] - threshold))
+    best = int(ious.argmax())
+    return {
+        "mask_iou": round(float(ious[nearest_step]), 3),
+        "best_mask_iou": round(float(ious[best]), 3),
+        "best_mask_threshold": MASK_THRESHOLDS[best],
     }
 
 
@@ -283,7 +299,17 @@ def ask_phrases(setting: Setting, record: RoomRecord, prediction: Prediction, ta
     maps = relevancy(positives, negatives, setting.temperature)
     covered = torch.ones(maps.shape[-2:], dtype=torch.bool)
     tally.scores.append(presence_scores(maps, covered))
-    tally.truths.append(torch.arange(len(vectors)) < len([p for p in present if p in setting.groups]))
+    known = [p for p in present if p in setting.groups]
+    tally.truths.append(torch.arange(len(vectors)) < len(known))
+    for phrase, values in zip(known, maps, strict=False):
+        truth = group_mask(record, phrase, view=0)
+        tally.mask_ious.append(torch.tensor([_iou(values >= limit, truth) for limit in MASK_THRESHOLDS]))
+
+
+def group_mask(record: RoomRecord, group: str, view: int) -> Tensor:
+    """Pixels (H, W) of every instance of a class group in a view."""
+    own = [index for index, label in enumerate(record.labels) if label.group == group]
+    return torch.isin(record.instances[view].long(), torch.tensor(own))
 
 
 def visible_groups(record: RoomRecord, view: int) -> list[str]:
