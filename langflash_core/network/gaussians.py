@@ -19,7 +19,7 @@ from langflash_core.types import Gaussians
 _COVER = 0.6  # standard deviation in pixel spacings: neighbours blend into a closed surface
 _THIN = 0.1  # thickness of a surface element over its pixel footprint
 _STRETCH = 5.0  # a surface seen edge-on is not stretched further than this many footprints
-_SCALE_RANGE = 1.0  # the head changes a scale by at most exp(+-1)
+_SCALE_RANGE = 1.0  # the head enlarges a scale by at most e
 _COLOUR_RANGE = 0.1  # and a colour by at most this
 CHANNELS = 1 + 3 + 3  # opacity, three scales, colour
 
@@ -107,7 +107,9 @@ def assemble_gaussians(
     raw = raw.movedim(1, -1)  # (V, H, W, 7)
     # Starts at opacity 0.88; a pixel whose depth is not trusted starts fainter.
     opacities = torch.sigmoid(raw[..., 0] + 2.0) * depth_maps.confidences.clamp(0.2, 1).sqrt()
-    scales = scales * torch.exp(_SCALE_RANGE * torch.tanh(raw[..., 1:4]))
+    # Never below the footprint that closes the surface: seen from nearer than the photo, where the
+    # renderer's dilation of 0.3 px no longer helps, smaller ones would leave gaps.
+    scales = scales * torch.exp(_SCALE_RANGE * torch.tanh(raw[..., 1:4]).clamp_min(0))
     colours = images.movedim(1, -1) + _COLOUR_RANGE * torch.tanh(raw[..., 4:])
     return Gaussians(
         means=means.reshape(-1, 3),
