@@ -16,6 +16,7 @@ _CONTRAST = 0.01  # walls have little: the default of 0.04 finds nothing on them
 _RATIO = 0.8  # Lowe's test
 _MIN_INLIERS = 15
 _DEPTH_SIGMA = 0.25  # log-depth error expected of a monocular map
+_INDEPENDENT = 50  # errors of one map go together: all its matches count as this many
 _SCALE_SIGMA = 0.3  # log ratio expected between the scales of two monocular maps
 _INLIER = 3.0  # sigmas of reprojection
 _CAUCHY = 2.0  # residuals beyond this many sigma lose weight
@@ -164,6 +165,28 @@ def _pnp(matches: Matches, depth_i: np.ndarray) -> list[tuple[np.ndarray, np.nda
     return [(cv2.Rodrigues(turn)[0], translation[:, 0], keep)]
 
 
+@dataclass(frozen=True)
+class DepthPriors:
+    """What the monocular maps say at n matches: log depths (n,) of both; share weighs them.
+
+    Errors of a map are smooth, so n matches do not know n times as much; taking them as
+    independent turned cameras by up to a degree to please a tilted map.
+    """
+
+    log_i: np.ndarray
+    log_j: np.ndarray
+    share: float
+
+    @staticmethod
+    def of(depth_i: np.ndarray, depth_j: np.ndarray) -> "DepthPriors":
+        """From depths (n,) > 0."""
+        return DepthPriors(np.log(depth_i), np.log(depth_j), min(1.0, _INDEPENDENT / len(depth_i)))
+
+    def weigh(self, terms: np.ndarray) -> np.ndarray:
+        """Terms (n, 4) of the residuals, those of depth times `share`."""
+        return terms * np.array([1.0, 1.0, self.share, self.share])
+
+
 def refine_pose(
     matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray, rotation: np.ndarray, translation: np.ndarray
 ) -> RelativePose:
@@ -175,15 +198,15 @@ def refine_pose(
     Source: own derivation on Triggs et al. 2000; twin: scipy.optimize.least_squares in the tests.
     """
     state = _State(rotation, translation, 0.0, np.log(depth_i))
-    priors = (np.log(depth_i), np.log(depth_j))
+    priors = DepthPriors.of(depth_i, depth_j)
     damping, cost = 1e-3, np.inf
     for _ in range(_ITERATIONS):
         residuals, jac_pose, jac_depth = _linearise(state, matches, priors)
-        weights = 1 / (1 + (residuals / _CAUCHY) ** 2)
-        cost = _robust_cost(residuals)
+        weights = priors.weigh(1 / (1 + (residuals / _CAUCHY) ** 2))
+        cost = _robust_cost(residuals, priors)
         step = _solve(residuals, weights, jac_pose, jac_depth, state.log_scale, damping)
         trial = state.moved(*step)
-        if _robust_cost(_residuals(trial, matches, priors)) < cost:
+        if _robust_cost(_residuals(trial, matches, priors), priors) < cost:
             state, damping = trial, max(damping / 5, 1e-9)
         else:
             damping *= 8
@@ -198,11 +221,12 @@ def _score(matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray, pose: Rel
     depths = np.clip(triangulate(matches.x_i, matches.x_j, pose.rotation, pose.translation), 1e-3, 1e4)
     parallax = np.linalg.norm(pose.translation) / np.maximum(depth_i, 1e-6)
     depths = np.where(parallax > 4 * matches.sigma, depths, depth_i)
-    log_prior = np.log(depth_i)
+    priors = DepthPriors.of(depth_i, depth_j)
+    log_prior = priors.log_i
     state = _State(
         pose.rotation, pose.translation, pose.log_scale, np.clip(np.log(depths), log_prior - 1, log_prior + 1)
     )
-    residuals = _residuals(state, matches, (log_prior, np.log(depth_j)))
+    residuals = _residuals(state, matches, priors)
     agrees = (np.linalg.norm(residuals[:, :2], axis=1) < _INLIER) & (np.abs(residuals[:, 2:]) < 4).all(1)
     costs = np.minimum(np.log1p((residuals / _CAUCHY) ** 2).sum(1), 6.0)
     return RelativePose(pose.rotation, pose.translation, pose.log_scale, agrees, float(costs.mean()))
@@ -223,20 +247,20 @@ class _State:
         )
 
 
-def _residuals(state: _State, matches: Matches, priors: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+def _residuals(state: _State, matches: Matches, priors: DepthPriors) -> np.ndarray:
     """(n, 4) in sigmas: reprojection x, y; log depth against view i's map; against view j's."""
     pos_j = (
         _homogeneous(matches.x_i) * np.exp(state.log_depths)[:, None] @ state.rotation.T + state.translation
     )
     z = np.maximum(pos_j[:, 2], 1e-6)
     reprojection = (pos_j[:, :2] / z[:, None] - matches.x_j) / matches.sigma
-    from_i = (state.log_depths - priors[0]) / _DEPTH_SIGMA
-    from_j = (np.log(z) - priors[1] - state.log_scale) / _DEPTH_SIGMA
+    from_i = (state.log_depths - priors.log_i) / _DEPTH_SIGMA
+    from_j = (np.log(z) - priors.log_j - state.log_scale) / _DEPTH_SIGMA
     return np.column_stack((reprojection, from_i, from_j))
 
 
 def _linearise(
-    state: _State, matches: Matches, priors: tuple[np.ndarray, np.ndarray]
+    state: _State, matches: Matches, priors: DepthPriors
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Residuals (n, 4), their Jacobians to the pose and scale (n, 4, 7) and to the depth (n, 4)."""
     turned = _homogeneous(matches.x_i) * np.exp(state.log_depths)[:, None] @ state.rotation.T
@@ -273,8 +297,8 @@ def _solve(residuals, weights, jac_pose, jac_depth, log_scale, damping) -> tuple
     return pose_step, -(own_gradient + cross @ pose_step) / own
 
 
-def _robust_cost(residuals: np.ndarray) -> float:
-    return float(np.log1p((residuals / _CAUCHY) ** 2).sum(1).mean())
+def _robust_cost(residuals: np.ndarray, priors: DepthPriors) -> float:
+    return float(priors.weigh(np.log1p((residuals / _CAUCHY) ** 2)).sum(1).mean())
 
 
 def _homogeneous(x: np.ndarray) -> np.ndarray:

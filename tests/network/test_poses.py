@@ -94,9 +94,16 @@ def test_noise_and_too_few_matches_give_none():
     assert relative_pose(matches, depth_i, depth_j) is None
 
 
+def test_a_tilted_map_does_not_turn_the_camera():
+    """A narrow baseline, and a map whose error grows from left to right."""
+    matches, depth_i, depth_j, rotation, _ = _pair(5, turn=(0, 0, 0), move=(-0.08, 0, 0), n=600)
+    pose = _pose(matches, depth_i * np.exp(0.4 * matches.x_i[:, 0] ** 2), depth_j)
+    assert _degrees(pose.rotation, rotation) < 0.25  # the parallax itself is 2 degrees
+
+
 def test_jacobians_equal_finite_differences():
     matches, depth_i, depth_j, rotation, translation = _pair(3, n=6)
-    priors = (np.log(depth_i), np.log(depth_j))
+    priors = matching.DepthPriors.of(depth_i, depth_j)
     state = matching._State(rotation, translation, 0.1, np.log(depth_i))
     _, jac_pose, jac_depth = matching._linearise(state, matches, priors)
     for column in range(7):
@@ -112,16 +119,16 @@ def test_jacobians_equal_finite_differences():
 
 def test_refinement_reaches_the_optimum_of_scipy():
     matches, depth_i, depth_j, rotation, translation = _pair(4, n=40)
-    priors = (np.log(depth_i), np.log(depth_j))
+    priors = matching.DepthPriors.of(depth_i, depth_j)
     own = refine_pose(matches, depth_i, depth_j, rotation, translation * 1.2)
 
     def residuals(x):
         state = matching._State(Rotation.from_rotvec(x[:3]).as_matrix(), x[3:6], x[6], x[7:])
         # Cauchy through scipy's soft residuals: sqrt(log(1 + (r / c)^2)).
-        soft = np.sqrt(np.log1p((matching._residuals(state, matches, priors) / 2) ** 2)).ravel()
+        soft = np.sqrt(priors.weigh(np.log1p((matching._residuals(state, matches, priors) / 2) ** 2))).ravel()
         return np.append(soft, x[6] / 0.3 / 2)
 
-    start = np.concatenate((Rotation.from_matrix(rotation).as_rotvec(), translation, [0.2], priors[0]))
+    start = np.concatenate((Rotation.from_matrix(rotation).as_rotvec(), translation, [0.2], priors.log_i))
     twin = least_squares(residuals, start, xtol=1e-12, ftol=1e-12)
     assert _degrees(own.rotation, Rotation.from_rotvec(twin.x[:3]).as_matrix()) < 0.02
     assert own.translation == pytest.approx(twin.x[3:6], abs=2e-3)
