@@ -1,4 +1,4 @@
-"""Measures of poses, points, pictures and presence; those of depth and classes are in
+"""Measures of poses, points and presence; those of depth and classes are in
 `training.measures`. Every measure is NaN where nothing can be measured."""
 
 import math
@@ -8,7 +8,6 @@ import torch
 from torch import Tensor
 
 from langflash_core.geometry.cameras import invert_rigid, rotation_angle_degrees, transform, unproject
-from langflash_core.training.losses import ssim_map
 
 
 @dataclass(frozen=True)
@@ -47,11 +46,6 @@ def point_error(points: Tensor, depths: Tensor, K: Tensor, viewmat: Tensor, scal
     truth = transform(invert_rigid(viewmat), unproject(depths, K).flatten(0, 1)).unflatten(0, depths.shape)
     error = (points * scale - truth).norm(dim=-1)[valid] / truth.norm(dim=-1)[valid].clamp_min(1e-6)
     return float(error.mean())
-
-
-def ssim(rendered: Tensor, photo: Tensor) -> float:
-    """Mean structural similarity of pictures (H, W, 3) in [0, 1]."""
-    return float(ssim_map(rendered.clamp(0, 1), photo).mean())
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,9 @@
 """`langflash eval rooms`: the network on rooms with furniture it has never seen, in one command.
 
 Every scene gives two photos to the network and keeps a third as the target view. Depth, pose and
-points are judged in the photos, pictures and labels in the photos and in the target view, phrases
-in the first photo. Trivial answers are measured in the same run on the same scenes.
+points are judged in the photos, pictures and labels in the photos and in the target view (there
+only where a photo sees the surface), phrases in the first photo. Trivial answers are measured in
+the same run on the same scenes.
 
 Sizes: V views, H W pixels, K atoms, G class groups, C channels, P phrases.
 """
@@ -14,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional as F
@@ -26,7 +28,6 @@ from langflash_core.evaluation.metrics import (
     point_error,
     pose_error,
     presence,
-    ssim,
 )
 from langflash_core.evaluation.words import OTHER, PAPER_LABELS, PARAPHRASES, absent_phrases, paper_label
 from langflash_core.geometry.cameras import unproject
@@ -35,9 +36,10 @@ from langflash_core.network.aggregation import average_atoms
 from langflash_core.query.answers import presence_scores
 from langflash_core.query.relevance import relevancy
 from langflash_core.query.spaces import LanguageSpace, language_space
-from langflash_core.rooms.cameras import overlap_fraction
+from langflash_core.rooms.cameras import overlap_fraction, reproject
 from langflash_core.splat import rasterize, view_colours
 from langflash_core.training.batches import RoomSet
+from langflash_core.training.losses import ssim_map
 from langflash_core.training.measures import (
     abs_rel,
     align_scale,
@@ -49,8 +51,7 @@ from langflash_core.training.measures import (
     psnr,
 )
 from langflash_core.training.measures import accuracy as pixel_accuracy
-from langflash_core.training.shards import RoomRecord
-from langflash_core.training.stages import nearest
+from langflash_core.training.shards import NOTHING, RoomRecord
 from langflash_core.types import Camera, Prediction, Views
 
 log = logging.getLogger(__name__)
@@ -338,11 +339,18 @@ def judge_views(
         alone = network.language_head(network.encoder(target.images[None]))[0, 0]
     rgb, maps, true_maps = _rendered(record, prediction, masks, scale)
     photo = record.rgb[2].permute(1, 2, 0).float() / 255
-    tally.note(psnr=psnr(rgb, photo), ssim=ssim(rgb, photo))
-    tally.note(psnr_mean_colour=psnr(photo.mean((0, 1)).expand_as(photo), photo))
-    for name, view, own, weights, exact in (
-        ("source", 0, features[0, 0], prediction.weights[0], masks[0]),
-        ("target", 2, alone, maps, true_maps),
+    seen = seen_by_photos(record)
+    flat = photo[seen].mean(0).expand_as(photo)
+    if bool(seen.any()):
+        tally.note(
+            psnr=psnr(rgb[seen], photo[seen]),
+            ssim=float(ssim_map(rgb.clamp(0, 1), photo)[seen].mean()),
+            psnr_mean_colour=psnr(flat[seen], photo[seen]),
+        )
+    tally.note(psnr_whole_picture=psnr(rgb, photo), target_seen_share=float(seen.float().mean()))
+    for view, own, weights, exact in (
+        (0, features[0, 0], prediction.weights[0], masks[0]),
+        (2, alone, maps, true_maps),
     ):
         vectors = {
             "features": _upsampled(own, (photo.shape[0], photo.shape[1])),
@@ -350,7 +358,24 @@ def judge_views(
             "lfa": torch.einsum("khw,kc->hwc", weights, prediction.dictionary),
             "true_masks_lfa": torch.einsum("khw,kc->hwc", exact, true_atoms),
         }
-        _count_labels(setting, record, view, name, vectors, tally)
+        _count_labels(setting, record, view, vectors, tally, torch.ones_like(seen) if view == 0 else seen)
+
+
+def seen_by_photos(record: RoomRecord, tolerance: float = 0.04) -> Tensor:
+    """Pixels (H, W) of the target view whose surface photo 0 or 1 sees, from true depths.
+
+    What no photo saw cannot be drawn or named by any method; it is left out of the target's
+    measures, alike for all of them.
+    """
+    depths, viewmats, Ks = (t.double().numpy() for t in (record.depths, record.viewmats, record.Ks))
+    height, width = depths.shape[1], depths.shape[2]
+    seen = np.zeros((height, width), dtype=bool)
+    for photo in (0, 1):
+        z, u, v, valid = reproject(depths[2], viewmats[[2, photo]], Ks[[2, photo]])
+        inside = valid & (z > 0.05) & (u >= 0) & (v >= 0) & (u < width) & (v < height)
+        there = depths[photo][np.where(inside, v, 0).astype(int), np.where(inside, u, 0).astype(int)]
+        seen |= inside & (np.abs(there - z) < tolerance * z)
+    return torch.from_numpy(seen)
 
 
 def _upsampled(features: Tensor, size: tuple[int, int]) -> Tensor:
@@ -383,11 +408,17 @@ def _rendered(
 
 
 def _count_labels(
-    setting: Setting, record: RoomRecord, view: int, name: str, vectors: dict[str, Tensor], tally: Tally
+    setting: Setting,
+    record: RoomRecord,
+    view: int,
+    vectors: dict[str, Tensor],
+    tally: Tally,
+    counted: Tensor,
 ) -> None:
-    """Confusion counts over class groups and over the paper's labels, of every method in one view."""
-    size = (record.rgb.shape[-2], record.rgb.shape[-1])
-    ids = nearest(record.instances[view].long(), size)
+    """Confusion counts over class groups and over the paper's labels, of every method in one view;
+    only pixels `counted` (H, W)."""
+    name = "source" if view == 0 else "target"
+    ids = record.instances[view].long().masked_fill(~counted, NOTHING)
     rows = {group: row for row, group in enumerate(setting.groups)}
     groups = torch.full((256,), -1)
     papers = torch.full((256,), -1)
