@@ -17,6 +17,7 @@ MIN_MEDIAN_DEPTH = 0.6
 MAX_SHARE = 0.75
 _GRID = 20
 _HEIGHTS = ((1.45, 1.75), (1.0, 1.3), (0.75, 1.0))
+_NEAR_SHARE = 0.3  # of all picture sets are taken of one thing, large or small, from near by
 _FLAT = frozenset({"rug", "mat"})
 
 
@@ -31,7 +32,8 @@ class CameraSet:
 def propose_cameras(
     rng: np.random.Generator, room: Room, num_views: int, size: tuple[int, int], tries: int = 60
 ) -> CameraSet | None:
-    """Views of shared content, 0.1-1.0 m and up to 45 degrees apart.
+    """Views of shared content, 0.1-1.0 m and up to 45 degrees apart; the third lies about between
+    the first two, so that it can judge what they reconstruct (as NoPoSplat's targets do).
 
     Args:
         rng: the only source of chance.
@@ -53,7 +55,11 @@ def propose_cameras(
         for _ in range(8 * num_views):
             if len(views) == num_views:
                 return CameraSet(np.stack(views), np.repeat(K[None], num_views, axis=0))
-            other = _next_view(rng, room, boxes, first)
+            other = (
+                _view_between(rng, room, boxes, first, views[1])
+                if len(views) == 2
+                else _next_view(rng, room, boxes, first)
+            )
             if other is not None and _pair_is_good(boxes, first, other, K, size):
                 views.append(other)
         if len(views) == num_views:
@@ -171,11 +177,14 @@ def _first_view(rng: np.random.Generator, room: Room, boxes: _Boxes) -> Float[np
     things = [i for i in room.instances if i.item >= 0 and i.group not in {"window", "switch", "socket"}]
     if not things:
         return None
-    weights = np.array([float(np.prod(np.maximum(i.high - i.low, 0.05))) ** 0.4 for i in things])
+    near = rng.random() < _NEAR_SHARE
+    power = 0.1 if near else 0.4
+    weights = np.array([float(np.prod(np.maximum(i.high - i.low, 0.05))) ** power for i in things])
     aim = things[int(rng.choice(len(things), p=weights / weights.sum()))]
     target = (aim.low + aim.high) / 2 + rng.normal(0, 0.25, 3)
     low, high = _HEIGHTS[int(rng.choice(3, p=[0.55, 0.3, 0.15]))]
-    distance, bearing = rng.uniform(1.0, 4.2), rng.uniform(0, 2 * math.pi)
+    distance = rng.uniform(0.8, 1.8) if near else rng.uniform(1.0, 4.2)
+    bearing = rng.uniform(0, 2 * math.pi)
     eye = np.array(
         [
             target[0] + distance * math.cos(bearing),
@@ -204,6 +213,24 @@ def _next_view(
     view = look_at(other, target, float(rng.normal(0, math.radians(2.0))))
     turn = math.degrees(math.acos(float(np.clip((np.trace(first[:3, :3] @ view[:3, :3].T) - 1) / 2, -1, 1))))
     return view if turn <= 45 else None
+
+
+def _view_between(
+    rng: np.random.Generator,
+    room: Room,
+    boxes: _Boxes,
+    first: Float[np.ndarray, "4 4"],
+    second: Float[np.ndarray, "4 4"],
+) -> Float[np.ndarray, "4 4"] | None:
+    """A camera on the way from one view to the other, a little off the straight line."""
+    eyes = np.stack([-view[:3, :3].T @ view[:3, 3] for view in (first, second)])
+    share = float(rng.uniform(0.2, 0.8))
+    span = float(np.linalg.norm(eyes[1] - eyes[0]))
+    eye = (1 - share) * eyes[0] + share * eyes[1] + rng.normal(0, 0.1 * span, 3)
+    if not _stands_free(room, boxes, eye):
+        return None
+    forward = (1 - share) * first[2, :3] + share * second[2, :3] + rng.normal(0, 0.03, 3)
+    return look_at(eye, eye + forward, float(rng.normal(0, math.radians(2.0))))
 
 
 def _stands_free(room: Room, boxes: _Boxes, eye: Float[np.ndarray, " 3"]) -> bool:

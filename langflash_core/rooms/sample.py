@@ -17,7 +17,7 @@ from langflash_core.rooms.catalogue import TRAIN_LIBRARIES
 from langflash_core.rooms.layout import Room, make_room
 from langflash_core.rooms.pack import Pack
 from langflash_core.rooms.render import Picture, RoomRenderer
-from langflash_core.rooms.sensor import expose, random_sensor
+from langflash_core.rooms.sensor import expose, meter, random_sensor
 
 _ROOM_TRIES = 60
 _STRUCTURAL = 3  # wall, floor, ceiling
@@ -140,6 +140,7 @@ def _views(
     rng: np.random.Generator,
 ) -> RoomViews:
     sensor = random_sensor(rng)
+    grey = float(np.mean([meter(p.radiance) for p in pictures]))
     ids = np.stack([p.ids for p in pictures])
     present = [int(i) for i in np.unique(ids) if i > 0]
     relabel = np.zeros(len(room.instances) + 1, dtype=np.uint8)
@@ -147,7 +148,7 @@ def _views(
     kept = [room.instances[i - 1] for i in present]
     home = np.linalg.inv(cameras.viewmats[0])
     return RoomViews(
-        images=np.stack([expose(p.radiance, sensor, rng) for p in pictures]),
+        images=np.stack([expose(p.radiance, sensor, rng, grey) for p in pictures]),
         depths=np.stack([p.depth for p in pictures]).astype(np.float32),
         instances=relabel[ids],
         names=((), *(i.names for i in kept)),

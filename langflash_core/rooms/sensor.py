@@ -42,24 +42,29 @@ def random_sensor(rng: np.random.Generator) -> Sensor:
     )
 
 
+def meter(radiance: Float[np.ndarray, "H W 3"]) -> float:
+    """The middle grey of a view: its geometric mean brightness, linear."""
+    return max(float(np.exp(np.log(radiance.mean(-1) + 1e-3).mean())), 1e-3)
+
+
 def expose(
-    radiance: Float[np.ndarray, "H W 3"], sensor: Sensor, rng: np.random.Generator
+    radiance: Float[np.ndarray, "H W 3"], sensor: Sensor, rng: np.random.Generator, grey: float
 ) -> UInt8[np.ndarray, "H W 3"]:
     """One photo of one view.
 
     Args:
         radiance: linear, >= 0.
         sensor: the camera.
-        rng: noise, and the small drift of automatic exposure between shots.
+        rng: noise.
+        grey: what is brought to the sensor's level (`meter`); one value for all photos of a room
+            locks the exposure, so that a wall keeps its brightness from photo to photo.
 
     Returns:
         sRGB photo.
     """
-    grey = float(np.exp(np.log(radiance.mean(-1) + 1e-3).mean()))
-    gain = sensor.level / max(grey, 1e-3) * float(np.exp(rng.normal(0, 0.08)))
     light = (
         radiance
-        * gain
+        * (sensor.level / grey)
         * np.array(sensor.balance, dtype=np.float32)
         * _falloff(radiance.shape[:2], sensor.vignette)
     )

@@ -129,19 +129,23 @@ def encode_pictures(encoder: Encoder, rgb: Tensor) -> Tensor:
 
 
 def photometric(rgb: Tensor, seed: int) -> Tensor:
-    """Grey pictures (15 %), and brightness, contrast and saturation shifted, alike in all views.
+    """Grey pictures (15 %), and brightness, contrast and saturation shifted, alike in all views;
+    in every second scene each view has an exposure of its own besides, as automatic cameras do.
 
-    The generator already varies exposure, white balance, noise and blur; this only widens it, and
-    teaches that colour may be missing. rgb (V, 3, H, W) uint8; the same seed gives the same result.
+    The generator already varies white balance, noise and blur; this only widens it, and teaches
+    that colour may be missing. rgb (V, 3, H, W) uint8; the same seed gives the same result.
     """
     generator = torch.Generator().manual_seed(seed * 2 + 1)
-    grey_draw, gain, contrast, saturation = torch.rand(4, generator=generator).tolist()
+    grey_draw, gain, contrast, saturation, own = torch.rand(5, generator=generator).tolist()
     images = rgb.float() / 255
     grey = (images * torch.tensor([0.299, 0.587, 0.114])[:, None, None]).sum(1, keepdim=True)
     share = 0.0 if grey_draw < 0.15 else 0.7 + 0.6 * saturation
     images = grey + share * (images - grey)
     mean = images.mean()
     images = ((images - mean) * (0.85 + 0.3 * contrast) + mean) * (0.85 + 0.3 * gain)
+    if own < 0.5:
+        drift = 0.1 * torch.randn(len(images), generator=generator)
+        images = images * drift.clamp(-0.25, 0.25).exp()[:, None, None, None]
     return (images.clamp(0, 1) * 255).round().to(torch.uint8)
 
 

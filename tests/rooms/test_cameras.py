@@ -5,7 +5,7 @@ import pytest
 
 from langflash_core.rooms import HELD_OUT_LIBRARIES, Pack, make_room
 from langflash_core.rooms.cameras import look_at, overlap_fraction, propose_cameras
-from langflash_core.rooms.sensor import Sensor, expose, random_sensor
+from langflash_core.rooms.sensor import Sensor, expose, meter, random_sensor
 
 
 def test_look_at_axes() -> None:
@@ -40,8 +40,8 @@ def test_cameras_are_held_by_people(pack: Pack, seed: int) -> None:
         assert room.shell.holds(eye, eye)
         assert (
             0.09 <= np.linalg.norm(eye - eyes[0]) <= 1.01
-            or view is cameras.viewmats[0]
             or np.allclose(eye, eyes[0])
+            or np.allclose(eye, eyes[2])  # between the first two
         )
         turn = np.degrees(
             np.arccos(np.clip((np.trace(cameras.viewmats[0, :3, :3] @ view[:3, :3].T) - 1) / 2, -1, 1))
@@ -58,13 +58,37 @@ def test_cameras_are_held_by_people(pack: Pack, seed: int) -> None:
 def test_exposure_brings_any_light_to_the_same_level() -> None:
     rng = np.random.default_rng(0)
     scene = rng.uniform(0.2, 0.6, (32, 32, 3)).astype(np.float32)
-    photos = [expose(scene * gain, Sensor(), np.random.default_rng(1)) for gain in (0.1, 1.0, 10.0)]
+    lit = [scene * gain for gain in (0.1, 1.0, 10.0)]
+    photos = [expose(light, Sensor(), np.random.default_rng(1), meter(light)) for light in lit]
     assert np.abs(photos[0].astype(int) - photos[2].astype(int)).max() <= 2
     assert 80 < photos[1].mean() < 180
+
+
+def test_one_exposure_for_all_photos_of_a_room() -> None:
+    """A wall keeps its brightness although the second photo also shows something dark."""
+    wall = np.full((32, 32, 3), 0.4, np.float32)
+    darker = wall.copy()
+    darker[:16] = 0.02
+    photos = [expose(light, Sensor(), np.random.default_rng(1), meter(wall)) for light in (wall, darker)]
+    assert np.array_equal(photos[0][16:], photos[1][16:])
+    assert photos[1][:16].max() < photos[0].min()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_third_camera_lies_between(pack: Pack, seed: int) -> None:
+    room = make_room(seed, pack, HELD_OUT_LIBRARIES)
+    cameras = propose_cameras(np.random.default_rng(seed), room, 3, (112, 168))
+    if cameras is None:
+        return
+    first, second, third = (-v[:3, :3].T @ v[:3, 3] for v in cameras.viewmats)
+    span = float(np.linalg.norm(second - first))
+    share = float((third - first) @ (second - first)) / span**2
+    assert -0.2 < share < 1.2  # 0.2 to 0.8, and four sigmas of a tenth
+    assert np.linalg.norm(third - first - share * (second - first)) < 0.6 * span
 
 
 def test_sensor_effects_stay_finite() -> None:
     for seed in range(6):
         rng = np.random.default_rng(seed)
-        photo = expose(np.zeros((28, 42, 3), np.float32), random_sensor(rng), rng)
+        photo = expose(np.zeros((28, 42, 3), np.float32), random_sensor(rng), rng, grey=0.001)
         assert photo.shape == (28, 42, 3) and photo.dtype == np.uint8
