@@ -113,10 +113,12 @@ def _paired_dice(logits: Tensor, masks: Tensor) -> Tensor:
 
 @dataclass(frozen=True)
 class GroupTexts:
-    """What the matched groups are called: truth (M, C) unit, one phrase per group; bank (A, C) unit."""
+    """What the matched groups are called: truth (M, C) unit, one phrase per group; bank (A, C) unit;
+    true (M, A) bool, which phrases of the bank hold for which group (None: go by cosine)."""
 
     truth: Tensor
     bank: Tensor
+    true: Tensor | None = None
 
 
 def aggregation_loss(
@@ -138,7 +140,7 @@ def aggregation_loss(
              whose mask leaks over its neighbours does not learn the wrong name. The paper prints
              p_n in L_gt but defines w_n; w_n is what is meant.
     L_text = sum_n w_n CE_n / (sum_n w_n + 1e-6): the atom must prefer its own phrase to every phrase
-             of the bank that is no synonym (cosine to g_n above `synonym`).
+             of the bank that is false of it (`texts.true`; without it, cosine to g_n up to `synonym`).
 
     Args:
         atoms: (M, C) refined d_n of matched queries. pooled: (M, C) d_n^(0). quality: (M,) in [0, 1].
@@ -153,9 +155,8 @@ def aggregation_loss(
     share = share / (share.sum() + 1e-6)
     initial = cosine_distance(units, pooled.detach()).mean()
     truth = (share * cosine_distance(units, texts.truth)).sum()
-    negatives = (temperature * units @ texts.bank.T).masked_fill(
-        texts.truth @ texts.bank.T > synonym, -torch.inf
-    )
+    alike = texts.truth @ texts.bank.T > synonym if texts.true is None else texts.true
+    negatives = (temperature * units @ texts.bank.T).masked_fill(alike, -torch.inf)
     positives = temperature * (units * texts.truth).sum(-1, keepdim=True)
     logits = torch.cat((positives, negatives), 1)
     text = (share * (torch.logsumexp(logits, 1) - logits[:, 0])).sum()

@@ -102,23 +102,25 @@ def language_loss(
     targets: Tensor,
     bank: Tensor,
     *,
+    true: Tensor | None = None,
     temperature: float = 14.0,
     synonym: float = 0.6,
     attract: float = 0.5,
 ) -> Tensor:
     """Contrastive cross-entropy of pixel features against phrases, plus plain attraction.
 
-    For pixel p with phrase t_p: -log e^{s f.t_p} / (e^{s f.t_p} + sum_{a: t_a.t_p <= synonym} e^{s f.t_a})
-    plus attract * (1 - f.t_p). Phrases too close in meaning to t_p ("couch" for "sofa") are no
-    negatives. Attraction keeps the features in the text tower's own space, so that unseen phrases
-    and absolute cosines mean something.
+    For pixel p with phrase t_p: -log e^{s f.t_p} / (e^{s f.t_p} + sum_{a: not true_pa} e^{s f.t_a})
+    plus attract * (1 - f.t_p). Phrases that are true of the pixel's thing, too ("settee" and
+    "furniture" for "sofa"), are no negatives; its nearest false ones ("armchair") are. Attraction
+    keeps the features in the text tower's own space, so that unseen phrases and absolute cosines
+    mean something.
 
     Args:
         features: (P, C), any norm (normalised here).
         targets: (P, C) unit, the phrase of each pixel's instance.
         bank: (A, C) unit, every phrase of the batch and the standing ones.
+        true: (P, A) bool, which phrases hold for the pixel; without it, those with t_a.t_p > synonym.
         temperature: s.
-        synonym: cosine above which a phrase is no negative.
 
     Returns:
         Scalar; 0 for P = 0. Pixels must already be drawn class-balanced.
@@ -130,7 +132,7 @@ def language_loss(
     units = F.normalize(features.float(), dim=-1)
     positives = (units * targets).sum(-1)
     negatives = temperature * units @ bank.T
-    negatives = negatives.masked_fill(targets @ bank.T > synonym, -math.inf)
+    negatives = negatives.masked_fill(targets @ bank.T > synonym if true is None else true, -math.inf)
     logits = torch.cat((temperature * positives[:, None], negatives), 1)
     contrast = torch.logsumexp(logits, 1) - logits[:, 0]
     return contrast.mean() + attract * (1 - positives).mean()

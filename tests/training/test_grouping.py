@@ -111,6 +111,15 @@ def test_aggregation_loss_is_the_sum_of_its_terms():
     assert value == pytest.approx(float(0.5 * initial + truth + text), rel=1e-5)  # float32 sums
 
 
+def test_what_is_true_of_a_group_is_no_rival():
+    atoms, pooled, texts = aggregation_case()
+    quality, weights = torch.ones(3), AggregationWeights(initial=0.0, truth=0.0)
+    everything = GroupTexts(texts.truth, texts.bank, torch.ones(3, 6, dtype=torch.bool))
+    assert float(aggregation_loss(atoms, pooled, quality, everything, weights)) == pytest.approx(0, abs=1e-6)
+    nothing = GroupTexts(texts.truth, texts.bank, torch.zeros(3, 6, dtype=torch.bool))
+    assert float(aggregation_loss(atoms, pooled, quality, nothing, weights)) > 0.1
+
+
 def test_a_leaking_mask_teaches_nothing():
     atoms, pooled, texts = aggregation_case()
     atoms = atoms.requires_grad_()

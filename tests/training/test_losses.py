@@ -112,6 +112,15 @@ def test_a_synonym_is_no_negative():
     assert float(losses.language_loss(target, target, stranger, temperature=1.0)) > 0.1
 
 
+def test_what_is_true_is_no_negative_however_far():
+    target = F.normalize(torch.tensor([[1.0, 0.0, 0.0]]), dim=-1)
+    bank = F.normalize(torch.tensor([[0.0, 1.0, 0.0], [1.0, 0.1, 0.0]]), dim=-1)
+    true = torch.tensor([[True, False]])
+    kept = float(losses.language_loss(target, target, bank, true=true, temperature=1.0))
+    near = float(losses.language_loss(target, target, bank[1:], synonym=1.0, temperature=1.0))
+    assert kept == pytest.approx(near, rel=SINGLE)
+
+
 def test_language_loss_of_no_pixels_is_zero():
     assert float(losses.language_loss(torch.zeros(0, 4), torch.zeros(0, 4), torch.eye(4))) == 0
 

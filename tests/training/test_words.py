@@ -3,45 +3,87 @@
 import pytest
 import torch
 
+from langflash_core.query.spaces import NEGATIVES
 from langflash_core.training.shards import Label
-from langflash_core.training.words import PhraseSampler, build_table
+from langflash_core.training.vocabulary import further_words
+from langflash_core.training.words import BASELINES, PhraseSampler, build_table
 from tests.training.conftest import encode
 
-LABELS = [Label("wall", "wall")] * 50 + [Label("red sofa", "sofa", ("couch", "settee"))] * 2
-LABELS += [Label("oak table", "table")] * 5
+SOFA, TABLE = Label("red sofa", "sofa", ("couch", "chesterfield")), Label("oak table", "table")
+LABELS = [Label("wall", "wall")] * 50 + [SOFA] * 2 + [TABLE] * 5 + [Label("grey yeti", "yeti")] * 5
+
+
+def drawn(label: Label, count: int) -> list[str]:
+    sampler = PhraseSampler(build_table(LABELS, encode))
+    rows = sampler.draw([label] * count, torch.Generator().manual_seed(0))
+    return [sampler.table.phrases[row] for row in rows]
 
 
 def test_the_table_holds_every_phrase_once():
     table = build_table(LABELS, encode)
-    assert table.phrases == ("couch", "oak table", "red sofa", "settee", "sofa", "table", "wall")
-    assert table.groups == ("sofa", "table", "wall")
-    assert table.group_counts.tolist() == [2, 5, 50]
+    assert list(table.phrases) == sorted(set(table.phrases))
+    assert {"red sofa", "chesterfield", "settee", "grey yeti", *BASELINES} <= set(table.phrases)
+    assert table.groups == ("sofa", "table", "wall", "yeti")
+    assert table.group_counts.tolist() == [2, 5, 50, 5]
     assert [table.phrases[row] for row in table.group_rows()] == list(table.groups)
     with pytest.raises(ValueError, match="labels"):
         build_table([], encode)
 
 
+def test_the_baselines_are_those_of_queries():
+    assert BASELINES == NEGATIVES
+
+
 def test_a_label_is_called_by_all_its_phrases_and_no_other():
-    sampler = PhraseSampler(build_table(LABELS, encode))
-    generator = torch.Generator().manual_seed(0)
-    rows = sampler.draw([LABELS[50]] * 400, generator)
-    names = [sampler.table.phrases[row] for row in rows]
-    assert set(names) == {"red sofa", "sofa", "couch", "settee"}
-    assert 0.2 < names.count("red sofa") / 400 < 0.4  # 0.3 by design; 4 sigma are 0.09
-    assert 0.25 < names.count("sofa") / 400 < 0.45
+    names = drawn(SOFA, 2000)
+    assert set(names) == {"red sofa", "sofa", "chesterfield", *further_words("sofa")}
+    assert 0.26 < names.count("red sofa") / 2000 < 0.34  # 0.3 by design; 4 sigma are 0.04
+    assert 0.26 < names.count("sofa") / 2000 < 0.34
 
 
 def test_a_label_without_further_words_is_name_or_group():
-    sampler = PhraseSampler(build_table(LABELS, encode))
-    rows = sampler.draw([LABELS[-1]] * 200, torch.Generator().manual_seed(0))
-    names = [sampler.table.phrases[row] for row in rows]
-    assert set(names) == {"oak table", "table"}
-    assert 0.35 < names.count("oak table") / 200 < 0.65  # halves; 4 sigma are 0.14
+    names = drawn(LABELS[-1], 200)
+    assert set(names) == {"grey yeti", "yeti"}
+    assert 0.35 < names.count("grey yeti") / 200 < 0.65  # halves; 4 sigma are 0.14
+
+
+def test_what_is_kept_for_the_evaluation_is_never_said():
+    label = Label("couch", "sofa", ("the couch", "settee"))
+    table = build_table([label], encode)
+    assert not {"couch", "the couch"} & set(table.phrases)
+    rows = PhraseSampler(table).draw([label] * 500, torch.Generator().manual_seed(0))
+    assert "sofa" in {table.phrases[row] for row in rows}
+
+
+def test_a_broad_phrase_is_true_of_every_thing_it_covers():
+    chair, armchair, lamp = (Label(g, g) for g in ("chair", "armchair", "lamp"))
+    labels = [SOFA, chair, armchair, lamp, Label("ceiling", "ceiling")]
+    labels[3] = Label("lamp", "lamp", ("ceiling",))
+    sampler = PhraseSampler(build_table(labels, encode))
+    rows, true = sampler.table.index(), sampler.true(labels)
+    assert true[:, rows["seating"]].tolist() == [True, True, True, False, False]
+    assert true[:, rows["chair"]].tolist() == [False, True, True, False, False]
+    assert true[:, rows["armchair"]].tolist() == [False, False, True, False, False]
+    assert true[:, rows["ceiling"]].tolist() == [False, False, False, False, True]  # a tag of place
+    assert not bool(true[:, rows["object"]].any())
+
+
+def test_an_unlisted_name_is_false_of_other_groups_unless_it_is_near():
+    labels = [
+        Label("soft sofa", "sofa"),
+        Label("big pendulum", "clock"),
+        Label("old pendulum", "lamp"),
+        TABLE,
+    ]
+    sampler = PhraseSampler(build_table(labels, encode))  # equal last words are equal vectors
+    rows, true = sampler.table.index(), sampler.true(labels)
+    assert true[:, rows["big pendulum"]].tolist() == [False, True, True, False]
+    assert true[:, rows["soft sofa"]].tolist() == [True, False, False, False]
 
 
 def test_rare_groups_weigh_more():
     sampler = PhraseSampler(build_table(LABELS, encode))
-    wall, sofa, table = sampler.balance([LABELS[0], LABELS[50], LABELS[-1]]).tolist()
+    wall, sofa, table = sampler.balance([LABELS[0], SOFA, TABLE]).tolist()
     assert wall < table < sofa
-    assert sampler.groups([Label("yeti", "yeti")]).tolist() == [-1]
-    assert sampler.balance([Label("yeti", "yeti")]).tolist() == [1.0]
+    assert sampler.groups([Label("ghost", "ghost")]).tolist() == [-1]
+    assert sampler.balance([Label("ghost", "ghost")]).tolist() == [1.0]
