@@ -2,14 +2,17 @@
 
 A monocular map is right in its shape at short range and wrong in slow trends: its scale, a tilt,
 too little or too much contrast. Matches are sparse but exact. So the log depth gets the smooth
-correction c = b_0 + b_1 x + b_2 y + b_3 (log d - mean), fitted robustly and held near zero.
+correction c = b_0 + b_1 x + b_2 y + b_3 (log d - mean), fitted robustly and held near zero:
+matches gather on few things, and a trend read off one of them is wrong everywhere else. On 32
+validation rooms slopes expected at 0.3 gave a mean AbsRel of .156 after refinement, at 0.1 .133,
+at 0.05 .119 (mean; medians .097, .089, .091), none at all .118 (.108).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-_PRIOR_SIGMAS = np.array([0.5, 0.3, 0.3, 0.2])  # what is expected of b without any match
+_PRIOR_SIGMAS = np.array([0.5, 0.05, 0.05, 0.05])  # what is expected of b without any match
 _PRIOR_ERROR = 0.08  # log-depth error that no smooth correction removes
 _CAUCHY = 2.0
 _ITERATIONS = 15

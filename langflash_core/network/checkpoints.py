@@ -5,7 +5,7 @@ A matrix or convolution is stored as int8 with one float16 scale per output row 
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import torch
@@ -15,6 +15,7 @@ from torch import Tensor
 
 from langflash_core.errors import WeightsError
 from langflash_core.files import make_folder, write_atomically
+from langflash_core.network.local import convert
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.presets import PRESETS, Preset
 from langflash_core.resources import asset_path
@@ -56,22 +57,53 @@ def _embedded(preset: str) -> Path:
         raise WeightsError(f"{error}, or name a checkpoint with --weights") from None
 
 
-def initial_network(preset: Preset, encoder: Path, seed: int = 0) -> LangFlashNet:
-    """A network to train: the encoder from a file, every head freshly drawn from `seed`.
+FROZEN = ("encoder", "local")
+"""Parts of the network that this project takes as they are and never trains."""
 
-    The encoder goes through the int8 rows it will be shipped in, so that the heads learn on the
-    tokens they will see.
+
+def initial_network(preset: Preset, frozen: Path, seed: int = 0) -> LangFlashNet:
+    """A network to train: the frozen parts from a file, every head freshly drawn from `seed`.
+
+    They go through the int8 rows they will be shipped in, so that the heads learn on what they
+    will see.
 
     Args:
-        encoder: a timm state dict of the preset's encoder, or a file of `save_network`.
+        frozen: a file of `save_network` (see `adopt_frozen` for the published files).
     """
     torch.manual_seed(seed)
     network = LangFlashNet(preset)
-    tensors, metadata = read_weights(encoder)
-    prefix = "encoder.vit." if metadata.get("preset") else ""
-    own = {k.removeprefix(prefix): v for k, v in tensors.items() if k.startswith(prefix)}
-    _load_strictly(network.encoder.vit, dequantise(quantise(own)), encoder)
+    tensors, _ = read_weights(frozen)
+    for name in FROZEN:
+        own = {k.removeprefix(f"{name}."): v for k, v in tensors.items() if k.startswith(f"{name}.")}
+        _load_strictly(getattr(network, name), dequantise(quantise(own)), frozen)
     return network
+
+
+def adopt_frozen(preset: Preset, encoder: Path, local: Path, out: Path, seed: int = 0) -> None:
+    """Write a file to train from out of published weights: a timm state dict of the preset's
+    encoder, and XFeat's. The heads in it are untrained."""
+    torch.manual_seed(seed)
+    network = LangFlashNet(preset)
+    _load_strictly(network.encoder.vit, read_weights(encoder)[0], encoder)
+    _load_strictly(network.local, convert(read_weights(local)[0]), local)
+    save_network(network, out)
+
+
+def start_from(network: LangFlashNet, weights: Path, modules: Sequence[str]) -> bool:
+    """Fill some modules from a weights file; False, and nothing changed, where it does not hold
+    exactly their tensors (an older shape of the network, say).
+
+    Args:
+        modules: attribute names of the network, all or none of which are filled.
+    """
+    tensors, _ = read_weights(weights)
+    prefixes = tuple(f"{name}." for name in modules)
+    own = {k: v for k, v in tensors.items() if k.startswith(prefixes)}
+    wanted = {k: v.shape for k, v in network.state_dict().items() if k.startswith(prefixes)}
+    if wanted != {k: v.shape for k, v in own.items()}:
+        return False
+    network.load_state_dict(own, strict=False)
+    return True
 
 
 def save_network(network: LangFlashNet, path: Path, metadata: Mapping | None = None) -> None:

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from langflash_core.network.alignment import NO_CORRECTION, Correction, fit_correction
+from langflash_core.network.dense import match_cells
 from langflash_core.network.matching import (
     Matches,
     RelativePose,
@@ -19,6 +20,8 @@ _MANY_VIEWS = 4  # beyond this, fewer features keep the V (V - 1) / 2 pairs affo
 _MIN_SHARE = 0.25  # of the matches must agree with a pose
 _MAX_DEPTH_SIGMA = 0.2  # log-depth error beyond which a triangulated match says too little
 _MIN_POINTS = 10  # matches needed to correct a map
+_FEW = 40  # inliers among key points, below which dense matches are asked as well
+_DENSE_SIGMA = 3.0  # pixels at the working size: a third of a cell
 _WORKING_SIDE = 768  # pixels; sigma is one pixel at this size
 
 
@@ -27,13 +30,15 @@ class PoseInput:
     """What pose estimation reads of one view.
 
     grey: (h, w) uint8, any size, the same crop as the network's image. K: (3, 3) pixels of the
-    network's image of `size` (width, height). depth: (H, W), z of the monocular map.
+    network's image of `size` (width, height). depth: (H, W), z of the monocular map. local: unit
+    descriptors (C, h', w') of `LocalFeatures`.
     """
 
     grey: np.ndarray
     K: np.ndarray
     size: tuple[int, int]
     depth: np.ndarray
+    local: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -62,6 +67,10 @@ def estimate_poses(views: list[PoseInput]) -> Poses:
         for j in range(i + 1, num_views):
             matches = _key_point_matches(views, features, i, j)
             pose = _pair_pose(views[i], views[j], matches)
+            if pose is None or pose.num_inliers < _FEW:
+                more = _joined(matches, _dense_matches(views[i], views[j]))
+                better = _pair_pose(views[i], views[j], more)
+                pose, matches = (better, more) if better is not None else (pose, matches)
             if pose is not None:
                 pairs[i, j], agreed[i, j] = pose, matches.subset(pose.inliers)
     viewmats, scales, guessed = _chain(num_views, pairs)
@@ -89,6 +98,21 @@ def _key_point_matches(views: list[PoseInput], features: list, i: int, j: int) -
     x_i = _without_camera(features[i][0][pairs[:, 0]], views[i], _WORKING_SIDE)
     x_j = _without_camera(features[j][0][pairs[:, 1]], views[j], _WORKING_SIDE)
     return Matches(x_i, x_j, _sigma(views[j], 1.0))
+
+
+def _dense_matches(view_i: PoseInput, view_j: PoseInput) -> Matches:
+    cells_i, cells_j = match_cells(view_i.local, view_j.local)
+    x_i, x_j = (
+        (cells * (np.array(view.size) / view.local.shape[:0:-1]) - view.K[:2, 2]) / view.K.diagonal()[:2]
+        for view, cells in ((view_i, cells_i), (view_j, cells_j))
+    )
+    return Matches(x_i, x_j, _sigma(view_j, _DENSE_SIGMA))
+
+
+def _joined(exact: Matches, dense: Matches) -> Matches:
+    """Both sets, with the tolerance of the coarser."""
+    x_i, x_j = (np.concatenate(both) for both in ((exact.x_i, dense.x_i), (exact.x_j, dense.x_j)))
+    return Matches(x_i, x_j, dense.sigma)
 
 
 def _sigma(view: PoseInput, pixels: float) -> float:

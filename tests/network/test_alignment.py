@@ -23,8 +23,9 @@ def test_a_smooth_error_is_taken_out(outliers):
     x, priors, targets, sigmas = _points(0, outliers=outliers)
     clean = _points(0)[2]
     left = priors + fit_correction(x, priors, targets, sigmas).at(x, priors) - clean
-    # The ridge leaves 1-2 % of the planted 0.2-0.3; outliers lose their pull beyond 2 sigma.
-    assert np.abs(left).max() < (0.015 if outliers == 0 else 0.06)
+    # The planted 0.2-0.3 are four to six sigmas: the ridge keeps an eighth of them back. Outliers
+    # lose their pull beyond 2 sigma.
+    assert np.abs(left).max() < (0.045 if outliers == 0 else 0.09)
 
 
 def test_the_optimum_is_that_of_scipy():

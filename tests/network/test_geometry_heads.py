@@ -7,8 +7,9 @@ from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import invert_rigid, rays
 from langflash_core.geometry.quaternions import covariances, quats_to_matrices
-from langflash_core.network.depth import DepthMaps, sweep_correlation
+from langflash_core.network.depth import DepthMaps
 from langflash_core.network.gaussians import CHANNELS, assemble_gaussians, footprints
+from langflash_core.network.refiner import patches, sweep_correlation
 
 K = torch.tensor([[40.0, 0, 16], [0, 40.0, 12], [0, 0, 1]], dtype=torch.float64)
 
@@ -45,7 +46,10 @@ def test_sweep_equals_its_twin():
         expected = _sweep_twin(
             features, log_depths, offsets, viewmats, K.expand(2, 3, 3), 0, 1, plane, row, column
         )
-        assert volume[0, plane, row, column].item() == pytest.approx(expected, abs=1e-10)
+        assert volume[0, 0, plane, row, column].item() == pytest.approx(expected, abs=1e-10)
+    grouped, _ = sweep_correlation(features, log_depths, offsets, viewmats, K.expand(2, 3, 3), groups=3)
+    assert grouped.shape == (2, 3, 5, 24, 32)
+    torch.testing.assert_close(grouped.sum(1), volume[:, 0])
 
 
 def test_sweep_peaks_at_the_true_depth():
@@ -58,7 +62,7 @@ def test_sweep_peaks_at_the_true_depth():
     features = torch.stack((texture[0, :, :, :32], texture[0, :, :, 8:]))
     log_depths = torch.full((2, 24, 32), np.log(2.0) - 0.2, dtype=torch.float64)
     volume, _ = sweep_correlation(features, log_depths, offsets, viewmats, K.expand(2, 3, 3))
-    best = offsets[volume[0, :, :, 8:].argmax(0)]  # the first 8 columns leave the other view
+    best = offsets[volume[0, 0, :, :, 8:].argmax(0)]  # the first 8 columns leave the other view
     assert (best - 0.2).abs().max() < 1e-9
 
 
@@ -77,6 +81,20 @@ def test_sweep_of_a_lonely_or_blind_view_is_zero():
         assert volume.abs().max() == 0 and seen.abs().max() == 0
 
 
+def test_patches_are_what_cross_correlation_compares():
+    """Against numpy.corrcoef of two patches; exposure changes nothing; a blank patch is zero."""
+    torch.manual_seed(0)
+    images = torch.rand(1, 3, 24, 32)
+    vectors = patches(images)
+    resized = F.interpolate(images, scale_factor=0.5, mode="bilinear", antialias=True).mean(1)[0]
+    one, two = (resized[r - 2 : r + 3, c - 2 : c + 3].flatten() for r, c in ((5, 6), (7, 9)))
+    expected = np.corrcoef(one.numpy(), two.numpy())[0, 1]
+    assert float(vectors[0, :, 5, 6] @ vectors[0, :, 7, 9]) == pytest.approx(expected, abs=1e-5)
+    inside = (..., slice(2, -2), slice(2, -2))  # patches over the edge see zeros
+    torch.testing.assert_close(patches(0.3 * images + 0.2)[inside], vectors[inside], atol=1e-4, rtol=0)
+    assert patches(torch.full((1, 3, 24, 32), 0.5))[..., 4, 4].abs().max() < 1e-2
+
+
 def test_refiner_stays_in_its_range_and_is_finite(untrained):
     from langflash_core.network.encoder import Tokens
 
@@ -86,7 +104,8 @@ def test_refiner_stays_in_its_range_and_is_finite(untrained):
     prior = DepthMaps(torch.rand(1, 2, 56, 70), torch.zeros(1, 2, 56, 70))
     viewmats = torch.eye(4).expand(1, 2, 4, 4)
     Ks = torch.tensor([[60.0, 0, 35], [0, 60.0, 28], [0, 0, 1]]).expand(1, 2, 3, 3)
-    refined = untrained.refiner(images, tokens, prior, viewmats, Ks)
+    local = untrained.local(images[0])
+    refined = untrained.refiner(images, tokens, local, prior, viewmats, Ks)
     assert torch.isfinite(refined.depths).all()
     assert (
         refined.log_depths - prior.log_depths

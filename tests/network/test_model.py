@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 import torch
+from safetensors.torch import save_file
 
 from langflash_core.errors import Cancelled, WeightsError
 from langflash_core.network import MINI, STAGES, LangFlashNet, initial_network, load_network, save_network
-from langflash_core.network.checkpoints import dequantise, quantise
+from langflash_core.network.checkpoints import dequantise, quantise, start_from
 from langflash_core.types import Prediction, Views
 
 
@@ -101,19 +102,30 @@ def test_quantised_rows_of_zeros_stay_zero():
     assert dequantise(quantise({"w": torch.zeros(80, 80)}))["w"].abs().max() == 0
 
 
-def test_initial_network_takes_the_encoder_and_draws_the_rest(untrained, tmp_path):
+def test_heads_of_another_shape_are_not_started_from(untrained, tmp_path):
+    tensors = {f"depth_head.{k}": v + 1 for k, v in untrained.depth_head.state_dict().items()}
+    save_file({**tensors, "refiner.sharpness": torch.zeros(3)}, tmp_path / "w.safetensors")
+    network = LangFlashNet(MINI)
+    before = network.refiner.sharpness.detach().clone()
+    assert not start_from(network, tmp_path / "w.safetensors", ("refiner",))
+    assert torch.equal(network.refiner.sharpness.detach(), before)
+    assert start_from(network, tmp_path / "w.safetensors", ("depth_head",))
+    moved = network.depth_head.state_dict()["head.0.bias"]
+    assert torch.equal(moved, untrained.depth_head.state_dict()["head.0.bias"] + 1)
+
+
+def test_initial_network_takes_the_frozen_parts_and_draws_the_rest(untrained, tmp_path):
     save_network(untrained, tmp_path / "w.safetensors")
     fresh = initial_network(MINI, tmp_path / "w.safetensors", seed=7)
     stored = load_network("mini", tmp_path / "w.safetensors")
     key = "encoder.vit.blocks.0.attn.qkv.weight"
     assert torch.allclose(fresh.state_dict()[key], stored.state_dict()[key], rtol=1e-3)
+    assert torch.allclose(fresh.local.skip.weight, stored.local.skip.weight)
     assert not torch.equal(fresh.decoder.embed.weight, stored.decoder.embed.weight)
     assert isinstance(fresh, LangFlashNet)
 
 
 def _damaged(path, kind, network):
-    from safetensors.torch import save_file
-
     tensors = quantise(network.state_dict())
     header = {"langflash": '{"preset": "mini"}'}
     if kind == "missing file":
