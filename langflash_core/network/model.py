@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -17,7 +17,7 @@ from langflash_core.geometry.cameras import rays
 from langflash_core.network.aggregation import Aggregation
 from langflash_core.network.alignment import Correction
 from langflash_core.network.decoder import SiameseDecoder, TwoStackDecoder
-from langflash_core.network.depth import DepthHead, DepthMaps, DepthRefiner
+from langflash_core.network.depth import DepthHead, DepthMaps
 from langflash_core.network.encoder import Encoder, Tokens, tokens_to_maps
 from langflash_core.network.gaussians import GaussianHead, assemble_gaussians
 from langflash_core.network.grouping import (
@@ -28,10 +28,12 @@ from langflash_core.network.grouping import (
     surviving,
 )
 from langflash_core.network.language import LanguageHead
+from langflash_core.network.local import LocalFeatures
 from langflash_core.network.poses import PoseInput, Poses, estimate_poses
 from langflash_core.network.presets import Preset
+from langflash_core.network.refiner import DepthRefiner
 from langflash_core.network.splitting import split_groups
-from langflash_core.types import Prediction, Views
+from langflash_core.types import Gaussians, Prediction, Views
 
 Progress = Callable[[str, float], None]
 STAGES = (
@@ -44,7 +46,7 @@ class LangFlashNet(nn.Module):
 
     Trained stage by stage: `depth` = decoder + depth_head, `refine` = refiner, `gaussians` =
     gaussian_head, `language` = language_head, `grouping` = siamese + scratch + grouping,
-    `aggregation` = aggregation. The encoder stays frozen.
+    `aggregation` = aggregation. The encoder and the local features stay frozen.
     """
 
     def __init__(self, preset: Preset):
@@ -52,6 +54,7 @@ class LangFlashNet(nn.Module):
         self.preset = preset
         self.calibration: dict = {}
         self.encoder = Encoder(preset)
+        self.local = LocalFeatures()
         self.decoder = TwoStackDecoder(preset)
         self.depth_head = DepthHead(preset)
         self.refiner = DepthRefiner(preset)
@@ -77,6 +80,14 @@ class LangFlashNet(nn.Module):
         memories, finest = self.scratch(tokens, self.siamese(tokens), images)
         return self.grouping(memories, finest, tokens.shape[1])
 
+    def parts(self, tokens: Tokens, images: Tensor, size: tuple[int, int]) -> Tensor:
+        """w_k(x) of one scene (B = 1), (V, K, *size): the surviving groups, cut into parts."""
+        memories, finest = self.scratch(tokens, self.siamese(tokens), images)
+        groups = self.grouping(memories, finest, tokens.shape[1])[-1]
+        survivors = surviving(groups, self.preset.tau_exist)
+        whole = group_weights(groups, survivors, (finest.shape[-2], finest.shape[-1]))
+        return split_groups(whole, finest, self.preset.splitting, size)
+
     @torch.inference_mode()
     def predict(
         self, views: Views, progress: Progress | None = None, cancelled: Callable[[], bool] | None = None
@@ -95,20 +106,19 @@ class LangFlashNet(nn.Module):
             levels = self.levels(tokens, Ks)
             prior = self.depth_head(levels, tokens)
         with run.stage("poses"):
-            poses = estimate_poses(self._pose_inputs(views, prior))
+            local = self.local(images[0])
+            poses = estimate_poses(self._pose_inputs(views, prior, local))
             viewmats = torch.from_numpy(poses.viewmats).to(images)[None]
         with run.stage("refinement"):
-            maps = self._refine(images, tokens, prior, poses, viewmats, Ks)
+            maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)
         with run.stage("Gaussians"):
             raw = self.gaussian_head(levels, images)
             gaussians = assemble_gaussians(raw[0], images[0], maps, viewmats[0], Ks[0])
+            gaussians = _without(gaussians, poses.guessed, views.num_views)
         with run.stage("language features"):
             features = self.language_head(tokens)
         with run.stage("grouping"):
-            groups = self.group(tokens, images)[-1]
-            survivors = surviving(groups, self.preset.tau_exist)
-            whole = group_weights(groups, survivors, (images.shape[-2], images.shape[-1]))
-            weights = split_groups(whole, features[0], self.preset.splitting)
+            weights = self.parts(tokens, images, (images.shape[-2], images.shape[-1]))
         with run.stage("aggregation"):
             pooled = F.adaptive_avg_pool2d(weights, (features.shape[-2], features.shape[-1]))
             dictionary = self.aggregation(pooled[None], features)[0]
@@ -124,7 +134,7 @@ class LangFlashNet(nn.Module):
             timings=run.timings,
         )
 
-    def _refine(self, images, tokens, prior: DepthMaps, poses: Poses, viewmats, Ks) -> DepthMaps:
+    def _refine(self, images, tokens, local, prior: DepthMaps, poses: Poses, viewmats, Ks) -> DepthMaps:
         """Refined maps (V, H, W), in view 0's unit; a view of unknown pose keeps its prior."""
         logs = [
             _corrected(prior.log_depths[0, v], K, correction) + math.log(scale)
@@ -139,19 +149,20 @@ class LangFlashNet(nn.Module):
             return maps
         chosen = Tokens(tuple(h[:, keep] for h in tokens.hooks), tokens.grid)
         part = DepthMaps(scaled.log_depths[:, keep], scaled.log_errors[:, keep])
-        refined = self.refiner(images[:, keep], chosen, part, viewmats[:, keep], Ks[:, keep])
+        refined = self.refiner(images[:, keep], chosen, local[keep], part, viewmats[:, keep], Ks[:, keep])
         log_depths, log_errors = maps.log_depths.clone(), maps.log_errors.clone()
         log_depths[keep], log_errors[keep] = refined.log_depths[0], refined.log_errors[0]
         return DepthMaps(log_depths, log_errors)
 
     @staticmethod
-    def _pose_inputs(views: Views, prior: DepthMaps) -> list[PoseInput]:
+    def _pose_inputs(views: Views, prior: DepthMaps, local: Tensor) -> list[PoseInput]:
         return [
             PoseInput(
                 grey=_grey(views, v),
                 K=views.Ks[v].double().numpy(),
                 size=views.size,
                 depth=prior.depths[0, v].cpu().numpy(),
+                local=local[v].cpu().numpy(),
             )
             for v in range(views.num_views)
         ]
@@ -175,9 +186,17 @@ def _grey(views: Views, view: int) -> np.ndarray:
     return cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
 
 
+def _without(gaussians: Gaussians, hidden: tuple[int, ...], num_views: int) -> Gaussians:
+    """Gaussians (V*H*W) of which those of some views are transparent: where a photo belongs is not
+    known, and drawn in the wrong place it would hide what is right."""
+    opacities = gaussians.opacities.unflatten(0, (num_views, -1)).clone()
+    opacities[list(hidden)] = 0
+    return replace(gaussians, opacities=opacities.flatten())
+
+
 def _guess_warning(name: str) -> str:
     return (
-        f"{name}: too little of it could be matched with the other photos, so its pose is a guess; "
+        f"{name}: too little of it could be matched with the other photos, so it is left out; "
         "take photos that share at least a third of the picture"
     )
 

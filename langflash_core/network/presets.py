@@ -9,16 +9,16 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Splitting:
-    """When groups are split, and how softly.
+    """How finely a scene is cut into parts, and how softly.
 
-    max_cosine: clusters closer than this stay together. min_area: of all pixels, for a cluster.
-    sharpness: of the softmax that shares a pixel among its group's clusters.
+    max_parts: K never exceeds it. max_cosine: parts closer than this are one. agreement: what the
+    queries' answer counts for beside the mask map. sharpness: of the softmax over the parts.
     """
 
-    max_cosine: float = 0.85
-    min_area: float = 0.006
-    max_clusters: int = 4
-    sharpness: float = 20.0
+    max_parts: int = 48
+    max_cosine: float = 0.9
+    agreement: float = 0.6
+    sharpness: float = 25.0
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,9 @@ class Preset:
     sweep_planes: int
     sweep_range: float
     """Plane-sweep hypotheses span prior depth times exp(+-sweep_range)."""
-    sweep_feature: int
+    sweep_groups: int
+    refiner_widths: tuple[int, int, int]
+    """Channels at 4, 2 and 1 times the token grid."""
 
     num_queries: int
     grouping_dim: int
@@ -86,9 +88,10 @@ MINI = Preset(
     dpt_feature=64,
     language_feature=96,
     sh_degree=0,
-    sweep_planes=17,
-    sweep_range=0.4,
-    sweep_feature=32,
+    sweep_planes=24,
+    sweep_range=0.45,
+    sweep_groups=2,
+    refiner_widths=(64, 128, 192),
     num_queries=64,
     grouping_dim=128,
     grouping_layers=6,

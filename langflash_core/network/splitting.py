@@ -1,9 +1,15 @@
-"""Groups that speak of two things become two groups. X language vectors of one group, C channels.
+"""Groups become parts: pixels that look alike to the mask map and to the queries share one atom.
 
-Masks that grouping merges (a plant and the wall behind it) would share one atom and answer to
-neither word. L(x) still tells them apart, so a group is split where its language vectors form
-clusters that differ and are large. On held-out rooms this raised the labels' mIoU from .456 to
-.503 (8 labels) and from .125 to .161 (all classes) before any further training.
+The queries merge neighbours (a chair takes its table along), and a merged group's atom answers to
+neither word. The map that masks are read from tells the two apart: it was trained so that pixels
+of one instance point the same way. So a scene is cut into many parts in the joint space of that
+map and of the queries' answer; parts of one object simply get similar atoms. Against splitting
+each group by its language vectors, mIoU in target views rose, without training: averaged atoms on
+48 validation rooms from .590 to .627 (8 labels) and .181 to .215 (class groups), aggregated atoms
+on 47 held-out rooms from .520 to .546 and .136 to .160; the atoms went from 20 to 38.
+
+Notation: V views, K groups, f channels of the mask map, J parts, X pixels of all views,
+S = f + K channels of the joint space.
 """
 
 import torch
@@ -13,62 +19,68 @@ from torch.nn import functional as F
 from langflash_core.network.depth import resize
 from langflash_core.network.presets import Splitting
 
-_ITERATIONS = 8
-_SEED_SHARE = 0.02  # of a group's pixels, the least explained ones, start a new cluster
+_ITERATIONS = 6
+_SEEDS_FROM = 1500  # pixels; enough to seed from, and seeding is the only serial step
 
 
-def split_groups(weights: Tensor, features: Tensor, rule: Splitting) -> Tensor:
-    """w_kj(x) = w_k(x) softmax_j(sharpness cos(L(x), c_kj)) over the clusters j of group k.
+def split_groups(weights: Tensor, embeddings: Tensor, rule: Splitting, size: tuple[int, int]) -> Tensor:
+    """w_j(x) = softmax_j(sharpness u(x) . c_j), u = (e, agreement sqrt(w)) / norm, over all parts j.
+
+    sqrt(w) is a unit vector, so u . u' adds the Bhattacharyya affinity of the queries' answers at
+    two pixels to the cosine of their embeddings. The c_j are the means of spherical k-means.
 
     Args:
-        weights: (V, K, H, W), sums to 1 over K. features: L(x), (V, C, h, w), unit channel norm.
+        weights: w_k(x), (V, K, h, w), sums to 1 over K; K may be 0.
+        embeddings: e(x), the mask map (V, f, h, w), any norm.
+        size: (H, W) of the answer.
 
     Returns:
-        (V, K', H, W) with K' >= K; the parts of a group sum to it. Deterministic.
+        (V, J, H, W), sums to 1 over J >= 1; J = 0 where K = 0. Deterministic.
 
-    Source: own; spherical k-means (Dhillon and Modha 2001) grown one cluster at a time.
+    Source: own; spherical k-means (Dhillon and Modha 2001), seeded as k-means++ (Arthur and
+    Vassilvitskii 2007).
     """
-    size = (features.shape[-2], features.shape[-1])
     if weights.shape[1] == 0:
-        return weights
-    owners = F.adaptive_avg_pool2d(weights, size).argmax(1).flatten()  # (V*h*w,)
-    vectors = features.movedim(1, -1).flatten(0, -2)  # (V*h*w, C)
-    parts = []
-    for group in range(weights.shape[1]):
-        centres = cluster(vectors[owners == group], rule, len(vectors))
-        own = weights[:, group : group + 1]
-        if len(centres) < 2:
-            parts.append(own)
-            continue
-        shares = (rule.sharpness * torch.einsum("vchw,jc->vjhw", features, centres)).softmax(1)
-        parts.append(own * resize(shares, (weights.shape[-2], weights.shape[-1])))
-    return torch.cat(parts, 1)
+        return weights.new_zeros(len(weights), 0, *size)
+    units = F.normalize(embeddings.float(), dim=1)
+    joint = F.normalize(torch.cat((units, rule.agreement * weights.float().sqrt()), 1), dim=1)
+    coarse = F.avg_pool2d(joint, 2, ceil_mode=True).movedim(1, -1).flatten(0, 2)  # (X, S)
+    centres = cluster(F.normalize(coarse, dim=-1), rule)
+    closeness = torch.einsum("vshw,js->vjhw", joint, centres)
+    return (rule.sharpness * resize(closeness, size)).softmax(1)
 
 
-def cluster(vectors: Tensor, rule: Splitting, num_pixels: int) -> Tensor:
-    """Centres (j, C), unit norm, of one group's language vectors (X, C); one where it is uniform.
+def cluster(vectors: Tensor, rule: Splitting) -> Tensor:
+    """Centres (J, S), unit norm, of unit vectors (X, S), the largest first; 1 <= J <= max_parts.
 
-    A new cluster starts from the vectors that the present centres explain least, and stays if
-    all clusters then cover `min_area` of the `num_pixels` and no two centres are too close.
+    Centres closer than `max_cosine` to a larger one are left out: simple rooms keep few parts.
     """
-    least = rule.min_area * num_pixels
-    if len(vectors) < 2 * least or len(vectors) == 0:
-        return vectors.new_zeros(0, vectors.shape[1])
-    centres = F.normalize(vectors.mean(0, keepdim=True), dim=-1)
-    while len(centres) < rule.max_clusters:
-        explained = (vectors @ centres.T).amax(1)
-        strangers = explained.argsort(stable=True)[: max(1, int(_SEED_SHARE * len(vectors)))]
-        trial = torch.cat((centres, F.normalize(vectors[strangers].mean(0, keepdim=True), dim=-1)))
-        trial, counts = _settle(vectors, trial)
-        closeness = (trial @ trial.T).fill_diagonal_(-1)
-        if counts.min() < least or closeness.max() > rule.max_cosine:
-            break
-        centres = trial
-    return centres
+    centres, counts = _settle(vectors, _seeds(vectors, rule.max_parts))
+    order = counts.argsort(descending=True, stable=True)
+    centres = centres[order[counts[order] > 0]]
+    alike = (centres @ centres.T > rule.max_cosine).tolist()
+    kept: list[int] = []
+    for row in range(len(centres)):
+        if not any(alike[row][other] for other in kept):
+            kept.append(row)
+    return centres[kept]
+
+
+def _seeds(vectors: Tensor, count: int) -> Tensor:
+    """Up to `count` of the vectors, each drawn with the squared distance to those before it."""
+    generator = torch.Generator().manual_seed(0)
+    some = vectors[:: max(1, len(vectors) // _SEEDS_FROM)]
+    distances = torch.full_like(some[:, 0], torch.inf)
+    chosen = [0]
+    while len(chosen) < min(count, len(some)):
+        distances = distances.minimum((some - some[chosen[-1]]).square().sum(1))
+        chance = distances.clamp_min(1e-9).cpu()  # equal pixels still give a seed
+        chosen.append(int(torch.multinomial(chance, 1, generator=generator)))
+    return some[chosen]
 
 
 def _settle(vectors: Tensor, centres: Tensor) -> tuple[Tensor, Tensor]:
-    """Lloyd iterations: centres (j, C) and how many vectors each has."""
+    """Lloyd iterations: unit centres (J, S) and how many vectors each has; empty ones stay put."""
     counts = torch.zeros(len(centres))
     for _ in range(_ITERATIONS):
         nearest = (vectors @ centres.T).argmax(1)

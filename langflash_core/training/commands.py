@@ -5,14 +5,14 @@ import the query stage."""
 import json
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import torch
 from torch import Tensor
 
 from langflash_core.errors import InputError
-from langflash_core.network.checkpoints import initial_network, save_network
+from langflash_core.network.checkpoints import adopt_frozen, initial_network, save_network, start_from
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.presets import PRESETS
 from langflash_core.rooms import RoomRenderer, load_pack
@@ -57,7 +57,7 @@ def cache_plan(kind: str, scenes: int, first_seed: int | None = None) -> CachePl
 def run_cache(
     out: Path,
     pack: Path,
-    encoder: Path,
+    start: Path,
     *,
     kind: str = "train",
     scenes: int = 4096,
@@ -71,17 +71,17 @@ def run_cache(
 
     Args:
         pack: furniture (`langflash rooms pack`).
-        encoder: weights of the frozen encoder, or any weights file of the preset.
+        start: weights file of the preset, whose encoder is used.
     """
     torch.set_num_threads(1)
     plan = cache_plan(kind, scenes, first_seed)
-    network = initial_network(PRESETS[preset], encoder) if plan.with_tokens else None
+    network = initial_network(PRESETS[preset], start) if plan.with_tokens else None
     furniture = load_pack(pack)
-    start = time.perf_counter()
+    began = time.perf_counter()
     with RoomRenderer(furniture) as renderer:
         render = rooms_renderer(furniture, renderer, held_out=plan.held_out)
         written = fill_cache(out / kind, plan, render, network.encoder if network else None, part)
-    log.info("%d scenes in %.0f s", written, time.perf_counter() - start)
+    log.info("%d scenes in %.0f s", written, time.perf_counter() - began)
     return written
 
 
@@ -89,17 +89,23 @@ def run_train(
     stages: Sequence[str],
     folder: Path,
     run_dir: Path,
-    encoder: Path,
+    start: Path,
     encode: Encode,
     minutes: Sequence[float],
     *,
     preset: str = "mini",
     options: LoopOptions | None = None,
+    from_scratch: bool = False,
 ) -> LangFlashNet:
     """Train stages one after the other, each for its minutes, on the cached sets in `folder`.
 
     Earlier stages are read from `run_dir`; a stage found there continues unless
     `options.resume` is False. Returns the network with every stage trained so far.
+
+    Args:
+        start: weights file of the preset. Its frozen parts are used, and stages without a run of
+            their own begin with its heads, as far as these still fit the network.
+        from_scratch: draw the heads anew instead.
 
     Raises:
         InputError: an unknown stage, a stage whose needs have not been trained, or no cache.
@@ -114,8 +120,10 @@ def run_train(
     options = options or LoopOptions(minutes=0)
     rooms = _open(folder / "train")
     table = phrase_table(folder, encode)
-    network = initial_network(PRESETS[preset], encoder, options.seed)
+    network = initial_network(PRESETS[preset], start, options.seed)
     done = _load_trained(network, run_dir)
+    if not from_scratch:
+        done |= dict.fromkeys(_begin(network, start, STAGES.keys() - done.keys()), 0)
     for name, budget in zip(stages, minutes, strict=True):
         stage = STAGES[name]
         missing = [need for need in stage.needs if need not in done]
@@ -174,10 +182,22 @@ def _load_trained(network: LangFlashNet, run_dir: Path) -> dict[str, int]:
     return {name: counts[0] for name, counts in found.items() if counts is not None}
 
 
+def _begin(network: LangFlashNet, start: Path, names: Iterable[str]) -> list[str]:
+    """The stages among `names` whose modules could be filled from `start`."""
+    return [name for name in names if start_from(network, start, STAGES[name].modules)]
+
+
+def run_adopt(encoder: Path, local: Path, out: Path, *, preset: str = "mini") -> Path:
+    """Make a file to start from out of published weights of the frozen parts (see NOTICE)."""
+    adopt_frozen(PRESETS[preset], encoder, local, out)
+    return out
+
+
 def run_export(
-    run_dir: Path, out: Path, encoder: Path, *, preset: str = "mini", metadata: dict | None = None
+    run_dir: Path, out: Path, start: Path, *, preset: str = "mini", metadata: dict | None = None
 ) -> Path:
-    """Join the averaged weights of every stage in `run_dir` into one weights file.
+    """Join the averaged weights of every stage in `run_dir` into one weights file; stages that
+    were not trained there keep the heads of `start`.
 
     The header says how long each stage trained, its last validation, and `metadata` (data,
     metrics, calibration: `calibration` is what queries read).
@@ -185,8 +205,9 @@ def run_export(
     Raises:
         InputError: no stage has been trained.
     """
-    network = initial_network(PRESETS[preset], encoder)
+    network = initial_network(PRESETS[preset], start)
     trained = {name: load_averaged(network, run_dir, name) for name in STAGES}
+    _begin(network, start, [name for name, counts in trained.items() if counts is None])
     report = {
         name: {
             "steps": counts[0],

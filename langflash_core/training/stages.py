@@ -14,7 +14,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.network.depth import DepthMaps, DepthRefiner, resize, sweep_correlation
+from langflash_core.network.aggregation import average_atoms
+from langflash_core.network.depth import DepthMaps, resize
 from langflash_core.network.encoder import Tokens
 from langflash_core.network.gaussians import assemble_gaussians
 from langflash_core.network.language import LanguageHead
@@ -23,13 +24,11 @@ from langflash_core.splat import rasterize, view_colours
 from langflash_core.training.batches import SceneBatch
 from langflash_core.training.grouping import (
     AggregationWeights,
-    Assignment,
     GroupingWeights,
     GroupTexts,
     aggregation_loss,
     grouping_loss,
     mask_quality,
-    match,
 )
 from langflash_core.training.losses import (
     depth_loss,
@@ -46,7 +45,7 @@ from langflash_core.types import Camera
 
 PIXELS_PER_PICTURE = 512
 """Pixels that the language stage draws from one picture, balanced over its instances."""
-CONTRAST_PIXELS = 384
+CONTRAST_PIXELS = 768
 """Pixels per scene that the grouping stage compares with each other."""
 MIN_GROUP_PIXELS = 12
 """Instances with fewer pixels over all views (at the mask map's sampled size) are not groups."""
@@ -97,50 +96,17 @@ def depth_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
 
 
 def refine_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
-    """Plane-sweep refinement of the frozen prior, with the small errors that poses will have.
-
-    Beside the depth losses the correlation itself is told which hypothesis is right
-    (`match_loss`): through the soft-argmax alone, features that do not match yet learn slowly.
-    """
+    """Plane-sweep refinement of the frozen prior, with the small errors that poses will have."""
     with torch.no_grad():
         prior = scaled_prior(network, batch)
         prior = replace(prior, log_depths=prior.log_depths + 0.05 * _noise(batch, (1, 1), words.generator))
-        viewmats = perturbed_poses(batch.viewmats, words.generator)
-    maps = network.refiner(batch.images, _tokens(batch), prior, viewmats, batch.Ks)
+        viewmats = perturbed_poses(batch.viewmats, words.generator, *_pose_noise(words.generator))
+        local = network.local(batch.images.flatten(0, 1))
+    maps = network.refiner(batch.images, _tokens(batch), local, prior, viewmats, batch.Ks)
     logs, errors, truth = (t.flatten(0, 1).float() for t in (maps.log_depths, maps.log_errors, batch.depths))
     shape, slope = depth_loss(logs, truth, absolute=1.0), gradient_loss(logs, truth)
     error = error_loss(logs, errors, truth, shared_offset=False)
-    matching = match_loss(network.refiner, batch, prior, viewmats)
-    total = shape + slope + 0.05 * error + 0.2 * matching
-    return Loss(total, _numbers(shape=shape, slope=slope, error=error, matching=matching))
-
-
-def match_loss(refiner: DepthRefiner, batch: SceneBatch, prior: DepthMaps, viewmats: Tensor) -> Tensor:
-    """Cross-entropy of the sweep's correlations against the hypothesis next to the true depth.
-
-    The target is shared linearly between the two neighbouring hypotheses. Only pixels count whose
-    true depth lies within the sweep's range and that another view sees there; 0 with one view.
-    """
-    features = refiner.features(batch.images, _tokens(batch)).unflatten(0, batch.images.shape[:2])
-    size = (features.shape[-2], features.shape[-1])
-    ratio = torch.tensor([size[1] / batch.size[1], size[0] / batch.size[0], 1.0]).to(batch.Ks)[:, None]
-    offsets = refiner.offsets
-    step = offsets[1] - offsets[0]
-    entropies, counts = [], []
-    for i in range(batch.images.shape[0]):
-        logs = _shrink(prior.log_depths[i], size)
-        wanted, valid = log_residual(-logs, 1 / _shrink(batch.depths[i], size).clamp_min(1e-6))
-        place = ((wanted - offsets[0]) / step).clamp(0, len(offsets) - 1)
-        volume, seen = sweep_correlation(features[i], logs, offsets, viewmats[i], batch.Ks[i] * ratio)
-        share = (1 - (place[:, None] - torch.arange(len(offsets)).to(place)[:, None, None]).abs()).clamp_min(
-            0
-        )
-        known = _shrink(batch.depths[i], size) > 0
-        valid = valid & known & (wanted.abs() <= offsets[-1]) & ((share * seen).sum(1) > 0.99)
-        entropy = -(share * (refiner.sharpness * volume).log_softmax(1)).sum(1)
-        entropies.append((entropy * valid).sum())
-        counts.append(valid.sum())
-    return torch.stack(entropies).sum() / torch.stack(counts).sum().clamp_min(1)
+    return Loss(shape + slope + 0.05 * error, _numbers(shape=shape, slope=slope, error=error))
 
 
 def scaled_prior(network: LangFlashNet, batch: SceneBatch) -> DepthMaps:
@@ -158,9 +124,18 @@ def scaled_prior(network: LangFlashNet, batch: SceneBatch) -> DepthMaps:
     )
 
 
-def perturbed_poses(
-    viewmats: Tensor, generator: torch.Generator, degrees: float = 0.2, share: float = 0.02
-) -> Tensor:
+POSE_NOISE = ((0.2, 0.02, 0.6), (0.8, 0.08, 0.3), (4.0, 0.4, 0.1))
+"""(degrees, share of the baseline, chance): how wrong poses are at run time; mostly little."""
+
+
+def _pose_noise(generator: torch.Generator) -> tuple[float, float]:
+    """Degrees and share for one batch."""
+    chances = torch.tensor([chance for _, _, chance in POSE_NOISE])
+    degrees, share, _ = POSE_NOISE[int(torch.multinomial(chances, 1, generator=generator))]
+    return degrees, share
+
+
+def perturbed_poses(viewmats: Tensor, generator: torch.Generator, degrees: float, share: float) -> Tensor:
     """Poses (B, V, 4, 4) with rotations off by about `degrees`, translations by `share` of their length."""
     shape = viewmats.shape[:2]
     turn = (
@@ -198,7 +173,12 @@ def novel_views(network: LangFlashNet, batch: SceneBatch) -> list[tuple[Tensor, 
     context = _views(batch, range(batch.images.shape[1] - 1))
     with torch.no_grad():
         maps = network.refiner(
-            context.images, _tokens(context), scaled_prior(network, context), context.viewmats, context.Ks
+            context.images,
+            _tokens(context),
+            network.local(context.images.flatten(0, 1)),
+            scaled_prior(network, context),
+            context.viewmats,
+            context.Ks,
         )
         levels = network.levels(_tokens(context), context.Ks)
     raw = network.gaussian_head(levels, context.images)
@@ -225,20 +205,25 @@ def language_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Lo
     """
     hidden = language_hidden(network.language_head, batch.tokens)  # (B*V, F, h, w)
     scenes = [words.sampler.draw(labels, words.generator) for labels in batch.labels]
-    features, rows = [], []
+    bank = phrase_bank(torch.cat(scenes), words)
+    features, rows, true = [], [], []
     for b, labels in enumerate(batch.labels):
+        holds = words.sampler.true(labels)[:, bank]
         for v in range(batch.images.shape[1]):
             ids = nearest(batch.instances[b, v], (hidden.shape[-2], hidden.shape[-1]))
             chosen = balanced_pixels(ids, words.sampler.balance(labels), PIXELS_PER_PICTURE, words.generator)
             flat = hidden[b * batch.images.shape[1] + v].flatten(1).T
             features.append(flat[chosen])
-            rows.append(scenes[b].to(ids.device)[ids.flatten()[chosen]])
+            named = ids.flatten()[chosen].cpu()
+            rows.append(scenes[b][named])
+            true.append(holds[named])
     last = network.language_head.out
     vectors = F.linear(torch.cat(features), last.weight[:, :, 0, 0], last.bias)
-    table = words.sampler.table
-    bank = phrase_bank(torch.cat(scenes), words)
-    targets = table.embeddings.to(vectors.device)[torch.cat(rows)]
-    total = language_loss(vectors, targets, bank.to(vectors.device))
+    texts = words.sampler.table.embeddings.to(vectors.device)
+    targets = texts[torch.cat(rows).to(vectors.device)]
+    total = language_loss(
+        vectors, targets, texts[bank.to(vectors.device)], true=torch.cat(true).to(vectors.device)
+    )
     cosine = F.cosine_similarity(vectors.detach().float(), targets, dim=-1)
     return Loss(total, _numbers(cosine=cosine.mean()))
 
@@ -255,11 +240,11 @@ def language_hidden(head: LanguageHead, tokens: Tokens | None) -> Tensor:
     return F.gelu(head.mix(F.avg_pool2d(path, 2)))
 
 
-def phrase_bank(used: Tensor, words: Words, extra: int = 64) -> Tensor:
-    """Embeddings (A, C) of negatives: the batch's phrases, every class group, some random phrases."""
+def phrase_bank(used: Tensor, words: Words, extra: int = 128) -> Tensor:
+    """Rows (A,) of negatives: the batch's phrases, every class group and baseline, some random phrases."""
     table = words.sampler.table
     random = torch.randint(len(table.phrases), (extra,), generator=words.generator)
-    return table.embeddings[torch.cat((used.cpu(), table.group_rows(), random)).unique()]
+    return torch.cat((used.cpu(), table.standing_rows(), random)).unique()
 
 
 def balanced_pixels(ids: Tensor, weights: Tensor, count: int, generator: torch.Generator) -> Tensor:
@@ -329,16 +314,19 @@ def group_masks(ids: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def aggregation_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
-    """L_LFA over the groups that the frozen grouping finds and matching names."""
+    """L_LFA over the parts that the frozen grouping finds; a part is called what most of it shows."""
     losses, cosines = [], []
     for i in range(batch.images.shape[0]):
-        found = matched_groups(network, one_scene(batch, i))
+        found = named_parts(network, one_scene(batch, i))
         if found is None:
             continue
-        phrases = words.sampler.draw(batch.labels[i], words.generator)[found.instances.cpu()]
-        table = words.sampler.table
+        instances = found.instances.cpu()
+        phrases = words.sampler.draw(batch.labels[i], words.generator)[instances]
+        bank, embeddings = phrase_bank(phrases, words), words.sampler.table.embeddings
         texts = GroupTexts(
-            table.embeddings[phrases].to(found.atoms), phrase_bank(phrases, words).to(found.atoms)
+            embeddings[phrases].to(found.atoms),
+            embeddings[bank].to(found.atoms),
+            words.sampler.true(batch.labels[i])[instances][:, bank].to(found.atoms.device),
         )
         losses.append(aggregation_loss(found.atoms, found.pooled, found.quality, texts, AggregationWeights()))
         cosines.append(float(F.cosine_similarity(found.atoms.detach(), texts.truth, dim=-1).mean()))
@@ -348,8 +336,9 @@ def aggregation_stage(network: LangFlashNet, batch: SceneBatch, words: Words) ->
 
 
 @dataclass(frozen=True)
-class MatchedGroups:
-    """M matched queries of a scene: atoms and pooled (M, C), quality (M,), instances (M,)."""
+class NamedParts:
+    """M parts of a scene that show something labelled: atoms and pooled (M, C), instances (M,), and
+    quality (M,), the share of a part that is its instance."""
 
     atoms: Tensor
     pooled: Tensor
@@ -357,26 +346,24 @@ class MatchedGroups:
     instances: Tensor
 
 
-def matched_groups(network: LangFlashNet, batch: SceneBatch) -> MatchedGroups | None:
-    """The atoms of one scene (B = 1) and the instances their queries were matched to; None if none.
-
-    The softmax runs over the matched queries, which stand in for the survivors of run time.
-    """
+def named_parts(network: LangFlashNet, batch: SceneBatch) -> NamedParts | None:
+    """The atoms of one scene (B = 1) made as at run time, and the instance each mostly covers."""
     with torch.no_grad():
-        groups = network.group(_tokens(batch), batch.images)[-1]
-        features = network.language_head(_tokens(batch))
+        features = network.language_head(_tokens(batch)).float()
         size = (features.shape[-2], features.shape[-1])
-        masks, instances = group_masks(nearest(batch.instances[0], size))
-        small = resize(groups.mask_logits[0].float(), size)  # (V, N, h, w)
-        flat = small.transpose(0, 1).flatten(1)
-        chosen: Assignment = match(flat, groups.existence_logits[0], masks, GroupingWeights())
-        if len(chosen.queries) == 0:
+        weights = network.parts(_tokens(batch), batch.images, size)[None]
+        masks, instances = group_masks(nearest(batch.instances[0], size))  # (G, V*h*w), (G,)
+        if weights.shape[2] == 0 or len(instances) == 0:
             return None
-        weights = small[:, chosen.queries].softmax(1)[None]
-        quality = mask_quality(flat[chosen.queries], masks[chosen.groups])
-        pooled = torch.einsum("bvkhw,bvchw->bkc", weights, features.float())[0]
-    atoms = network.aggregation(weights, features.float())[0]
-    return MatchedGroups(atoms, F.normalize(pooled, dim=-1), quality, instances[chosen.groups])
+        shared = weights[0].transpose(0, 1).flatten(1) @ masks.T  # (K, G)
+        overlap, majority = shared.max(1)
+        quality = overlap / (weights.sum((0, 1, 3, 4)) + network.preset.eps)
+        named = overlap > 0
+        pooled = average_atoms(weights, features, network.preset.eps)[0]
+    atoms = network.aggregation(weights, features)[0]
+    return NamedParts(
+        atoms[named], F.normalize(pooled[named], dim=-1), quality[named], instances[majority[named]]
+    )
 
 
 def _tokens(batch: SceneBatch) -> Tokens:

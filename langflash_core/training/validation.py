@@ -22,7 +22,7 @@ from langflash_core.training.measures import (
 from langflash_core.training.stages import (
     Words,
     group_masks,
-    matched_groups,
+    named_parts,
     nearest,
     novel_views,
     one_scene,
@@ -74,7 +74,8 @@ def measure_refine(network: LangFlashNet, batch: SceneBatch, words: Words) -> di
     """AbsRel of the refined and of the scale-aligned prior depth, true poses, no alignment after."""
     assert batch.tokens is not None
     prior = scaled_prior(network, batch)
-    maps = network.refiner(batch.images, batch.tokens, prior, batch.viewmats, batch.Ks)
+    local = network.local(batch.images.flatten(0, 1))
+    maps = network.refiner(batch.images, batch.tokens, local, prior, batch.viewmats, batch.Ks)
     flat = batch.depths.flatten(0, 1)
     refined, before = (d.float().flatten(0, 1) for d in (maps.depths, prior.depths))
     return {
@@ -148,14 +149,14 @@ def measure_grouping(network: LangFlashNet, batch: SceneBatch, words: Words) -> 
 
 
 def measure_aggregation(network: LangFlashNet, batch: SceneBatch, words: Words) -> dict[str, float | Tensor]:
-    """Class group of each matched atom, and of the plain average it starts from."""
+    """Class group that most of a part shows: as its atom says, and as the plain average said."""
     table = words.sampler.table
     texts = table.embeddings[table.group_rows()]
     rows: dict[str, float | Tensor] = {}
     for key in ("atoms", "pooled"):
         rows[key] = torch.zeros(len(table.groups), len(table.groups), dtype=torch.int64)
     for b in range(batch.images.shape[0]):
-        found = matched_groups(network, one_scene(batch, b))
+        found = named_parts(network, one_scene(batch, b))
         if found is None:
             continue
         truth = words.sampler.groups(batch.labels[b])[found.instances.cpu()]

@@ -1,4 +1,6 @@
-"""Groups split where language says they hold two things, and only there."""
+"""Scenes cut into parts where pixels look alike to the mask map, and only there."""
+
+from dataclasses import replace
 
 import pytest
 import torch
@@ -8,61 +10,75 @@ from langflash_core.network.presets import Splitting
 from langflash_core.network.splitting import cluster, split_groups
 
 RULE = Splitting()
+SIZE = (64, 128)
 
 
-def _features(*columns: int, cosine: float = 0.3, noise: float = 0.05) -> torch.Tensor:
-    """Language maps (1, 16, 16, 32): vertical bands of unit vectors with a given mutual cosine."""
+def _embeddings(*columns: int, cosine: float = 0.3, noise: float = 0.02) -> torch.Tensor:
+    """Mask maps (1, 16, 16, 32): vertical bands of vectors with a given mutual cosine."""
     basis = torch.eye(16)
-    words = [F.normalize(cosine**0.5 * basis[0] + (1 - cosine) ** 0.5 * basis[w + 1], dim=0) for w in columns]
-    bands = torch.stack([words[x * len(words) // 32] for x in range(32)], -1)  # (16, 32)
+    kinds = [F.normalize(cosine**0.5 * basis[0] + (1 - cosine) ** 0.5 * basis[c + 1], dim=0) for c in columns]
+    bands = torch.stack([kinds[x * len(kinds) // 32] for x in range(32)], -1)  # (16, 32)
     maps = bands[None, :, None, :].expand(1, 16, 16, 32)
-    return F.normalize(maps + noise * torch.randn(maps.shape, generator=torch.manual_seed(0)), dim=1)
+    return 3 * (maps + noise * torch.randn(maps.shape, generator=torch.manual_seed(0)))
+
+
+def _one_group() -> torch.Tensor:
+    return torch.ones(1, 1, 16, 32)
 
 
 def test_a_group_of_two_things_becomes_two():
-    weights = torch.ones(1, 1, 64, 128)
-    parts = split_groups(weights, _features(0, 1), RULE)
-    assert parts.shape == (1, 2, 64, 128)
+    parts = split_groups(_one_group(), _embeddings(0, 1), RULE, SIZE)
+    assert parts.shape == (1, 2, *SIZE)
     halves = parts[0, :, :, :56].mean((1, 2)), parts[0, :, :, 72:].mean((1, 2))
     assert (halves[0] - halves[1]).abs().min() > 0.9  # each part owns one half
 
 
-def test_parts_sum_to_their_group():
-    torch.manual_seed(1)
-    weights = torch.rand(1, 3, 64, 128).softmax(1)
-    weights[:, 0, :, :] += 2
-    weights = weights / weights.sum(1, keepdim=True)
-    parts = split_groups(weights, _features(0, 1, 2), RULE)
-    assert parts.shape[1] > 3 and (parts >= 0).all()
-    assert torch.allclose(parts.sum(1), torch.ones(1, 64, 128), atol=1e-5)  # float32 softmax
+def test_parts_share_every_pixel():
+    weights = torch.rand(2, 3, 16, 32, generator=torch.manual_seed(1)).softmax(1)
+    parts = split_groups(weights, _embeddings(0, 1, 2).expand(2, -1, -1, -1), RULE, SIZE)
+    assert parts.shape[1] >= 3 and (parts >= 0).all()
+    assert torch.allclose(parts.sum(1), torch.ones(2, *SIZE), atol=1e-5)  # float32 softmax
 
 
 @pytest.mark.parametrize("columns", [(0,), (3, 3)])
-def test_one_thing_stays_one_group(columns):
-    weights = torch.ones(1, 1, 64, 128)
-    assert torch.equal(split_groups(weights, _features(*columns), RULE), weights)
+def test_one_thing_is_one_part(columns):
+    parts = split_groups(_one_group(), _embeddings(*columns), RULE, SIZE)
+    assert torch.equal(parts, torch.ones(1, 1, *SIZE))
 
 
-def test_near_synonyms_and_specks_stay_together():
-    weights = torch.ones(1, 1, 64, 128)
-    assert split_groups(weights, _features(0, 1, cosine=0.95, noise=0.01), RULE).shape[1] == 1
-    speck = _features(0).clone()
-    speck[:, :, 3, 5] = _features(1)[:, :, 3, 5]  # one of 512 pixels: 0.2 %
-    assert split_groups(weights, speck, RULE).shape[1] == 1
+def test_what_nearly_looks_alike_stays_together():
+    assert split_groups(_one_group(), _embeddings(0, 1, cosine=0.97), RULE, SIZE).shape[1] == 1
 
 
-def test_no_groups_and_empty_groups():
-    assert split_groups(torch.zeros(2, 0, 8, 8), torch.rand(2, 4, 4, 4), RULE).shape == (2, 0, 8, 8)
-    weights = torch.stack((torch.ones(64, 128), torch.zeros(64, 128)))[None]
-    assert split_groups(weights, _features(0), RULE).shape[1] == 2
+def test_the_queries_answer_keeps_look_alikes_apart():
+    """Two chairs of one look: the map cannot tell them apart, two queries can."""
+    weights = torch.zeros(1, 2, 16, 32)
+    weights[:, 0, :, :16], weights[:, 1, :, 16:] = 1, 1
+    assert split_groups(weights, _embeddings(0), RULE, SIZE).shape[1] == 2
+    deaf = replace(RULE, agreement=0.0)
+    assert split_groups(weights, _embeddings(0), deaf, SIZE).shape[1] == 1
+
+
+@pytest.mark.parametrize("max_parts", [1, 3])
+def test_there_are_never_more_parts_than_allowed(max_parts):
+    parts = split_groups(_one_group(), _embeddings(*range(8)), replace(RULE, max_parts=max_parts), SIZE)
+    assert 1 <= parts.shape[1] <= max_parts
+
+
+def test_no_groups_flat_maps_and_single_pixels_are_finite():
+    assert split_groups(torch.zeros(2, 0, 8, 8), torch.rand(2, 4, 8, 8), RULE, SIZE).shape == (2, 0, *SIZE)
+    assert torch.equal(
+        split_groups(_one_group(), torch.zeros(1, 16, 16, 32), RULE, SIZE), torch.ones(1, 1, *SIZE)
+    )
+    assert split_groups(torch.ones(1, 1, 1, 1), torch.ones(1, 4, 1, 1), RULE, SIZE).shape == (1, 1, *SIZE)
 
 
 def test_clusters_are_the_best_of_their_kind():
     """Spherical k-means ends where every vector sits with its nearest centre, the mean of its own."""
-    vectors = _features(0, 1, 2, noise=0.1)[0].flatten(1).T
-    centres = cluster(vectors, RULE, len(vectors))
+    vectors = F.normalize(_embeddings(0, 1, 2)[0].flatten(1).T, dim=-1)
+    centres = cluster(vectors, replace(RULE, max_parts=3))
     assert len(centres) == 3
     nearest = (vectors @ centres.T).argmax(1)
     for index, centre in enumerate(centres):
         assert F.cosine_similarity(vectors[nearest == index].mean(0), centre, dim=0) > 1 - 1e-5
-    assert torch.equal(cluster(vectors, RULE, len(vectors)), centres)
+    assert torch.equal(cluster(vectors, replace(RULE, max_parts=3)), centres)

@@ -23,7 +23,7 @@ OVERFIT = {
     "depth": (20, 2e-3, 0.6),
     "refine": (40, 2e-3, 0.85),
     "gaussians": (10, 2e-2, 0.9),
-    "language": (20, 2e-3, 0.5),
+    "language": (20, 2e-3, 0.7),  # a thing has many names, unrelated here: they cannot all be met
     "grouping": (20, 2e-3, 0.85),
     "aggregation": (60, 1e-2, 0.85),
 }
@@ -112,7 +112,7 @@ def test_nearest_keeps_ids():
 def test_perturbed_poses_stay_rigid_and_near():
     poses = torch.eye(4).repeat(3, 2, 1, 1)
     poses[:, 1, 0, 3] = 0.5
-    moved = perturbed_poses(poses, torch.Generator().manual_seed(0))
+    moved = perturbed_poses(poses, torch.Generator().manual_seed(0), degrees=0.2, share=0.02)
     rotations = moved[..., :3, :3]
     identity = rotations @ rotations.transpose(-1, -2)
     torch.testing.assert_close(identity, torch.eye(3).expand_as(identity), atol=1e-6, rtol=0)  # float32
