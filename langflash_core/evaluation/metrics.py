@@ -90,21 +90,3 @@ def presence(scores: Tensor, present: Tensor, threshold: float) -> Presence:
         int((~found & present).sum()),
         int((~found & ~present).sum()),
     )
-
-
-def best_threshold(scores: Tensor, present: Tensor) -> tuple[float, Presence]:
-    """The threshold with the highest F1, midway between neighbouring scores; scores (P,).
-
-    Raises:
-        ValueError: there is no phrase that is present, or none that is absent.
-    """
-    if not bool(present.any()) or bool(present.all()):
-        raise ValueError("present: expected both present and absent phrases")
-    order = scores.argsort(descending=True)
-    ranked, truth = scores[order].double(), present[order]
-    hits = truth.cumsum(0)
-    f1 = 2 * hits / (torch.arange(1, len(ranked) + 1) + int(truth.sum()))
-    last = int(f1.argmax())
-    following = ranked[last + 1] if last + 1 < len(ranked) else ranked[last]
-    threshold = float((ranked[last] + following) / 2)
-    return threshold, presence(scores, present, threshold)

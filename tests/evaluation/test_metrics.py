@@ -59,23 +59,6 @@ def test_presence_counts():
     assert math.isnan(metrics.Presence().precision)
 
 
-def test_the_best_threshold_separates():
-    scores = torch.tensor([0.2, 0.9, 0.3, 0.8])
-    threshold, counts = metrics.best_threshold(scores, torch.tensor([False, True, False, True]))
-    assert 0.3 < threshold < 0.8
-    assert counts.f1 == 1
-    with pytest.raises(ValueError, match="present"):
-        metrics.best_threshold(scores, torch.ones(4, dtype=torch.bool))
-
-
-def test_the_best_threshold_is_found_by_trying_all():
-    generator = torch.Generator().manual_seed(1)
-    present = torch.rand(60, generator=generator) > 0.5
-    scores = torch.rand(60, generator=generator) + 0.4 * present
-    _, counts = metrics.best_threshold(scores, present)
-    assert counts.f1 == pytest.approx(max(metrics.presence(scores, present, float(t)).f1 for t in scores))
-
-
 def test_paper_labels():
     assert PAPER_LABELS[paper_label("armchair")] == "chair"
     assert PAPER_LABELS[paper_label("coffee table")] == "table"

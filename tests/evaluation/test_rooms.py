@@ -129,3 +129,20 @@ def test_the_truth_scores_as_the_truth():
     # Edges blend where Gaussians of two surfaces overlap.
     assert labels["target_groups_accuracy"] > 0.95
     assert measures["psnr"] > 20
+
+
+def test_other_words_are_judged_by_all_they_are_true_of():
+    net = LangFlashNet(MINI).eval()
+    setting = rooms.Setting.of(net, ["chair", "lamp", "sofa", "wall"], 2.5)
+    truth = torch.arange(4).repeat_interleave(25)
+    maps = setting.texts[truth].reshape(10, 10, -1)
+    tally = rooms.Tally()
+    rooms._note_paraphrases(setting, maps, truth, tally)
+    assert {"couch", "seat", "light source"} <= set(tally.paraphrases)
+    assert "something to read" not in tally.paraphrases
+    (_, seats_by_name), (couch, sofa) = tally.paraphrases["seat"][0], tally.paraphrases["couch"][0]
+    assert seats_by_name == pytest.approx(1)  # "chair" or "sofa"
+    assert sofa == pytest.approx(1)
+    assert couch == pytest.approx(1)
+    report = rooms._paraphrase_report(tally)
+    assert report["couch"] == {"asked": 1, "iou": 1.0, "name_iou": 1.0}
