@@ -189,6 +189,11 @@ def _add_seeds(command: argparse.ArgumentParser, *, count: int) -> None:
 
 def _add_train(commands) -> None:
     actions = _actions(commands, "train", "train the network on rendered rooms")
+    adopt = _command(actions, "adopt", "published weights of the frozen parts to a file to start from")
+    adopt.add_argument("encoder", type=Path, metavar="ENCODER", help="timm state dict, .safetensors")
+    adopt.add_argument("local", type=Path, metavar="XFEAT", help="XFeat's state dict, .safetensors")
+    _add_output(adopt, "FILE", "the .safetensors to write")
+    adopt.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
     cache = _command(actions, "cache", "render and encode one set of rooms; an interrupted run continues")
     cache.add_argument("pack", type=Path, metavar="PACK", help="made by rooms pack")
     _add_output(cache, "CACHE", "folder to fill")
@@ -198,7 +203,7 @@ def _add_train(commands) -> None:
     cache.add_argument(
         "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
     )
-    _add_encoder(cache)
+    _add_start(cache)
     run = _command(actions, "run", "train stages, one after the other; continues where a run stopped")
     run.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
     _add_output(run, "RUN", "folder of checkpoints and logs")
@@ -212,12 +217,15 @@ def _add_train(commands) -> None:
     run.add_argument(
         "--restart", action="store_true", help="forget what the run folder holds of these stages"
     )
-    _add_encoder(run)
+    run.add_argument(
+        "--from-scratch", action="store_true", help="draw the heads anew instead of going on with --start's"
+    )
+    _add_start(run)
     export = _command(actions, "export", "all stages of a run to one checkpoint")
     export.add_argument("run", type=Path, metavar="RUN")
     _add_output(export, "FILE", "the .safetensors to write")
     export.add_argument("--metadata", type=Path, metavar="JSON", help="an object to add to the model card")
-    _add_encoder(export)
+    _add_start(export)
 
 
 def _add_eval(commands) -> None:
@@ -238,14 +246,20 @@ def _add_eval(commands) -> None:
         command.add_argument("--weights", type=Path, metavar="PATH", help="(default: the shipped ones)")
         command.add_argument("--limit", type=whole_count, metavar="N", help="only the first N scenes")
 
+    photos = _command(actions, "photos", "a sheet to judge by eye: pairs of photos, new views, heat-maps")
+    photos.add_argument("photos", nargs="+", type=Path, metavar="PHOTO", help="first and second in turn")
+    _add_output(photos, "IMG", "the .png to write")
+    photos.add_argument("--weights", type=Path, metavar="PATH", help="(default: the shipped ones)")
+    photos.add_argument("--prompt", nargs="+", metavar="PHRASE", help="(default: ten things of a home)")
 
-def _add_encoder(command: argparse.ArgumentParser) -> None:
+
+def _add_start(command: argparse.ArgumentParser) -> None:
     command.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
     command.add_argument(
-        "--encoder",
+        "--start",
         type=Path,
         metavar="PATH",
-        help="weights of the frozen encoder (default: the shipped ones)",
+        help="weights to begin with; their encoder stays as it is (default: the shipped ones)",
     )
 
 

@@ -12,7 +12,7 @@ from langflash_core.errors import InputError, WeightsError
 from langflash_core.network import PRESETS
 from langflash_core.query.spaces import language_space
 from langflash_core.resources import asset_path
-from langflash_core.training.commands import run_cache, run_export, run_train
+from langflash_core.training.commands import run_adopt, run_cache, run_export, run_train
 from langflash_core.training.loop import LoopOptions
 
 
@@ -23,7 +23,14 @@ def run(args: Namespace, out: TextIO) -> None:
         LangFlashError: the furniture, the encoder, the cache or the output cannot be used.
     """
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s", stream=sys.stderr)
-    {"cache": _cache, "run": _run, "export": _export}[args.action](args, out)
+    {"adopt": _adopt, "cache": _cache, "run": _run, "export": _export}[args.action](args, out)
+
+
+def _adopt(args: Namespace, out: TextIO) -> None:
+    encoder = readable_file(args.encoder, "encoder checkpoint", WeightsError)
+    local = readable_file(args.local, "XFeat checkpoint", WeightsError)
+    check_output_file(args.output, (".safetensors",))
+    print(f"{run_adopt(encoder, local, args.output, preset=args.preset)}: ready to train", file=out)
 
 
 def _cache(args: Namespace, out: TextIO) -> None:
@@ -32,7 +39,7 @@ def _cache(args: Namespace, out: TextIO) -> None:
     count = run_cache(
         args.output,
         args.pack,
-        _encoder(args),
+        _start(args),
         kind=args.set,
         scenes=args.scenes,
         first_seed=args.first_seed,
@@ -51,13 +58,14 @@ def _run(args: Namespace, out: TextIO) -> None:
         args.stages,
         args.cache,
         args.output,
-        _encoder(args),
+        _start(args),
         space.encode,
         args.minutes,
         preset=args.preset,
         options=LoopOptions(
             minutes=0, device=args.device, seed=args.seed, max_steps=args.max_steps, resume=not args.restart
         ),
+        from_scratch=args.from_scratch,
     )
     print(f"{args.output}: trained {', '.join(args.stages)}", file=out)
 
@@ -67,13 +75,13 @@ def _export(args: Namespace, out: TextIO) -> None:
         raise InputError(f"there is no folder {args.run}; make it with langflash train run")
     check_output_file(args.output, (".safetensors",))
     details = None if args.metadata is None else _details(args.metadata)
-    path = run_export(args.run, args.output, _encoder(args), preset=args.preset, metadata=details)
+    path = run_export(args.run, args.output, _start(args), preset=args.preset, metadata=details)
     print(f"{path}: {path.stat().st_size / 1e6:.1f} MB", file=out)
 
 
-def _encoder(args: Namespace) -> Path:
-    path = args.encoder or asset_path(f"weights/{args.preset}.safetensors")
-    return readable_file(path, "encoder checkpoint", WeightsError)
+def _start(args: Namespace) -> Path:
+    path = args.start or asset_path(f"weights/{args.preset}.safetensors")
+    return readable_file(path, "weights file", WeightsError)
 
 
 def _details(path: Path) -> dict[str, Any]:

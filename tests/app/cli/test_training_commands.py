@@ -57,8 +57,9 @@ def test_weights_verify_notices_damage(run, checkpoint, tmp_path):
         (["rooms", "render", "gone.npz", "-o", "out"], "no furniture pack at gone.npz"),
         (["rooms", "render", TINY_PACK, "-o", "out", "--count", "0"], "--count"),
         (["train", "cache", "gone.npz", "-o", "out"], "no furniture pack at gone.npz"),
-        (["train", "cache", TINY_PACK, "-o", "out", "--encoder", "gone"], "no encoder checkpoint at gone"),
+        (["train", "cache", TINY_PACK, "-o", "out", "--start", "gone"], "no weights file at gone"),
         (["train", "cache", TINY_PACK, "-o", "out", "--part", "2/2"], "--part"),
+        (["train", "adopt", "gone", "gone", "-o", "w.safetensors"], "no encoder checkpoint at gone"),
         (
             ["train", "run", "gone", "-o", "out", "--stages", "depth", "--minutes", "1"],
             "there is no folder gone",
@@ -80,7 +81,7 @@ def test_bad_input(run, tmp_path, monkeypatch, words, hint):
 
 def test_train_needs_what_a_stage_reads(run, checkpoint, tmp_path):
     (tmp_path / "cache").mkdir()
-    words = ("--stages", "depth", "--minutes", "1", "--encoder", checkpoint)
+    words = ("--stages", "depth", "--minutes", "1", "--start", checkpoint)
     outcome = run("train", "run", tmp_path / "cache", "-o", tmp_path / "run", *words)
     assert outcome.code == 2 and outcome.err.count("\n") == 1  # an empty cache
 
@@ -88,7 +89,7 @@ def test_train_needs_what_a_stage_reads(run, checkpoint, tmp_path):
 def test_train_export_of_nothing(run, checkpoint, tmp_path):
     (tmp_path / "run").mkdir()
     card = tmp_path / "card.json"
-    words = ("train", "export", tmp_path / "run", "-o", tmp_path / "w.safetensors", "--encoder", checkpoint)
+    words = ("train", "export", tmp_path / "run", "-o", tmp_path / "w.safetensors", "--start", checkpoint)
     assert "no trained stage" in run(*words).err
     card.write_text("[]")
     assert "one JSON object" in run(*words, "--metadata", card).err
