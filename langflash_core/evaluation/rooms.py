@@ -59,6 +59,8 @@ log = logging.getLogger(__name__)
 PHRASES = 20
 """Asked per scene: half of them things that are there, half things that are not."""
 MASK_THRESHOLDS = tuple(round(0.3 + 0.01 * step, 2) for step in range(70))
+MEDIANS = ("depth_abs_rel", "depth_abs_rel_view_0_twice", "points_view_1")
+"""Of these the median room is told beside the mean, which a few wrong poses dominate."""
 MIN_SHARE = 0.004
 """Of view 0: a thing counts as there from this share of its pixels on (200 of 224 x 224)."""
 
@@ -503,6 +505,7 @@ def summary(tally: Tally, setting: Setting) -> dict:
     rotations = torch.tensor([error.rotation for error, _ in tally.poses])
     directions = torch.tensor([error.direction for error, _ in tally.poses])
     geometry = {name: nan_mean(values) for name, values in tally.numbers.items()}
+    geometry |= {f"{name}_median": _median(tally.numbers[name]) for name in MEDIANS if name in tally.numbers}
     geometry |= {
         "pose_rotation_median": float(rotations.nanmedian()),
         "pose_direction_median": float(directions.nanmedian()),
@@ -534,6 +537,10 @@ def summary(tally: Tally, setting: Setting) -> dict:
         "target_iou_by_label": _rounded(per_label),
         "paraphrases": _paraphrase_report(tally),
     }
+
+
+def _median(values: Sequence[float]) -> float:
+    return float(torch.tensor(values).nanmedian())
 
 
 def _rounded(values: dict[str, float]) -> dict[str, float | None]:

@@ -3,10 +3,13 @@
 _MEASURES = (
     ("Depth AbsRel, view 1", "depth_abs_rel", "constant depth", "depth_abs_rel_constant"),
     ("Depth AbsRel, fed view 1 twice", "depth_abs_rel_view_0_twice", "", ""),
+    ("Depth AbsRel, view 1, median room", "depth_abs_rel_median", "fed view 1 twice",
+     "depth_abs_rel_view_0_twice_median"),
     ("Depth delta < 1.25, view 1", "depth_delta1", "", ""),
     ("Depth AbsRel in metres, no alignment", "depth_abs_rel_metric", "", ""),
     ("View-2 points in frame 1, relative", "points_view_1", "true depth, identity pose",
      "points_view_1_true_depth_identity_pose"),
+    ("View-2 points in frame 1, median room", "points_view_1_median", "", ""),
     ("Rotation error, median (degrees)", "pose_rotation_median", "", ""),
     ("Direction error, median (degrees)", "pose_direction_median", "", ""),
     ("Right pose (5 / 15 degrees), overlap >= 30 %", "pose_right_share", "", ""),
@@ -19,6 +22,7 @@ _MEASURES = (
     ("Presence F1", "presence_f1", "always found", "presence_f1_always_found"),
     ("IoU of plain names", "name_iou", "", ""),
     ("IoU of other words for them", "paraphrase_iou", "", ""),
+    ("IoU of other words as a share of the names'", "paraphrase_share", "", ""),
     ("Network, seconds for two photos", "seconds", "", ""),
 )  # fmt: skip
 _METHODS = {
