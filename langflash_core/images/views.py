@@ -179,4 +179,4 @@ def _assumption(assumed: list[str], total: int) -> str:
     whose = "the photos do" if len(assumed) == total > 1 else f"{' and '.join(assumed)} do"
     whose = f"{assumed[0]} does" if len(assumed) == 1 else whose
     assumption = f"assumed field of view {ASSUMED_FOV:g} degrees"
-    return f"{assumption}, {whose} not record the lens; give --fov if you know it"
+    return f"{assumption}, {whose} not record the lens; on the command line, --fov tells it"
