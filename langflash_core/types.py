@@ -115,7 +115,8 @@ class Prediction:
     gaussians: N = V*H*W of them, order (v h w), world = view 0, network length units.
     weights: (V, K, H, W) softmax over the K surviving groups (K may be 0).
     dictionary: (K, C) unit rows. viewmats (V, 4, 4). depths (V, H, W), z, same unit.
-    confidences (V, H, W) in [0, 1]. timings: seconds per stage, in order.
+    confidences (V, H, W) in [0, 1]. unplaced: views whose pose is not known (view 0's stands in).
+    timings: seconds per stage, in order.
     """
 
     gaussians: Gaussians
@@ -125,6 +126,7 @@ class Prediction:
     viewmats: Tensor
     depths: Tensor
     confidences: Tensor
+    unplaced: tuple[int, ...] = ()
     warnings: tuple[str, ...] = ()
     timings: dict[str, float] = field(default_factory=dict)
 

@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -33,7 +33,7 @@ from langflash_core.network.poses import PoseInput, Poses, estimate_poses
 from langflash_core.network.presets import Preset
 from langflash_core.network.refiner import DepthRefiner
 from langflash_core.network.splitting import split_groups
-from langflash_core.types import Gaussians, Prediction, Views
+from langflash_core.types import Prediction, Views
 
 Progress = Callable[[str, float], None]
 STAGES = (
@@ -114,7 +114,6 @@ class LangFlashNet(nn.Module):
         with run.stage("Gaussians"):
             raw = self.gaussian_head(levels, images)
             gaussians = assemble_gaussians(raw[0], images[0], maps, viewmats[0], Ks[0])
-            gaussians = _without(gaussians, poses.guessed, views.num_views)
         with run.stage("language features"):
             features = self.language_head(tokens)
         with run.stage("grouping"):
@@ -130,6 +129,7 @@ class LangFlashNet(nn.Module):
             viewmats=viewmats[0],
             depths=maps.depths,
             confidences=maps.confidences,
+            unplaced=poses.guessed,
             warnings=tuple(_guess_warning(views.names[v]) for v in poses.guessed),
             timings=run.timings,
         )
@@ -184,14 +184,6 @@ def _grey(views: Views, view: int) -> np.ndarray:
         return grey
     rgb = (views.images[view].movedim(0, -1).cpu().numpy() * 255).round().astype(np.uint8)
     return cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
-
-
-def _without(gaussians: Gaussians, hidden: tuple[int, ...], num_views: int) -> Gaussians:
-    """Gaussians (V*H*W) of which those of some views are transparent: where a photo belongs is not
-    known, and drawn in the wrong place it would hide what is right."""
-    opacities = gaussians.opacities.unflatten(0, (num_views, -1)).clone()
-    opacities[list(hidden)] = 0
-    return replace(gaussians, opacities=opacities.flatten())
 
 
 def _guess_warning(name: str) -> str:

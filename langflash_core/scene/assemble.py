@@ -1,6 +1,7 @@
 """From a network's `Prediction` to a `Scene`: one unit of length, sparse weights, no bad numbers."""
 
 import time
+from dataclasses import replace
 
 import torch
 from torch import Tensor
@@ -16,6 +17,9 @@ MIN_SCALE = 1e-7  # scene units; below it a covariance is singular in float32
 
 def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: str = "mini") -> Scene:
     """A scene in scene units: the mean distance of view 0's points from its camera is 1.
+
+    Views that the prediction could not place are left out, photo and all: in the wrong place
+    their surfaces would hide what is right, and their depths would speak against it.
 
     Args:
         prediction: N = V*H*W Gaussians in the order (v h w); may hold non-finite ones.
@@ -39,6 +43,8 @@ def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: st
             f"gaussians: expected {num_views * height * width} of {views.num_views} views, "
             f"received {num_predicted} of {num_views}"
         )
+    prediction, views = _placed(prediction, views)
+    num_views, num_predicted = views.num_views, len(prediction.gaussians)
     if not bool(torch.isfinite(prediction.viewmats).all()):
         raise ValueError("viewmats: expected finite poses, received others")
     unit = mean_distance(prediction.gaussians.means[: height * width], prediction.viewmats[0])
@@ -72,6 +78,35 @@ def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: st
     )
     timings = {**prediction.timings, "assembly": time.perf_counter() - start}
     return scene.with_metadata(timings=timings)
+
+
+def _placed(prediction: Prediction, views: Views) -> tuple[Prediction, Views]:
+    """Both without the views of unknown pose."""
+    keep = [v for v in range(views.num_views) if v not in prediction.unplaced]
+    if len(keep) == views.num_views:
+        return prediction, views
+
+    def kept(values: Tensor) -> Tensor:
+        return values.unflatten(0, (views.num_views, -1))[keep].flatten(0, 1)
+
+    return (
+        replace(
+            prediction,
+            gaussians=prediction.gaussians.map(kept),
+            weights=prediction.weights[keep],
+            viewmats=prediction.viewmats[keep],
+            depths=prediction.depths[keep],
+            confidences=prediction.confidences[keep],
+            unplaced=(),
+        ),
+        replace(
+            views,
+            images=views.images[keep],
+            Ks=views.Ks[keep],
+            names=tuple(views.names[v] for v in keep),
+            sources=tuple(views.sources[v] for v in keep) if views.sources else (),
+        ),
+    )
 
 
 def mean_distance(means: Tensor, viewmat: Tensor) -> float:

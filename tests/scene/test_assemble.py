@@ -136,3 +136,21 @@ def test_no_group_survived():
     )
     check_scene(scene)
     assert scene.semantics.num_atoms == 0 and scene.semantics.weight_ids.shape == (2 * 14 * 14, 0)
+
+
+def test_a_view_without_a_place_leaves_no_trace():
+    """Three photos of which the middle one is lost: the scene is that of the other two."""
+    prediction, views = wall_prediction(num_views=3)
+    lost = replace(
+        prediction, unplaced=(1,), depths=prediction.depths * torch.tensor([1.0, 9, 1])[:, None, None]
+    )
+    scene = assemble(lost, views)
+    check_scene(scene)
+    per_view = views.size[0] * views.size[1]
+    assert scene.num_views == 2 and scene.metadata["photos"] == ["0.jpg", "2.jpg"]
+    assert scene.photos == (views.sources[0], views.sources[2])
+    assert scene.metadata["gaussians_per_view"] == [per_view, per_view]  # nothing was "seen through"
+    assert torch.allclose(scene.viewmats[1, :3, :3], prediction.viewmats[2, :3, :3])
+    rows = torch.cat((torch.arange(per_view), torch.arange(2 * per_view, 3 * per_view)))
+    unit = scene.metadata["network_unit"]
+    assert torch.allclose(scene.gaussians.means * unit, prediction.gaussians.means[rows], atol=1e-5)

@@ -58,7 +58,9 @@ def _calibrate(args: Namespace, out: TextIO) -> None:
 
 def _photos(args: Namespace, out: TextIO) -> None:
     if len(args.photos) % 2:
-        raise InputError(f"{len(args.photos)} photos do not make pairs; give first and second in turn")
+        raise InputError(
+            f"photos come in pairs, but these are {len(args.photos)}; give first and second in turn"
+        )
     photos = [readable_file(path, "photo", ImageError) for path in args.photos]
     check_output_file(args.output, (".png",))
     from app.cli.sheet import PROMPTS, pair_sheet
@@ -71,4 +73,4 @@ def _photos(args: Namespace, out: TextIO) -> None:
     sheet.save(stream, "PNG", optimize=True)
     make_folder(args.output.parent)
     write_atomically(args.output, stream.getvalue())
-    print(f"{args.output}: {len(pairs)} pairs", file=out)
+    print(f"{args.output}: {len(pairs)} pair{'s' * (len(pairs) > 1)}", file=out)

@@ -38,7 +38,7 @@ def test_between_runs_from_one_pose_to_the_other():
 def test_a_pair_fills_a_sheet(run, tmp_path):
     sheet = tmp_path / "sheet.png"
     outcome = run("eval", "photos", *PAIR, "-o", sheet, "--prompt", "plant", "trombone")
-    assert outcome.code == 0 and "1 pairs" in outcome.out
+    assert outcome.code == 0 and "1 pair" in outcome.out
     with Image.open(sheet) as picture:
         pixels = np.asarray(picture.convert("RGB")).astype(int)
         assert picture.width % 8 == 0 and 240 < picture.height < 300  # eight cells in one row
@@ -51,7 +51,7 @@ def test_a_pair_fills_a_sheet(run, tmp_path):
 @pytest.mark.parametrize(
     ("words", "hint"),
     [
-        ([PAIR[0], "-o", "sheet.png"], "1 photos do not make pairs"),
+        ([PAIR[0], "-o", "sheet.png"], "photos come in pairs, but these are 1"),
         ([PAIR[0], "gone.png", "-o", "sheet.png"], "no photo at gone.png"),
         ([*PAIR, "-o", "sheet.txt"], "sheet.txt"),
         ([*PAIR, "-o", "sheet.png", "--prompt", " "], "prompt is empty"),
