@@ -55,5 +55,6 @@ def run(args: Namespace, out: TextIO) -> None:
 def _sentence(path: Path, scene, document: dict) -> str:
     return (
         f"{path}: {len(scene.gaussians):,} Gaussians in {scene.semantics.num_atoms} groups from "
-        f"{scene.num_views} view{'s' * (scene.num_views > 1)}, {document['file_bytes'] / 1e6:.1f} MB, {document['seconds']:.1f} s"
+        f"{scene.num_views} view{'s' * (scene.num_views > 1)}, "
+        f"{document['file_bytes'] / 1e6:.1f} MB, {document['seconds']:.1f} s"
     )
