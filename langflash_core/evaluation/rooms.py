@@ -12,7 +12,7 @@ import logging
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -411,9 +411,12 @@ def _rendered(
     atoms = prediction.weights.shape[1]
     weights = prediction.weights.permute(0, 2, 3, 1).flatten(0, 2)
     exact = masks.permute(0, 2, 3, 1).flatten(0, 2)
-    colours = view_colours(prediction.gaussians, camera)
+    opacities = prediction.gaussians.opacities.unflatten(0, (len(prediction.viewmats), -1)).clone()
+    opacities[list(prediction.unplaced)] = 0  # a scene leaves such photos out
+    gaussians = replace(prediction.gaussians, opacities=opacities.flatten())
     with torch.no_grad():
-        layers, _ = rasterize(prediction.gaussians, torch.cat((colours, weights, exact), 1), camera)
+        colours = view_colours(gaussians, camera)
+        layers, _ = rasterize(gaussians, torch.cat((colours, weights, exact), 1), camera)
     layers = layers.permute(2, 0, 1)
     return layers[:3].permute(1, 2, 0), layers[3 : 3 + atoms], layers[3 + atoms :]
 
