@@ -1,9 +1,12 @@
 """The frozen local features against their published form, batch norms and all."""
 
 import torch
+from safetensors.torch import save_file
 from torch import nn
 from torch.nn import functional as F
 
+from langflash_core.network import MINI, initial_network
+from langflash_core.network.checkpoints import adopt_frozen
 from langflash_core.network.depth import resize
 from langflash_core.network.local import DIM, LocalFeatures, convert
 
@@ -75,3 +78,19 @@ def test_folded_norms_change_nothing():
 
 def test_a_blank_picture_gives_finite_descriptors():
     assert torch.isfinite(LocalFeatures().eval()(torch.full((1, 3, 56, 70), 0.5))).all()
+
+
+def test_published_weights_become_a_file_to_start_from(untrained, tmp_path):
+    torch.manual_seed(0)
+    published = Published()
+    save_file(published.tensors, tmp_path / "xfeat.safetensors")
+    save_file(untrained.encoder.vit.state_dict(), tmp_path / "vit.safetensors")
+    out = tmp_path / "start.safetensors"
+    adopt_frozen(MINI, tmp_path / "vit.safetensors", tmp_path / "xfeat.safetensors", out)
+    network = initial_network(MINI, out)
+    images = torch.rand(1, 3, 56, 70)
+    alike = F.cosine_similarity(network.local(images), published(images)).mean()
+    assert alike > 0.99  # int8 rows
+    key = "blocks.3.attn.qkv.bias"
+    own, given = (n.encoder.vit.state_dict()[key] for n in (network, untrained))
+    torch.testing.assert_close(own, given, rtol=1e-3, atol=1e-6)  # float16
