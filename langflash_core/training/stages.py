@@ -47,6 +47,8 @@ PIXELS_PER_PICTURE = 512
 """Pixels that the language stage draws from one picture, balanced over its instances."""
 CONTRAST_PIXELS = 768
 """Pixels per scene that the grouping stage compares with each other."""
+TOKEN_DROPOUT = 0.15
+"""Share of token channels that the language stage hides in a picture."""
 MIN_GROUP_PIXELS = 12
 """Instances with fewer pixels over all views (at the mask map's sampled size) are not groups."""
 GAUSSIAN_STRIDE = 2
@@ -201,9 +203,12 @@ def novel_views(network: LangFlashNet, batch: SceneBatch) -> list[tuple[Tensor, 
 def language_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
     """L(x) against the sampled phrase of each pixel's instance; pixels are drawn class-balanced.
 
-    The last layer runs on the drawn pixels only: it is linear per pixel, so nothing changes.
+    What follows the last 3x3 convolution runs on the drawn pixels only: it is per pixel, so
+    nothing changes. Channels of the tokens are dropped, so that the head names things by more
+    than what gives away one piece of furniture.
     """
-    hidden = language_hidden(network.language_head, batch.tokens)  # (B*V, F, h, w)
+    tokens = thinned(_tokens(batch), TOKEN_DROPOUT, words.generator)
+    hidden = language_hidden(network.language_head, tokens)  # (B*V, F, h, w)
     scenes = [words.sampler.draw(labels, words.generator) for labels in batch.labels]
     bank = phrase_bank(torch.cat(scenes), words)
     features, rows, true = [], [], []
@@ -218,7 +223,7 @@ def language_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Lo
             rows.append(scenes[b][named])
             true.append(holds[named])
     last = network.language_head.out
-    vectors = F.linear(torch.cat(features), last.weight[:, :, 0, 0], last.bias)
+    vectors = F.linear(F.gelu(torch.cat(features)), last.weight[:, :, 0, 0], last.bias)
     texts = words.sampler.table.embeddings.to(vectors.device)
     targets = texts[torch.cat(rows).to(vectors.device)]
     total = language_loss(
@@ -228,16 +233,19 @@ def language_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Lo
     return Loss(total, _numbers(cosine=cosine.mean()))
 
 
-def language_hidden(head: LanguageHead, tokens: Tokens | None) -> Tensor:
-    """What the language head holds before its last, per-pixel layer: (B*V, F, 4h, 4w).
+def thinned(tokens: Tokens, share: float, generator: torch.Generator) -> Tokens:
+    """Tokens with `share` of each view's channels set to 0 and the rest scaled up, hook by hook."""
+    hooks = []
+    for hook in tokens.hooks:
+        kept = torch.rand(*hook.shape[:2], 1, hook.shape[-1], generator=generator) >= share
+        hooks.append(hook * (kept.to(hook) / (1 - share)))
+    return replace(tokens, hooks=tuple(hooks))
 
-    Raises:
-        ValueError: the batch came without tokens.
-    """
-    if tokens is None:
-        raise ValueError("tokens: expected cached tokens, received none; cache with tokens")
+
+def language_hidden(head: LanguageHead, tokens: Tokens) -> Tensor:
+    """What the language head holds before its last activation: (B*V, F, 4h, 4w)."""
     path = head.dpt((tokens.maps(0), tokens.maps(1), tokens.maps(2), tokens.maps(3))).path_1
-    return F.gelu(head.mix(F.avg_pool2d(path, 2)))
+    return head.mix(F.avg_pool2d(path, 2))
 
 
 def phrase_bank(used: Tensor, words: Words, extra: int = 128) -> Tensor:

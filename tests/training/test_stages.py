@@ -15,6 +15,7 @@ from langflash_core.training.stages import (
     language_hidden,
     nearest,
     perturbed_poses,
+    thinned,
 )
 from langflash_core.training.validation import MEASURES, Validator
 
@@ -74,9 +75,22 @@ def test_the_drawn_pixels_read_what_the_whole_head_gives(rooms, words, network):
     with torch.no_grad():
         hidden = language_hidden(head, tokens)
         rows = hidden[1].flatten(1).T[[3, 100]]
-        vectors = F.normalize(F.linear(rows, head.out.weight[:, :, 0, 0], head.out.bias), dim=-1)
+        vectors = F.normalize(F.linear(F.gelu(rows), head.out.weight[:, :, 0, 0], head.out.bias), dim=-1)
         whole = head(tokens)[1, 0].flatten(1).T[[3, 100]]
     torch.testing.assert_close(vectors, whole, atol=1e-5, rtol=1e-4)  # float32, another order of sums
+
+
+def test_thinned_tokens_lose_whole_channels_and_keep_their_mean(rooms, words):
+    tokens = rooms.draw(2, 2, words.generator).tokens
+    ones = replace(tokens, hooks=tuple(torch.ones_like(hook) for hook in tokens.hooks))
+    thin = thinned(ones, 0.25, torch.Generator().manual_seed(0))
+    for hook in thin.hooks:
+        assert bool(((hook == 0) | (hook == 1 / 0.75)).all())
+        assert bool((hook == hook[:, :, :1]).all())  # a channel goes from every token of a view
+    # 4 hooks x 4 views x 384 channels: the mean's deviation is sqrt(.25 / .75 / 6144) = .007.
+    means = torch.stack([hook[:, :, 0].mean() for hook in thin.hooks])
+    assert abs(float(means.mean()) - 1) < 0.03
+    assert len({tuple(hook[b, v, 0].tolist()) for hook in thin.hooks for b in (0, 1) for v in (0, 1)}) == 16
 
 
 def test_pixels_are_drawn_evenly_over_instances():
