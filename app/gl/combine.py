@@ -1,4 +1,9 @@
-"""Everything computed from weight maps without touching a splat: norms, relevance, atom colours."""
+"""Everything computed from weight maps without touching a splat: norms, relevance, atom colours.
+
+The maps are packed once a view into shares of the pixel's largest weight, sixteen bits each, eight
+atoms a texel: a phrase then reads a third as many texels, of a format that is quick to read. Half
+a step, 8e-6 of the peak, moves a cosine by some 1e-5; float16 maps are 30 times coarser.
+"""
 
 from collections import Counter
 
@@ -10,8 +15,12 @@ from langflash_core.query.relevance import EMPTY_NORM, CompiledQuery
 from .programs import Programs, set_uniforms
 from .targets import ADDED, MAXIMUM, LayerTarget, drawing
 
-_MAX_LAYERS = 340  # 1,020 atoms: 1,020 of the 1,024 uniform vec4s every OpenGL 3.3 has
-_BLOCKS = 4  # of four components of |F|^2 a pass, where the uniforms suffice
+_CAPACITIES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 120)  # few, so that few programs are compiled
+_UNIFORMS = 960  # of the 1,024 vec4s that drivers have
+_PACKED = 8  # atoms a texel
+_PHRASES = 4  # a layer of relevance
+_MAX_COLUMNS = 16  # of |F|^2 a pass
+_STEPS = 65535
 
 
 class Screen:
@@ -32,29 +41,29 @@ class Screen:
         self._vaos.clear()
 
 
-def layer_capacity(num_layers: int) -> int:
-    """Uniform array length for so many layers: a few sizes, so that few programs are compiled.
+def layer_capacity(num_atoms: int) -> int:
+    """Texels that so many atoms are given: a few sizes only.
 
     Raises:
         ValueError: more atoms than a shader's uniforms hold.
     """
-    if num_layers > _MAX_LAYERS:
-        raise ValueError(f"atoms in view: expected at most {3 * _MAX_LAYERS}, received {3 * num_layers}")
-    return next(size for size in (8, 16, 48, _MAX_LAYERS // _BLOCKS, _MAX_LAYERS) if num_layers <= size)
+    if num_atoms > _PACKED * _CAPACITIES[-1]:
+        raise ValueError(f"atoms in view: expected at most {_PACKED * _CAPACITIES[-1]}, received {num_atoms}")
+    return next(size for size in _CAPACITIES if num_atoms <= _PACKED * size)
 
 
 def pack_columns(columns: np.ndarray, capacity: int) -> np.ndarray:
-    """(Ka, up to 4) to the (3 * capacity, 4) floats of `columns` in combine.glsl."""
-    packed = np.zeros((3 * capacity, 4), np.float32)
-    packed[: columns.shape[0], : columns.shape[1]] = columns
-    return packed
+    """(Ka, n) to the (2 * capacity * n, 4) floats of `columns` in combine.glsl."""
+    padded = np.zeros((_PACKED * capacity, columns.shape[1]), np.float32)
+    padded[: len(columns)] = columns / _STEPS
+    return padded.reshape(2 * capacity, 4, -1).transpose(0, 2, 1).reshape(-1, 4)
 
 
 class QueryPasses:
     """Relevance of a compiled query over one set of weight maps.
 
-    Three cached steps: |F|^2 (per view and dictionary), the best negative's cosine (per set of
-    negatives), relevance (per prompts). Only what changed is drawn.
+    Cached steps: packing (per view), |F|^2 (per dictionary), its inverse root and the best
+    negative's cosine (per set of negatives), relevance (per prompts). Only what changed is drawn.
     """
 
     def __init__(
@@ -70,10 +79,13 @@ class QueryPasses:
         self._screen = screen
         self._size = size
         self._passes = passes
-        self._squares = ctx.texture(size, 1, dtype="f4")
-        self._largest = ctx.texture(size, 1, dtype="f4")
+        self._squares = ctx.texture(size, 2, dtype="f4")
+        self._scales = ctx.texture(size, 2, dtype="f4")
+        self._peaks = ctx.texture(size, 1, dtype="f4")
+        self._peaks_target = ctx.framebuffer([self._peaks])
         self._squares_target = ctx.framebuffer([self._squares])
-        self._largest_target = ctx.framebuffer([self._largest])
+        self._scales_target = ctx.framebuffer([self._scales])
+        self._packed: LayerTarget | None = None
         self.relevance: LayerTarget | None = None
         self._keys: dict[str, tuple] = {}
 
@@ -89,7 +101,7 @@ class QueryPasses:
         factor = compiled.factor.detach().cpu().double().numpy()[atoms]  # (Ka, r)
         prompts = compiled.prompts.detach().cpu().double().numpy()
         negatives = compiled.negatives.detach().cpu().double().numpy()
-        num_groups = max(1, -(-len(prompts) // 4))
+        num_groups = max(1, -(-len(prompts) // _PHRASES))
         if self.relevance is None or self.relevance.num_layers != num_groups:
             self._drop_relevance()
             self.relevance = LayerTarget(self._ctx, self._size, num_groups, "f4")
@@ -97,14 +109,16 @@ class QueryPasses:
             for group in range(num_groups):
                 self.relevance.layers(group, 1).clear()
             return self.relevance
+        self._pack(weights, len(atoms), version)
         if self._stale("norm", (version, factor.tobytes())):
-            self._norms(weights, factor)
+            self._norms(factor)
+            self._keys.pop("scales", None)
+        if self._stale("scales", (version, negatives.tobytes())):
+            self._scale(factor @ negatives.T)
+            self._keys.pop("prompts", None)
         temperature = float(compiled.temperature) if compiled.mode == "relevancy" else 0.0
-        if temperature and self._stale("negatives", (version, negatives.tobytes())):
-            self._negatives(weights, factor @ negatives.T)
-        key = (version, temperature, factor.tobytes(), prompts.tobytes(), negatives.tobytes())
-        if self._stale("prompts", key):
-            self._relevance(weights, factor @ prompts.T, temperature)
+        if self._stale("prompts", (version, temperature, prompts.tobytes())):
+            self._relevance(factor @ prompts.T, temperature)
         return self.relevance
 
     def _stale(self, name: str, key: tuple) -> bool:
@@ -112,62 +126,89 @@ class QueryPasses:
         self._keys[name] = key
         return changed
 
-    def _program(
-        self, weights: LayerTarget, num_atoms: int, fragment: str, defines: dict[str, float] | None = None
-    ) -> tuple[moderngl.Program, int]:
+    def _pack(self, weights: LayerTarget, num_atoms: int, version: int) -> None:
+        """The weight maps as shares of their peaks, once for each version of them."""
+        if not self._stale("packed", (version,)):
+            return
+        chunks = -(-num_atoms // 24)
+        needed = max(3 * chunks, layer_capacity(num_atoms))
+        if self._packed is None or self._packed.num_layers < needed:
+            self._drop_packed()
+            self._packed = LayerTarget(self._ctx, self._size, needed, "u4")
         num_layers = -(-num_atoms // 3)
-        capacity = layer_capacity(num_layers)
-        program = self._programs.get("screen.vert", fragment, {"MAX_LAYERS": capacity, **(defines or {})})
         weights.array.use(0)
-        set_uniforms(program, weight_maps=0, num_layers=num_layers, first_layer=0)
-        return program, capacity
+        self._peaks.use(1)
+        program = self._programs.get("screen.vert", "peak.frag")
+        set_uniforms(program, weight_maps=0, num_layers=num_layers)
+        with drawing(self._peaks_target):
+            self._screen.draw(program)
+        program = self._programs.get("screen.vert", "pack.frag")
+        for chunk in range(chunks):
+            set_uniforms(program, weight_maps=0, peaks=1, first_layer=8 * chunk, num_layers=num_layers)
+            with drawing(self._packed.layers(3 * chunk, 3)):
+                self._screen.draw(program)
+        self._passes["pack"] += 1
 
-    def _norms(self, weights: LayerTarget, factor: np.ndarray) -> None:
-        """|W R|^2. R = L Q with triangular L, so column j needs no atom before j."""
-        blocks = _BLOCKS if -(-len(factor) // 3) <= _MAX_LAYERS // _BLOCKS else 1
-        program, capacity = self._program(weights, len(factor), "norm.frag", {"BLOCKS": blocks})
+    def _program(self, fragment: str, columns: np.ndarray, first_layer: int = 0, **defines: float):
+        """The program that combines `columns` (Ka, n) of the atoms from `first_layer` on, ready to draw."""
+        assert self._packed is not None
+        capacity = layer_capacity(len(columns))
+        settings = {"LAYERS": capacity, "COLUMNS": columns.shape[1], **defines}
+        program = self._programs.get("screen.vert", fragment, settings)
+        self._packed.array.use(0)
+        set_uniforms(program, packed_maps=0, first_layer=first_layer, columns=pack_columns(columns, capacity))
+        return program
+
+    def _norms(self, factor: np.ndarray) -> None:
+        """|w R|^2. R = L Q with triangular L, so column j needs no atom before j."""
         triangular = np.asarray(np.linalg.qr(factor.T, mode="r")).T  # (Ka, min(Ka, r))
+        together = _UNIFORMS // (2 * layer_capacity(len(factor)))
+        width = min(_MAX_COLUMNS, 1 << (together.bit_length() - 1))
+        self._peaks.use(1)
         self._squares_target.clear()
         with drawing(self._squares_target, ADDED):
-            for start in range(0, triangular.shape[1], 4 * blocks):
-                parts = np.split(triangular[:, start : start + 4 * blocks], range(4, 4 * blocks, 4), axis=1)
-                columns = np.concatenate([pack_columns(part, capacity) for part in parts])
-                set_uniforms(program, columns=columns, first_layer=start // 3)
+            for start in range(0, triangular.shape[1], width):
+                first = start // _PACKED
+                columns = triangular[_PACKED * first :, start : start + width]
+                columns = np.pad(columns, ((0, 0), (0, width - columns.shape[1])))
+                program = self._program("norm.frag", columns, first)
+                set_uniforms(program, peaks=1, with_peak=float(start == 0))
                 self._screen.draw(program)
         self._passes["norm"] += 1
 
-    def _negatives(self, weights: LayerTarget, dots: np.ndarray) -> None:
-        program, capacity = self._program(
-            weights, len(dots), "relevance.frag", {"LARGEST": 1, "EMPTY_NORM": EMPTY_NORM}
-        )
+    def _scale(self, dots: np.ndarray) -> None:
+        """1 / |w R| and the largest of the negatives' cosines (Ka, M); of none where M = 0."""
+        groups = range(0, max(1, dots.shape[1]), _PHRASES)
         self._squares.use(1)
-        set_uniforms(program, square_norms=1)
-        self._largest_target.clear(-1.0, -1.0, -1.0, -1.0)
-        with drawing(self._largest_target, ADDED, MAXIMUM):
-            for group in range(0, dots.shape[1], 4):
-                block = dots[:, group : group + 4]
-                block = np.concatenate((block, np.repeat(block[:, :1], 4 - block.shape[1], 1)), 1)
-                set_uniforms(program, columns=pack_columns(block, capacity))
+        self._scales_target.clear(0.0, -1.0)
+        with drawing(self._scales_target, ADDED, MAXIMUM):
+            for group in groups:
+                block = dots[:, group : group + _PHRASES]
+                filler = block[:, :1] if block.shape[1] else np.zeros((len(dots), 1))
+                block = np.concatenate((block, np.repeat(filler, _PHRASES - block.shape[1], 1)), 1)
+                program = self._program("scale.frag", block, EMPTY_NORM=EMPTY_NORM)
+                set_uniforms(program, squares=1)
                 self._screen.draw(program)
         self._passes["negatives"] += 1
 
-    def _relevance(self, weights: LayerTarget, dots: np.ndarray, temperature: float) -> None:
+    def _relevance(self, dots: np.ndarray, temperature: float) -> None:
         assert self.relevance is not None
-        program, capacity = self._program(weights, len(dots), "relevance.frag", {"EMPTY_NORM": EMPTY_NORM})
-        self._squares.use(1)
-        self._largest.use(2)
-        set_uniforms(program, square_norms=1, negatives=2, temperature=temperature)
+        self._scales.use(1)
         for group in range(self.relevance.num_layers):
-            block = pack_columns(dots[:, 4 * group : 4 * group + 4], capacity)
-            set_uniforms(program, columns=block)
+            program = self._program("relevance.frag", dots[:, _PHRASES * group : _PHRASES * (group + 1)])
+            set_uniforms(program, scales=1, temperature=temperature)
             with drawing(self.relevance.layers(group, 1)):
                 self._screen.draw(program)
         self._passes["query"] += 1
 
-    def paint_atoms(self, weights: LayerTarget, colours: np.ndarray, target: moderngl.Framebuffer) -> None:
+    def paint_atoms(
+        self, weights: LayerTarget, colours: np.ndarray, version: int, target: moderngl.Framebuffer
+    ) -> None:
         """sum_k W_k c_k into `target` for colours (Ka, 3) of the atoms in `weights`."""
-        program, capacity = self._program(weights, len(colours), "show_atoms.frag")
-        set_uniforms(program, columns=pack_columns(colours, capacity))
+        self._pack(weights, len(colours), version)
+        program = self._program("show_atoms.frag", colours)
+        self._peaks.use(1)
+        set_uniforms(program, peaks=1)
         with drawing(target):
             self._screen.draw(program)
 
@@ -177,7 +218,20 @@ class QueryPasses:
         self.relevance = None
         self._keys.pop("prompts", None)
 
+    def _drop_packed(self) -> None:
+        if self._packed is not None:
+            self._packed.release()
+        self._packed = None
+
     def release(self) -> None:
         self._drop_relevance()
-        for owned in (self._squares_target, self._largest_target, self._squares, self._largest):
+        self._drop_packed()
+        for owned in (
+            self._squares_target,
+            self._scales_target,
+            self._peaks_target,
+            self._squares,
+            self._scales,
+            self._peaks,
+        ):
             owned.release()

@@ -330,7 +330,7 @@ class SplatRenderer:
         assert self._query is not None
         into.clear(0.0, 0.0, 0.0, 1.0)
         if len(self._atoms) and self._weights is not None:
-            self._query.paint_atoms(self._weights, self._atom_colours[self._atoms], into)
+            self._query.paint_atoms(self._weights, self._atom_colours[self._atoms], self._version, into)
 
     def _read_weights(self, height: int, width: int) -> np.ndarray:
         self._ensure_weights()

@@ -1,23 +1,20 @@
 #version 330 core
-// Purpose: 4 * BLOCKS more components of |F|^2 = |W R|^2, added up by blending.
+// Purpose: COLUMNS more components of |F|^2 / peak^2 = |w R|^2, added up by blending; the peak beside them.
 // Source: D = R Q with orthonormal Q, blueprint section 1; R is made triangular, so late columns skip layers.
-// Frames: texel = pixel. One fetch of a layer serves all components of the pass.
+// Frames: texel = pixel.
 
-uniform sampler2DArray weight_maps;
-uniform mat3x4 columns[BLOCKS * MAX_LAYERS];  // block by block, as in combine.glsl
-uniform int first_layer;
-uniform int num_layers;
+#include "combine.glsl"
 
-out float out_square;
+uniform sampler2D peaks;
+uniform float with_peak;   // 1 in the first pass, 0 in the others
+
+out vec2 out_square_peak;
 
 void main() {
-    vec4 parts[BLOCKS];
-    for (int block = 0; block < BLOCKS; ++block) parts[block] = vec4(0.0);
-    for (int layer = first_layer; layer < num_layers; ++layer) {
-        vec3 weights = texelFetch(weight_maps, ivec3(gl_FragCoord.xy, layer), 0).rgb;
-        for (int block = 0; block < BLOCKS; ++block)
-            parts[block] += columns[block * MAX_LAYERS + layer] * weights;
-    }
-    out_square = 0.0;
-    for (int block = 0; block < BLOCKS; ++block) out_square += dot(parts[block], parts[block]);
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    float parts[COLUMNS];
+    combine(pixel, parts);
+    float square = 0.0;
+    for (int column = 0; column < COLUMNS; ++column) square += parts[column] * parts[column];
+    out_square_peak = vec2(square, with_peak * texelFetch(peaks, pixel, 0).r);
 }

@@ -1,32 +1,24 @@
 #version 330 core
-// Purpose: cosine of the pixel's feature with four phrases, or their relevancy against the best negative.
+// Purpose: cosine of the pixel's feature with up to four phrases, or their relevancy against the best negative.
 // Source: Kerr et al. 2023 (LERF); twin langflash_core/query/relevance.py. The smallest pairwise softmax is
-//         the sigmoid against the largest negative. EMPTY_NORM is set by the program.
+//         the sigmoid against the largest negative.
 
 #include "combine.glsl"
 
-uniform sampler2D square_norms;  // |F|^2
-uniform sampler2D negatives;     // largest cosine over the negatives
-uniform float temperature;       // 0: cosine mode
+uniform sampler2D scales;    // 1 / |w R| or 0 where empty, largest cosine of the negatives
+uniform float temperature;   // 0: cosine mode
 
-#ifdef LARGEST
-out float out_largest;           // of four phrases; MAX blending goes over the groups
-#else
 out vec4 out_relevance;
-#endif
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-    float norm = sqrt(texelFetch(square_norms, pixel, 0).r);
-    bool empty = norm < EMPTY_NORM;
-    vec4 cosines = empty ? vec4(0.0) : clamp(combine(pixel) / norm, -1.0, 1.0);
-#ifdef LARGEST
-    out_largest = max(max(cosines.x, cosines.y), max(cosines.z, cosines.w));
-#else
-    if (temperature > 0.0) {
-        float negative = texelFetch(negatives, pixel, 0).r;
-        cosines = 1.0 / (1.0 + exp(clamp(temperature * (negative - cosines), -80.0, 80.0)));
+    vec2 scale = texelFetch(scales, pixel, 0).rg;
+    float dots[COLUMNS];
+    combine(pixel, dots);
+    out_relevance = vec4(0.0);
+    for (int column = 0; column < COLUMNS; ++column) {
+        float value = clamp(scale.x * dots[column], -1.0, 1.0);
+        if (temperature > 0.0) value = 1.0 / (1.0 + exp(clamp(temperature * (scale.y - value), -80.0, 80.0)));
+        out_relevance[column] = scale.x > 0.0 ? value : 0.0;
     }
-    out_relevance = empty ? vec4(0.0) : cosines;
-#endif
 }

@@ -79,8 +79,10 @@ def test_weight_maps_and_relevance(gl, precision, num_atoms, kept):
         assert relevance.shape == (5, 48, 64)
         assert (relevance - truth).abs().mean() <= RELEVANCE_ERROR[precision]
         twin = relevance_maps(maps.double(), compiled)
-        # The same maps: only float32 sums differ, times the temperature.
-        assert (relevance - twin).abs().max() <= 5e-5
+        # The same maps in sixteen bits: half a step of 8e-6 on each of K shares turns a mixed vector by up to
+        # 8e-6 sqrt(K) / |w R|, here some 3e-5, times temperature / 4; on average a tenth of that.
+        assert (relevance - twin).abs().max() <= 2e-4
+        assert (relevance - twin).abs().mean() <= 2e-5
     renderer.release()
 
 
