@@ -7,8 +7,10 @@
 #include "harmonics.glsl"
 
 in vec4 in_mean;   // xyz world, w opacity
-in vec4 in_quat;   // wxyz, any norm
+in vec4 in_quat;   // wxyz, unit
 in vec3 in_scale;  // standard deviations, world
+
+const float HALF_MAX = 65504.0;  // of float16: sums of T alpha c stay finite in every target
 
 uniform mat4 viewmat;      // world to camera
 uniform vec3 eye;          // camera centre, world
@@ -27,5 +29,5 @@ void main() {
     float opacity = in_mean.w;
     out_place = vec4(pos_c.xy / pos_c.z * pinhole.xy + pinhole.zw, opacity, pos_c.z);
     out_shape = vec4(root, sqrt(2.0 * log(max(opacity / ALPHA_MIN, 1.0))));
-    out_colour = sh_colour(normalize(in_mean.xyz - eye));
+    out_colour = min(sh_colour(normalize(in_mean.xyz - eye)), HALF_MAX);
 }
