@@ -27,6 +27,11 @@ def bound_framebuffer(ctx: moderngl.Context) -> moderngl.Framebuffer:
     return ctx.fbo
 
 
+def context_lives(ctx: moderngl.Context) -> bool:
+    """Whether the context can still be called: releasing it takes its inside away."""
+    return hasattr(ctx.mglo, "enable_only")
+
+
 def gl_function(ctx: moderngl.Context, name: str, result: type | None, *arguments: type) -> Callable:
     """An OpenGL function that moderngl does not wrap, from the loader of the context itself.
 
