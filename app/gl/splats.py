@@ -114,7 +114,10 @@ class SplatBuffers:
             focal, principal = K[axis, axis], K[axis, 2]
             steepest = (max(principal, extent - principal) + TAN_MARGIN * 0.5 * extent) / focal
             bound += focal * focal * (1 + steepest * steepest)
-        deviations = np.sqrt(np.square(self._widest * inverse) * np.float32(bound) + np.float32(DILATION))
+        rounding = np.float32(1e-6 * np.abs(viewmat[:3, 3]).max())  # of places far from the origin
+        deviations = np.sqrt(
+            np.square((self._widest + rounding) * inverse) * np.float32(bound) + np.float32(DILATION)
+        )
         radius = np.float32(math.sqrt(2 * math.log(1 / ALPHA_MIN))) * deviations + np.float32(1)
         for axis, extent in enumerate(sizes):
             pos_c = self._means @ viewmat[axis, :3].astype(np.float32) + np.float32(viewmat[axis, 3])
@@ -139,10 +142,12 @@ class SplatBuffers:
         )
         viewmat = camera.viewmat.detach().cpu().double().numpy()
         K = camera.K.detach().cpu().double().numpy()
+        eye = -viewmat[:3, :3].T @ viewmat[:3, 3]
         set_uniforms(
             program,
             viewmat=viewmat.T,
-            eye=-viewmat[:3, :3].T @ viewmat[:3, 3],
+            eye=eye,
+            eye_rest=eye - eye.astype(np.float32),
             pinhole=np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2]]),
             image_size=(float(camera.width), float(camera.height)),
         )

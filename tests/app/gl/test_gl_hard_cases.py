@@ -214,6 +214,20 @@ def test_nothing_nearer_than_near(gl, precision):
     renderer.release()
 
 
+@pytest.mark.parametrize("away", [100.0, 1e4, 1e5])
+def test_a_scene_far_from_its_origin(gl, precision, away):
+    """float32 means are coarse there, 4e-3 at 1e5; what they say is drawn as exactly as anywhere."""
+    scene = cloud(300, 0, size=0.05, dtype=torch.float32)
+    shift = torch.tensor([away, -away / 2, away / 3])
+    gaussians = dataclasses.replace(scene.gaussians, means=scene.gaussians.means + shift)
+    pose = turned(0.3, (0.0, 0.0, 0.0))
+    pose[:3, 3] = -pose[:3, :3] @ (shift.double() + torch.tensor([-0.6, 0.0, 0.1]))
+    scene, seen = scene_of(gaussians), camera(pose=pose)
+    expected = render(scene, seen)
+    assert expected.alphas.max() > 0.9
+    agree(draw(gl, precision, scene, seen), expected, precision, steps=4)  # a few layers a pixel
+
+
 @pytest.mark.parametrize("yaw", [0.0, 2.0])
 def test_depths_from_1e_3_to_1e6(gl, precision, yaw):
     """All over one another, half transparent, in no order. 1e-3 is nearer than near: not drawn."""
