@@ -68,7 +68,11 @@ def drawing(
 
 
 class ColourTarget:
-    """Premultiplied colour + alpha; beside it sum of T alpha z and of T alpha, always float32."""
+    """Premultiplied colour + alpha; beside it sum of T alpha z and of T alpha, always float32.
+
+    A float16 colour stops growing where a layer adds less than its last bit: under thousands of
+    layers of alpha 0.004, the thinnest drawn, it ends 12 % too dark, of 0.05, 1 %.
+    """
 
     def __init__(self, ctx: moderngl.Context, size: tuple[int, int], dtype: str):
         self.colour = ctx.texture(size, 4, dtype=dtype)
