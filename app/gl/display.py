@@ -151,11 +151,12 @@ def atom_colours(dictionary: np.ndarray) -> np.ndarray:
     """Colours (K, 3) in [0.1, 0.95] from the first three principal axes of the atoms (K, C).
 
     Made from the whole dictionary, so that an atom has one colour in every view. Each axis'
-    sign makes its largest entry positive.
+    sign makes its largest entry positive. An atom that is not finite counts as one of length 0.
     """
     count = dictionary.shape[0]
     if count == 0:
         return np.zeros((0, 3), np.float32)
+    dictionary = np.where(np.isfinite(dictionary).all(1, keepdims=True), dictionary, 0.0)
     centred = dictionary - dictionary.mean(0)
     left, values, _ = np.linalg.svd(centred, full_matrices=False)
     scores = np.zeros((count, 3))

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import GraphicsError
-from langflash_core.query.relevance import CompiledQuery
+from langflash_core.query.relevance import CompiledQuery, finite_atoms
 from langflash_core.splat.projection import ALPHA_MIN
 from langflash_core.types import Camera, Frame, Scene
 
@@ -23,7 +23,7 @@ from .combine import QueryPasses, Screen
 from .display import COLOUR_MAPS, Display, atom_colours
 from .programs import Programs, set_uniforms
 from .splats import SplatBuffers
-from .targets import MAX_LAYERS_AT_ONCE, PREMULTIPLIED, ColourTarget, LayerTarget, drawing
+from .targets import MAX_LAYERS_AT_ONCE, PREMULTIPLIED, ColourTarget, LayerTarget, context_lives, drawing
 
 _DTYPES = {"float16": "f2", "float32": "f4"}
 _NUMPY = {"f2": np.float16, "f4": np.float32}
@@ -90,8 +90,13 @@ class SplatRenderer:
 
     @property
     def num_dropped(self) -> int:
-        """Gaussians of the scene left out because a value was NaN or infinite."""
+        """Gaussians of the scene left out because a value or a weight was NaN or infinite."""
         return self._splats.num_dropped if self._splats else 0
+
+    @property
+    def num_dropped_atoms(self) -> int:
+        """Atoms of the scene that say nothing because a number was NaN or infinite."""
+        return int((~finite_atoms(self._scene.semantics.dictionary)).sum()) if self._scene else 0
 
     def draw(
         self, camera: Camera, background: Background = (0.0, 0.0, 0.0), weight_maps: bool = True
@@ -100,8 +105,10 @@ class SplatRenderer:
 
         Raises:
             ValueError: there is no scene, or the image has no pixels.
-            GraphicsError: the image is larger than the driver's textures.
+            GraphicsError: the image is larger than the driver's textures, or the context is gone.
         """
+        if not context_lives(self._ctx):
+            raise GraphicsError("The OpenGL context of this view is gone: open the scene again.")
         if self._splats is None:
             raise ValueError("draw: expected set_scene before, received no scene")
         self._resize(camera)
@@ -374,7 +381,13 @@ class SplatRenderer:
         self._drawn = {}
 
     def release(self) -> None:
-        """Give every GL object back; harmless twice."""
+        """Give every GL object back; harmless twice, and after the context went.
+
+        A context takes its objects along. Their names may belong to a newer context's by then,
+        which must not lose them.
+        """
+        if not context_lives(self._ctx):
+            return
         self._release_targets()
         self._release_scene()
         self._screen.release()

@@ -1,25 +1,28 @@
 """One scene's Gaussians on the GPU: sorted, projected, and their weights expanded, per camera."""
 
 import math
+from dataclasses import replace
 
 import moderngl
 import numpy as np
 
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
-from langflash_core.splat.projection import ALPHA_MIN, DILATION, NEAR, TAN_MARGIN, finite_rows
+from langflash_core.geometry.quaternions import unit_quats
+from langflash_core.splat.projection import ALPHA_MIN, DILATION, NEAR, TAN_MARGIN, drawable_rows
 from langflash_core.types import Camera, Scene
 
 from .programs import Programs, set_uniforms
 
 _ROW_TEXELS = 4096
 _PLACE_FLOATS = 11  # place (4), shape (4), colour (3)
+_WIDEST = 1e12  # scene units: wider Gaussians are flat over any view, and float32 squares end at 1e38
 
 
 class SplatBuffers:
     """Owns the vertex data of a scene; `sort` chooses and orders, `project` and `expand` fill.
 
-    Gaussians with a value that is not finite are left out (`num_dropped`), and those below
-    opacity 1/255, which no pixel can show.
+    Gaussians with a value or a weight that is not finite are left out (`num_dropped`), and those
+    below opacity 1/255, which no pixel can show.
     """
 
     def __init__(self, ctx: moderngl.Context, programs: Programs, scene: Scene):
@@ -27,16 +30,17 @@ class SplatBuffers:
         self._programs = programs
         self._owned: list = []
         gaussians = scene.gaussians.map(lambda v: v.detach().cpu().float())
-        finite = finite_rows(gaussians)
+        finite = drawable_rows(scene).cpu()
         kept = finite & (gaussians.opacities >= ALPHA_MIN)
         gaussians = gaussians.map(lambda v: v[kept])
+        gaussians = replace(gaussians, scales=gaussians.scales.clamp(-_WIDEST, _WIDEST))
         self.num_dropped = int((~finite).sum())
         self.num_gaussians = len(gaussians)
         self.order = np.zeros(0, np.uint32)
         self.depth_range = (NEAR, 1.0)
         self._means = gaussians.means.numpy()
-        self._means64 = self._means.astype(np.float64)
-        self._widest = gaussians.scales.amax(-1).numpy() if self.num_gaussians else np.zeros(0, np.float32)
+        self._coordinates = np.ascontiguousarray(self._means.T, np.float64)
+        self._widest = gaussians.scales.abs().amax(-1).numpy()
         self._ids = scene.semantics.weight_ids.cpu()[kept].numpy()
         self._values = scene.semantics.weight_values.detach().cpu().float()[kept].numpy()
         self._num_atoms = scene.semantics.num_atoms
@@ -52,7 +56,7 @@ class SplatBuffers:
         self._sh_vec4s = (3 * num_bases + 3) // 4
         sh = np.zeros((count, 4 * self._sh_vec4s), np.float32)
         sh[:, : 3 * num_bases] = gaussians.sh[:, :num_bases].flatten(1).numpy()
-        fields = (place, gaussians.quats.numpy(), gaussians.scales.numpy(), sh)
+        fields = (place, unit_quats(gaussians.quats).numpy(), gaussians.scales.numpy(), sh)
         self._vertex_buffers = [
             self._own(self._ctx.buffer(np.ascontiguousarray(f).tobytes())) for f in fields
         ]
@@ -81,12 +85,15 @@ class SplatBuffers:
     def sort(self, camera: Camera) -> None:
         """Choose the Gaussians that may touch the image and order them back to front.
 
-        z is computed in float64, as in the reference, so that both agree on near ties; of equal
-        depths the first Gaussian is in front.
+        z is computed in float64, term by term as in the reference (`view_depths`), so that both
+        agree on near ties; of equal depths the first Gaussian is in front.
         """
         viewmat = camera.viewmat.detach().cpu().double().numpy()
-        z = self._means64 @ viewmat[2, :3] + viewmat[2, 3]
-        rows = np.flatnonzero(self._may_touch(camera, viewmat, z))
+        across, down, along = self._coordinates
+        row = viewmat[2]
+        z = across * row[0] + down * row[1] + along * row[2] + row[3]
+        with np.errstate(over="ignore", invalid="ignore"):  # places beyond float32 are beside any image
+            rows = np.flatnonzero(self._may_touch(camera, viewmat, z))
         depths = z[rows]
         nearest_first = rows[stable_order(depths)]
         self.order = nearest_first[::-1].astype(np.uint32)
@@ -107,7 +114,10 @@ class SplatBuffers:
             focal, principal = K[axis, axis], K[axis, 2]
             steepest = (max(principal, extent - principal) + TAN_MARGIN * 0.5 * extent) / focal
             bound += focal * focal * (1 + steepest * steepest)
-        deviations = np.sqrt(np.square(self._widest * inverse) * np.float32(bound) + np.float32(DILATION))
+        rounding = np.float32(1e-6 * np.abs(viewmat[:3, 3]).max())  # of places far from the origin
+        deviations = np.sqrt(
+            np.square((self._widest + rounding) * inverse) * np.float32(bound) + np.float32(DILATION)
+        )
         radius = np.float32(math.sqrt(2 * math.log(1 / ALPHA_MIN))) * deviations + np.float32(1)
         for axis, extent in enumerate(sizes):
             pos_c = self._means @ viewmat[axis, :3].astype(np.float32) + np.float32(viewmat[axis, 3])
@@ -132,10 +142,12 @@ class SplatBuffers:
         )
         viewmat = camera.viewmat.detach().cpu().double().numpy()
         K = camera.K.detach().cpu().double().numpy()
+        eye = -viewmat[:3, :3].T @ viewmat[:3, 3]
         set_uniforms(
             program,
             viewmat=viewmat.T,
-            eye=-viewmat[:3, :3].T @ viewmat[:3, 3],
+            eye=eye,
+            eye_rest=eye - eye.astype(np.float32),
             pinhole=np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2]]),
             image_size=(float(camera.width), float(camera.height)),
         )

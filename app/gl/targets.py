@@ -27,6 +27,11 @@ def bound_framebuffer(ctx: moderngl.Context) -> moderngl.Framebuffer:
     return ctx.fbo
 
 
+def context_lives(ctx: moderngl.Context) -> bool:
+    """Whether the context can still be called: releasing it takes its inside away."""
+    return hasattr(ctx.mglo, "enable_only")
+
+
 def gl_function(ctx: moderngl.Context, name: str, result: type | None, *arguments: type) -> Callable:
     """An OpenGL function that moderngl does not wrap, from the loader of the context itself.
 
@@ -63,7 +68,11 @@ def drawing(
 
 
 class ColourTarget:
-    """Premultiplied colour + alpha; beside it sum of T alpha z and of T alpha, always float32."""
+    """Premultiplied colour + alpha; beside it sum of T alpha z and of T alpha, always float32.
+
+    A float16 colour stops growing where a layer adds less than its last bit: under thousands of
+    layers of alpha 0.004, the thinnest drawn, it ends 12 % too dark, of 0.05, 1 %.
+    """
 
     def __init__(self, ctx: moderngl.Context, size: tuple[int, int], dtype: str):
         self.colour = ctx.texture(size, 4, dtype=dtype)

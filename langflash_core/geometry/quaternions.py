@@ -5,21 +5,29 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 
+def unit_quats(quats: Tensor, eps: float = 1e-12) -> Tensor:
+    """Unit quaternions (..., 4) of any finite ones; where no entry exceeds `eps`, the identity.
+
+    Divided by the largest entry first: squares of float32 overflow above 1e19.
+    """
+    largest = quats.abs().amax(-1, keepdim=True)
+    identity = torch.zeros_like(quats)
+    identity[..., 0] = 1
+    return torch.where(largest > eps, normalize(quats / largest.clamp_min(eps), dim=-1), identity)
+
+
 def quats_to_matrices(quats: Tensor, eps: float = 1e-12) -> Tensor:
     """Rotation matrices of quaternions that need not be unit.
 
     Args:
-        quats: (..., 4) wxyz, any norm; a norm below `eps` gives the identity.
+        quats: (..., 4) wxyz, any norm; see `unit_quats` for those near 0.
 
     Returns:
         (..., 3, 3) rotation matrices.
 
     Source: standard formula; twin scipy.spatial.transform.Rotation in the tests.
     """
-    norms = quats.norm(dim=-1, keepdim=True)
-    identity = torch.zeros_like(quats)
-    identity[..., 0] = 1
-    w, x, y, z = torch.where(norms > eps, quats / norms.clamp_min(eps), identity).unbind(-1)
+    w, x, y, z = unit_quats(quats, eps).unbind(-1)
     rows = (
         1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
         2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),

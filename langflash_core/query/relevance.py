@@ -57,21 +57,28 @@ class Calibration:
     negatives: tuple[str, ...]
 
 
+def finite_atoms(dictionary: Tensor) -> Tensor:
+    """(K,) bool: every number of the atom is finite; the others count as atoms of length 0."""
+    return torch.isfinite(dictionary).all(-1)
+
+
 def reduce_dictionary(dictionary: Tensor) -> tuple[Tensor, Tensor]:
     """Thin factorisation D = R Q of a dictionary (K, C).
 
     Householder QR of D^T in float64: exact also where rows repeat, vanish, or outnumber the
-    channels. K may be 0.
+    channels. K may be 0. Atoms that are not finite say nothing: they become 0.
 
     Returns:
         R (K, r) and Q (r, C) in the dictionary's dtype, r = min(K, C); Q Q^T = 1.
 
     Raises:
-        ValueError: not a finite matrix.
+        ValueError: not a matrix.
     """
-    if dictionary.dim() != 2 or not torch.isfinite(dictionary).all():
-        raise ValueError(f"dictionary: expected a finite (K, C) matrix, received {tuple(dictionary.shape)}")
-    q, r = torch.linalg.qr(dictionary.detach().to("cpu", torch.float64).T, mode="reduced")  # (C, r), (r, K)
+    if dictionary.dim() != 2:
+        raise ValueError(f"dictionary: expected a (K, C) matrix, received {tuple(dictionary.shape)}")
+    atoms = dictionary.detach().to("cpu", torch.float64)
+    atoms = torch.where(finite_atoms(atoms)[:, None], atoms, 0.0)
+    q, r = torch.linalg.qr(atoms.T, mode="reduced")  # (C, r), (r, K)
     return r.T.contiguous().to(dictionary), q.T.contiguous().to(dictionary)
 
 

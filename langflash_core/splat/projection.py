@@ -22,9 +22,11 @@ from torch.nn.functional import normalize
 from langflash_core.geometry.cameras import transform
 from langflash_core.geometry.harmonics import sh_to_colour
 from langflash_core.geometry.quaternions import quats_to_matrices
-from langflash_core.types import Camera, Gaussians
+from langflash_core.types import Camera, Gaussians, Scene
 
-NEAR = 0.01  # scene units; the scene's size is 1 by convention
+# Scene units, and the mean distance of a normalised scene is 1. Nearer than a hundredth of it nothing
+# is drawn, as in gsplat: what is there touches the eye, and the linearised projection fails.
+NEAR = 0.01
 DILATION = 0.3  # pixels^2 added to both axes: a footprint is never thinner than a pixel
 TAN_MARGIN = 0.3  # the Jacobian's direction may leave the image by this share of its half size
 ALPHA_MAX = 0.99
@@ -69,10 +71,28 @@ def finite_rows(gaussians: Gaussians) -> Tensor:
     return torch.stack(rows).all(0)
 
 
+def drawable_rows(scene: Scene) -> Tensor:
+    """(N,) bool: every value of the Gaussian and each of its weights is finite.
+
+    Raises:
+        ValueError: a weight row does not belong to a Gaussian.
+    """
+    count, values = len(scene.gaussians), scene.semantics.weight_values
+    if values.shape[0] != count:
+        raise ValueError(f"weight_ids: expected {count} rows, received {values.shape[0]}")
+    return finite_rows(scene.gaussians) & values.isfinite().all(-1)
+
+
 def view_depths(gaussians: Gaussians, camera: Camera) -> Tensor:
-    """z (N,) of every mean in the camera's frame, scene units."""
-    viewmat = camera.viewmat.to(gaussians.means)
-    return gaussians.means @ viewmat[2, :3] + viewmat[2, 3]
+    """z (N,) of every mean in the camera's frame, scene units.
+
+    Term by term: matrix products of two libraries round a third of the rows differently, and
+    nothing promises that one kernel rounds all rows alike. Equal means must have equal depths,
+    and the renderer, which computes the same terms, the same order.
+    """
+    x, y, z = gaussians.means.unbind(-1)
+    row = camera.viewmat.to(gaussians.means)[2]
+    return x * row[0] + y * row[1] + z * row[2] + row[3]
 
 
 def view_colours(gaussians: Gaussians, camera: Camera) -> Tensor:

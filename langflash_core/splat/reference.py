@@ -19,7 +19,16 @@ from torch import Tensor
 
 from langflash_core.types import Camera, Frame, Gaussians, Scene
 
-from .projection import ALPHA_MAX, ALPHA_MIN, NEAR, Footprints, project, view_colours, view_depths
+from .projection import (
+    ALPHA_MAX,
+    ALPHA_MIN,
+    NEAR,
+    Footprints,
+    drawable_rows,
+    project,
+    view_colours,
+    view_depths,
+)
 
 _MAX_PAIRS = 1 << 17  # held at once: 30 MB at 28 channels; more leave the processor's caches
 _Box = tuple[int, int, int, int]  # x0, y0, x1, y1 in pixels, half open
@@ -37,6 +46,8 @@ def render(
     Computed in float64 whatever the scene holds; the frame comes back in the scene's dtype.
     Differentiable in every Gaussian value, the weights, and the camera.
 
+    Gaussians with a value or a weight that is not finite are left out.
+
     Args:
         background: colour under what is transparent, [0, 1].
         weight_maps: also composite w_ik, (H, W, K).
@@ -45,14 +56,11 @@ def render(
         ValueError: a weight row does not belong to a Gaussian.
     """
     dtype = scene.gaussians.means.dtype
-    gaussians = scene.gaussians.map(lambda v: v.double())
-    if weight_maps and scene.semantics.weight_ids.shape[0] != len(gaussians):
-        raise ValueError(
-            f"weight_ids: expected {len(gaussians)} rows, received {scene.semantics.weight_ids.shape[0]}"
-        )
+    rows = drawable_rows(scene)
+    gaussians = scene.gaussians.map(lambda v: v.double()[rows])
     layers = [view_colours(gaussians, camera), view_depths(gaussians, camera)[:, None]]
     if weight_maps:
-        layers.append(scene.semantics.dense_weights().double())
+        layers.append(scene.semantics.dense_weights().double()[rows])
     maps, alphas = rasterize(gaussians, torch.cat(layers, -1), camera)
     under = torch.tensor(background, dtype=maps.dtype, device=maps.device)
     rgb = maps[..., :3] + (1 - alphas[..., None]) * under

@@ -7,9 +7,7 @@ const float TAN_MARGIN = 0.3;   // how far the Jacobian's direction may leave th
 const float ALPHA_MAX = 0.99;
 const float ALPHA_MIN = 1.0 / 255.0;
 
-mat3 rotation_of(vec4 quat) {
-    float squared = dot(quat, quat);
-    vec4 q = squared > 1e-24 ? quat * inversesqrt(squared) : vec4(1.0, 0.0, 0.0, 0.0);
+mat3 rotation_of(vec4 q) {  // unit
     float w = q.x, x = q.y, y = q.z, z = q.w;
     return mat3(
         1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y),

@@ -7,11 +7,14 @@
 #include "harmonics.glsl"
 
 in vec4 in_mean;   // xyz world, w opacity
-in vec4 in_quat;   // wxyz, any norm
+in vec4 in_quat;   // wxyz, unit
 in vec3 in_scale;  // standard deviations, world
 
+const float HALF_MAX = 65504.0;  // of float16: sums of T alpha c stay finite in every target
+
 uniform mat4 viewmat;      // world to camera
-uniform vec3 eye;          // camera centre, world
+uniform vec3 eye;          // camera centre, world; what float32 rounds off it is eye_rest, so that
+uniform vec3 eye_rest;     // scenes far from their origin lose no digits
 uniform vec4 pinhole;      // fx, fy, cx, cy in pixels
 uniform vec2 image_size;   // pixels
 
@@ -20,12 +23,13 @@ out vec4 out_shape;   // l11, l21, l22 (pixels), radius of the alpha cut in devi
 out vec3 out_colour;
 
 void main() {
-    vec3 pos_c = (viewmat * vec4(in_mean.xyz, 1.0)).xyz;
+    vec3 from_eye = (in_mean.xyz - eye) - eye_rest;
+    vec3 pos_c = mat3(viewmat) * from_eye;
     mat3 axes_w = rotation_of(in_quat);
     axes_w = mat3(axes_w[0] * in_scale.x, axes_w[1] * in_scale.y, axes_w[2] * in_scale.z);
     vec3 root = footprint_root(pos_c, mat3(viewmat) * axes_w, pinhole, image_size);
     float opacity = in_mean.w;
     out_place = vec4(pos_c.xy / pos_c.z * pinhole.xy + pinhole.zw, opacity, pos_c.z);
     out_shape = vec4(root, sqrt(2.0 * log(max(opacity / ALPHA_MIN, 1.0))));
-    out_colour = sh_colour(normalize(in_mean.xyz - eye));
+    out_colour = min(sh_colour(normalize(from_eye)), HALF_MAX);
 }

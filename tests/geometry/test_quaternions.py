@@ -10,6 +10,7 @@ from langflash_core.geometry.quaternions import (
     matrices_to_quats,
     multiply_quats,
     quats_to_matrices,
+    unit_quats,
 )
 
 
@@ -31,6 +32,15 @@ def test_scale_and_sign_do_not_matter():
 
 def test_a_zero_quaternion_is_the_identity():
     assert torch.equal(quats_to_matrices(torch.zeros(2, 4)), torch.eye(3).expand(2, 3, 3))
+    assert torch.equal(unit_quats(torch.full((4,), 1e-13)), torch.tensor([1.0, 0.0, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize("size", [1e-11, 1e-3, 1.0, 1e20, 1e38])
+def test_unit_quats_of_any_size(size):
+    """Squares of float32 overflow above 1e19 and vanish below 1e-23."""
+    quats = size * torch.tensor([[0.5, -0.5, 0.5, 0.5], [0.0, 0.0, 1.0, 0.0]])
+    expected = torch.tensor([[0.5, -0.5, 0.5, 0.5], [0.0, 0.0, 1.0, 0.0]])
+    torch.testing.assert_close(unit_quats(quats), expected, rtol=0, atol=1e-6)  # a few float32 ulps
 
 
 @pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0)])

@@ -1,3 +1,4 @@
+import math
 import time
 from dataclasses import replace
 
@@ -12,6 +13,7 @@ from langflash_core.query.relevance import (
     Mode,
     compile_query,
     cosine_maps,
+    finite_atoms,
     reduce_dictionary,
     relevance_maps,
     relevancy,
@@ -77,14 +79,22 @@ def test_reduced_dictionary_of_lower_rank(kind):
     assert torch.isfinite(relevance_maps(maps(24), compiled(dictionary, atoms(3), atoms(2)))).all()
 
 
-def test_reduced_dictionary_keeps_float32_and_refuses_nan():
+def test_reduced_dictionary_keeps_float32():
     factor, basis = reduce_dictionary(atoms(24).float())
     assert factor.dtype == basis.dtype == torch.float32
     # Computed in float64, rounded once: half an ulp of numbers below 1.
     torch.testing.assert_close(factor @ basis, atoms(24).float(), rtol=0, atol=1e-6)
-    for bad in (torch.full((2, 3), float("nan")), torch.zeros(3)):
-        with pytest.raises(ValueError, match="dictionary: expected"):
-            reduce_dictionary(bad)
+    with pytest.raises(ValueError, match="dictionary: expected"):
+        reduce_dictionary(torch.zeros(3))
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_atoms_that_are_not_finite_say_nothing(bad):
+    broken, silent = atoms(5), atoms(5)
+    broken[2, 3], silent[2] = bad, 0.0
+    assert torch.equal(finite_atoms(broken), torch.arange(5) != 2)
+    for made, expected in zip(reduce_dictionary(broken), reduce_dictionary(silent), strict=True):
+        assert torch.equal(made, expected)
 
 
 @pytest.mark.parametrize("num", [0, 1, 24, 25, 130])

@@ -6,7 +6,7 @@ import math
 import pytest
 import torch
 
-from langflash_core.splat import project, rasterize, reference, render
+from langflash_core.splat import project, rasterize, reference, render, view_depths
 from langflash_core.types import Camera, Gaussians
 from tests.splat.scenes import brute_force, camera, cloud, maps_of, scene_of, splats, turned
 
@@ -164,6 +164,36 @@ def test_nothing_behind_or_nearer_than_near():
     assert render(scene_of(gaussians), centred()).alphas.max() == 0
     kept = project(splats([(0.0, 0.0, 0.01)]), centred())
     assert len(kept.ids) == 1
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_weight_that_is_not_finite_drops_its_gaussian(bad):
+    scene = cloud(50)
+    values = scene.semantics.weight_values.clone()
+    values[::10, 2] = bad
+    poisoned = dataclasses.replace(
+        scene, semantics=dataclasses.replace(scene.semantics, weight_values=values)
+    )
+    hidden = scene.gaussians.opacities.clone()
+    hidden[::10] = 0
+    expected = dataclasses.replace(scene, gaussians=dataclasses.replace(scene.gaussians, opacities=hidden))
+    for with_maps in (True, False):  # the picture is the same with and without maps
+        frame = render(poisoned, camera(), weight_maps=with_maps)
+        truth = render(expected, camera(), weight_maps=with_maps)
+        torch.testing.assert_close(frame.rgb, truth.rgb, rtol=0, atol=EXACT)
+        if with_maps:
+            torch.testing.assert_close(maps_of(frame), maps_of(truth), rtol=0, atol=EXACT)
+
+
+def test_equal_means_have_equal_depths():
+    """Whatever the row, and bit by bit as NumPy computes the same terms for the renderer."""
+    gaussians = cloud(37).gaussians.map(lambda v: v.repeat_interleave(3, 0))
+    seen = camera(pose=turned(0.3, (0.1, -0.05, 0.2)))
+    depths = view_depths(gaussians, seen)
+    triples = depths.unflatten(0, (37, 3))
+    assert (triples == triples[:, :1]).all()
+    (x, y, z), row = gaussians.means.numpy().T, seen.viewmat[2].numpy()
+    assert (depths.numpy() == x * row[0] + y * row[1] + z * row[2] + row[3]).all()
 
 
 @pytest.mark.parametrize("field", ["means", "quats", "scales", "opacities", "sh"])
