@@ -48,8 +48,12 @@ def test_nothing_leaks_in_1000_frames(gl):
     for _ in range(1000):
         scene = shake.choice(scenes)
         renderer.set_scene(scene)
+        size = shake.randrange(1, 60), shake.randrange(1, 60)
         renderer.draw(
-            camera(shake.randrange(1, 60), shake.randrange(1, 60)), weight_maps=shake.random() < 0.5
+            camera(*size),
+            weight_maps=shake.random() < 0.5,
+            fast=shake.random() < 0.3,
+            share=shake.choice((1.0, 1.0, 0.25)),
         )
         renderer.ask(question(scene, shake.randrange(1, 9)))
         renderer.heat_texture(0)
