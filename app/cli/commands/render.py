@@ -67,6 +67,8 @@ def _prompts_for(kind: str, given: list[str] | None) -> list[str]:
 
 def _check_atom(what: tuple[str, int | None], scene: Scene) -> None:
     atom, count = what[1], scene.semantics.num_atoms
+    if what[0] == "atoms" and not count:
+        raise InputError("this scene has no atoms to show, so there is nothing to colour; use --what rgb")
     if atom is not None and atom >= count:
         choice = f"use weights:0 to weights:{count - 1}" if count else "use --what rgb"
         raise InputError(f"there is no atom {atom}: this scene has {count}; {choice}")
