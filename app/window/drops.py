@@ -56,6 +56,8 @@ def sort_drop(paths: Iterable[str | Path]) -> Drop:
         elif path.suffix.lower() in PHOTO_SUFFIXES:
             photos.append(path)
         else:
-            rejected.append(f"{path.name} is no photo and no scene; drop JPEG, PNG, .langflash or .ply files.")
+            rejected.append(
+                f"{path.name} is no photo and no scene; drop JPEG, PNG, .langflash or .ply files."
+            )
     unique = tuple(dict.fromkeys(p.resolve() for p in photos))
     return Drop(unique, tuple(dict.fromkeys(p.resolve() for p in scenes)), tuple(rejected))

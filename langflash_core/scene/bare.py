@@ -77,8 +77,8 @@ def _from_origin(means: Tensor) -> Camera | None:
 
 def _from_outside(means: Tensor, width: float) -> Camera:
     """Ahead of the middle box of means (n, 3), which is never thinner than their median `width`."""
-    middle = means.median(0).values
-    reach = _DEVIATIONS * (means - middle).abs().median(0).values
+    middle = means.quantile(0.5, dim=0)
+    reach = _DEVIATIONS * (means - middle).abs().quantile(0.5, dim=0)
     ordered = means.sort(dim=0).values
     low = torch.maximum(middle - reach, ordered[round(0.01 * (len(means) - 1))])
     high = torch.minimum(middle + reach, ordered[round(0.99 * (len(means) - 1))])
