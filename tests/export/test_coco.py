@@ -56,6 +56,7 @@ def test_the_document(tmp_path):
     assert np.array_equal(decoded(found[0]["segmentation"]["counts"], HEIGHT, WIDTH), block[0].numpy())
 
 
+@pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")  # pycocotools' own
 def test_pycocotools_agrees(tmp_path):
     coco_api = pytest.importorskip("pycocotools.coco")
     masks = torch.rand(2, HEIGHT, WIDTH, generator=torch.Generator().manual_seed(0)) > 0.6
