@@ -7,6 +7,7 @@ import trimesh
 
 from langflash_core.errors import SceneFileError
 from langflash_core.export import export, read
+from langflash_core.files import write_atomically
 from langflash_core.scene import bare_scene
 from langflash_core.scene.checks import check_scene
 from tests.export.splats import damaged_files, ply_bytes, random_gaussians, stored_columns
@@ -181,3 +182,14 @@ def test_more_rows_than_are_read_at_once(tmp_path, monkeypatch):
     in_parts = read(written(tmp_path, random_gaussians(1000, 1))).gaussians
     for name, values in vars(whole).items():
         assert torch.equal(values, getattr(in_parts, name)), name
+
+
+def test_what_stops_the_writing_leaves_the_old_file(tmp_path):
+    def parts():
+        yield b"half"
+        raise KeyboardInterrupt
+
+    (tmp_path / "a.ply").write_bytes(b"old")
+    with pytest.raises(KeyboardInterrupt):
+        write_atomically(tmp_path / "a.ply", parts())
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("a.ply", b"old")]
