@@ -152,7 +152,7 @@ def _add_export(commands) -> None:
         command,
         "FILE",
         ".png: a picture, or a cut-out with --prompt; .ply, .splat, .langflash: Gaussians; "
-        ".json: COCO masks of --prompt; .mp4: a flight",
+        ".json: COCO masks of --prompt; .npz: a view as numbers; .mp4: a flight",
     )
     command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="keep only what answers one of these")
     command.add_argument(
