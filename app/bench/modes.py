@@ -1,0 +1,74 @@
+"""The modes that are compared: the default, and each of its decisions taken the other way."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+from app.gl.combine import QueryPasses
+from app.gl.splats import SplatBuffers
+from langflash_core.scene.assemble import renormalised
+from langflash_core.types import Scene
+
+from .twins import FullQuery, GramQuery, StaleOrder, ThreeSigma
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One way of drawing: the default but for the fields named.
+
+    axis: what is decided. name: how. precision: of the targets. kept: weights per Gaussian, None:
+    all that the scene has. shrink: of the picture's sides. buffers, query: parts of the renderer.
+    colours: whether the picture's colours may differ from the default's, not its answers alone.
+    """
+
+    axis: str
+    name: str
+    precision: str = "float16"
+    kept: int | None = None
+    shrink: int = 1
+    buffers: type[SplatBuffers] = SplatBuffers
+    query: type[QueryPasses] = QueryPasses
+    colours: bool = False
+
+    def scene(self, scene: Scene) -> Scene:
+        """The scene as this mode draws it: the largest weights of each Gaussian, renormalised."""
+        semantics = scene.semantics
+        if self.kept is None or self.kept >= semantics.weight_ids.shape[1]:
+            return scene
+        values, places = semantics.weight_values.topk(self.kept, dim=-1)
+        kept = replace(
+            semantics, weight_ids=semantics.weight_ids.gather(1, places), weight_values=renormalised(values)
+        )
+        return replace(scene, semantics=kept)
+
+
+DEFAULT = Mode("default", "default")
+MODES = (
+    DEFAULT,
+    Mode("precision", "float32", precision="float32", colours=True),
+    Mode("weights", "m = 1", kept=1),
+    Mode("weights", "m = 2", kept=2),
+    Mode("weights", "m = 4", kept=4),
+    Mode("weights", "m = 8", kept=8),
+    Mode("cut", "3 sigma cut", buffers=ThreeSigma, colours=True),
+    Mode("dictionary", "full D", query=FullQuery),
+    Mode("dictionary", "Gram matrix", query=GramQuery),
+    Mode("resolution", "half resolution", shrink=2, colours=True),
+    Mode("sort", "stale sort", buffers=StaleOrder, colours=True),
+)
+AXES = tuple(dict.fromkeys(mode.axis for mode in MODES[1:]))
+
+
+def modes_for(scene: Scene, axes: Collection[str] = AXES) -> tuple[Mode, ...]:
+    """The default first, then the modes of these axes that differ from it on this scene."""
+    stored = scene.semantics.weight_ids.shape[1]
+    chosen = (mode for mode in MODES[1:] if mode.axis in axes and (mode.kept is None or mode.kept < stored))
+    return DEFAULT, *chosen
+
+
+def described_default(scene: Scene) -> str:
+    """What "default" means on this scene, in words."""
+    stored = scene.semantics.weight_ids.shape[1]
+    return (
+        f"float16 targets, exact relevance, all {stored} weights per Gaussian, opacity-aware cut, "
+        "reduced D, full resolution, fresh sort"
+    )
