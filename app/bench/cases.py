@@ -18,7 +18,7 @@ PHRASES = ("plant", "floor", "window")
 PAPER_GAUSSIANS, PAPER_ATOMS = 131_072, 128
 PAPER_SIZES = ((988, 731), (1920, 1080))
 SYNTHETIC_ATOMS = 24
-_USUAL_SIDE = 320  # pixels, of a scene without photos
+SYNTHETIC_SIZE = (320, 240)
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def synthetic_case(
     spread: float = 1.0,
 ) -> Case:
     """A generated room."""
-    chosen = size or (_USUAL_SIDE, 3 * _USUAL_SIDE // 4)
+    chosen = size or SYNTHETIC_SIZE
     scene = generated.with_atoms(generated.room(num_gaussians, chosen, spread), num_atoms)
     query = generated.phrases(scene, min(num_phrases, num_atoms))
     notes = ("the scene, its dictionary and the phrases are generated",)
@@ -125,8 +125,7 @@ def _case(
     compiled: CompiledQuery,
     notes: tuple[str, ...] = (),
 ) -> Case:
-    usual = scene.view_size if scene.num_views else (_USUAL_SIDE, 3 * _USUAL_SIDE // 4)
-    path = camera_path(scene, size or usual, num_frames)
+    path = camera_path(scene, size or scene.view_size, num_frames)
     dictionary = scene.semantics.dictionary.double()
     basis = reduce_dictionary(dictionary)[1]  # (r, C); what of a phrase leaves its span meets no F
     uncompiled = replace(

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from app.gl.combine import QueryPasses
 from app.gl.splats import SplatBuffers
@@ -22,7 +23,7 @@ class Mode:
 
     axis: str
     name: str
-    precision: str = "float16"
+    precision: Literal["float16", "float32"] = "float16"
     kept: int | None = None
     shrink: int = 1
     buffers: type[SplatBuffers] = SplatBuffers

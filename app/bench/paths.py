@@ -1,4 +1,4 @@
-"""Camera paths: between a scene's own views, or an arc where it has fewer than two."""
+"""Camera paths: between a scene's own views, or an arc where it has one only, as splat files do."""
 
 from dataclasses import dataclass
 
@@ -7,16 +7,10 @@ import torch
 from scipy.spatial.transform import Rotation, Slerp
 from torch import Tensor
 
-from langflash_core.geometry.cameras import (
-    intrinsics_from_fov,
-    invert_rigid,
-    rotation_angle_degrees,
-    transform,
-)
+from langflash_core.geometry.cameras import invert_rigid, rotation_angle_degrees, transform
 from langflash_core.types import Camera, Scene
 
 ARC_STEP = 2.0  # degrees a frame: a turn of 60 degrees a second at 30 frames a second
-_FOV = 60.0  # degrees, for a scene without photos
 
 
 @dataclass(frozen=True)
@@ -42,8 +36,7 @@ class Path:
 
 
 def camera_path(scene: Scene, size: tuple[int, int], num_frames: int) -> Path:
-    """Through all views in order, turning evenly; with one view an arc about what it looks at, with
-    none an arc about the scene's middle.
+    """Through all views in order at even places; with one view, an arc about what it looks at.
 
     Args:
         size: (width, height) in pixels; the field of view of each axis is kept.
@@ -57,11 +50,11 @@ def camera_path(scene: Scene, size: tuple[int, int], num_frames: int) -> Path:
         lenses = (1 - share) * Ks[lower] + share * Ks[lower + 1]
         cameras = [Camera(pose, K, *scene.view_size) for pose, K in zip(poses, lenses, strict=True)]
     else:
-        start, pivot = _first(scene, size)
-        kind = "an arc about its middle" if scene.num_views == 0 else "an arc about what its view shows"
+        start, pivot = scene.camera(0), _pivot(scene)
+        kind = "on an arc about what its view shows"
         cameras = [
             Camera(
-                _turned(start.viewmat, pivot, ARC_STEP * (i - num_frames / 2)),
+                _turned(start.viewmat.double(), pivot, ARC_STEP * (i - num_frames / 2)),
                 start.K,
                 start.width,
                 start.height,
@@ -83,22 +76,13 @@ def _between(viewmats: Tensor, num_frames: int) -> Tensor:
     return invert_rigid(torch.from_numpy(made))
 
 
-def _first(scene: Scene, size: tuple[int, int]) -> tuple[Camera, Tensor]:
-    """The camera in the middle of the arc, and the point (3,) it turns about."""
-    means = scene.gaussians.means.double()
-    means = means[torch.isfinite(means).all(-1)]
-    if scene.num_views:
-        seen = scene.camera(0)
-        viewmat = seen.viewmat.double()
-        depths = transform(viewmat, means)[:, 2]
-        depth = depths[depths > 0].median() if bool((depths > 0).any()) else torch.tensor(1.0)
-        pivot = transform(invert_rigid(viewmat), torch.stack((depth * 0, depth * 0, depth))[None])[0]
-        return Camera(viewmat, seen.K.double(), seen.width, seen.height), pivot
-    middle = means.median(0).values if len(means) else torch.zeros(3, dtype=torch.float64)
-    reach = float((means - middle).norm(dim=-1).median()) if len(means) else 1.0
-    viewmat = torch.eye(4, dtype=torch.float64)
-    viewmat[:3, 3] = -middle + torch.tensor([0.0, 0.0, 2.0 * max(reach, 1e-3)])
-    return Camera(viewmat, intrinsics_from_fov(_FOV, *size).double(), *size), middle
+def _pivot(scene: Scene) -> Tensor:
+    """The point (3,) straight ahead of view 0, at the median depth of what lies there."""
+    viewmat, means = scene.viewmats[0].double(), scene.gaussians.means.double()
+    depths = transform(viewmat, means)[:, 2]
+    ahead = depths[torch.isfinite(depths) & (depths > 0)]
+    depth = float(ahead.median()) if len(ahead) else 1.0
+    return transform(invert_rigid(viewmat), torch.tensor([[0.0, 0.0, depth]], dtype=torch.float64))[0]
 
 
 def _turned(viewmat: Tensor, pivot: Tensor, degrees: float) -> Tensor:
