@@ -70,7 +70,7 @@ def _visible(
     """World points (count, 3) and their depths (count,) where rays of one view meet the room."""
     width, height = size
     columns = max(1, round(math.sqrt(count * width / height)))
-    rows = -(-count // columns)
+    rows = max(1, -(-count // columns))
     index = torch.arange(count)
     cell = torch.stack((index % columns, index // columns), -1) + torch.rand(count, 2, generator=g)
     pixels = cell * torch.tensor([width / columns, height / rows])

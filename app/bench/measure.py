@@ -91,6 +91,7 @@ class _Bench:
 
     def __init__(self, ctx: moderngl.Context, case: Case, modes: Sequence[Mode]):
         self.ctx, self.case, self.modes = ctx, case, modes
+        # moderngl has no way to give a query back: these two live as long as the context.
         self.timer = ctx.query(time=True)
         self.counter = ctx.query(samples=True)
         self._renderers: dict[tuple, SwitchedRenderer] = {}

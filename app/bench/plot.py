@@ -33,6 +33,11 @@ _Point = tuple[str, str, float, float]  # mode, axis, ms, error
 
 def write_plot(document: dict, path: Path) -> None:
     """A PNG with a row of panels for each case of a bench document."""
+    figure_of(document).savefig(path, format="png", metadata={"Software": None})
+
+
+def figure_of(document: dict) -> Figure:
+    """The same as a figure of matplotlib's, every label in its place."""
     cases = document["cases"]
     figure = Figure((_INCHES[0], _INCHES[1] * len(cases)), dpi=_DPI, layout="constrained", facecolor="white")
     canvas = FigureCanvasAgg(figure)
@@ -44,7 +49,7 @@ def write_plot(document: dict, path: Path) -> None:
     for row, pair in zip(panels, drawn, strict=True):
         for axes, points in zip(row, pair, strict=True):
             _label(axes, points)
-    figure.savefig(path, format="png", metadata={"Software": None})
+    return figure
 
 
 def _draw_case(row: Sequence[Axes], case: dict) -> tuple[list[_Point], list[_Point]]:

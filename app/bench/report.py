@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from langflash_core.query.relevance import CompiledQuery
+from langflash_core.scene.prune import CUT
 
 from .cases import Case
 from .errors import Errors
@@ -72,7 +73,7 @@ def _case(result: Result) -> dict:
             "channels": semantics.dictionary.shape[1],
             "rank": case.compiled.factor.shape[1],
             "weights_per_gaussian": semantics.weight_ids.shape[1],
-            "weights_above_zero": round(float((semantics.weight_values > 0).sum(-1).float().mean()), 3),
+            "weights_above_cut": round(float((semantics.weight_values >= CUT).sum(-1).float().mean()), 3),
             "sh_bases": gaussians.sh.shape[1],
             "space": semantics.space,
             "notes": list(case.notes),
@@ -142,7 +143,7 @@ def _case_lines(case: dict) -> list[str]:
         case["name"],
         f"  {scene['gaussians']:,} Gaussians, K = {scene['atoms']}, C = {scene['channels']}, "
         f"r = {scene['rank']}, m = {scene['weights_per_gaussian']} "
-        f"({scene['weights_above_zero']:.1f} above 0); phrases: {', '.join(case['query']['phrases'])}",
+        f"({scene['weights_above_cut']:.1f} above 1/255); phrases: {', '.join(case['query']['phrases'])}",
         *(f"  {note}" for note in scene["notes"]),
         f"  {path['frames']} frames {path['kind']}, {path['degrees_a_frame']:g} degrees and "
         f"{path['units_a_frame']:g} units a frame; errors against the float64 reference at frames "
