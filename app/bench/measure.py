@@ -31,7 +31,8 @@ class Times:
 
     frames: a moving camera, wall clock. cpu: the same in processor time of all threads, which other
     programs do not lengthen. gpu: the same by a GL timer query, empty where it does not work. answers:
-    every query pass of a view whose maps are drawn. phrases: a new phrase, nothing else.
+    every query pass of a view whose maps are drawn, empty in the fast mode, which has none. phrases: a
+    new phrase, nothing else.
     """
 
     frames: list[float] = field(default_factory=list)
@@ -114,6 +115,8 @@ class _Bench:
         if isinstance(buffers, StaleOrder):
             buffers.sort_for(self.camera(mode, frame - 1))
         renderer.ask(self.question(mode))
+        if mode.fast:
+            renderer.carry()
         self.ctx.finish()
         return renderer
 
@@ -144,7 +147,7 @@ def _errors(bench: _Bench, frames: tuple[int, ...], progress: Progress) -> dict[
         drawn = []
         for frame, true in zip(frames, truth, strict=True):
             renderer = bench.prepared(mode, frame)
-            renderer.draw(bench.camera(mode, frame))
+            renderer.draw(bench.camera(mode, frame), fast=mode.fast)
             drawn.append(View(renderer.frame().rgb, renderer.relevance(), true.covered))
         errors[mode] = errors_of(drawn, truth, bench.case.compiled.threshold)
     return errors
@@ -166,7 +169,7 @@ def _time_frame(bench: _Bench, mode: Mode, frame: int, into: Times) -> None:
 
     def moving() -> None:
         with bench.timer:
-            renderer.draw(camera)
+            renderer.draw(camera, fast=mode.fast)
             renderer.heat_texture(0)
 
     def another() -> None:
@@ -180,9 +183,10 @@ def _time_frame(bench: _Bench, mode: Mode, frame: int, into: Times) -> None:
     elapsed = bench.timer.elapsed
     if 0 < elapsed < _TIMER_END:
         into.gpu.append(elapsed / 1e6)
-    renderer.forget_answers()
-    renderer.ask(bench.question(mode))
-    into.answers.append(_milliseconds(bench.ctx, lambda: renderer.heat_texture(0)))
+    if not mode.fast:
+        renderer.forget_answers()
+        renderer.ask(bench.question(mode))
+        into.answers.append(_milliseconds(bench.ctx, lambda: renderer.heat_texture(0)))
     into.phrases.append(_milliseconds(bench.ctx, another))
 
 

@@ -17,7 +17,8 @@ class Mode:
     """One way of drawing: the default but for the fields named.
 
     axis: what is decided. name: how. precision: of the targets. kept: weights per Gaussian, None:
-    all that the scene has. shrink: of the picture's sides. buffers, query: parts of the renderer.
+    all that the scene has. fast: relevance from numbers splatted beside the colour. shrink: of the
+    picture's sides. buffers, query: parts of the renderer.
     colours: whether the picture's colours may differ from the default's, not its answers alone.
     """
 
@@ -25,6 +26,7 @@ class Mode:
     name: str
     precision: Literal["float16", "float32"] = "float16"
     kept: int | None = None
+    fast: bool = False
     shrink: int = 1
     buffers: type[SplatBuffers] = SplatBuffers
     query: type[QueryPasses] = QueryPasses
@@ -46,6 +48,7 @@ DEFAULT = Mode("default", "default")
 MODES = (
     DEFAULT,
     Mode("precision", "float32", precision="float32", colours=True),
+    Mode("relevance", "fast relevance", fast=True),
     Mode("weights", "m = 1", kept=1),
     Mode("weights", "m = 2", kept=2),
     Mode("weights", "m = 4", kept=4),

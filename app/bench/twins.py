@@ -50,7 +50,12 @@ class SwitchedRenderer(SplatRenderer):
             self._kept_queries[query] = made
         self._query = self._kept_queries[query]
         self._drawn = {}
+        self._numbers = self._norms = None
         return self._splats
+
+    def carry(self) -> None:
+        """Make what the fast mode's Gaussians carry for this question, as a camera that moves finds it."""
+        self._carried()
 
     def forget_answers(self) -> None:
         """The next question is answered from the weight maps alone, as the first of a view."""
