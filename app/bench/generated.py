@@ -22,9 +22,7 @@ _HALF_ROOM = torch.tensor([1.3, 0.9, 2.6])  # walls at x, floor and ceiling at y
 _BALLS = torch.tensor(
     [[-0.6, 0.5, 1.6, 0.4], [0.5, 0.6, 1.3, 0.3], [0.1, -0.2, 2.0, 0.35], [0.9, 0.2, 2.2, 0.4]]
 )  # x y z radius
-_SOFTNESS = (
-    0.5  # of the borders between groups: a Gaussian's largest weight is 0.8 on average, as a network's
-)
+_SOFTNESS = 0.5  # of the groups' borders: a Gaussian's largest weight is 0.8 on average, as a network's
 _ROWS_AT_ONCE = 1 << 15
 
 
