@@ -16,6 +16,7 @@ from torch import Tensor
 
 from langflash_core.errors import GraphicsError
 from langflash_core.query.relevance import CompiledQuery, finite_atoms
+from langflash_core.scene import thin
 from langflash_core.splat.projection import ALPHA_MIN
 from langflash_core.types import Camera, Frame, Scene
 
@@ -62,7 +63,8 @@ class SplatRenderer:
         self._programs = Programs(ctx)
         self._screen = Screen(ctx)
         self._scene: Scene | None = None
-        self._splats: SplatBuffers | None = None
+        self._levels: dict[float, SplatBuffers] = {}  # by share of the Gaussians
+        self._splats: SplatBuffers | None = None  # the level in use
         self._background: Background = (0.0, 0.0, 0.0)
         self._compiled: CompiledQuery | None = None
         self._asked = 0  # how often; names the current query in keys
@@ -88,6 +90,7 @@ class SplatRenderer:
             return
         self._release_scene()
         self._splats = SplatBuffers(self._ctx, self._programs, scene)
+        self._levels = {1.0: self._splats}
         self._scene = scene
         self._atom_colours = atom_colours(scene.semantics.dictionary.detach().cpu().double().numpy())
         if self._compiled is not None and self._compiled.factor.shape[0] != scene.semantics.num_atoms:
@@ -96,7 +99,7 @@ class SplatRenderer:
     @property
     def num_dropped(self) -> int:
         """Gaussians of the scene left out because a value or a weight was NaN or infinite."""
-        return self._splats.num_dropped if self._splats else 0
+        return self._levels[1.0].num_dropped if self._levels else 0
 
     @property
     def num_dropped_atoms(self) -> int:
@@ -109,6 +112,7 @@ class SplatRenderer:
         background: Background = (0.0, 0.0, 0.0),
         weight_maps: bool = True,
         fast: bool = False,
+        share: float = 1.0,
     ) -> None:
         """Draw the scene; nothing is drawn again for the same scene, camera and size.
 
@@ -117,6 +121,8 @@ class SplatRenderer:
             fast: until the next call, answer from numbers splatted beside the colour (app/gl/fast.py)
                 instead of weight maps, unless those are drawn already: for a moving camera. Serves
                 up to 17 phrases; more are answered exactly.
+            share: in (0, 1], of the Gaussians to draw, wider in return (scene/thin.py). A level is
+                made once and kept with the scene: use few values.
 
         Raises:
             ValueError: there is no scene, or the image has no pixels.
@@ -127,6 +133,7 @@ class SplatRenderer:
         if self._splats is None:
             raise ValueError("draw: expected set_scene before, received no scene")
         self._resize(camera)
+        self._use_level(share)
         key = _camera_key(camera)
         if self._drawn.get("sorted") != key:
             self._splats.sort(camera)
@@ -305,6 +312,15 @@ class SplatRenderer:
         self._display = Display(self._ctx, self._programs, self._screen, size, self.passes)
         self._size = size
 
+    def _use_level(self, share: float) -> None:
+        assert self._scene is not None
+        if share not in self._levels:
+            self._levels[share] = SplatBuffers(self._ctx, self._programs, thin(self._scene, share))
+        if self._levels[share] is not self._splats:
+            self._splats = self._levels[share]
+            self._drawn = {}
+            self._numbers = self._norms = None
+
     def _draw_colour(self, numbers: np.ndarray | None = None) -> None:
         """Colour and depth, and with `numbers` (N, 3 L) the layers of the fast mode."""
         assert self._target is not None and self._splats is not None
@@ -448,8 +464,9 @@ class SplatRenderer:
         self._drawn = {}
 
     def _release_scene(self) -> None:
-        if self._splats is not None:
-            self._splats.release()
+        for level in self._levels.values():
+            level.release()
+        self._levels = {}
         self._splats = self._scene = self._numbers = self._norms = None
         self._drawn = {}
 
