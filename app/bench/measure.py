@@ -96,7 +96,7 @@ class _Bench:
         self.timer = ctx.query(time=True)
         self.counter = ctx.query(samples=True)
         self._renderers: dict[tuple, SwitchedRenderer] = {}
-        self._scenes: dict[int | None, Scene] = {mode.kept: mode.scene(case.scene) for mode in modes}
+        self._scenes: dict[tuple, Scene] = {_scene_key(mode): mode.scene(case.scene) for mode in modes}
 
     def camera(self, mode: Mode, frame: int) -> Camera:
         """Frame -1 is where frame 0 comes from."""
@@ -111,7 +111,9 @@ class _Bench:
         if key not in self._renderers:
             self._renderers[key] = SwitchedRenderer(self.ctx, mode.precision)
         renderer = self._renderers[key]
-        buffers = renderer.switch(self._scenes[mode.kept], self.camera(mode, frame), mode.buffers, mode.query)
+        buffers = renderer.switch(
+            self._scenes[_scene_key(mode)], self.camera(mode, frame), mode.buffers, mode.query
+        )
         if isinstance(buffers, StaleOrder):
             buffers.sort_for(self.camera(mode, frame - 1))
         renderer.ask(self.question(mode))
@@ -127,6 +129,10 @@ class _Bench:
         for renderer in self._renderers.values():
             renderer.release()
         self._renderers.clear()
+
+
+def _scene_key(mode: Mode) -> tuple:
+    return mode.kept, mode.share
 
 
 def _error_frames(num_frames: int) -> tuple[int, ...]:

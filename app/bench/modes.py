@@ -6,6 +6,7 @@ from typing import Literal
 
 from app.gl.combine import QueryPasses
 from app.gl.splats import SplatBuffers
+from langflash_core.scene import thin
 from langflash_core.scene.assemble import renormalised
 from langflash_core.types import Scene
 
@@ -16,9 +17,9 @@ from .twins import FullQuery, GramQuery, StaleOrder, ThreeSigma
 class Mode:
     """One way of drawing: the default but for the fields named.
 
-    axis: what is decided. name: how. precision: of the targets. kept: weights per Gaussian, None:
-    all that the scene has. fast: relevance from numbers splatted beside the colour. shrink: of the
-    picture's sides. buffers, query: parts of the renderer.
+    axis: what is decided. name: how. precision: of the targets. kept: weights per Gaussian, None: all
+    that the scene has. share: of the Gaussians, the others widened. fast: relevance from numbers
+    splatted beside the colour. shrink: of the picture's sides. buffers, query: parts of the renderer.
     colours: whether the picture's colours may differ from the default's, not its answers alone.
     """
 
@@ -26,6 +27,7 @@ class Mode:
     name: str
     precision: Literal["float16", "float32"] = "float16"
     kept: int | None = None
+    share: float = 1.0
     fast: bool = False
     shrink: int = 1
     buffers: type[SplatBuffers] = SplatBuffers
@@ -33,7 +35,8 @@ class Mode:
     colours: bool = False
 
     def scene(self, scene: Scene) -> Scene:
-        """The scene as this mode draws it: the largest weights of each Gaussian, renormalised."""
+        """The scene as this mode draws it: fewer Gaussians, or the largest weights of each, renormalised."""
+        scene = thin(scene, self.share)
         semantics = scene.semantics
         if self.kept is None or self.kept >= semantics.weight_ids.shape[1]:
             return scene
@@ -57,6 +60,7 @@ MODES = (
     Mode("dictionary", "full D", query=FullQuery),
     Mode("dictionary", "Gram matrix", query=GramQuery),
     Mode("resolution", "half resolution", shrink=2, colours=True),
+    Mode("detail", "half the Gaussians", share=0.5, colours=True),
     Mode("sort", "stale sort", buffers=StaleOrder, colours=True),
 )
 AXES = tuple(dict.fromkeys(mode.axis for mode in MODES[1:]))

@@ -20,6 +20,7 @@ _COLOURS = {
     "cut": "#3b8f4e",
     "dictionary": "#7a55b5",
     "resolution": "#c43d3d",
+    "detail": "#8a6d3b",
     "sort": "#15878f",
 }
 _INK, _GRID = "#3a3a40", "#dcdce2"
@@ -61,9 +62,9 @@ def _draw_case(row: Sequence[Axes], case: dict) -> tuple[list[_Point], list[_Poi
         if name in changes_colours:
             psnr = _BEST_PSNR if each["psnr_db"] is None else each["psnr_db"]
             colours.append((name, axis, ms, min(psnr, _BEST_PSNR)))
-    _scatter(row[0], answers, "mean error of relevance", case["name"])
+    _scatter(row[0], answers, "mean error of relevance", f"{case['name']}: answers")
     row[0].set_yscale("log")
-    _scatter(row[1], colours, "PSNR of colours, dB (upside down)", "colours")
+    _scatter(row[1], colours, "PSNR of colours, dB (worse is up)", "colours; lower left is better")
     row[1].invert_yaxis()
     for axes in row:
         axes.margins(0.14, 0.16)
@@ -89,7 +90,11 @@ def _plain_ticks(axes: Axes) -> None:
     """Round milliseconds instead of powers of ten."""
     low, high = axes.get_xlim()
     if high < 4 * low:
-        ticks = [tick for tick in MaxNLocator(6).tick_values(low, high) if low <= tick <= high]
+        ticks = [
+            tick
+            for tick in MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
+            if low <= tick <= high
+        ]
     else:
         decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
         steps = (1, 2, 3, 5, 7) if high < 20 * low else (1, 2, 5)
@@ -113,8 +118,8 @@ def _label(axes: Axes, points: list[_Point]) -> None:
         box = _free_box(x, y, size.width, size.height, taken, inside)
         text.set_position((box.x0, (box.y0 + box.y1) / 2))
         taken.append(box)
-        end = min(max(x, box.x0), box.x1), min(max(y, box.y0), box.y1)
-        if math.dist(end, (x, y)) > 14:
+        end = (box.x0 if x < box.x0 else box.x1 if x > box.x1 else x), min(max(y, box.y0), box.y1)
+        if math.dist(end, (x, y)) > 20:
             axes.annotate(
                 "", end, (x, y), "figure pixels", "figure pixels",
                 arrowprops={"arrowstyle": "-", "color": _COLOURS[axis], "linewidth": 0.7, "shrinkA": 5},

@@ -23,7 +23,7 @@ from app.cli.values import (
 from langflash_core.errors import InputError
 
 # The decisions that `bench` compares: app.bench.modes.AXES, which would bring torch along.
-BENCH_AXES = ("precision", "relevance", "weights", "cut", "dictionary", "resolution", "sort")
+BENCH_AXES = ("precision", "relevance", "weights", "cut", "dictionary", "resolution", "detail", "sort")
 
 
 class UsageError(InputError):
