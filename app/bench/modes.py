@@ -60,7 +60,7 @@ MODES = (
     Mode("dictionary", "full D", query=FullQuery),
     Mode("dictionary", "Gram matrix", query=GramQuery),
     Mode("resolution", "half resolution", shrink=2, colours=True),
-    Mode("detail", "half the Gaussians", share=0.5, colours=True),
+    Mode("detail", "quarter of Gaussians", share=0.25, colours=True),
     Mode("sort", "stale sort", buffers=StaleOrder, colours=True),
 )
 AXES = tuple(dict.fromkeys(mode.axis for mode in MODES[1:]))

@@ -42,6 +42,7 @@ class SwitchedRenderer(SplatRenderer):
         if scene is not self._scene:
             self._compiled = None
         self._scene, self._splats = scene, self._kept_buffers[key]
+        self._levels = {1.0: self._splats}
         self._resize(camera)
         assert self._query is not None and self._size is not None
         self._kept_queries.setdefault(type(self._query), self._query)

@@ -70,7 +70,7 @@ def test_another_way_to_the_norm_is_the_same_answer(rows, name):
 
 def test_a_cut_at_three_sigma_and_halves_lose_something(rows):
     assert rows["3 sigma cut"][1].relevance_mean > 1.5 * rows["default"][1].relevance_mean
-    for name in ("half resolution", "half the Gaussians"):
+    for name in ("half resolution", "quarter of Gaussians"):
         assert rows[name][1].psnr < rows["default"][1].psnr - 10
 
 
