@@ -139,18 +139,19 @@ def _row(mode: Mode, times: Times, errors: Errors, base: list[float]) -> dict:
 
 def _case_lines(case: dict) -> list[str]:
     scene, path, stages = case["scene"], case["path"], case["stages"]
+    frames, compared, passes = path["frames"], path["error_frames"], stages["map_passes"]
     lines = [
         case["name"],
         f"  {scene['gaussians']:,} Gaussians, K = {scene['atoms']}, C = {scene['channels']}, "
         f"r = {scene['rank']}, m = {scene['weights_per_gaussian']} "
         f"({scene['weights_above_cut']:.1f} above 1/255); phrases: {', '.join(case['query']['phrases'])}",
         *(f"  {note}" for note in scene["notes"]),
-        f"  {path['frames']} frames {path['kind']}, {path['degrees_a_frame']:g} degrees and "
-        f"{path['units_a_frame']:g} units a frame; errors against the float64 reference at frames "
-        f"{', '.join(map(str, path['error_frames']))}",
+        f"  {frames} frame{_s(frames)} {path['kind']}, {path['degrees_a_frame']:g} degrees and "
+        f"{path['units_a_frame']:g} units a frame; errors against the float64 reference at "
+        f"frame{_s(len(compared))} {', '.join(map(str, compared))}",
         f"  default: {case['default']}",
         f"  of it, {stages['colour_ms']:g} ms sort and colours, {stages['maps_ms']:g} ms "
-        f"{stages['map_passes']} passes of weight maps; {stages['layers_a_pixel']:.1f} splats a pixel",
+        f"{passes} pass{_s(passes, 'es')} of weight maps; {stages['layers_a_pixel']:.1f} splats a pixel",
     ]
     rows = [_HEADINGS, *(_cells(row) for row in case["rows"])]
     widths = [max(len(row[i]) for row in rows) for i in range(len(_HEADINGS))]
@@ -182,7 +183,11 @@ def _cells(row: dict) -> tuple[str, ...]:
 
 def _count(compiled: CompiledQuery) -> str:
     count = len(compiled.texts)
-    return f"{count} phrase{'s' if count != 1 else ''}"
+    return f"{count} phrase{_s(count)}"
+
+
+def _s(count: int, plural: str = "s") -> str:
+    return "" if count == 1 else plural
 
 
 def _rounded(value: float) -> float | None:
