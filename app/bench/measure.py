@@ -123,7 +123,7 @@ class _Bench:
         return renderer
 
     def question(self, mode: Mode):
-        return self.case.uncompiled if issubclass(mode.query, FullQuery) else self.case.compiled
+        return self.case.uncompiled if mode.query is FullQuery else self.case.compiled
 
     def release(self) -> None:
         for renderer in self._renderers.values():

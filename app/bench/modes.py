@@ -4,7 +4,10 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import moderngl
+
 from app.gl.combine import QueryPasses
+from app.gl.host import draws_in_software
 from app.gl.splats import SplatBuffers
 from langflash_core.scene import thin
 from langflash_core.scene.assemble import renormalised
@@ -31,7 +34,7 @@ class Mode:
     fast: bool = False
     shrink: int = 1
     buffers: type[SplatBuffers] = SplatBuffers
-    query: type[QueryPasses] = QueryPasses
+    query: type[QueryPasses] | None = None
     colours: bool = False
 
     def scene(self, scene: Scene) -> Scene:
@@ -57,6 +60,7 @@ MODES = (
     Mode("weights", "m = 4", kept=4),
     Mode("weights", "m = 8", kept=8),
     Mode("cut", "3 sigma cut", buffers=ThreeSigma, colours=True),
+    Mode("dictionary", "shader queries", query=QueryPasses),
     Mode("dictionary", "full D", query=FullQuery),
     Mode("dictionary", "Gram matrix", query=GramQuery),
     Mode("resolution", "half resolution", shrink=2, colours=True),
@@ -66,11 +70,19 @@ MODES = (
 AXES = tuple(dict.fromkeys(mode.axis for mode in MODES[1:]))
 
 
-def modes_for(scene: Scene, axes: Collection[str] = AXES) -> tuple[Mode, ...]:
-    """The default first, then the modes of these axes that differ from it on this scene."""
+def modes_for(ctx: moderngl.Context, scene: Scene, axes: Collection[str] = AXES) -> tuple[Mode, ...]:
+    """The default first, then the modes of these axes that differ from it here and on this scene.
+
+    Full D and the Gram matrix are shaders: where the renderer asks on the processor, the shaders of
+    the reduced D stand beside them.
+    """
     stored = scene.semantics.weight_ids.shape[1]
-    chosen = (mode for mode in MODES[1:] if mode.axis in axes and (mode.kept is None or mode.kept < stored))
-    return DEFAULT, *chosen
+    same = () if draws_in_software(ctx) else (QueryPasses,)
+    return DEFAULT, *(
+        mode
+        for mode in MODES[1:]
+        if mode.axis in axes and (mode.kept is None or mode.kept < stored) and mode.query not in same
+    )
 
 
 def described_default(scene: Scene) -> str:

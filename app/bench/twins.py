@@ -31,9 +31,14 @@ class SwitchedRenderer(SplatRenderer):
         scene: Scene,
         camera: Camera,
         buffers: type[SplatBuffers] = SplatBuffers,
-        query: type[QueryPasses] = QueryPasses,
+        query: type[QueryPasses] | None = None,
     ) -> SplatBuffers:
-        """Draw `scene` with these parts from now on, at the camera's size; nothing counts as drawn."""
+        """Draw `scene` with these parts from now on, at the camera's size; nothing counts as drawn.
+
+        Args:
+            query: None: the one that the renderer has chosen for this OpenGL.
+        """
+        query = query or self._query_passes
         if self._size != (camera.width, camera.height):
             self._drop_queries()
         key = (id(scene), buffers)
@@ -127,37 +132,31 @@ class GramQuery(QueryPasses):
 
 
 class FullQuery(QueryPasses):
-    """F formed in all its C channels at every pixel, for every question; `factor` is D itself."""
+    """F formed in all its C channels at every pixel, for every question."""
 
     _sums: LayerTarget | None = None
 
-    def run(
-        self, compiled: CompiledQuery, weights: LayerTarget | None, atoms: np.ndarray, version: int
-    ) -> LayerTarget:
-        """As `QueryPasses.run`, of a query whose factor is D (K, C) and whose phrases have C numbers.
+    def _answer(
+        self,
+        compiled: CompiledQuery,
+        weights: LayerTarget,
+        atoms: np.ndarray,
+        version: int,
+        temperature: float,
+    ) -> None:
+        """Of a query whose factor is D (K, C) and whose phrases have C numbers.
 
         Raises:
             ValueError: more than 28 phrases and negatives.
         """
         prompts, negatives = compiled.prompts.double().numpy(), compiled.negatives.double().numpy()
-        num_groups = -(-len(prompts) // _GROUP)
-        groups = num_groups + -(-len(negatives) // _GROUP)
-        if groups > _MAX_GROUPS:
+        phrases = np.concatenate((_in_fours(prompts), _in_fours(negatives)))
+        if len(phrases) > _GROUP * _MAX_GROUPS:
             raise ValueError(f"phrases: expected at most {_GROUP * _MAX_GROUPS}, in fours")
-        if self.relevance is None or self.relevance.num_layers != num_groups:
-            self._drop_relevance()
-            self.relevance = LayerTarget(self._ctx, self._size, num_groups, "f4")
-        if weights is None or not len(atoms):
-            for group in range(num_groups):
-                self.relevance.layers(group, 1).clear()
-            return self.relevance
         self._pack(weights, len(atoms), version)
-        key = (version, prompts.tobytes(), negatives.tobytes())
-        if self._stale("prompts", key):
-            phrases = np.concatenate((_in_fours(prompts), _in_fours(negatives)))
+        if self._stale("prompts", (version, phrases.tobytes())):
             self._add_channels(compiled.factor.double().numpy()[atoms], phrases)
-            self._answer(compiled, num_groups)
-        return self.relevance
+            self._compare(len(prompts), len(negatives), temperature)
 
     def _add_channels(self, dictionary: np.ndarray, phrases: np.ndarray) -> None:
         """|F|^2 and the products with `phrases` (4 * groups, C), over all channels."""
@@ -178,18 +177,19 @@ class FullQuery(QueryPasses):
                 self._screen.draw(program)
         self._passes["norm"] += 1
 
-    def _answer(self, compiled: CompiledQuery, num_groups: int) -> None:
+    def _compare(self, num_prompts: int, num_negatives: int, temperature: float) -> None:
+        """The sums into relevance."""
         assert self.relevance is not None and self._sums is not None
         program = self._programs.get("screen.vert", "bench/full_relevance.frag", {"EMPTY_NORM": EMPTY_NORM})
         self._sums.array.use(0)
-        for group in range(num_groups):
+        for group in range(self.relevance.num_layers):
             set_uniforms(
                 program,
                 sums=0,
                 layer=1 + group,
-                first_negative=_GROUP * num_groups,
-                num_negatives=len(compiled.negatives),
-                temperature=float(compiled.temperature) if compiled.mode == "relevancy" else 0.0,
+                first_negative=num_prompts + -num_prompts % _GROUP,
+                num_negatives=num_negatives,
+                temperature=temperature,
             )
             with drawing(self.relevance.layers(group, 1)):
                 self._screen.draw(program)

@@ -35,7 +35,7 @@ def run(args: Namespace, out: TextIO) -> None:
                 def told(stage: str, share: float, number: int = number) -> None:
                     progress(stage, (number + share) / len(cases))
 
-                modes = modes_for(case.scene, args.only or AXES)
+                modes = modes_for(context, case.scene, args.only or AXES)
                 results.append(measure(context, case, modes, told))
         measured = document(machine(context), results)
     finally:

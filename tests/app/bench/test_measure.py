@@ -22,12 +22,12 @@ from tests.splat.scenes import maps_of
 def rows(context):
     """(times, errors) of every mode, by name."""
     case = small_case()
-    result = measure(context, case, modes_for(case.scene), silent)
+    result = measure(context, case, modes_for(context, case.scene), silent)
     return {mode.name: (times, errors) for mode, times, errors in result.rows}
 
 
 def test_every_mode_is_measured_on_every_frame(rows):
-    assert list(rows) == [mode.name for mode in MODES]
+    assert set(rows) >= {mode.name for mode in MODES} - {"shader queries"}
     for name, (times, _) in rows.items():
         for samples in (times.frames, times.cpu, times.answers, times.phrases):
             expected = 0 if name == "fast relevance" and samples is times.answers else 2  # it has no maps
@@ -59,12 +59,14 @@ def test_the_fast_mode_is_near_but_not_exact(rows):
     assert min(rows["fast relevance"][0].cpu) < min(rows["default"][0].cpu)
 
 
-@pytest.mark.parametrize("name", ["full D", "Gram matrix"])
+@pytest.mark.parametrize("name", ["shader queries", "full D", "Gram matrix"])
 def test_another_way_to_the_norm_is_the_same_answer(rows, name):
+    if name not in rows:
+        pytest.skip("the default asks in shaders here")
     default, other = rows["default"][1], rows[name][1]
     assert other.psnr == default.psnr
-    # The same maps by float32 sums in another order: 1e-6 of a cosine, ten times that of relevancy.
-    assert abs(other.relevance_mean - default.relevance_mean) <= 1e-5
+    # The same maps, packed to sixteen bits or as they are: 1e-5 of a cosine, temperature / 4 of it.
+    assert abs(other.relevance_mean - default.relevance_mean) <= 3e-5
     assert abs(other.relevance_max - default.relevance_max) <= 1e-4
 
 
@@ -98,22 +100,22 @@ def test_a_stale_order_is_right_while_the_camera_stands(gl, case):
         assert (fresh == late) == same
 
 
-def test_all_weights_are_the_scene_itself(case):
+def test_all_weights_are_the_scene_itself(gl, case):
     stored = case.scene.semantics.weight_ids.shape[1]
     assert Mode("weights", "all", kept=stored).scene(case.scene) is case.scene
     fewer = Mode("weights", "m = 2", kept=2).scene(case.scene).semantics
     assert fewer.weight_values.shape == (400, 2)
     assert torch.allclose(fewer.weight_values.sum(-1), torch.ones(400))
     assert torch.equal(fewer.weight_ids[:, 0], case.scene.semantics.weight_ids[:, 0])
-    assert [mode.kept for mode in modes_for(fewer_scene(case, 4)) if mode.axis == "weights"] == [1, 2]
+    assert [mode.kept for mode in modes_for(gl, fewer_scene(case, 4)) if mode.axis == "weights"] == [1, 2]
 
 
 def fewer_scene(case, kept):
     return Mode("weights", "fewer", kept=kept).scene(case.scene)
 
 
-def test_only_the_axes_asked_for(case):
-    assert [mode.name for mode in modes_for(case.scene, ["sort", "precision"])] == [
+def test_only_the_axes_asked_for(gl, case):
+    assert [mode.name for mode in modes_for(gl, case.scene, ["sort", "precision"])] == [
         "default",
         "float32",
         "stale sort",
@@ -127,14 +129,16 @@ def test_the_default_must_come_first(gl, case):
 
 def test_a_picture_of_one_pixel(gl, case):
     tiny = dataclasses.replace(case, path=Path(tuple(c.resized(1, 1) for c in case.path.cameras), "by hand"))
-    for mode, times, errors in measure(gl, tiny, modes_for(case.scene, ["resolution", "cut"]), silent).rows:
+    for mode, times, errors in measure(
+        gl, tiny, modes_for(gl, case.scene, ["resolution", "cut"]), silent
+    ).rows:
         assert len(times.frames) == 2 and 0 <= errors.relevance_max <= 1, mode.name
 
 
 def test_nothing_is_left_behind(gl, case):
-    measure(gl, case, modes_for(case.scene), silent)
+    measure(gl, case, modes_for(gl, case.scene), silent)
     before = living(gl)
-    measure(gl, case, modes_for(case.scene), silent)
+    measure(gl, case, modes_for(gl, case.scene), silent)
     assert living(gl) == before
 
 

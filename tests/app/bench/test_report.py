@@ -20,7 +20,7 @@ from tests.app.bench.conftest import silent, small_case
 @pytest.fixture(scope="module")
 def measured(context) -> dict:
     case = small_case()
-    results = [measure(context, case, modes_for(case.scene), silent)]
+    results = [measure(context, case, modes_for(context, case.scene), silent)]
     return document(machine(context), results)
 
 
