@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from app.cli.files import check_folder, readable_file, staged_folder
 from app.cli.report import ProgressBar, say_warnings, write_json
+from app.cli.scenes import open_scene
 from langflash_core.errors import InputError, OutputError, PromptError, SceneFileError
 
 if TYPE_CHECKING:
@@ -82,9 +83,7 @@ def _cases(args: Namespace) -> "list[Case]":
     if args.synthetic is not None:
         atoms = args.atoms or cases.SYNTHETIC_ATOMS
         return [synthetic_case(args.synthetic, atoms, args.size, frames, spread=spread)]
-    from langflash_core.scene import load
-
-    scene, name = load(args.scene), args.scene.stem
+    scene, name = open_scene(args.scene), args.scene.stem
     if args.atoms is not None:
         return [generated_atoms_case(name, scene, args.atoms, args.size, frames)]
     return [scene_case(name, scene, args.size, frames, args.prompt)]
