@@ -67,6 +67,7 @@ class SplatRenderer:
         self._asked = 0  # how often; names the current query in keys
         self._drawn: dict[str, tuple] = {}  # what the colour and weight textures show
         self._version = 0  # of the weight maps
+        self._marked = 0  # how often; names the current tints in keys
         self._atoms = np.zeros(0, np.int64)
         self._atom_colours = np.zeros((0, 3), np.float32)
         self._size: tuple[int, int] | None = None
@@ -87,6 +88,22 @@ class SplatRenderer:
         self._atom_colours = atom_colours(scene.semantics.dictionary.detach().cpu().double().numpy())
         if self._compiled is not None and self._compiled.factor.shape[0] != scene.semantics.num_atoms:
             self._compiled = None
+
+    def mark(self, shown: np.ndarray, tints: np.ndarray) -> None:
+        """Draw only some Gaussians, and some in a tint (`splats.TINTS`); holds until `set_scene`.
+
+        Args:
+            shown: (N,) bool. tints: (N,) uint8, 0 for the own colour.
+
+        Raises:
+            ValueError: there is no scene, or N is another.
+        """
+        count = len(self._scene.gaussians) if self._scene else 0
+        if self._splats is None or shown.shape != (count,) or tints.shape != (count,):
+            raise ValueError(f"mark: expected {count} rows, received {shown.shape} and {tints.shape}")
+        if self._splats.mark(shown, tints):
+            self._drawn = {}
+        self._marked += 1
 
     @property
     def num_dropped(self) -> int:
@@ -115,13 +132,13 @@ class SplatRenderer:
         key = _camera_key(camera)
         if self._drawn.get("sorted") != key:
             self._splats.sort(camera)
-            if len(self._splats.order):
-                self._splats.project(camera)
             self._drawn = {"sorted": key}
         self._background = background
-        if self._drawn.get("colour") != key:
+        if self._drawn.get("colour") != (key, self._marked):
+            if len(self._splats.order):
+                self._splats.project(camera)
             self._draw_colour()
-            self._drawn["colour"] = key
+            self._drawn["colour"] = (key, self._marked)
         if weight_maps:
             self._ensure_weights()
 
@@ -152,6 +169,32 @@ class SplatRenderer:
         under = np.asarray(self._background, np.float32)
         rgb = torch.from_numpy(colour[..., :3] + (1 - alphas[..., None]) * under)
         return Frame(rgb, torch.from_numpy(alphas.copy()), torch.from_numpy(depths), maps)
+
+    def pixel(self, x: int, y: int) -> tuple[float, float, np.ndarray | None]:
+        """Alpha, depth (scene units, 0 where empty) and weights (K,) of one pixel of the view.
+
+        The weights are None until the weight maps of this view are drawn. Reads a few texels.
+        """
+        viewport = (x, y, 1, 1)
+        content = self._drawn_target().framebuffer.read(viewport, 2, attachment=1, dtype="f4")
+        total, alpha = np.frombuffer(content, np.float32).tolist()
+        depth = total / alpha if alpha >= ALPHA_MIN else 0.0
+        if self._drawn.get("weights") != self._drawn["sorted"]:
+            return alpha, depth, None
+        assert self._scene is not None
+        weights = np.zeros(self._scene.semantics.num_atoms, np.float32)
+        num_layers = -(-len(self._atoms) // _ATOMS_PER_LAYER)
+        texels: list[np.ndarray] = []
+        for first in range(0, num_layers, MAX_LAYERS_AT_ONCE):
+            count = min(MAX_LAYERS_AT_ONCE, num_layers - first)
+            assert self._weights is not None
+            layers = self._weights.layers(first, count)
+            for layer in range(count):
+                read = layers.read(viewport, 4, attachment=layer, dtype=self._dtype)
+                texels.append(np.frombuffer(read, _NUMPY[self._dtype])[:_ATOMS_PER_LAYER])
+        if texels:
+            weights[self._atoms] = np.concatenate(texels)[: len(self._atoms)]
+        return alpha, depth, weights
 
     def relevance(self) -> Tensor:
         """Relevance (P, H, W) float32 of the phrases asked, 0 where the view is empty.

@@ -45,20 +45,19 @@ def random_history(seed: int, steps: int) -> tuple[History, list[Marks]]:
         found = Mask.of(generator.random(COUNT) < generator.choice([0.01, 0.3, 0.9]))
         atom, other = (int(k) for k in generator.choice(ATOMS, 2, replace=False))
         choices = (
-            ("select", lambda m=marks, f=found: select(m, f)),
-            ("add", lambda m=marks, f=found: select(m, f, "add")),
-            ("remove", lambda m=marks, f=found: select(m, f, "remove")),
-            ("invert", lambda m=marks: invert(m)),
-            ("delete", lambda m=marks, f=found: delete(m, f & m.selected)),
-            ("hide", lambda m=marks: hide(m, m.selected)),
-            ("isolate", lambda m=marks: isolate(m, m.selected)),
-            ("show", lambda m=marks: show_all(m)),
-            ("rename", lambda m=marks, a=atom, t=f"thing {generator.integers(9)}": rename_atom(m, a, t)),
-            ("toggle", lambda m=marks, a=atom: toggle_atom(m, a)),
-            ("merge", lambda m=marks, a=atom, b=other: merge_atoms(m, (a, b))),
+            ("select", select(marks, found)),
+            ("add", select(marks, found, "add")),
+            ("remove", select(marks, found, "remove")),
+            ("invert", invert(marks)),
+            ("delete", delete(marks, found & marks.selected)),
+            ("hide", hide(marks, marks.selected)),
+            ("isolate", isolate(marks, marks.selected)),
+            ("show", show_all(marks)),
+            ("rename", rename_atom(marks, atom, f"thing {generator.integers(9)}")),
+            ("toggle", toggle_atom(marks, atom)),
+            ("merge", merge_atoms(marks, (atom, other))),
         )
-        label, change = choices[generator.integers(len(choices))]
-        history = history.edited(label, change())
+        history = history.edited(*choices[generator.integers(len(choices))])
         if len(history.done) == len(passed):
             passed.append(history.marks)
     return history, passed
