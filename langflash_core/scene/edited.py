@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from langflash_core.scene.edits import Atom, Marks
+from langflash_core.edits import Atom, Marks
 from langflash_core.types import Scene, Semantics
 
 NAMES, SILENT = "atom_names", "silent_atoms"

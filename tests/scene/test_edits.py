@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from langflash_core.errors import SceneFileError
-from langflash_core.query.relevance import compile_query, relevance_maps
-from langflash_core.query.spaces import LanguageSpace
-from langflash_core.scene import load, save
-from langflash_core.scene.edited import NAMES, edited_scene, first_marks, spoken_scene
-from langflash_core.scene.edits import (
+from langflash_core.edits import (
     History,
     Marks,
     Mask,
@@ -27,6 +22,11 @@ from langflash_core.scene.edits import (
     show_all,
     toggle_atom,
 )
+from langflash_core.errors import SceneFileError
+from langflash_core.query.relevance import compile_query, relevance_maps
+from langflash_core.query.spaces import LanguageSpace
+from langflash_core.scene import load, save
+from langflash_core.scene.edited import NAMES, edited_scene, first_marks, spoken_scene
 from langflash_core.scene.edits_file import load_history, read_about, save_history, scene_digest
 from langflash_core.splat import render
 from langflash_core.types import Scene

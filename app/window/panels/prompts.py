@@ -39,7 +39,11 @@ def _row(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
         issued.append(do.ColourPrompt(prompt.key, (red, green, blue)))
     imgui.same_line()
     imgui.set_next_item_width(imgui.get_content_region_avail().x - 2 * look.px(38))
-    changed, text = imgui.input_text_with_hint("##text", "a thing, e.g. armchair", prompt.text)
+    frame = theme.LINE if prompt.like else theme.RAISED  # a chip that stands for a place, not for its words
+    with widgets.colours(frame_bg=frame):
+        changed, text = imgui.input_text_with_hint("##text", "a thing, e.g. armchair", prompt.text)
+    if prompt.like:
+        widgets.tooltip("Asks for what the place you clicked says; type to ask for words instead")
     if imgui.is_item_activated() and state.active != prompt.key:
         issued.append(do.SelectPrompt(prompt.key))
     if changed:
