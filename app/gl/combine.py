@@ -15,10 +15,10 @@ from langflash_core.query.relevance import EMPTY_NORM, CompiledQuery
 from .programs import Programs, set_uniforms
 from .targets import ADDED, MAXIMUM, LayerTarget, drawing
 
+PHRASES = 4  # a layer of relevance
 _CAPACITIES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 120)  # few, so that few programs are compiled
 _UNIFORMS = 960  # of the 1,024 vec4s that drivers have
 _PACKED = 8  # atoms a texel
-_PHRASES = 4  # a layer of relevance
 _MAX_COLUMNS = 16  # of |F|^2 a pass
 _STEPS = 65535
 
@@ -101,7 +101,7 @@ class QueryPasses:
         factor = compiled.factor.detach().cpu().double().numpy()[atoms]  # (Ka, r)
         prompts = compiled.prompts.detach().cpu().double().numpy()
         negatives = compiled.negatives.detach().cpu().double().numpy()
-        num_groups = max(1, -(-len(prompts) // _PHRASES))
+        num_groups = max(1, -(-len(prompts) // PHRASES))
         if self.relevance is None or self.relevance.num_layers != num_groups:
             self._drop_relevance()
             self.relevance = LayerTarget(self._ctx, self._size, num_groups, "f4")
@@ -178,14 +178,14 @@ class QueryPasses:
 
     def _scale(self, dots: np.ndarray) -> None:
         """1 / |w R| and the largest of the negatives' cosines (Ka, M); of none where M = 0."""
-        groups = range(0, max(1, dots.shape[1]), _PHRASES)
+        groups = range(0, max(1, dots.shape[1]), PHRASES)
         self._squares.use(1)
         self._scales_target.clear(0.0, -1.0)
         with drawing(self._scales_target, ADDED, MAXIMUM):
             for group in groups:
-                block = dots[:, group : group + _PHRASES]
+                block = dots[:, group : group + PHRASES]
                 filler = block[:, :1] if block.shape[1] else np.zeros((len(dots), 1))
-                block = np.concatenate((block, np.repeat(filler, _PHRASES - block.shape[1], 1)), 1)
+                block = np.concatenate((block, np.repeat(filler, PHRASES - block.shape[1], 1)), 1)
                 program = self._program("scale.frag", block, EMPTY_NORM=EMPTY_NORM)
                 set_uniforms(program, squares=1)
                 self._screen.draw(program)
@@ -195,7 +195,7 @@ class QueryPasses:
         assert self.relevance is not None
         self._scales.use(1)
         for group in range(self.relevance.num_layers):
-            program = self._program("relevance.frag", dots[:, _PHRASES * group : _PHRASES * (group + 1)])
+            program = self._program("relevance.frag", dots[:, PHRASES * group : PHRASES * (group + 1)])
             set_uniforms(program, scales=1, temperature=temperature)
             with drawing(self.relevance.layers(group, 1)):
                 self._screen.draw(program)

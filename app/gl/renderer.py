@@ -16,11 +16,13 @@ from torch import Tensor
 
 from langflash_core.errors import GraphicsError
 from langflash_core.query.relevance import CompiledQuery, finite_atoms
+from langflash_core.scene.thin import thin_with_rows
 from langflash_core.splat.projection import ALPHA_MIN
 from langflash_core.types import Camera, Frame, Scene
 
 from .combine import QueryPasses, Screen
 from .display import COLOUR_MAPS, Display, atom_colours
+from .fast import MAX_PHRASES, NUMBERS, FastPasses, splat_norms, splat_numbers
 from .programs import Programs, set_uniforms
 from .splats import SplatBuffers
 from .targets import MAX_LAYERS_AT_ONCE, PREMULTIPLIED, ColourTarget, LayerTarget, context_lives, drawing
@@ -61,19 +63,26 @@ class SplatRenderer:
         self._programs = Programs(ctx)
         self._screen = Screen(ctx)
         self._scene: Scene | None = None
-        self._splats: SplatBuffers | None = None
+        self._levels: dict[float, SplatBuffers] = {}  # by share of the Gaussians
+        self._rows: dict[float, np.ndarray] = {}  # of the scene, that a level draws
+        self._splats: SplatBuffers | None = None  # the level in use
         self._background: Background = (0.0, 0.0, 0.0)
         self._compiled: CompiledQuery | None = None
         self._asked = 0  # how often; names the current query in keys
         self._drawn: dict[str, tuple] = {}  # what the colour and weight textures show
         self._version = 0  # of the weight maps
-        self._marked = 0  # how often; names the current tints in keys
+        self._marks: tuple[np.ndarray, np.ndarray] | None = None  # shown, tints
+        self._marked = 0  # how often; names the current marks in keys
         self._atoms = np.zeros(0, np.int64)
         self._atom_colours = np.zeros((0, 3), np.float32)
         self._size: tuple[int, int] | None = None
         self._target: ColourTarget | None = None
         self._weights: LayerTarget | None = None
         self._query: QueryPasses | None = None
+        self._fast: FastPasses | None = None
+        self._is_fast = False  # relevance comes from the fast mode
+        self._numbers: tuple[int, np.ndarray] | None = None  # `_asked` and what its Gaussians carry
+        self._norms: tuple[bytes, np.ndarray] | None = None  # factor and |f_i|
         self._display: Display | None = None
 
     # --- what to draw -----------------------------------------------------------------------
@@ -84,6 +93,8 @@ class SplatRenderer:
             return
         self._release_scene()
         self._splats = SplatBuffers(self._ctx, self._programs, scene)
+        self._levels, self._rows = {1.0: self._splats}, {1.0: np.arange(len(scene.gaussians))}
+        self._marks = None
         self._scene = scene
         self._atom_colours = atom_colours(scene.semantics.dictionary.detach().cpu().double().numpy())
         if self._compiled is not None and self._compiled.factor.shape[0] != scene.semantics.num_atoms:
@@ -101,14 +112,21 @@ class SplatRenderer:
         count = len(self._scene.gaussians) if self._scene else 0
         if self._splats is None or shown.shape != (count,) or tints.shape != (count,):
             raise ValueError(f"mark: expected {count} rows, received {shown.shape} and {tints.shape}")
-        if self._splats.mark(shown, tints):
+        self._marks = (shown, tints)
+        changed = [self._mark_level(share) for share in self._levels]
+        if any(changed):
             self._drawn = {}
         self._marked += 1
+
+    def _mark_level(self, share: float) -> bool:
+        """Bring the marks to a level; returns whether it shows other Gaussians now."""
+        rows = self._rows[share]
+        return self._marks is not None and self._levels[share].mark(*(part[rows] for part in self._marks))
 
     @property
     def num_dropped(self) -> int:
         """Gaussians of the scene left out because a value or a weight was NaN or infinite."""
-        return self._splats.num_dropped if self._splats else 0
+        return self._levels[1.0].num_dropped if self._levels else 0
 
     @property
     def num_dropped_atoms(self) -> int:
@@ -116,9 +134,22 @@ class SplatRenderer:
         return int((~finite_atoms(self._scene.semantics.dictionary)).sum()) if self._scene else 0
 
     def draw(
-        self, camera: Camera, background: Background = (0.0, 0.0, 0.0), weight_maps: bool = True
+        self,
+        camera: Camera,
+        background: Background = (0.0, 0.0, 0.0),
+        weight_maps: bool = True,
+        fast: bool = False,
+        share: float = 1.0,
     ) -> None:
         """Draw the scene; nothing is drawn again for the same scene, camera and size.
+
+        Args:
+            weight_maps: draw them at once; else the first question that needs them does.
+            fast: until the next call, answer from numbers splatted beside the colour (app/gl/fast.py)
+                instead of weight maps, unless those are drawn already: for a moving camera. Serves
+                up to 17 phrases; more are answered exactly.
+            share: in (0, 1], of the Gaussians to draw, wider in return (scene/thin.py). A level is
+                made once and kept with the scene: use few values.
 
         Raises:
             ValueError: there is no scene, or the image has no pixels.
@@ -129,17 +160,24 @@ class SplatRenderer:
         if self._splats is None:
             raise ValueError("draw: expected set_scene before, received no scene")
         self._resize(camera)
+        self._use_level(share)
         key = _camera_key(camera)
         if self._drawn.get("sorted") != key:
             self._splats.sort(camera)
             self._drawn = {"sorted": key}
         self._background = background
-        if self._drawn.get("colour") != (key, self._marked):
+        if self._drawn.get("projected") != (key, self._marked):
             if len(self._splats.order):
                 self._splats.project(camera)
+            self._drawn.pop("colour", None)
+            self._drawn.pop("numbers", None)
+            self._drawn["projected"] = (key, self._marked)
+        self._is_fast = fast
+        if self._answers_fast():
+            self._ensure_numbers()
+        if "colour" not in self._drawn:
             self._draw_colour()
-            self._drawn["colour"] = (key, self._marked)
-        if weight_maps:
+        if weight_maps and not fast:
             self._ensure_weights()
 
     def ask(self, compiled: CompiledQuery | None) -> None:
@@ -199,10 +237,12 @@ class SplatRenderer:
     def relevance(self) -> Tensor:
         """Relevance (P, H, W) float32 of the phrases asked, 0 where the view is empty.
 
+        Exact, unless the view was drawn with `fast`.
+
         Raises:
             ValueError: nothing was asked or drawn.
         """
-        layers, compiled = self._ensure_relevance()
+        layers, compiled, _ = self._ensure_relevance()
         width, height, num_layers = layers.array.size[0], layers.array.size[1], layers.num_layers
         values = _read(layers.array).reshape(num_layers, height, width, 4)
         maps = np.moveaxis(values, -1, 1).reshape(4 * num_layers, height, width)
@@ -246,13 +286,13 @@ class SplatRenderer:
         """
         if colormap not in COLOUR_MAPS:
             raise ValueError(f"colormap: expected one of {COLOUR_MAPS}, received {colormap!r}")
-        layers, compiled = self._ensure_relevance()
+        layers, compiled, key = self._ensure_relevance()
         if not 0 <= prompt < compiled.prompts.shape[0]:
             raise ValueError(f"prompt: expected 0 to {compiled.prompts.shape[0] - 1}, received {prompt}")
         limit = compiled.threshold if threshold is None else threshold
         chosen = (min(limit, 0.999), 1.0) if span is None else span
         target, display = self._drawn_target(), self._shown()
-        key = (self._drawn["colour"], self._asked, colormap, limit, over_rgb, chosen)
+        key = (*key, colormap, limit, over_rgb, chosen)
         return display.picture(
             ("heat", prompt),
             key,
@@ -276,14 +316,14 @@ class SplatRenderer:
         Args:
             colours: (P, 3) in [0, 1]; None: hues spread by the golden ratio.
         """
-        layers, compiled = self._ensure_relevance()
+        layers, compiled, key = self._ensure_relevance()
         count = compiled.prompts.shape[0]
         chosen = _hues(count) if colours is None else np.asarray(colours, np.float32)
         if chosen.shape != (count, 3):
             raise ValueError(f"colours: expected ({count}, 3), received {chosen.shape}")
         limit = compiled.threshold if threshold is None else threshold
         target, display = self._drawn_target(), self._shown()
-        key = (self._drawn["colour"], self._asked, limit, chosen.tobytes())
+        key = (*key, limit, chosen.tobytes())
         return display.picture(
             ("labels",),
             key,
@@ -329,15 +369,68 @@ class SplatRenderer:
         self._display = Display(self._ctx, self._programs, self._screen, size, self.passes)
         self._size = size
 
-    def _draw_colour(self) -> None:
+    def _use_level(self, share: float) -> None:
+        assert self._scene is not None
+        if share not in self._levels:
+            thinner, rows = thin_with_rows(self._scene, share)
+            self._levels[share] = SplatBuffers(self._ctx, self._programs, thinner)
+            self._rows[share] = rows
+            self._mark_level(share)
+        if self._levels[share] is not self._splats:
+            self._splats = self._levels[share]
+            self._drawn = {}
+            self._numbers = self._norms = None
+
+    def _draw_colour(self, numbers: np.ndarray | None = None) -> None:
+        """Colour and depth, and with `numbers` (N, 3 L) the layers of the fast mode."""
         assert self._target is not None and self._splats is not None
-        program = self._programs.get("quad.vert", "colour.frag")
+        defines: dict[str, float] = {"COLOUR": 1}
+        framebuffer = self._target.framebuffer
+        layers = 0 if numbers is None else numbers.shape[1] // NUMBERS
+        if layers:
+            assert self._fast is not None
+            defines["LAYERS"], framebuffer = layers, self._fast.framebuffer
+        program = self._programs.get("quad.vert", "colour.frag", defines)
         set_uniforms(program, image_size=tuple(float(n) for n in self._target.colour.size))
-        self._target.framebuffer.clear()
-        with drawing(self._target.framebuffer, PREMULTIPLIED):
+        framebuffer.clear()
+        with drawing(framebuffer, PREMULTIPLIED):
             if len(self._splats.order):
-                self._splats.draw(program)
+                carried = None if numbers is None else self._splats.in_order(numbers)
+                self._splats.draw(program, carried, layers)
+        self._drawn["colour"] = self._drawn["projected"]
         self.passes["colour"] += 1
+
+    def _answers_fast(self) -> bool:
+        """Whether the next answer comes from the fast mode."""
+        assert self._scene is not None
+        if not self._is_fast or self._compiled is None or self._drawn.get("weights") == self._drawn["sorted"]:
+            return False
+        return self._scene.semantics.num_atoms > 0 and len(self._compiled.prompts) <= MAX_PHRASES
+
+    def _ensure_numbers(self) -> None:
+        """Colour, depth and the numbers of the phrases asked, in one splat pass, unless they are there."""
+        assert self._splats is not None and self._compiled is not None and self._target is not None
+        key = (self._drawn["sorted"], self._asked)
+        if self._drawn.get("numbers") == key:
+            return
+        if self._fast is None or not self._fast.fits(self._compiled):
+            self._release_fast()
+            self._fast = FastPasses(
+                self._ctx, self._programs, self._screen, self._target, self._compiled, self._dtype
+            )
+        self._draw_colour(self._carried())
+        self._fast.run(self._compiled)
+        self._drawn["numbers"] = key
+
+    def _carried(self) -> np.ndarray:
+        """What each Gaussian carries for the phrases asked; made once a question, norms once a dictionary."""
+        assert self._splats is not None and self._compiled is not None
+        if self._numbers is None or self._numbers[0] != self._asked:
+            factor = self._compiled.factor.detach().cpu().double().numpy()
+            if self._norms is None or self._norms[0] != factor.tobytes():
+                self._norms = factor.tobytes(), splat_norms(self._splats, factor)
+            self._numbers = self._asked, splat_numbers(self._splats, self._compiled, self._norms[1])
+        return self._numbers[1]
 
     def _ensure_weights(self) -> None:
         """Draw the weight maps of the current view unless they are there."""
@@ -364,17 +457,24 @@ class SplatRenderer:
         target = self._weights.layers(first, count)
         target.clear()
         with drawing(target, PREMULTIPLIED):
-            self._splats.draw(program, expanded, count)
+            self._splats.draw(program, expanded, count, colour=False)
         self.passes["weights"] += 1
 
-    def _ensure_relevance(self) -> tuple[LayerTarget, CompiledQuery]:
+    def _ensure_relevance(self) -> tuple[LayerTarget, CompiledQuery, tuple]:
+        """Relevance of the query, the query, and what names both."""
         self._drawn_target()
         if self._compiled is None:
             raise ValueError("relevance: expected ask(...) before, received no query")
+        key = (self._drawn["colour"], self._asked)
+        if self._answers_fast():
+            self._ensure_numbers()
+            assert self._fast is not None
+            return self._fast.relevance, self._compiled, (*key, "fast")
         self._ensure_weights()
         assert self._query is not None
         weights = self._weights if len(self._atoms) else None
-        return self._query.run(self._compiled, weights, self._atoms, self._version), self._compiled
+        layers = self._query.run(self._compiled, weights, self._atoms, self._version)
+        return layers, self._compiled, (*key, "exact")
 
     def _paint_atoms(self, into: moderngl.Framebuffer) -> None:
         assert self._query is not None
@@ -408,8 +508,14 @@ class SplatRenderer:
             self._weights.release()
         self._weights = None
 
+    def _release_fast(self) -> None:
+        if self._fast is not None:
+            self._fast.release()
+        self._fast = None
+
     def _release_targets(self) -> None:
         self._release_weights()
+        self._release_fast()
         for owned in (self._display, self._query, self._target):
             if owned is not None:
                 owned.release()
@@ -418,9 +524,10 @@ class SplatRenderer:
         self._drawn = {}
 
     def _release_scene(self) -> None:
-        if self._splats is not None:
-            self._splats.release()
-        self._splats = self._scene = None
+        for level in self._levels.values():
+            level.release()
+        self._levels = {}
+        self._splats = self._scene = self._numbers = self._norms = None
         self._drawn = {}
 
     def release(self) -> None:

@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import moderngl
 import numpy as np
+import torch
+from torch.nn import functional as F
 
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.geometry.quaternions import unit_quats
@@ -71,6 +73,7 @@ class SplatBuffers:
             self._own(self._ctx.texture((self._num_atoms, 1), 1, dtype="f4")) if self._sparse else None
         )
         self._weights: moderngl.Buffer | None = None
+        self._numbers: moderngl.Buffer | None = None
         self._vaos: dict[tuple, moderngl.VertexArray] = {}
 
     def _upload_weights(self) -> moderngl.Texture:
@@ -197,6 +200,22 @@ class SplatBuffers:
         self._transform(program, [], self._weights)
         return self._weights
 
+    def mixed(self, table: np.ndarray) -> np.ndarray:
+        """sum_j w_ij table[id_ij], (N, n) float32 in the scene's order, of a table (K, n)."""
+        rows = torch.from_numpy(np.ascontiguousarray(table, np.float32))
+        ids, values = torch.from_numpy(self._ids), torch.from_numpy(self._values)
+        return F.embedding_bag(ids, rows, per_sample_weights=values, mode="sum").numpy()
+
+    def in_order(self, numbers: np.ndarray) -> moderngl.Buffer:
+        """Numbers (N, n) float32 of all Gaussians as those of the chosen ones, in draw order."""
+        data = numbers[self.order].tobytes()
+        if self._numbers is None:
+            self._numbers = self._own(self._ctx.buffer(reserve=numbers.nbytes))
+        elif self._numbers.size < len(data):
+            self._numbers.orphan(numbers.nbytes)
+        self._numbers.write(data)
+        return self._numbers
+
     def _transform(self, program: moderngl.Program, content: list, out: moderngl.Buffer) -> None:
         key = ("transform", program.glo)
         if key not in self._vaos:
@@ -206,18 +225,21 @@ class SplatBuffers:
         self._vaos[key].transform(out, mode=moderngl.POINTS, vertices=len(self.order))
 
     def draw(
-        self, program: moderngl.Program, weights: moderngl.Buffer | None = None, num_layers: int = 0
+        self,
+        program: moderngl.Program,
+        weights: moderngl.Buffer | None = None,
+        num_layers: int = 0,
+        colour: bool = True,
     ) -> None:
-        """One instanced quad per chosen Gaussian, with its colour or with `num_layers` of weights."""
+        """One instanced quad per chosen Gaussian, with its colour, `num_layers` of weights, or both."""
         key = ("draw", program.glo)
         if key not in self._vaos:
-            if weights is None:
-                content = [(self.places, "4f 4f 3f/i", "in_place", "in_shape", "in_colour")]
-            else:
-                content = [
-                    (self.places, "4f 4f 12x/i", "in_place", "in_shape"),
-                    (weights, f"{3 * num_layers}f/i", "in_weights"),
-                ]
+            footprint = ("in_place", "in_shape")
+            content: list[tuple] = [(self.places, "4f 4f 12x/i", *footprint)]
+            if colour:
+                content = [(self.places, "4f 4f 3f/i", *footprint, "in_colour")]
+            if weights is not None:
+                content.append((weights, f"{3 * num_layers}f/i", "in_weights"))
             self._vaos[key] = self._ctx.vertex_array(program, content)
         self._vaos[key].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(self.order))
 

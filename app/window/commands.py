@@ -25,7 +25,8 @@ from app.window.state import (
     State,
     Stats,
     Toast,
-)from langflash_core.edits import Marks
+)
+from langflash_core.edits import Marks
 
 _NOTHING_TO_SAVE = "There is no scene to save; drop photos on the window first."
 

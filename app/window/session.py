@@ -382,7 +382,7 @@ class Session:
         """Shortcuts by the letter that the keyboard's layout puts there; the rest is ImGui's."""
         if action == glfw.PRESS and mods & (glfw.MOD_CONTROL | glfw.MOD_SUPER):
             letter = glfw.get_key_name(key, scancode)
-            edits = EDIT_SHORTCUTS.get((letter, bool(mods & glfw.MOD_SHIFT)))
+            edits = EDIT_SHORTCUTS.get((letter or "", bool(mods & glfw.MOD_SHIFT)))
             if edits is not None and not imgui.get_io().want_text_input and not self.state.dialog:
                 self.dispatch(edits)
                 return

@@ -43,8 +43,8 @@ def nearest_words(
     cosines = embeddings @ (vector / norm).to(embeddings)
     best: dict[str, NearWord] = {}
     for row in cosines.argsort(descending=True, stable=True).tolist():
-        word = words[row]
-        best.setdefault(word.strip().lower(), NearWord(word.strip(), float(cosines[row].clamp(-1, 1))))
+        word = str(words[row]).strip()
+        best.setdefault(word.lower(), NearWord(word, float(cosines[row].clamp(-1, 1))))
         if len(best) == count:
             break
     return tuple(best.values())

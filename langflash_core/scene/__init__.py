@@ -4,5 +4,6 @@ from langflash_core.scene.assemble import assemble
 from langflash_core.scene.file import load, save
 from langflash_core.scene.prune import prune
 from langflash_core.scene.report import describe
+from langflash_core.scene.thin import thin
 
-__all__ = ["assemble", "describe", "load", "prune", "save"]
+__all__ = ["assemble", "describe", "load", "prune", "save", "thin"]

@@ -1,7 +1,7 @@
 """Selections of Gaussians by where they are: growing, floaters, the atom they belong to."""
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from langflash_core.types import Gaussians, Semantics
 
@@ -24,7 +24,7 @@ def grow(means: np.ndarray, selected: np.ndarray, allowed: np.ndarray, distance:
     around = np.flatnonzero(allowed & ~selected)
     if not selected.any() or not len(around):
         return grown
-    nearest, _ = cKDTree(means[selected]).query(
+    nearest, _ = KDTree(means[selected]).query(
         means[around], distance_upper_bound=np.nextafter(distance, np.inf)
     )
     grown[around[np.isfinite(nearest)]] = True
@@ -39,7 +39,8 @@ def spacing(means: np.ndarray, most: int = 4000) -> float:
     if len(means) < 2:
         return 0.0
     some = means[:: max(1, len(means) // most)]
-    return float(np.median(cKDTree(means).query(some, k=2)[0][:, 1]))
+    distances = np.asarray(KDTree(means).query(some, k=2)[0])  # (n, 2), the first its own 0
+    return float(np.median(distances[:, 1]))
 
 
 def isolation(gaussians: Gaussians, visible: np.ndarray) -> np.ndarray:
@@ -67,9 +68,9 @@ def isolation(gaussians: Gaussians, visible: np.ndarray) -> np.ndarray:
     scales = gaussians.scales.detach().cpu().double().amax(-1).numpy()[rows]
     opacities = np.clip(gaussians.opacities.detach().cpu().double().numpy()[rows], 1e-3, 1.0)
     count = min(NEIGHBOURS + 1, len(rows))
-    distances, neighbours = cKDTree(means).query(means, k=count)
-    apart = np.maximum(distances[:, 1:].mean(1), 1e-12)
-    support = opacities[neighbours[:, 1:]].mean(1)
+    distances, neighbours = KDTree(means).query(means, k=count)
+    apart = np.maximum(np.asarray(distances)[:, 1:].mean(1), 1e-12)
+    support = opacities[np.asarray(neighbours)[:, 1:]].mean(1)
     loneliness = np.log(apart / np.maximum(scales, 1e-12)) - 0.5 * np.log(opacities * support)
     middle = np.median(loneliness)
     deviation = max(_MAD_TO_DEVIATION * np.median(abs(loneliness - middle)), _LEAST_DEVIATION)

@@ -39,8 +39,7 @@ def _region(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
     editing = state.editing
     if not editing.tool.selects:
         return
-    io, canvas = imgui.get_io(), imgui.get_background_draw_list()
-    canvas = imgui.get_foreground_draw_list()
+    io, canvas = imgui.get_io(), imgui.get_foreground_draw_list()
     canvas.push_clip_rect(place, ImVec2(place.x + size.x, place.y + size.y), True)
     combine = "add" if io.key_shift else "remove" if io.key_ctrl else editing.combine
     colour = theme.BAD if combine == "remove" else theme.SELECTED
@@ -54,7 +53,7 @@ def _region(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
         canvas.add_rect(low, high, line, 0.0, look.px(1.5))
     elif editing.tool is Tool.BRUSH and path:
         if len(path) > 1:
-            canvas.add_polyline(path, fill, 0, 2 * radius)
+            canvas.add_polyline([*path], col=fill, thickness=2 * radius, flags=0)
         canvas.add_circle_filled(path[0], radius, fill)
         canvas.add_circle_filled(path[-1], radius, fill)
         canvas.add_circle(path[-1], radius, line, 0, look.px(1.5))
@@ -107,7 +106,6 @@ def _bar(share: float, colour: ImVec4, look: Look) -> None:
 
 
 def _pin(at: ImVec2, look: Look) -> None:
-    canvas = imgui.get_background_draw_list()
     canvas = imgui.get_foreground_draw_list()
     canvas.add_circle_filled(at, look.px(5), widgets.u32(theme.ACCENT))
     canvas.add_circle(at, look.px(7), widgets.u32(ImVec4(0, 0, 0, 0.7)), 0, look.px(1.5))

@@ -10,6 +10,7 @@ from app.window.editing import RADIUS_RANGE, REACH_RANGE, STRICTNESS_RANGE, Floa
 from app.window.panels import widgets
 from app.window.panels.look import Look
 from app.window.state import State
+from langflash_core.edits import Combine
 
 _TOOLS = (
     (Tool.MOVE, fa.ICON_FA_ARROWS_UP_DOWN_LEFT_RIGHT, "Move around  (V)"),
@@ -18,7 +19,7 @@ _TOOLS = (
     (Tool.BRUSH, fa.ICON_FA_PAINTBRUSH, "Select with a brush  (B)\n[ and ] change its size"),
     (Tool.PICK, fa.ICON_FA_ARROW_POINTER, "Select what is under a click  (C)"),
 )
-_COMBINES = (
+_COMBINES: tuple[tuple[Combine, str, str], ...] = (
     ("replace", fa.ICON_FA_SQUARE, "A new selection each time"),
     ("add", fa.ICON_FA_PLUS, "Add to the selection  (Shift)"),
     ("remove", fa.ICON_FA_MINUS, "Take from the selection  (Ctrl)"),
