@@ -1,5 +1,6 @@
 """The worker's side of editing: each request to its result, by the library. No OpenGL, no ImGui."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -24,8 +25,11 @@ from app.window.edit_messages import (
     Result,
     ScoreFloaters,
     SelectionFound,
+    Weigh,
+    Weighed,
 )
-from app.window.poses import to_camera
+from app.window.editing import Reading, strongest
+from app.window.poses import Pose, to_camera
 from langflash_core.edits import Mask
 
 SEEN = 0.05  # of a pixel's colour: a Gaussian that adds less anywhere in a region is not seen there
@@ -56,6 +60,8 @@ def run(request: Request) -> Result | None:
             return FloatersScored(request.serial, scores.tobytes())
         case NamePlace():
             return name_place(request)
+        case Weigh():
+            return Weighed(request.serial, _with_atoms(request.reading, weigh(request)))
         case NameAtoms():
             return name_atoms(request)
         case KeepEdits(scene, history, name, path, token):
@@ -113,6 +119,44 @@ def grow_selection(request: GrowSelection) -> SelectionFound:
     return SelectionFound(request.serial, Mask.of(found), "add", what)
 
 
+def weigh(request: Weigh) -> np.ndarray:
+    """Weights (K,) of a pixel, composed exactly; a view is projected once for all its pixels."""
+    import torch
+
+    rows, footprints = _projected(request.scene, request.marks.visible, request.pose, request.size)
+    from langflash_core.splat.contributions import composition
+
+    x, y = (min(max(int(at), 0), side - 1) for at, side in zip(request.reading.at, request.size, strict=True))
+    here, shares = composition(footprints, x, y)
+    semantics = request.scene.semantics
+    weights = torch.zeros(semantics.num_atoms, dtype=torch.float64)
+    ids, values = semantics.weight_ids[rows[here]], semantics.weight_values[rows[here]]
+    weights.index_add_(0, ids.flatten(), (values * shares[:, None]).flatten())
+    return weights.float().numpy()
+
+
+_views: dict[tuple, tuple] = {}  # the last view that was projected
+
+
+def _projected(scene, visible: Mask, pose: Pose, size: tuple[int, int]):
+    """Rows of what is shown, and their footprints in a view."""
+    import torch
+
+    from langflash_core.splat import project
+
+    key = (id(scene), visible, pose, size)
+    if key not in _views:
+        rows = torch.from_numpy(np.flatnonzero(visible.rows()))
+        shown = scene.gaussians.map(lambda values: values[rows].double())
+        _views.clear()
+        _views[key] = scene, rows, project(shown, to_camera(pose, *size))
+    return _views[key][1:]
+
+
+def _with_atoms(reading: Reading, weights: np.ndarray) -> Reading:
+    return replace(reading, atoms=strongest(weights))
+
+
 def name_place(request: NamePlace) -> PlaceNamed:
     """The nearest words of F(p) = W D, of the household's and the person's own."""
     import torch
@@ -120,13 +164,14 @@ def name_place(request: NamePlace) -> PlaceNamed:
     from langflash_core.query.words import feature_at, nearest_words
 
     scene = _spoken(request)
-    weights = torch.from_numpy(np.frombuffer(request.weights, np.float32).copy())
-    vector = feature_at(weights, scene.semantics.dictionary)
+    weights = np.frombuffer(request.weights, np.float32).copy() if request.weights else weigh(request)
+    vector = feature_at(torch.from_numpy(weights), scene.semantics.dictionary)
     words, embeddings = _vocabulary(scene.semantics.space, request.extra)
     near = nearest_words(vector, words, embeddings, WORDS_ASKED)
     pairs = tuple((each.word, each.cosine) for each in near)
     content = vector.float().numpy().tobytes() if near else b""
-    return PlaceNamed(request.serial, request.reading, pairs, content)
+    reading = _with_atoms(request.reading, weights)
+    return PlaceNamed(request.serial, request.reading, reading, pairs, content)
 
 
 def name_atoms(request: NameAtoms) -> AtomWords:

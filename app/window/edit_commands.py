@@ -403,7 +403,7 @@ class ReadingTaken:
 
 @dataclass(frozen=True)
 class Ask:
-    """What is this, at a pixel? Answered as soon as the picture rests."""
+    """What is this, at a pixel?"""
 
     at: Point
 
@@ -423,15 +423,16 @@ class CardOpened:
 
 @dataclass(frozen=True)
 class Named:
-    """Nearest words (word, cosine) and language vector of a place."""
+    """Nearest words (word, cosine) and language vector of the place that was asked about."""
 
+    asked: Reading
     reading: Reading
     words: tuple[tuple[str, float], ...]
     vector: bytes
 
     def apply(self, state: "State") -> "State":
         card = state.editing.card
-        if card is None or card.reading != self.reading:
+        if card is None or card.reading != self.asked:
             return state
         return change(state, card=Card(self.reading, self.words, self.vector))
 

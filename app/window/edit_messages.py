@@ -65,10 +65,21 @@ class ScoreFloaters(EditErrand):
 
 
 @dataclass(frozen=True)
-class NamePlace(EditErrand):
-    """Words for a pixel with these weights (K,), float32 bytes. extra: words beside the household's."""
+class Weigh(EditErrand):
+    """The groups of a pixel whose weight maps are not drawn. size: of the picture's place."""
 
     reading: Reading
+    pose: Pose
+    size: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class NamePlace(Weigh):
+    """Words for a pixel with `weights` (K,), float32 bytes; none: not drawn, to be composed.
+
+    extra: words beside the household's.
+    """
+
     weights: bytes
     extra: tuple[str, ...]
 
@@ -119,6 +130,7 @@ Request = (
     | FindAtom
     | GrowSelection
     | ScoreFloaters
+    | Weigh
     | NamePlace
     | NameAtoms
     | KeepEdits
@@ -147,10 +159,22 @@ class FloatersScored:
 
 
 @dataclass(frozen=True)
-class PlaceNamed:
-    """(word, cosine), best first, and the place's language vector, float32 bytes."""
+class Weighed:
+    """A reading with its groups."""
 
     serial: int
+    reading: Reading
+
+
+@dataclass(frozen=True)
+class PlaceNamed:
+    """(word, cosine), best first, and the place's language vector, float32 bytes.
+
+    asked: the reading that was asked about; reading: the same with its groups.
+    """
+
+    serial: int
+    asked: Reading
     reading: Reading
     words: tuple[tuple[str, float], ...]
     vector: bytes
@@ -172,4 +196,4 @@ class EditsKept:
     offer: Offer
 
 
-Result = SelectionFound | FloatersScored | PlaceNamed | AtomWords | EditsKept
+Result = SelectionFound | FloatersScored | Weighed | PlaceNamed | AtomWords | EditsKept

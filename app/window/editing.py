@@ -13,6 +13,7 @@ RADIUS_RANGE = (4.0, 160.0)  # design pixels
 PICK_RADIUS = 4.0
 STRICTNESS_RANGE = (1.0, 6.0)
 REACH_RANGE = (1.0, 12.0)
+TOP_ATOMS = 3
 
 
 class Tool(Enum):
@@ -94,7 +95,7 @@ class Floaters:
     """The preview of floaters. scores: (N,) float32 bytes in robust deviations, empty while computed."""
 
     scores: bytes = field(default=b"", repr=False)
-    strictness: float = 3.0
+    strictness: float = 2.0
 
     def mask(self, visible: Mask) -> Mask:
         """Gaussians at least this strict, of what is shown."""
@@ -181,3 +182,10 @@ def _stroke(inside: np.ndarray, start: np.ndarray, end: np.ndarray, radius: floa
     share = (((x - start[0]) * along[0] + (y - start[1]) * along[1]) / length).clip(0, 1)
     apart = np.hypot(x - start[0] - share * along[0], y - start[1] - share * along[1])
     inside[low[1] : high[1], low[0] : high[0]] |= apart <= radius
+
+
+def strongest(weights: np.ndarray) -> tuple[tuple[int, float], ...]:
+    """The atoms that a pixel carries most of, with their shares of all."""
+    total = max(float(weights.sum()), 1e-9)
+    order = np.argsort(-weights, kind="stable")[:TOP_ATOMS]
+    return tuple((int(k), float(weights[k]) / total) for k in order if weights[k] > 0.005 * total)

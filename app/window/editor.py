@@ -8,7 +8,7 @@ import numpy as np
 from app.window import autosave, edit_messages, messages
 from app.window import commands as do
 from app.window import edit_commands as edit
-from app.window.editing import Offer
+from app.window.editing import Offer, Reading, Tool
 from app.window.state import SceneInfo, State
 from app.window.viewport import Viewport
 from langflash_core.edits import Combine, Marks
@@ -56,26 +56,35 @@ class Editor:
         if hover is not None and key != self._read:
             found = self._viewport.read(hover.at)
             if found is not None:
-                self._perform(edit.ReadingTaken(found[0]))
+                reading, weights = found
+                self._perform(edit.ReadingTaken(reading))
+                if weights is None and reading.point is not None and editing.tool is Tool.POINT:
+                    self._weigh(state, info, reading)
         self._read = key
         if editing.asked is not None and state.pose == self._viewport.pose:
             self._ask(state, info)
 
+    def _weigh(self, state: State, info: SceneInfo, reading: Reading) -> None:
+        marks, size = state.editing.marks, self._viewport.size
+        if marks is not None and info.num_atoms and state.pose == self._viewport.pose:
+            self._submit(edit_messages.Weigh(info.serial, info.scene, marks, reading, state.pose, size))
+
     def _ask(self, state: State, info: SceneInfo) -> None:
-        """Send the place that was clicked on, if its weights are drawn."""
+        """Send the place that was clicked on."""
         assert state.editing.asked is not None and state.editing.marks is not None
         found = self._viewport.read(state.editing.asked)
-        if found is None or (found[1] is None and info.num_atoms):
+        if found is None:
             return
         reading, weights = found
         self._perform(edit.CardOpened(reading))
-        if weights is None or reading.point is None:
-            self._perform(edit.Named(reading, (), b""))
+        if reading.point is None or not info.num_atoms:
+            self._perform(edit.Named(reading, reading, (), b""))
             return
         extra = tuple(p.text.strip() for p in state.asked if not p.like)
-        content = weights.astype(np.float32).tobytes()
-        marks = state.editing.marks
-        self._submit(edit_messages.NamePlace(info.serial, info.scene, marks, reading, content, extra))
+        content = b"" if weights is None else weights.astype(np.float32).tobytes()
+        scene = (info.serial, info.scene, state.editing.marks)
+        place = (reading, state.pose, self._viewport.size)
+        self._submit(edit_messages.NamePlace(*scene, *place, content, extra))
 
     # Commands
 

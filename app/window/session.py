@@ -333,8 +333,10 @@ class Session:
                 self.dispatch(edit.Found(mask, combine, what))
             case edit_messages.FloatersScored(of, scores) if of == serial:
                 self.dispatch(edit.FloatersFound(scores))
-            case edit_messages.PlaceNamed(of, reading, words, vector) if of == serial:
-                self.dispatch(edit.Named(reading, words, vector))
+            case edit_messages.Weighed(of, reading) if of == serial:
+                self.dispatch(edit.ReadingTaken(reading))
+            case edit_messages.PlaceNamed(of, asked, reading, words, vector) if of == serial:
+                self.dispatch(edit.Named(asked, reading, words, vector))
             case edit_messages.AtomWords(of, names) if of == serial:
                 self.dispatch(edit.AtomsNamed(names))
             case edit_messages.EditsKept(of, offer) if of == serial:

@@ -5,7 +5,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.window.editing import NO_EDITING, Editing, Tool
+from app.window.editing import NO_EDITING, Editing
 from app.window.poses import START, Pose
 
 if TYPE_CHECKING:
@@ -176,8 +176,5 @@ class State:
 
     @property
     def wants_maps(self) -> bool:
-        """Whether the picture needs the weight maps and not only colour and depth."""
-        asking = self.editing.tool is Tool.POINT
-        return (
-            asking or self.mode is Mode.ATOMS or (self.mode in (Mode.HEAT, Mode.LABELS) and bool(self.asked))
-        )
+        """Whether the picture shows the weight maps and not only colour and depth."""
+        return self.mode is Mode.ATOMS or (self.mode in (Mode.HEAT, Mode.LABELS) and bool(self.asked))

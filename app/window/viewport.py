@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
-from app.window.editing import Point, Reading
+from app.window.editing import Point, Reading, strongest
 from app.window.pace import SETTLE_AFTER, Kind, Pace, Plan
 from app.window.poses import START, Pose, to_camera
 from app.window.state import Mode, State
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 BACKGROUND = (0.055, 0.06, 0.07)  # the theme's canvas
 COLORMAP = "turbo"
 SHOWN_ALPHA = 0.5  # as in the answers: from here on a pixel shows the scene
-TOP_ATOMS = 3
 
 
 @dataclass(frozen=True)
@@ -157,7 +156,7 @@ class Viewport:
         pos_c = depth * np.array([(x + 0.5 - K[0, 2]) / K[0, 0], (y + 0.5 - K[1, 2]) / K[1, 1], 1.0])
         place = viewmat[:3, :3].T @ (pos_c - viewmat[:3, 3])
         point = (float(place[0]), float(place[1]), float(place[2]))
-        return Reading(at, point, depth, None if weights is None else _strongest(weights)), weights
+        return Reading(at, point, depth, None if weights is None else strongest(weights)), weights
 
     def update(self, state: State, size: tuple[int, int], touched: float) -> float:
         """Bring the picture up to date; returns seconds until it wants to be called again.
@@ -252,13 +251,6 @@ class Viewport:
             self._texture = renderer.depth_texture()
         else:
             self._texture = renderer.rgb_texture
-
-
-def _strongest(weights: np.ndarray) -> tuple[tuple[int, float], ...]:
-    """The atoms that a pixel carries most of, with their shares of all."""
-    total = max(float(weights.sum()), 1e-9)
-    order = np.argsort(-weights, kind="stable")[:TOP_ATOMS]
-    return tuple((int(k), float(weights[k]) / total) for k in order if weights[k] > 0.005 * total)
 
 
 def _kind(state: State) -> Kind:

@@ -15,6 +15,7 @@ from queue import Empty, SimpleQueue
 import numpy as np
 
 from app.window import chores
+from app.window.edit_messages import Weigh
 from app.window.messages import (
     Answer,
     Compiled,
@@ -41,7 +42,7 @@ from langflash_core.errors import Cancelled, ImageError, LangFlashError
 log = logging.getLogger(__name__)
 
 THUMBNAIL_SIDE = 320  # pixels of the longer side
-_ANSWERS_REPLACE = (Encode, Answer)  # a newer one of these makes an older one pointless
+_ANSWERS_REPLACE = (Encode, Answer, Weigh)  # a newer one of these makes an older one pointless
 
 
 class Worker:

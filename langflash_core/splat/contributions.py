@@ -60,6 +60,19 @@ def contributions(
     return result
 
 
+def composition(footprints: Footprints, x: int, y: int) -> tuple[Tensor, Tensor]:
+    """What one pixel is made of: rows (n,) of the Gaussians projected, nearest first, and T alpha (n,).
+
+    A weight map at the pixel is W_k = sum_i T_i alpha_i w_ik. `project` takes most of the time and
+    serves every pixel of a view.
+    """
+    x0, y0, x1, y1 = footprints.boxes().unbind(-1)
+    near = ((x0 <= x) & (x < x1) & (y0 <= y) & (y < y1)).nonzero().squeeze(-1)
+    alphas = _alphas(footprints, near, torch.full_like(near, x), torch.full_like(near, y))
+    near, alphas = near[alphas >= ALPHA_MIN], alphas[alphas >= ALPHA_MIN]
+    return footprints.ids[near], _transmittances(alphas, torch.zeros_like(near)) * alphas
+
+
 def _raise_to(
     result: Tensor, footprints: Footprints, reaching: Tensor, clipped: Tensor, pixels: Tensor, through: bool
 ) -> None:

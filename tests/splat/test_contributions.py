@@ -3,7 +3,8 @@
 import pytest
 import torch
 
-from langflash_core.splat.contributions import contributions
+from langflash_core.splat import project
+from langflash_core.splat.contributions import composition, contributions
 from langflash_core.splat.reference import rasterize
 from langflash_core.types import Gaussians
 from tests.splat.scenes import camera, cloud, turned
@@ -67,3 +68,14 @@ def test_no_pixels_no_contribution_and_wrong_sizes_are_refused():
     assert not contributions(gaussians, seen, nothing).any()
     with pytest.raises(ValueError, match="pixels: expected"):
         contributions(gaussians, seen, nothing[1:])
+
+
+@pytest.mark.parametrize("x,y", [(24, 20), (12, 6), (30, 11), (20, 33)])
+def test_the_composition_of_a_pixel_is_the_reference(x, y):
+    gaussians, seen = cloud(400, size=0.06).gaussians, camera(pose=turned(0.2, (0.1, 0.0, 0.0)))
+    maps, _ = rasterize(gaussians, torch.eye(400, dtype=torch.float64), seen)
+    rows, shares = composition(project(gaussians, seen), x, y)
+    dense = torch.zeros(400, dtype=torch.float64)
+    dense[rows] = shares
+    torch.testing.assert_close(dense, maps[y, x], rtol=0, atol=EXACT)
+    assert len(rows) > 0

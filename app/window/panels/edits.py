@@ -63,16 +63,16 @@ def draw_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do
     if offer is None or state.job is not None:
         return []
     issued: list[do.Command] = []
-    corner = ImVec2(place.x + size.x / 2, place.y + size.y - look.px(110))
+    corner = ImVec2(place.x + size.x / 2, place.y + size.y - look.px(14))
     imgui.set_next_window_pos(corner, 0, ImVec2(0.5, 1))
     imgui.set_next_window_size(ImVec2(look.px(_OFFER), 0))
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     with widgets.colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
         imgui.begin("##offer", None, widgets.PLAIN | imgui.WindowFlags_.no_focus_on_appearing)
-        edits = "1 edit" if offer.count == 1 else f"{offer.count} edits"
+        edits, were = ("1 edit", "was") if offer.count == 1 else (f"{offer.count} edits", "were")
         imgui.text_colored(theme.ACCENT, fa.ICON_FA_CLOCK_ROTATE_LEFT)
         imgui.same_line()
-        imgui.text_wrapped(f"{edits} of {offer.name} were not saved ({offer.when:%d %B, %H:%M}).")
+        imgui.text_wrapped(f"{edits} of {offer.name} {were} not saved ({offer.when:%d %B, %H:%M}).")
         if widgets.primary_button("Restore", look.vec(120, 0)):
             issued.append(edit.EndOffer(restore=True))
         imgui.same_line()

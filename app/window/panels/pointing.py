@@ -20,7 +20,8 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     """What belongs to the pointer and to the place that was asked about."""
     _region(state, look, place, size)
     editing = state.editing
-    if editing.tool is Tool.POINT and editing.hover is not None and editing.hover.point is not None:
+    quiet = editing.card is not None or editing.asked is not None
+    if editing.tool is Tool.POINT and not quiet and editing.hover is not None and editing.hover.point:
         _tooltip(state, editing.hover, look)
     if editing.card is not None:
         return _card(state, editing.card, look, place, size)
@@ -68,6 +69,7 @@ def _region(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
 
 def _tooltip(state: State, reading: Reading, look: Look) -> None:
     """Coordinates, depth, and the groups that the pixel shows."""
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     imgui.begin_tooltip()
     imgui.text_colored(theme.MUTED, _coordinates(reading))
     if reading.atoms is None:
@@ -76,13 +78,14 @@ def _tooltip(state: State, reading: Reading, look: Look) -> None:
         _bar(share, theme.ACCENT, look)
         imgui.same_line()
         imgui.text(f"{100 * share:.0f} %")
-        imgui.same_line(look.px(118))
+        imgui.same_line(look.px(134))
         imgui.text(state.editing.atom_name(k))
         others = state.editing.names[k][1:] if k < len(state.editing.names) else ()
         if others:
             imgui.same_line()
             imgui.text_colored(theme.MUTED, ", ".join(others))
     imgui.end_tooltip()
+    imgui.pop_style_var()
 
 
 def _coordinates(reading: Reading) -> str:
@@ -164,7 +167,7 @@ def _answer(state: State, card: Card, look: Look) -> list[do.Command]:
         _bar(cosine, theme.ACCENT, look)
         imgui.same_line()
         imgui.text(f"{cosine:.2f}")
-        imgui.same_line(look.px(122))
+        imgui.same_line(look.px(134))
         imgui.text_unformatted(word)
     if card.reading.point is not None:
         imgui.text_colored(theme.MUTED, _coordinates(card.reading))

@@ -75,7 +75,9 @@ def _strip(state: State, look: Look) -> list[do.Command]:
         if _tool_button(icon, editing.tool is tool, side, tip):
             issued.append(edit.SetTool(tool))
     imgui.separator()
-    if _tool_button(fa.ICON_FA_BROOM, editing.floaters is not None, side, "Find floaters, with a preview"):
+    if _tool_button(
+        fa.ICON_FA_WAND_MAGIC_SPARKLES, editing.floaters is not None, side, "Find floaters, with a preview"
+    ):
         issued.append(edit.FindFloaters() if editing.floaters is None else edit.EndFloaters())
     imgui.separator()
     history = editing.history
@@ -115,10 +117,10 @@ def _options(state: State, look: Look) -> list[do.Command]:
         imgui.same_line()
     imgui.pop_style_var()
     imgui.same_line(0, look.px(14))
-    changed, through = imgui.checkbox("through", editing.through)
+    label = f"{fa.ICON_FA_LAYER_GROUP}  Through"
+    if widgets.primary_button(label) if editing.through else imgui.button(label):
+        issued.append(edit.SetThrough(not editing.through))
     widgets.tooltip("Also select what is hidden behind other things")
-    if changed:
-        issued.append(edit.SetThrough(through))
     if editing.tool is Tool.BRUSH:
         imgui.same_line(0, look.px(14))
         tip = "Radius of the brush, pixels  ([ and ])"
@@ -179,7 +181,7 @@ def _floaters(state: State, found: Floaters, look: Look) -> list[do.Command]:
     """The preview of floaters, in red in the picture."""
     issued: list[do.Command] = []
     imgui.align_text_to_frame_padding()
-    imgui.text_colored(theme.BAD, fa.ICON_FA_BROOM)
+    imgui.text_colored(theme.BAD, fa.ICON_FA_WAND_MAGIC_SPARKLES)
     imgui.same_line()
     marks = state.editing.marks
     if not found.scores or marks is None:
