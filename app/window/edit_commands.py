@@ -119,13 +119,13 @@ class SelectRegion:
 
 @dataclass(frozen=True)
 class SelectByPhrase:
-    """Find the Gaussians that a prompt means, from its threshold on."""
+    """Find the Gaussians that a prompt means, from its threshold on; a heat-map would cover them."""
 
     key: int
     combine: Combine = "replace"
 
     def apply(self, state: "State") -> "State":
-        return change(state, waiting="Selecting")
+        return change(replace(state, mode=Mode.RGB), waiting="Selecting")
 
 
 @dataclass(frozen=True)
