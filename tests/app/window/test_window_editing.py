@@ -26,7 +26,7 @@ __all__ = ["display", "pytestmark", "scene_file"]  # fixtures and the mark of th
 
 ACROSS, DOWN = SIZE[0] - LEFT, CANVAS[0].stop - TOP
 CHAIR = (LEFT + ACROSS * 3 // 10, TOP + DOWN * 6 // 10)  # as in test_the_scene_is_drawn
-WALL = (LEFT + ACROSS * 8 // 10, TOP + DOWN // 5)
+WALL = (LEFT + ACROSS * 8 // 10, TOP + DOWN * 3 // 10)  # below the bars
 
 
 @pytest.fixture
@@ -58,6 +58,12 @@ def move(program: Program, at: tuple[int, int]) -> None:
     program.xdotool("mousemove", *map(str, at))
 
 
+def drag_with(program: Program, key: str) -> None:
+    """Drag by 30 x 30 pixels with a modifier held; the pauses let a busy machine see it held."""
+    drag = ("mousedown", "1", "mousemove_relative", "30", "30", "sleep", "0.3", "mouseup", "1")
+    program.xdotool("keydown", key, *drag, "sleep", "0.3", "keyup", key)
+
+
 def test_brush_delete_undo_save(program: Program, tmp_path: Path) -> None:
     plain = program.picture()
     press(program, "b", "BRUSH")
@@ -82,7 +88,8 @@ def test_brush_delete_undo_save(program: Program, tmp_path: Path) -> None:
     program.xdotool("key", "ctrl+z")
     program.until(lambda s: s["selected"] == 0 and s["edits"] == [], "undo of the selection")
     program.at_rest()
-    assert np.array_equal(program.picture()[y - 30 : y + 30], plain[y - 30 : y + 30])
+    around = (slice(y - 30, y + 30), slice(x - 60, x + 200))  # without the tools on the left
+    assert np.array_equal(program.picture()[around], plain[around])
     program.xdotool("key", "ctrl+y", "key", "ctrl+shift+z")
     state = program.until(lambda s: s["deleted"] == count, "redo")
     assert state["unsaved"]
@@ -102,8 +109,8 @@ def test_what_is_this_and_find_similar(program: Program) -> None:
     press(program, "x", "POINT")
     move(program, CHAIR)
     state = program.until(lambda s: s["shares"] is not None, "the groups under the pointer")
-    # The front of the block stands at z = 0.65; splats of 0.005 spread it by a few thousandths.
-    assert abs(state["hover"][2] - 0.65) < 0.01 and state["shares"]["0"] > 0.9
+    # The front of the block stands at z = 0.65; a few percent of what is behind, at up to 1.3, shine through.
+    assert abs(state["hover"][2] - 0.65) < 0.05 and state["shares"]["0"] > 0.9
     program.xdotool("click", "1")
     state = program.until(lambda s: s["words"], "the words")
     assert state["words"][0] == "armchair"
@@ -123,16 +130,10 @@ def test_a_box_with_shift_adds_and_with_ctrl_removes(program: Program) -> None:
     program.xdotool("mousedown", "1", "mousemove_relative", "30", "30", "mouseup", "1")
     first = program.until(lambda s: s["selected"] > 0 and not s["waiting"], "a selection")["selected"]
     move(program, WALL)
-    program.xdotool(
-        "keydown", "shift", "mousedown", "1", "mousemove_relative", "30", "40", "sleep", "0.3", "mouseup", "1",
-        "sleep", "0.3", "keyup", "shift",
-    )  # fmt: skip
+    drag_with(program, "shift")
     more = program.until(lambda s: s["selected"] > first and not s["waiting"], "more")["selected"]
     move(program, CHAIR)
-    program.xdotool(
-        "keydown", "ctrl", "mousedown", "1", "mousemove_relative", "30", "30", "sleep", "0.3", "mouseup", "1",
-        "sleep", "0.3", "keyup", "ctrl",
-    )  # fmt: skip
+    drag_with(program, "ctrl")
     state = program.until(lambda s: s["selected"] == more - first, "less")
     assert [label.split()[0] for label in state["edits"]] == ["Select", "Add", "Unselect"]
     assert state["pose"] == [0, 0, 0, 1, 0, 0, 0]  # the camera stood still all the while
