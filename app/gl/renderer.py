@@ -16,7 +16,7 @@ from torch import Tensor
 
 from langflash_core.errors import GraphicsError
 from langflash_core.query.relevance import CompiledQuery, finite_atoms
-from langflash_core.scene import thin
+from langflash_core.scene.thin import thin_with_rows
 from langflash_core.splat.projection import ALPHA_MIN
 from langflash_core.types import Camera, Frame, Scene
 
@@ -78,12 +78,15 @@ class SplatRenderer:
         self._screen = Screen(ctx)
         self._scene: Scene | None = None
         self._levels: dict[float, SplatBuffers] = {}  # by share of the Gaussians
+        self._rows: dict[float, np.ndarray] = {}  # of the scene, that a level draws
         self._splats: SplatBuffers | None = None  # the level in use
         self._background: Background = (0.0, 0.0, 0.0)
         self._compiled: CompiledQuery | None = None
         self._asked = 0  # how often; names the current query in keys
         self._drawn: dict[str, tuple] = {}  # what the colour and weight textures show
         self._version = 0  # of the weight maps
+        self._marks: tuple[np.ndarray, np.ndarray] | None = None  # shown, tints
+        self._marked = 0  # how often; names the current marks in keys
         self._atoms = np.zeros(0, np.int64)
         self._atom_colours = np.zeros((0, 3), np.float32)
         self._size: tuple[int, int] | None = None
@@ -104,11 +107,35 @@ class SplatRenderer:
             return
         self._release_scene()
         self._splats = SplatBuffers(self._ctx, self._programs, scene)
-        self._levels = {1.0: self._splats}
+        self._levels, self._rows = {1.0: self._splats}, {1.0: np.arange(len(scene.gaussians))}
+        self._marks = None
         self._scene = scene
         self._atom_colours = atom_colours(scene.semantics.dictionary.detach().cpu().double().numpy())
         if self._compiled is not None and self._compiled.factor.shape[0] != scene.semantics.num_atoms:
             self._compiled = None
+
+    def mark(self, shown: np.ndarray, tints: np.ndarray) -> None:
+        """Draw only some Gaussians, and some in a tint (`splats.TINTS`); holds until `set_scene`.
+
+        Args:
+            shown: (N,) bool. tints: (N,) uint8, 0 for the own colour.
+
+        Raises:
+            ValueError: there is no scene, or N is another.
+        """
+        count = len(self._scene.gaussians) if self._scene else 0
+        if self._splats is None or shown.shape != (count,) or tints.shape != (count,):
+            raise ValueError(f"mark: expected {count} rows, received {shown.shape} and {tints.shape}")
+        self._marks = (shown, tints)
+        changed = [self._mark_level(share) for share in self._levels]
+        if any(changed):
+            self._drawn = {}
+        self._marked += 1
+
+    def _mark_level(self, share: float) -> bool:
+        """Bring the marks to a level; returns whether it shows other Gaussians now."""
+        rows = self._rows[share]
+        return self._marks is not None and self._levels[share].mark(*(part[rows] for part in self._marks))
 
     @property
     def num_dropped(self) -> int:
@@ -151,14 +178,18 @@ class SplatRenderer:
         key = _camera_key(camera)
         if self._drawn.get("sorted") != key:
             self._splats.sort(camera)
-            if len(self._splats.order):
-                self._splats.project(camera)
             self._drawn = {"sorted": key}
         self._background = background
+        if self._drawn.get("projected") != (key, self._marked):
+            if len(self._splats.order):
+                self._splats.project(camera)
+            self._drawn.pop("colour", None)
+            self._drawn.pop("numbers", None)
+            self._drawn["projected"] = (key, self._marked)
         self._is_fast = fast
         if self._answers_fast():
             self._ensure_numbers()
-        if self._drawn.get("colour") != key:
+        if "colour" not in self._drawn:
             self._draw_colour()
         if weight_maps and not fast:
             self._ensure_weights()
@@ -190,6 +221,32 @@ class SplatRenderer:
         under = np.asarray(self._background, np.float32)
         rgb = torch.from_numpy(colour[..., :3] + (1 - alphas[..., None]) * under)
         return Frame(rgb, torch.from_numpy(alphas.copy()), torch.from_numpy(depths), maps)
+
+    def pixel(self, x: int, y: int) -> tuple[float, float, np.ndarray | None]:
+        """Alpha, depth (scene units, 0 where empty) and weights (K,) of one pixel of the view.
+
+        The weights are None until the weight maps of this view are drawn. Reads a few texels.
+        """
+        viewport = (x, y, 1, 1)
+        content = self._drawn_target().framebuffer.read(viewport, 2, attachment=1, dtype="f4")
+        total, alpha = np.frombuffer(content, np.float32).tolist()
+        depth = total / alpha if alpha >= ALPHA_MIN else 0.0
+        if self._drawn.get("weights") != self._drawn["sorted"]:
+            return alpha, depth, None
+        assert self._scene is not None
+        weights = np.zeros(self._scene.semantics.num_atoms, np.float32)
+        num_layers = -(-len(self._atoms) // _ATOMS_PER_LAYER)
+        texels: list[np.ndarray] = []
+        for first in range(0, num_layers, MAX_LAYERS_AT_ONCE):
+            count = min(MAX_LAYERS_AT_ONCE, num_layers - first)
+            assert self._weights is not None
+            layers = self._weights.layers(first, count)
+            for layer in range(count):
+                read = layers.read(viewport, 4, attachment=layer, dtype=self._dtype)
+                texels.append(np.frombuffer(read, _NUMPY[self._dtype])[:_ATOMS_PER_LAYER])
+        if texels:
+            weights[self._atoms] = np.concatenate(texels)[: len(self._atoms)]
+        return alpha, depth, weights
 
     def relevance(self) -> Tensor:
         """Relevance (P, H, W) float32 of the phrases asked, 0 where the view is empty.
@@ -329,7 +386,10 @@ class SplatRenderer:
     def _use_level(self, share: float) -> None:
         assert self._scene is not None
         if share not in self._levels:
-            self._levels[share] = SplatBuffers(self._ctx, self._programs, thin(self._scene, share))
+            thinner, rows = thin_with_rows(self._scene, share)
+            self._levels[share] = SplatBuffers(self._ctx, self._programs, thinner)
+            self._rows[share] = rows
+            self._mark_level(share)
         if self._levels[share] is not self._splats:
             self._splats = self._levels[share]
             self._drawn = {}
@@ -351,7 +411,7 @@ class SplatRenderer:
             if len(self._splats.order):
                 carried = None if numbers is None else self._splats.in_order(numbers)
                 self._splats.draw(program, carried, layers)
-        self._drawn["colour"] = self._drawn["sorted"]
+        self._drawn["colour"] = self._drawn["projected"]
         self.passes["colour"] += 1
 
     def _answers_fast(self) -> bool:

@@ -10,6 +10,7 @@ from typing import Protocol
 
 from app.window import poses
 from app.window.drops import MAX_PHOTOS, SCENE_SUFFIX
+from app.window.edit_commands import fresh
 from app.window.poses import Pose
 from app.window.state import (
     FLIGHT_SECONDS,
@@ -25,6 +26,7 @@ from app.window.state import (
     Stats,
     Toast,
 )
+from langflash_core.edits import Marks
 
 _NOTHING_TO_SAVE = "There is no scene to save; drop photos on the window first."
 
@@ -152,12 +154,14 @@ class Reconstruct:
 
 @dataclass(frozen=True)
 class OpenScene:
-    """Read a scene file; replaces a job under way."""
+    """Read a scene file; replaces a job under way. edits: kept by an earlier session."""
 
     path: Path
+    edits: Path | None = None
 
     def apply(self, state: State) -> State:
-        return replace(state, job=Job(f"Opening {self.path.name}", "reading", started=state.now))
+        title = "Restoring" if self.edits else f"Opening {self.path.name}"
+        return replace(state, job=Job(title, "reading", started=state.now))
 
 
 @dataclass(frozen=True)
@@ -264,7 +268,7 @@ class EditPrompt:
     text: str
 
     def apply(self, state: State) -> State:
-        after = _change_prompt(state, self.key, text=self.text, score=None)
+        after = _change_prompt(state, self.key, text=self.text, score=None, like=b"")
         first = not state.asked and bool(after.asked)
         mode = Mode.HEAT if first and state.mode is Mode.RGB else after.mode
         return replace(after, mode=mode, active=self.key)
@@ -432,8 +436,11 @@ class SceneArrived:
 
     def apply(self, state: State) -> State:
         prompts = tuple(replace(p, score=None) for p in state.prompts)
+        history = self.info.history
+        saved = None if history is None else history.moved_to(0).marks
         return replace(
             state,
+            editing=fresh(state.editing, history, saved),
             info=self.info,
             prompts=prompts,
             job=None,
@@ -445,13 +452,16 @@ class SceneArrived:
 
 @dataclass(frozen=True)
 class SceneSaved:
-    """The scene on show now lives at `path`."""
+    """The scene on show, edited up to `marks`, now lives at `path`."""
 
     path: Path
+    marks: Marks | None = None
 
     def apply(self, state: State) -> State:
         info = None if state.info is None else replace(state.info, path=self.path, name=self.path.name)
-        return Notify(f"Saved {self.path}", "info").apply(replace(state, info=info))
+        saved = self.marks or state.editing.saved
+        state = replace(state, info=info, editing=replace(state.editing, saved=saved))
+        return Notify(f"Saved {self.path}", "info").apply(state)
 
 
 @dataclass(frozen=True)

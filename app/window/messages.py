@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from app.window import edit_messages
 from app.window.state import SceneInfo
+from langflash_core.edits import Marks
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -30,9 +32,10 @@ class ReconstructPhotos:
 
 @dataclass(frozen=True)
 class LoadScene:
-    """Read a scene file."""
+    """Read a scene file; or, with `edits`, the scene and the history that an earlier session kept."""
 
     path: Path
+    edits: Path | None = None
 
 
 # Requests: small ones, answered between the stages of a job
@@ -40,21 +43,27 @@ class LoadScene:
 
 @dataclass(frozen=True)
 class WriteScene:
-    """Write a scene file."""
+    """Write a scene file of the scene as edited."""
 
     scene: "Scene"
     path: Path
+    marks: Marks | None = None
 
 
 @dataclass(frozen=True)
 class Encode:
-    """Compile prompts against a scene; only the newest one counts."""
+    """Compile prompts against a scene; only the newest one counts.
+
+    likes: per prompt a language vector as float32 bytes, asked instead of the text, or none.
+    """
 
     serial: int
     scene: "Scene"
     keys: tuple[int, ...]
     texts: tuple[str, ...]
     negatives: tuple[str, ...]
+    likes: tuple[bytes, ...] = ()
+    marks: Marks | None = None
 
 
 @dataclass(frozen=True)
@@ -77,7 +86,7 @@ class MakeThumbnails:
 
 
 Job = ReconstructPhotos | LoadScene
-Errand = WriteScene | Encode | Answer | MakeThumbnails
+Errand = WriteScene | Encode | Answer | MakeThumbnails | edit_messages.Request
 
 
 # Results
@@ -100,9 +109,10 @@ class SceneReady:
 
 @dataclass(frozen=True)
 class SceneWritten:
-    """A scene file is complete."""
+    """A scene file is complete; it holds the edits up to `marks`."""
 
     path: Path
+    marks: Marks | None = None
 
 
 @dataclass(frozen=True)
@@ -144,4 +154,14 @@ class Thumbnail:
     problem: str = ""
 
 
-Result = Progress | SceneReady | SceneWritten | Failed | Stopped | Compiled | Scored | Thumbnail
+Result = (
+    Progress
+    | SceneReady
+    | SceneWritten
+    | Failed
+    | Stopped
+    | Compiled
+    | Scored
+    | Thumbnail
+    | edit_messages.Result
+)

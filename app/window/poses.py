@@ -161,6 +161,15 @@ def with_fov(pose: Pose, degrees: float) -> Pose:
     return replace(pose, fov=float(np.clip(degrees, *FOV_RANGE)))
 
 
+def framing(pose: Pose, centre: np.ndarray, radius: float) -> Pose:
+    """From the same direction, a ball around `centre` (3,) fills the photo box; radius in scene units."""
+    narrow = min(pose.aspect, 1 / pose.aspect)
+    half = math.atan(narrow * math.tan(math.radians(pose.fov) / 2))
+    reach = max(radius / math.sin(half), MIN_REACH)
+    place = np.asarray(centre) - reach * pose.axes[:, 2]
+    return replace(pose, centre=Vector(*place.tolist()), reach=reach)
+
+
 def units_per_pixel(pose: Pose, width: int, height: int) -> float:
     """Scene units that one pixel spans at the pivot's depth."""
     return pose.reach / float(intrinsics(pose, width, height)[0, 0])

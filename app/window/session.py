@@ -19,10 +19,12 @@ from imgui_bundle import imgui
 from imgui_bundle.python_backends.glfw_backend import GlfwRenderer
 
 from app.window import commands as do
-from app.window import messages, theme
+from app.window import edit_commands as edit
+from app.window import edit_messages, messages, theme
 from app.window.drops import sort_drop
+from app.window.editor import Editor
 from app.window.panels import Look, draw_all
-from app.window.panels.canvas import SHORTCUTS
+from app.window.panels.canvas import EDIT_SHORTCUTS, SHORTCUTS
 from app.window.state import State, Stats
 from app.window.textures import Thumbnails
 from app.window.viewport import BACKGROUND, Viewport
@@ -89,8 +91,11 @@ class Session:
         self._viewport = Viewport(self._ctx)
         self._worker = Worker(glfw.post_empty_event)
         self._renderer_name = _short_name(self._ctx.info["GL_RENDERER"])
+        self._editor = Editor(self._worker.submit, self._viewport, self._perform)
         if paths:
             self.dispatch(do.OpenPaths(tuple(str(p) for p in paths)))
+        else:
+            self._worker.submit(edit_messages.LookForEdits(0))
 
     # Life
 
@@ -123,6 +128,7 @@ class Session:
         now = self._now()
         if now >= self._encode_at:
             self._encode()
+        self._editor.keep_if_due(self.state, now)
         if not self._inbox and not self._due(now):
             return False
         self._frame(now)
@@ -134,6 +140,7 @@ class Session:
             return
         self._closed = True
         self._worker.stop()
+        self._editor.close(self.state)
         self._viewport.release()
         self._thumbnails.release()
         self._backend.shutdown()
@@ -166,6 +173,7 @@ class Session:
             return 0.0
         now = self._now()
         moments = [self._viewport_wants, self._encode_at, *(t.until for t in self.state.toasts)]
+        moments.append(self._editor.keep_at)
         if imgui.get_io().want_text_input:
             moments.append(self.state.now + BLINK_SECONDS)
         if self.state.job is not None:
@@ -196,11 +204,13 @@ class Session:
 
     def _update_picture(self, now: float) -> None:
         try:
+            self._editor.mark(self.state)
             wait = self._viewport.update(self.state, self._panel, self._touched)
         except LangFlashError as error:
             self._perform(do.Notify(str(error)))
             wait = float("inf")
         self._viewport_wants = self._now() + wait
+        self._editor.point(self.state)
         view = self._viewport.view(self.state)
         if view is not None:
             self._worker.submit(
@@ -242,10 +252,11 @@ class Session:
                 self._worker.submit(messages.MakeThumbnails(paths))
             case do.Reconstruct() if self.state.photos:
                 self._worker.submit(messages.ReconstructPhotos(tuple(p.path for p in self.state.photos)))
-            case do.OpenScene(path):
-                self._worker.submit(messages.LoadScene(path))
+            case do.OpenScene(path, edits):
+                self._worker.submit(messages.LoadScene(path, edits))
             case do.SaveScene(path) if self.state.info is not None:
-                self._worker.submit(messages.WriteScene(self.state.info.scene, path))
+                marks = self.state.editing.marks
+                self._worker.submit(messages.WriteScene(self.state.info.scene, path, marks))
             case do.CancelJob():
                 self._worker.cancel()
             case do.CopyText(text):
@@ -254,6 +265,7 @@ class Session:
                 self._show_scene(info)
             case _:
                 pass
+        self._editor.follow(command, before, self.state)
         if _question(before) != _question(self.state):
             pause = DEBOUNCE_SECONDS if isinstance(command, do.EditPrompt | do.SetNegatives) else 0.0
             self._encode_at = self._now() + pause
@@ -286,7 +298,9 @@ class Session:
             self._viewport.ask((), None)
             return
         keys, texts = tuple(p.key for p in asked), tuple(p.text.strip() for p in asked)
-        self._worker.submit(messages.Encode(info.serial, info.scene, keys, texts, self.state.negatives))
+        likes, marks = tuple(p.like for p in asked), self.state.editing.marks
+        negatives = self.state.negatives
+        self._worker.submit(messages.Encode(info.serial, info.scene, keys, texts, negatives, likes, marks))
 
     # Results of the worker
 
@@ -298,10 +312,11 @@ class Session:
                 self.dispatch(do.Progressed(stage, fraction))
             case messages.SceneReady(info):
                 self.dispatch(do.SceneArrived(info))
-            case messages.SceneWritten(path):
-                self.dispatch(do.SceneSaved(path))
+            case messages.SceneWritten(path, marks):
+                self.dispatch(do.SceneSaved(path, marks))
             case messages.Failed(sentence, job):
                 self.dispatch(do.JobFailed(sentence) if job else do.Notify(sentence))
+                self.dispatch(edit.StopWaiting())
             case messages.Stopped():
                 self.dispatch(do.JobCancelled())
             case messages.Compiled(of, keys, query) if of == serial:
@@ -314,6 +329,18 @@ class Session:
                     self.dispatch(do.PhotoFailed(Path(key), problem))
                 else:
                     self._thumbnails.put(key, rgb)
+            case edit_messages.SelectionFound(of, mask, combine, what) if of == serial:
+                self.dispatch(edit.Found(mask, combine, what))
+            case edit_messages.FloatersScored(of, scores) if of == serial:
+                self.dispatch(edit.FloatersFound(scores))
+            case edit_messages.Weighed(of, reading) if of == serial:
+                self.dispatch(edit.ReadingTaken(reading))
+            case edit_messages.PlaceNamed(of, asked, reading, words, vector) if of == serial:
+                self.dispatch(edit.Named(asked, reading, words, vector))
+            case edit_messages.AtomWords(of, names) if of == serial:
+                self.dispatch(edit.AtomsNamed(names))
+            case edit_messages.EditsKept(of, offer) if of == serial:
+                self.dispatch(edit.OfferEdits(offer))
             case _:
                 pass  # an answer about a scene that is gone
 
@@ -357,6 +384,10 @@ class Session:
         """Shortcuts by the letter that the keyboard's layout puts there; the rest is ImGui's."""
         if action == glfw.PRESS and mods & (glfw.MOD_CONTROL | glfw.MOD_SUPER):
             letter = glfw.get_key_name(key, scancode)
+            edits = EDIT_SHORTCUTS.get((letter or "", bool(mods & glfw.MOD_SHIFT)))
+            if edits is not None and not imgui.get_io().want_text_input and not self.state.dialog:
+                self.dispatch(edits)
+                return
             if letter in SHORTCUTS:
                 self.dispatch(SHORTCUTS[letter])
                 return
@@ -369,7 +400,8 @@ class Session:
 def _question(state: State) -> tuple:
     """What an encoding depends on."""
     serial = state.info.serial if state.info else 0
-    return serial, tuple((p.key, p.text.strip()) for p in state.asked), state.negatives
+    atoms = state.editing.marks.atoms if state.editing.marks else ()
+    return serial, tuple((p.key, p.text.strip(), p.like) for p in state.asked), state.negatives, atoms
 
 
 def _open_window(size: tuple[int, int]):

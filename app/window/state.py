@@ -5,9 +5,11 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.window.editing import NO_EDITING, Editing
 from app.window.poses import START, Pose
 
 if TYPE_CHECKING:
+    from langflash_core.edits import History
     from langflash_core.types import Scene
 
 NEGATIVES = ("object", "things", "stuff", "texture")
@@ -50,6 +52,7 @@ class Prompt:
     """One phrase. `key` never changes; `score` is None until the view on show is answered.
 
     threshold: the person's own, or None for the calibrated one. calibrated: what None means.
+    like: a language vector as float32 bytes that is asked instead of the words.
     """
 
     key: int
@@ -59,6 +62,7 @@ class Prompt:
     calibrated: float = 0.5
     visible: bool = True
     score: float | None = None
+    like: bytes = field(default=b"", repr=False)
 
     @property
     def found(self) -> bool | None:
@@ -95,7 +99,10 @@ class Toast:
 
 @dataclass(frozen=True)
 class SceneInfo:
-    """The scene on show. `scene` is the immutable snapshot; `views` are poses of its photos."""
+    """The scene on show. `scene` is the immutable snapshot; `views` are poses of its photos.
+
+    history: edits that came with it, none of them or those of an earlier session.
+    """
 
     serial: int
     name: str
@@ -106,6 +113,7 @@ class SceneInfo:
     space: str
     warnings: tuple[str, ...] = ()
     path: Path | None = None
+    history: "History | None" = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True)
@@ -152,6 +160,7 @@ class State:
     dialog: str | None = None
     dialog_path: str = ""
     stats: Stats = NO_STATS
+    editing: Editing = NO_EDITING
     leaving: bool = False
 
     @property
@@ -167,5 +176,5 @@ class State:
 
     @property
     def wants_maps(self) -> bool:
-        """Whether the picture needs the weight maps and not only colour and depth."""
+        """Whether the picture shows the weight maps and not only colour and depth."""
         return self.mode is Mode.ATOMS or (self.mode in (Mode.HEAT, Mode.LABELS) and bool(self.asked))

@@ -20,6 +20,7 @@ PANEL = ImVec4(0.098, 0.106, 0.122, 1.0)
 RAISED = ImVec4(0.150, 0.161, 0.184, 1.0)
 HOVER = ImVec4(0.205, 0.220, 0.250, 1.0)
 PRESSED = ImVec4(0.255, 0.272, 0.310, 1.0)
+SELECTED = ImVec4(0.36, 0.68, 1.0, 1.0)  # near the tint of selected Gaussians
 LINE = ImVec4(0.200, 0.213, 0.240, 1.0)
 ON_ACCENT = ImVec4(0.10, 0.07, 0.02, 1.0)
 

@@ -8,11 +8,14 @@ between the stages of one. Of `Encode` and `Answer` only the newest is ever run.
 import logging
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
 import numpy as np
 
+from app.window import chores
+from app.window.edit_messages import Weigh
 from app.window.messages import (
     Answer,
     Compiled,
@@ -32,12 +35,14 @@ from app.window.messages import (
     Thumbnail,
     WriteScene,
 )
+from app.window.state import SceneInfo
+from langflash_core.edits import History
 from langflash_core.errors import Cancelled, ImageError, LangFlashError
 
 log = logging.getLogger(__name__)
 
 THUMBNAIL_SIDE = 320  # pixels of the longer side
-_ANSWERS_REPLACE = (Encode, Answer)  # a newer one of these makes an older one pointless
+_ANSWERS_REPLACE = (Encode, Answer, Weigh)  # a newer one of these makes an older one pointless
 
 
 class Worker:
@@ -138,14 +143,19 @@ class Worker:
                 self._put(compile_prompts(errand))
             case Answer():
                 self._put(score_prompts(errand))
-            case WriteScene(scene, path):
+            case WriteScene(scene, path, marks):
                 from langflash_core.export import export
+                from langflash_core.scene.edited import edited_scene
 
-                export(scene, path)
-                self._put(SceneWritten(path))
+                export(scene if marks is None else edited_scene(scene, marks), path)
+                self._put(SceneWritten(path, marks))
             case MakeThumbnails(paths):
                 for path in paths:
                     self._put(make_thumbnail(path))
+            case _:
+                answer = chores.run(errand)
+                if answer is not None:
+                    self._put(answer)
 
     def _run_job(self, job: Job, token: int) -> None:
         def stale() -> bool:
@@ -185,6 +195,8 @@ def make_scene(
         from langflash_core.export import read
 
         scene = read(job.path)
+        if job.edits is not None:
+            return SceneReady(_restored(describe_scene(scene, serial, ""), job.edits))
         return SceneReady(describe_scene(scene, serial, job.path.name, job.path))
     from langflash_core.pipeline import reconstruct
 
@@ -193,10 +205,25 @@ def make_scene(
     return SceneReady(describe_scene(scene, serial, name))
 
 
-def describe_scene(scene, serial: int, name: str, path: Path | None = None):
+def _restored(info: SceneInfo, edits: Path) -> SceneInfo:
+    """The scene with the edits of an earlier session, its name and its place.
+
+    Raises:
+        SceneFileError: the edits cannot be read.
+    """
+    from langflash_core.scene.edits_file import load_history, read_about
+
+    assert info.history is not None
+    history = load_history(edits, info.scene, info.history.marks)
+    about = read_about(edits)[1]
+    path = Path(about["path"]) if about.get("path") else None
+    return replace(info, name=str(about.get("name", "")), path=path, history=history)
+
+
+def describe_scene(scene, serial: int, name: str, path: Path | None = None) -> SceneInfo:
     """`SceneInfo` of a `Scene`: counts, warnings, and a pose per input view."""
     from app.window.poses import from_view, median_reach
-    from app.window.state import SceneInfo
+    from langflash_core.scene.edited import first_marks
     from langflash_core.types import NO_LANGUAGE
 
     mute = scene.semantics.space == NO_LANGUAGE
@@ -215,6 +242,7 @@ def describe_scene(scene, serial: int, name: str, path: Path | None = None):
         space=scene.semantics.space,
         warnings=(*said, *(str(w) for w in scene.metadata.get("warnings", ()))),
         path=path,
+        history=History(first_marks(scene)),
     )
 
 
@@ -222,12 +250,21 @@ def compile_prompts(request: Encode) -> Compiled:
     """Text towers and the reduced dictionary; milliseconds once the tower is loaded."""
     from langflash_core.query.relevance import compile_query
     from langflash_core.query.spaces import language_space
+    from langflash_core.query.words import with_vectors
+    from langflash_core.scene.edited import spoken_scene
 
-    space = language_space(request.scene.semantics.space)
-    query = compile_query(
-        request.scene, space, list(request.texts), negatives=list(request.negatives) or None
-    )
+    scene = request.scene if request.marks is None else spoken_scene(request.scene, request.marks)
+    space = language_space(scene.semantics.space)
+    query = compile_query(scene, space, list(request.texts), negatives=list(request.negatives) or None)
+    likes = {row: _vector(like) for row, like in enumerate(request.likes) if like}
+    query = with_vectors(query, scene.semantics.dictionary, likes)
     return Compiled(request.serial, request.keys, query)
+
+
+def _vector(content: bytes):
+    import torch
+
+    return torch.from_numpy(np.frombuffer(content, np.float32).copy())
 
 
 def score_prompts(request: Answer) -> Scored:

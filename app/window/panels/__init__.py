@@ -4,7 +4,18 @@ from imgui_bundle import ImVec2, imgui
 
 from app.window import commands as do
 from app.window import theme
-from app.window.panels import canvas, overlays, photos, prompts, status, toolbar, widgets
+from app.window.panels import (
+    canvas,
+    edits,
+    overlays,
+    photos,
+    pointing,
+    prompts,
+    status,
+    toolbar,
+    tools,
+    widgets,
+)
 from app.window.panels.look import Look
 from app.window.state import State
 
@@ -31,12 +42,17 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
         imgui.separator()
         widgets.gap(look.px(6))
         issued += prompts.draw(state, look)
+        issued += edits.draw(state, look)
     with widgets.window("##toolbar", ImVec2(left, 0), ImVec2(size.x, top)):
         imgui.set_cursor_pos_y((top - imgui.get_frame_height()) / 2)
         issued += toolbar.draw(state, look)
     with widgets.window("##status", ImVec2(0, height - bar), ImVec2(width, bar)):
         imgui.set_cursor_pos_y((bar - imgui.get_text_line_height()) / 2)
         status.draw(state, look)
+    if state.info is not None:
+        issued += tools.draw(state, look, place)
+        issued += pointing.draw(state, look, place, size)
+    issued += edits.draw_offer(state, look, place, size)
     issued += overlays.draw_toasts(state, look, ImVec2(width, height - bar))
     issued += overlays.draw_dialog(state, look)
     issued += canvas.keys(state)

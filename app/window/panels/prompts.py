@@ -4,6 +4,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from app.window import commands as do
+from app.window import edit_commands as edit
 from app.window import theme
 from app.window.panels import widgets
 from app.window.panels.look import Look
@@ -38,8 +39,12 @@ def _row(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
         red, green, blue = colour
         issued.append(do.ColourPrompt(prompt.key, (red, green, blue)))
     imgui.same_line()
-    imgui.set_next_item_width(imgui.get_content_region_avail().x - 2 * look.px(38))
-    changed, text = imgui.input_text_with_hint("##text", "a thing, e.g. armchair", prompt.text)
+    imgui.set_next_item_width(imgui.get_content_region_avail().x - 3 * look.px(38))
+    frame = theme.LINE if prompt.like else theme.RAISED  # a chip that stands for a place, not for its words
+    with widgets.colours(frame_bg=frame):
+        changed, text = imgui.input_text_with_hint("##text", "a thing, e.g. armchair", prompt.text)
+    if prompt.like:
+        widgets.tooltip("Asks for what the place you clicked says; type to ask for words instead")
     if imgui.is_item_activated() and state.active != prompt.key:
         issued.append(do.SelectPrompt(prompt.key))
     if changed:
@@ -48,6 +53,12 @@ def _row(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     eye = fa.ICON_FA_EYE if prompt.visible else fa.ICON_FA_EYE_SLASH
     if widgets.quiet_button(f"{eye}##eye", "Ask, or leave out"):
         issued.append(do.ShowPrompt(prompt.key, not prompt.visible))
+    imgui.same_line(0, look.px(2))
+    tip = "Select the Gaussians that this phrase means; Shift adds, Ctrl removes"
+    if widgets.quiet_button(f"{fa.ICON_FA_DRAW_POLYGON}##select", tip) and prompt.text.strip():
+        io = imgui.get_io()
+        combine = "add" if io.key_shift else "remove" if io.key_ctrl else state.editing.combine
+        issued.append(edit.SelectByPhrase(prompt.key, combine))
     imgui.same_line(0, look.px(2))
     if widgets.quiet_button(f"{fa.ICON_FA_XMARK}##remove", "Remove"):
         issued.append(do.RemovePrompt(prompt.key))

@@ -8,7 +8,29 @@ A line is printed when anything a test may wait for has changed. The last one ha
 import json
 import sys
 
+from app.window.editing import Editing
 from app.window.session import Session
+
+
+def editing(now: Editing) -> dict:
+    history, card, preview = now.history, now.card, now.floaters
+    return {
+        "tool": now.tool.name,
+        "selected": now.num_selected,
+        "deleted": len(history.marks.deleted) if history else 0,
+        "hidden": len(history.marks.hidden) if history else 0,
+        "edits": [edit.label for edit in history.done] if history else [],
+        "undone": len(history.undone) if history else 0,
+        "waiting": now.waiting,
+        "unsaved": now.unsaved,
+        "hover": None if now.hover is None else now.hover.point,
+        "shares": None if now.hover is None or now.hover.atoms is None else dict(now.hover.atoms),
+        "words": None if card is None or card.words is None else [word for word, _ in card.words],
+        "floaters": None
+        if preview is None or not preview.scores or history is None
+        else len(preview.mask(history.marks.visible)),
+        "offer": None if now.offer is None else now.offer.count,
+    }
 
 
 def summary(session: Session) -> dict:
@@ -24,6 +46,7 @@ def summary(session: Session) -> dict:
         "prompts": [[p.text, p.score, p.found] for p in state.prompts],
         "toasts": [toast.text for toast in state.toasts],
         "dialog": state.dialog,
+        **editing(state.editing),
         "maps": dict(state.stats.passes).get("weights", 0),
         "picture": list(state.stats.picture_size),
         "splats": sum(n for kind, n in state.stats.passes if kind in ("colour", "weights")),
