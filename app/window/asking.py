@@ -1,0 +1,68 @@
+"""What asking adds to the state: recent phrases, the scores behind an answer, the dictionary."""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+MOST_RECENT = 20
+BINS = 50  # of a histogram of scores, over [0, 1]
+_DANGLING = re.compile(r"^[+-]\s|\s[+-]$|\s[+-]\s+[+-]\s")
+
+
+@dataclass(frozen=True)
+class Insight:
+    """What the worker says about the K atoms of the scene on show.
+
+    words: the nearest of the household's, best first. shares: of the scene's opacity, sum 1.
+    colours: as in the atoms picture. similarity: (K, K) cosines.
+    """
+
+    words: tuple[tuple[str, ...], ...]
+    shares: tuple[float, ...]
+    colours: tuple[tuple[float, float, float], ...]
+    similarity: np.ndarray = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True)
+class Histogram:
+    """How many covered pixels of the view on show score how high. counts: (BINS,) over [0, 1]."""
+
+    key: int
+    text: str
+    counts: tuple[int, ...] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Asking:
+    """The asking half of the state.
+
+    recent: phrases asked, the newest first. atom: whose weight map is on show. chosen: atoms to
+    merge. opened: whether the dictionary is on show. prompts_path: where the last set was.
+    """
+
+    recent: tuple[str, ...] = ()
+    histograms: tuple[Histogram, ...] = ()
+    insight: Insight | None = None
+    atom: int = 0
+    chosen: tuple[int, ...] = ()
+    opened: bool = False
+    prompts_path: Path | None = None
+
+    def histogram(self, key: int, text: str) -> Histogram | None:
+        """Of a prompt as it reads now; None until it is answered."""
+        return next((h for h in self.histograms if h.key == key and h.text == text.strip()), None)
+
+
+NO_ASKING = Asking()
+
+
+def unfinished(text: str) -> bool:
+    """Whether a phrase is still missing beside a + or -, as while one is being typed."""
+    return bool(_DANGLING.search(text.strip()))
+
+
+def usable(text: str) -> bool:
+    """Whether a prompt can be asked as it reads."""
+    return bool(text.strip()) and not unfinished(text)
