@@ -98,10 +98,7 @@ class QueryPasses:
             weights: None where no atom is in view: relevance is 0.
             version: changes whenever the weight maps do.
         """
-        factor = compiled.factor.detach().cpu().double().numpy()[atoms]  # (Ka, r)
-        prompts = compiled.prompts.detach().cpu().double().numpy()
-        negatives = compiled.negatives.detach().cpu().double().numpy()
-        num_groups = max(1, -(-len(prompts) // PHRASES))
+        num_groups = max(1, -(-len(compiled.prompts) // PHRASES))
         if self.relevance is None or self.relevance.num_layers != num_groups:
             self._drop_relevance()
             self.relevance = LayerTarget(self._ctx, self._size, num_groups, "f4")
@@ -109,22 +106,39 @@ class QueryPasses:
             for group in range(num_groups):
                 self.relevance.layers(group, 1).clear()
             return self.relevance
+        temperature = float(compiled.temperature) if compiled.mode == "relevancy" else 0.0
+        self._answer(compiled, weights, atoms, version, temperature)
+        return self.relevance
+
+    def _answer(
+        self,
+        compiled: CompiledQuery,
+        weights: LayerTarget,
+        atoms: np.ndarray,
+        version: int,
+        temperature: float,
+    ) -> None:
+        """Fill `relevance`; temperature 0 is the cosine mode."""
+        factor = compiled.factor.detach().cpu().double().numpy()[atoms]  # (Ka, r)
+        prompts = compiled.prompts.detach().cpu().double().numpy()
+        negatives = compiled.negatives.detach().cpu().double().numpy()
         self._pack(weights, len(atoms), version)
         if self._stale("norm", (version, factor.tobytes())):
             self._norms(factor)
-            self._keys.pop("scales", None)
+            self._forget("scales")
         if self._stale("scales", (version, negatives.tobytes())):
             self._scale(factor @ negatives.T)
-            self._keys.pop("prompts", None)
-        temperature = float(compiled.temperature) if compiled.mode == "relevancy" else 0.0
+            self._forget("prompts")
         if self._stale("prompts", (version, temperature, prompts.tobytes())):
             self._relevance(factor @ prompts.T, temperature)
-        return self.relevance
 
     def _stale(self, name: str, key: tuple) -> bool:
         changed = self._keys.get(name) != key
         self._keys[name] = key
         return changed
+
+    def _forget(self, name: str) -> None:
+        self._keys.pop(name, None)
 
     def _pack(self, weights: LayerTarget, num_atoms: int, version: int) -> None:
         """The weight maps as shares of their peaks, once for each version of them."""
@@ -227,7 +241,7 @@ class QueryPasses:
         if self.relevance is not None:
             self.relevance.release()
         self.relevance = None
-        self._keys.pop("prompts", None)
+        self._forget("prompts")
 
     def _drop_packed(self) -> None:
         if self._packed is not None:

@@ -23,6 +23,7 @@ from langflash_core.types import Camera, Frame, Scene
 from .combine import QueryPasses, Screen
 from .display import COLOUR_MAPS, MASK_STYLES, Display, atom_colours, feature_axes
 from .fast import MAX_PHRASES, NUMBERS, FastPasses, splat_norms, splat_numbers
+from .host import HostQueryPasses, draws_in_software
 from .photos import PhotoDepths
 from .programs import Programs, set_uniforms
 from .splats import SplatBuffers
@@ -44,15 +45,26 @@ class SplatRenderer:
     "negatives", "query", "show" do not.
     """
 
-    def __init__(self, ctx: moderngl.Context, precision: Literal["float16", "float32"] = "float16"):
-        """Args: precision of colour and weight maps; alphas, depth and relevance are always float32.
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        precision: Literal["float16", "float32"] = "float16",
+        queries: Literal["shader", "host"] | None = None,
+    ):
+        """
+        Args:
+            precision: of colour and weight maps; alphas, depth and relevance are always float32.
+            queries: where phrases are multiplied with weight maps; None: on the processor where
+                OpenGL runs there too (app/gl/host.py), else in shaders.
 
         Raises:
             GraphicsError: the context is older than OpenGL 3.3.
-            ValueError: another precision.
+            ValueError: another precision, another place.
         """
         if precision not in _DTYPES:
             raise ValueError(f"precision: expected float16 or float32, received {precision!r}")
+        if queries not in ("shader", "host", None):
+            raise ValueError(f"queries: expected shader, host or None, received {queries!r}")
         if ctx.version_code < 330:
             raise GraphicsError(
                 f"OpenGL {ctx.version_code / 100:.1f} is too old for splatting, 3.3 is needed: "
@@ -61,6 +73,8 @@ class SplatRenderer:
         self.passes: Counter[str] = Counter()
         self._ctx = ctx
         self._dtype = _DTYPES[precision]
+        on_host = draws_in_software(ctx) if queries is None else queries == "host"
+        self._query_passes = HostQueryPasses if on_host else QueryPasses
         self._programs = Programs(ctx)
         self._screen = Screen(ctx)
         self._scene: Scene | None = None
@@ -413,7 +427,7 @@ class SplatRenderer:
             )
         self._release_targets()
         self._target = ColourTarget(self._ctx, size, self._dtype)
-        self._query = QueryPasses(self._ctx, self._programs, self._screen, size, self.passes)
+        self._query = self._query_passes(self._ctx, self._programs, self._screen, size, self.passes)
         self._display = Display(self._ctx, self._programs, self._screen, size, self.passes)
         self._size = size
 

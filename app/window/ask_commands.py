@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from app.window.asking import MOST_RECENT, Asking, Histogram, Insight
+from app.window.asking import MOST_RECENT, Histogram, Insight
 from app.window.prompt_sets import MOST_PROMPTS, PromptSet
 from app.window.state import PALETTE, Mode, Prompt, State
 
@@ -11,11 +11,6 @@ from app.window.state import PALETTE, Mode, Prompt, State
 def change(state: State, **changes) -> State:
     """The state with another asking half."""
     return replace(state, asking=replace(state.asking, **changes))
-
-
-def fresh(asking: Asking) -> Asking:
-    """For another scene: what belongs to the old one goes."""
-    return replace(asking, histograms=(), insight=None, atom=0, chosen=())
 
 
 # Phrases

@@ -1,12 +1,14 @@
 """What asking adds to the state: recent phrases, the scores behind an answer, the dictionary."""
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 MOST_RECENT = 20
+PROMPT_DIALOGS = ("save prompts", "load prompts")
+PROMPTS_SUFFIX = ".prompts.json"
 BINS = 50  # of a histogram of scores, over [0, 1]
 _DANGLING = re.compile(r"^[+-]\s|\s[+-]$|\s[+-]\s+[+-]\s")
 
@@ -15,11 +17,9 @@ _DANGLING = re.compile(r"^[+-]\s|\s[+-]$|\s[+-]\s+[+-]\s")
 class Insight:
     """What the worker says about the K atoms of the scene on show.
 
-    words: the nearest of the household's, best first. shares: of the scene's opacity, sum 1.
-    colours: as in the atoms picture. similarity: (K, K) cosines.
+    shares: of the scene's opacity, sum 1. colours: as in the atoms picture. similarity: (K, K) cosines.
     """
 
-    words: tuple[tuple[str, ...], ...]
     shares: tuple[float, ...]
     colours: tuple[tuple[float, float, float], ...]
     similarity: np.ndarray = field(compare=False, repr=False)
@@ -54,6 +54,10 @@ class Asking:
         """Of a prompt as it reads now; None until it is answered."""
         return next((h for h in self.histograms if h.key == key and h.text == text.strip()), None)
 
+    def without_scene(self) -> "Asking":
+        """For another scene: what belongs to the old one goes."""
+        return replace(self, histograms=(), insight=None, atom=0, chosen=())
+
 
 NO_ASKING = Asking()
 
@@ -66,3 +70,8 @@ def unfinished(text: str) -> bool:
 def usable(text: str) -> bool:
     """Whether a prompt can be asked as it reads."""
     return bool(text.strip()) and not unfinished(text)
+
+
+def margin_span(num_prompts: int) -> tuple[float, float]:
+    """Margins shown as the first and the last colour: of one prompt it may be negative."""
+    return (-0.5, 0.5) if num_prompts == 1 else (0.0, 0.5)

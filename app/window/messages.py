@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from app.window import ask_messages
 from app.window.state import SceneInfo
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ class MakeThumbnails:
 
 
 Job = ReconstructPhotos | LoadScene
-Errand = WriteScene | Encode | Answer | MakeThumbnails
+Errand = WriteScene | Encode | Answer | MakeThumbnails | ask_messages.Request
 
 
 # Results
@@ -144,4 +145,4 @@ class Thumbnail:
     problem: str = ""
 
 
-Result = Progress | SceneReady | SceneWritten | Failed | Stopped | Compiled | Scored | Thumbnail
+Result = Progress | SceneReady | SceneWritten | Failed | Stopped | Compiled | Scored | Thumbnail | ask_messages.Result

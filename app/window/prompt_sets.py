@@ -10,7 +10,6 @@ from langflash_core.errors import PromptError
 from langflash_core.files import write_atomically
 
 FORMAT, VERSION = "langflash prompts", 1
-SUFFIX = ".prompts.json"
 MOST_BYTES = 1 << 20
 MOST_PROMPTS = 8
 LONGEST = 500  # characters of a phrase

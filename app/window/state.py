@@ -5,6 +5,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.window.asking import NO_ASKING, Asking, usable
 from app.window.poses import START, Pose
 
 if TYPE_CHECKING:
@@ -35,6 +36,29 @@ class Mode(Enum):
     LABELS = "Labels"
     ATOMS = "Atoms"
     DEPTH = "Depth"
+    MASKS = "Masks"
+    ISOLATE = "Only these"
+    HIDE = "Without these"
+    DIM = "Dim the rest"
+    FEATURES = "Features"
+    WEIGHT = "One atom"
+    TRANSMITTANCE = "Transmittance"
+    COVERAGE = "Coverage"
+    AGREEMENT = "Agreement"
+    MARGIN = "Margin"
+
+    @property
+    def answers(self) -> bool:
+        """Whether it shows relevance."""
+        return self in _ANSWERING
+
+    @property
+    def of_atoms(self) -> bool:
+        """Whether it shows weight maps whatever is asked."""
+        return self in (Mode.ATOMS, Mode.FEATURES, Mode.WEIGHT)
+
+
+_ANSWERING = (Mode.HEAT, Mode.LABELS, Mode.MASKS, Mode.ISOLATE, Mode.HIDE, Mode.DIM, Mode.MARGIN)
 
 
 @dataclass(frozen=True)
@@ -95,7 +119,10 @@ class Toast:
 
 @dataclass(frozen=True)
 class SceneInfo:
-    """The scene on show. `scene` is the immutable snapshot; `views` are poses of its photos."""
+    """The scene on show. `scene` is the immutable snapshot; `views` are poses of its photos.
+
+    own_views: whether it says which photo made which Gaussian, so that photos can be compared.
+    """
 
     serial: int
     name: str
@@ -106,6 +133,7 @@ class SceneInfo:
     space: str
     warnings: tuple[str, ...] = ()
     path: Path | None = None
+    own_views: bool = False
 
 
 @dataclass(frozen=True)
@@ -125,6 +153,7 @@ class Stats:
     picture_seconds: float = 0.0
     picture_size: tuple[int, int] = (0, 0)
     renderer: str = ""
+    depth_range: tuple[float, float] = (0.0, 1.0)
     passes: tuple[tuple[str, int], ...] = ()
 
 
@@ -152,12 +181,13 @@ class State:
     dialog: str | None = None
     dialog_path: str = ""
     stats: Stats = NO_STATS
+    asking: Asking = NO_ASKING
     leaving: bool = False
 
     @property
     def asked(self) -> tuple[Prompt, ...]:
-        """Prompts to answer: visible ones that say something."""
-        return tuple(p for p in self.prompts if p.visible and p.text.strip())
+        """Prompts to answer: visible ones that say something whole."""
+        return tuple(p for p in self.prompts if p.visible and usable(p.text))
 
     @property
     def active_prompt(self) -> Prompt | None:
@@ -168,4 +198,4 @@ class State:
     @property
     def wants_maps(self) -> bool:
         """Whether the picture needs the weight maps and not only colour and depth."""
-        return self.mode is Mode.ATOMS or (self.mode in (Mode.HEAT, Mode.LABELS) and bool(self.asked))
+        return self.mode.of_atoms or (self.mode.answers and bool(self.asked))

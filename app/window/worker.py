@@ -13,6 +13,7 @@ from queue import Empty, SimpleQueue
 
 import numpy as np
 
+from app.window import ask_messages, insight
 from app.window.messages import (
     Answer,
     Compiled,
@@ -138,6 +139,7 @@ class Worker:
                 self._put(compile_prompts(errand))
             case Answer():
                 self._put(score_prompts(errand))
+                self._put(insight.bin_scores(errand))
             case WriteScene(scene, path):
                 from langflash_core.scene import save
 
@@ -146,6 +148,8 @@ class Worker:
             case MakeThumbnails(paths):
                 for path in paths:
                     self._put(make_thumbnail(path))
+            case ask_messages.WritePrompts() | ask_messages.ReadPrompts() | ask_messages.DescribeAtoms():
+                self._put(insight.run(errand))
 
     def _run_job(self, job: Job, token: int) -> None:
         def stale() -> bool:
@@ -195,6 +199,7 @@ def make_scene(
 
 def describe_scene(scene, serial: int, name: str, path: Path | None = None):
     """`SceneInfo` of a `Scene`: counts, warnings, and a pose per input view."""
+    from app.gl.photos import gaussians_per_view
     from app.window.poses import from_view, median_reach
     from app.window.state import SceneInfo
 
@@ -212,6 +217,7 @@ def describe_scene(scene, serial: int, name: str, path: Path | None = None):
         space=scene.semantics.space,
         warnings=tuple(str(w) for w in scene.metadata.get("warnings", ())),
         path=path,
+        own_views=scene.num_views > 1 and gaussians_per_view(scene) is not None,
     )
 
 

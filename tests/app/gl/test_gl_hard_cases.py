@@ -29,6 +29,8 @@ from langflash_core.types import Camera, Frame, Gaussians, Scene, Semantics
 from tests.app.gl.questions import full_relevance, question
 from tests.splat.scenes import camera, cloud, maps_of, scene_of, splats, turned
 
+pytestmark = pytest.mark.usefixtures("queries")
+
 STEP = {"float16": 2**-10, "float32": 2**-22}
 ALPHA = 1e-5
 PACKED = 2**-17

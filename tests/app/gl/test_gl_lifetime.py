@@ -33,13 +33,21 @@ def resident_megabytes() -> float:
     return int(statm.read_text().split()[1]) * mmap.PAGESIZE / 1e6 if statm.exists() else 0.0
 
 
-def test_nothing_leaks_in_1000_frames(gl):
-    """Random sizes, scenes and phrases: no error, every name given back, memory level."""
-    bystander = gl.program(
+@pytest.fixture(scope="module")
+def use_another_program(context):
+    """A program in use outlives its deletion: use this one before counting."""
+    program = context.program(
         vertex_shader="#version 330 core\nout float x; void main() { x = 1.0; }", varyings=["x"]
     )
-    room, draws = gl.buffer(reserve=4), gl.vertex_array(bystander, [])
-    draws.transform(room, vertices=1)  # a program in use outlives its deletion: use this one before counting
+    room, draws = context.buffer(reserve=4), context.vertex_array(program, [])
+    yield lambda: draws.transform(room, vertices=1)
+    for owned in (draws, room, program):
+        owned.release()
+
+
+def test_nothing_leaks_in_1000_frames(gl, queries, use_another_program):
+    """Random sizes, scenes and phrases: no error, every name given back, memory level."""
+    use_another_program()
     before = living(gl)
     renderer = SplatRenderer(gl)
     shake = random.Random(0)
@@ -69,10 +77,8 @@ def test_nothing_leaks_in_1000_frames(gl):
     assert max(megabytes[600:]) - max(megabytes[:600]) < 20
     renderer.release()
     renderer.release()
-    draws.transform(room, vertices=1)
+    use_another_program()
     assert living(gl) == before
-    for owned in (draws, room, bystander):
-        owned.release()
 
 
 def test_a_released_renderer_draws_again(gl):
