@@ -3,8 +3,12 @@
 import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from app.window.state import State
 
 MOST_RECENT = 20
 PROMPT_DIALOGS = ("save prompts", "load prompts")
@@ -75,3 +79,8 @@ def usable(text: str) -> bool:
 def margin_span(num_prompts: int) -> tuple[float, float]:
     """Margins shown as the first and the last colour: of one prompt it may be negative."""
     return (-0.5, 0.5) if num_prompts == 1 else (0.0, 0.5)
+
+
+def atom_name(state: "State", k: int) -> str:
+    """What an atom is called."""
+    return f"atom {k}"

@@ -98,7 +98,7 @@ def thumbnails(scene) -> tuple[np.ndarray | None, ...]:
 
 
 def _cells(scene, view: int) -> np.ndarray:
-    """(K, h, w): how much of each atom the cells of a photo show, of what is not hidden behind other things."""
+    """(K, h, w): how much of each atom the cells of a photo show, of what is not hidden there."""
     camera = scene.camera(view)
     viewmat, K = camera.viewmat.double().numpy(), camera.K.double().numpy()
     pos_c = scene.gaussians.means.double().numpy() @ viewmat[:3, :3].T + viewmat[:3, 3]

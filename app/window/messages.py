@@ -145,4 +145,14 @@ class Thumbnail:
     problem: str = ""
 
 
-Result = Progress | SceneReady | SceneWritten | Failed | Stopped | Compiled | Scored | Thumbnail | ask_messages.Result
+Result = (
+    Progress
+    | SceneReady
+    | SceneWritten
+    | Failed
+    | Stopped
+    | Compiled
+    | Scored
+    | Thumbnail
+    | ask_messages.Result
+)

@@ -58,7 +58,8 @@ def read_prompts(path: Path) -> PromptSet:
         return _parsed(document)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         why = " ".join(str(error).split())[:120]
-        raise PromptError(f"{path.name} is no usable prompt set ({why}): save one from the window.") from error
+        message = f"{path.name} is no usable prompt set ({why}): save one from the window."
+        raise PromptError(message) from error
 
 
 def _parsed(document: dict) -> PromptSet:

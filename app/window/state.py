@@ -57,6 +57,12 @@ class Mode(Enum):
         """Whether it shows weight maps whatever is asked."""
         return self in (Mode.ATOMS, Mode.FEATURES, Mode.WEIGHT)
 
+    def possible(self, info: "SceneInfo | None") -> bool:
+        """Whether a scene has what it shows."""
+        if info is None or (self in (Mode.WEIGHT, Mode.FEATURES) and info.num_atoms == 0):
+            return False
+        return bool(info.views) if self is Mode.COVERAGE else self is not Mode.AGREEMENT or info.own_views
+
 
 _ANSWERING = (Mode.HEAT, Mode.LABELS, Mode.MASKS, Mode.ISOLATE, Mode.HIDE, Mode.DIM, Mode.MARGIN)
 

@@ -189,7 +189,7 @@ class Viewport:
         shown = {p.key: p for p in state.prompts}
         asked = [shown[key] for key in self._keys if key in shown]
         mode = state.mode if drawn.plan.covers(replace(drawn.plan, kind=_kind(state))) else Mode.RGB
-        if mode.answers and (not asked or len(asked) != len(self._keys)):
+        if (mode.answers and (not asked or len(asked) != len(self._keys))) or not mode.possible(state.info):
             mode = Mode.RGB
         active = next((i for i, p in enumerate(asked) if p.key == state.active), 0)
         colouring = (mode, active, state.asking.atom, tuple((p.colour, p.cut) for p in asked))

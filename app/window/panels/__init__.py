@@ -4,7 +4,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app.window import commands as do
 from app.window import theme
-from app.window.panels import canvas, overlays, photos, prompts, status, toolbar, widgets
+from app.window.panels import canvas, legend, overlays, photos, prompts, status, toolbar, widgets
 from app.window.panels.look import Look
 from app.window.state import State
 
@@ -37,6 +37,7 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
     with widgets.window("##status", ImVec2(0, height - bar), ImVec2(width, bar)):
         imgui.set_cursor_pos_y((bar - imgui.get_text_line_height()) / 2)
         status.draw(state, look)
+    legend.draw(state, look, place, size)
     issued += overlays.draw_toasts(state, look, ImVec2(width, height - bar))
     issued += overlays.draw_dialog(state, look)
     issued += canvas.keys(state)

@@ -5,11 +5,11 @@ from imgui_bundle import icons_fontawesome_6 as fa
 
 from app.window import commands as do
 from app.window import theme
-from app.window.panels import widgets
+from app.window.asking import usable
+from app.window.panels import asking, scores, widgets
 from app.window.panels.look import Look
 from app.window.state import NEGATIVES, Prompt, State
 
-MAX_PROMPTS = 8
 _SWATCH = imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label | imgui.ColorEditFlags_.no_tooltip
 
 
@@ -21,10 +21,8 @@ def draw(state: State, look: Look) -> list[do.Command]:
         imgui.push_id(prompt.key)
         issued += _row(state, prompt, look)
         imgui.pop_id()
-    imgui.begin_disabled(len(state.prompts) >= MAX_PROMPTS)
-    if imgui.button(f"{fa.ICON_FA_PLUS}  Add a phrase"):
-        issued.append(do.AddPrompt())
-    imgui.end_disabled()
+    issued += asking.tools(state, look)
+    issued += scores.draw(state, look)
     widgets.gap(look.px(2))
     issued += _negatives(state)
     return issued
@@ -39,7 +37,8 @@ def _row(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
         issued.append(do.ColourPrompt(prompt.key, (red, green, blue)))
     imgui.same_line()
     imgui.set_next_item_width(imgui.get_content_region_avail().x - 2 * look.px(38))
-    changed, text = imgui.input_text_with_hint("##text", "a thing, e.g. armchair", prompt.text)
+    changed, text = asking.field(state, prompt)
+    issued += asking.remembered(text)
     if imgui.is_item_activated() and state.active != prompt.key:
         issued.append(do.SelectPrompt(prompt.key))
     if changed:
@@ -65,6 +64,10 @@ def _verdict(prompt: Prompt, look: Look) -> list[do.Command]:
     """Found or not with the score, then the threshold slider."""
     issued: list[do.Command] = []
     imgui.indent(look.px(36))
+    if not usable(prompt.text):
+        asking.unfinished_hint()
+        imgui.unindent(look.px(36))
+        return issued
     imgui.align_text_to_frame_padding()
     if prompt.score is None:
         imgui.text_colored(theme.MUTED, "...")

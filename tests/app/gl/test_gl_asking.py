@@ -1,4 +1,4 @@
-"""The pictures that answer and that say what to trust, each against float64 arithmetic on the reference's maps."""
+"""The pictures that answer and those that say what to trust, against float64 arithmetic on the reference."""
 
 import dataclasses
 
@@ -214,7 +214,7 @@ def test_coverage_counts_the_photos_that_saw_a_pixel(exact):
     # Each count's colour lies far from the others', whatever the grey of the photo below it.
     nearest = np.argmin([np.ptp(picture - 0.7 * np.array(c), axis=-1) for c in COUNT_COLOURS], axis=0)
     assert {0, 1, 2} <= set(count[covered])
-    # Where a pixel's place falls on the border of two texels, or a ratio on the limit, float32 may choose the other.
+    # On the border of two texels, or with a ratio on the limit, float32 may choose the other side.
     assert (nearest == count)[covered].mean() > 0.98
     assert (picture[~covered] == 0).all()
 
