@@ -15,10 +15,11 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from langflash_core.errors import Cancelled, InputError, ViewError, WeightsError
+from langflash_core.errors import Cancelled, InputError, PromptError, ViewError, WeightsError
 from langflash_core.images import load_views
 from langflash_core.network import PRESETS, LangFlashNet, load_network
 from langflash_core.query.answers import answer
+from langflash_core.query.gaussians import gaussian_relevance, kept
 from langflash_core.query.relevance import Mode, compile_query, relevance_maps
 from langflash_core.query.spaces import language_space
 from langflash_core.scene import assemble, prune
@@ -123,6 +124,31 @@ def query(
             raise ValueError("render: expected a frame with weight maps, received one without")
         relevance = relevance_maps(frame.weight_maps, compiled)
         return answer(relevance, frame, chosen, compiled, threshold)
+
+
+def select(scene: Scene, prompts: Sequence[str], *, threshold: float | None = None) -> Scene:
+    """The part of a scene that answers at least one of these phrases, whatever the view.
+
+    Args:
+        threshold: relevancy in [0, 1] from which a Gaussian is kept; None: the scene's calibration.
+
+    Raises:
+        PromptError: a prompt or the threshold cannot be used, or no Gaussian passes.
+        WeightsError: the language space has no text weights.
+    """
+    compiled = compile_query(scene, language_space(scene.semantics.space), list(prompts))
+    limit = compiled.threshold if threshold is None else threshold
+    if not 0 <= limit <= 1:
+        raise PromptError(f"The threshold {limit} is out of range: relevancy needs 0 to 1.")
+    best = gaussian_relevance(scene.semantics, compiled).amax(0)  # (N,)
+    passing = best >= limit if scene.semantics.num_atoms else torch.zeros_like(best, dtype=torch.bool)
+    if not bool(passing.any()):
+        asked, highest = ", ".join(prompts), float(best.max()) if len(best) else 0.0
+        raise PromptError(
+            f"Nothing in the scene answers {asked} (best {highest:.3f}, threshold {limit:.3f}): "
+            "lower the threshold."
+        )
+    return kept(scene, passing)
 
 
 @dataclass

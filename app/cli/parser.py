@@ -6,6 +6,7 @@ from typing import NoReturn
 
 import langflash_core
 from app.cli.values import (
+    film_seconds,
     intrinsics,
     kept_fraction,
     minutes,
@@ -145,20 +146,29 @@ def _add_render(commands) -> None:
 
 
 def _add_export(commands) -> None:
-    command = _command(commands, "export", "a scene, or what answers a phrase, as a file: .png")
+    command = _command(commands, "export", "a scene, or what answers a phrase, as a file for other programs")
     command.add_argument("scene", type=Path, metavar="SCENE")
-    _add_output(command, "FILE", ".png: a picture, or a cut-out with --prompt")
+    _add_output(
+        command,
+        "FILE",
+        ".png: a picture, or a cut-out with --prompt; .ply, .splat, .langflash: Gaussians; "
+        ".json: COCO masks of --prompt; .mp4: a flight",
+    )
     command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="keep only what answers one of these")
     command.add_argument(
         "--threshold", type=kept_fraction, metavar="T", help="relevancy to keep, between 0 and 1"
     )
+    command.add_argument(
+        "--what", choices=("labels",), help="labels: a .png of phrase numbers, with its legend as .json"
+    )
+    command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of an .mp4 (default: 6)")
     _add_camera(command)
     _add_backend(command)
 
 
 def _add_info(commands) -> None:
     command = _command(commands, "info", "what a scene file holds, and what pruning saved")
-    command.add_argument("scene", type=Path, metavar="SCENE")
+    command.add_argument("scene", type=Path, metavar="SCENE", help=".langflash, .ply or .splat")
     _add_json(command)
 
 

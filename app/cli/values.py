@@ -56,6 +56,14 @@ def minutes(text: str) -> float:
     return value
 
 
+def film_seconds(text: str) -> float:
+    """Length of a video, up to ten minutes."""
+    value = _number(text)
+    if not 0 < value <= 600:
+        raise ArgumentTypeError(f"expected seconds above 0, at most 600, received {text}")
+    return value
+
+
 def open_fov(text: str) -> float:
     """Degrees, between 1 and 179."""
     value = _number(text)

@@ -16,6 +16,7 @@ from langflash_core.types import Camera, Scene
 from .programs import Programs, set_uniforms
 
 _ROW_TEXELS = 4096
+_ROWS_AT_ONCE = 1 << 16  # Gaussians: 12 MB of coefficients of degree 3
 _PLACE_FLOATS = 11  # place (4), shape (4), colour (3)
 _WIDEST = 1e12  # scene units: wider Gaussians are flat over any view, and float32 squares end at 1e38
 
@@ -34,7 +35,8 @@ class SplatBuffers:
         gaussians = scene.gaussians.map(lambda v: v.detach().cpu().float())
         finite = drawable_rows(scene).cpu()
         kept = finite & (gaussians.opacities >= ALPHA_MIN)
-        gaussians = gaussians.map(lambda v: v[kept])
+        sh = gaussians.sh  # most of a large scene's bytes: never copied as a whole
+        gaussians = replace(gaussians, sh=sh[:, :0]).map(lambda v: v[kept])
         gaussians = replace(gaussians, scales=gaussians.scales.clamp(-_WIDEST, _WIDEST))
         self.num_dropped = int((~finite).sum())
         self.num_gaussians = len(gaussians)
@@ -48,20 +50,18 @@ class SplatBuffers:
         self._num_atoms = scene.semantics.num_atoms
         self._carried = atom_bits(self._ids, self._values, self._num_atoms)
         if self.num_gaussians:
-            self._upload(gaussians)
+            self._upload(gaussians, sh, np.flatnonzero(kept.numpy()))
 
-    def _upload(self, gaussians) -> None:
+    def _upload(self, gaussians, sh, rows: np.ndarray) -> None:
+        """`sh` (all, S, 3) of which `rows` are drawn, like every row of `gaussians`."""
         count = self.num_gaussians
         place = np.concatenate((self._means, gaussians.opacities.numpy()[:, None]), 1)
-        self.sh_degree = min(math.isqrt(gaussians.sh.shape[1]) - 1, MAX_SHOWN_DEGREE)
-        num_bases = (self.sh_degree + 1) ** 2
-        self._sh_vec4s = (3 * num_bases + 3) // 4
-        sh = np.zeros((count, 4 * self._sh_vec4s), np.float32)
-        sh[:, : 3 * num_bases] = gaussians.sh[:, :num_bases].flatten(1).numpy()
-        fields = (place, unit_quats(gaussians.quats).numpy(), gaussians.scales.numpy(), sh)
+        self.sh_degree = min(math.isqrt(sh.shape[1]) - 1, MAX_SHOWN_DEGREE)
+        fields = (place, unit_quats(gaussians.quats).numpy(), gaussians.scales.numpy())
         self._vertex_buffers = [
             self._own(self._ctx.buffer(np.ascontiguousarray(f).tobytes())) for f in fields
         ]
+        self._vertex_buffers.append(self._upload_harmonics(sh.numpy(), rows))
         self._order_buffer = self._own(self._ctx.buffer(reserve=4 * count))
         self.places = self._own(self._ctx.buffer(reserve=4 * _PLACE_FLOATS * count))
         self._sparse = self._upload_weights() if self._num_atoms and self._ids.shape[1] else None
@@ -71,6 +71,19 @@ class SplatBuffers:
         self._weights: moderngl.Buffer | None = None
         self._numbers: moderngl.Buffer | None = None
         self._vaos: dict[tuple, moderngl.VertexArray] = {}
+
+    def _upload_harmonics(self, sh: np.ndarray, rows: np.ndarray) -> moderngl.Buffer:
+        """Coefficients of the shown degree, flat, padded to whole vec4s."""
+        num_numbers = 3 * (self.sh_degree + 1) ** 2
+        self._sh_vec4s = (num_numbers + 3) // 4
+        stride = 16 * self._sh_vec4s  # bytes
+        buffer = self._own(self._ctx.buffer(reserve=stride * len(rows)))
+        for first in range(0, len(rows), _ROWS_AT_ONCE):
+            some = sh[rows[first : first + _ROWS_AT_ONCE]].reshape(-1, 3 * sh.shape[1])[:, :num_numbers]
+            padded = np.zeros((len(some), 4 * self._sh_vec4s), np.float32)
+            padded[:, :num_numbers] = some
+            buffer.write(padded.tobytes(), offset=stride * first)
+        return buffer
 
     def _upload_weights(self) -> moderngl.Texture:
         pairs = np.stack((self._ids.astype(np.float32), self._values), -1).reshape(-1, 2)

@@ -141,9 +141,9 @@ class Worker:
                 self._put(score_prompts(errand))
                 self._put(insight.bin_scores(errand))
             case WriteScene(scene, path):
-                from langflash_core.scene import save
+                from langflash_core.export import export
 
-                save(scene, path)
+                export(scene, path)
                 self._put(SceneWritten(path))
             case MakeThumbnails(paths):
                 for path in paths:
@@ -186,9 +186,9 @@ def make_scene(
         LangFlashError: what `reconstruct` and `load` raise; Cancelled among them.
     """
     if isinstance(job, LoadScene):
-        from langflash_core.scene import load
+        from langflash_core.export import read
 
-        scene = load(job.path)
+        scene = read(job.path)
         return SceneReady(describe_scene(scene, serial, job.path.name, job.path))
     from langflash_core.pipeline import reconstruct
 
@@ -202,7 +202,10 @@ def describe_scene(scene, serial: int, name: str, path: Path | None = None):
     from app.gl.photos import gaussians_per_view
     from app.window.poses import from_view, median_reach
     from app.window.state import SceneInfo
+    from langflash_core.types import NO_LANGUAGE
 
+    mute = scene.semantics.space == NO_LANGUAGE
+    said = ("This splat file holds no language: phrases find nothing in it.",) if mute else ()
     means = scene.gaussians.means.double().numpy()
     views = []
     for viewmat, K in zip(scene.viewmats.double().numpy(), scene.Ks.double().numpy(), strict=True):
@@ -215,7 +218,7 @@ def describe_scene(scene, serial: int, name: str, path: Path | None = None):
         num_gaussians=len(scene.gaussians),
         num_atoms=scene.semantics.num_atoms,
         space=scene.semantics.space,
-        warnings=tuple(str(w) for w in scene.metadata.get("warnings", ())),
+        warnings=(*said, *(str(w) for w in scene.metadata.get("warnings", ()))),
         path=path,
         own_views=scene.num_views > 1 and gaussians_per_view(scene) is not None,
     )
