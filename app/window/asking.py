@@ -21,11 +21,13 @@ _DANGLING = re.compile(r"^[+-]\s|\s[+-]$|\s[+-]\s+[+-]\s")
 class Insight:
     """What the worker says about the K atoms of the scene on show.
 
-    shares: of the scene's opacity, sum 1. colours: as in the atoms picture. similarity: (K, K) cosines.
+    shares: of the scene's opacity, sum 1. colours: as in the atoms picture. order: alike atoms side
+    by side. similarity: (K, K) cosines.
     """
 
     shares: tuple[float, ...]
     colours: tuple[tuple[float, float, float], ...]
+    order: tuple[int, ...]
     similarity: np.ndarray = field(compare=False, repr=False)
 
 

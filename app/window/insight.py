@@ -67,12 +67,30 @@ def describe_atoms(request: DescribeAtoms) -> Described:
     unit = normalize(dictionary, dim=-1)
     masses = _carried(scene, np.ones(len(scene.gaussians), bool))
     colours = atom_colours(scene.semantics.dictionary.double().numpy())
+    similarity = (unit @ unit.T).numpy()
     insight = Insight(
         shares=tuple(float(share) for share in masses / max(masses.sum(), 1e-12)),
         colours=tuple((float(r), float(g), float(b)) for r, g, b in colours),
-        similarity=(unit @ unit.T).numpy(),
+        order=alike_order(similarity),
+        similarity=similarity,
     )
     return Described(request.serial, insight, thumbnails(scene))
+
+
+def alike_order(similarity: np.ndarray) -> tuple[int, ...]:
+    """An order (K,) of rows in which alike ones are near: each next to its likest among the rest.
+
+    Starts at the row least like all others.
+    """
+    count = len(similarity)
+    left = set(range(count))
+    order: list[int] = []
+    while left:
+        rest = sorted(left)
+        scores = similarity[order[-1], rest] if order else -similarity[rest].sum(1)
+        order.append(rest[int(np.argmax(scores))])
+        left.remove(order[-1])
+    return tuple(order)
 
 
 def _carried(scene, rows: np.ndarray) -> np.ndarray:

@@ -15,7 +15,6 @@ _FLAGS = (
     widgets.PLAIN
     | imgui.WindowFlags_.no_inputs
     | imgui.WindowFlags_.no_focus_on_appearing
-    | imgui.WindowFlags_.no_bring_to_front_on_focus
 )
 
 
