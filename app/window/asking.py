@@ -14,7 +14,7 @@ MOST_RECENT = 20
 PROMPT_DIALOGS = ("save prompts", "load prompts")
 PROMPTS_SUFFIX = ".prompts.json"
 BINS = 50  # of a histogram of scores, over [0, 1]
-_DANGLING = re.compile(r"^[+-]\s|\s[+-]$|\s[+-]\s+[+-]\s")
+_OPERATOR = re.compile(r"\s+[+-]\s+")  # as langflash_core/query/algebra.py, which loads torch
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,8 @@ NO_ASKING = Asking()
 
 def unfinished(text: str) -> bool:
     """Whether a phrase is still missing beside a + or -, as while one is being typed."""
-    return bool(_DANGLING.search(text.strip()))
+    parts = _OPERATOR.split(f" {text} ")
+    return len(parts) > 1 and not all(part.strip() for part in parts)
 
 
 def usable(text: str) -> bool:

@@ -11,11 +11,7 @@ from app.window.state import Mode, State
 _WIDTH = 244.0  # design pixels
 _MARGIN = 12.0
 _ATOMS_NAMED = 6
-_FLAGS = (
-    widgets.PLAIN
-    | imgui.WindowFlags_.no_inputs
-    | imgui.WindowFlags_.no_focus_on_appearing
-)
+_FLAGS = widgets.PLAIN | imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_focus_on_appearing
 
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
