@@ -6,6 +6,8 @@ from typing import NoReturn
 
 import langflash_core
 from app.cli.values import (
+    above_zero,
+    atom_count,
     film_seconds,
     intrinsics,
     kept_fraction,
@@ -20,6 +22,9 @@ from app.cli.values import (
     whole_count,
 )
 from langflash_core.errors import InputError
+
+# The decisions that `bench` compares: app.bench.modes.AXES, which would bring torch along.
+BENCH_AXES = ("precision", "relevance", "weights", "cut", "dictionary", "resolution", "detail", "sort")
 
 
 class UsageError(InputError):
@@ -54,6 +59,7 @@ def build_parser() -> Parser:
         _add_render,
         _add_export,
         _add_info,
+        _add_bench,
         _add_rooms,
         _add_train,
         _add_eval,
@@ -152,7 +158,7 @@ def _add_export(commands) -> None:
         command,
         "FILE",
         ".png: a picture, or a cut-out with --prompt; .ply, .splat, .langflash: Gaussians; "
-        ".json: COCO masks of --prompt; .mp4: a flight",
+        ".json: COCO masks of --prompt; .npz: a view as numbers; .mp4: a flight",
     )
     command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="keep only what answers one of these")
     command.add_argument(
@@ -236,6 +242,33 @@ def _add_train(commands) -> None:
     _add_output(export, "FILE", "the .safetensors to write")
     export.add_argument("--metadata", type=Path, metavar="JSON", help="an object to add to the model card")
     _add_start(export)
+
+
+def _add_bench(commands) -> None:
+    command = _command(commands, "bench", "how fast each way of drawing is, and what it gets wrong")
+    command.add_argument("scene", nargs="?", type=Path, metavar="SCENE")
+    command.add_argument("--synthetic", type=whole_count, metavar="N", help="a generated room of N Gaussians")
+    command.add_argument(
+        "--paper",
+        action="store_true",
+        help="the paper's size: 131,072 Gaussians, 128 atoms, 1 and 16 phrases, 988x731 and 1920x1080",
+    )
+    command.add_argument(
+        "--atoms", type=atom_count, metavar="K", help="generated atoms, for a scene that has none"
+    )
+    command.add_argument(
+        "--spread", type=above_zero, metavar="F", help="generated Gaussians F times as wide: more overdraw"
+    )
+    command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="up to 16 (default: three of a home)")
+    command.add_argument(
+        "--size", type=size, metavar="WxH", help="pixels to draw (default: as the network saw it)"
+    )
+    command.add_argument("--frames", type=whole_count, metavar="N", help="of the camera's way (default: 8)")
+    command.add_argument("--only", nargs="+", choices=BENCH_AXES, help="what to compare (default: all)")
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="FOLDER", help="also write bench.json, bench.csv and bench.png"
+    )
+    _add_json(command)
 
 
 def _add_eval(commands) -> None:

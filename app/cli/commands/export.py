@@ -18,7 +18,7 @@ from langflash_core.errors import InputError, PromptError, SceneFileError
 from langflash_core.types import Camera, QueryResult, Scene
 
 SCENES = (".langflash", ".ply", ".splat")
-SUFFIXES = (".png", *SCENES, ".json", ".mp4")
+SUFFIXES = (".png", *SCENES, ".json", ".mp4", ".npz")
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -41,6 +41,8 @@ def run(args: Namespace, out: TextIO) -> None:
         write = _write_video
     elif suffix == ".json":
         write = _write_masks
+    elif suffix == ".npz":
+        write = _write_numbers
     elif suffix == ".png":
         write = _write_labels if args.what == "labels" else _write_picture
     print(f"{args.output}: {write(args, open_scene(args.scene), prompts, choice)}", file=out)
@@ -99,6 +101,22 @@ def _write_picture(args: Namespace, scene: Scene, prompts: list[str], choice: Ca
             pixels = to_8bit(renderer(scene, camera, weight_maps=False).rgb)
     write_picture(args.output, pixels)
     return f"{camera.width} x {camera.height}"
+
+
+def _write_numbers(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
+    """Relevance and masks of the phrases, or, without one, the view with its weight maps and dictionary."""
+    from langflash_core.export.npz import write_npz, write_view
+    from langflash_core.files import make_folder
+
+    camera = choice.of(scene)
+    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+        progress("drawing", 0.2)
+        make_folder(args.output.parent)
+        if prompts:
+            write_npz(_answer(args, scene, prompts, camera, renderer), args.output)
+            return f"{len(prompts)} phrases over {camera.width} x {camera.height}"
+        write_view(renderer(scene, camera), scene.semantics, camera, args.output)
+    return f"{camera.width} x {camera.height} with {scene.semantics.num_atoms} weight maps"
 
 
 def _write_labels(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:

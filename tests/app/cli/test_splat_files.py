@@ -14,6 +14,7 @@ from PIL import Image
 from app.cli.commands.export import SCENES, SUFFIXES
 from app.window.drops import SCENE_SUFFIXES
 from langflash_core.export import READERS, WRITERS, export, read
+from langflash_core.query.spaces import language_space
 from langflash_core.types import Scene
 from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, stripes
 from tests.export.splats import damaged_files
@@ -135,6 +136,26 @@ def test_coco_of_all_views_with_their_pictures(run, scene_file, tmp_path):
     assert x == 0 and abs(x + width - WIDTH / 3) < 4  # the left third, and a soft edge
     assert run(*words, "--view", "1", "-o", tmp_path / "one.json").code == 0
     assert len(json.loads((tmp_path / "one.json").read_text())["images"]) == 1
+
+
+def test_a_view_as_numbers_holds_its_feature_image(run, scene_file, tmp_path):
+    """F = W D, normalised, gives the cosines that a query gives, but for the rounding to float32."""
+    run("export", scene_file, *TORCH, "-o", tmp_path / "view.npz")
+    run("export", scene_file, *TORCH, "--prompt", WORDS[0], "-o", tmp_path / "answer.npz")
+    run("query", scene_file, WORDS[0], *TORCH, "--mode", "cosine", "--npz", "-o", tmp_path / "out")
+    (cosines,) = (tmp_path / "out").glob("*.npz")
+    with np.load(tmp_path / "view.npz") as view, np.load(cosines) as asked:
+        features = view["weights"].astype(np.float64) @ view["dictionary"]
+        space = language_space(str(view["space"]))
+        phrase = space.encode([WORDS[0]])[0].double().numpy()
+        norms = np.linalg.norm(features, axis=-1)
+        solid = view["alphas"] > 0.5
+        cosine = (features @ phrase / np.maximum(norms, 1e-4))[solid]
+        assert features.shape == (*view["rgb"].shape[:2], space.dimension)
+        assert np.abs(cosine - asked["relevance"][0][solid]).max() <= 1e-5
+        assert np.abs(view["depth"] - asked["depth"]).max() <= 1e-6
+    with np.load(tmp_path / "answer.npz") as answer:
+        assert answer["prompts"].tolist() == [WORDS[0]] and answer["mask"].any()
 
 
 def test_label_map_and_legend(run, scene_file, tmp_path):
