@@ -34,6 +34,7 @@ TIPS = {
     Mode.AGREEMENT: "How well the photos agree on depth",
     Mode.MARGIN: "How clear the answer is",
 }
+_RESTING = imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled
 _MENU = 296.0  # design pixels wide
 
 
@@ -86,11 +87,17 @@ def _menu(state: State, look: Look) -> list[do.Command]:
         for mode in group:
             possible = mode.possible(state.info)
             imgui.begin_disabled(not possible)
-            mark = fa.ICON_FA_CHECK if state.mode is mode else "   "
-            if imgui.selectable(f"{mark}  {mode.value}", False, 0, ImVec2(look.px(_MENU - 24), 0))[0]:
+            if imgui.selectable(f"##{mode.name}", False, 0, ImVec2(look.px(_MENU - 24), 0))[0]:
                 issued.append(do.SetMode(mode))
+            hovered = imgui.is_item_hovered(_RESTING)
+            if state.mode is mode:
+                imgui.same_line(look.px(12))
+                imgui.text(fa.ICON_FA_CHECK)
+            imgui.same_line(look.px(36))
+            imgui.text(mode.value)
             imgui.end_disabled()
-            widgets.tooltip(TIPS[mode] if possible else _missing(mode))
+            if hovered:
+                imgui.set_tooltip(TIPS[mode] if possible else _missing(mode))
             key = _key(mode).strip(" ()")
             imgui.same_line(look.px(_MENU) - look.px(14) - imgui.calc_text_size(key).x)
             imgui.text_colored(theme.MUTED, key)

@@ -10,7 +10,7 @@ from app.window.panels import widgets
 from app.window.panels.look import Look
 from app.window.state import Prompt, State
 
-_HEIGHT = 96.0  # design pixels
+_HEIGHT = 78.0  # design pixels
 _PLOT = implot.Flags_.canvas_only | implot.Flags_.no_frame
 _AXIS = implot.AxisFlags_.no_grid_lines | implot.AxisFlags_.no_tick_marks | implot.AxisFlags_.lock
 _BARE = _AXIS | implot.AxisFlags_.no_tick_labels
