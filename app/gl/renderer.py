@@ -17,13 +17,14 @@ from torch import Tensor
 from langflash_core.errors import GraphicsError
 from langflash_core.query.relevance import CompiledQuery, finite_atoms
 from langflash_core.scene.thin import thin_with_rows
-from langflash_core.splat.projection import ALPHA_MIN
+from langflash_core.splat.projection import ALPHA_MIN, NEAR
 from langflash_core.types import Camera, Frame, Scene
 
 from .combine import QueryPasses, Screen
-from .display import COLOUR_MAPS, Display, atom_colours
+from .display import COLOUR_MAPS, MASK_STYLES, Display, atom_colours, feature_axes
 from .fast import MAX_PHRASES, NUMBERS, FastPasses, splat_norms, splat_numbers
 from .host import HostQueryPasses, draws_in_software
+from .photos import PhotoDepths
 from .programs import Programs, set_uniforms
 from .splats import SplatBuffers
 from .targets import MAX_LAYERS_AT_ONCE, PREMULTIPLIED, ColourTarget, LayerTarget, context_lives, drawing
@@ -98,6 +99,8 @@ class SplatRenderer:
         self._numbers: tuple[int, np.ndarray] | None = None  # `_asked` and what its Gaussians carry
         self._norms: tuple[bytes, np.ndarray] | None = None  # factor and |f_i|
         self._display: Display | None = None
+        self._camera: Camera | None = None
+        self._photos: dict[bool, PhotoDepths] = {}  # by whether each sees its own Gaussians alone
 
     # --- what to draw -----------------------------------------------------------------------
 
@@ -174,6 +177,7 @@ class SplatRenderer:
         if self._splats is None:
             raise ValueError("draw: expected set_scene before, received no scene")
         self._resize(camera)
+        self._camera = camera
         self._use_level(share)
         key = _camera_key(camera)
         if self._drawn.get("sorted") != key:
@@ -363,6 +367,107 @@ class SplatRenderer:
         key = (self._drawn["colour"], colormap)
         return display.picture(("depth",), key, lambda into: display.paint_depth(into, target, span, which))
 
+    def mask_texture(self, style: str, colours: np.ndarray, thresholds: np.ndarray) -> moderngl.Texture:
+        """What passes its own prompt's threshold.
+
+        Args:
+            style: "flat" in the prompt's colour, "isolate" alone, "hide" left out, "dim" the rest dimmed.
+            colours: (P, 3) in [0, 1]. thresholds: (P,).
+        """
+        layers, compiled, key = self._ensure_relevance()
+        expected = ((compiled.prompts.shape[0], 3), (compiled.prompts.shape[0],))
+        if (colours.shape, thresholds.shape) != expected or style not in MASK_STYLES:
+            raise ValueError(f"masks: expected {expected} and one of {MASK_STYLES}, received {style!r}")
+        target, display, background = self._drawn_target(), self._shown(), self._background
+        key = (*key, background, colours.tobytes(), thresholds.tobytes())
+        return display.picture(
+            ("masks", style),
+            key,
+            lambda into: display.paint_masks(into, target, layers, style, colours, thresholds, background),
+        )
+
+    def margin_texture(
+        self,
+        threshold: float,
+        span: tuple[float, float],
+        colormap: str = "turbo",
+        over_rgb: bool = True,
+    ) -> moderngl.Texture:
+        """The best prompt's relevance less the second best's; of one prompt, less `threshold`."""
+        layers, compiled, key = self._ensure_relevance()
+        target, display, which = self._drawn_target(), self._shown(), COLOUR_MAPS.index(colormap)
+        count = compiled.prompts.shape[0]
+        return display.picture(
+            ("margin",),
+            (*key, threshold, span, which, over_rgb),
+            lambda into: display.paint_margin(into, target, layers, count, threshold, span, which, over_rgb),
+        )
+
+    def weight_texture(self, atom: int, colormap: str = "inferno") -> moderngl.Texture:
+        """One atom's weight map, 0 to 1.
+
+        Raises:
+            ValueError: there is no such atom.
+        """
+        self._drawn_target()
+        self._ensure_weights()
+        count = 0 if self._scene is None else self._scene.semantics.num_atoms
+        if not 0 <= atom < count:
+            raise ValueError(f"atom: expected 0 to {count - 1}, received {atom}")
+        weights, display, which = self._weights, self._shown(), COLOUR_MAPS.index(colormap)
+        places = np.flatnonzero(self._atoms == atom)
+
+        def paint(into: moderngl.Framebuffer) -> None:
+            into.clear(0.0, 0.0, 0.0, 1.0)
+            if len(places) and weights is not None:
+                display.paint_weight(into, weights, int(places[0]), which)
+
+        return display.picture(("weight",), (self._version, atom, which), paint)
+
+    def transmittance_texture(self, colormap: str = "inferno") -> moderngl.Texture:
+        """What passes every splat, 0 to 1."""
+        target, display, which = self._drawn_target(), self._shown(), COLOUR_MAPS.index(colormap)
+        key = (self._drawn["colour"], which)
+        return display.picture(
+            ("transmittance",), key, lambda into: display.paint_transmittance(into, target, which)
+        )
+
+    def feature_texture(self) -> moderngl.Texture:
+        """Principal axes of F(p) = W D as colours, the same in every view; empty pixels black."""
+        self._drawn_target()
+        self._ensure_weights()
+        return self._shown().picture(("features",), (self._version,), self._paint_features)
+
+    def coverage_texture(self) -> moderngl.Texture:
+        """How many photos saw what each pixel shows, in `COUNT_COLOURS`; the first call draws their views."""
+        return self._trust_texture(own=False)
+
+    def agreement_texture(self) -> moderngl.Texture:
+        """How well the photos' own depths agree at each pixel; grey where fewer than two can tell.
+
+        Raises:
+            ValueError: the scene does not say which photo made which Gaussian.
+        """
+        return self._trust_texture(own=True)
+
+    def colour_bar(self, colormap: str) -> np.ndarray:
+        """A colour map from left to right, (1, 256, 3) uint8."""
+        texture = self._ctx.texture((256, 1), 4)
+        framebuffer = self._ctx.framebuffer([texture])
+        program = self._programs.get("screen.vert", "show_bar.frag")
+        set_uniforms(program, width=256.0, which_map=COLOUR_MAPS.index(colormap))
+        with drawing(framebuffer):
+            self._screen.draw(program)
+        shown = np.frombuffer(texture.read(), np.uint8).reshape(1, 256, 4)[..., :3].copy()
+        framebuffer.release()
+        texture.release()
+        return shown
+
+    @property
+    def depth_range(self) -> tuple[float, float]:
+        """Depths of the first and the last colour of `depth_texture`, scene units."""
+        return (NEAR, 1.0) if self._splats is None else self._splats.depth_range
+
     # --- inside -------------------------------------------------------------------------------
 
     def _resize(self, camera: Camera) -> None:
@@ -496,6 +601,31 @@ class SplatRenderer:
         if len(self._atoms) and self._weights is not None:
             self._query.paint_atoms(self._weights, self._atom_colours[self._atoms], self._version, into)
 
+    def _paint_features(self, into: moderngl.Framebuffer) -> None:
+        assert self._query is not None and self._scene is not None
+        into.clear(0.0, 0.0, 0.0, 1.0)
+        if not len(self._atoms) or self._weights is None:
+            return
+        semantics = self._scene.semantics
+        masses = np.zeros(semantics.num_atoms)
+        carried = semantics.weight_values.double() * self._scene.gaussians.opacities.double()[:, None]
+        np.add.at(masses, semantics.weight_ids.numpy(), carried.nan_to_num(0, 0, 0).numpy())
+        columns = feature_axes(semantics.dictionary.double().numpy(), masses)[self._atoms]
+        self._query.paint_features(self._weights, columns, self._version, into)
+
+    def _trust_texture(self, own: bool) -> moderngl.Texture:
+        target, display, camera = self._drawn_target(), self._shown(), self._camera
+        assert self._scene is not None and camera is not None
+        if own not in self._photos:
+            self._photos[own] = PhotoDepths(self._ctx, self._programs, self._scene, own)
+        photos = self._photos[own]
+        which = COLOUR_MAPS.index("turbo")
+        return display.picture(
+            ("trust", own),
+            (self._drawn["colour"],),
+            lambda into: display.paint_trust(into, target, photos, camera, own, which),
+        )
+
     def _read_weights(self, height: int, width: int) -> np.ndarray:
         self._ensure_weights()
         assert self._scene is not None
@@ -541,6 +671,9 @@ class SplatRenderer:
         for level in self._levels.values():
             level.release()
         self._levels = {}
+        for photos in self._photos.values():
+            photos.release()
+        self._photos = {}
         self._splats = self._scene = self._numbers = self._norms = None
         self._drawn = {}
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Protocol
 
 from app.window import poses
+from app.window.asking import PROMPT_DIALOGS, PROMPTS_SUFFIX
 from app.window.drops import MAX_PHOTOS, SCENE_SUFFIX
 from app.window.edit_commands import fresh
 from app.window.poses import Pose
@@ -188,7 +189,7 @@ class OpenPaths:
 
 @dataclass(frozen=True)
 class ShowDialog:
-    """`which` is "save", "open", "help" or "leave"; None closes."""
+    """`which` is a key of `panels.overlays.TITLES`; None closes."""
 
     which: str | None
 
@@ -196,6 +197,8 @@ class ShowDialog:
         if self.which == "save" and state.info is None:
             return Notify(_NOTHING_TO_SAVE).apply(state)
         path = str(_place_to_save(state)) if self.which == "save" else ""
+        if self.which in PROMPT_DIALOGS:
+            path = str(state.asking.prompts_path or Path.home() / f"my{PROMPTS_SUFFIX}")
         return replace(state, dialog=self.which, dialog_path=path)
 
 
@@ -441,6 +444,7 @@ class SceneArrived:
         return replace(
             state,
             editing=fresh(state.editing, history, saved),
+            asking=state.asking.without_scene(),
             info=self.info,
             prompts=prompts,
             job=None,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.window import edit_messages
+from app.window import ask_messages, edit_messages
 from app.window.state import SceneInfo
 from langflash_core.edits import Marks
 
@@ -86,7 +86,7 @@ class MakeThumbnails:
 
 
 Job = ReconstructPhotos | LoadScene
-Errand = WriteScene | Encode | Answer | MakeThumbnails | edit_messages.Request
+Errand = WriteScene | Encode | Answer | MakeThumbnails | ask_messages.Request | edit_messages.Request
 
 
 # Results
@@ -164,4 +164,5 @@ Result = (
     | Scored
     | Thumbnail
     | edit_messages.Result
+    | ask_messages.Result
 )

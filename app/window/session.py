@@ -15,16 +15,18 @@ from typing import Any
 
 import glfw
 import moderngl
-from imgui_bundle import imgui
+from imgui_bundle import imgui, implot
 from imgui_bundle.python_backends.glfw_backend import GlfwRenderer
 
+from app.window import ask_commands as ask
+from app.window import ask_messages, edit_messages, messages, theme
 from app.window import commands as do
 from app.window import edit_commands as edit
-from app.window import edit_messages, messages, theme
 from app.window.drops import sort_drop
 from app.window.editor import Editor
 from app.window.panels import Look, draw_all
 from app.window.panels.canvas import EDIT_SHORTCUTS, SHORTCUTS
+from app.window.prompt_sets import PromptSet
 from app.window.state import State, Stats
 from app.window.textures import Thumbnails
 from app.window.viewport import BACKGROUND, Viewport
@@ -38,6 +40,7 @@ MOST_AWAKE = 16  # of a burst of events, which ImGui takes in a frame or two eac
 DEBOUNCE_SECONDS = 0.12  # of typing
 BLINK_SECONDS = 0.4  # of the text cursor
 LONGEST_NAP = 60.0
+COLORMAPS = ("turbo", "inferno")  # of colour-bars
 MIN_SIZE = (900, 560)  # design pixels; below this the panels would overlap
 
 
@@ -83,6 +86,7 @@ class Session:
         self._window = _open_window(size)
         self._ctx = moderngl.create_context(require=330, **_LOADER)
         imgui.create_context()
+        implot.create_context()
         self._scale = _interface_scale(self._window)
         theme.set_up(self._scale)
         self._backend = GlfwRenderer(self._window, attach_callbacks=False)
@@ -144,6 +148,7 @@ class Session:
         self._viewport.release()
         self._thumbnails.release()
         self._backend.shutdown()
+        implot.destroy_context()
         imgui.destroy_context()
         self._ctx.release()
         glfw.destroy_window(self._window)
@@ -221,6 +226,7 @@ class Session:
             self._viewport.picture_seconds,
             self._viewport.picture_size,
             self._renderer_name,
+            self._viewport.depth_range,
             self._viewport.passes,
         )
         self._perform(do.Measured(stats))
@@ -263,6 +269,11 @@ class Session:
                 glfw.set_clipboard_string(self._window, text)
             case do.SceneArrived(info):
                 self._show_scene(info)
+            case ask.SavePrompts(path):
+                chosen = PromptSet(self.state.prompts, self.state.negatives)
+                self._worker.submit(ask_messages.WritePrompts(chosen, path))
+            case ask.LoadPrompts(path):
+                self._worker.submit(ask_messages.ReadPrompts(path))
             case _:
                 pass
         self._editor.follow(command, before, self.state)
@@ -288,6 +299,9 @@ class Session:
         for index, photo in enumerate(info.scene.photos):
             with suppress(OSError):  # a scene whose small photos are damaged still shows; buttons get numbers
                 self._thumbnails.put_encoded(f"view {index}", photo)
+        for colormap in COLORMAPS:
+            self._thumbnails.put(f"bar {colormap}", self._viewport.colour_bar(colormap))
+        self._worker.submit(ask_messages.DescribeAtoms(info.serial, info.scene))
         glfw.set_window_title(self._window, f"{info.name} - LangFlash")
 
     def _encode(self) -> None:
@@ -324,6 +338,17 @@ class Session:
                 self.dispatch(do.Calibrated(query.threshold))
             case messages.Scored(of, scores) if of == serial:
                 self.dispatch(do.Answered(scores))
+            case ask_messages.Histograms(of, histograms) if of == serial:
+                self.dispatch(ask.Binned(histograms))
+            case ask_messages.PromptsLoaded(path, chosen):
+                self.dispatch(ask.PromptsRead(path, chosen))
+            case ask_messages.PromptsWritten(path):
+                self.dispatch(do.Notify(f"Saved {path}", "info"))
+            case ask_messages.Described(of, insight, pictures) if of == serial:
+                for k, rgb in enumerate(pictures):
+                    if rgb is not None:
+                        self._thumbnails.put(f"atom {k}", rgb)
+                self.dispatch(ask.AtomsDescribed(insight))
             case messages.Thumbnail(key, rgb, problem):
                 if rgb is None:
                     self.dispatch(do.PhotoFailed(Path(key), problem))

@@ -5,6 +5,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.window.asking import NO_ASKING, Asking, usable
 from app.window.editing import NO_EDITING, Editing
 from app.window.poses import START, Pose
 
@@ -37,6 +38,35 @@ class Mode(Enum):
     LABELS = "Labels"
     ATOMS = "Atoms"
     DEPTH = "Depth"
+    MASKS = "Masks"
+    ISOLATE = "Only these"
+    HIDE = "Without these"
+    DIM = "Dim the rest"
+    FEATURES = "Features"
+    WEIGHT = "One atom"
+    TRANSMITTANCE = "Transmittance"
+    COVERAGE = "Coverage"
+    AGREEMENT = "Agreement"
+    MARGIN = "Margin"
+
+    @property
+    def answers(self) -> bool:
+        """Whether it shows relevance."""
+        return self in _ANSWERING
+
+    @property
+    def of_atoms(self) -> bool:
+        """Whether it shows weight maps whatever is asked."""
+        return self in (Mode.ATOMS, Mode.FEATURES, Mode.WEIGHT)
+
+    def possible(self, info: "SceneInfo | None") -> bool:
+        """Whether a scene has what it shows."""
+        if info is None or (self in (Mode.WEIGHT, Mode.FEATURES) and info.num_atoms == 0):
+            return False
+        return bool(info.views) if self is Mode.COVERAGE else self is not Mode.AGREEMENT or info.own_views
+
+
+_ANSWERING = (Mode.HEAT, Mode.LABELS, Mode.MASKS, Mode.ISOLATE, Mode.HIDE, Mode.DIM, Mode.MARGIN)
 
 
 @dataclass(frozen=True)
@@ -102,6 +132,7 @@ class SceneInfo:
     """The scene on show. `scene` is the immutable snapshot; `views` are poses of its photos.
 
     history: edits that came with it, none of them or those of an earlier session.
+    own_views: whether it says which photo made which Gaussian, so that photos can be compared.
     """
 
     serial: int
@@ -114,6 +145,7 @@ class SceneInfo:
     warnings: tuple[str, ...] = ()
     path: Path | None = None
     history: "History | None" = field(default=None, compare=False, repr=False)
+    own_views: bool = False
 
 
 @dataclass(frozen=True)
@@ -133,6 +165,7 @@ class Stats:
     picture_seconds: float = 0.0
     picture_size: tuple[int, int] = (0, 0)
     renderer: str = ""
+    depth_range: tuple[float, float] = (0.0, 1.0)
     passes: tuple[tuple[str, int], ...] = ()
 
 
@@ -161,12 +194,13 @@ class State:
     dialog_path: str = ""
     stats: Stats = NO_STATS
     editing: Editing = NO_EDITING
+    asking: Asking = NO_ASKING
     leaving: bool = False
 
     @property
     def asked(self) -> tuple[Prompt, ...]:
-        """Prompts to answer: visible ones that say something."""
-        return tuple(p for p in self.prompts if p.visible and p.text.strip())
+        """Prompts to answer: visible ones that say something whole."""
+        return tuple(p for p in self.prompts if p.visible and usable(p.text))
 
     @property
     def active_prompt(self) -> Prompt | None:
@@ -176,5 +210,5 @@ class State:
 
     @property
     def wants_maps(self) -> bool:
-        """Whether the picture shows the weight maps and not only colour and depth."""
-        return self.mode is Mode.ATOMS or (self.mode in (Mode.HEAT, Mode.LABELS) and bool(self.asked))
+        """Whether the picture needs the weight maps and not only colour and depth."""
+        return self.mode.of_atoms or (self.mode.answers and bool(self.asked))

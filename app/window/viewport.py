@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
+from app.window.asking import margin_span
 from app.window.editing import Point, Reading, strongest
 from app.window.pace import SETTLE_AFTER, Kind, Pace, Plan
 from app.window.poses import START, Pose, to_camera
-from app.window.state import Mode, State
+from app.window.state import Mode, Prompt, State
 from langflash_core.edits import Marks, Mask
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 BACKGROUND = (0.055, 0.06, 0.07)  # the theme's canvas
 COLORMAP = "turbo"
 SHOWN_ALPHA = 0.5  # as in the answers: from here on a pixel shows the scene
+MASKS = {Mode.MASKS: "flat", Mode.ISOLATE: "isolate", Mode.HIDE: "hide", Mode.DIM: "dim"}
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,16 @@ class Viewport:
     def passes(self) -> tuple[tuple[str, int], ...]:
         """Passes run so far, by kind."""
         return () if self._renderer is None else tuple(sorted(self._renderer.passes.items()))
+
+    @property
+    def depth_range(self) -> tuple[float, float]:
+        """Depths of the first and the last colour of the depth picture, scene units."""
+        return (0.0, 1.0) if self._renderer is None else self._renderer.depth_range
+
+    def colour_bar(self, colormap: str) -> np.ndarray:
+        """A colour map from left to right, (1, n, 3) uint8; after the first scene."""
+        assert self._renderer is not None
+        return self._renderer.colour_bar(colormap)
 
     def set_scene(self, serial: int, scene: "Scene") -> None:
         """Upload a scene; the first one builds the renderer.
@@ -232,29 +244,50 @@ class Viewport:
         shown = {p.key: p for p in state.prompts}
         asked = [shown[key] for key in self._keys if key in shown]
         mode = state.mode if drawn.plan.covers(replace(drawn.plan, kind=_kind(state))) else Mode.RGB
-        if mode in (Mode.HEAT, Mode.LABELS) and (not asked or len(asked) != len(self._keys)):
+        if (mode.answers and (not asked or len(asked) != len(self._keys))) or not mode.possible(state.info):
             mode = Mode.RGB
         active = next((i for i, p in enumerate(asked) if p.key == state.active), 0)
-        colouring = (mode, active, tuple((p.colour, p.cut) for p in asked))
-        if colouring == self._colouring:
-            return
-        self._colouring = colouring
-        if mode is Mode.HEAT:
-            self._texture = renderer.heat_texture(active, COLORMAP, asked[active].cut, True)
-        elif mode is Mode.LABELS:
-            self._texture = renderer.label_texture(
-                np.array([p.colour for p in asked], np.float32), min(p.cut for p in asked)
-            )
-        elif mode is Mode.ATOMS:
-            self._texture = renderer.atom_texture()
-        elif mode is Mode.DEPTH:
-            self._texture = renderer.depth_texture()
-        else:
-            self._texture = renderer.rgb_texture
+        colouring = (mode, active, state.asking.atom, tuple((p.colour, p.cut) for p in asked))
+        if colouring != self._colouring:
+            self._colouring = colouring
+            self._texture = _picture(renderer, mode, asked, active, state.asking.atom)
+
+
+def _picture(
+    renderer: "SplatRenderer", mode: Mode, asked: list[Prompt], active: int, atom: int
+) -> moderngl.Texture:
+    """The texture that shows a mode; `asked` in the order of the query, not empty where it `answers`."""
+    colours = np.array([p.colour for p in asked], np.float32)
+    cuts = np.array([p.cut for p in asked], np.float32)
+    match mode:
+        case Mode.HEAT:
+            return renderer.heat_texture(active, COLORMAP, asked[active].cut, True)
+        case Mode.LABELS:
+            return renderer.label_texture(colours, min(p.cut for p in asked))
+        case Mode.MASKS | Mode.ISOLATE | Mode.HIDE | Mode.DIM:
+            return renderer.mask_texture(MASKS[mode], colours, cuts)
+        case Mode.MARGIN:
+            return renderer.margin_texture(asked[0].cut, margin_span(len(asked)), COLORMAP)
+        case Mode.ATOMS:
+            return renderer.atom_texture()
+        case Mode.WEIGHT:
+            return renderer.weight_texture(atom)
+        case Mode.FEATURES:
+            return renderer.feature_texture()
+        case Mode.TRANSMITTANCE:
+            return renderer.transmittance_texture()
+        case Mode.COVERAGE:
+            return renderer.coverage_texture()
+        case Mode.AGREEMENT:
+            return renderer.agreement_texture()
+        case Mode.DEPTH:
+            return renderer.depth_texture()
+        case Mode.RGB:
+            return renderer.rgb_texture
 
 
 def _kind(state: State) -> Kind:
     """What a picture must hold to show what is wanted while the camera moves."""
     if not state.wants_maps or state.info is None or state.info.num_atoms == 0:
         return Kind.COLOUR
-    return Kind.MAPS if state.mode is Mode.ATOMS else Kind.FAST
+    return Kind.MAPS if state.mode.of_atoms else Kind.FAST

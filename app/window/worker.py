@@ -14,7 +14,7 @@ from queue import Empty, SimpleQueue
 
 import numpy as np
 
-from app.window import chores
+from app.window import ask_messages, chores, insight
 from app.window.edit_messages import Weigh
 from app.window.messages import (
     Answer,
@@ -143,6 +143,7 @@ class Worker:
                 self._put(compile_prompts(errand))
             case Answer():
                 self._put(score_prompts(errand))
+                self._put(insight.bin_scores(errand))
             case WriteScene(scene, path, marks):
                 from langflash_core.export import export
                 from langflash_core.scene.edited import edited_scene
@@ -152,6 +153,8 @@ class Worker:
             case MakeThumbnails(paths):
                 for path in paths:
                     self._put(make_thumbnail(path))
+            case ask_messages.WritePrompts() | ask_messages.ReadPrompts() | ask_messages.DescribeAtoms():
+                self._put(insight.run(errand))
             case _:
                 answer = chores.run(errand)
                 if answer is not None:
@@ -222,6 +225,7 @@ def _restored(info: SceneInfo, edits: Path) -> SceneInfo:
 
 def describe_scene(scene, serial: int, name: str, path: Path | None = None) -> SceneInfo:
     """`SceneInfo` of a `Scene`: counts, warnings, and a pose per input view."""
+    from app.gl.photos import gaussians_per_view
     from app.window.poses import from_view, median_reach
     from langflash_core.scene.edited import first_marks
     from langflash_core.types import NO_LANGUAGE
@@ -243,6 +247,7 @@ def describe_scene(scene, serial: int, name: str, path: Path | None = None) -> S
         warnings=(*said, *(str(w) for w in scene.metadata.get("warnings", ()))),
         path=path,
         history=History(first_marks(scene)),
+        own_views=scene.num_views > 1 and gaussians_per_view(scene) is not None,
     )
 
 

@@ -7,6 +7,7 @@ from app.window import theme
 from app.window.panels import (
     canvas,
     edits,
+    legend,
     overlays,
     photos,
     pointing,
@@ -49,6 +50,7 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
     with widgets.window("##status", ImVec2(0, height - bar), ImVec2(width, bar)):
         imgui.set_cursor_pos_y((bar - imgui.get_text_line_height()) / 2)
         status.draw(state, look)
+    legend.draw(state, look, place, size)
     if state.info is not None:
         issued += tools.draw(state, look, place)
         issued += pointing.draw(state, look, place, size)

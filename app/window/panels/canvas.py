@@ -11,8 +11,9 @@ from app.window import poses, theme
 from app.window.editing import PICK_RADIUS, Point, Region, Tool
 from app.window.panels import widgets
 from app.window.panels.look import Look
+from app.window.panels.modes import KEYED
 from app.window.poses import Pose
-from app.window.state import Mode, State
+from app.window.state import State
 
 TURN = math.radians(0.3)  # per pixel at scale 1
 ZOOM = 0.9  # of the distance, per notch of the wheel
@@ -24,9 +25,11 @@ _FLY_KEYS = (
     (imgui.Key.w, (0, 0, 1)), (imgui.Key.s, (0, 0, -1)), (imgui.Key.a, (-1, 0, 0)),
     (imgui.Key.d, (1, 0, 0)), (imgui.Key.q, (0, 1, 0)), (imgui.Key.e, (0, -1, 0)),
 )  # fmt: skip
-_MODE_KEYS = tuple(
-    zip((imgui.Key._1, imgui.Key._2, imgui.Key._3, imgui.Key._4, imgui.Key._5), Mode, strict=True)
-)
+_DIGITS = (
+    imgui.Key._1, imgui.Key._2, imgui.Key._3, imgui.Key._4, imgui.Key._5,
+    imgui.Key._6, imgui.Key._7, imgui.Key._8, imgui.Key._9, imgui.Key._0,
+)  # fmt: skip
+_MODE_KEYS = tuple(zip(_DIGITS, KEYED, strict=True))
 
 # Taken from the event itself: on a slow machine S and the release of Ctrl share a frame.
 EDIT_SHORTCUTS: dict[tuple[str, bool], do.Command] = {  # with Ctrl; the second tells whether with Shift

@@ -3,6 +3,7 @@
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from app.window import ask_commands as ask
 from app.window import commands as do
 from app.window import theme
 from app.window.drops import typed_path, typed_scene
@@ -10,7 +11,14 @@ from app.window.panels import widgets
 from app.window.panels.look import Look
 from app.window.state import State, Toast
 
-TITLES = {"save": "Save the scene", "open": "Open", "help": "Mouse and keys", "leave": "Leave?"}
+TITLES = {
+    "save": "Save the scene",
+    "open": "Open",
+    "help": "Mouse and keys",
+    "leave": "Leave?",
+    "save prompts": "Save the phrases",
+    "load prompts": "Load phrases",
+}
 HELP = (
     ("Left drag", "orbit"),
     ("Middle drag, Shift + left drag", "pan"),
@@ -20,6 +28,8 @@ HELP = (
     ("H or Home", "back to the first photo's view"),
     ("F", "fly to the selection"),
     ("1 to 5", "colour, heat-map, labels, atoms, depth"),
+    ("6 to 0", "masks, only these, without these, dim, features"),
+    ("Up, Down in a phrase", "recent phrases"),
     ("V, X", "move; ask what is there"),
     ("R, B, C", "select with a box, a brush, a click"),
     ("Shift, Ctrl while selecting", "add, remove;  Alt: orbit"),
@@ -30,6 +40,8 @@ HELP = (
     ("Ctrl + O, Ctrl + S", "open, save"),
     ("Ctrl + Q", "leave"),
 )
+
+_CLOSING = do.ShowDialog | do.SaveScene | do.OpenPaths | ask.SavePrompts | ask.LoadPrompts
 
 
 def draw_toasts(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
@@ -84,11 +96,12 @@ def draw_dialog(state: State, look: Look) -> list[do.Command]:
     opened, kept = imgui.begin_popup_modal(title, True, imgui.WindowFlags_.no_resize)
     issued: list[do.Command] = []
     if opened:
-        body = {"save": _save, "open": _open, "help": _help, "leave": _leave}[state.dialog]
+        bodies = {"save": _save, "open": _open, "help": _help, "leave": _leave}
+        body = {**bodies, "save prompts": _save_prompts, "load prompts": _load_prompts}[state.dialog]
         issued = body(state, look)
         if not kept:
             issued.append(do.ShowDialog(None))
-        if any(isinstance(c, do.ShowDialog | do.SaveScene | do.OpenPaths) for c in issued):
+        if any(isinstance(c, _CLOSING) for c in issued):
             imgui.close_current_popup()
         imgui.end_popup()
     imgui.pop_style_var()
@@ -117,6 +130,29 @@ def _open(state: State, look: Look) -> list[do.Command]:
     imgui.end_disabled()
     if text and (pressed or confirmed):
         issued.append(do.OpenPaths((str(typed_path(text)),)))
+    return issued
+
+
+def _save_prompts(state: State, look: Look) -> list[do.Command]:
+    issued, confirmed = _path_field(state, "Where to write them")
+    text = state.dialog_path.strip()
+    exists = bool(text) and typed_path(text).is_file()
+    imgui.begin_disabled(not text)
+    pressed = widgets.primary_button("Replace" if exists else "Save", look.vec(120, 0))
+    imgui.end_disabled()
+    if text and (pressed or confirmed):
+        issued.append(ask.SavePrompts(typed_path(text)))
+    return issued
+
+
+def _load_prompts(state: State, look: Look) -> list[do.Command]:
+    issued, confirmed = _path_field(state, "A set of phrases (.prompts.json); they replace the present ones")
+    text = state.dialog_path.strip()
+    imgui.begin_disabled(not text)
+    pressed = widgets.primary_button("Load", look.vec(120, 0))
+    imgui.end_disabled()
+    if text and (pressed or confirmed):
+        issued.append(ask.LoadPrompts(typed_path(text)))
     return issued
 
 

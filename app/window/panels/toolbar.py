@@ -5,18 +5,11 @@ from imgui_bundle import icons_fontawesome_6 as fa
 
 from app.window import commands as do
 from app.window import theme
-from app.window.panels import widgets
+from app.window.panels import modes, widgets
 from app.window.panels.look import Look
 from app.window.poses import FOV_RANGE
-from app.window.state import Mode, State
+from app.window.state import State
 
-TIPS = {
-    Mode.RGB: "Colour  (1)",
-    Mode.HEAT: "Where the active phrase fits, over the colours  (2)",
-    Mode.LABELS: "Every phrase in its own colour  (3)",
-    Mode.ATOMS: "The groups the scene is made of  (4)",
-    Mode.DEPTH: "Distance, near to far  (5)",
-}
 _FOV = 150.0  # design pixels of the slider; left out where the window is too narrow
 _BUTTONS = 4 * 44.0
 
@@ -24,27 +17,14 @@ _BUTTONS = 4 * 44.0
 def draw(state: State, look: Look) -> list[do.Command]:
     """The strip above the picture."""
     issued: list[do.Command] = []
-    imgui.begin_disabled(state.info is None)
-    imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 0))
-    for mode in Mode:
-        if _choice(mode.value, state.mode is mode):
-            issued.append(do.SetMode(mode))
-        widgets.tooltip(TIPS[mode])
-        imgui.same_line()
-    imgui.pop_style_var()
-    imgui.end_disabled()
-    modes = imgui.get_cursor_pos_x()
+    issued += modes.draw(state, look, imgui.get_window_width() - look.px(_BUTTONS + 40))
+    imgui.same_line()
+    used = imgui.get_cursor_pos_x()
     width = look.px(_FOV + _BUTTONS)
-    roomy = modes + width < imgui.get_window_width() - look.px(24)
+    roomy = used + width < imgui.get_window_width() - look.px(24)
     width = width if roomy else look.px(_BUTTONS)
     imgui.same_line(imgui.get_window_width() - width - look.px(8))
     return issued + (_fov(state, look) if roomy else []) + _home(state) + _files(state)
-
-
-def _choice(label: str, chosen: bool) -> bool:
-    if chosen:
-        return widgets.primary_button(label)
-    return imgui.button(label)
 
 
 def _fov(state: State, look: Look) -> list[do.Command]:

@@ -89,6 +89,16 @@ def tooltip(text: str) -> None:
         imgui.set_tooltip(text)
 
 
+def shortened(text: str, width: float) -> str:
+    """The text, cut with an ellipsis where it is wider than `width` interface pixels."""
+    if imgui.calc_text_size(text).x <= width:
+        return text
+    kept = len(text)
+    while kept > 1 and imgui.calc_text_size(text[:kept].rstrip() + "...").x > width:
+        kept -= 1
+    return text[:kept].rstrip() + "..."
+
+
 def rgba(colour: tuple[float, float, float], alpha: float = 1.0) -> ImVec4:
     """An ImGui colour of an RGB triple."""
     return ImVec4(*colour, alpha)

@@ -2,7 +2,8 @@
 
     python driver.py WIDTH HEIGHT [PATHS...]
 
-A line is printed when anything a test may wait for has changed. The last one has "closed".
+A line is printed when anything a test may wait for has changed, with the seconds that each frame
+since the last line took. The last one has "closed".
 """
 
 import json
@@ -43,7 +44,9 @@ def summary(session: Session) -> dict:
         "view": state.view,
         "flying": state.flight is not None,
         "job": None if state.job is None else state.job.stage,
-        "prompts": [[p.text, p.score, p.found] for p in state.prompts],
+        "prompts": [[p.text, p.score, p.found, p.cut] for p in state.prompts],
+        "recent": list(state.asking.recent),
+        "binned": [h.key for h in state.asking.histograms],
         "toasts": [toast.text for toast in state.toasts],
         "dialog": state.dialog,
         **editing(state.editing),
@@ -60,14 +63,18 @@ def main() -> int:
     session = Session(paths, (int(width), int(height)))
     last = None
     frames = 0
+    seconds: list[float] = []
     try:
         while not session.should_close:
-            frames += session.step()
+            if session.step():
+                frames += 1
+                seconds.append(session.state.stats.frame_seconds)  # of the frame before
             now = summary(session)
             if now != last:
                 last = now
-                sys.stdout.write(json.dumps({**now, "frames": frames}) + "\n")
+                sys.stdout.write(json.dumps({**now, "frames": frames, "seconds": seconds}) + "\n")
                 sys.stdout.flush()
+                seconds = []
     finally:
         session.close()
     return 0

@@ -14,7 +14,7 @@ from app.window.commands import apply
 from app.window.editing import RADIUS_RANGE, Floaters, Offer, Reading, Region, Tool
 from app.window.state import FLIGHT_SECONDS, Mode, State
 from app.window.worker import describe_scene
-from langflash_core.edits import Mask
+from langflash_core.edits import Combine, Mask
 from langflash_core.scene.edited import edited_scene
 from tests.app.window.scenes import CHAIR, room
 
@@ -43,7 +43,7 @@ def rows(first: int, last: int, count: int = 12_300) -> Mask:
     return Mask.of(inside)
 
 
-def found(first: int, last: int, combine="replace") -> edit.Found:
+def found(first: int, last: int, combine: Combine = "replace") -> edit.Found:
     return edit.Found(rows(first, last), combine, "in a box")
 
 
