@@ -51,8 +51,9 @@ def reconstruct(
     Args:
         photos: one or more files; the first one's camera becomes the world.
         preset: size of the network. weights: its checkpoint, None for the shipped one.
-        fov: degrees, of the photos' longer side, one for all or one per photo. intrinsics: (fx, fy, cx, cy) in pixels of the
-            photos as given, the same for all. Neither: EXIF, else an assumption with a warning.
+        fov: degrees, of the photos' longer side, one for all or one per photo. intrinsics:
+            (fx, fy, cx, cy) in pixels of the photos as given, the same for all. Neither: EXIF, else
+            an assumption with a warning.
         size: the network sees about size x size pixels per photo, whatever their shape.
         device: "auto" takes CUDA where there is one; "cpu"; "cuda".
         progress: called with the stage and the fraction of the whole in [0, 1].

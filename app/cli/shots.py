@@ -45,7 +45,9 @@ def write_answered(what: str, path: Path, result: QueryResult) -> None:
         pictures.write_picture(path, pictures.cut_out(result.frame, found))
 
 
-def box_rows(results: Sequence[QueryResult], views: Iterable[int | None], scene: Scene) -> list[dict[str, Any]]:
+def box_rows(
+    results: Sequence[QueryResult], views: Iterable[int | None], scene: Scene
+) -> list[dict[str, Any]]:
     """A row per view and phrase; lengths in metres where the scene's scale is known."""
     metres = scene.metadata.get("metric_scale")
     return [

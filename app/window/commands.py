@@ -184,7 +184,7 @@ class OpenPaths:
 
 @dataclass(frozen=True)
 class ShowDialog:
-    """`which` is "save", "open", "help" or "leave"; None closes."""
+    """`which` is "save", "open", "help", "leave", "export", "settings" or "log"; None closes."""
 
     which: str | None
 
@@ -371,6 +371,16 @@ class JumpTo:
             return state
         flight = Flight(state.pose, state.info.views[self.view], state.now)
         return replace(state, flight=flight, view=self.view)
+
+
+@dataclass(frozen=True)
+class FlyTo:
+    """Fly to a pose that is no photo's."""
+
+    pose: Pose
+
+    def apply(self, state: State) -> State:
+        return replace(state, flight=Flight(state.pose, self.pose, state.now), view=None)
 
 
 @dataclass(frozen=True)

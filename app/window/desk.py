@@ -37,7 +37,8 @@ NO_FORM = ExportForm()
 @dataclass(frozen=True)
 class Desk:
     """compare: where the photo begins, 0 to 1 across the picture; None: not compared. choosing:
-    the best pair is being looked for. offer: a session that ended badly."""
+    the best pair is being looked for. copy: where a scene that nobody saved is kept. offer: a
+    session that ended badly."""
 
     preferences: Preferences = NO_PREFERENCES
     lines: tuple[Line, ...] = ()
@@ -45,4 +46,5 @@ class Desk:
     exporting: Exporting | None = None
     compare: float | None = None
     choosing: bool = False
+    copy: Path | None = None
     offer: Kept | None = None

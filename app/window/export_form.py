@@ -94,11 +94,14 @@ class Order:
         return shlex.join(("langflash", *self.words))
 
 
-def order(state: "State", scene_file: Path) -> Order | str:
+def order(state: "State") -> Order | str:
     """The command for the form as it stands, or a sentence that says what is missing."""
     form, info = state.desk.form, state.info
     if info is None:
         return "There is no scene to export; drop photos on the window first."
+    scene_file = info.path or state.desk.copy
+    if scene_file is None:
+        return "The scene has no file yet; save it first."
     target = typed_target(form)
     if target is None:
         return "Type a file name."
@@ -174,6 +177,8 @@ def remarks(state: "State") -> list[str]:
     from app.window.state import NEGATIVES
 
     form, notes = state.desk.form, []
+    if state.info is not None and state.info.path is None:
+        notes.append("The scene is not saved: the command reads a copy that goes when the window closes.")
     if not (form.what.needs_phrases or form.only_found):
         return notes
     if form.what is not What.HEAT and len({prompt.threshold for prompt in state.asked}) > 1:

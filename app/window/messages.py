@@ -23,9 +23,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ReconstructPhotos:
-    """Make a scene of photos."""
+    """Make a scene of photos. fovs: degrees of the longer side, one per photo; None: its record."""
 
     paths: tuple[Path, ...]
+    fovs: tuple[float | None, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -76,8 +77,24 @@ class MakeThumbnails:
     paths: tuple[Path, ...]
 
 
+@dataclass(frozen=True)
+class KeepCopy:
+    """Write a scene that nobody saved where a crash cannot take it."""
+
+    serial: int
+    scene: "Scene"
+    path: Path
+
+
+@dataclass(frozen=True)
+class FindPair:
+    """The two photos that make the best scene."""
+
+    paths: tuple[Path, ...]
+
+
 Job = ReconstructPhotos | LoadScene
-Errand = WriteScene | Encode | Answer | MakeThumbnails
+Errand = WriteScene | Encode | Answer | MakeThumbnails | KeepCopy | FindPair
 
 
 # Results
@@ -137,11 +154,44 @@ class Scored:
 
 @dataclass(frozen=True)
 class Thumbnail:
-    """rgb (h, w, 3) uint8, or None with the reason; `key` names the texture."""
+    """rgb (h, w, 3) uint8, or None with the reason; `key` names the texture.
+
+    fov: recorded in the file, degrees of the longer side. notes: triage.
+    """
 
     key: str
     rgb: np.ndarray | None
     problem: str = ""
+    fov: float | None = None
+    notes: tuple[str, ...] = ()
 
 
-Result = Progress | SceneReady | SceneWritten | Failed | Stopped | Compiled | Scored | Thumbnail
+@dataclass(frozen=True)
+class CopyKept:
+    """The copy is there."""
+
+    serial: int
+    path: Path
+
+
+@dataclass(frozen=True)
+class PairFound:
+    """`pair`: places in `paths`; None where no two match, with a problem where it could not be told."""
+
+    paths: tuple[Path, ...]
+    pair: tuple[int, int] | None
+    problem: str = ""
+
+
+Result = (
+    Progress
+    | SceneReady
+    | SceneWritten
+    | Failed
+    | Stopped
+    | Compiled
+    | Scored
+    | Thumbnail
+    | CopyKept
+    | PairFound
+)

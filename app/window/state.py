@@ -5,7 +5,8 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.window.poses import START, Pose
+from app.window.desk import Desk
+from app.window.poses import START, Pose, Vector
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
@@ -39,10 +40,16 @@ class Mode(Enum):
 
 @dataclass(frozen=True)
 class Photo:
-    """A photo in the tray; `problem` is a sentence when it could not be shown."""
+    """A photo in the tray; `problem` is a sentence when it could not be shown.
+
+    fov: the person's own, degrees of the longer side. recorded: what the file says. notes: triage.
+    """
 
     path: Path
     problem: str = ""
+    fov: float | None = None
+    recorded: float | None = None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -95,7 +102,10 @@ class Toast:
 
 @dataclass(frozen=True)
 class SceneInfo:
-    """The scene on show. `scene` is the immutable snapshot; `views` are poses of its photos."""
+    """The scene on show. `scene` is the immutable snapshot; `views` are poses of its photos.
+
+    extent: corners (low, high) of the box around nearly all of it, world axes, scene units.
+    """
 
     serial: int
     name: str
@@ -106,6 +116,7 @@ class SceneInfo:
     space: str
     warnings: tuple[str, ...] = ()
     path: Path | None = None
+    extent: tuple[Vector, Vector] | None = None
 
 
 @dataclass(frozen=True)
@@ -129,6 +140,7 @@ class Stats:
 
 
 NO_STATS = Stats()
+NO_DESK = Desk()
 FIRST_PROMPT = Prompt(key=0)
 
 
@@ -152,6 +164,7 @@ class State:
     dialog: str | None = None
     dialog_path: str = ""
     stats: Stats = NO_STATS
+    desk: Desk = NO_DESK
     leaving: bool = False
 
     @property

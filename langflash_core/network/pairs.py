@@ -46,7 +46,9 @@ def _scaled(grey: np.ndarray) -> np.ndarray:
     return cv2.resize(grey, None, fx=ratio, fy=ratio, interpolation=method)
 
 
-def _worth(pos_i: np.ndarray, descriptors_i: np.ndarray, pos_j: np.ndarray, descriptors_j: np.ndarray) -> float:
+def _worth(
+    pos_i: np.ndarray, descriptors_i: np.ndarray, pos_j: np.ndarray, descriptors_j: np.ndarray
+) -> float:
     """Agreeing matches, fewer where they show no parallax. pos: (n, 2) pixels."""
     pairs = match_descriptors(descriptors_i, descriptors_j)
     if len(pairs) < _FEWEST:

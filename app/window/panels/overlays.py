@@ -4,13 +4,18 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from app.window import commands as do
+from app.window import desk_commands as desk
 from app.window import theme
 from app.window.drops import typed_path, typed_scene
-from app.window.panels import widgets
+from app.window.panels import desk_dialogs, exporting, widgets
 from app.window.panels.look import Look
 from app.window.state import State, Toast
 
-TITLES = {"save": "Save the scene", "open": "Open", "help": "Mouse and keys", "leave": "Leave?"}
+TITLES = {
+    "save": "Save the scene", "open": "Open", "help": "Mouse and keys", "leave": "Leave?",
+    "export": "Export", "settings": "Preferences", "log": "Log",
+}  # fmt: skip
+WIDTHS = {"export": exporting.WIDTH, "settings": 560.0, "log": 640.0}  # design pixels; others 520
 HELP = (
     ("Left drag", "orbit"),
     ("Middle drag, Shift + left drag", "pan"),
@@ -18,8 +23,11 @@ HELP = (
     ("Right drag", "look around"),
     ("W A S D, Q E", "fly, down and up; Shift is faster"),
     ("H or Home", "back to the first photo's view"),
+    ("Z", "show all of the scene"),
+    ("P, K", "compare with the photo; show the cameras"),
     ("1 to 5", "colour, heat-map, labels, atoms, depth"),
-    ("Ctrl + O, Ctrl + S", "open, save"),
+    ("Ctrl + O, Ctrl + S, Ctrl + E", "open, save, export"),
+    ("Ctrl + P, F2", "preferences, log"),
     ("Ctrl + Q", "leave"),
 )
 
@@ -71,16 +79,21 @@ def draw_dialog(state: State, look: Look) -> list[do.Command]:
         imgui.open_popup(title)
     middle = imgui.get_main_viewport().get_center()
     imgui.set_next_window_pos(middle, imgui.Cond_.appearing, ImVec2(0.5, 0.5))
-    imgui.set_next_window_size(ImVec2(look.px(520), 0))
+    width = min(look.px(WIDTHS.get(state.dialog, 520.0)), imgui.get_io().display_size.x - look.px(24))
+    imgui.set_next_window_size(ImVec2(width, 0))
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     opened, kept = imgui.begin_popup_modal(title, True, imgui.WindowFlags_.no_resize)
     issued: list[do.Command] = []
     if opened:
-        body = {"save": _save, "open": _open, "help": _help, "leave": _leave}[state.dialog]
+        bodies = {
+            "save": _save, "open": _open, "help": _help, "leave": _leave, "export": exporting.draw,
+            "settings": desk_dialogs.draw_settings, "log": desk_dialogs.draw_log,
+        }  # fmt: skip
+        body = bodies[state.dialog]
         issued = body(state, look)
         if not kept:
             issued.append(do.ShowDialog(None))
-        if any(isinstance(c, do.ShowDialog | do.SaveScene | do.OpenPaths) for c in issued):
+        if any(isinstance(c, do.ShowDialog | do.SaveScene | do.OpenPaths | desk.Export) for c in issued):
             imgui.close_current_popup()
         imgui.end_popup()
     imgui.pop_style_var()

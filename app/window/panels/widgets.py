@@ -16,11 +16,12 @@ PLAIN = (
 
 
 @contextmanager
-def window(name: str, pos: ImVec2, size: ImVec2, flags: int = 0) -> Iterator[None]:
-    """A fixed window without decoration."""
+def window(name: str, pos: ImVec2, size: ImVec2, flags: int = 0, scrolls: bool = False) -> Iterator[None]:
+    """A fixed window without decoration; with a scroll bar when it `scrolls`."""
+    plain = PLAIN & ~imgui.WindowFlags_.no_scrollbar if scrolls else PLAIN
     imgui.set_next_window_pos(pos)
     imgui.set_next_window_size(size)
-    imgui.begin(name, None, PLAIN | imgui.WindowFlags_.no_bring_to_front_on_focus | flags)
+    imgui.begin(name, None, plain | imgui.WindowFlags_.no_bring_to_front_on_focus | flags)
     try:
         yield
     finally:
@@ -102,3 +103,10 @@ def u32(colour: ImVec4) -> int:
 def gap(height: float) -> None:
     """Vertical space, interface pixels."""
     imgui.dummy(ImVec2(0, height))
+
+
+def at_right_edge(text: str) -> None:
+    """Text on the last item's line, flush right."""
+    edge = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x
+    imgui.same_line(edge - imgui.calc_text_size(text).x)
+    imgui.text(text)
