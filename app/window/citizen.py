@@ -16,7 +16,7 @@ from app.window import export_form, messages, preferences, recovery
 from app.window.exporter import Exporter, camera_json
 from app.window.preferences import Preferences
 from app.window.recovery import Keeper, Kept
-from app.window.state import State
+from app.window.state import SceneInfo, State
 from langflash_core.errors import LangFlashError
 from langflash_core.files import make_folder, write_atomically
 
@@ -93,7 +93,7 @@ class Citizen:
         """What a command asks of the world, after its pure change."""
         match command:
             case do.SceneArrived(info):
-                self._arrived(info, state)
+                self._arrived(info)
             case do.SceneSaved(path):
                 self._perform(desk.Opened(path))
             case desk.ChoosePair() if state.desk.choosing and not before.desk.choosing:
@@ -133,17 +133,15 @@ class Citizen:
             case _:
                 pass
 
-    def _arrived(self, info, state: State) -> None:
+    def _arrived(self, info: SceneInfo) -> None:
         kept, self._restoring = self._restoring, None
         if kept is not None and info.path is not None and str(info.path) == kept.scene:
             self._perform(desk.StandAgain(kept.pose, kept.mode, kept.name, kept.saved))
-            if kept.saved:
-                self._perform(desk.Opened(info.path))
             unsaved = not kept.saved
         else:
             unsaved = info.path is None
-            if not unsaved:
-                self._perform(desk.Opened(info.path))
+        if info.path is not None and not unsaved:
+            self._perform(desk.Opened(info.path))
         self._copied = False
         if unsaved:
             self._perform(desk.CopyAt(self._keeper.scene_file))

@@ -7,6 +7,7 @@ used falls back to its default, and one sentence says so.
 import json
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 from app.window.places import config_folder
 from langflash_core.errors import OutputError
@@ -64,7 +65,7 @@ def load(path: Path | None = None) -> tuple[Preferences, str]:
     if not isinstance(content, dict):
         return DEFAULTS, f"The preferences hold something else, so the defaults are used; see {path}."
     known = {field.name for field in fields(Preferences)}
-    good = {name: _fitting(name, value) for name, value in content.items() if name in known}
+    good: dict[str, Any] = {name: _fitting(name, value) for name, value in content.items() if name in known}
     lost = sorted(name for name, value in good.items() if value is None)
     kept = {name: value for name, value in good.items() if value is not None}
     sentence = f"Some preferences could not be used ({', '.join(lost)}); their defaults are." if lost else ""
@@ -91,7 +92,7 @@ def try_to_save(preferences: Preferences) -> str:
     return ""
 
 
-def _fitting(name: str, value: object):
+def _fitting(name: str, value: Any) -> Any:
     """The value as its field's type and in its range, or None."""
     default = getattr(DEFAULTS, name)
     if isinstance(default, bool):
@@ -101,7 +102,7 @@ def _fitting(name: str, value: object):
     if isinstance(default, float):
         low, high = {"scale": SCALES, "speed": SPEEDS, "panel_width": PANEL_WIDTHS}[name]
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        return float(value) if number and low <= value <= high else None  # pyright: ignore
+        return float(value) if number and low <= value <= high else None
     if not isinstance(value, list):
         return None
     if name == "recent":

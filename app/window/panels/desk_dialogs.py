@@ -10,7 +10,7 @@ from app.window import desk_commands as desk
 from app.window import preferences, theme
 from app.window.panels import widgets
 from app.window.panels.look import Look
-from app.window.preferences import SCALES, SPEEDS, THEMES
+from app.window.preferences import SPEEDS, THEMES
 from app.window.state import State
 
 _OFFER = 480.0  # design pixels
@@ -22,17 +22,10 @@ def draw_settings(state: State, look: Look) -> list[do.Command]:
     old = state.desk.preferences
     new = old
     _label("Theme", look)
-    for index, name in enumerate(THEMES):
-        if index:
-            imgui.same_line()
-        if imgui.radio_button(name.capitalize(), old.theme == name):
-            new = replace(new, theme=name)
+    new = replace(new, theme=widgets.choice([(name.capitalize(), name) for name in THEMES], old.theme))
     _label("Size of the interface", look)
-    for index, scale in enumerate((0.75, 1.0, 1.25, 1.5, 2.0)):
-        if index:
-            imgui.same_line()
-        if imgui.radio_button(f"{scale:.0%}", abs(old.scale - scale) < 0.01):
-            new = replace(new, scale=min(max(scale, SCALES[0]), SCALES[1]))
+    sizes = [(f"{scale:.0%}", scale) for scale in (0.75, 1.0, 1.25, 1.5, 2.0)]
+    new = replace(new, scale=widgets.choice(sizes, old.scale))
     _label("Speed of flying", look)
     width = imgui.get_content_region_avail().x
     changed, speed = widgets.slider("##speed", old.speed, SPEEDS, f"{old.speed:.1f}", "", width)

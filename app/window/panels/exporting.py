@@ -69,20 +69,16 @@ def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
         imgui.align_text_to_frame_padding()
         imgui.text("Seen from")
         imgui.same_line(look.px(110))
-        if imgui.radio_button("the view on show", not form.all_views):
-            form = replace(form, all_views=False)
-        imgui.same_line()
         count = len(state.info.views) if state.info else 0
-        if imgui.radio_button(f"all {count} photos' views", form.all_views):
-            form = replace(form, all_views=True)
+        options = (("the view on show", False), (f"all {count} photos' views", True))
+        form = replace(form, all_views=widgets.choice(options, form.all_views))
     if what.sized:
         imgui.align_text_to_frame_padding()
         imgui.text("Longer side")
         imgui.same_line(look.px(110))
-        for side in SIDES:
-            if imgui.radio_button(str(side), form.side == side):
-                form = replace(form, side=side)
-            imgui.same_line()
+        form = replace(form, side=widgets.choice([(str(side), side) for side in SIDES], form.side))
+        imgui.same_line()
+        imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.MUTED, "px")
     if what is What.VIDEO:
         imgui.align_text_to_frame_padding()

@@ -56,12 +56,13 @@ def _frusta(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.C
         colour = widgets.u32(theme.DARK.ACCENT if over else theme.DARK.TEXT)
         for point in base:
             canvas.add_line(tip, point, colour, look.px(1.2))
+        a, b, c, d = base
         picture = look.thumbnails.get(f"view {view}")
         if picture is not None:
-            a, b, c, d = base
-            uvs = (ImVec2(0, 0), ImVec2(1, 0), ImVec2(1, 1), ImVec2(0, 1))
-            canvas.add_image_quad(picture[0], a, b, c, d, *uvs, imgui.IM_COL32(255, 255, 255, 225))
-        canvas.add_quad(*base, colour, look.px(2.2 if over else 1.2))
+            tint = imgui.IM_COL32(255, 255, 255, 225)
+            corners = (ImVec2(0, 0), ImVec2(1, 0), ImVec2(1, 1), ImVec2(0, 1))
+            canvas.add_image_quad(picture[0], a, b, c, d, *corners, col=tint)
+        canvas.add_quad(a, b, c, d, colour, look.px(2.2 if over else 1.2))
         if over:
             imgui.set_tooltip(f"Stand where photo {view} was taken")
             if imgui.is_mouse_clicked(0):

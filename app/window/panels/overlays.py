@@ -15,7 +15,12 @@ TITLES = {
     "save": "Save the scene", "open": "Open", "help": "Mouse and keys", "leave": "Leave?",
     "export": "Export", "settings": "Preferences", "log": "Log",
 }  # fmt: skip
-WIDTHS = {"export": exporting.WIDTH, "settings": 560.0, "log": 640.0}  # design pixels; others 520
+WIDTHS = {
+    "export": exporting.WIDTH,
+    "settings": 560.0,
+    "log": 640.0,
+    "help": 600.0,
+}  # design pixels; others 520
 HELP = (
     ("Left drag", "orbit"),
     ("Middle drag, Shift + left drag", "pan"),

@@ -15,6 +15,7 @@ from app.window.state import Job, Photo, State
 COLUMNS = 3
 NOTABLE_SECONDS = 0.05  # of a finished stage; a shorter one is only a heading of others
 ASSUMED_FOV = 65.0  # degrees, as the core assumes where neither file nor person says
+HOW_TO_TELL = "click a photo to tell it"
 _DRAGGED = "photo"  # what a card is called while it is dragged
 
 
@@ -41,6 +42,8 @@ def _sentences(state: State) -> list[str]:
     said = [photo.problem for photo in state.photos if photo.problem]
     said += [note for photo in state.photos for note in photo.notes]
     said += state.info.warnings if state.info else ()
+    # What the core says of its command line is said here in the window's words.
+    said = [each.replace("on the command line, --fov tells it", HOW_TO_TELL) for each in said]
     return list(dict.fromkeys(_sentence(each) for each in said))
 
 

@@ -1,7 +1,8 @@
 """Small pieces that several panels share."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import TypeVar
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
@@ -13,6 +14,8 @@ PLAIN = (
     | imgui.WindowFlags_.no_saved_settings
     | imgui.WindowFlags_.no_nav
 )
+
+_Value = TypeVar("_Value")
 
 
 @contextmanager
@@ -58,6 +61,16 @@ def primary_button(label: str, size: ImVec2 | None = None) -> bool:
     lighter = ImVec4(min(accent.x * 1.06, 1), accent.y * 1.08, accent.z * 1.3, 1)
     with colours(button=accent, button_hovered=lighter, button_active=accent, text=theme.ON_ACCENT):
         return imgui.button(label, size or ImVec2(0, 0))
+
+
+def choice(options: Sequence[tuple[str, _Value]], chosen: _Value) -> _Value:
+    """One of several values, a button each in a row; returns the one that now holds."""
+    for index, (label, value) in enumerate(options):
+        if index:
+            imgui.same_line(0, 0.5 * imgui.get_style().item_spacing.x)
+        if primary_button(label) if value == chosen else imgui.button(label):
+            chosen = value
+    return chosen
 
 
 def quiet_button(label: str, tip: str = "") -> bool:
