@@ -16,8 +16,8 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import Cancelled, InputError, PromptError, ViewError, WeightsError
-from langflash_core.images import load_views
-from langflash_core.network import PRESETS, LangFlashNet, load_network
+from langflash_core.images import grey_photo, load_views
+from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_network
 from langflash_core.query.answers import answer
 from langflash_core.query.gaussians import gaussian_relevance, kept
 from langflash_core.query.relevance import Mode, compile_query, relevance_maps
@@ -39,7 +39,7 @@ def reconstruct(
     *,
     preset: str = "mini",
     weights: Path | str | None = None,
-    fov: float | None = None,
+    fov: float | Sequence[float | None] | None = None,
     intrinsics: tuple[float, float, float, float] | None = None,
     size: int | None = None,
     device: str = "auto",
@@ -51,12 +51,13 @@ def reconstruct(
     Args:
         photos: one or more files; the first one's camera becomes the world.
         preset: size of the network. weights: its checkpoint, None for the shipped one.
-        fov: degrees, of the photos' longer side. intrinsics: (fx, fy, cx, cy) in pixels of the
-            photos as given, the same for all. Neither: EXIF, else an assumption with a warning.
+        fov: degrees, of the photos' longer side, one for all or one per photo. intrinsics:
+            (fx, fy, cx, cy) in pixels of the photos as given, the same for all. Neither: EXIF, else
+            an assumption with a warning.
         size: the network sees about size x size pixels per photo, whatever their shape.
         device: "auto" takes CUDA where there is one; "cpu"; "cuda".
         progress: called with the stage and the fraction of the whole in [0, 1].
-        cancelled: asked between stages.
+        cancelled: asked between stages, photos and pairs of photos, and before every layer.
 
     Returns:
         A scene on the CPU; `metadata` holds seconds per stage, peak memory and warnings.
@@ -73,7 +74,14 @@ def reconstruct(
     area = PRESETS[preset].native_area if size is None else _area(size)
     with run.stage("photos"):
         files = [Path(photo) for photo in photos]
-        views = load_views(files, fov=fov, intrinsics=intrinsics, area=area, multiple=PRESETS[preset].patch)
+        views = load_views(
+            files,
+            fov=fov,
+            intrinsics=intrinsics,
+            area=area,
+            multiple=PRESETS[preset].patch,
+            check=run.check,
+        )
     with run.stage("weights"):
         network = _network(preset, weights, device)
     with run.stage("network"):
@@ -149,6 +157,25 @@ def select(scene: Scene, prompts: Sequence[str], *, threshold: float | None = No
             "lower the threshold."
         )
     return kept(scene, passing)
+
+
+def best_pair(
+    photos: Sequence[Path | str], *, cancelled: Callable[[], bool] | None = None
+) -> tuple[int, int] | None:
+    """The two photos that make the best scene together: much in common, seen from different places.
+
+    Returns:
+        Their places in `photos`; None where no two photos match.
+
+    Raises:
+        ImageError: a photo cannot be used. Cancelled: `cancelled()` became true.
+    """
+    run = _Run(None, cancelled)
+    greys = []
+    for photo in photos:
+        run.check()
+        greys.append(grey_photo(Path(photo)))
+    return choose_pair(greys, run.check)
 
 
 @dataclass

@@ -158,14 +158,20 @@ def _add_export(commands) -> None:
         command,
         "FILE",
         ".png: a picture, or a cut-out with --prompt; .ply, .splat, .langflash: Gaussians; "
-        ".json: COCO masks of --prompt; .npz: a view as numbers; .mp4: a flight",
+        ".json: COCO masks of --prompt; .csv: their boxes; .npz: a view as numbers; .mp4: a flight",
     )
     command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="keep only what answers one of these")
     command.add_argument(
         "--threshold", type=kept_fraction, metavar="T", help="relevancy to keep, between 0 and 1"
     )
     command.add_argument(
-        "--what", choices=("labels",), help="labels: a .png of phrase numbers, with its legend as .json"
+        "--what",
+        choices=("rgb", "heat", "mask", "cutout", "labels", "boxes"),
+        help="of a .png: colours, a heat-map, a mask, a cut-out with transparency (default with --prompt), "
+        "or phrase numbers with a legend as .json; boxes: a .json or .csv of places and sizes",
+    )
+    command.add_argument(
+        "--all-views", action="store_true", help="from every photo: FILE_0, FILE_1 and so on"
     )
     command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of an .mp4 (default: 6)")
     _add_camera(command)

@@ -5,8 +5,6 @@ opened, and the history of its edits. Both are written whole. The eight newest a
 names the session.
 """
 
-import os
-import sys
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
@@ -14,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from app.window.drops import SCENE_SUFFIX
 from app.window.editing import Offer
+from app.window.places import state_folder
 from langflash_core.edits import History
 from langflash_core.errors import SceneFileError
 
@@ -22,19 +21,6 @@ if TYPE_CHECKING:
 
 MOST_KEPT = 8
 SUFFIX = ".edits"
-FOLDER_VARIABLE = "LANGFLASH_STATE"
-
-
-def folder() -> Path:
-    """Where the program keeps its state; `LANGFLASH_STATE` names another place."""
-    own = os.environ.get(FOLDER_VARIABLE)
-    if own:
-        return Path(own)
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Application Support" / "langflash"
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", Path.home())) / "langflash"
-    return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "langflash"
 
 
 def keep(scene: "Scene", history: History, name: str, path: Path | None, token: str) -> Path:
@@ -89,9 +75,9 @@ def find(scene: "Scene | None" = None, path: Path | None = None) -> Offer | None
 
 
 def _place(digest: str, token: str) -> Path:
-    return folder() / f"{digest[:20]}-{token}{SUFFIX}"
+    return state_folder() / f"{digest[:20]}-{token}{SUFFIX}"
 
 
 def _newest_first() -> list[Path]:
-    found = [file for file in folder().glob(f"*{SUFFIX}") if file.is_file()]
+    found = [file for file in state_folder().glob(f"*{SUFFIX}") if file.is_file()]
     return sorted(found, key=lambda file: file.stat().st_mtime, reverse=True)

@@ -8,6 +8,7 @@ import numpy as np
 from app.window import autosave
 from app.window.edit_messages import (
     AtomWords,
+    EditsFound,
     EditsKept,
     FindAtom,
     FindByPhrase,
@@ -64,15 +65,15 @@ def run(request: Request) -> Result | None:
             return Weighed(request.serial, _with_atoms(request.reading, weigh(request)))
         case NameAtoms():
             return name_atoms(request)
-        case KeepEdits(scene, history, name, path, token):
-            autosave.keep(scene, history, name, path, token)
+        case KeepEdits(serial, scene, history, name, path, token):
+            return EditsKept(serial, autosave.keep(scene, history, name, path, token))
         case ForgetEdits(scene, token):
             autosave.forget(scene, token)
         case ForgetFile(edits):
             autosave.forget_file(edits)
         case LookForEdits(serial, scene, path):
             offer = autosave.find(scene, path)
-            return None if offer is None else EditsKept(serial, offer)
+            return None if offer is None else EditsFound(serial, offer)
     return None
 
 

@@ -381,6 +381,16 @@ class JumpTo:
 
 
 @dataclass(frozen=True)
+class FlyTo:
+    """Fly to a pose that is no photo's."""
+
+    pose: Pose
+
+    def apply(self, state: State) -> State:
+        return replace(state, flight=Flight(state.pose, self.pose, state.now), view=None)
+
+
+@dataclass(frozen=True)
 class Home:
     """Fly back to the first photo's view."""
 

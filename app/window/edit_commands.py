@@ -1,6 +1,7 @@
 """What can happen while editing. Every change of the scene is an entry of the history."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,7 @@ from app.window.editing import (
     Region,
     Tool,
 )
+from app.window.poses import Vector
 from app.window.state import PALETTE, Flight, Mode, Prompt
 from langflash_core import edits
 from langflash_core.edits import Combine, History, Marks, Mask
@@ -488,11 +490,21 @@ class FrameSelection:
         if not len(points):
             return state
         low, high = np.quantile(points, (0.02, 0.98), axis=0)
-        pose = poses.framing(state.pose, (low + high) / 2, float(np.linalg.norm(high - low)) / 2)
+        pose = poses.framing(state.pose, Vector(*low.tolist()), Vector(*high.tolist()))
         return replace(state, flight=Flight(state.pose, pose, state.now), view=None)
 
 
 # Edits of an earlier session
+
+
+@dataclass(frozen=True)
+class EditsKept:
+    """Where the edits lie until they are saved; None: nowhere."""
+
+    file: Path | None
+
+    def apply(self, state: "State") -> "State":
+        return change(state, kept=self.file)
 
 
 @dataclass(frozen=True)

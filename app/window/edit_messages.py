@@ -93,6 +93,7 @@ class NameAtoms(EditErrand):
 class KeepEdits:
     """Write the edits where a crash cannot take them; `token` names the session."""
 
+    serial: int
     scene: "Scene" = field(repr=False)
     history: History = field(repr=False)
     name: str
@@ -189,11 +190,19 @@ class AtomWords:
 
 
 @dataclass(frozen=True)
-class EditsKept:
+class EditsFound:
     """Edits of an earlier session were found."""
 
     serial: int
     offer: Offer
 
 
-Result = SelectionFound | FloatersScored | Weighed | PlaceNamed | AtomWords | EditsKept
+@dataclass(frozen=True)
+class EditsKept:
+    """The edits lie in a file."""
+
+    serial: int
+    file: Path
+
+
+Result = SelectionFound | FloatersScored | Weighed | PlaceNamed | AtomWords | EditsFound | EditsKept

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from app.window.drops import SCENE_SUFFIX
 from langflash_core.edits import Combine, History, Marks, Mask
 
 RADIUS_RANGE = (4.0, 160.0)  # design pixels
@@ -113,6 +114,11 @@ class Offer:
     count: int
     when: datetime
 
+    @property
+    def scene(self) -> Path:
+        """The scene as it was before them, kept beside them."""
+        return self.edits.with_suffix(SCENE_SUFFIX)
+
 
 @dataclass(frozen=True)
 class Editing:
@@ -122,7 +128,7 @@ class Editing:
     radius: of the brush, design pixels. reach: of growing, in spacings of the Gaussians.
     drag: the region being drawn, framebuffer pixels. waiting: what the worker is looking for.
     hover: what is under the pointer. asked: where a click waits for the picture to rest.
-    names: nearest words of each atom, best first.
+    names: nearest words of each atom, best first. kept: the file that holds unsaved edits.
     """
 
     history: History | None = None
@@ -140,6 +146,7 @@ class Editing:
     names: tuple[tuple[str, ...], ...] = ()
     floaters: Floaters | None = None
     offer: Offer | None = None
+    kept: Path | None = None
 
     @property
     def marks(self) -> Marks | None:

@@ -2,6 +2,7 @@
 
 import secrets
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from app.window import edit_commands as edit
 from app.window.editing import Offer, Reading, Tool
 from app.window.state import SceneInfo, State
 from app.window.viewport import Viewport
-from langflash_core.edits import Combine, Marks
+from langflash_core.edits import Combine, History, Marks
 from langflash_core.errors import LangFlashError
 
 KEEP_AFTER = 1.0  # seconds after an edit that it is written, so that a burst is written once
@@ -34,7 +35,7 @@ class Editor:
         self._perform = perform
         self._token = secrets.token_hex(4)
         self._kept = False  # whether edits of the scene on show lie on the disk
-        self._restoring: Offer | None = None
+        self._restoring: Path | None = None  # a file of edits
         self._read: tuple | None = None  # what the last reading under the pointer was of
         self.keep_at = float("inf")
 
@@ -91,6 +92,8 @@ class Editor:
     def follow(self, command: do.Command, before: State, state: State) -> None:
         """What a command asks of the world, after its pure change."""
         match command:
+            case do.OpenScene(_, edits):
+                self._restoring = edits
             case do.SceneArrived(info):
                 self._arrived(info, before)
             case do.SceneSaved():
@@ -120,20 +123,16 @@ class Editor:
         if info.num_atoms and info.history is not None:
             self._submit(edit_messages.NameAtoms(info.serial, info.scene, info.history.marks))
         if self._restoring is not None and info.history is not None and info.history.done:
-            token = self._token
-            self._submit(edit_messages.KeepEdits(info.scene, info.history, info.name, info.path, token))
-            self._kept = True
-            if not self._restoring.edits.name.endswith(f"-{token}{autosave.SUFFIX}"):
-                self._submit(edit_messages.ForgetFile(self._restoring.edits))
+            self._write(info, info.history)
+            if not self._restoring.name.endswith(f"-{self._token}{autosave.SUFFIX}"):
+                self._submit(edit_messages.ForgetFile(self._restoring))
         else:
             self._submit(edit_messages.LookForEdits(info.serial, info.scene, info.path))
         self._restoring = None
 
     def _end_offer(self, offer: Offer, restore: bool, forget: bool) -> None:
         if restore:
-            self._restoring = offer
-            scene = offer.edits.with_suffix(autosave.SCENE_SUFFIX)
-            self._perform(do.OpenScene(scene, offer.edits))
+            self._perform(do.OpenScene(offer.scene, offer.edits))
         elif forget:
             self._submit(edit_messages.ForgetFile(offer.edits))
 
@@ -159,13 +158,18 @@ class Editor:
             self._keep(state)
         elif self._kept and state.info is not None:
             self._submit(edit_messages.ForgetEdits(state.info.scene, self._token))
+            self._perform(edit.EditsKept(None))
             self._kept = False
 
     def _keep(self, state: State) -> None:
         info, history = state.info, state.editing.history
         if info is not None and history is not None and history.done:
-            self._submit(edit_messages.KeepEdits(info.scene, history, info.name, info.path, self._token))
-            self._kept = True
+            self._write(info, history)
+
+    def _write(self, info: SceneInfo, history: History) -> None:
+        place = (info.name, info.path, self._token)
+        self._submit(edit_messages.KeepEdits(info.serial, info.scene, history, *place))
+        self._kept = True
 
     def close(self, state: State) -> None:
         """At the end, when the worker is gone: edits that a saved file would miss are kept."""

@@ -25,9 +25,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ReconstructPhotos:
-    """Make a scene of photos."""
+    """Make a scene of photos. fovs: degrees of the longer side, one per photo; None: its record."""
 
     paths: tuple[Path, ...]
+    fovs: tuple[float | None, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -85,8 +86,33 @@ class MakeThumbnails:
     paths: tuple[Path, ...]
 
 
+@dataclass(frozen=True)
+class KeepCopy:
+    """Write a scene that nobody saved where a crash cannot take it."""
+
+    serial: int
+    scene: "Scene"
+    path: Path
+
+
+@dataclass(frozen=True)
+class FindPair:
+    """The two photos that make the best scene."""
+
+    paths: tuple[Path, ...]
+
+
 Job = ReconstructPhotos | LoadScene
-Errand = WriteScene | Encode | Answer | MakeThumbnails | ask_messages.Request | edit_messages.Request
+Errand = (
+    WriteScene
+    | Encode
+    | Answer
+    | MakeThumbnails
+    | KeepCopy
+    | FindPair
+    | ask_messages.Request
+    | edit_messages.Request
+)
 
 
 # Results
@@ -147,10 +173,32 @@ class Scored:
 
 @dataclass(frozen=True)
 class Thumbnail:
-    """rgb (h, w, 3) uint8, or None with the reason; `key` names the texture."""
+    """rgb (h, w, 3) uint8, or None with the reason; `key` names the texture.
+
+    fov: recorded in the file, degrees of the longer side. notes: triage.
+    """
 
     key: str
     rgb: np.ndarray | None
+    problem: str = ""
+    fov: float | None = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class CopyKept:
+    """The copy is there."""
+
+    serial: int
+    path: Path
+
+
+@dataclass(frozen=True)
+class PairFound:
+    """`pair`: places in `paths`; None where no two match, with a problem where it could not be told."""
+
+    paths: tuple[Path, ...]
+    pair: tuple[int, int] | None
     problem: str = ""
 
 
@@ -165,4 +213,6 @@ Result = (
     | Thumbnail
     | edit_messages.Result
     | ask_messages.Result
+    | CopyKept
+    | PairFound
 )

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.window.asking import NO_ASKING, Asking, usable
+from app.window.desk import Desk
 from app.window.editing import NO_EDITING, Editing
-from app.window.poses import START, Pose
+from app.window.poses import START, Pose, Vector
 
 if TYPE_CHECKING:
     from langflash_core.edits import History
@@ -71,10 +72,16 @@ _ANSWERING = (Mode.HEAT, Mode.LABELS, Mode.MASKS, Mode.ISOLATE, Mode.HIDE, Mode.
 
 @dataclass(frozen=True)
 class Photo:
-    """A photo in the tray; `problem` is a sentence when it could not be shown."""
+    """A photo in the tray; `problem` is a sentence when it could not be shown.
+
+    fov: the person's own, degrees of the longer side. recorded: what the file says. notes: triage.
+    """
 
     path: Path
     problem: str = ""
+    fov: float | None = None
+    recorded: float | None = None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -133,6 +140,7 @@ class SceneInfo:
 
     history: edits that came with it, none of them or those of an earlier session.
     own_views: whether it says which photo made which Gaussian, so that photos can be compared.
+    extent: corners (low, high) of the box around nearly all of it, world axes, scene units.
     """
 
     serial: int
@@ -146,6 +154,7 @@ class SceneInfo:
     path: Path | None = None
     history: "History | None" = field(default=None, compare=False, repr=False)
     own_views: bool = False
+    extent: tuple[Vector, Vector] | None = None
 
 
 @dataclass(frozen=True)
@@ -170,6 +179,7 @@ class Stats:
 
 
 NO_STATS = Stats()
+NO_DESK = Desk()
 FIRST_PROMPT = Prompt(key=0)
 
 
@@ -195,6 +205,7 @@ class State:
     stats: Stats = NO_STATS
     editing: Editing = NO_EDITING
     asking: Asking = NO_ASKING
+    desk: Desk = NO_DESK
     leaving: bool = False
 
     @property

@@ -2,6 +2,7 @@
 
 from langflash_core.network.checkpoints import initial_network, load_network, save_network
 from langflash_core.network.model import STAGES, LangFlashNet
+from langflash_core.network.pairs import choose_pair
 from langflash_core.network.presets import MINI, PRESETS, Preset
 
 __all__ = [
@@ -10,6 +11,7 @@ __all__ = [
     "STAGES",
     "LangFlashNet",
     "Preset",
+    "choose_pair",
     "initial_network",
     "load_network",
     "save_network",

@@ -88,6 +88,16 @@ class LangFlashNet(nn.Module):
         whole = group_weights(groups, survivors, (finest.shape[-2], finest.shape[-1]))
         return split_groups(whole, finest, self.preset.splitting, size)
 
+    @contextmanager
+    def stopping(self, check: Callable[[], None]) -> Iterator[None]:
+        """Calls `check` before every layer, so that what it raises ends the work within one layer."""
+        handles = [part.register_forward_pre_hook(lambda *_: check()) for part in self.modules()]
+        try:
+            yield
+        finally:
+            for handle in handles:
+                handle.remove()
+
     @torch.inference_mode()
     def predict(
         self, views: Views, progress: Progress | None = None, cancelled: Callable[[], bool] | None = None
@@ -95,9 +105,14 @@ class LangFlashNet(nn.Module):
         """One scene from V photos of one size (sides multiples of the patch).
 
         Raises:
-            Cancelled: `cancelled()` became true between two stages.
+            Cancelled: `cancelled()` became true; asked before every layer and every pair of photos.
         """
         run = _Run(progress, cancelled)
+        with self.stopping(run.check):
+            return self._predict(views, run)
+
+    def _predict(self, views: Views, run: "_Run") -> Prediction:
+        """The stages, timed by `run`."""
         device = next(self.parameters()).device
         images, Ks = views.images[None].to(device), views.Ks[None].to(device)
         with run.stage("encoder"):
@@ -107,7 +122,7 @@ class LangFlashNet(nn.Module):
             prior = self.depth_head(levels, tokens)
         with run.stage("poses"):
             local = self.local(images[0])
-            poses = estimate_poses(self._pose_inputs(views, prior, local))
+            poses = estimate_poses(self._pose_inputs(views, prior, local), run.check)
             viewmats = torch.from_numpy(poses.viewmats).to(images)[None]
         with run.stage("refinement"):
             maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)
@@ -201,10 +216,14 @@ class _Run:
     cancelled: Callable[[], bool] | None
     timings: dict[str, float] = field(default_factory=dict)
 
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
+    def check(self) -> None:
+        """Stop here if asked to."""
         if self.cancelled is not None and self.cancelled():
             raise Cancelled("The reconstruction was cancelled")
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        self.check()
         if self.progress is not None:
             self.progress(name, len(self.timings) / len(STAGES))
         start = time.perf_counter()

@@ -1,15 +1,17 @@
 """The picture and the hands on it: orbit, pan, zoom, fly. Also the keys that work everywhere."""
 
 import math
+from dataclasses import replace
 
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from app.window import commands as do
+from app.window import desk_commands as desk
 from app.window import edit_commands as edit
 from app.window import poses, theme
 from app.window.editing import PICK_RADIUS, Point, Region, Tool
-from app.window.panels import widgets
+from app.window.panels import in_space, widgets
 from app.window.panels.look import Look
 from app.window.panels.modes import KEYED
 from app.window.poses import Pose
@@ -19,6 +21,7 @@ TURN = math.radians(0.3)  # per pixel at scale 1
 ZOOM = 0.9  # of the distance, per notch of the wheel
 SPEED = 0.9  # of the distance to the pivot, per second
 FAST = 3.0  # with shift
+SCROLL = 30.0  # design pixels that a step of a touch pad's scrolling counts for
 LONGEST_STEP = 0.25  # seconds of flight a slow frame may count for
 
 _FLY_KEYS = (
@@ -47,7 +50,10 @@ _DOING_KEYS: tuple[tuple[imgui.Key, do.Command], ...] = (
 BRUSH_STEP = 1.15  # of its radius, per press of [ or ]
 CLICK = 4.0  # design pixels that a click may slip
 
-SHORTCUTS = {"s": do.ShowDialog("save"), "o": do.ShowDialog("open"), "q": do.Leave()}
+SHORTCUTS = {
+    "s": do.ShowDialog("save"), "o": do.ShowDialog("open"), "q": do.Leave(),
+    "e": desk.ShowExport(), "p": do.ShowDialog("settings"),
+}  # fmt: skip
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
@@ -59,18 +65,22 @@ def draw(state: State, look: Look) -> list[do.Command]:
         imgui.get_window_draw_list().add_image(imgui.ImTextureRef(look.picture.glo), corner, end)
     else:
         _welcome(state, corner, size)
+    over = in_space.draw(state, look, corner, size)
+    if any(isinstance(command, do.JumpTo) for command in over):
+        return over  # the click was on a camera
     buttons = imgui.ButtonFlags_
+    imgui.set_next_item_allow_overlap()
     flags = buttons.mouse_button_left | buttons.mouse_button_right | buttons.mouse_button_middle
     imgui.invisible_button("picture", ImVec2(max(size.x, 1), max(size.y, 1)), flags)
     if state.info is None:
         return []
-    issued = _hover(state, corner)
+    issued = over + _hover(state, corner)
     if state.editing.tool.selects and not imgui.get_io().key_alt:
         issued += _region(state, look, corner)
     elif state.editing.tool is Tool.POINT:
         issued += _ask(look, corner)
-    pose = _pointed(state.pose, look, size, state.editing.tool.selects)
-    pose = _flown(pose)
+    pose = _pointed(state, look, size)
+    pose = _flown(pose, state.desk.preferences.speed)
     return issued + ([do.MoveTo(pose)] if pose != state.pose else [])
 
 
@@ -80,12 +90,21 @@ def keys(state: State) -> list[do.Command]:
     issued: list[do.Command] = []
     if imgui.is_key_pressed(imgui.Key.f1, False):
         issued.append(do.ShowDialog("help"))
+    if imgui.is_key_pressed(imgui.Key.f2, False):
+        issued.append(do.ShowDialog("log"))
     if imgui.is_key_pressed(imgui.Key.escape, False) and not io.want_text_input:
         issued.append(_escape(state))
     if io.want_text_input or io.key_ctrl or state.dialog or state.info is None:
         return issued
     if imgui.is_key_pressed(imgui.Key.h, False) or imgui.is_key_pressed(imgui.Key.home, False):
         issued.append(do.Home())
+    if imgui.is_key_pressed(imgui.Key.z, False):
+        issued.append(desk.FrameAll())
+    if imgui.is_key_pressed(imgui.Key.p, False) and state.view is not None:
+        issued.append(desk.Compare(None if in_space.comparing(state) else 0.5))
+    if imgui.is_key_pressed(imgui.Key.k, False):
+        wanted = state.desk.preferences
+        issued.append(desk.Prefer(replace(wanted, photos_in_space=not wanted.photos_in_space)))
     issued += [do.SetMode(mode) for key, mode in _MODE_KEYS if imgui.is_key_pressed(key, False)]
     issued += [edit.SetTool(tool) for key, tool in _TOOL_KEYS if imgui.is_key_pressed(key, False)]
     issued += [command for key, command in _DOING_KEYS if imgui.is_key_pressed(key, False)]
@@ -156,9 +175,9 @@ def _region(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
     return [edit.SelectRegion(Region(path, scaled), combine)]
 
 
-def _pointed(pose: Pose, look: Look, size: ImVec2, selecting: bool) -> Pose:
+def _pointed(state: State, look: Look, size: ImVec2) -> Pose:
     """The pose after this frame's dragging and wheel; with a selecting tool Alt orbits."""
-    io = imgui.get_io()
+    io, pose, selecting = imgui.get_io(), state.pose, state.editing.tool.selects
     dx, dy = io.mouse_delta.x, io.mouse_delta.y
     if (imgui.is_item_active() or imgui.is_item_deactivated()) and (dx or dy):
         turn = TURN / look.scale
@@ -171,9 +190,22 @@ def _pointed(pose: Pose, look: Look, size: ImVec2, selecting: bool) -> Pose:
             pose = poses.pan(pose, -dx * unit, -dy * unit)
         else:
             pose = poses.orbit(pose, -dx * turn, -dy * turn)
-    if imgui.is_item_hovered() and io.mouse_wheel:
-        pose = poses.zoom(pose, ZOOM**io.mouse_wheel)
+    if imgui.is_item_hovered() and (io.mouse_wheel or io.mouse_wheel_h):
+        pose = _scrolled(pose, state.desk.preferences.touch_pad, look, size)
     return pose
+
+
+def _scrolled(pose: Pose, touch_pad: bool, look: Look, size: ImVec2) -> Pose:
+    """The wheel zooms; two fingers on a touch pad turn, zoom with Ctrl (which a pinch sends), slide
+    with Shift."""
+    io = imgui.get_io()
+    if not touch_pad or io.key_ctrl:
+        return poses.zoom(pose, ZOOM**io.mouse_wheel)
+    across, along = SCROLL * io.mouse_wheel_h, SCROLL * io.mouse_wheel
+    if io.key_shift:
+        unit = poses.units_per_pixel(pose, round(size.x), round(size.y)) * look.scale
+        return poses.pan(pose, -across * unit, -along * unit)
+    return poses.orbit(pose, across * TURN, along * TURN)
 
 
 def _held(button: int) -> bool:
@@ -181,12 +213,12 @@ def _held(button: int) -> bool:
     return imgui.is_mouse_down(button) or imgui.is_mouse_released(button)
 
 
-def _flown(pose: Pose) -> Pose:
+def _flown(pose: Pose, speed: float) -> Pose:
     """The pose after this frame's WASD, Q down and E up."""
     io = imgui.get_io()
     if io.want_text_input or io.key_ctrl or imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
         return pose
-    step = SPEED * pose.reach * min(io.delta_time, LONGEST_STEP) * (FAST if io.key_shift else 1.0)
+    step = speed * SPEED * pose.reach * min(io.delta_time, LONGEST_STEP) * (FAST if io.key_shift else 1.0)
     held = [axis for key, axis in _FLY_KEYS if imgui.is_key_down(key)]
     right, down, forward = (step * sum(axis[i] for axis in held) for i in range(3))
     return poses.fly(pose, right, down, forward) if held else pose

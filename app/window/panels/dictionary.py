@@ -25,10 +25,10 @@ def button(state: State) -> list[do.Command]:
     """Opens the dictionary, or closes it."""
     imgui.begin_disabled(state.info is None or state.info.num_atoms == 0)
     opened = state.asking.opened
-    label = f"{fa.ICON_FA_BOOK}  Dictionary"
+    label = f"{fa.ICON_FA_BOOK}##dictionary"
     pressed = widgets.primary_button(label) if opened else imgui.button(label)
     imgui.end_disabled()
-    widgets.tooltip("The atoms that the scene speaks with: name, silence, merge them")
+    widgets.tooltip("The dictionary: what the scene is made of; name, silence, merge its atoms")
     return [ask.OpenDictionary(not opened)] if pressed else []
 
 

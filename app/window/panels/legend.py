@@ -129,5 +129,5 @@ def _swatch(colour: tuple[float, float, float], look: Look) -> None:
     imgui.same_line()
 
 
-def _fitted(text: str, colour: ImVec4 = theme.TEXT) -> None:
-    imgui.text_colored(colour, widgets.shortened(text, imgui.get_content_region_avail().x))
+def _fitted(text: str, colour: ImVec4 | None = None) -> None:
+    imgui.text_colored(colour or theme.TEXT, widgets.shortened(text, imgui.get_content_region_avail().x))

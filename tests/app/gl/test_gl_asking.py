@@ -74,9 +74,7 @@ def test_masks_are_what_passes_its_own_threshold(asked, truth, style):
         "dim": (rgb, dimmed),
     }[style]
     expected = np.where(shown[..., None], yes, no)
-    sure: np.ndarray = clear_of(relevance - THRESHOLDS[:, None, None]) & (
-        np.abs(frame.alphas.numpy() - 0.5) > 1e-4
-    )
+    sure = clear_of(relevance - THRESHOLDS[:, None, None]) & (np.abs(frame.alphas.numpy() - 0.5) > 1e-4)
     picture = pixels(asked.mask_texture(style, COLOURS, THRESHOLDS))
     assert shown.any() and not shown.all() and sure.mean() > 0.95
     np.testing.assert_allclose(picture[sure], expected[sure], atol=STEP)

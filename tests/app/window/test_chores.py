@@ -32,7 +32,7 @@ def info():
 
 @pytest.fixture(autouse=True)
 def state_folder(tmp_path: Path, monkeypatch) -> Path:
-    monkeypatch.setenv(autosave.FOLDER_VARIABLE, str(tmp_path / "state"))
+    monkeypatch.setenv("LANGFLASH_STATE", str(tmp_path / "state"))
     return tmp_path / "state"
 
 
@@ -158,7 +158,7 @@ def restore(offer) -> object:
 def test_edits_are_offered_and_restored_whole(info, state_folder: Path) -> None:
     assert autosave.find(info.scene) is None
     history = edited(info)
-    chores.run(ask.KeepEdits(info.scene, history, "room", Path("/p/room.langflash"), "me"))
+    chores.run(ask.KeepEdits(info.serial, info.scene, history, "room", Path("/p/room.langflash"), "me"))
     offer = autosave.find(info.scene)
     assert offer is not None and (offer.name, offer.count) == ("room", 2)
     again = restore(offer)
