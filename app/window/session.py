@@ -77,7 +77,7 @@ class Session:
         remembered, complaint = preferences.load()
         self.state = State()
         self.gl_errors: list[str] = []
-        self.longest_frame = 0.0  # seconds, without drawing the scene
+        self.lag = 0.0  # seconds that the last step took, without its nap and without drawing the scene
         self._born = time.perf_counter()
         self._inbox: list[do.Command] = []
         self._awake = AWAKE_FRAMES
@@ -132,6 +132,7 @@ class Session:
 
         Returns whether a frame was drawn.
         """
+        start = time.perf_counter()
         nap = self._nap() if patience is None else min(patience, self._nap())
         if nap > 0:
             glfw.wait_events_timeout(nap)
@@ -146,7 +147,8 @@ class Session:
         self._citizen.tick(self.state, now)
         if not self._inbox and not self._due(now):
             return False
-        self._frame(now)
+        drawing = self._frame(now)
+        self.lag = time.perf_counter() - start - nap - drawing
         return True
 
     def close(self, crashed: bool = False) -> None:
@@ -208,7 +210,8 @@ class Session:
             moments.append(self.state.now + 0.1)
         return min(max(min(moments) - now, 0.0), LONGEST_NAP)
 
-    def _frame(self, now: float) -> None:
+    def _frame(self, now: float) -> float:
+        """Returns the seconds that drawing the scene took."""
         start = time.perf_counter()
         self._awake = max(self._awake - 1, 0)
         for command in (do.Tick(now), *self._take()):
@@ -222,11 +225,11 @@ class Session:
         imgui.render()
         self._present()
         self._frame_seconds = time.perf_counter() - start
-        self.longest_frame = max(self.longest_frame, self._frame_seconds - drawing)
         if issued:
             self._awake = AWAKE_FRAMES
         for command in issued:
             self._perform(command)
+        return drawing
 
     def _take(self) -> list[do.Command]:
         taken, self._inbox = self._inbox, []
