@@ -7,6 +7,7 @@ awake; a resting window draws nothing.
 
 import ctypes
 import logging
+import sys
 import time
 from collections.abc import Sequence
 from contextlib import suppress
@@ -43,6 +44,9 @@ DEBOUNCE_SECONDS = 0.12  # of typing
 BLINK_SECONDS = 0.4  # of the text cursor
 LONGEST_NAP = 60.0
 COLORMAPS = ("turbo", "inferno")  # of colour-bars
+SWITCH_SECONDS = 0.0005
+"""How long the worker may hold the interpreter while a frame waits for it. A frame lets go of it some
+dozen times, at every call into OpenGL; at Python's own 5 ms each, frames would take 100 ms more."""
 MIN_SIZE = (900, 560)  # design pixels; below this the panels would overlap
 
 
@@ -75,6 +79,7 @@ class Session:
 
     def __init__(self, paths: Sequence[str | Path] = (), size: tuple[int, int] | None = None) -> None:
         remembered, complaint = preferences.load()
+        sys.setswitchinterval(SWITCH_SECONDS)
         self.state = State()
         self.gl_errors: list[str] = []
         self.lag = 0.0  # seconds that the last step took, without its nap and without drawing the scene

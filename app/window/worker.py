@@ -13,10 +13,12 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
 import numpy as np
+from PIL import Image
 
 from app.window import ask_messages, chores, desk_chores, insight
 from app.window.edit_messages import Weigh
@@ -48,6 +50,9 @@ from langflash_core.errors import Cancelled, ImageError, LangFlashError
 
 log = logging.getLogger(__name__)
 
+AHEAD = ("torch._dynamo", "torchvision", "timm", "langflash_core.pipeline")
+"""What a reconstruction imports, some seconds of it, in the order in which one needs the next."""
+IDLE = 0.5  # seconds without a request until the next of them is imported
 THUMBNAIL_SIDE = 320  # pixels of the longer side
 _ANSWERS_REPLACE = (Encode, Answer, Weigh)  # a newer one of these makes an older one pointless
 
@@ -119,9 +124,10 @@ class Worker:
             _import_heavy()
         except Exception as error:  # a broken installation: say so, and let each request say it again
             self._put(Failed(_unexpected(error), job=False))
+        foresight = list(AHEAD)
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._stopping or self._errands or self._job)
+                self._changed.wait_for(self._asked, IDLE if foresight else None)
                 if self._stopping:
                     return
                 job, token = self._job, self._token
@@ -131,6 +137,11 @@ class Worker:
                 self._run_errands()
             elif job is not None:
                 self._run_job(job, token)
+            elif foresight:
+                _import_ahead(foresight.pop(0))
+
+    def _asked(self) -> bool:
+        return bool(self._stopping or self._errands or self._job)
 
     def _run_errands(self) -> None:
         """Run what is queued now, oldest first."""
@@ -335,7 +346,21 @@ def _import_heavy() -> None:
     import langflash_core.network
     import langflash_core.query.spaces  # noqa: F401
 
+    Image.preinit()  # else the first thumbnail of the window does
     log.debug("loaded %s", app.gl.__name__)
+
+
+def _import_ahead(name: str) -> None:
+    """Import what the first reconstruction would wait for, while nobody waits."""
+    from langflash_core.torchvision_fix import ensure_torchvision
+
+    try:
+        if name == "torchvision":
+            ensure_torchvision()
+        else:
+            import_module(name)
+    except Exception:  # who needs it will say so
+        log.debug("%s cannot be imported", name, exc_info=True)
 
 
 def _give_back_memory() -> None:
