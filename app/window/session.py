@@ -104,7 +104,7 @@ class Session:
         self._attach()
         self._thumbnails = Thumbnails(self._ctx)
         self._viewport = Viewport(self._ctx)
-        self._worker = Worker(glfw.post_empty_event)
+        self._worker = Worker(glfw.post_empty_event, begins=False)  # loads torch: the first frame is first
         self._renderer_name = _short_name(self._ctx.info["GL_RENDERER"])
         self._editor = Editor(self._worker.submit, self._viewport, self._perform)
         self._citizen = Citizen(self._perform, self._post, self._worker.submit)
@@ -153,6 +153,7 @@ class Session:
         if not self._inbox and not self._due(now):
             return False
         drawing = self._frame(now)
+        self._worker.begin()
         self.lag = time.perf_counter() - start - nap - drawing
         return True
 

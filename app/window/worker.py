@@ -8,12 +8,14 @@ between the stages of one. Of `Encode` and `Answer` only the newest is ever run.
 import ctypes
 import gc
 import logging
+import os
 import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
@@ -61,10 +63,10 @@ class Worker:
     """A thread with a mailbox. `notify` is called, from the thread, after each result.
 
     `submit` and `cancel` return at once. `stop` cancels, waits at most `patience` seconds, and
-    may be called twice.
+    may be called twice. Unless `begins`, what is asked of it waits for `begin`.
     """
 
-    def __init__(self, notify: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, notify: Callable[[], None] = lambda: None, begins: bool = True) -> None:
         self._notify = notify
         self._changed = threading.Condition()
         self._errands: list[Errand] = []
@@ -75,7 +77,13 @@ class Worker:
         self._results: SimpleQueue[Result] = SimpleQueue()
         self._serial = 0
         self._thread = threading.Thread(target=self._run, name="langflash-worker", daemon=True)
-        self._thread.start()
+        if begins:
+            self.begin()
+
+    def begin(self) -> None:
+        """Start the thread, once; it takes seconds to load what it needs."""
+        if self._thread.ident is None:
+            self._thread.start()
 
     def submit(self, request: Job | Errand) -> None:
         """Queue a request; a job cancels the job under way."""
@@ -113,7 +121,8 @@ class Worker:
         with self._changed:
             self._stopping = True
             self._changed.notify()
-        self._thread.join(patience)
+        if self._thread.ident is not None:
+            self._thread.join(patience)
 
     def _put(self, result: Result) -> None:
         self._results.put(result)
@@ -340,6 +349,7 @@ def make_thumbnail(path: Path) -> Thumbnail:
 
 def _import_heavy() -> None:
     """Load torch and the renderer's module here, while the window is already up."""
+    _link_torch()
     import torch  # noqa: F401
 
     import app.gl
@@ -347,7 +357,21 @@ def _import_heavy() -> None:
     import langflash_core.query.spaces  # noqa: F401
 
     Image.preinit()  # else the first thumbnail of the window does
+    gc.freeze()
     log.debug("loaded %s", app.gl.__name__)
+
+
+def _link_torch() -> None:
+    """Link torch's largest library through a foreign call, which lets go of the interpreter.
+
+    `import torch` would hold on to it for about half a second, and so hold up a frame.
+    """
+    spec = find_spec("torch")
+    if sys.platform != "linux" or spec is None or spec.origin is None:
+        return
+    library = Path(spec.origin).parent / "lib" / "libtorch_cpu.so"
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).dlopen(os.fsencode(library), os.RTLD_NOW)  # 0 where it fails: torch will say why
 
 
 def _import_ahead(name: str) -> None:
@@ -361,6 +385,9 @@ def _import_ahead(name: str) -> None:
             import_module(name)
     except Exception:  # who needs it will say so
         log.debug("%s cannot be imported", name, exc_info=True)
+    # What modules hold stays for good. The collector, which stops every thread, need not look at it
+    # again: that took a fifth of a second each time.
+    gc.freeze()
 
 
 def _give_back_memory() -> None:

@@ -36,7 +36,7 @@ KEYS = (
     "Tab", "shift+Tab", "Up", "Down", "Left", "Right", "Home", "End", "space", "F1", "F2", "minus", "plus",
     *(f"ctrl+{letter}" for letter in "zyadisoepqvc"), "ctrl+shift+z", "F11",
 )  # fmt: skip
-WORDS = ("armchair", "wall - floor", "sofa + cushion", "plant", "+", "élan 椅子", "a " * 40, "0.5", "-3", "room")
+WORDS = ("armchair", "wall - floor", "sofa + cushion", "plant", "+", "élan 椅子", "a " * 200, "0.5", "-3", "room")
 PHOTOS = ("living_room_left.png", "living_room_right.png", "books_left.jpg")
 
 
@@ -148,8 +148,10 @@ class Hands:
             with self._client() as client:
                 client.ask_to_close(self.window)
         else:
-            steps = (self._step() for _ in range(STEPS_AT_ONCE))
+            steps = [self._step() for _ in range(STEPS_AT_ONCE)]
             self._xdotool(*(word for step in steps for word in step))
+            if chosen > 0.7:  # to xdotool all words after "type" are text
+                self._xdotool("type", "--delay", "5", self._random.choice(WORDS))
             self._xdotool("keyup", "shift", "keyup", "ctrl", "mouseup", "1", "mouseup", "2", "mouseup", "3")
 
     def drop(self, paths: list[Path]) -> None:
@@ -167,7 +169,7 @@ class Hands:
         r = self._random
         place = [str(r.randrange(side)) for side in self._size]
         button = r.choice("11123")
-        match r.choices(("move", "click", "drag", "wheel", "key", "type"), (2, 5, 3, 2, 5, 1))[0]:
+        match r.choices(("move", "click", "drag", "wheel", "key"), (2, 5, 3, 2, 5))[0]:
             case "move":
                 return ["mousemove", *place]
             case "click":
@@ -180,9 +182,7 @@ class Hands:
                 return [*(["keydown", held] if held else []), *drag, *(["keyup", held] if held else [])]
             case "wheel":
                 return ["mousemove", *place, "click", "--repeat", str(r.randint(1, 5)), r.choice("45")]
-            case "key":
-                return ["key", r.choice(KEYS)]
-        return ["type", "--delay", "5", r.choice(WORDS)]
+        return ["key", r.choice(KEYS)]
 
     @contextmanager
     def _client(self):
