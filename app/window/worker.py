@@ -391,8 +391,10 @@ def _import_ahead(name: str) -> None:
 
 
 def _give_back_memory() -> None:
-    """What a stopped job held goes back to the system, where the allocator would keep it."""
-    gc.collect()
+    """What a stopped job held goes back to the system, where the allocator would keep it.
+
+    Its tensors are gone by now, without the collector, which would stop the window for a while.
+    """
     if sys.platform == "linux":
         with suppress(OSError, AttributeError):
             ctypes.CDLL(None).malloc_trim(0)

@@ -2,6 +2,7 @@
 
 import gc
 import os
+import sys
 import time
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 from app.window import messages
 from app.window.worker import Worker, _give_back_memory
 from langflash_core.resources import asset_path
-from tests.app.window.test_worker import wait_for
+from tests.app.window.test_worker import PATIENCE, wait_for
 
 HEARD_SECONDS = 0.1  # it never waits for the job, only for its turn on a busy machine
 STOPPED_SECONDS = 1.0  # from the cancel until the worker is free for the next job
@@ -24,26 +25,42 @@ def resident_mb() -> float:
     return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS:")) / 1024
 
 
+def stages_of(worker: Worker) -> dict[str, float]:
+    """When each stage of a whole reconstruction began, seconds from the first one."""
+    began: dict[str, float] = {}
+    worker.submit(messages.ReconstructPhotos(PHOTOS))
+    end = time.monotonic() + PATIENCE
+    while "done" not in began:
+        assert time.monotonic() < end, began
+        for stage in (r.stage for r in worker.poll() if isinstance(r, messages.Progress)):
+            began.setdefault(stage, time.monotonic())
+        time.sleep(0.002)
+    wait_for(worker, messages.SceneReady)
+    return began
+
+
 @pytest.fixture(scope="module")
 def rehearsed():
-    """A worker that has made the scene once, so that weights are read, and the stages it went through."""
+    """A worker that has made the scene once, so that weights are read, and its stages: name -> the
+    middle of each, seconds after its beginning."""
     worker = Worker()
-    worker.submit(messages.ReconstructPhotos(PHOTOS))
-    results = wait_for(worker, messages.SceneReady)
-    stages = list(dict.fromkeys(r.stage for r in results if isinstance(r, messages.Progress)))
-    del results
-    yield worker, stages[:-1]  # the last says that it is done
+    stages_of(worker)  # the first one reads the weights
+    began = stages_of(worker)
+    times = list(began.values())
+    lasted = (after - before for before, after in zip(times, times[1:], strict=False))
+    yield worker, {stage: seconds / 2 for stage, seconds in zip(began, lasted, strict=False)}
     worker.stop()
 
 
-def cancelled_in(worker: Worker, stage: str) -> tuple[float, float, float]:
-    """Seconds until the person hears of it, until the worker is free, and MB that stayed."""
+def cancelled_in(worker: Worker, stage: str, wait: float) -> tuple[float, float, float]:
+    """Cancel `wait` seconds into a stage. Seconds until the person hears of it, until the worker is free, and MB that stayed."""
     gc.collect()
     _give_back_memory()
     before = resident_mb()
     worker.submit(messages.ReconstructPhotos(PHOTOS))
     while not any(r.stage == stage for r in worker.poll() if isinstance(r, messages.Progress)):
         time.sleep(0.002)
+    time.sleep(wait)
     start = time.monotonic()
     worker.cancel()
     wait_for(worker, messages.Stopped)
@@ -57,13 +74,13 @@ def cancelled_in(worker: Worker, stage: str) -> tuple[float, float, float]:
 def test_cancel_in_any_stage_frees_the_worker_and_its_memory(rehearsed) -> None:
     worker, stages = rehearsed
     assert len(stages) >= 8  # photos, weights, the network's own, assemble, prune
-    for stage in stages:
+    for stage, middle in stages.items():
         tries = []
         for _ in range(TRIES):
-            tries.append(cancelled_in(worker, stage))
+            tries.append(cancelled_in(worker, stage, middle))
             heard, free, kept = (min(values) for values in zip(*tries, strict=True))
             if heard < HEARD_SECONDS and free < STOPPED_SECONDS and kept < KEPT_MB:
                 break
-        print(f"{stage:20s} heard {heard:.3f} s, free {free:.2f} s, kept {kept:+.0f} MB")  # noqa: T201
+        sys.stdout.write(f"{stage:20s} heard {heard:.3f} s, free {free:.2f} s, kept {kept:+.0f} MB\n")
         assert heard < HEARD_SECONDS, (stage, tries)
         assert free < STOPPED_SECONDS and kept < KEPT_MB, (stage, tries)
