@@ -29,7 +29,7 @@ MODULES = (commands, edit_commands, ask_commands, desk_commands)
 ARRIVES = do.SceneArrived  # another scene; the edits of the one before are kept on the disk
 SAYS_WHICH = {"combine": ("replace", "add", "remove"), "kind": ("info", "error"), "then": ("", "delete", "select")}
 GIVEN = {("mode", str): "RGB", ("pair", tuple[int, int] | None): None}  # what else would be no answer
-SIZE = (96, 72)  # pixels of the picture that regions are drawn on
+SIZE = (64, 48)  # pixels of the picture that regions are drawn on
 
 
 def command_classes() -> list[type]:
@@ -100,7 +100,7 @@ def value(name: str, hint, chance: np.random.Generator, state: State):
     simple = {
         bool: bool(chance.integers(2)), int: int(chance.integers(-1, 5)), float: float(chance.normal()),
         str: ("", "wall", "an armchair")[chance.integers(3)], bytes: chance.random(12_300, np.float32).tobytes(),
-        Path: Path(f"/nowhere/{chance.integers(5)}.langflash"),
+        np.ndarray: np.eye(3), datetime: datetime(2026, 1, 1), Path: Path(f"/nowhere/{chance.integers(5)}.langflash"),
     }  # fmt: skip
     if hint in simple:
         return simple[hint]
