@@ -27,7 +27,7 @@ SIZE = (1280, 800)
 PHOTOS = [asset_path(f"photos/living_room_{side}.png") for side in ("left", "right")]
 PATIENCE = 180.0  # seconds; an upper bound for a busy machine, never waited for in full
 LEFT, TOP = int(theme.PANEL_WIDTH), 52
-REST = 1.5  # seconds without a change
+REST = 3.0  # seconds without a change; a full picture on a software renderer takes one or two
 
 
 class Person:
@@ -93,6 +93,15 @@ class Person:
     def click(self, x: int, y: int) -> None:
         self.do("mousemove", str(x), str(y), "sleep", "0.2", "click", "1")
 
+    def type(self, phrase: str) -> None:
+        """Into the first phrase's field, over what it holds. The pauses let a busy machine see the
+        click before the keys."""
+        self.click(*self.field)
+        time.sleep(1.0)
+        self.do("key", "ctrl+a")
+        self.do("type", "--delay", "60", phrase)
+        time.sleep(1.0)
+
     @property
     def field(self) -> tuple[int, int]:
         """Where the first phrase is typed, beside its swatch in the accent colour."""
@@ -131,16 +140,13 @@ def walk(someone: Person) -> Iterator[Shot]:
     someone.until_first_frame()
     yield Shot("Launch: an empty window", someone.rest())
     someone.drop(PHOTOS)
-    time.sleep(1.5)
+    time.sleep(4.0)  # some stages on
     yield Shot("Two photos dropped: it starts at once", someone.see())
     someone.until(lambda: "living_room_left" in someone.title(), "the scene")
     yield Shot("The scene, from the first photo's view", someone.rest())
-    x, y = someone.field
-    someone.click(x, y)
-    someone.do("type", "--delay", "60", "pla")
-    time.sleep(0.3)
+    someone.type("pla")
     yield Shot("Typing", someone.see())
-    someone.do("type", "--delay", "60", "nt")
+    someone.type("plant")
     someone.until(lambda: lit(someone.canvas).mean() > 0.01, "the answer")
     someone.do("mousemove", str(someone.size[0] - 40), str(TOP + 40))
     yield Shot("The answer: where the plant is", someone.rest())
