@@ -313,6 +313,8 @@ class Session:
                 self._worker.submit(ask_messages.ReadPrompts(path))
             case _:
                 pass
+        if self.state.dialog != before.dialog:
+            self._awake = MOST_AWAKE  # while what is behind it darkens
         self._editor.follow(command, before, self.state)
         self._citizen.follow(command, before, self.state)
         if _question(before) != _question(self.state):

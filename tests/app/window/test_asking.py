@@ -124,7 +124,7 @@ def test_atoms_are_shown_and_chosen(info) -> None:
     state = after(State(), do.SceneArrived(info))
     assert after(state, ask.ShowAtom(3)) == state and after(State(), ask.ShowAtom(0)) == State()
     state = after(state, ask.ShowAtom(2), ask.OpenDictionary(True))
-    assert (state.mode, state.asking.atom, state.asking.opened) == (Mode.WEIGHT, 2, True)
+    assert (state.mode, state.asking.atom, state.desk.preferences.dictionary_open) == (Mode.WEIGHT, 2, True)
     state = after(state, ask.ChooseAtom(2, True), ask.ChooseAtom(0, True), ask.ChooseAtom(2, True))
     assert state.asking.chosen == (0, 2)
     assert after(state, ask.ChooseAtom(0, False)).asking.chosen == (2,)
