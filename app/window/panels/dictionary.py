@@ -117,7 +117,7 @@ def _row(state: State, k: int, atoms: tuple[Atom, ...], share: float, look: Look
     imgui.same_line(0, look.px(10))
     imgui.begin_group()
     atom, side = atoms[k], imgui.get_frame_height()
-    start, room = imgui.get_cursor_pos_x(), imgui.get_content_region_avail().x
+    start, room = imgui.get_cursor_pos_x(), imgui.get_content_region_avail().x - look.px(6)
     imgui.set_next_item_width(room - look.px(62))
     with widgets.colours(text=theme.TEXT if atom.on else theme.MUTED):
         changed, name = imgui.input_text_with_hint(

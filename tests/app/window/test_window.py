@@ -144,9 +144,14 @@ class Program:
         return (left + right) // 2, (top + bottom) // 2
 
     def click(self, label: str, place: int = 0) -> None:
-        """Click an item once it is there; the pause lets a busy machine see the pointer arrive."""
+        """Click an item once it is there and stands still; a new window finds its size in two frames."""
         self.until(lambda s: any(name.endswith(label) for name in s["items"]), f"the item {label}")
-        self.xdotool("mousemove", *map(str, self.item(label, place)), "sleep", "0.2", "click", "1")
+        place_before = None
+        while (at := self.item(label, place)) != place_before:
+            place_before = at
+            # The pause also lets a busy machine see the pointer arrive before the click.
+            self.xdotool("mousemove", *map(str, at), "sleep", "0.25")
+        self.xdotool("click", "1")
 
     def type_prompt(self, text: str) -> None:
         """Click the first prompt's field and type."""
