@@ -3,7 +3,8 @@
     python driver.py WIDTH HEIGHT [PATHS...]
 
 A line is printed when anything a test may wait for has changed, with the seconds that each frame
-since the last line took, and by how much each came late. The last one has "closed".
+since the last line took and by how much each came late. "items" tells where the things to click are.
+The last line has "closed".
 """
 
 import json
@@ -11,6 +12,7 @@ import sys
 
 from app.window.editing import Editing
 from app.window.session import Session
+from tests.app.window.items import Items
 
 
 def editing(now: Editing) -> dict:
@@ -60,6 +62,7 @@ def summary(session: Session) -> dict:
 
 def main() -> int:
     width, height, *paths = sys.argv[1:]
+    items = Items()
     session = Session(paths, (int(width), int(height)))
     last = None
     frames = 0
@@ -71,7 +74,7 @@ def main() -> int:
                 frames += 1
                 seconds.append(session.state.stats.frame_seconds)  # of the frame before
                 lags.append(session.lag)
-            now = summary(session)
+            now = {**summary(session), "items": items.now()}
             if now != last:
                 last = now
                 line = {**now, "frames": frames, "seconds": seconds, "lags": lags}

@@ -37,7 +37,18 @@ KEYS = (
     "Tab", "shift+Tab", "Up", "Down", "Left", "Right", "Home", "End", "space", "F1", "F2", "minus", "plus",
     *(f"ctrl+{letter}" for letter in "zyadisoepqvc"), "ctrl+shift+z", "F11",
 )  # fmt: skip
-WORDS = ("armchair", "wall - floor", "sofa + cushion", "plant", "+", "élan 椅子", "a " * 200, "0.5", "-3", "room")
+WORDS = (
+    "armchair",
+    "wall - floor",
+    "sofa + cushion",
+    "plant",
+    "+",
+    "élan 椅子",
+    "a " * 200,
+    "0.5",
+    "-3",
+    "room",
+)
 PHOTOS = ("living_room_left.png", "living_room_right.png", "books_left.jpg")
 
 
@@ -194,7 +205,9 @@ class Hands:
             client.close()
 
     def _xdotool(self, *words: str) -> str:
-        return subprocess.run(["xdotool", *words], env=self._environment, capture_output=True, text=True).stdout
+        return subprocess.run(
+            ["xdotool", *words], env=self._environment, capture_output=True, text=True
+        ).stdout
 
 
 class Watched:
@@ -206,7 +219,13 @@ class Watched:
         own.pop("WAYLAND_DISPLAY", None)
         self._errors = (folder / "stderr.txt").open("w+")
         self.process = subprocess.Popen(
-            program, env=own, cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, text=True
+            program,
+            env=own,
+            cwd=folder,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+            text=True,
         )
         self.last: dict = {}
         self.heard = time.monotonic()
@@ -257,7 +276,9 @@ class Watched:
         return code
 
 
-def run(seconds: float, seed: int, size: tuple[int, int], every: float = 60.0, say=lambda text: None) -> Outcome:
+def run(
+    seconds: float, seed: int, size: tuple[int, int], every: float = 60.0, say=lambda text: None
+) -> Outcome:
     """Random input for some seconds, a checkpoint `every` so many."""
     from langflash_core.query.spaces import language_space
     from langflash_core.scene import save

@@ -1,6 +1,7 @@
 """Cancel in every stage of a reconstruction: at once for the person, soon for the machine."""
 
 import gc
+import itertools
 import os
 import sys
 import time
@@ -47,7 +48,7 @@ def rehearsed():
     stages_of(worker)  # the first one reads the weights
     began = stages_of(worker)
     times = list(began.values())
-    lasted = (after - before for before, after in zip(times, times[1:], strict=False))
+    lasted = (after - before for before, after in itertools.pairwise(times))
     yield worker, {stage: seconds / 2 for stage, seconds in zip(began, lasted, strict=False)}
     worker.stop()
 
