@@ -108,7 +108,7 @@ def order(state: "State") -> Order | str:
     target = typed_target(form)
     if target is None:
         return "Type a file name."
-    if target.resolve() == scene_file.resolve():
+    if os.path.realpath(target) == os.path.realpath(scene_file):
         return "This file is the scene itself; choose another name."
     phrases, problem = _phrases(state)
     if problem:

@@ -5,7 +5,6 @@
 The program is the one that people start, `python -m app view`; it is seen only on the screen.
 """
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -33,12 +32,16 @@ REST = 3.0  # seconds without a change; a full picture on a software renderer ta
 class Person:
     """One window, the hands on it and the eyes before it."""
 
-    def __init__(self, display: str, folder: Path, size: tuple[int, int] = SIZE, words: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self, display: str, folder: Path, size: tuple[int, int] = SIZE, words: tuple[str, ...] = ()
+    ) -> None:
         self.size = size
         self._environment = {**environment(folder, ROOT), "DISPLAY": display}
         self._environment.pop("WAYLAND_DISPLAY", None)
         self.started = time.perf_counter()
-        self.process = subprocess.Popen([sys.executable, "-m", "app", "view", *words], env=self._environment, cwd=folder)
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "app", "view", *words], env=self._environment, cwd=folder
+        )
         self._client = Client(display)
         self.window = 0
 
@@ -151,7 +154,19 @@ def walk(someone: Person) -> Iterator[Shot]:
     someone.do("mousemove", str(someone.size[0] - 40), str(TOP + 40))
     yield Shot("The answer: where the plant is", someone.rest())
     middle = (str((LEFT + someone.size[0]) // 2), str(someone.size[1] // 2))
-    someone.do("mousemove", *middle, "mousedown", "1", "mousemove_relative", "60", "-25", "sleep", "0.3", "mouseup", "1")
+    someone.do(
+        "mousemove",
+        *middle,
+        "mousedown",
+        "1",
+        "mousemove_relative",
+        "60",
+        "-25",
+        "sleep",
+        "0.3",
+        "mouseup",
+        "1",
+    )
     yield Shot("The same from another place", someone.rest())
 
 

@@ -38,7 +38,18 @@ def write_sheet(shots: list[Shot], path: Path, columns: int, width: int, numbere
         draw.text((x + 2, y + 3), words, INK, font)
         small = Image.fromarray(shot.picture).resize((width, height), Image.Resampling.LANCZOS)
         sheet.paste(small, (x, y + CAPTION))
+    _write(sheet, path)
+
+
+def write_picture(picture: np.ndarray, path: Path, width: int = 960) -> None:
+    """One PNG of one screenshot, `width` pixels wide."""
+    tall, wide = picture.shape[:2]
+    small = Image.fromarray(picture).resize((width, round(width * tall / wide)), Image.Resampling.LANCZOS)
+    _write(small, path)
+
+
+def _write(image: Image.Image, path: Path) -> None:
+    """With a palette: a third of the bytes, and on such pictures hard to tell from all colours."""
     stream = io.BytesIO()
-    # A palette: a third of the bytes, and on such pictures hard to tell from all colours.
-    sheet.quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(stream, "PNG", optimize=True)
+    image.quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(stream, "PNG", optimize=True)
     write_atomically(path, stream.getvalue())

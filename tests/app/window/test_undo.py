@@ -27,7 +27,11 @@ from tests.app.window.scenes import PHRASES, room
 
 MODULES = (commands, edit_commands, ask_commands, desk_commands)
 ARRIVES = do.SceneArrived  # another scene; the edits of the one before are kept on the disk
-SAYS_WHICH = {"combine": ("replace", "add", "remove"), "kind": ("info", "error"), "then": ("", "delete", "select")}
+SAYS_WHICH = {
+    "combine": ("replace", "add", "remove"),
+    "kind": ("info", "error"),
+    "then": ("", "delete", "select"),
+}
 GIVEN = {("mode", str): "RGB", ("pair", tuple[int, int] | None): None}  # what else would be no answer
 SIZE = (64, 48)  # pixels of the picture that regions are drawn on
 
@@ -37,7 +41,10 @@ def command_classes() -> list[type]:
         cls
         for module in MODULES
         for cls in vars(module).values()
-        if isinstance(cls, type) and cls.__module__ == module.__name__ and is_dataclass(cls) and cls is not ARRIVES
+        if isinstance(cls, type)
+        and cls.__module__ == module.__name__
+        and is_dataclass(cls)
+        and cls is not ARRIVES
     ]
 
 
@@ -99,8 +106,9 @@ def value(name: str, hint, chance: np.random.Generator, state: State):
         return hint(**arguments(hint, chance, state))
     simple = {
         bool: bool(chance.integers(2)), int: int(chance.integers(-1, 5)), float: float(chance.normal()),
-        str: ("", "wall", "an armchair")[chance.integers(3)], bytes: chance.random(12_300, np.float32).tobytes(),
-        np.ndarray: np.eye(3), datetime: datetime(2026, 1, 1), Path: Path(f"/nowhere/{chance.integers(5)}.langflash"),
+        str: ("", "wall", "an armchair")[chance.integers(3)], np.ndarray: np.eye(3),
+        bytes: chance.random(12_300, np.float32).tobytes(), datetime: datetime(2026, 1, 1),
+        Path: Path(f"/nowhere/{chance.integers(5)}.langflash"),
     }  # fmt: skip
     if hint in simple:
         return simple[hint]
@@ -129,7 +137,10 @@ def test_a_command_can_be_undone_or_changes_no_edit(cls: type, edited: State) ->
         there = apply(after, edit.GoTo(len(history.done)))
         assert bits(there) == before
         # Nothing that was done is gone: the entries before are still there, done or to redo.
-        assert now.done[: len(history.done)] == history.done or now.undone[: len(history.undone)] == history.undone
+        assert (
+            now.done[: len(history.done)] == history.done
+            or now.undone[: len(history.undone)] == history.undone
+        )
 
 
 def answered(state: State, command: do.Command) -> State:
@@ -159,9 +170,10 @@ def random_command(chance: np.random.Generator, state: State) -> do.Command:
         edit.SelectRegion(Region(points[:1], 4.0), combine), edit.SelectByPhrase(key, combine),
         edit.SelectAtom(atom, combine), edit.Grow(), edit.Grow(phrase=True), edit.Invert(), edit.SelectAll(),
         edit.Deselect(), edit.Delete(), edit.Hide(), edit.Isolate(), edit.ShowAll(), edit.FindFloaters(),
-        edit.SetStrictness(float(chance.uniform(1, 6))), edit.EndFloaters("select"), edit.EndFloaters("delete"),
+        edit.SetStrictness(float(chance.uniform(1, 6))), edit.EndFloaters("select"),
+        edit.EndFloaters("delete"), edit.SetThrough(bool(chance.integers(2))),
         edit.RenameAtom(atom, f"thing {key}"), edit.ToggleAtom(atom), edit.MergeAtoms((atom, key)),
-        edit.Undo(), edit.Redo(), edit.GoTo(int(chance.integers(0, 200))), edit.SetThrough(bool(chance.integers(2))),
+        edit.Undo(), edit.Redo(), edit.GoTo(int(chance.integers(0, 200))),
     )  # fmt: skip
     command = choices[chance.integers(len(choices))]
     if isinstance(command, edit.GoTo) and chance.random() < 0.9:

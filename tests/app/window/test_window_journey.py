@@ -53,7 +53,9 @@ def test_torch_is_not_loaded_before_the_first_frame(folders: Path, monkeypatch) 
     with x_server(900, 600) as display:
         monkeypatch.setenv("DISPLAY", display)
         monkeypatch.setenv("PYTHONPATH", str(test_window.ROOT))
-        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=PATIENCE)
+        done = subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True, timeout=PATIENCE
+        )
     assert done.stdout == "loaded: []", done.stderr
 
 
