@@ -4,7 +4,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.window import theme
 from app.window.asking import margin_span
-from app.window.panels import widgets
+from app.window.panels import photos, widgets
 from app.window.panels.look import Look
 from app.window.state import Mode, State
 
@@ -114,7 +114,7 @@ def _trust(state: State, look: Look) -> None:
         _swatch((0.3, 0.3, 0.3), look)
         imgui.text_colored(theme.MUTED, "fewer than two can tell")
     assert state.info is not None
-    for sentence in state.info.warnings[:2]:
+    for sentence in photos.sentences(state.info.warnings)[:2]:
         widgets.muted(sentence)
 
 

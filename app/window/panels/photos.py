@@ -1,6 +1,8 @@
 """The tray: photos with their lenses and notes, the reconstruct button, a job's progress and, at its
 end, what each stage cost."""
 
+from collections.abc import Iterable
+
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
@@ -42,9 +44,13 @@ def _sentences(state: State) -> list[str]:
     said = [photo.problem for photo in state.photos if photo.problem]
     said += [note for photo in state.photos for note in photo.notes]
     said += state.info.warnings if state.info else ()
-    # What the core says of its command line is said here in the window's words.
-    said = [each.replace("on the command line, --fov tells it", HOW_TO_TELL) for each in said]
-    return list(dict.fromkeys(_sentence(each) for each in said))
+    return sentences(said)
+
+
+def sentences(said: Iterable[str]) -> list[str]:
+    """Warnings as sentences, each once; what the core says of its command line in the window's words."""
+    own = (each.replace("on the command line, --fov tells it", HOW_TO_TELL) for each in said)
+    return list(dict.fromkeys(_sentence(each) for each in own))
 
 
 def _sentence(text: str) -> str:

@@ -51,5 +51,6 @@ def write_picture(picture: np.ndarray, path: Path, width: int = 960) -> None:
 def _write(image: Image.Image, path: Path) -> None:
     """With a palette: a third of the bytes, and on such pictures hard to tell from all colours."""
     stream = io.BytesIO()
-    image.quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(stream, "PNG", optimize=True)
+    small = image.quantize(256, Image.Quantize.MEDIANCUT, kmeans=3, dither=Image.Dither.NONE)
+    small.save(stream, "PNG", optimize=True)
     write_atomically(path, stream.getvalue())

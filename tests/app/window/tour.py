@@ -20,7 +20,9 @@ from app.window import ask_commands as ask
 from app.window import commands as do
 from app.window import desk_commands as desk
 from app.window import edit_commands as edit
+from app.window import poses
 from app.window.editing import Region, Tool
+from app.window.export_form import What
 from app.window.recovery import Kept
 from app.window.session import Session
 from app.window.state import Mode
@@ -128,7 +130,7 @@ def atom_of(guide: Guide, word: str) -> int:
 
 def asking(guide: Guide, folder: Path) -> None:
     guide.ask("plant", "window", "armchair")
-    guide.tell(do.SetMode(Mode.MASKS))
+    guide.tell(do.SetMode(Mode.LABELS))
     guide.rest()
     write_picture(guide.screen(), folder / "tour_ask.png")
 
@@ -153,7 +155,7 @@ def editing(guide: Guide, folder: Path) -> None:
     )
     guide.rest()
     write_picture(guide.screen(), folder / "tour_edit.png")
-    guide.tell(edit.Deselect(), edit.SetTool(Tool.MOVE))
+    guide.tell(edit.GoTo(0), edit.SetTool(Tool.MOVE))
 
 
 def dictionary(guide: Guide, folder: Path) -> None:
@@ -165,14 +167,16 @@ def dictionary(guide: Guide, folder: Path) -> None:
 
 
 def trust(guide: Guide, folder: Path) -> None:
-    guide.tell(do.SetMode(Mode.COVERAGE), do.JumpTo(0))
+    aside = poses.orbit(guide.session.state.pose, 0.35, -0.1)
+    guide.tell(do.SetMode(Mode.COVERAGE), do.MoveTo(aside))
     guide.rest()
     write_picture(guide.screen(), folder / "tour_trust.png")
+    guide.tell(do.JumpTo(0))
 
 
 def exporting(guide: Guide, folder: Path) -> None:
-    guide.tell(do.SetMode(Mode.HEAT), desk.ShowExport())
-    form = replace(guide.session.state.desk.form, path="plant.png")
+    guide.tell(do.SceneSaved(Path("room.langflash")), do.SetMode(Mode.HEAT), desk.ShowExport())
+    form = replace(guide.session.state.desk.form, what=What.CUTOUT, path="plant.png")
     guide.tell(desk.EditForm(form))
     guide.rest()
     write_picture(guide.screen(), folder / "tour_export.png")
@@ -184,12 +188,12 @@ def recovery(guide: Guide, folder: Path) -> None:
         tuple(map(str, PHOTOS)), (None, None), "room.langflash", name="living room", phrases=("plant",)
     )
     guide.tell(desk.OfferSession(kept))
-    guide.rest()
+    guide.steps(1.0)
     write_picture(guide.screen(), folder / "tour_recovery.png")
     guide.tell(desk.EndSessionOffer(False))
 
 
-TOUR = (modes, asking, pointing, editing, dictionary, trust, exporting, recovery)
+TOUR = (modes, asking, pointing, editing, dictionary, trust, exporting)
 
 
 def main() -> int:
@@ -198,6 +202,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="tour-") as place, x_server(*SIZE) as display:
         os.environ.update(DISPLAY=display, LANGFLASH_CONFIG=place, LANGFLASH_STATE=place, HOME=place)
         guide = Guide(display)
+        recovery(guide, folder)
         guide.tell(do.OpenPaths(tuple(map(str, PHOTOS))))
         guide.until(lambda: guide.session.state.info is not None, "the scene")
         for each in wanted:
