@@ -10,8 +10,7 @@ import torch
 
 import langflash_core as lf
 from langflash_core.errors import Cancelled, ImageError, InputError, PromptError, ViewError, WeightsError
-from langflash_core.network import PRESETS, LangFlashNet, save_network
-from langflash_core.network import STAGES as NETWORK_STAGES
+from langflash_core.network import PRESETS, GuidedDepthNet, build_network, save_network
 from langflash_core.query.spaces import language_space
 from langflash_core.resources import asset_path
 from langflash_core.splat import render
@@ -37,7 +36,7 @@ def weights(tmp_path_factory) -> Path:
     except FileNotFoundError:
         torch.manual_seed(0)
         path = tmp_path_factory.mktemp("weights") / "mini.safetensors"
-        save_network(LangFlashNet(PRESETS["mini"]), path)
+        save_network(build_network(PRESETS["mini"]), path)
         return path
 
 
@@ -69,12 +68,12 @@ def test_the_scene_records_how_it_was_made(scene):
     record = scene.metadata
     assert record["preset"] == "mini"
     assert record["photos"] == ["books_left.jpg", "books_right.jpg"]
-    stages = ["photos", "weights", *NETWORK_STAGES, "assembly", "pruning"]
+    stages = ["photos", "weights", *GuidedDepthNet.stages, "assembly", "pruning"]
     assert list(record["timings"]) == stages
     assert all(seconds > 0 for seconds in record["timings"].values())
     # The stages are all that is done: between them lie bookkeeping, one copy, and what a busy machine takes.
     assert sum(record["timings"].values()) == pytest.approx(record["seconds"]["total"], rel=0.2)
-    network = sum(record["timings"][stage] for stage in NETWORK_STAGES)
+    network = sum(record["timings"][stage] for stage in GuidedDepthNet.stages)
     assert network == pytest.approx(record["seconds"]["network"], rel=0.2)
     assert sys.platform == "win32" or 100 < record["peak_memory_mb"] < 100_000
     assert len(set(record["warnings"])) == len(record["warnings"])

@@ -6,7 +6,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from langflash_core.network.presets import Preset
+from langflash_core.network.presets import GuidedDepth
 from langflash_core.torchvision_fix import ensure_torchvision
 
 _MEAN = (0.485, 0.456, 0.406)
@@ -41,7 +41,7 @@ class Encoder(nn.Module):
     mean: Tensor
     std: Tensor
 
-    def __init__(self, preset: Preset):
+    def __init__(self, preset: GuidedDepth):
         super().__init__()
         ensure_torchvision()
         import timm  # heavy, and only importable after the line above

@@ -1,0 +1,28 @@
+"""The network of a preset: which kind of geometry it has decides the class."""
+
+from typing import overload
+
+from langflash_core.network.guided import GuidedDepthNet
+from langflash_core.network.model import LangFlashNet
+from langflash_core.network.pointmaps import PointMapNet
+from langflash_core.network.presets import GuidedDepth, PointMaps, Preset
+
+
+@overload
+def build_network(preset: GuidedDepth) -> GuidedDepthNet: ...
+@overload
+def build_network(preset: PointMaps) -> PointMapNet: ...
+@overload
+def build_network(preset: Preset) -> LangFlashNet: ...
+def build_network(preset: Preset) -> LangFlashNet:
+    """A freshly drawn network.
+
+    Raises:
+        ValueError: the preset is of neither kind of geometry.
+    """
+    match preset:
+        case GuidedDepth():
+            return GuidedDepthNet(preset)
+        case PointMaps():
+            return PointMapNet(preset)
+    raise ValueError(f"preset: expected GuidedDepth or PointMaps, received {type(preset).__name__}")
