@@ -16,11 +16,12 @@ from torch import Tensor
 
 from langflash_core.errors import WeightsError
 from langflash_core.files import make_folder, write_atomically
-from langflash_core.network.build import build_network
+from langflash_core.network.build import build_network, network_class
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.local import convert
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.presets import PRESETS, GuidedDepth, Preset
+from langflash_core.network.store import assemble_network, write_part
 from langflash_core.resources import asset_path
 
 FORMAT = "langflash-weights-1"
@@ -28,18 +29,27 @@ _MIN_QUANTISED = 4096  # numbers; smaller tensors are not worth a scale per row
 
 
 def load_network(
-    preset: str = "mini", weights: Path | None = None, device: str | torch.device = "cpu"
+    preset: str = "mini",
+    weights: Path | None = None,
+    device: str | torch.device = "cpu",
+    *,
+    bfloat16: bool = False,
 ) -> LangFlashNet:
     """The network of a preset with trained weights, in evaluation mode.
 
     Args:
-        weights: a file written by `save_network`; None takes the embedded one.
+        weights: a file written by `save_network` or `weights import`; None takes the embedded one,
+            or what has been imported.
+        bfloat16: compute in it where the network has a rule for that.
 
     Raises:
         WeightsError: the file is missing, damaged, of another preset, or does not fit.
     """
     if preset not in PRESETS:
         raise WeightsError(f"There is no preset '{preset}'; choose one of {', '.join(PRESETS)}")
+    if not network_class(PRESETS[preset]).compact:
+        named = None if weights is None else Path(weights)
+        return assemble_network(PRESETS[preset], named, device, bfloat16=bfloat16)
     path = _embedded(preset) if weights is None else Path(weights)
     tensors, metadata = read_weights(path)
     if metadata.get("preset") != preset:
@@ -115,6 +125,9 @@ def start_from(network: LangFlashNet, weights: Path, modules: Sequence[str]) -> 
 
 def save_network(network: LangFlashNet, path: Path, metadata: Mapping | None = None) -> None:
     """Write all weights atomically. `metadata` is plain JSON: data, steps, hours, metrics, calibration."""
+    if not network.compact:
+        write_part(path, network.state_dict(), network.preset, "trained here", path.name)
+        return
     header = {
         "format": FORMAT,
         "preset": network.preset.name,
@@ -122,8 +135,7 @@ def save_network(network: LangFlashNet, path: Path, metadata: Mapping | None = N
         **(metadata or {}),
     }
     make_folder(path.parent)
-    tensors = quantise(network.state_dict()) if network.compact else network.state_dict()
-    write_atomically(path, save(tensors, {"langflash": json.dumps(header)}))
+    write_atomically(path, save(quantise(network.state_dict()), {"langflash": json.dumps(header)}))
 
 
 def read_weights(path: Path) -> tuple[dict[str, Tensor], dict]:

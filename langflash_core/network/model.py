@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from langflash_core.errors import Cancelled
+from langflash_core.errors import Cancelled, WeightsError
 from langflash_core.network.aggregation import Aggregation
 from langflash_core.network.encoder import Tokens
 from langflash_core.network.grouping import Groups
@@ -54,6 +54,20 @@ class LangFlashNet(nn.Module):
         super().__init__()
         self.preset = preset
         self.calibration: dict = {}
+
+    def use_bfloat16(self) -> "LangFlashNet":
+        """Matrix products in bfloat16 where the network has a rule for it; else nothing changes."""
+        return self
+
+    def complete(self, filled: set[str], remedy: str) -> None:
+        """Settle what has no weights after those of `filled` were read.
+
+        Raises:
+            WeightsError: a module cannot do without; ends with `remedy`.
+        """
+        missing = [name for name, _ in self.named_children() if name not in filled]
+        if missing:
+            raise WeightsError(f"There are no weights for {', '.join(missing)}; {remedy}")
 
     @abstractmethod
     def encode(self, images: Tensor, Ks: Tensor) -> Tokens:

@@ -30,7 +30,8 @@ class PointMapNet(LangFlashNet):
     gaussian_heads, `grouping` = scratch + grouping, `aggregation` = aggregation.
 
     grouped: there are weights for `scratch` and `grouping`; without them groups are clusters of
-    the language features. mixed: bfloat16 where it costs little (see `use_bfloat16`).
+    the language features. aggregated: likewise for `aggregation`; atoms are averages without.
+    mixed: bfloat16 where it costs little (see `use_bfloat16`).
     """
 
     frozen = ("encoder", "language_head")
@@ -41,7 +42,7 @@ class PointMapNet(LangFlashNet):
     def __init__(self, preset: PointMaps):
         super().__init__(preset)
         self.sizes = preset
-        self.grouped, self.mixed = True, False
+        self.grouped, self.aggregated, self.mixed = True, True, False
         self.encoder = RotaryEncoder(preset)
         self.decoder = TwoStacks(preset, preset.norm_eps)
         self.point_heads = PerView([PointHead(preset), PointHead(preset)])
@@ -63,6 +64,20 @@ class PointMapNet(LangFlashNet):
                     layer.to(torch.bfloat16)
         self.mixed = True
         return self
+
+    def complete(self, filled: set[str], remedy: str) -> None:
+        """Without grouping weights groups are clusters; without aggregation's, atoms are averages.
+
+        Raises:
+            WeightsError: geometry or language features have none.
+        """
+        if not {"scratch", "grouping"} <= filled:
+            del self.scratch, self.grouping
+            self.grouped = False
+        if "aggregation" not in filled:
+            self.aggregation = Aggregation(self.preset).eval()
+            self.aggregated = False
+        super().complete(filled | {"aggregation"}, remedy)
 
     @contextmanager
     def _fast(self, images: Tensor) -> Iterator[None]:

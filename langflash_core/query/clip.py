@@ -7,7 +7,7 @@ The weights are not shipped. They are searched, in this order:
 2. the environment variable LANGFLASH_CLIP,
    both a file (open_clip or plain state dict, .safetensors or .pt; image weights are ignored)
    or a tag that open_clip downloads ("openai"),
-3. `weights/clip_vitb32.safetensors` (or .pt) under LANGFLASH_HOME, by default ~/.langflash.
+3. `weights/clip_vitb32.safetensors` (or .pt) in the cache folder (`resources.home_folder`).
 
 LSeg was trained with OpenAI's weights and plain phrases: "openai", and no prompt template.
 """
@@ -26,6 +26,7 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from langflash_core.errors import PromptError, WeightsError
+from langflash_core.resources import weights_folder
 from langflash_core.torchvision_fix import ensure_torchvision
 
 DIMENSION = 512
@@ -88,18 +89,14 @@ def load_clip(source: str | None = None) -> ClipText:
     return tower
 
 
-def _home() -> Path:
-    return Path(os.environ.get("LANGFLASH_HOME") or Path.home() / ".langflash") / "weights"
-
-
 def _remedy() -> str:
-    return _REMEDY.format(place=_home() / _FILES[0])
+    return _REMEDY.format(place=weights_folder() / _FILES[0])
 
 
 def _locate(source: str | None) -> Path:
     """The file that `source` names, downloaded where it is an open_clip tag."""
     if source is None:
-        found = [_home() / name for name in _FILES if (_home() / name).is_file()]
+        found = [weights_folder() / name for name in _FILES if (weights_folder() / name).is_file()]
         if not found:
             raise WeightsError(f"The 'clip' language space needs CLIP's text weights: {_remedy()}.")
         return found[0]
