@@ -17,18 +17,27 @@ from torch import Tensor
 
 from langflash_core.errors import Cancelled, InputError, ViewError, WeightsError
 from langflash_core.images import load_views
+from langflash_core.images.views import source_pictures
 from langflash_core.network import PRESETS, LangFlashNet, load_network
+from langflash_core.network.aggregation import averaged_atoms
+from langflash_core.network.build import network_class
+from langflash_core.network.crops import crop_atoms
+from langflash_core.network.model import Atoms, pooled_weights
+from langflash_core.network.store import part_folder
 from langflash_core.query.answers import answer
+from langflash_core.query.clip import load_clip_images
 from langflash_core.query.relevance import Mode, compile_query, relevance_maps
 from langflash_core.query.spaces import language_space
 from langflash_core.scene import assemble, prune
 from langflash_core.splat import render as render_reference
-from langflash_core.types import Camera, Frame, Prediction, QueryResult, Scene
+from langflash_core.types import Camera, Frame, Prediction, QueryResult, Scene, Views
 
 Progress = Callable[[str, float], None]
 
 # Where each stage begins in the whole, from its measured share of the time on two CPU cores.
 STAGES = {"photos": 0.0, "weights": 0.1, "network": 0.2, "assemble": 0.85, "prune": 0.95}
+PRECISIONS = ("auto", "float32", "bfloat16")
+AGGREGATIONS = ("lfa", "average", "crops")
 SIZES = (56, 1024)  # pixels: below, the encoder's grid is 4 patches; above, attention's memory runs away
 LARGEST_PICTURE = 8192
 
@@ -42,6 +51,8 @@ def reconstruct(
     intrinsics: tuple[float, float, float, float] | None = None,
     size: int | None = None,
     device: str = "auto",
+    precision: str = "auto",
+    aggregation: str | None = None,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Scene:
@@ -53,6 +64,10 @@ def reconstruct(
         fov: degrees, of the photos' longer side. intrinsics: (fx, fy, cx, cy) in pixels of the
             photos as given, the same for all. Neither: EXIF, else an assumption with a warning.
         size: the network sees about size x size pixels per photo, whatever their shape.
+        precision: "float32"; "bfloat16", for presets with a rule for it; "auto" takes it where
+            there is one. aggregation: how a group gets its vector: "lfa" (trained), "average" (of
+            dense features), "crops" (CLIP on a cut-out; presets of its space); None: lfa where
+            it has weights, else average.
         device: "auto" takes CUDA where there is one; "cpu"; "cuda".
         progress: called with the stage and the fraction of the whole in [0, 1].
         cancelled: asked between stages.
@@ -72,11 +87,15 @@ def reconstruct(
     area = PRESETS[preset].native_area if size is None else _area(size)
     with run.stage("photos"):
         files = [Path(photo) for photo in photos]
-        views = load_views(files, fov=fov, intrinsics=intrinsics, area=area, multiple=PRESETS[preset].patch)
+        views = load_views(
+            files, fov=fov, intrinsics=intrinsics, area=area,
+            multiple=PRESETS[preset].patch, square=PRESETS[preset].square,
+        )  # fmt: skip
     with run.stage("weights"):
-        network = _network(preset, weights, device)
+        network = _network(preset, weights, device, precision)
+        atoms = _atoms(network, aggregation, views)
     with run.stage("network"):
-        prediction = _on_cpu(network.predict(views, run.within("network"), cancelled))
+        prediction = _on_cpu(network.predict(views, run.within("network"), cancelled, atoms))
     with run.stage("assemble"), torch.no_grad():
         scene = assemble(prediction, views, preset=preset)
     with run.stage("prune"), torch.no_grad():
@@ -184,17 +203,57 @@ def peak_memory_mb() -> int | None:
     return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6)
 
 
-def _network(preset: str, weights: Path | str | None, device: str) -> LangFlashNet:
+def _atoms(network: LangFlashNet, way: str | None, views: Views) -> Atoms | None:
+    """How groups get their vectors; None: as the network does it.
+
+    Raises:
+        InputError: an unknown way, or one that this preset does not have. WeightsError: no weights for it.
+    """
+    if way is None:
+        return None
+    if way == "average":
+        return lambda weights, features: averaged_atoms(pooled_weights(weights, features), features)[0]
+    if way == "lfa":
+        if not network.aggregated:
+            raise WeightsError("The aggregation has no weights here; choose --aggregation average or crops")
+        return None
+    if way != "crops":
+        raise InputError(f"The aggregation '{way}' is unknown: choose {', '.join(AGGREGATIONS)}.")
+    if network.preset.space != "clip":
+        raise InputError(
+            f"Crops are embedded by CLIP, but the preset '{network.preset.name}' speaks "
+            f"'{network.preset.space}': choose --aggregation lfa or average."
+        )
+    tower, photos = load_clip_images(), source_pictures(views)
+    return lambda weights, _: crop_atoms(weights, photos, lambda p: tower.encode(p.cpu()).to(weights))
+
+
+def _bfloat16(preset: str, precision: str) -> bool:
+    if precision not in PRECISIONS:
+        raise InputError(f"The precision '{precision}' is unknown: choose {', '.join(PRECISIONS)}.")
+    can = network_class(PRESETS[preset]).mixes
+    if precision == "bfloat16" and not can:
+        raise InputError(
+            f"The preset '{preset}' computes in float32 only: choose --precision float32 or auto."
+        )
+    return can and precision != "float32"
+
+
+def _network(preset: str, weights: Path | str | None, device: str, precision: str) -> LangFlashNet:
     """The network, read once; a checkpoint that changed on disk is read again."""
     path = None if weights is None else Path(weights).resolve()
     changed = path.stat().st_mtime_ns if path is not None and path.is_file() else 0
-    return _read_network(preset, path, device, changed)
+    folder = part_folder(PRESETS[preset])
+    installed = tuple((p.name, p.stat().st_mtime_ns) for p in sorted(folder.glob("*.safetensors")))
+    return _read_network(preset, path, device, _bfloat16(preset, precision), (changed, installed))
 
 
 @lru_cache(maxsize=1)
-def _read_network(preset: str, path: Path | None, device: str, changed: int) -> LangFlashNet:
+def _read_network(
+    preset: str, path: Path | None, device: str, bfloat16: bool, changed: tuple
+) -> LangFlashNet:
     """`changed` is only part of the key."""
-    return load_network(preset, path, device)
+    return load_network(preset, path, device, bfloat16=bfloat16)
 
 
 def _on_cpu(prediction: Prediction) -> Prediction:

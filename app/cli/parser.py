@@ -84,9 +84,20 @@ def _add_reconstruct(commands) -> None:
     command = _command(commands, "reconstruct", "photos of one place to a scene file")
     command.add_argument("photos", nargs="+", type=Path, metavar="PHOTO")
     _add_output(command, "SCENE", "the scene to write")
-    command.add_argument("--preset", choices=("mini",), default="mini", help="which network (default: mini)")
     command.add_argument(
-        "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped one"
+        "--preset", choices=("mini", "full"), default="mini", help="which network (default: mini)"
+    )
+    command.add_argument(
+        "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped or imported ones"
+    )
+    command.add_argument(
+        "--aggregation",
+        choices=("lfa", "average", "crops"),
+        help="how a group gets its vector: trained, the average of dense features, or CLIP on a cut-out "
+        "(default: lfa where it has weights, else average)",
+    )
+    command.add_argument(
+        "--precision", choices=("auto", "float32", "bfloat16"), default="auto", help="(default: auto)"
     )
     lens = command.add_mutually_exclusive_group()
     lens.add_argument("--fov", type=open_fov, metavar="DEG", help="field of view of the photos' longer side")
@@ -97,7 +108,10 @@ def _add_reconstruct(commands) -> None:
         help="in pixels of the photos as given, after EXIF orientation",
     )
     command.add_argument(
-        "--size", type=pixel_side, metavar="PX", help="the network sees about PX x PX pixels (default: 224)"
+        "--size",
+        type=pixel_side,
+        metavar="PX",
+        help="the network sees about PX x PX pixels (default: 224; full: 256)",
     )
     command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
     _add_json(command)
@@ -264,9 +278,23 @@ def _add_start(command: argparse.ArgumentParser) -> None:
 
 
 def _add_weights(commands) -> None:
-    actions = _actions(commands, "weights", "the checkpoints this installation holds")
-    listing = _command(actions, "list", "name, size and origin of each checkpoint")
+    actions = _actions(commands, "weights", "the checkpoints this installation holds, and published ones")
+    listing = _command(actions, "list", "name, size and origin of each checkpoint, and what can be had")
     _add_json(listing)
+    get = _command(
+        actions, "get", "download a published checkpoint and convert it; continues where it stopped"
+    )
+    get.add_argument("name", metavar="NAME", help="as `langflash weights list` has it")
+    get.add_argument("--url", metavar="URL", help="fetch it from there instead")
+    get.add_argument("--keep", action="store_true", help="keep the file as it was downloaded")
+    _add_json(get)
+    imported = _command(actions, "import", "convert a published checkpoint that is already here")
+    imported.add_argument("path", type=Path, metavar="PATH", help=".ckpt, .pt or .safetensors")
+    imported.add_argument("--preset", choices=("full",), default="full", help="(default: full)")
+    imported.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="(default: in the cache folder, where it is found)"
+    )
+    _add_json(imported)
     verify = _command(actions, "verify", "read every number and check that it fits its network")
     verify.add_argument(
         "paths", nargs="*", type=Path, metavar="PATH", help="checkpoints (default: the shipped ones)"

@@ -11,13 +11,14 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from langflash_core.errors import Cancelled, WeightsError
-from langflash_core.network.aggregation import Aggregation
+from langflash_core.network.aggregation import Aggregation, averaged_atoms
 from langflash_core.network.encoder import Tokens
 from langflash_core.network.grouping import Groups
 from langflash_core.network.presets import Preset
 from langflash_core.types import Gaussians, Prediction, Views
 
 Progress = Callable[[str, float], None]
+Atoms = Callable[[Tensor, Tensor], Tensor]
 MEANING_STAGES = ("language features", "grouping", "aggregation")
 
 
@@ -45,6 +46,8 @@ class LangFlashNet(nn.Module):
     """Parts that this project takes as they are and never trains."""
     compact: bool
     """Weights are stored as int8 rows; else as they are."""
+    mixes: bool = False
+    """`use_bfloat16` does something."""
     caches_tokens: bool
     """Training may read tokens from disk, because nothing that is trained changes them."""
     grouping: nn.Module
@@ -96,15 +99,29 @@ class LangFlashNet(nn.Module):
         memories, finest = self.semantic_maps(tokens, images)
         return self.grouping(memories, finest, tokens.shape[1])
 
+    aggregated = True
+    """The aggregation has weights; else atoms are plain averages."""
+
     def dictionary(self, weights: Tensor, features: Tensor) -> Tensor:
         """Atoms (K, C) of unit norm of one scene: weights (V, K, H, W), features (1, V, C, h, w)."""
-        return self.aggregation(pooled_weights(weights, features), features)[0]
+        small = pooled_weights(weights, features)
+        if self.aggregated:
+            return self.aggregation(small, features)[0]
+        return averaged_atoms(small, features, self.preset.eps)[0]
 
     @torch.inference_mode()
     def predict(
-        self, views: Views, progress: Progress | None = None, cancelled: Callable[[], bool] | None = None
+        self,
+        views: Views,
+        progress: Progress | None = None,
+        cancelled: Callable[[], bool] | None = None,
+        atoms: Atoms | None = None,
     ) -> Prediction:
         """One scene from V photos of one size (sides multiples of the patch).
+
+        Args:
+            atoms: weights (V, K, H, W) and features (1, V, C, h, w) to atoms (K, C) of unit norm;
+                None: `dictionary`.
 
         Raises:
             Cancelled: `cancelled()` became true between two stages.
@@ -120,7 +137,7 @@ class LangFlashNet(nn.Module):
         with run.stage("grouping"):
             weights = self.parts(tokens, images, (images.shape[-2], images.shape[-1]), features)
         with run.stage("aggregation"):
-            dictionary = self.dictionary(weights, features)
+            dictionary = (atoms or self.dictionary)(weights, features)
         return Prediction(
             gaussians=geometry.gaussians,
             weights=weights,

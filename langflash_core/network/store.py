@@ -135,6 +135,18 @@ def assemble_network(
     return network.to(device)
 
 
+def verify_part(path: Path, preset: Preset) -> None:
+    """Read every number of a part and check that it fits the preset's network.
+
+    Raises:
+        WeightsError: it does not.
+    """
+    with torch.device("meta"):
+        network = build_network(preset)
+    for name in read_part(path).modules:
+        _fill(network, name, path, "cpu")
+
+
 def _fill(network: LangFlashNet, name: str, path: Path, device: str | torch.device) -> None:
     """One module from a part, strictly."""
     module = getattr(network, name, None)

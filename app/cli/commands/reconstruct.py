@@ -34,6 +34,8 @@ def run(args: Namespace, out: TextIO) -> None:
             intrinsics=args.intrinsics,
             size=args.size,
             device=args.device,
+            precision=args.precision,
+            aggregation=args.aggregation,
             progress=progress,
         )
         progress("writing", 1.0)
