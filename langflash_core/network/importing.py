@@ -4,6 +4,8 @@ Refused with the list: tensors that are missing, surplus, misshaped, or not fini
 """
 
 import pickle
+import struct
+import warnings
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,6 +23,11 @@ from langflash_core.network.origins import LSEG, ORIGINS, Origin
 from langflash_core.network.presets import Preset
 
 _SHOWN = 6  # names of each kind of trouble in a message
+_BROKEN = (
+    SafetensorError, zipfile.BadZipFile, struct.error, RuntimeError, EOFError, OSError, ValueError,
+    KeyError, IndexError, TypeError, AttributeError,
+)  # fmt: skip
+"""What a reader of pickles and zip files may stumble over in bytes that are none."""
 _CLIP_PREFIX = "clip_pretrained."
 _REMEDY = "download it again, or choose another file"
 
@@ -51,15 +58,7 @@ def read_checkpoint(path: Path) -> dict[str, Tensor]:
     except pickle.UnpicklingError as error:
         wanted = _forbidden(str(error))
         raise WeightsError(f"{path} is not a plain checkpoint{wanted}; {_REMEDY}") from None
-    except (
-        SafetensorError,
-        zipfile.BadZipFile,
-        RuntimeError,
-        EOFError,
-        OSError,
-        ValueError,
-        KeyError,
-    ) as error:
+    except _BROKEN as error:
         reason = " ".join(str(error).split())[:120]
         raise WeightsError(f"{path} is damaged or no checkpoint ({reason}); {_REMEDY}") from None
     return _state_dict(held, path)
@@ -72,7 +71,9 @@ def _read_safetensors(path: Path) -> Any:
 def _read_pickle(path: Path) -> Any:
     with path.open("rb") as stream:
         mapped = stream.read(2) == b"PK"  # the zip format can be mapped, the older one cannot
-    return torch.load(path, map_location="cpu", weights_only=True, mmap=mapped)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # about pickle protocols: what cannot be read is refused anyway
+        return torch.load(path, map_location="cpu", weights_only=True, mmap=mapped)
 
 
 def _forbidden(message: str) -> str:

@@ -120,8 +120,8 @@ def test_the_checksum_that_the_server_names_is_checked(shelf, tmp_path, where):
 
 
 def test_refusals_and_silence_are_one_sentence(shelf, tmp_path):
-    with pytest.raises(DownloadError, match="refused .404"):
+    with pytest.raises(DownloadError, match=r"refused .404"):
         download(f"{shelf.url}/nothing", tmp_path / "x")
-    with pytest.raises(DownloadError, match="could not be downloaded.*weights import"):
+    with pytest.raises(DownloadError, match=r"could not be downloaded.*weights import"):
         download("http://127.0.0.1:1/file", tmp_path / "x")
     assert not list(Path(tmp_path).iterdir())
