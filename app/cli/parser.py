@@ -53,6 +53,7 @@ def build_parser() -> Parser:
         _add_render,
         _add_export,
         _add_info,
+        _add_bench_network,
         _add_rooms,
         _add_train,
         _add_eval,
@@ -240,6 +241,34 @@ def _add_train(commands) -> None:
     _add_output(export, "FILE", "the .safetensors to write")
     export.add_argument("--metadata", type=Path, metavar="JSON", help="an object to add to the model card")
     _add_start(export)
+
+
+def _add_bench_network(commands) -> None:
+    command = _command(
+        commands, "bench-network", "how long each stage of the network takes, by the paper's table"
+    )
+    command.add_argument("--preset", choices=("mini", "full"), default="full", help="(default: full)")
+    weights = command.add_mutually_exclusive_group()
+    weights.add_argument(
+        "--weights", type=Path, metavar="PATH", help="(default: the shipped or imported ones)"
+    )
+    weights.add_argument("--random", action="store_true", help="draw them: the times are the same")
+    command.add_argument(
+        "--views", type=whole_count, nargs="+", default=[2], metavar="V", help="(default: 2)"
+    )
+    command.add_argument(
+        "--atoms", type=whole_count, nargs="+", default=[128], metavar="K", help="(default: 128)"
+    )
+    command.add_argument(
+        "--repeats", type=whole_count, default=3, metavar="N", help="the median counts (default: 3)"
+    )
+    command.add_argument("--size", type=pixel_side, default=256, metavar="PX", help="(default: 256)")
+    command.add_argument(
+        "--float32", action="store_true", help="leave bfloat16 out, which is slow where a CPU lacks it"
+    )
+    command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the numbers as .json")
+    _add_json(command)
 
 
 def _add_eval(commands) -> None:
