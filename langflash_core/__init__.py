@@ -5,7 +5,7 @@
     scene = lf.reconstruct(["a.jpg", "b.jpg"])
     answer = lf.query(scene, ["armchair", "door"], view=0)
     lf.save(scene, "room.langflash")
-    scene = lf.load("room.langflash")
+    scene = lf.load("room.langflash")  # or .ply, .splat: the suffix says which
 
 The four functions are read in at first use: importing the package alone costs no torch.
 """
@@ -16,14 +16,19 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from langflash_core.export import export as save  # noqa: F401
+    from langflash_core.export import read as load  # noqa: F401
     from langflash_core.pipeline import query as query
     from langflash_core.pipeline import reconstruct as reconstruct
-    from langflash_core.scene import load as load
-    from langflash_core.scene import save as save
 
 __version__ = "0.1.0"
 
-_HOMES = {"reconstruct": "pipeline", "query": "pipeline", "save": "scene", "load": "scene"}
+_HOMES = {
+    "reconstruct": ("pipeline", "reconstruct"),
+    "query": ("pipeline", "query"),
+    "save": ("export", "export"),
+    "load": ("export", "read"),
+}
 
 
 class _Package(ModuleType):
@@ -44,7 +49,8 @@ sys.modules[__name__].__class__ = _Package
 def __getattr__(name: str) -> object:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    module, own_name = _HOMES[name]
+    return getattr(import_module(f"{__name__}.{module}"), own_name)
 
 
 def __dir__() -> list[str]:

@@ -2,15 +2,15 @@
 
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from langflash_core.errors import OutputError
 
 
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write `content` to `path`; whatever stops it, the old file or none is there, never half.
+def write_atomically(path: Path, content: bytes | Iterable[bytes]) -> None:
+    """Write `content`, whole or in parts, to `path`; whatever stops it, the old file or none is there.
 
     Raises:
         OutputError: the folder is missing, is a file, or cannot be written.
@@ -24,7 +24,8 @@ def write_atomically(path: Path, content: bytes) -> None:
     temporary = folder / f".{path.name[:100]}.{secrets.token_hex(6)}.part"
     try:
         with temporary.open("xb") as stream:
-            stream.write(content)
+            for part in (content,) if isinstance(content, bytes) else content:
+                stream.write(part)
             stream.flush()
             os.fsync(stream.fileno())
         os.replace(temporary, path)

@@ -15,7 +15,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from langflash_core.errors import Cancelled, InputError, ViewError, WeightsError
+from langflash_core.errors import Cancelled, InputError, PromptError, ViewError, WeightsError
 from langflash_core.images import load_views
 from langflash_core.images.views import source_pictures
 from langflash_core.network import PRESETS, LangFlashNet, load_network
@@ -23,9 +23,11 @@ from langflash_core.network.aggregation import averaged_atoms
 from langflash_core.network.build import network_class
 from langflash_core.network.crops import crop_atoms
 from langflash_core.network.model import Atoms, pooled_weights
+from langflash_core.network.precision import has_bfloat16
 from langflash_core.network.store import part_folder
 from langflash_core.query.answers import answer
 from langflash_core.query.clip import load_clip_images
+from langflash_core.query.gaussians import gaussian_relevance, kept
 from langflash_core.query.relevance import Mode, compile_query, relevance_maps
 from langflash_core.query.spaces import language_space
 from langflash_core.scene import assemble, prune
@@ -65,9 +67,10 @@ def reconstruct(
             photos as given, the same for all. Neither: EXIF, else an assumption with a warning.
         size: the network sees about size x size pixels per photo, whatever their shape.
         precision: "float32"; "bfloat16", for presets with a rule for it; "auto" takes it where
-            there is one. aggregation: how a group gets its vector: "lfa" (trained), "average" (of
-            dense features), "crops" (CLIP on a cut-out; presets of its space); None: lfa where
-            it has weights, else average.
+            there is one and the processor is quick at it.
+        aggregation: how a group gets its vector: "lfa" (trained), "average" (of dense features),
+            "crops" (CLIP on a cut-out; presets of its space); None: lfa where it has weights,
+            else average.
         device: "auto" takes CUDA where there is one; "cpu"; "cuda".
         progress: called with the stage and the fraction of the whole in [0, 1].
         cancelled: asked between stages.
@@ -142,6 +145,31 @@ def query(
             raise ValueError("render: expected a frame with weight maps, received one without")
         relevance = relevance_maps(frame.weight_maps, compiled)
         return answer(relevance, frame, chosen, compiled, threshold)
+
+
+def select(scene: Scene, prompts: Sequence[str], *, threshold: float | None = None) -> Scene:
+    """The part of a scene that answers at least one of these phrases, whatever the view.
+
+    Args:
+        threshold: relevancy in [0, 1] from which a Gaussian is kept; None: the scene's calibration.
+
+    Raises:
+        PromptError: a prompt or the threshold cannot be used, or no Gaussian passes.
+        WeightsError: the language space has no text weights.
+    """
+    compiled = compile_query(scene, language_space(scene.semantics.space), list(prompts))
+    limit = compiled.threshold if threshold is None else threshold
+    if not 0 <= limit <= 1:
+        raise PromptError(f"The threshold {limit} is out of range: relevancy needs 0 to 1.")
+    best = gaussian_relevance(scene.semantics, compiled).amax(0)  # (N,)
+    passing = best >= limit if scene.semantics.num_atoms else torch.zeros_like(best, dtype=torch.bool)
+    if not bool(passing.any()):
+        asked, highest = ", ".join(prompts), float(best.max()) if len(best) else 0.0
+        raise PromptError(
+            f"Nothing in the scene answers {asked} (best {highest:.3f}, threshold {limit:.3f}): "
+            "lower the threshold."
+        )
+    return kept(scene, passing)
 
 
 @dataclass
@@ -228,7 +256,7 @@ def _atoms(network: LangFlashNet, way: str | None, views: Views) -> Atoms | None
     return lambda weights, _: crop_atoms(weights, photos, lambda p: tower.encode(p.cpu()).to(weights))
 
 
-def _bfloat16(preset: str, precision: str) -> bool:
+def _bfloat16(preset: str, precision: str, device: str) -> bool:
     if precision not in PRECISIONS:
         raise InputError(f"The precision '{precision}' is unknown: choose {', '.join(PRECISIONS)}.")
     can = network_class(PRESETS[preset]).mixes
@@ -236,7 +264,8 @@ def _bfloat16(preset: str, precision: str) -> bool:
         raise InputError(
             f"The preset '{preset}' computes in float32 only: choose --precision float32 or auto."
         )
-    return can and precision != "float32"
+    quick = device != "cpu" or has_bfloat16()
+    return can and (precision == "bfloat16" or (precision == "auto" and quick))
 
 
 def _network(preset: str, weights: Path | str | None, device: str, precision: str) -> LangFlashNet:
@@ -245,7 +274,7 @@ def _network(preset: str, weights: Path | str | None, device: str, precision: st
     changed = path.stat().st_mtime_ns if path is not None and path.is_file() else 0
     folder = part_folder(PRESETS[preset])
     installed = tuple((p.name, p.stat().st_mtime_ns) for p in sorted(folder.glob("*.safetensors")))
-    return _read_network(preset, path, device, _bfloat16(preset, precision), (changed, installed))
+    return _read_network(preset, path, device, _bfloat16(preset, precision, device), (changed, installed))
 
 
 @lru_cache(maxsize=1)

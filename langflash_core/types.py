@@ -82,13 +82,16 @@ class Gaussians:
         return Gaussians(*(change(v) for v in (self.means, self.quats, self.scales, self.opacities, self.sh)))
 
 
+NO_LANGUAGE = "none"  # the `space` of scenes that come from splat files
+
+
 @dataclass(frozen=True)
 class Semantics:
     """Sparse weights over a global dictionary: f_i = sum_j weight_values[i, j] d_{weight_ids[i, j]}.
 
     weight_ids (N, m) int64 in [0, K); weight_values (N, m) >= 0, rows sum to 1 (or 0 where a
     Gaussian carries nothing); dictionary (K, C), rows of unit norm; space: name of the
-    language space the dictionary lives in ("minilm", "clip").
+    language space the dictionary lives in ("minilm", "clip"; "none" where there is no language).
     """
 
     weight_ids: Tensor
@@ -136,6 +139,7 @@ class Scene:
     """A finished scene: what is saved, splatted, queried, and exported.
 
     viewmats (V, 4, 4) and Ks (V, 3, 3) describe the input views at `view_size` (width, height).
+    A scene from a splat file has no photos: its one view frames it, and its world is the file's.
     photos: small JPEG bytes per view. metadata: plain JSON values (preset, timings, counts,
     warnings, photo names, `metric_scale`).
     """

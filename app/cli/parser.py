@@ -1,11 +1,15 @@
 """The words of the command line. Only the standard library is imported here."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
 import langflash_core
 from app.cli.values import (
+    above_zero,
+    atom_count,
+    film_seconds,
     intrinsics,
     kept_fraction,
     minutes,
@@ -19,6 +23,9 @@ from app.cli.values import (
     whole_count,
 )
 from langflash_core.errors import InputError
+
+# The decisions that `bench` compares: app.bench.modes.AXES, which would bring torch along.
+BENCH_AXES = ("precision", "relevance", "weights", "cut", "dictionary", "resolution", "detail", "sort")
 
 
 class UsageError(InputError):
@@ -53,6 +60,7 @@ def build_parser() -> Parser:
         _add_render,
         _add_export,
         _add_info,
+        _add_bench,
         _add_bench_network,
         _add_rooms,
         _add_train,
@@ -61,6 +69,11 @@ def build_parser() -> Parser:
     ):
         add(commands)
     return parser
+
+
+def joined(words: Sequence[str]) -> list[str]:
+    """`bench network` is a command of its own, though `bench` takes a scene; ./network names a file."""
+    return ["bench-network", *words[2:]] if list(words[:2]) == ["bench", "network"] else list(words)
 
 
 def _command(commands, name: str, purpose: str, **more) -> argparse.ArgumentParser:
@@ -160,20 +173,29 @@ def _add_render(commands) -> None:
 
 
 def _add_export(commands) -> None:
-    command = _command(commands, "export", "a scene, or what answers a phrase, as a file: .png")
+    command = _command(commands, "export", "a scene, or what answers a phrase, as a file for other programs")
     command.add_argument("scene", type=Path, metavar="SCENE")
-    _add_output(command, "FILE", ".png: a picture, or a cut-out with --prompt")
+    _add_output(
+        command,
+        "FILE",
+        ".png: a picture, or a cut-out with --prompt; .ply, .splat, .langflash: Gaussians; "
+        ".json: COCO masks of --prompt; .npz: a view as numbers; .mp4: a flight",
+    )
     command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="keep only what answers one of these")
     command.add_argument(
         "--threshold", type=kept_fraction, metavar="T", help="relevancy to keep, between 0 and 1"
     )
+    command.add_argument(
+        "--what", choices=("labels",), help="labels: a .png of phrase numbers, with its legend as .json"
+    )
+    command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of an .mp4 (default: 6)")
     _add_camera(command)
     _add_backend(command)
 
 
 def _add_info(commands) -> None:
     command = _command(commands, "info", "what a scene file holds, and what pruning saved")
-    command.add_argument("scene", type=Path, metavar="SCENE")
+    command.add_argument("scene", type=Path, metavar="SCENE", help=".langflash, .ply or .splat")
     _add_json(command)
 
 
@@ -243,9 +265,36 @@ def _add_train(commands) -> None:
     _add_start(export)
 
 
+def _add_bench(commands) -> None:
+    command = _command(commands, "bench", "how fast each way of drawing is, and what it gets wrong")
+    command.add_argument("scene", nargs="?", type=Path, metavar="SCENE")
+    command.add_argument("--synthetic", type=whole_count, metavar="N", help="a generated room of N Gaussians")
+    command.add_argument(
+        "--paper",
+        action="store_true",
+        help="the paper's size: 131,072 Gaussians, 128 atoms, 1 and 16 phrases, 988x731 and 1920x1080",
+    )
+    command.add_argument(
+        "--atoms", type=atom_count, metavar="K", help="generated atoms, for a scene that has none"
+    )
+    command.add_argument(
+        "--spread", type=above_zero, metavar="F", help="generated Gaussians F times as wide: more overdraw"
+    )
+    command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="up to 16 (default: three of a home)")
+    command.add_argument(
+        "--size", type=size, metavar="WxH", help="pixels to draw (default: as the network saw it)"
+    )
+    command.add_argument("--frames", type=whole_count, metavar="N", help="of the camera's way (default: 8)")
+    command.add_argument("--only", nargs="+", choices=BENCH_AXES, help="what to compare (default: all)")
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="FOLDER", help="also write bench.json, bench.csv and bench.png"
+    )
+    _add_json(command)
+
+
 def _add_bench_network(commands) -> None:
     command = _command(
-        commands, "bench-network", "how long each stage of the network takes, by the paper's table"
+        commands, "bench-network", "how long each stage of the network takes (also: bench network)"
     )
     command.add_argument("--preset", choices=("mini", "full"), default="full", help="(default: full)")
     weights = command.add_mutually_exclusive_group()

@@ -39,6 +39,19 @@ def whole_count(text: str) -> int:
     return _whole(text, 1, 10**9)
 
 
+def atom_count(text: str) -> int:
+    """How many atoms, 1 to 960: as many as a query's shader holds."""
+    return _whole(text, 1, 960)
+
+
+def above_zero(text: str) -> float:
+    """A factor above 0."""
+    value = _number(text)
+    if value <= 0:
+        raise ArgumentTypeError(f"expected a number above 0, received {text}")
+    return value
+
+
 def part(text: str) -> tuple[int, int]:
     """`I/N`: the I-th of N parts, from 0."""
     index, slash, count = text.partition("/")
@@ -53,6 +66,14 @@ def minutes(text: str) -> float:
     value = _number(text)
     if value <= 0:
         raise ArgumentTypeError(f"expected minutes above 0, received {text}")
+    return value
+
+
+def film_seconds(text: str) -> float:
+    """Length of a video, up to ten minutes."""
+    value = _number(text)
+    if not 0 < value <= 600:
+        raise ArgumentTypeError(f"expected seconds above 0, at most 600, received {text}")
     return value
 
 

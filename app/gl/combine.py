@@ -15,10 +15,10 @@ from langflash_core.query.relevance import EMPTY_NORM, CompiledQuery
 from .programs import Programs, set_uniforms
 from .targets import ADDED, MAXIMUM, LayerTarget, drawing
 
+PHRASES = 4  # a layer of relevance
 _CAPACITIES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 120)  # few, so that few programs are compiled
 _UNIFORMS = 960  # of the 1,024 vec4s that drivers have
 _PACKED = 8  # atoms a texel
-_PHRASES = 4  # a layer of relevance
 _MAX_COLUMNS = 16  # of |F|^2 a pass
 _STEPS = 65535
 
@@ -98,10 +98,7 @@ class QueryPasses:
             weights: None where no atom is in view: relevance is 0.
             version: changes whenever the weight maps do.
         """
-        factor = compiled.factor.detach().cpu().double().numpy()[atoms]  # (Ka, r)
-        prompts = compiled.prompts.detach().cpu().double().numpy()
-        negatives = compiled.negatives.detach().cpu().double().numpy()
-        num_groups = max(1, -(-len(prompts) // _PHRASES))
+        num_groups = max(1, -(-len(compiled.prompts) // PHRASES))
         if self.relevance is None or self.relevance.num_layers != num_groups:
             self._drop_relevance()
             self.relevance = LayerTarget(self._ctx, self._size, num_groups, "f4")
@@ -109,22 +106,39 @@ class QueryPasses:
             for group in range(num_groups):
                 self.relevance.layers(group, 1).clear()
             return self.relevance
+        temperature = float(compiled.temperature) if compiled.mode == "relevancy" else 0.0
+        self._answer(compiled, weights, atoms, version, temperature)
+        return self.relevance
+
+    def _answer(
+        self,
+        compiled: CompiledQuery,
+        weights: LayerTarget,
+        atoms: np.ndarray,
+        version: int,
+        temperature: float,
+    ) -> None:
+        """Fill `relevance`; temperature 0 is the cosine mode."""
+        factor = compiled.factor.detach().cpu().double().numpy()[atoms]  # (Ka, r)
+        prompts = compiled.prompts.detach().cpu().double().numpy()
+        negatives = compiled.negatives.detach().cpu().double().numpy()
         self._pack(weights, len(atoms), version)
         if self._stale("norm", (version, factor.tobytes())):
             self._norms(factor)
-            self._keys.pop("scales", None)
+            self._forget("scales")
         if self._stale("scales", (version, negatives.tobytes())):
             self._scale(factor @ negatives.T)
-            self._keys.pop("prompts", None)
-        temperature = float(compiled.temperature) if compiled.mode == "relevancy" else 0.0
+            self._forget("prompts")
         if self._stale("prompts", (version, temperature, prompts.tobytes())):
             self._relevance(factor @ prompts.T, temperature)
-        return self.relevance
 
     def _stale(self, name: str, key: tuple) -> bool:
         changed = self._keys.get(name) != key
         self._keys[name] = key
         return changed
+
+    def _forget(self, name: str) -> None:
+        self._keys.pop(name, None)
 
     def _pack(self, weights: LayerTarget, num_atoms: int, version: int) -> None:
         """The weight maps as shares of their peaks, once for each version of them."""
@@ -178,14 +192,14 @@ class QueryPasses:
 
     def _scale(self, dots: np.ndarray) -> None:
         """1 / |w R| and the largest of the negatives' cosines (Ka, M); of none where M = 0."""
-        groups = range(0, max(1, dots.shape[1]), _PHRASES)
+        groups = range(0, max(1, dots.shape[1]), PHRASES)
         self._squares.use(1)
         self._scales_target.clear(0.0, -1.0)
         with drawing(self._scales_target, ADDED, MAXIMUM):
             for group in groups:
-                block = dots[:, group : group + _PHRASES]
+                block = dots[:, group : group + PHRASES]
                 filler = block[:, :1] if block.shape[1] else np.zeros((len(dots), 1))
-                block = np.concatenate((block, np.repeat(filler, _PHRASES - block.shape[1], 1)), 1)
+                block = np.concatenate((block, np.repeat(filler, PHRASES - block.shape[1], 1)), 1)
                 program = self._program("scale.frag", block, EMPTY_NORM=EMPTY_NORM)
                 set_uniforms(program, squares=1)
                 self._screen.draw(program)
@@ -195,7 +209,7 @@ class QueryPasses:
         assert self.relevance is not None
         self._scales.use(1)
         for group in range(self.relevance.num_layers):
-            program = self._program("relevance.frag", dots[:, _PHRASES * group : _PHRASES * (group + 1)])
+            program = self._program("relevance.frag", dots[:, PHRASES * group : PHRASES * (group + 1)])
             set_uniforms(program, scales=1, temperature=temperature)
             with drawing(self.relevance.layers(group, 1)):
                 self._screen.draw(program)
@@ -216,7 +230,7 @@ class QueryPasses:
         if self.relevance is not None:
             self.relevance.release()
         self.relevance = None
-        self._keys.pop("prompts", None)
+        self._forget("prompts")
 
     def _drop_packed(self) -> None:
         if self._packed is not None:

@@ -16,11 +16,14 @@ from torch import Tensor
 
 from langflash_core.errors import GraphicsError
 from langflash_core.query.relevance import CompiledQuery, finite_atoms
+from langflash_core.scene import thin
 from langflash_core.splat.projection import ALPHA_MIN
 from langflash_core.types import Camera, Frame, Scene
 
 from .combine import QueryPasses, Screen
 from .display import COLOUR_MAPS, Display, atom_colours
+from .fast import MAX_PHRASES, NUMBERS, FastPasses, splat_norms, splat_numbers
+from .host import HostQueryPasses, draws_in_software
 from .programs import Programs, set_uniforms
 from .splats import SplatBuffers
 from .targets import MAX_LAYERS_AT_ONCE, PREMULTIPLIED, ColourTarget, LayerTarget, context_lives, drawing
@@ -41,15 +44,26 @@ class SplatRenderer:
     "negatives", "query", "show" do not.
     """
 
-    def __init__(self, ctx: moderngl.Context, precision: Literal["float16", "float32"] = "float16"):
-        """Args: precision of colour and weight maps; alphas, depth and relevance are always float32.
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        precision: Literal["float16", "float32"] = "float16",
+        queries: Literal["shader", "host"] | None = None,
+    ):
+        """
+        Args:
+            precision: of colour and weight maps; alphas, depth and relevance are always float32.
+            queries: where phrases are multiplied with weight maps; None: on the processor where
+                OpenGL runs there too (app/gl/host.py), else in shaders.
 
         Raises:
             GraphicsError: the context is older than OpenGL 3.3.
-            ValueError: another precision.
+            ValueError: another precision, another place.
         """
         if precision not in _DTYPES:
             raise ValueError(f"precision: expected float16 or float32, received {precision!r}")
+        if queries not in ("shader", "host", None):
+            raise ValueError(f"queries: expected shader, host or None, received {queries!r}")
         if ctx.version_code < 330:
             raise GraphicsError(
                 f"OpenGL {ctx.version_code / 100:.1f} is too old for splatting, 3.3 is needed: "
@@ -58,10 +72,13 @@ class SplatRenderer:
         self.passes: Counter[str] = Counter()
         self._ctx = ctx
         self._dtype = _DTYPES[precision]
+        on_host = draws_in_software(ctx) if queries is None else queries == "host"
+        self._query_passes = HostQueryPasses if on_host else QueryPasses
         self._programs = Programs(ctx)
         self._screen = Screen(ctx)
         self._scene: Scene | None = None
-        self._splats: SplatBuffers | None = None
+        self._levels: dict[float, SplatBuffers] = {}  # by share of the Gaussians
+        self._splats: SplatBuffers | None = None  # the level in use
         self._background: Background = (0.0, 0.0, 0.0)
         self._compiled: CompiledQuery | None = None
         self._asked = 0  # how often; names the current query in keys
@@ -73,6 +90,10 @@ class SplatRenderer:
         self._target: ColourTarget | None = None
         self._weights: LayerTarget | None = None
         self._query: QueryPasses | None = None
+        self._fast: FastPasses | None = None
+        self._is_fast = False  # relevance comes from the fast mode
+        self._numbers: tuple[int, np.ndarray] | None = None  # `_asked` and what its Gaussians carry
+        self._norms: tuple[bytes, np.ndarray] | None = None  # factor and |f_i|
         self._display: Display | None = None
 
     # --- what to draw -----------------------------------------------------------------------
@@ -83,6 +104,7 @@ class SplatRenderer:
             return
         self._release_scene()
         self._splats = SplatBuffers(self._ctx, self._programs, scene)
+        self._levels = {1.0: self._splats}
         self._scene = scene
         self._atom_colours = atom_colours(scene.semantics.dictionary.detach().cpu().double().numpy())
         if self._compiled is not None and self._compiled.factor.shape[0] != scene.semantics.num_atoms:
@@ -91,7 +113,7 @@ class SplatRenderer:
     @property
     def num_dropped(self) -> int:
         """Gaussians of the scene left out because a value or a weight was NaN or infinite."""
-        return self._splats.num_dropped if self._splats else 0
+        return self._levels[1.0].num_dropped if self._levels else 0
 
     @property
     def num_dropped_atoms(self) -> int:
@@ -99,9 +121,22 @@ class SplatRenderer:
         return int((~finite_atoms(self._scene.semantics.dictionary)).sum()) if self._scene else 0
 
     def draw(
-        self, camera: Camera, background: Background = (0.0, 0.0, 0.0), weight_maps: bool = True
+        self,
+        camera: Camera,
+        background: Background = (0.0, 0.0, 0.0),
+        weight_maps: bool = True,
+        fast: bool = False,
+        share: float = 1.0,
     ) -> None:
         """Draw the scene; nothing is drawn again for the same scene, camera and size.
+
+        Args:
+            weight_maps: draw them at once; else the first question that needs them does.
+            fast: until the next call, answer from numbers splatted beside the colour (app/gl/fast.py)
+                instead of weight maps, unless those are drawn already: for a moving camera. Serves
+                up to 17 phrases; more are answered exactly.
+            share: in (0, 1], of the Gaussians to draw, wider in return (scene/thin.py). A level is
+                made once and kept with the scene: use few values.
 
         Raises:
             ValueError: there is no scene, or the image has no pixels.
@@ -112,6 +147,7 @@ class SplatRenderer:
         if self._splats is None:
             raise ValueError("draw: expected set_scene before, received no scene")
         self._resize(camera)
+        self._use_level(share)
         key = _camera_key(camera)
         if self._drawn.get("sorted") != key:
             self._splats.sort(camera)
@@ -119,10 +155,12 @@ class SplatRenderer:
                 self._splats.project(camera)
             self._drawn = {"sorted": key}
         self._background = background
+        self._is_fast = fast
+        if self._answers_fast():
+            self._ensure_numbers()
         if self._drawn.get("colour") != key:
             self._draw_colour()
-            self._drawn["colour"] = key
-        if weight_maps:
+        if weight_maps and not fast:
             self._ensure_weights()
 
     def ask(self, compiled: CompiledQuery | None) -> None:
@@ -156,10 +194,12 @@ class SplatRenderer:
     def relevance(self) -> Tensor:
         """Relevance (P, H, W) float32 of the phrases asked, 0 where the view is empty.
 
+        Exact, unless the view was drawn with `fast`.
+
         Raises:
             ValueError: nothing was asked or drawn.
         """
-        layers, compiled = self._ensure_relevance()
+        layers, compiled, _ = self._ensure_relevance()
         width, height, num_layers = layers.array.size[0], layers.array.size[1], layers.num_layers
         values = _read(layers.array).reshape(num_layers, height, width, 4)
         maps = np.moveaxis(values, -1, 1).reshape(4 * num_layers, height, width)
@@ -203,13 +243,13 @@ class SplatRenderer:
         """
         if colormap not in COLOUR_MAPS:
             raise ValueError(f"colormap: expected one of {COLOUR_MAPS}, received {colormap!r}")
-        layers, compiled = self._ensure_relevance()
+        layers, compiled, key = self._ensure_relevance()
         if not 0 <= prompt < compiled.prompts.shape[0]:
             raise ValueError(f"prompt: expected 0 to {compiled.prompts.shape[0] - 1}, received {prompt}")
         limit = compiled.threshold if threshold is None else threshold
         chosen = (min(limit, 0.999), 1.0) if span is None else span
         target, display = self._drawn_target(), self._shown()
-        key = (self._drawn["colour"], self._asked, colormap, limit, over_rgb, chosen)
+        key = (*key, colormap, limit, over_rgb, chosen)
         return display.picture(
             ("heat", prompt),
             key,
@@ -233,14 +273,14 @@ class SplatRenderer:
         Args:
             colours: (P, 3) in [0, 1]; None: hues spread by the golden ratio.
         """
-        layers, compiled = self._ensure_relevance()
+        layers, compiled, key = self._ensure_relevance()
         count = compiled.prompts.shape[0]
         chosen = _hues(count) if colours is None else np.asarray(colours, np.float32)
         if chosen.shape != (count, 3):
             raise ValueError(f"colours: expected ({count}, 3), received {chosen.shape}")
         limit = compiled.threshold if threshold is None else threshold
         target, display = self._drawn_target(), self._shown()
-        key = (self._drawn["colour"], self._asked, limit, chosen.tobytes())
+        key = (*key, limit, chosen.tobytes())
         return display.picture(
             ("labels",),
             key,
@@ -282,19 +322,69 @@ class SplatRenderer:
             )
         self._release_targets()
         self._target = ColourTarget(self._ctx, size, self._dtype)
-        self._query = QueryPasses(self._ctx, self._programs, self._screen, size, self.passes)
+        self._query = self._query_passes(self._ctx, self._programs, self._screen, size, self.passes)
         self._display = Display(self._ctx, self._programs, self._screen, size, self.passes)
         self._size = size
 
-    def _draw_colour(self) -> None:
+    def _use_level(self, share: float) -> None:
+        assert self._scene is not None
+        if share not in self._levels:
+            self._levels[share] = SplatBuffers(self._ctx, self._programs, thin(self._scene, share))
+        if self._levels[share] is not self._splats:
+            self._splats = self._levels[share]
+            self._drawn = {}
+            self._numbers = self._norms = None
+
+    def _draw_colour(self, numbers: np.ndarray | None = None) -> None:
+        """Colour and depth, and with `numbers` (N, 3 L) the layers of the fast mode."""
         assert self._target is not None and self._splats is not None
-        program = self._programs.get("quad.vert", "colour.frag")
+        defines: dict[str, float] = {"COLOUR": 1}
+        framebuffer = self._target.framebuffer
+        layers = 0 if numbers is None else numbers.shape[1] // NUMBERS
+        if layers:
+            assert self._fast is not None
+            defines["LAYERS"], framebuffer = layers, self._fast.framebuffer
+        program = self._programs.get("quad.vert", "colour.frag", defines)
         set_uniforms(program, image_size=tuple(float(n) for n in self._target.colour.size))
-        self._target.framebuffer.clear()
-        with drawing(self._target.framebuffer, PREMULTIPLIED):
+        framebuffer.clear()
+        with drawing(framebuffer, PREMULTIPLIED):
             if len(self._splats.order):
-                self._splats.draw(program)
+                carried = None if numbers is None else self._splats.in_order(numbers)
+                self._splats.draw(program, carried, layers)
+        self._drawn["colour"] = self._drawn["sorted"]
         self.passes["colour"] += 1
+
+    def _answers_fast(self) -> bool:
+        """Whether the next answer comes from the fast mode."""
+        assert self._scene is not None
+        if not self._is_fast or self._compiled is None or self._drawn.get("weights") == self._drawn["sorted"]:
+            return False
+        return self._scene.semantics.num_atoms > 0 and len(self._compiled.prompts) <= MAX_PHRASES
+
+    def _ensure_numbers(self) -> None:
+        """Colour, depth and the numbers of the phrases asked, in one splat pass, unless they are there."""
+        assert self._splats is not None and self._compiled is not None and self._target is not None
+        key = (self._drawn["sorted"], self._asked)
+        if self._drawn.get("numbers") == key:
+            return
+        if self._fast is None or not self._fast.fits(self._compiled):
+            self._release_fast()
+            self._fast = FastPasses(
+                self._ctx, self._programs, self._screen, self._target, self._compiled, self._dtype
+            )
+        self._draw_colour(self._carried())
+        self._fast.run(self._compiled)
+        self._drawn["numbers"] = key
+
+    def _carried(self) -> np.ndarray:
+        """What each Gaussian carries for the phrases asked; made once a question, norms once a dictionary."""
+        assert self._splats is not None and self._compiled is not None
+        if self._numbers is None or self._numbers[0] != self._asked:
+            factor = self._compiled.factor.detach().cpu().double().numpy()
+            if self._norms is None or self._norms[0] != factor.tobytes():
+                self._norms = factor.tobytes(), splat_norms(self._splats, factor)
+            self._numbers = self._asked, splat_numbers(self._splats, self._compiled, self._norms[1])
+        return self._numbers[1]
 
     def _ensure_weights(self) -> None:
         """Draw the weight maps of the current view unless they are there."""
@@ -321,17 +411,24 @@ class SplatRenderer:
         target = self._weights.layers(first, count)
         target.clear()
         with drawing(target, PREMULTIPLIED):
-            self._splats.draw(program, expanded, count)
+            self._splats.draw(program, expanded, count, colour=False)
         self.passes["weights"] += 1
 
-    def _ensure_relevance(self) -> tuple[LayerTarget, CompiledQuery]:
+    def _ensure_relevance(self) -> tuple[LayerTarget, CompiledQuery, tuple]:
+        """Relevance of the query, the query, and what names both."""
         self._drawn_target()
         if self._compiled is None:
             raise ValueError("relevance: expected ask(...) before, received no query")
+        key = (self._drawn["colour"], self._asked)
+        if self._answers_fast():
+            self._ensure_numbers()
+            assert self._fast is not None
+            return self._fast.relevance, self._compiled, (*key, "fast")
         self._ensure_weights()
         assert self._query is not None
         weights = self._weights if len(self._atoms) else None
-        return self._query.run(self._compiled, weights, self._atoms, self._version), self._compiled
+        layers = self._query.run(self._compiled, weights, self._atoms, self._version)
+        return layers, self._compiled, (*key, "exact")
 
     def _paint_atoms(self, into: moderngl.Framebuffer) -> None:
         assert self._query is not None
@@ -365,8 +462,14 @@ class SplatRenderer:
             self._weights.release()
         self._weights = None
 
+    def _release_fast(self) -> None:
+        if self._fast is not None:
+            self._fast.release()
+        self._fast = None
+
     def _release_targets(self) -> None:
         self._release_weights()
+        self._release_fast()
         for owned in (self._display, self._query, self._target):
             if owned is not None:
                 owned.release()
@@ -375,9 +478,10 @@ class SplatRenderer:
         self._drawn = {}
 
     def _release_scene(self) -> None:
-        if self._splats is not None:
-            self._splats.release()
-        self._splats = self._scene = None
+        for level in self._levels.values():
+            level.release()
+        self._levels = {}
+        self._splats = self._scene = self._numbers = self._norms = None
         self._drawn = {}
 
     def release(self) -> None:

@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import moderngl
 import numpy as np
+import torch
+from torch.nn import functional as F
 
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.geometry.quaternions import unit_quats
@@ -14,6 +16,7 @@ from langflash_core.types import Camera, Scene
 from .programs import Programs, set_uniforms
 
 _ROW_TEXELS = 4096
+_ROWS_AT_ONCE = 1 << 16  # Gaussians: 12 MB of coefficients of degree 3
 _PLACE_FLOATS = 11  # place (4), shape (4), colour (3)
 _WIDEST = 1e12  # scene units: wider Gaussians are flat over any view, and float32 squares end at 1e38
 
@@ -32,7 +35,8 @@ class SplatBuffers:
         gaussians = scene.gaussians.map(lambda v: v.detach().cpu().float())
         finite = drawable_rows(scene).cpu()
         kept = finite & (gaussians.opacities >= ALPHA_MIN)
-        gaussians = gaussians.map(lambda v: v[kept])
+        sh = gaussians.sh  # most of a large scene's bytes: never copied as a whole
+        gaussians = replace(gaussians, sh=sh[:, :0]).map(lambda v: v[kept])
         gaussians = replace(gaussians, scales=gaussians.scales.clamp(-_WIDEST, _WIDEST))
         self.num_dropped = int((~finite).sum())
         self.num_gaussians = len(gaussians)
@@ -46,20 +50,18 @@ class SplatBuffers:
         self._num_atoms = scene.semantics.num_atoms
         self._carried = atom_bits(self._ids, self._values, self._num_atoms)
         if self.num_gaussians:
-            self._upload(gaussians)
+            self._upload(gaussians, sh, np.flatnonzero(kept.numpy()))
 
-    def _upload(self, gaussians) -> None:
+    def _upload(self, gaussians, sh, rows: np.ndarray) -> None:
+        """`sh` (all, S, 3) of which `rows` are drawn, like every row of `gaussians`."""
         count = self.num_gaussians
         place = np.concatenate((self._means, gaussians.opacities.numpy()[:, None]), 1)
-        self.sh_degree = min(math.isqrt(gaussians.sh.shape[1]) - 1, MAX_SHOWN_DEGREE)
-        num_bases = (self.sh_degree + 1) ** 2
-        self._sh_vec4s = (3 * num_bases + 3) // 4
-        sh = np.zeros((count, 4 * self._sh_vec4s), np.float32)
-        sh[:, : 3 * num_bases] = gaussians.sh[:, :num_bases].flatten(1).numpy()
-        fields = (place, unit_quats(gaussians.quats).numpy(), gaussians.scales.numpy(), sh)
+        self.sh_degree = min(math.isqrt(sh.shape[1]) - 1, MAX_SHOWN_DEGREE)
+        fields = (place, unit_quats(gaussians.quats).numpy(), gaussians.scales.numpy())
         self._vertex_buffers = [
             self._own(self._ctx.buffer(np.ascontiguousarray(f).tobytes())) for f in fields
         ]
+        self._vertex_buffers.append(self._upload_harmonics(sh.numpy(), rows))
         self._order_buffer = self._own(self._ctx.buffer(reserve=4 * count))
         self.places = self._own(self._ctx.buffer(reserve=4 * _PLACE_FLOATS * count))
         self._sparse = self._upload_weights() if self._num_atoms and self._ids.shape[1] else None
@@ -67,7 +69,21 @@ class SplatBuffers:
             self._own(self._ctx.texture((self._num_atoms, 1), 1, dtype="f4")) if self._sparse else None
         )
         self._weights: moderngl.Buffer | None = None
+        self._numbers: moderngl.Buffer | None = None
         self._vaos: dict[tuple, moderngl.VertexArray] = {}
+
+    def _upload_harmonics(self, sh: np.ndarray, rows: np.ndarray) -> moderngl.Buffer:
+        """Coefficients of the shown degree, flat, padded to whole vec4s."""
+        num_numbers = 3 * (self.sh_degree + 1) ** 2
+        self._sh_vec4s = (num_numbers + 3) // 4
+        stride = 16 * self._sh_vec4s  # bytes
+        buffer = self._own(self._ctx.buffer(reserve=stride * len(rows)))
+        for first in range(0, len(rows), _ROWS_AT_ONCE):
+            some = sh[rows[first : first + _ROWS_AT_ONCE]].reshape(-1, 3 * sh.shape[1])[:, :num_numbers]
+            padded = np.zeros((len(some), 4 * self._sh_vec4s), np.float32)
+            padded[:, :num_numbers] = some
+            buffer.write(padded.tobytes(), offset=stride * first)
+        return buffer
 
     def _upload_weights(self) -> moderngl.Texture:
         pairs = np.stack((self._ids.astype(np.float32), self._values), -1).reshape(-1, 2)
@@ -180,6 +196,22 @@ class SplatBuffers:
         self._transform(program, [], self._weights)
         return self._weights
 
+    def mixed(self, table: np.ndarray) -> np.ndarray:
+        """sum_j w_ij table[id_ij], (N, n) float32 in the scene's order, of a table (K, n)."""
+        rows = torch.from_numpy(np.ascontiguousarray(table, np.float32))
+        ids, values = torch.from_numpy(self._ids), torch.from_numpy(self._values)
+        return F.embedding_bag(ids, rows, per_sample_weights=values, mode="sum").numpy()
+
+    def in_order(self, numbers: np.ndarray) -> moderngl.Buffer:
+        """Numbers (N, n) float32 of all Gaussians as those of the chosen ones, in draw order."""
+        data = numbers[self.order].tobytes()
+        if self._numbers is None:
+            self._numbers = self._own(self._ctx.buffer(reserve=numbers.nbytes))
+        elif self._numbers.size < len(data):
+            self._numbers.orphan(numbers.nbytes)
+        self._numbers.write(data)
+        return self._numbers
+
     def _transform(self, program: moderngl.Program, content: list, out: moderngl.Buffer) -> None:
         key = ("transform", program.glo)
         if key not in self._vaos:
@@ -189,18 +221,21 @@ class SplatBuffers:
         self._vaos[key].transform(out, mode=moderngl.POINTS, vertices=len(self.order))
 
     def draw(
-        self, program: moderngl.Program, weights: moderngl.Buffer | None = None, num_layers: int = 0
+        self,
+        program: moderngl.Program,
+        weights: moderngl.Buffer | None = None,
+        num_layers: int = 0,
+        colour: bool = True,
     ) -> None:
-        """One instanced quad per chosen Gaussian, with its colour or with `num_layers` of weights."""
+        """One instanced quad per chosen Gaussian, with its colour, `num_layers` of weights, or both."""
         key = ("draw", program.glo)
         if key not in self._vaos:
-            if weights is None:
-                content = [(self.places, "4f 4f 3f/i", "in_place", "in_shape", "in_colour")]
-            else:
-                content = [
-                    (self.places, "4f 4f 12x/i", "in_place", "in_shape"),
-                    (weights, f"{3 * num_layers}f/i", "in_weights"),
-                ]
+            footprint = ("in_place", "in_shape")
+            content: list[tuple] = [(self.places, "4f 4f 12x/i", *footprint)]
+            if colour:
+                content = [(self.places, "4f 4f 3f/i", *footprint, "in_colour")]
+            if weights is not None:
+                content.append((weights, f"{3 * num_layers}f/i", "in_weights"))
             self._vaos[key] = self._ctx.vertex_array(program, content)
         self._vaos[key].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(self.order))
 

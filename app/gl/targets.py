@@ -99,21 +99,24 @@ class LayerTarget:
         self.array.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._ctx = ctx
         self._dtype = dtype
-        self._framebuffers: dict[int, moderngl.Framebuffer] = {}
+        self._framebuffers: dict[tuple, moderngl.Framebuffer] = {}
         arguments = (ctypes.c_uint,) * 3 + (ctypes.c_int,) * 2
         self._attach = gl_function(ctx, "glFramebufferTextureLayer", None, *arguments)
 
-    def layers(self, first: int, count: int) -> moderngl.Framebuffer:
-        """A framebuffer whose `count` attachments are the layers from `first` on."""
-        if count not in self._framebuffers:
+    def layers(
+        self, first: int, count: int, beside: tuple[moderngl.Texture, ...] = ()
+    ) -> moderngl.Framebuffer:
+        """A framebuffer whose attachments are `beside` and then `count` layers from `first` on."""
+        key = (count, *(texture.glo for texture in beside))
+        if key not in self._framebuffers:
             stand_in = self._ctx.texture(self.array.size[:2], 4, dtype=self._dtype)
-            self._framebuffers[count] = self._ctx.framebuffer([stand_in] * count)
+            self._framebuffers[key] = self._ctx.framebuffer([*beside, *[stand_in] * count])
             stand_in.release()
-        framebuffer = self._framebuffers[count]
+        framebuffer = self._framebuffers[key]
         previous = bound_framebuffer(self._ctx)
         framebuffer.use()
         for offset in range(count):
-            point = _GL_COLOR_ATTACHMENT0 + offset
+            point = _GL_COLOR_ATTACHMENT0 + len(beside) + offset
             self._attach(_GL_FRAMEBUFFER, point, self.array.glo, 0, first + offset)
         previous.use()
         return framebuffer

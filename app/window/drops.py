@@ -9,6 +9,7 @@ PHOTO_SUFFIXES = frozenset(
     {".jpg", ".jpeg", ".png", ".webp", ".heic", ".heif", ".tif", ".tiff", ".bmp", ".avif"}
 )
 SCENE_SUFFIX = ".langflash"
+SCENE_SUFFIXES = frozenset({SCENE_SUFFIX, ".ply", ".splat"})  # those of langflash_core.export.READERS
 MAX_PHOTOS = 8  # what the network was shaped for
 
 
@@ -43,18 +44,20 @@ def sort_drop(paths: Iterable[str | Path]) -> Drop:
         if path.is_dir():
             inside = sorted(p for p in path.iterdir() if p.is_file() and not p.name.startswith("."))
             found = [p for p in inside if p.suffix.lower() in PHOTO_SUFFIXES]
-            kept = [p for p in inside if p.suffix.lower() == SCENE_SUFFIX]
+            kept = [p for p in inside if p.suffix.lower() in SCENE_SUFFIXES]
             if not found and not kept:
                 rejected.append(f"The folder {path.name} holds no photo; drop a folder of JPEG or PNG files.")
             photos += found
             scenes += [] if found else kept
         elif not path.exists():
             rejected.append(f"{path} does not exist; check the path.")
-        elif path.suffix.lower() == SCENE_SUFFIX:
+        elif path.suffix.lower() in SCENE_SUFFIXES:
             scenes.append(path)
         elif path.suffix.lower() in PHOTO_SUFFIXES:
             photos.append(path)
         else:
-            rejected.append(f"{path.name} is no photo and no scene; drop JPEG, PNG or .langflash files.")
+            rejected.append(
+                f"{path.name} is no photo and no scene; drop JPEG, PNG, .langflash or .ply files."
+            )
     unique = tuple(dict.fromkeys(p.resolve() for p in photos))
     return Drop(unique, tuple(dict.fromkeys(p.resolve() for p in scenes)), tuple(rejected))

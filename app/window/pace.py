@@ -1,82 +1,137 @@
-"""How large to draw, so that a slow machine stays fluent: what the last pictures cost decides.
+"""How much to draw, so that a slow machine stays fluent: what the last pictures cost decides.
 
-Colour and weight maps are paced apart, because maps cost many passes. While the camera moves,
-each is drawn at the scale that keeps a picture near `MOVING_SECONDS`, and colour alone when
-even small maps take too long. At rest the picture settles: at once at full size where that is
-quick, else smaller first and full after a longer pause, so that neither the next drag nor the
-next keystroke is met by a frozen window.
+While the camera moves, a picture should take `MOVING_SECONDS`: one that takes longer sends the next
+ones down a ladder of smaller pictures, for large scenes also of fewer Gaussians; ones that take less
+than half send them up again, a rung at a time. Colour, colour with the fast mode's relevance, and
+exact maps are paced apart, because they cost so differently. At rest the picture settles: at once at
+full size where that is quick, else smaller first and full after a longer pause, so that neither the
+next drag nor the next keystroke is met by a frozen window.
 """
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass, field, replace
+from enum import Enum
 
-SCALES = (1.0, 0.75, 0.5, 0.35, 0.25)  # of the panel's sides; few, so that textures are reused
 MOVING_SECONDS = 0.060
 QUICK_SECONDS = 0.15  # a full picture this quick is drawn as soon as the hands rest
 SETTLE_AFTER = 0.12  # seconds since the last motion, key or pointer event
 FULL_AFTER = 0.70
-MAPS_OVER_COLOUR = 4.0  # cost of colour and maps over colour alone, until measured
+LARGE_SCENE = 200_000  # Gaussians, from which drawing fewer of them pays
+_RUNG_FACTOR = 1.8  # about what a rung saves
+
+
+class Kind(Enum):
+    """What a picture holds; the value is its expected cost over colour alone, until measured."""
+
+    COLOUR = 1.0
+    FAST = 1.5
+    MAPS = 4.0
 
 
 @dataclass(frozen=True)
 class Plan:
-    """One picture to draw: scale of the panel's sides, and whether with weight maps."""
+    """One picture to draw: its kind, the scale of the panel's sides, the share of the Gaussians."""
 
-    scale: float
-    maps: bool
+    kind: Kind
+    scale: float = 1.0
+    share: float = 1.0
+
+    def covers(self, other: "Plan") -> bool:
+        """Whether a picture of this plan has all that `other` asks for."""
+        enough = self.kind is other.kind or self.kind is Kind.MAPS or other.kind is Kind.COLOUR
+        return enough and self.scale >= other.scale and self.share >= other.share
+
+
+SIZES = ((1.0, 1.0), (0.75, 1.0), (0.5, 1.0), (0.35, 1.0), (0.25, 1.0))
+"""(scale, share) from dear to cheap; few, so that textures and levels are reused."""
+SIZES_OF_LARGE_SCENES = (
+    (1.0, 1.0),
+    (0.75, 1.0),
+    (0.5, 1.0),
+    (0.5, 0.25),
+    (0.35, 0.25),
+    (0.35, 0.0625),
+    (0.25, 0.0625),
+)
+_START = 2  # rung of an unknown machine
 
 
 @dataclass(frozen=True)
 class Pace:
-    """Seconds that a full-size picture is expected to take; None before the first."""
+    """For one scene. full_seconds: what a full picture of a kind cost last, smoothed; rungs: where
+    on the ladder a kind moves."""
 
-    colour_seconds: float | None = None
-    maps_seconds: float | None = None
+    num_gaussians: int = 0
+    full_seconds: dict[Kind, float] = field(default_factory=dict)
+    rungs: dict[Kind, int] = field(default_factory=dict)
 
-    def learn(self, plan: Plan, seconds: float) -> "Pace":
-        """Account for a picture just drawn. Cost is taken as proportional to the pixels."""
-        full = seconds / plan.scale**2
-        if plan.maps:
-            return replace(self, maps_seconds=_smooth(self.maps_seconds, full))
-        return replace(self, colour_seconds=_smooth(self.colour_seconds, full))
+    @property
+    def ladder(self) -> tuple[tuple[float, float], ...]:
+        """(scale, share) from dear to cheap."""
+        return SIZES if self.num_gaussians < LARGE_SCENE else SIZES_OF_LARGE_SCENES
 
-    def moving(self, wants_maps: bool) -> Plan:
-        """What to draw while the camera moves."""
-        if wants_maps:
-            scale = _scale_for(self._expected(maps=True), MOVING_SECONDS)
-            if scale is not None:
-                return Plan(scale, maps=True)
-        return Plan(_scale_for(self.colour_seconds, MOVING_SECONDS) or SCALES[-1], maps=False)
+    def learn(self, plan: Plan, seconds: float, moving: bool = True) -> "Pace":
+        """Account for a picture just drawn, while the camera moved or at rest."""
+        full = self.full_seconds
+        if plan.share == 1:  # cost goes with the pixels, nearly
+            estimate = seconds / plan.scale**2
+            full = {**full, plan.kind: 0.5 * (full.get(plan.kind, estimate) + estimate)}
+        if not moving or (plan.scale, plan.share) not in self.ladder:
+            return replace(self, full_seconds=full)
+        rung = self.ladder.index((plan.scale, plan.share))
+        return replace(self, full_seconds=full, rungs={**self.rungs, plan.kind: self._next(rung, seconds)})
 
-    def resting(self, wants_maps: bool, still: float) -> Plan | None:
+    def _next(self, rung: int, seconds: float) -> int:
+        over = math.log(max(seconds, 1e-6) / MOVING_SECONDS) / math.log(_RUNG_FACTOR)
+        if over > 0:
+            return min(rung + math.ceil(over), len(self.ladder) - 1)
+        return max(rung - 1, 0) if over < -1.2 else rung
+
+    def moving(self, wanted: Kind) -> Plan:
+        """What to draw while the camera moves.
+
+        Exact maps where even a full picture of them is quick. Else, for relevance (`Kind.FAST`), the
+        fast mode, and for atoms (`Kind.MAPS`) smaller maps, or colour where these take too long.
+        """
+        if wanted is not Kind.COLOUR and self._expected(Kind.MAPS, MOVING_SECONDS) <= MOVING_SECONDS:
+            return Plan(Kind.MAPS)
+        if wanted is Kind.MAPS:
+            smallest = min(scale for scale, _ in SIZES)
+            if self._expected(Kind.MAPS, 1.0) * smallest**2 > MOVING_SECONDS:
+                wanted = Kind.COLOUR
+        return Plan(wanted, *self.ladder[self.rungs.get(wanted, self._first_rung(wanted))])
+
+    def _first_rung(self, kind: Kind) -> int:
+        """By the cost of another kind, or in the middle."""
+        expected = self._expected(kind, math.inf)
+        if expected == math.inf:
+            return _START
+        fits = (i for i, (scale, _) in enumerate(self.ladder) if expected * scale**2 <= MOVING_SECONDS)
+        return next(fits, len(self.ladder) - 1)
+
+    def resting(self, wanted: Kind, still: float) -> Plan | None:
         """What to draw `still` seconds after the last event; None while more may come."""
         if still < SETTLE_AFTER:
             return None
-        scale = 1.0 if still >= FULL_AFTER else _scale_for(self._expected(wants_maps), QUICK_SECONDS)
-        return Plan(scale or SCALES[-1], maps=wants_maps)
+        kind = Kind.COLOUR if wanted is Kind.COLOUR else Kind.MAPS
+        if still >= FULL_AFTER:
+            return Plan(kind)
+        full = self._expected(kind, math.inf)
+        scales = [scale for scale, _ in SIZES]
+        if full == math.inf:
+            return Plan(kind, scales[_START])
+        return Plan(kind, next((s for s in scales if full * s * s <= QUICK_SECONDS), scales[-1]))
 
-    def _expected(self, maps: bool) -> float | None:
-        """Seconds of a full picture; None before anything was measured."""
-        if not maps:
-            return self.colour_seconds
-        if self.maps_seconds is None and self.colour_seconds is not None:
-            return MAPS_OVER_COLOUR * self.colour_seconds
-        return self.maps_seconds
+    def _expected(self, kind: Kind, unknown: float) -> float:
+        """Seconds of a full picture, measured or scaled from another kind's; `unknown` before any."""
+        if kind in self.full_seconds:
+            return self.full_seconds[kind]
+        known = [seconds * kind.value / other.value for other, seconds in self.full_seconds.items()]
+        return max(known) if known else unknown
 
     def next_rest(self, still: float) -> float:
         """Seconds until `resting` may answer otherwise; infinity when it never will."""
         for moment in (SETTLE_AFTER, FULL_AFTER):
             if still < moment:
                 return moment - still
-        return float("inf")
-
-
-def _scale_for(full_seconds: float | None, budget: float) -> float | None:
-    """The largest scale within the budget; the middle one when unknown; None when none fits."""
-    if full_seconds is None:
-        return SCALES[2]
-    return next((s for s in SCALES if full_seconds * s * s <= budget), None)
-
-
-def _smooth(old: float | None, new: float) -> float:
-    """Half old, half new: one slow frame does not blur the picture for long."""
-    return new if old is None else 0.5 * (old + new)
+        return math.inf

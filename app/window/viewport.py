@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
-from app.window.pace import SETTLE_AFTER, Pace, Plan
+from app.window.pace import SETTLE_AFTER, Kind, Pace, Plan
 from app.window.poses import START, Pose, to_camera
 from app.window.state import Mode, State
 
@@ -94,7 +94,7 @@ class Viewport:
         renderer.ask(None)
         self._serial, self._query, self._keys = serial, None, ()
         self._drawn = self._texture = self._colouring = self._answered = None
-        self.pace = Pace()
+        self.pace = Pace(len(scene.gaussians))
 
     def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None") -> None:
         """Ask the prompts `keys`, in the order of `query`; None asks nothing."""
@@ -114,11 +114,11 @@ class Viewport:
         if (state.pose, size) != (self._pose, self._size):
             self._pose, self._size, self._moved = state.pose, size, state.now
         still = state.now - max(self._moved, touched)
-        wants_maps = state.wants_maps and state.info.num_atoms > 0
-        plan = self.pace.resting(wants_maps, still) or self.pace.moving(wants_maps)
-        wanted = _Drawn(self._serial, state.pose, size, plan)
+        kind = _kind(state)
+        resting = self.pace.resting(kind, still)
+        wanted = _Drawn(self._serial, state.pose, size, resting or self.pace.moving(kind))
         if not self._covers(wanted):
-            self._draw(wanted)
+            self._draw(wanted, moving=resting is None)
         self._colour(state)
         return self.pace.next_rest(still)
 
@@ -127,7 +127,7 @@ class Viewport:
         drawn = self._drawn
         if self._renderer is None or self._query is None or drawn is None or self._camera is None:
             return None
-        if not drawn.plan.maps or state.now - self._moved < SETTLE_AFTER:
+        if drawn.plan.kind is not Kind.MAPS or state.now - self._moved < SETTLE_AFTER:
             return None
         key = (drawn, id(self._query))
         if key == self._answered:
@@ -148,17 +148,24 @@ class Viewport:
         drawn = self._drawn
         if drawn is None or drawn != replace(wanted, plan=drawn.plan):
             return False
-        return drawn.plan.scale >= wanted.plan.scale and drawn.plan.maps >= wanted.plan.maps
+        return drawn.plan.covers(wanted.plan)
 
-    def _draw(self, wanted: _Drawn) -> None:
+    def _draw(self, wanted: _Drawn, moving: bool) -> None:
         assert self._renderer is not None
-        width, height = (max(8, round(side * wanted.plan.scale)) for side in wanted.size)
+        plan = wanted.plan
+        width, height = (max(8, round(side * plan.scale)) for side in wanted.size)
         self._camera = to_camera(wanted.pose, width, height)
         start = time.perf_counter()
-        self._renderer.draw(self._camera, background=BACKGROUND, weight_maps=wanted.plan.maps)
+        self._renderer.draw(
+            self._camera,
+            background=BACKGROUND,
+            weight_maps=plan.kind is Kind.MAPS,
+            fast=plan.kind is Kind.FAST,
+            share=plan.share,
+        )
         self._ctx.finish()  # software and hardware alike: the time of the picture, not of the call
         seconds = time.perf_counter() - start
-        self.pace = self.pace.learn(wanted.plan, seconds)
+        self.pace = self.pace.learn(plan, seconds, moving)
         self.picture_seconds, self.picture_size = seconds, (width, height)
         self._drawn, self._colouring = wanted, None
 
@@ -169,7 +176,7 @@ class Viewport:
             return
         shown = {p.key: p for p in state.prompts}
         asked = [shown[key] for key in self._keys if key in shown]
-        mode = state.mode if drawn.plan.maps or state.mode is Mode.DEPTH else Mode.RGB
+        mode = state.mode if drawn.plan.covers(replace(drawn.plan, kind=_kind(state))) else Mode.RGB
         if mode in (Mode.HEAT, Mode.LABELS) and (not asked or len(asked) != len(self._keys)):
             mode = Mode.RGB
         active = next((i for i, p in enumerate(asked) if p.key == state.active), 0)
@@ -189,3 +196,10 @@ class Viewport:
             self._texture = renderer.depth_texture()
         else:
             self._texture = renderer.rgb_texture
+
+
+def _kind(state: State) -> Kind:
+    """What a picture must hold to show what is wanted while the camera moves."""
+    if not state.wants_maps or state.info is None or state.info.num_atoms == 0:
+        return Kind.COLOUR
+    return Kind.MAPS if state.mode is Mode.ATOMS else Kind.FAST

@@ -139,9 +139,9 @@ class Worker:
             case Answer():
                 self._put(score_prompts(errand))
             case WriteScene(scene, path):
-                from langflash_core.scene import save
+                from langflash_core.export import export
 
-                save(scene, path)
+                export(scene, path)
                 self._put(SceneWritten(path))
             case MakeThumbnails(paths):
                 for path in paths:
@@ -182,9 +182,9 @@ def make_scene(
         LangFlashError: what `reconstruct` and `load` raise; Cancelled among them.
     """
     if isinstance(job, LoadScene):
-        from langflash_core.scene import load
+        from langflash_core.export import read
 
-        scene = load(job.path)
+        scene = read(job.path)
         return SceneReady(describe_scene(scene, serial, job.path.name, job.path))
     from langflash_core.pipeline import reconstruct
 
@@ -197,7 +197,10 @@ def describe_scene(scene, serial: int, name: str, path: Path | None = None):
     """`SceneInfo` of a `Scene`: counts, warnings, and a pose per input view."""
     from app.window.poses import from_view, median_reach
     from app.window.state import SceneInfo
+    from langflash_core.types import NO_LANGUAGE
 
+    mute = scene.semantics.space == NO_LANGUAGE
+    said = ("This splat file holds no language: phrases find nothing in it.",) if mute else ()
     means = scene.gaussians.means.double().numpy()
     views = []
     for viewmat, K in zip(scene.viewmats.double().numpy(), scene.Ks.double().numpy(), strict=True):
@@ -210,7 +213,7 @@ def describe_scene(scene, serial: int, name: str, path: Path | None = None):
         num_gaussians=len(scene.gaussians),
         num_atoms=scene.semantics.num_atoms,
         space=scene.semantics.space,
-        warnings=tuple(str(w) for w in scene.metadata.get("warnings", ())),
+        warnings=(*said, *(str(w) for w in scene.metadata.get("warnings", ()))),
         path=path,
     )
 

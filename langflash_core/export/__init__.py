@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from langflash_core.errors import OutputError, SceneFileError
-from langflash_core.export import npz, png
+from langflash_core.export import coco, npz, ply, png, splat
 from langflash_core.scene.file import load, save
 from langflash_core.types import Frame, QueryResult, Scene
 
@@ -28,8 +28,15 @@ WRITERS: dict[str, tuple[Writer, ...]] = {
         Writer(QueryResult, "an answer", png.write_answer),
     ),
     ".npz": (Writer(QueryResult, "an answer", npz.write_npz),),
+    ".json": (Writer(QueryResult, "an answer", coco.write_answer),),
+    ".ply": (Writer(Scene, "a scene", ply.write_ply),),
+    ".splat": (Writer(Scene, "a scene", splat.write_splat),),
 }
-READERS: dict[str, Callable[[Path], Scene]] = {".langflash": load}
+READERS: dict[str, Callable[[Path], Scene]] = {
+    ".langflash": load,
+    ".ply": ply.read_ply,
+    ".splat": splat.read_splat,
+}
 
 
 def export(subject: Scene | Frame | QueryResult, path: Path | str) -> None:
@@ -67,4 +74,9 @@ def read(path: Path | str) -> Scene:
     if reader is None:
         known = ", ".join(sorted(READERS))
         raise SceneFileError(f"{path.name} is not a scene this program reads; name a file ending in {known}")
-    return reader(path)
+    try:
+        return reader(path)
+    except FileNotFoundError as error:
+        raise SceneFileError(f"scene {path} does not exist; check the path") from error
+    except OSError as error:
+        raise SceneFileError(f"{path} cannot be read ({error.strerror}); check its permissions") from error

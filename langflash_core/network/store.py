@@ -132,6 +132,9 @@ def assemble_network(
             _fill(network, name, part.path, device)
         filled.update(fresh)
     network.complete(filled, _advice(preset))
+    for parameter in network.parameters():
+        if parameter.ndim == 4:  # convolutions are a fifth to a third faster on a CPU with channels last
+            parameter.data = parameter.data.contiguous(memory_format=torch.channels_last)
     return network.to(device)
 
 
@@ -162,11 +165,16 @@ def _fill(network: LangFlashNet, name: str, path: Path, device: str | torch.devi
             if value.shape != expected[key].shape:
                 problems.append(f"{key} is {tuple(value.shape)}, expected {tuple(expected[key].shape)}")
             tensors[key] = value
-    problems += [f"{k} holds NaN or Inf" for k, v in tensors.items() if not bool(torch.isfinite(v).all())]
+    problems += [f"{k} holds NaN or Inf" for k, v in tensors.items() if not _finite(v)]
     if problems:
         shown = "; ".join(sorted(problems)[:5]) + ("; ..." if len(problems) > 5 else "")
         raise WeightsError(f"{path} does not fit '{name}' ({len(problems)} tensors: {shown}); {_REMEDY}")
     module.load_state_dict(tensors, assign=True)
+
+
+def _finite(value: Tensor) -> bool:
+    """One sum tells nearly always, and is several times faster than asking every number."""
+    return bool(torch.isfinite(value.sum())) or bool(torch.isfinite(value).all())
 
 
 def _differences(expected: Iterable[str], found: Iterable[str]) -> list[str]:

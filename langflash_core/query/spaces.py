@@ -9,6 +9,7 @@ from torch import Tensor
 
 from langflash_core.errors import PromptError
 from langflash_core.query import clip, minilm
+from langflash_core.types import NO_LANGUAGE
 
 # Kerr et al. 2023 (LERF), section 4.2.
 NEGATIVES = ("object", "things", "stuff", "texture")
@@ -84,8 +85,13 @@ def language_space(name: str = "minilm") -> LanguageSpace:
     """The space called `name`; its tower is read only when something is encoded.
 
     Raises:
-        PromptError: there is no such space.
+        PromptError: there is no such space, or the scene came without language.
     """
+    if name == NO_LANGUAGE:
+        raise PromptError(
+            "This scene came from a splat file, which holds shapes and colours but no language, so it "
+            "answers no phrases: make a scene from photos with langflash reconstruct."
+        )
     try:
         return _SPACES[name]
     except KeyError:

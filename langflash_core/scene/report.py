@@ -13,10 +13,10 @@ def describe(scene: Scene) -> dict:
 
     Returns:
         `gaussians, atoms, channels, weights_per_gaussian (mean), sh_degree, views, view_size,
-        photos, preset, space, bytes {field: bytes, total}, bounding_box and core_box {min, max}
-        in scene units (None when empty), metric_scale (metres per unit or None), counts, pruning
-        (as `prune` left it, with `psnr_db` and `relevance_error` where they were measured),
-        timings {stage: seconds, total}, warnings`.
+        photos, preset, source (the splat file it came from, or None), space, bytes {field: bytes,
+        total}, bounding_box and core_box {min, max} in scene units (None when empty), metric_scale
+        (metres per unit or None), counts, pruning (as `prune` left it, with `psnr_db` and
+        `relevance_error` where they were measured), timings {stage: seconds, total}, warnings`.
     """
     known = scene.metadata
     sizes = field_bytes(scene)
@@ -32,6 +32,7 @@ def describe(scene: Scene) -> dict:
         "view_size": list(scene.view_size),
         "photos": list(known.get("photos", [])),
         "preset": known.get("preset"),
+        "source": known.get("source"),
         "space": scene.semantics.space,
         "bytes": {**sizes, "total": sum(sizes.values())},
         "bounding_box": _box(scene.gaussians.means, (0.0, 1.0)),

@@ -16,6 +16,7 @@ from scipy.ndimage import distance_transform_edt
 from torch import Tensor
 
 from langflash_core.network.encoder import Encoder
+from langflash_core.network.precision import mixed
 from langflash_core.rooms import (
     HELD_OUT_LIBRARIES,
     TRAIN_LIBRARIES,
@@ -123,7 +124,7 @@ def _finished(record: RoomRecord, plan: CachePlan, encoder: Encoder | None) -> R
 def encode_pictures(encoder: Encoder, rgb: Tensor) -> Tensor:
     """Hook tokens (V, L, T, C) float32 of pictures (V, 3, H, W) uint8, in bfloat16 where that is quick."""
     images = rgb.to(encoder.mean.device).float()[None] / 255
-    with torch.autocast(images.device.type, dtype=torch.bfloat16):
+    with mixed(images.device):
         hooks = encoder(images).hooks
     return torch.stack([hook[0].float() for hook in hooks], 1).cpu()
 

@@ -17,6 +17,7 @@ import torch
 from torch import Tensor, nn
 
 from langflash_core.network.model import LangFlashNet
+from langflash_core.network.precision import mixed
 from langflash_core.training.batches import RoomSet
 from langflash_core.training.stages import Stage, Words, modules_of
 
@@ -162,7 +163,7 @@ class _Run:
         views = sizes[int(torch.multinomial(chances, 1, generator=generator))]
         count = max(1, (options.pictures or stage.pictures) // views)
         batch = self.rooms.draw(count, views, generator).to(options.device)
-        with torch.autocast(torch.device(options.device).type, dtype=torch.bfloat16):
+        with mixed(options.device):
             loss = stage.loss(self.network, batch, self.words)
         self.optimiser.zero_grad(set_to_none=True)
         if not bool(torch.isfinite(loss.total)):

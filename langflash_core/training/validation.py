@@ -8,6 +8,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.network.model import LangFlashNet
+from langflash_core.network.precision import mixed
 from langflash_core.training.batches import RoomSet, SceneBatch
 from langflash_core.training.measures import (
     abs_rel,
@@ -47,7 +48,7 @@ class Validator:
     def __call__(self, network: LangFlashNet) -> dict[str, float]:
         rows: list[dict[str, float | Tensor]] = []
         for batch in self.rooms.walk(4, views=self.views):
-            with torch.autocast(torch.device(self.device).type, dtype=torch.bfloat16):
+            with mixed(self.device):
                 rows.append(self.measure(network, batch.to(self.device), self.words))
         return _summary(rows)
 

@@ -9,7 +9,8 @@ in vec4 in_shape;
 #ifdef LAYERS
 in vec3 in_weights[LAYERS];
 flat out vec3 weights[LAYERS];
-#else
+#endif
+#ifdef COLOUR
 in vec3 in_colour;
 flat out vec4 colour_depth;
 #endif
@@ -36,7 +37,8 @@ void main() {
     gl_Position = broken ? vec4(2.0, 2.0, 2.0, 1.0) : vec4(2.0 * pos_px / image_size - 1.0, 0.0, 1.0);
 #ifdef LAYERS
     for (int layer = 0; layer < LAYERS; ++layer) weights[layer] = in_weights[layer];
-#else
+#endif
+#ifdef COLOUR
     colour_depth = vec4(in_colour, in_place.w);
 #endif
 }

@@ -1,61 +1,199 @@
 """`langflash export`: a scene, or what answers a phrase, as a file other programs read."""
 
 from argparse import Namespace
+from collections.abc import Callable
 from typing import TextIO
 
 from torch import Tensor
 
 from app.cli import pictures
-from app.cli.cameras import chosen_camera
+from app.cli.cameras import CameraChoice, chosen_camera
 from app.cli.commands.query import spoken
-from app.cli.files import check_output_file, readable_file
+from app.cli.files import check_output_file, readable_file, staged_folder
 from app.cli.pictures import write_picture
-from app.cli.renderers import open_renderer
+from app.cli.renderers import Renderer, open_renderer
 from app.cli.report import ProgressBar
-from langflash_core.errors import PromptError, SceneFileError
-from langflash_core.types import QueryResult
+from app.cli.scenes import open_scene
+from langflash_core.errors import InputError, PromptError, SceneFileError
+from langflash_core.types import Camera, QueryResult, Scene
 
-SUFFIXES = (".png",)
+SCENES = (".langflash", ".ply", ".splat")
+SUFFIXES = (".png", *SCENES, ".json", ".mp4", ".npz")
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """Write the picture of a view, or with --prompt the cut-out of what answers it.
+    """Write what the suffix of -o says; with --prompt only what answers it.
 
     Raises:
         LangFlashError: the scene, a phrase, the camera or the output cannot be used, or
-            nothing in the view answers.
+            nothing answers.
     """
     prompts = spoken(args.prompt or [])
-    if args.threshold is not None and not prompts:
-        raise PromptError('--threshold needs a phrase; add --prompt "armchair"')
+    suffix = check_output_file(args.output, SUFFIXES, inputs=[args.scene]).suffix.lower()
+    _check_words(args, suffix, prompts)
     choice = chosen_camera(args)
     readable_file(args.scene, "scene", SceneFileError)
-    check_output_file(args.output, SUFFIXES, inputs=[args.scene])
-    from langflash_core import pipeline
-    from langflash_core.export.png import to_8bit
-    from langflash_core.scene import load
+    write: Callable[..., str] = _write_scene
+    if suffix == ".mp4":
+        from app.cli.video import check_encoder
 
-    scene = load(args.scene)
+        check_encoder()
+        write = _write_video
+    elif suffix == ".json":
+        write = _write_masks
+    elif suffix == ".npz":
+        write = _write_numbers
+    elif suffix == ".png":
+        write = _write_labels if args.what == "labels" else _write_picture
+    print(f"{args.output}: {write(args, open_scene(args.scene), prompts, choice)}", file=out)
+
+
+def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
+    """Options that do not go together.
+
+    Raises:
+        InputError: says which.
+    """
+    if args.threshold is not None and not prompts:
+        raise PromptError('--threshold needs a phrase; add --prompt "armchair"')
+    if not prompts and (suffix == ".json" or args.what == "labels"):
+        what = "a .json of masks" if suffix == ".json" else "--what labels"
+        raise PromptError(f'{what} needs a phrase; add --prompt "armchair"')
+    if args.what == "labels" and suffix != ".png":
+        raise InputError(f"--what labels is a picture; name a .png instead of {args.output.name}")
+    if args.seconds is not None and suffix != ".mp4":
+        raise InputError("--seconds is for videos; name an .mp4, or leave it away")
+    looked_at = [name for name in ("view", "camera", "size") if getattr(args, name) is not None]
+    if suffix in SCENES and looked_at:
+        raise InputError(f"a {suffix} holds the whole scene, not a view of it; leave --{looked_at[0]} away")
+    if suffix == ".mp4" and set(looked_at) - {"size"}:
+        raise InputError(f"a video moves between the views by itself; leave --{looked_at[0]} away")
+
+
+def _write_scene(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
+    from langflash_core.export import export
+    from langflash_core.files import make_folder
+
+    chosen = _selected(args, scene, prompts)
+    make_folder(args.output.parent)
+    export(chosen, args.output)
+    share = f" of {len(scene.gaussians):,}" if prompts else ""
+    return f"{len(chosen.gaussians):,}{share} Gaussians, {args.output.stat().st_size / 1e6:.1f} MB"
+
+
+def _selected(args: Namespace, scene: Scene, prompts: list[str]) -> Scene:
+    from langflash_core import pipeline
+
+    return pipeline.select(scene, prompts, threshold=args.threshold) if prompts else scene
+
+
+def _write_picture(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
+    from langflash_core.export.png import to_8bit
+
     camera = choice.of(scene)
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
         progress("drawing", 0.2)
         if prompts:
-            result = pipeline.query(scene, prompts, camera=camera, threshold=args.threshold, render=renderer)
+            result = _answer(args, scene, prompts, camera, renderer)
+            _check_found([result])
             pixels = pictures.cut_out(result.frame, _found(result))
         else:
             pixels = to_8bit(renderer(scene, camera, weight_maps=False).rgb)
     write_picture(args.output, pixels)
-    print(f"{args.output}: {camera.width} x {camera.height}", file=out)
+    return f"{camera.width} x {camera.height}"
+
+
+def _write_numbers(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
+    """Relevance and masks of the phrases, or, without one, the view with its weight maps and dictionary."""
+    from langflash_core.export.npz import write_npz, write_view
+    from langflash_core.files import make_folder
+
+    camera = choice.of(scene)
+    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+        progress("drawing", 0.2)
+        make_folder(args.output.parent)
+        if prompts:
+            write_npz(_answer(args, scene, prompts, camera, renderer), args.output)
+            return f"{len(prompts)} phrases over {camera.width} x {camera.height}"
+        write_view(renderer(scene, camera), scene.semantics, camera, args.output)
+    return f"{camera.width} x {camera.height} with {scene.semantics.num_atoms} weight maps"
+
+
+def _write_labels(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
+    """A palette PNG, 0 for nothing and i for the i-th phrase, and its legend as .json beside it."""
+    from langflash_core.export.png import label_map, write_labels
+
+    legend = check_output_file(args.output.with_suffix(".json"), inputs=[args.scene])
+    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+        progress("drawing", 0.2)
+        result = _answer(args, scene, prompts, choice.of(scene), renderer)
+        _check_found([result])
+        with staged_folder(args.output.parent) as staging:
+            write_labels(staging / args.output.name, label_map(result), prompts)
+    found = sum(answer.found for answer in result.answers)
+    return f"{found} of {len(prompts)} phrases, legend in {legend.name}"
+
+
+def _write_masks(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
+    """COCO instances of one view, or of every photo's, with the views' pictures beside the file."""
+    from langflash_core.export.coco import write_coco
+    from langflash_core.export.png import write_rgb
+
+    if args.view is None and args.camera is None:
+        cameras = [scene.camera(view, *(args.size or (None, None))) for view in range(scene.num_views)]
+    else:
+        cameras = [choice.of(scene)]
+    names = [f"{args.output.stem}_{index}.png" for index in range(len(cameras))]
+    for name in names:
+        check_output_file(args.output.with_name(name), inputs=[args.scene])
+    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+        results = []
+        for index, camera in enumerate(cameras):
+            progress("drawing", index / len(cameras))
+            results.append(_answer(args, scene, prompts, camera, renderer))
+        _check_found(results)
+        with staged_folder(args.output.parent) as staging:
+            for name, result in zip(names, results, strict=True):
+                write_rgb(staging / name, result.frame.rgb)
+            write_coco(results, names, staging / args.output.name)
+    masks = sum(answer.found for result in results for answer in result.answers)
+    return f"{masks} mask{'s' * (masks > 1)}, pictures in {', '.join(names)}"
+
+
+def _write_video(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
+    from app.cli import video
+
+    chosen = _selected(args, scene, prompts)
+    cameras = video.tour(scene, args.size or scene.view_size, args.seconds or video.SECONDS)
+    with (
+        ProgressBar() as progress,
+        open_renderer(args.backend) as renderer,
+        staged_folder(args.output.parent) as staging,
+    ):
+        video.write(staging / args.output.name, chosen, cameras, renderer, progress)
+    return f"{len(cameras) / video.RATE:.1f} s, {cameras[0].width} x {cameras[0].height}"
+
+
+def _answer(
+    args: Namespace, scene: Scene, prompts: list[str], camera: Camera, renderer: Renderer
+) -> QueryResult:
+    from langflash_core import pipeline
+
+    return pipeline.query(scene, prompts, camera=camera, threshold=args.threshold, render=renderer)
+
+
+def _check_found(results: list[QueryResult]) -> None:
+    """Raises:
+    PromptError: no view answers any phrase.
+    """
+    answers = [answer for result in results for answer in result.answers]
+    if not any(answer.found for answer in answers):
+        asked = ", ".join(answer.prompt for answer in results[0].answers)
+        where = "this view" if len(results) == 1 else "any view"
+        best = max(answer.score for answer in answers)
+        raise PromptError(f"not found in {where}: {asked} (best score {best:.3f}); lower --threshold")
 
 
 def _found(result: QueryResult) -> Tensor:
-    """Masks (P, H, W) of the phrases that are there.
-
-    Raises:
-        PromptError: none is.
-    """
-    if not any(answer.found for answer in result.answers):
-        asked = ", ".join(answer.prompt for answer in result.answers)
-        best = max(answer.score for answer in result.answers)
-        raise PromptError(f"not found in this view: {asked} (best score {best:.3f}); lower --threshold")
+    """Masks (P, H, W) of the phrases that are there."""
     return result.masks[[answer.found for answer in result.answers]]

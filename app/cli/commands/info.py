@@ -3,9 +3,8 @@
 from argparse import Namespace
 from typing import Any, TextIO
 
-from app.cli.files import readable_file
 from app.cli.report import write_json
-from langflash_core.errors import SceneFileError
+from app.cli.scenes import open_scene
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -14,12 +13,11 @@ def run(args: Namespace, out: TextIO) -> None:
     Raises:
         SceneFileError: missing, truncated or foreign.
     """
-    readable_file(args.scene, "scene", SceneFileError)
-    from langflash_core.scene import describe, load
+    from langflash_core.scene import describe
 
     document = {
         "scene": str(args.scene),
-        **describe(load(args.scene)),
+        **describe(open_scene(args.scene)),
         "file_bytes": args.scene.stat().st_size,
     }
     if args.json:

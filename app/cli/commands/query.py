@@ -9,6 +9,7 @@ from app.cli.cameras import chosen_camera
 from app.cli.files import check_folder, readable_file, staged_folder
 from app.cli.renderers import open_renderer
 from app.cli.report import ProgressBar, write_json
+from app.cli.scenes import open_scene
 from langflash_core.errors import PromptError, SceneFileError
 from langflash_core.types import PromptAnswer, QueryResult, Scene
 
@@ -26,9 +27,8 @@ def run(args: Namespace, out: TextIO) -> None:
     check_folder(args.output)
     from langflash_core import pipeline
     from langflash_core.export.answers import write_answers
-    from langflash_core.scene import load
 
-    scene = load(args.scene)
+    scene = open_scene(args.scene)
     camera = choice.of(scene)
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
         progress("drawing", 0.2)

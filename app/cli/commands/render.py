@@ -12,6 +12,7 @@ from app.cli.files import check_output_file, readable_file
 from app.cli.pictures import write_picture
 from app.cli.renderers import Renderer, open_renderer
 from app.cli.report import ProgressBar, write_json
+from app.cli.scenes import open_scene
 from langflash_core.errors import InputError, PromptError, SceneFileError
 from langflash_core.export.colours import label_colours
 from langflash_core.export.png import heat_over, to_8bit
@@ -30,9 +31,8 @@ def run(args: Namespace, out: TextIO) -> None:
     choice = chosen_camera(args)
     readable_file(args.scene, "scene", SceneFileError)
     check_output_file(args.output, (".png",), inputs=[args.scene])
-    from langflash_core.scene import load
 
-    scene = load(args.scene)
+    scene = open_scene(args.scene)
     _check_atom(args.what, scene)
     camera = choice.of(scene)
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
@@ -67,6 +67,8 @@ def _prompts_for(kind: str, given: list[str] | None) -> list[str]:
 
 def _check_atom(what: tuple[str, int | None], scene: Scene) -> None:
     atom, count = what[1], scene.semantics.num_atoms
+    if what[0] == "atoms" and not count:
+        raise InputError("this scene has no atoms to show, so there is nothing to colour; use --what rgb")
     if atom is not None and atom >= count:
         choice = f"use weights:0 to weights:{count - 1}" if count else "use --what rgb"
         raise InputError(f"there is no atom {atom}: this scene has {count}; {choice}")

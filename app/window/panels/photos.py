@@ -44,7 +44,7 @@ def _hint(look: Look) -> None:
     canvas.add_rect_filled(corner, end, widgets.u32(theme.CANVAS), look.px(8))
     canvas.add_rect(corner, end, widgets.u32(theme.LINE), look.px(8), look.px(1.5))
     lines = ((fa.ICON_FA_IMAGES, theme.ACCENT), ("Drop two or more photos of a room", theme.TEXT))
-    lines = (*lines, ("or a folder, or a .langflash scene", theme.MUTED))
+    lines = (*lines, ("or a folder, a scene, or a .ply of splats", theme.MUTED))
     step = height / (len(lines) + 1)
     for row, (text, colour) in enumerate(lines, start=1):
         size = imgui.calc_text_size(text)

@@ -21,6 +21,9 @@ WEIGHT_ERROR = {"float16": 2e-3, "float32": 2e-5}
 RELEVANCE_ERROR = {"float16": 2e-3, "float32": 1e-4}  # mean; ten times the slope of the sigmoid / 4
 
 
+pytestmark = pytest.mark.usefixtures("queries")
+
+
 @pytest.fixture(params=["float16", "float32"])
 def precision(request):
     return request.param

@@ -33,13 +33,21 @@ def resident_megabytes() -> float:
     return int(statm.read_text().split()[1]) * mmap.PAGESIZE / 1e6 if statm.exists() else 0.0
 
 
-def test_nothing_leaks_in_1000_frames(gl):
-    """Random sizes, scenes and phrases: no error, every name given back, memory level."""
-    bystander = gl.program(
+@pytest.fixture(scope="module")
+def use_another_program(context):
+    """A program in use outlives its deletion: use this one before counting."""
+    program = context.program(
         vertex_shader="#version 330 core\nout float x; void main() { x = 1.0; }", varyings=["x"]
     )
-    room, draws = gl.buffer(reserve=4), gl.vertex_array(bystander, [])
-    draws.transform(room, vertices=1)  # a program in use outlives its deletion: use this one before counting
+    room, draws = context.buffer(reserve=4), context.vertex_array(program, [])
+    yield lambda: draws.transform(room, vertices=1)
+    for owned in (draws, room, program):
+        owned.release()
+
+
+def test_nothing_leaks_in_1000_frames(gl, queries, use_another_program):
+    """Random sizes, scenes and phrases: no error, every name given back, memory level."""
+    use_another_program()
     before = living(gl)
     renderer = SplatRenderer(gl)
     shake = random.Random(0)
@@ -48,8 +56,12 @@ def test_nothing_leaks_in_1000_frames(gl):
     for _ in range(1000):
         scene = shake.choice(scenes)
         renderer.set_scene(scene)
+        size = shake.randrange(1, 60), shake.randrange(1, 60)
         renderer.draw(
-            camera(shake.randrange(1, 60), shake.randrange(1, 60)), weight_maps=shake.random() < 0.5
+            camera(*size),
+            weight_maps=shake.random() < 0.5,
+            fast=shake.random() < 0.3,
+            share=shake.choice((1.0, 1.0, 0.25)),
         )
         renderer.ask(question(scene, shake.randrange(1, 9)))
         renderer.heat_texture(0)
@@ -59,15 +71,14 @@ def test_nothing_leaks_in_1000_frames(gl):
         assert gl.error == "GL_NO_ERROR"
         megabytes.append(resident_megabytes())
     assert living(gl) != before
-    # Each frame makes textures of some 100 kB: a leak of them would be 100 MB. All scenes, pictures
-    # and shaders have been there after 300 frames; the allocator's own play is a few megabytes.
-    assert max(megabytes[700:]) - max(megabytes[:300]) < 8
+    # Each frame makes textures of some 100 kB: a leak of them would be 40 MB in 400 frames. After 600
+    # nearly all shaders have been there, which the driver compiles anew for each format it meets; what
+    # came later took 8 to 11 MB in runs of 3,000 frames, and nothing after 1,800.
+    assert max(megabytes[600:]) - max(megabytes[:600]) < 20
     renderer.release()
     renderer.release()
-    draws.transform(room, vertices=1)
+    use_another_program()
     assert living(gl) == before
-    for owned in (draws, room, bystander):
-        owned.release()
 
 
 def test_a_released_renderer_draws_again(gl):

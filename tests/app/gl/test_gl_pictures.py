@@ -9,6 +9,8 @@ import torch
 from tests.app.gl.questions import question
 from tests.splat.scenes import camera, cloud, maps_of, scene_of, splats
 
+pytestmark = pytest.mark.usefixtures("queries")
+
 
 def pixels(texture) -> np.ndarray:
     """(H, W, 4) in [0, 1], top row first."""

@@ -172,5 +172,7 @@ def test_drops_are_sorted(tmp_path: Path) -> None:
     drop = sort_drop([folder, scene, text, empty, tmp_path / "gone.jpg", folder / "b.JPG"])
     assert [p.name for p in drop.photos] == ["a.heic", "b.JPG"]
     assert [p.name for p in drop.scenes] == ["s.langflash"]
+    (tmp_path / "bonsai.PLY").touch()
+    assert [p.name for p in sort_drop([tmp_path / "bonsai.PLY"]).scenes] == ["bonsai.PLY"]
     assert [s.split(" ")[0] for s in drop.rejected[:1]] == ["t.txt"]
     assert "holds no photo" in drop.rejected[1] and "does not exist" in drop.rejected[2]

@@ -64,6 +64,18 @@ def test_a_scene_is_loaded_and_phrases_are_scored(worker: Worker, scene_file: Pa
     assert chair.score >= compiled.query.threshold > elephant.score
 
 
+def test_a_splat_file_is_opened_saved_and_said_to_be_mute(
+    worker: Worker, scene_file: Path, tmp_path: Path
+) -> None:
+    worker.submit(messages.WriteScene(load(scene_file), tmp_path / "room.ply"))
+    wait_for(worker, messages.SceneWritten)
+    worker.submit(messages.LoadScene(tmp_path / "room.ply"))
+    info = wait_for(worker, messages.SceneReady)[-1].info
+    assert (info.num_atoms, len(info.views), info.name) == (0, 1, "room.ply")
+    assert info.num_gaussians == len(load(scene_file).gaussians)
+    assert len(info.warnings) == 1 and "no language" in info.warnings[0]
+
+
 def test_failures_are_sentences_and_the_thread_lives_on(
     worker: Worker, scene_file: Path, tmp_path: Path
 ) -> None:

@@ -1,0 +1,18 @@
+"""Speed against error: every way of drawing timed beside the default, frame by frame, and compared
+with the float64 reference."""
+
+from .cases import Case, generated_atoms_case, paper_cases, scene_case, synthetic_case
+from .measure import measure
+from .report import csv_text, document, table
+
+__all__ = [
+    "Case",
+    "csv_text",
+    "document",
+    "generated_atoms_case",
+    "measure",
+    "paper_cases",
+    "scene_case",
+    "synthetic_case",
+    "table",
+]

@@ -1,0 +1,41 @@
+"""What a time was measured on."""
+
+import importlib.metadata
+import os
+import platform
+from pathlib import Path
+
+import moderngl
+
+import langflash_core
+
+_PACKAGES = ("moderngl", "numpy", "torch")
+_THREADS = ("LP_NUM_THREADS", "OMP_NUM_THREADS")  # how many the software rasteriser and torch may use
+
+
+def machine(ctx: moderngl.Context) -> dict:
+    """GPU, driver, processor and versions, as plain JSON values."""
+    return {
+        "gpu": ctx.info["GL_RENDERER"],
+        "vendor": ctx.info["GL_VENDOR"],
+        "driver": ctx.info["GL_VERSION"],
+        "processor": _processor(),
+        "cpus": os.cpu_count(),
+        "threads": {name: os.environ[name] for name in _THREADS if name in os.environ},
+        "load": round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None,
+        "system": f"{platform.system()} {platform.machine()}",
+        "versions": {
+            "langflash": langflash_core.__version__,
+            "python": platform.python_version(),
+            **{name: importlib.metadata.version(name) for name in _PACKAGES},
+        },
+    }
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    names = (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    return next(names, platform.processor())

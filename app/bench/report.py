@@ -1,0 +1,195 @@
+"""A result as JSON, CSV and a table to read."""
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from langflash_core.query.relevance import CompiledQuery
+from langflash_core.scene.prune import CUT
+
+from .cases import Case
+from .errors import Errors
+from .measure import Result, Times
+from .modes import Mode, described_default
+
+FORMAT = 1
+COLUMNS = (
+    "mode", "axis", "ms_median", "ms_p95", "times_default", "cpu_ms_median", "gpu_ms_median",
+    "query_ms", "phrase_ms", "psnr_db", "relevance_mean", "relevance_max", "mask_iou",
+)  # fmt: skip
+_HEADINGS = (
+    "mode", "ms", "p95", "x default", "CPU ms", "GPU ms", "query ms", "phrase ms",
+    "PSNR dB", "rel. mean", "rel. max", "mask IoU",
+)  # fmt: skip
+
+
+def document(machine: dict, results: Sequence[Result]) -> dict:
+    """Everything measured, as plain JSON values; what could not be measured is null."""
+    return {"format": FORMAT, "machine": machine, "cases": [_case(result) for result in results]}
+
+
+def csv_text(document: dict) -> str:
+    """One line a row of the document, its case before it."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(("case", *COLUMNS))
+    for case in document["cases"]:
+        for row in case["rows"]:
+            values = (row[name] for name in COLUMNS)
+            writer.writerow((case["name"], *("" if value is None else value for value in values)))
+    return stream.getvalue()
+
+
+def table(document: dict) -> str:
+    """For people: the machine, then a table for each case."""
+    machine = document["machine"]
+    versions = ", ".join(f"{name} {version}" for name, version in machine["versions"].items())
+    threads = "".join(f", {name}={value}" for name, value in machine["threads"].items())
+    lines = [
+        f"GPU: {machine['gpu']} ({machine['vendor']}), {machine['driver']}",
+        f"CPU: {machine['processor']}, {machine['cpus']} processors{threads}, load {machine['load']}",
+        f"{versions}; {machine['system']}",
+    ]
+    for case in document["cases"]:
+        lines += ["", *_case_lines(case)]
+    return "\n".join(lines)
+
+
+def _case(result: Result) -> dict:
+    case, stages = result.case, result.stages
+    gaussians, semantics = case.scene.gaussians, case.scene.semantics
+    degrees, way = case.path.step()
+    width, height = case.size
+    base = result.rows[0][1].frames
+    return {
+        "name": f"{case.name}, {width} x {height}, {_count(case.compiled)}",
+        "scene": {
+            "name": case.name,
+            "gaussians": len(gaussians),
+            "atoms": semantics.num_atoms,
+            "channels": semantics.dictionary.shape[1],
+            "rank": case.compiled.factor.shape[1],
+            "weights_per_gaussian": semantics.weight_ids.shape[1],
+            "weights_above_cut": round(float((semantics.weight_values >= CUT).sum(-1).float().mean()), 3),
+            "sh_bases": gaussians.sh.shape[1],
+            "space": semantics.space,
+            "notes": list(case.notes),
+        },
+        "picture": [width, height],
+        "query": {
+            "phrases": list(case.compiled.texts),
+            "negatives": list(case.compiled.negative_texts),
+            "mode": case.compiled.mode,
+            "threshold": case.compiled.threshold,
+        },
+        "path": {
+            "kind": case.path.kind,
+            "frames": case.path.num_frames,
+            "degrees_a_frame": _rounded(degrees),
+            "units_a_frame": _rounded(way),
+            "error_frames": list(result.error_frames),
+        },
+        "default": described_default(case.scene),
+        "stages": {
+            "colour_ms": _rounded(stages.colour_ms),
+            "maps_ms": _rounded(stages.maps_ms),
+            "map_passes": stages.map_passes,
+            "layers_a_pixel": _rounded(stages.layers_a_pixel),
+            **_per_splat(case, result),
+        },
+        "rows": [_row(mode, times, errors, base) for mode, times, errors in result.rows],
+    }
+
+
+def _per_splat(case: Case, result: Result) -> dict:
+    """Nanoseconds for one splat at one pixel: of the colours, and of one pass of weight maps."""
+    stages = result.stages
+    blended = stages.layers_a_pixel * case.size[0] * case.size[1]
+    passes = max(1, stages.map_passes)
+    if not blended:
+        return {"colour_ns_a_splat": None, "maps_ns_a_splat": None}
+    return {
+        "colour_ns_a_splat": _rounded(1e6 * stages.colour_ms / blended),
+        "maps_ns_a_splat": _rounded(1e6 * stages.maps_ms / blended / passes),
+    }
+
+
+def _row(mode: Mode, times: Times, errors: Errors, base: list[float]) -> dict:
+    ratios = np.array(times.frames) / np.array(base)
+    values = (
+        mode.name,
+        mode.axis,
+        _rounded(np.median(times.frames)),
+        _rounded(np.percentile(times.frames, 95)),
+        _rounded(np.median(ratios)),
+        _rounded(np.median(times.cpu)),
+        _rounded(np.median(times.gpu)) if times.gpu else None,
+        _rounded(np.median(times.answers)) if times.answers else None,
+        _rounded(np.median(times.phrases)) if times.phrases else None,
+        _rounded(errors.psnr),
+        _rounded(errors.relevance_mean),
+        _rounded(errors.relevance_max),
+        None if errors.mask_iou is None else round(errors.mask_iou, 5),
+    )
+    return dict(zip(COLUMNS, values, strict=True))
+
+
+def _case_lines(case: dict) -> list[str]:
+    scene, path, stages = case["scene"], case["path"], case["stages"]
+    frames, compared, passes = path["frames"], path["error_frames"], stages["map_passes"]
+    lines = [
+        case["name"],
+        f"  {scene['gaussians']:,} Gaussians, K = {scene['atoms']}, C = {scene['channels']}, "
+        f"r = {scene['rank']}, m = {scene['weights_per_gaussian']} "
+        f"({scene['weights_above_cut']:.1f} above 1/255); phrases: {', '.join(case['query']['phrases'])}",
+        *(f"  {note}" for note in scene["notes"]),
+        f"  {frames} frame{_s(frames)} {path['kind']}, {path['degrees_a_frame']:g} degrees and "
+        f"{path['units_a_frame']:g} units a frame; errors against the float64 reference at "
+        f"frame{_s(len(compared))} {', '.join(map(str, compared))}",
+        f"  default: {case['default']}",
+        f"  of it, {stages['colour_ms']:g} ms sort and colours, {stages['maps_ms']:g} ms "
+        f"{passes} pass{_s(passes, 'es')} of weight maps; {stages['layers_a_pixel']:.1f} splats a pixel",
+    ]
+    rows = [_HEADINGS, *(_cells(row) for row in case["rows"])]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(_HEADINGS))]
+    for row in rows:
+        cells = (c.rjust(w) if i else c.ljust(w) for i, (c, w) in enumerate(zip(row, widths, strict=True)))
+        lines.append("  " + "  ".join(cells).rstrip())
+    return lines
+
+
+def _cells(row: dict) -> tuple[str, ...]:
+    def number(name: str, form: str) -> str:
+        return "-" if row[name] is None else format(row[name], form)
+
+    return (
+        row["mode"],
+        number("ms_median", ".1f"),
+        number("ms_p95", ".1f"),
+        number("times_default", ".3f"),
+        number("cpu_ms_median", ".1f"),
+        number("gpu_ms_median", ".1f"),
+        number("query_ms", ".2f"),
+        number("phrase_ms", ".2f"),
+        number("psnr_db", ".1f"),
+        number("relevance_mean", ".1e"),
+        number("relevance_max", ".1e"),
+        number("mask_iou", ".4f"),
+    )
+
+
+def _count(compiled: CompiledQuery) -> str:
+    count = len(compiled.texts)
+    return f"{count} phrase{_s(count)}"
+
+
+def _s(count: int, plural: str = "s") -> str:
+    return "" if count == 1 else plural
+
+
+def _rounded(value: float) -> float | None:
+    """Five digits; None for what JSON cannot hold: the PSNR of equal pictures."""
+    return float(f"{value:.5g}") if math.isfinite(value) else None

@@ -1,0 +1,107 @@
+"""`langflash bench`: how fast each way of drawing is, and what it gets wrong."""
+
+from argparse import Namespace
+from typing import TYPE_CHECKING, TextIO
+
+from app.cli.files import check_folder, readable_file, staged_folder
+from app.cli.report import ProgressBar, say_warnings, write_json
+from app.cli.scenes import open_scene
+from langflash_core.errors import InputError, OutputError, PromptError, SceneFileError
+
+if TYPE_CHECKING:
+    from app.bench import Case
+
+FRAMES = 8
+
+
+def run(args: Namespace, out: TextIO) -> None:
+    """Measure every mode on a scene or on generated ones; print a table, write JSON, CSV and a plot.
+
+    Raises:
+        LangFlashError: the scene, the phrases or the output cannot be used, or OpenGL is missing.
+    """
+    _check(args)
+    from app.bench import document, measure, table
+    from app.bench.machine import machine
+    from app.bench.modes import AXES, modes_for
+    from app.gl import offscreen_context
+
+    cases = _cases(args)
+    context = offscreen_context()
+    results = []
+    try:
+        with ProgressBar() as progress:
+            for number, case in enumerate(cases):
+
+                def told(stage: str, share: float, number: int = number) -> None:
+                    progress(stage, (number + share) / len(cases))
+
+                modes = modes_for(context, case.scene, args.only or AXES)
+                results.append(measure(context, case, modes, told))
+        measured = document(machine(context), results)
+    finally:
+        context.release()
+    if args.output is not None:
+        _write(args, measured)
+    if args.json:
+        write_json(measured, out)
+    else:
+        print(table(measured), file=out)
+
+
+def _check(args: Namespace) -> None:
+    """What can be said before anything is loaded.
+
+    Raises:
+        InputError: options that contradict each other, or an output that cannot be made.
+    """
+    generated = args.paper or args.synthetic is not None
+    if args.scene is None and not generated:
+        raise InputError("there is no scene to measure; give one, or --synthetic 100000, or --paper")
+    if args.scene is not None and generated:
+        raise InputError("--synthetic and --paper generate their scene; leave the scene file out")
+    if args.spread is not None and not generated:
+        raise InputError("--spread is for generated scenes; add --synthetic or --paper, or leave it out")
+    if args.prompt and (generated or args.atoms is not None):
+        raise PromptError("generated atoms know no words; leave --prompt or --atoms out")
+    if args.scene is not None:
+        readable_file(args.scene, "scene", SceneFileError)
+    if args.output is not None:
+        if args.output.is_file():
+            raise OutputError(f"cannot write to {args.output}: it is a file; give a folder")
+        check_folder(args.output)
+
+
+def _cases(args: Namespace) -> "list[Case]":
+    from app.bench import cases, generated_atoms_case, paper_cases, scene_case, synthetic_case
+
+    frames = args.frames or FRAMES
+    spread = 1.0 if args.spread is None else args.spread
+    if args.paper:
+        atoms = args.atoms or cases.PAPER_ATOMS
+        return paper_cases(args.synthetic or cases.PAPER_GAUSSIANS, atoms, args.size, frames, spread)
+    if args.synthetic is not None:
+        atoms = args.atoms or cases.SYNTHETIC_ATOMS
+        return [synthetic_case(args.synthetic, atoms, args.size, frames, spread=spread)]
+    scene, name = open_scene(args.scene), args.scene.stem
+    if args.atoms is not None:
+        return [generated_atoms_case(name, scene, args.atoms, args.size, frames)]
+    return [scene_case(name, scene, args.size, frames, args.prompt)]
+
+
+def _write(args: Namespace, measured: dict) -> None:
+    """bench.json, bench.csv and, where matplotlib is installed, bench.png."""
+    from app.bench import csv_text
+
+    with staged_folder(args.output) as staging:
+        with (staging / "bench.json").open("w", encoding="ascii") as stream:
+            write_json(measured, stream)
+        (staging / "bench.csv").write_text(csv_text(measured), encoding="utf-8")
+        try:
+            from app.bench.plot import write_plot
+        except ImportError:
+            say_warnings(
+                ["the plot is left out, because matplotlib is missing; pip install matplotlib brings it"]
+            )
+        else:
+            write_plot(measured, staging / "bench.png")

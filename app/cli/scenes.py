@@ -1,0 +1,23 @@
+"""Scenes that a command is given: LangFlash's own files, and splat files of other programs."""
+
+from pathlib import Path
+
+from app.cli.files import readable_file
+from app.cli.report import say_warnings
+from langflash_core.errors import SceneFileError
+from langflash_core.types import NO_LANGUAGE, Scene
+
+
+def open_scene(path: Path) -> Scene:
+    """Read a scene; what a splat file left to guess or to leave out is said on stderr.
+
+    Raises:
+        SceneFileError: missing, damaged, or of a kind that this program does not read.
+    """
+    readable_file(path, "scene", SceneFileError)
+    from langflash_core.export import read
+
+    scene = read(path)
+    if scene.semantics.space == NO_LANGUAGE:
+        say_warnings(scene.metadata.get("warnings", ()))
+    return scene

@@ -1,0 +1,240 @@
+"""3D Gaussian Splatting's PLY: x y z, f_dc, f_rest, logit opacity, log scales, rot wxyz.
+
+f_rest is channel-major: f_rest_{c (S - 1) + b - 1} is basis b >= 1 of colour c. Read in either byte
+order, with properties of any numeric type, in any order, and with others between them. Written as
+binary_little_endian float32 with spherical harmonics up to degree 3, the most that viewers show.
+Source: Kerbl et al. 2023 (the layout of point_cloud.ply); Turk 1994 (the PLY format).
+"""
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.lib.recfunctions import structured_to_unstructured
+
+from langflash_core.errors import SceneFileError
+from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, logit, parts, to_scene
+from langflash_core.files import write_atomically
+from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
+from langflash_core.types import Gaussians, Scene
+
+_MEANS, _NORMALS = ("x", "y", "z"), ("nx", "ny", "nz")
+_DC = ("f_dc_0", "f_dc_1", "f_dc_2")
+_SCALES = ("scale_0", "scale_1", "scale_2")
+_QUATS = ("rot_0", "rot_1", "rot_2", "rot_3")
+_REQUIRED = (*_MEANS, *_DC, "opacity", *_SCALES, *_QUATS)
+_DEGREES = {0: 0, 9: 1, 24: 2, 45: 3, 72: 4}  # of spherical harmonics, by how many f_rest there are
+_TYPES = {
+    **dict.fromkeys(("char", "int8"), "i1"),
+    **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"),
+    **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"),
+    **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"),
+    **dict.fromkeys(("double", "float64"), "f8"),
+}
+_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
+_MAX_HEADER = 1 << 16  # bytes; 3DGS headers have about 1,500
+_OWN = "stored as logit opacity, log scales"  # a comment that leaves nothing to guess
+_REMEDY = "export it again as a binary 3D Gaussian Splatting .ply"
+_TOO_WIDE = 0.05  # of the scene: no capture is made of Gaussians that large
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Where the Gaussians are in a file: `count` rows of `row`, from byte `start`; `end` of the file."""
+
+    count: int
+    row: np.dtype
+    start: int
+    end: int | None  # not known where lists follow
+    own: bool  # written by this program
+
+    @property
+    def num_rest(self) -> int:
+        return sum(name.startswith("f_rest_") for name in self.row.names or ())
+
+
+def read_ply(path: Path) -> Scene:
+    """A scene without language from a 3DGS .ply.
+
+    Raises:
+        SceneFileError: missing, no such PLY, cut off, or without a usable Gaussian.
+    """
+    with path.open("rb") as stream:
+        layout = _read_layout(stream, path.name)
+        _check_size(path, layout)
+        num_bases = 1 + layout.num_rest // 3
+        gathering = Gathering(layout.count, num_bases)
+        stream.seek(layout.start)
+        for first in range(0, layout.count, ROWS_AT_ONCE):
+            rows = np.fromfile(stream, layout.row, min(ROWS_AT_ONCE, layout.count - first))
+            gathering.add(_columns(rows, num_bases))
+    stored, warnings = gathering.stored(), []
+    logits = layout.own or not _looks_activated(stored.opacities)
+    logs = layout.own or not _looks_linear(stored)
+    if not logits:
+        warnings.append("All opacities lie between 0 and 1, so they are taken as they are, not as logits.")
+    if not logs:
+        warnings.append("The scales are no logarithms (they would fill the scene); taken as lengths.")
+    return to_scene(gathering, path.name, warnings, logs=logs, logits=logits)
+
+
+def write_ply(scene: Scene, path: Path) -> None:
+    """The Gaussians of a scene, as viewers of 3D Gaussian Splatting read them.
+
+    Raises:
+        OutputError: the path cannot be written.
+    """
+    write_atomically(path, _encoded(scene.gaussians))
+
+
+def _encoded(gaussians: Gaussians) -> Iterator[bytes]:
+    num_bases = min(gaussians.sh.shape[1], (MAX_SHOWN_DEGREE + 1) ** 2)
+    rest = [f"f_rest_{index}" for index in range(3 * (num_bases - 1))]
+    names = (*_MEANS, *_NORMALS, *_DC, *rest, "opacity", *_SCALES, *_QUATS)
+    lines = ["ply", "format binary_little_endian 1.0", f"comment LangFlash: {_OWN}"]
+    lines += [f"element vertex {len(gaussians)}", *(f"property float {name}" for name in names), "end_header"]
+    yield ("\n".join(lines) + "\n").encode()
+    for part in parts(gaussians):
+        columns = (
+            part.means,
+            np.zeros_like(part.means),
+            part.sh[:, 0],
+            part.sh[:, 1:num_bases].transpose(0, 2, 1).reshape(len(part.means), -1),
+            logit(part.opacities)[:, None],
+            np.log(part.scales),
+            part.quats,
+        )
+        yield np.concatenate(columns, 1, dtype="<f4").tobytes()
+
+
+def _read_layout(stream: BinaryIO, name: str) -> _Layout:
+    """Read a header.
+
+    Raises:
+        SceneFileError: it is no PLY, or no binary one with Gaussians in it.
+    """
+    head = stream.read(_MAX_HEADER)
+    if not head:
+        raise SceneFileError(f"{name} is an empty file; {_REMEDY}")
+    if not re.match(rb"ply\s*\n", head):
+        raise SceneFileError(f"{name} is not a PLY file, whatever its name says; {_REMEDY}")
+    ended = re.search(rb"\nend_header\r?\n", head)
+    if ended is None:
+        state = "cut off inside its header" if len(head) < _MAX_HEADER else "damaged: its header does not end"
+        raise SceneFileError(f"{name} is {state}; {_REMEDY}")
+    lines = [line.split() for line in head[: ended.start()].decode("latin-1").splitlines()]
+    order, elements = _elements(lines, name)
+    before = 0
+    for index, (element, count, fields) in enumerate(elements):
+        if element == "vertex":
+            row = _row(fields, order, name)
+            after = [_bytes_of(count, fields, order) for _, count, fields in elements[index:]]
+            start = ended.end() + before
+            end = None if None in after else start + sum(size or 0 for size in after)
+            return _Layout(count, row, start, end, _OWN.encode() in head[: ended.start()])
+        size = _bytes_of(count, fields, order)
+        if size is None:
+            raise SceneFileError(f"{name} has lists ({element}) before its points; {_REMEDY}")
+        before += size
+    raise SceneFileError(f"{name} has no points (element vertex), so no Gaussians; {_REMEDY}")
+
+
+_Element = tuple[str, int, list[tuple[str, str]]]
+
+
+def _elements(lines: list[list[str]], name: str) -> tuple[str, list[_Element]]:
+    """The byte order, and per element its name, count, and (type, name) of each property."""
+    order, elements = "", []
+    for words in lines[1:]:
+        match words:
+            case ["format", "ascii", *_]:
+                raise SceneFileError(f"{name} is an ascii PLY, this program reads binary ones; {_REMEDY}")
+            case ["format", kind, *_] if kind in _ORDERS:
+                order = _ORDERS[kind]
+            case ["element", element, count] if count.isdecimal():
+                elements.append((element, int(count), []))
+            case ["property", "list", *_, field] if elements:
+                elements[-1][2].append(("list", field))
+            case ["property", kind, field] if elements and kind in _TYPES:
+                elements[-1][2].append((_TYPES[kind], field))
+            case ["comment" | "obj_info", *_] | []:
+                pass
+            case _:
+                raise SceneFileError(f"{name} has a header line '{' '.join(words)[:60]}'; {_REMEDY}")
+    if not order:
+        raise SceneFileError(f"{name} does not say how it is stored (no format line); {_REMEDY}")
+    return order, elements
+
+
+def _row(fields: list[tuple[str, str]], order: str, name: str) -> np.dtype:
+    names = [field for _, field in fields]
+    lists = [field for kind, field in fields if kind == "list"]
+    missing = [field for field in _REQUIRED if field not in names]
+    num_rest = sum(field.startswith("f_rest_") for field in names)
+    if lists:
+        raise SceneFileError(f"{name} has a list ({lists[0]}) among the points' numbers; {_REMEDY}")
+    if "packed_position" in names:
+        raise SceneFileError(f"{name} is a compressed PLY; save it uncompressed, for example in SuperSplat")
+    if missing:
+        kind = "a mesh or point cloud" if "opacity" in missing else "incomplete"
+        raise SceneFileError(f"{name} is {kind}: its points have no {', '.join(missing[:3])}; {_REMEDY}")
+    if len(set(names)) < len(names):
+        raise SceneFileError(f"{name} names a property twice; {_REMEDY}")
+    if num_rest not in _DEGREES or any(f"f_rest_{index}" not in names for index in range(num_rest)):
+        raise SceneFileError(f"{name} has {num_rest} f_rest, expected 0, 9, 24, 45 or 72; {_REMEDY}")
+    return np.dtype([(field, order + kind) for kind, field in fields])
+
+
+def _bytes_of(count: int, fields: list[tuple[str, str]], order: str) -> int | None:
+    """Bytes of an element, None where lists make it unknown."""
+    if any(kind == "list" for kind, _ in fields):
+        return None if count else 0
+    return count * sum(np.dtype(order + kind).itemsize for kind, _ in fields)
+
+
+def _check_size(path: Path, layout: _Layout) -> None:
+    if layout.count == 0:
+        raise SceneFileError(f"{path.name} holds no Gaussians; {_REMEDY}")
+    found, needed = path.stat().st_size, layout.start + layout.count * layout.row.itemsize
+    expected = needed if layout.end is None else layout.end
+    if found < expected or (layout.end is not None and found > expected):
+        state = "cut off" if found < expected else "damaged"
+        raise SceneFileError(
+            f"{path.name} is {state}: {layout.count:,} Gaussians need {expected:,} bytes, "
+            f"found {found:,}; {_REMEDY}"
+        )
+
+
+def _columns(rows: np.ndarray, num_bases: int) -> Rows:
+    """The numbers of structured rows (n,), float32."""
+
+    def block(names: tuple[str, ...]) -> np.ndarray:
+        return structured_to_unstructured(rows[list(names)], dtype=np.float32)
+
+    sh = np.empty((len(rows), num_bases, 3), np.float32)
+    sh[:, 0] = block(_DC)
+    if num_bases > 1:
+        rest = block(tuple(f"f_rest_{index}" for index in range(3 * (num_bases - 1))))
+        sh[:, 1:] = rest.reshape(-1, 3, num_bases - 1).transpose(0, 2, 1)
+    return Rows(block(_MEANS), block(_QUATS), block(_SCALES), block(("opacity",))[:, 0], sh)
+
+
+def _looks_activated(opacities: np.ndarray) -> bool:
+    """Whether none is outside [0, 1]; as logits that would be 0.5 to 0.73, which no capture has."""
+    return bool(len(opacities)) and float(opacities.min()) >= 0 and float(opacities.max()) <= 1
+
+
+def _looks_linear(stored: Rows) -> bool:
+    """Whether scales are lengths: all above 0, and as logarithms half would be as wide as the scene."""
+    if not len(stored.scales) or float(stored.scales.min()) <= 0:
+        return False
+    low, high = np.percentile(stored.means, (5, 95), axis=0)
+    extent = float(np.linalg.norm(high - low))
+    return math.exp(min(float(np.median(stored.scales)), 80.0)) > _TOO_WIDE * extent

@@ -1,0 +1,76 @@
+"""antimatter15's .splat: 32 bytes a Gaussian, no header, plain colours.
+
+Position 3 x float32, scale 3 x float32 (lengths), colour and opacity 4 x uint8, quaternion wxyz as
+4 x uint8, 128 (1 + q). Colour is the degree-0 one, 0.5 + SH_C0 f_dc; higher degrees are not held.
+Source: antimatter15/splat (MIT), the layout in its README and convert.py.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from langflash_core.errors import SceneFileError
+from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, parts, to_scene
+from langflash_core.files import write_atomically
+from langflash_core.geometry.harmonics import SH_C0
+from langflash_core.types import Gaussians, Scene
+
+_ROW = np.dtype([("mean", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("quat", "u1", 4)])
+_REMEDY = "export it again, or name a .ply"
+_UNIT = (0.9, 1.1)  # norms of quaternions that were unit before they became bytes (error up to 1/64)
+_PLAUSIBLE = 0.5  # share of unit quaternions below which the bytes are something else
+
+
+def read_splat(path: Path) -> Scene:
+    """A scene without language from a .splat.
+
+    Raises:
+        SceneFileError: missing, cut off, something else, or without a usable Gaussian.
+    """
+    size = path.stat().st_size
+    if size == 0:
+        raise SceneFileError(f"{path.name} is an empty file; {_REMEDY}")
+    if size % _ROW.itemsize:
+        raise SceneFileError(
+            f"{path.name} is cut off or no .splat: expected whole rows of {_ROW.itemsize} bytes, "
+            f"found {size:,} bytes; {_REMEDY}"
+        )
+    count = size // _ROW.itemsize
+    gathering, unit = Gathering(count, 1), 0
+    with path.open("rb") as stream:
+        for first in range(0, count, ROWS_AT_ONCE):
+            rows = np.fromfile(stream, _ROW, min(ROWS_AT_ONCE, count - first))
+            quats = rows["quat"].astype(np.float32) / 128 - 1
+            norms = np.linalg.norm(quats, axis=1)
+            usual = (rows["scale"] >= 0).all(1) & (norms > _UNIT[0]) & (norms < _UNIT[1])
+            unit += int(usual.sum())
+            colours = rows["rgba"].astype(np.float32) / 255
+            sh = ((colours[:, :3] - 0.5) / SH_C0)[:, None]
+            gathering.add(Rows(rows["mean"], quats, rows["scale"], colours[:, 3], sh))
+    if unit < _PLAUSIBLE * count:
+        raise SceneFileError(f"{path.name} is not a .splat file, whatever its name says; {_REMEDY}")
+    return to_scene(gathering, path.name, [], logs=False, logits=False)
+
+
+def write_splat(scene: Scene, path: Path) -> None:
+    """The Gaussians of a scene, 8 bits for colour, opacity and rotation; in the scene's own order.
+
+    Raises:
+        OutputError: the path cannot be written.
+    """
+    write_atomically(path, _encoded(scene.gaussians))
+
+
+def _encoded(gaussians: Gaussians) -> Iterator[bytes]:
+    for part in parts(gaussians):
+        rows = np.empty(len(part.means), _ROW)
+        rows["mean"], rows["scale"] = part.means, part.scales
+        rows["rgba"][:, :3] = _bytes((0.5 + SH_C0 * part.sh[:, 0]) * 255)
+        rows["rgba"][:, 3] = _bytes(part.opacities * 255)
+        rows["quat"] = _bytes(part.quats * 128 + 128)
+        yield rows.tobytes()
+
+
+def _bytes(values: np.ndarray) -> np.ndarray:
+    return np.clip(np.round(values), 0, 255).astype(np.uint8)

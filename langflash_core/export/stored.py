@@ -1,0 +1,120 @@
+"""Gaussians between their stored forms and the activated one, in parts: large files need little memory.
+
+3D Gaussian Splatting stores log scales, logit opacities and unnormalised quaternions wxyz.
+Source: Kerbl et al. 2023.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from langflash_core.errors import SceneFileError
+from langflash_core.geometry.quaternions import unit_quats
+from langflash_core.scene.bare import bare_scene
+from langflash_core.types import Gaussians, Scene
+
+ROWS_AT_ONCE = 1 << 16  # 16 MB of a file with spherical harmonics of degree 3
+_SMALLEST, _LARGEST = 1e-30, 1e30  # of scales: beyond, float32 products vanish or overflow
+_OPAQUE = 1 - 1e-7  # its logit, 16.1, is the largest that is written: infinity breaks other readers
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Some Gaussians as a file holds them, float32: scales and opacities in whatever form it has.
+
+    means (n, 3), quats (n, 4) wxyz of any norm, scales (n, 3), opacities (n,), sh (n, S, 3).
+    """
+
+    means: np.ndarray
+    quats: np.ndarray
+    scales: np.ndarray
+    opacities: np.ndarray
+    sh: np.ndarray
+
+    def all(self) -> tuple[np.ndarray, ...]:
+        return self.means, self.quats, self.scales, self.opacities, self.sh
+
+
+class Gathering:
+    """N Gaussians filled in part by part; those with a number that is not finite stay out.
+
+    An infinite logit opacity is kept, it means 0 or 1, and so is a log scale of minus infinity.
+    """
+
+    def __init__(self, most: int, num_bases: int):
+        self._rows = Rows(
+            *(np.empty((most, *shape), np.float32) for shape in ((3,), (4,), (3,), (), (num_bases, 3)))
+        )
+        self._count = 0
+        self.num_seen = 0
+
+    def add(self, part: Rows) -> None:
+        """Take the usable rows of a part."""
+        usable = ~np.isnan(part.opacities) & (np.isfinite(part.scales) | np.isneginf(part.scales)).all(1)
+        for values in (part.means, part.quats, part.sh.reshape(len(part.sh), -1)):
+            usable &= np.isfinite(values).all(1)
+        self.num_seen += len(usable)
+        chosen = slice(None) if usable.all() else usable
+        end = self._count + int(usable.sum())
+        for into, values in zip(self._rows.all(), part.all(), strict=True):
+            into[self._count : end] = values[chosen]
+        self._count = end
+
+    @property
+    def num_dropped(self) -> int:
+        """Gaussians that were not usable."""
+        return self.num_seen - self._count
+
+    def stored(self) -> Rows:
+        """What was taken so far, not copied."""
+        return Rows(*(values[: self._count] for values in self._rows.all()))
+
+
+def to_scene(gathering: Gathering, name: str, warnings: list[str], *, logs: bool, logits: bool) -> Scene:
+    """The scene of gathered rows, activated in place.
+
+    Args:
+        name: of the file. logs, logits: scales and opacities are stored that way.
+
+    Raises:
+        SceneFileError: no Gaussian is usable.
+    """
+    rows = gathering.stored()
+    if not len(rows.means):
+        raise SceneFileError(
+            f"{name} holds no Gaussian that could be drawn ({gathering.num_dropped} have numbers that are "
+            "not finite); export it again"
+        )
+    if gathering.num_dropped:
+        some = f"{gathering.num_dropped:,} of {gathering.num_seen:,} Gaussians"
+        warnings = [*warnings, f"{some} have numbers that are not finite; they are left out."]
+    scales, opacities = torch.from_numpy(rows.scales), torch.from_numpy(rows.opacities)
+    if logs:
+        scales.exp_()
+    if logits:
+        opacities.sigmoid_()
+    gaussians = Gaussians(
+        means=torch.from_numpy(rows.means),
+        quats=unit_quats(torch.from_numpy(rows.quats)),
+        scales=scales.clamp_(_SMALLEST, _LARGEST),
+        opacities=opacities.clamp_(0, 1),
+        sh=torch.from_numpy(rows.sh),
+    )
+    return bare_scene(gaussians, name, tuple(warnings))
+
+
+def parts(gaussians: Gaussians) -> Iterator[Rows]:
+    """Activated rows on the CPU, `ROWS_AT_ONCE` at a time."""
+    for first in range(0, len(gaussians), ROWS_AT_ONCE):
+        fields = (gaussians.means, gaussians.quats, gaussians.scales, gaussians.opacities, gaussians.sh)
+        yield Rows(
+            *(values[first : first + ROWS_AT_ONCE].detach().cpu().float().numpy() for values in fields)
+        )
+
+
+def logit(opacities: np.ndarray) -> np.ndarray:
+    """Stored opacities, finite."""
+    inside = np.clip(opacities.astype(np.float64), 1 - _OPAQUE, _OPAQUE)
+    return np.log(inside / (1 - inside)).astype(np.float32)

@@ -1,0 +1,102 @@
+"""Scenes of nothing but Gaussians, as splat files hold them: no photos, no words, one view that frames them.
+
+Nobody says where such a scene is best looked at from, or which way is up. Two cases are told apart:
+what lies in one cone ahead of the origin was predicted from photos there (as `langflash export`
+writes it) and is seen from the origin; anything else is looked at from outside, along +z, with +y
+down as in the field's captures. Medians choose the box to frame: floaters and far backgrounds are
+many and wide in captured scenes, and must not push the camera away.
+"""
+
+import math
+
+import torch
+from torch import Tensor
+
+from langflash_core.geometry.cameras import intrinsics_from_fov
+from langflash_core.types import NO_LANGUAGE, Camera, Gaussians, Scene, Semantics
+
+VIEW_SIZE = (960, 720)  # pixels
+_FOV = 50.0  # degrees of the longer side, from outside
+_ELEVATION = math.radians(15)  # floors and table tops show
+_MOST = 200_000  # Gaussians looked at: medians need no more
+_SEEN = 0.1  # opacity from which a Gaussian says where the scene is
+_CONE = math.tan(math.radians(50))  # wider than the field of view of photos
+_IN_CONE = 0.98  # share of the Gaussians; the rest bled in depth
+_SHOWN = 0.97  # share of the slopes that the view from the origin shows
+# An even spread ends 2 median deviations from its middle, a normal one fades at 4.
+_DEVIATIONS = 2.5
+_MARGIN = 1.2
+
+
+def bare_scene(gaussians: Gaussians, source: str, warnings: tuple[str, ...] = ()) -> Scene:
+    """A scene without language and photos: K = 0, C = 0, m = 0, one view that frames it.
+
+    Args:
+        gaussians: N >= 1. source: file name for people. warnings: one sentence each.
+    """
+    count = len(gaussians)
+    semantics = Semantics(
+        weight_ids=torch.zeros(count, 0, dtype=torch.int64),
+        weight_values=torch.zeros(count, 0),
+        dictionary=torch.zeros(0, 0),
+        space=NO_LANGUAGE,
+    )
+    camera = framing_camera(gaussians)
+    return Scene(
+        gaussians,
+        semantics,
+        viewmats=camera.viewmat[None],
+        Ks=camera.K[None],
+        view_size=VIEW_SIZE,
+        metadata={"source": source, "warnings": list(warnings)},
+    )
+
+
+def framing_camera(gaussians: Gaussians) -> Camera:
+    """A camera of `VIEW_SIZE` that shows most of the Gaussians, N >= 1."""
+    step = max(1, len(gaussians) // _MOST)
+    seen = gaussians.opacities[::step] >= _SEEN
+    rows = seen if bool(seen.any()) else torch.ones_like(seen)
+    means = gaussians.means[::step][rows].double().cpu()
+    widths = gaussians.scales[::step][rows].double().cpu().amax(-1)
+    return _from_origin(means) or _from_outside(means, float(widths.median()))
+
+
+def _from_origin(means: Tensor) -> Camera | None:
+    """The first photo's camera, where all lies ahead of it; None where it does not."""
+    ahead = means[:, 2] > 0
+    slopes = means[:, :2].abs() / means[:, 2:].clamp_min(1e-12)  # (n, 2)
+    if float((ahead & (slopes < _CONE).all(-1)).double().mean()) < _IN_CONE:
+        return None
+    width, height = VIEW_SIZE
+    across, down = (_at_share(slope[ahead], _SHOWN) for slope in slopes.unbind(-1))
+    widest = max(across, down * width / height, math.tan(math.radians(15)))
+    fov = 2 * math.degrees(math.atan(widest))
+    return Camera(torch.eye(4), intrinsics_from_fov(fov, width, height), width, height)
+
+
+def _from_outside(means: Tensor, width: float) -> Camera:
+    """Ahead of the middle box of means (n, 3), which is never thinner than their median `width`."""
+    middle = means.quantile(0.5, dim=0)
+    reach = _DEVIATIONS * (means - middle).abs().quantile(0.5, dim=0)
+    ordered = means.sort(dim=0).values
+    low = torch.maximum(middle - reach, ordered[round(0.01 * (len(means) - 1))])
+    high = torch.minimum(middle + reach, ordered[round(0.99 * (len(means) - 1))])
+    centre = (low + high) / 2
+    half = _MARGIN * ((high - low) / 2).clamp_min(3 * width)
+    sine, cosine = math.sin(_ELEVATION), math.cos(_ELEVATION)
+    axes = torch.tensor([[1.0, 0, 0], [0, cosine, -sine], [0, sine, cosine]], dtype=torch.float64)
+    signs = torch.cartesian_prod(*[torch.tensor([-1.0, 1.0], dtype=torch.float64)] * 3)
+    corners = (signs * half) @ axes.T  # (8, 3), camera axes, around the centre
+    K = intrinsics_from_fov(_FOV, *VIEW_SIZE)
+    tangents = torch.tensor(VIEW_SIZE) / 2 / K.diagonal()[:2]
+    distance = float((corners[:, :2].abs() / tangents - corners[:, 2:]).max())
+    viewmat = torch.eye(4)
+    viewmat[:3, :3] = axes
+    viewmat[:3, 3] = torch.tensor([0, 0, distance], dtype=torch.float64) - axes @ centre
+    return Camera(viewmat, K, *VIEW_SIZE)
+
+
+def _at_share(values: Tensor, share: float) -> float:
+    """The value that `share` of (n,) values stay below, by rank."""
+    return float(values.sort().values[round(share * (len(values) - 1))])

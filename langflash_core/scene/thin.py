@@ -1,0 +1,97 @@
+"""Fewer, wider Gaussians for a moving camera on a slow machine: levels of detail of a scene."""
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from langflash_core.types import Gaussians, Scene, Semantics
+
+_CELLS = 1 << 10  # a side of the grid that orders Gaussians along a space-filling curve
+
+
+def thin(scene: Scene, share: float) -> Scene:
+    """About `share` of the Gaussians, widened so that as much is covered as before.
+
+    Gaussian i is kept with probability p_i = min(1, c a_i), a_i its opacity times the area of its two
+    longest axes, and its axes grow by p_i^-1/2: what it covers, times p_i, stays a_i. Large ones are
+    therefore kept as they are and small ones give way to dots of one size. One draw serves all: along
+    a space-filling curve every 1 / p-th is taken, so that neighbours stand in for each other.
+
+    Args:
+        share: in (0, 1].
+
+    Returns:
+        The scene with at most ceil(share N) Gaussians, or itself for a share of 1. Gaussians
+        that are not finite or show nothing are never kept.
+
+    Raises:
+        ValueError: a share outside (0, 1].
+
+    Source: systematic sampling with probabilities proportional to size (Madow 1949); Z-order of Morton 1966.
+    """
+    if not 0 < share <= 1:
+        raise ValueError(f"share: expected a number in (0, 1], received {share}")
+    if share == 1 or not len(scene.gaussians):
+        return scene
+    chances = inclusion(covered_areas(scene.gaussians), share * len(scene.gaussians))
+    along = z_order(scene.gaussians.means.detach().cpu().numpy())
+    ends = np.floor(np.cumsum(chances[along]) + 1e-9)
+    rows = np.sort(along[np.diff(ends, prepend=0.0) > 0])
+    kept = torch.from_numpy(rows)
+    growth = torch.from_numpy(chances[rows] ** -0.5).to(scene.gaussians.scales)
+    gaussians = scene.gaussians.map(lambda v: v[kept])
+    wider = Gaussians(
+        gaussians.means,
+        gaussians.quats,
+        gaussians.scales * growth[:, None],
+        gaussians.opacities,
+        gaussians.sh,
+    )
+    said = scene.semantics
+    semantics = Semantics(said.weight_ids[kept], said.weight_values[kept], said.dictionary, said.space)
+    return Scene(wider, semantics, scene.viewmats, scene.Ks, scene.view_size, scene.photos, scene.metadata)
+
+
+def covered_areas(gaussians: Gaussians) -> np.ndarray:
+    """Opacity times the product of the two longest axes (N,) float64; 0 where a value is not finite."""
+    axes = gaussians.scales.detach().cpu().double().abs().sort(-1).values
+    areas = gaussians.opacities.detach().cpu().double() * axes[:, 1] * axes[:, 2]
+    finite = _finite(gaussians.means) & _finite(gaussians.quats) & torch.isfinite(areas)
+    return torch.where(finite, areas, 0.0).numpy()
+
+
+def _finite(values: Tensor) -> Tensor:
+    return torch.isfinite(values.detach().cpu()).all(-1)
+
+
+def inclusion(sizes: np.ndarray, expected: float) -> np.ndarray:
+    """Probabilities (N,) min(1, c s_i) with the c >= 0 that makes their sum `expected`.
+
+    With fewer positive sizes than that, every one of those is 1.
+    """
+    descending = np.sort(sizes)[::-1]
+    if np.count_nonzero(descending) <= expected:
+        return (sizes > 0).astype(np.float64)
+    rest = np.cumsum(descending[::-1])[::-1]  # sum of the sizes from each on
+    # With the j largest at 1, c = (expected - j) / rest_j; the right j is the first where c s_j <= 1.
+    ahead = np.arange(len(descending))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scale = np.where(rest > 0, (expected - ahead) / rest, 0.0)
+    certain = int(np.argmax(scale * descending <= 1))
+    return np.minimum(1.0, scale[certain] * sizes)
+
+
+def z_order(means: np.ndarray) -> np.ndarray:
+    """Rows of means (N, 3) along the Z-curve of a grid of 1024 cells a side; far outliers share the rim."""
+    finite = np.where(np.isfinite(means), means, 0.0).astype(np.float64)
+    low, high = np.percentile(finite, (1, 99), axis=0)
+    cells = np.clip((finite - low) / np.maximum(high - low, 1e-12) * _CELLS, 0, _CELLS - 1).astype(np.uint32)
+    code = _spread(cells[:, 0]) | _spread(cells[:, 1]) << np.uint32(1) | _spread(cells[:, 2]) << np.uint32(2)
+    return np.argsort(code, kind="stable")
+
+
+def _spread(bits: np.ndarray) -> np.ndarray:
+    """Ten bits to every third place of thirty."""
+    for shift, mask in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):
+        bits = (bits | bits << np.uint32(shift)) & np.uint32(mask)
+    return bits

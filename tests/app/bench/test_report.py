@@ -1,0 +1,90 @@
+"""JSON, CSV, table and plot say the same."""
+
+import csv
+import io
+import json
+import math
+from itertools import combinations
+
+import pytest
+from PIL import Image
+
+from app.bench import csv_text, document, measure, table
+from app.bench.machine import machine
+from app.bench.modes import modes_for
+from app.bench.plot import figure_of, write_plot
+from app.bench.report import COLUMNS, FORMAT
+from tests.app.bench.conftest import silent, small_case
+
+
+@pytest.fixture(scope="module")
+def measured(context) -> dict:
+    case = small_case()
+    results = [measure(context, case, modes_for(context, case.scene), silent)]
+    return document(machine(context), results)
+
+
+def test_json_holds_plain_values(measured):
+    assert json.loads(json.dumps(measured, allow_nan=False)) == measured
+    assert measured["format"] == FORMAT
+    for name in ("gpu", "vendor", "driver", "processor", "cpus", "versions"):
+        assert measured["machine"][name]
+    (case,) = measured["cases"]
+    assert case["scene"]["gaussians"] == 400 and case["scene"]["atoms"] == 30
+    assert case["scene"]["channels"] == 512 and case["scene"]["rank"] == 30
+    assert case["picture"] == [64, 48]
+    assert case["stages"]["map_passes"] == 2 and case["stages"]["layers_a_pixel"] > 1
+    assert case["rows"][0]["mode"] == "default" and case["rows"][0]["times_default"] == 1
+    for row in case["rows"]:
+        assert tuple(row) == COLUMNS
+        assert row["ms_median"] <= row["ms_p95"]
+
+
+def test_csv_has_the_rows_of_the_json(measured):
+    lines = list(csv.DictReader(io.StringIO(csv_text(measured))))
+    rows = [row for case in measured["cases"] for row in case["rows"]]
+    assert len(lines) == len(rows)
+    for line, row in zip(lines, rows, strict=True):
+        assert line["case"] == measured["cases"][0]["name"]
+        for name, value in row.items():
+            assert line[name] == ("" if value is None else str(value))
+
+
+def test_the_table_names_machine_scene_and_every_mode(measured):
+    text = table(measured)
+    for words in (measured["machine"]["gpu"], measured["machine"]["driver"], "400 Gaussians", "K = 30"):
+        assert words in text
+    for row in measured["cases"][0]["rows"]:
+        assert f"\n  {row['mode']} " in text
+
+
+def test_the_plot_is_small_and_its_labels_keep_apart(measured, tmp_path):
+    path = tmp_path / "bench.png"
+    write_plot(measured, path)
+    assert path.stat().st_size < 100_000
+    with Image.open(path) as image:
+        assert image.width == 1000
+    figure = figure_of(measured)
+    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    answers, colours = figure.axes
+    for axes in (answers, colours):
+        names = [text for text in axes.texts if text.get_text()]
+        boxes = {text.get_text(): text.get_window_extent(renderer) for text in names}
+        for one, other in combinations(boxes.values(), 2):
+            assert not one.overlaps(other)
+        frame = axes.get_window_extent(renderer)
+        assert all(
+            frame.contains(box.x0, box.y0) and frame.contains(box.x1, box.y1) for box in boxes.values()
+        )
+    assert {text.get_text() for text in answers.texts} - {""} == {
+        row["mode"] for row in measured["cases"][0]["rows"]
+    }
+
+
+def test_equal_pictures_and_no_error_are_drawn_too(measured, tmp_path):
+    row = {**measured["cases"][0]["rows"][0], "psnr_db": None, "relevance_mean": 0.0}
+    perfect = {**measured, "cases": [{**measured["cases"][0], "rows": [row]}]}
+    write_plot(perfect, tmp_path / "bench.png")
+    assert (tmp_path / "bench.png").stat().st_size > 1000
+    assert "-" in table(perfect).splitlines()[-1]
+    assert math.isfinite(perfect["cases"][0]["rows"][0]["ms_median"])

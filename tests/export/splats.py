@@ -1,0 +1,116 @@
+"""Small random splats, and a PLY writer of the tests' own that can also write what is wrong."""
+
+import numpy as np
+import torch
+from torch.nn.functional import normalize
+
+from langflash_core.types import Gaussians
+
+NAMES = (
+    *("x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"),
+    *("scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"),
+)
+
+
+def random_gaussians(count: int, degree: int = 0, seed: int = 0) -> Gaussians:
+    """Opacities from 0 to 1, both included; scales over six decades."""
+    rng = torch.Generator().manual_seed(seed)
+
+    def draw(*shape: int) -> torch.Tensor:
+        return torch.randn(*shape, generator=rng)
+
+    opacities = torch.sigmoid(3 * draw(count))
+    opacities[: min(count, 2)] = torch.tensor([0.0, 1.0])[: min(count, 2)]
+    return Gaussians(
+        means=draw(count, 3),
+        quats=normalize(draw(count, 4), dim=-1),
+        scales=torch.exp(2 * draw(count, 3) - 5),
+        opacities=opacities,
+        sh=draw(count, (degree + 1) ** 2, 3),
+    )
+
+
+def stored_columns(count: int = 50, seed: int = 0) -> dict[str, np.ndarray]:
+    """The required properties as a 3DGS trainer stores them, float32."""
+    rng = np.random.default_rng(seed)
+    columns = {name: rng.normal(size=count).astype(np.float32) for name in NAMES}
+    for axis in range(3):
+        columns[f"scale_{axis}"] -= 5
+    columns["opacity"] *= 4
+    return columns
+
+
+def ply_bytes(
+    columns: dict[str, np.ndarray],
+    order: str = "<",
+    count: int | None = None,
+    before: bytes = b"",
+    after: bytes = b"",
+    header: str = "",
+) -> bytes:
+    """A PLY of one element `vertex`; types are the columns' own.
+
+    order: "<" or ">". count: what the header claims. before, after: raw bytes around the rows, of
+    the elements that `header` may declare (its lines with "BEFORE" come first).
+    """
+    kinds = {"f4": "float", "f8": "double", "u1": "uchar", "i2": "short"}
+    rows = np.empty(
+        len(next(iter(columns.values()))), [(n, order + v.dtype.str[1:]) for n, v in columns.items()]
+    )
+    for name, values in columns.items():
+        rows[name] = values
+    early = [line.removeprefix("BEFORE ") for line in header.splitlines() if line.startswith("BEFORE ")]
+    late = [line for line in header.splitlines() if not line.startswith("BEFORE ")]
+    lines = [
+        "ply",
+        f"format binary_{'little' if order == '<' else 'big'}_endian 1.0",
+        *early,
+        f"element vertex {len(rows) if count is None else count}",
+        *(f"property {kinds[v.dtype.str[1:]]} {n}" for n, v in columns.items()),
+        *late,
+        "end_header",
+    ]
+    return "\n".join(lines).encode() + b"\n" + before + rows.tobytes() + after
+
+
+def damaged_files() -> dict[str, tuple[bytes, str]]:
+    """Files named .ply that must be refused, and a word of the sentence that says why."""
+    columns = stored_columns()
+    good = ply_bytes(columns)
+    body = good.index(b"end_header\n") + 11
+    nothing = {name: values[:0] for name, values in columns.items()}
+    unknown = {name: np.full_like(values, np.nan) for name, values in columns.items()}
+    incomplete = {name: values for name, values in columns.items() if name != "rot_3"}
+    points = {name: columns[name] for name in ("x", "y", "z")}
+    listed = good.replace(b"property float opacity", b"property list uchar float opacity")
+    return {
+        "cut off in the rows": (good[:-100], "cut off"),
+        "cut off in the header": (good[: body // 2], "cut off inside its header"),
+        "more rows than said": (ply_bytes(columns, count=49), "damaged"),
+        "fewer rows than said": (ply_bytes(columns, count=51), "cut off"),
+        "an absurd count": (ply_bytes(columns, count=10**15), "cut off"),
+        "a negative count": (good.replace(b"vertex 50", b"vertex -5"), "header line"),
+        "ascii": (b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n", "ascii"),
+        "a missing property": (ply_bytes(incomplete), "rot_3"),
+        "a point cloud": (ply_bytes(points), "point cloud"),
+        "only NaN": (ply_bytes(unknown), "not finite"),
+        "no splats": (ply_bytes(nothing), "no Gaussians"),
+        "no points": (b"ply\nformat binary_little_endian 1.0\nend_header\n", "no points"),
+        "a JPEG": (b"\xff\xd8\xff\xe0" + bytes(500), "not a PLY"),
+        "a shopping list": (b"milk\neggs\nplywood\n" * 30, "not a PLY"),
+        "nothing at all": (b"", "empty"),
+        "an endless header": (b"ply\n" + b"comment x\n" * 100_000, "does not end"),
+        "a list": (listed, "list"),
+        "an odd number of f_rest": (ply_bytes({**columns, "f_rest_0": columns["x"]}), "f_rest"),
+        "a gap in f_rest": (
+            ply_bytes({**columns, **{f"f_rest_{i}": columns["x"] for i in range(1, 10)}}),
+            "f_rest",
+        ),
+        "an unknown type": (good.replace(b"float x", b"quad x"), "header line"),
+        "a property twice": (good.replace(b"float y", b"float x"), "no y"),
+        "no format": (good.replace(b"format binary_little_endian 1.0\n", b""), "no format"),
+        "compressed": (
+            ply_bytes({"packed_position": columns["x"], **points}),
+            "uncompressed",
+        ),
+    }
