@@ -16,9 +16,9 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import Cancelled, InputError, PromptError, ViewError, WeightsError
-from langflash_core.images import load_views
+from langflash_core.images import grey_photo, load_views
 from langflash_core.images.views import source_pictures
-from langflash_core.network import PRESETS, LangFlashNet, load_network
+from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_network
 from langflash_core.network.aggregation import averaged_atoms
 from langflash_core.network.build import network_class
 from langflash_core.network.crops import crop_atoms
@@ -32,16 +32,18 @@ from langflash_core.query.relevance import Mode, compile_query, relevance_maps
 from langflash_core.query.spaces import language_space
 from langflash_core.scene import assemble, prune
 from langflash_core.splat import render as render_reference
+from langflash_core.splat.refine import Budget, refine
 from langflash_core.types import Camera, Frame, Prediction, QueryResult, Scene, Views
 
 Progress = Callable[[str, float], None]
 
 # Where each stage begins in the whole, from its measured share of the time on two CPU cores.
-STAGES = {"photos": 0.0, "weights": 0.1, "network": 0.2, "assemble": 0.85, "prune": 0.95}
+STAGES = {"photos": 0.0, "weights": 0.1, "network": 0.2, "assemble": 0.85, "prune": 0.95, "refine": 0.97}
 PRECISIONS = ("auto", "float32", "bfloat16")
 AGGREGATIONS = ("lfa", "average", "crops")
 SIZES = (56, 1024)  # pixels: below, the encoder's grid is 4 patches; above, attention's memory runs away
 LARGEST_PICTURE = 8192
+LONGEST_REFINEMENT = 3600  # seconds
 
 
 def reconstruct(
@@ -49,12 +51,13 @@ def reconstruct(
     *,
     preset: str = "mini",
     weights: Path | str | None = None,
-    fov: float | None = None,
+    fov: float | Sequence[float | None] | None = None,
     intrinsics: tuple[float, float, float, float] | None = None,
     size: int | None = None,
     device: str = "auto",
     precision: str = "auto",
     aggregation: str | None = None,
+    refine_seconds: float | None = None,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Scene:
@@ -63,17 +66,20 @@ def reconstruct(
     Args:
         photos: one or more files; the first one's camera becomes the world.
         preset: size of the network. weights: its checkpoint, None for the shipped one.
-        fov: degrees, of the photos' longer side. intrinsics: (fx, fy, cx, cy) in pixels of the
-            photos as given, the same for all. Neither: EXIF, else an assumption with a warning.
+        fov: degrees, of the photos' longer side, one for all or one per photo. intrinsics:
+            (fx, fy, cx, cy) in pixels of the photos as given, the same for all. Neither: EXIF, else
+            an assumption with a warning.
         size: the network sees about size x size pixels per photo, whatever their shape.
         precision: "float32"; "bfloat16", for presets with a rule for it; "auto" takes it where
             there is one and the processor is quick at it.
         aggregation: how a group gets its vector: "lfa" (trained), "average" (of dense features),
             "crops" (CLIP on a cut-out; presets of its space); None: lfa where it has weights,
             else average.
+        refine_seconds: so long poses and Gaussians are fitted to the photos afterwards, and kept so
+            if that brings a view closer that was held out; None: not at all.
         device: "auto" takes CUDA where there is one; "cpu"; "cuda".
         progress: called with the stage and the fraction of the whole in [0, 1].
-        cancelled: asked between stages.
+        cancelled: asked between stages, photos and pairs of photos, and before every layer.
 
     Returns:
         A scene on the CPU; `metadata` holds seconds per stage, peak memory and warnings.
@@ -87,13 +93,20 @@ def reconstruct(
     if preset not in PRESETS:
         raise WeightsError(f"There is no preset '{preset}': choose one of {', '.join(PRESETS)}.")
     device = _device(device)
+    if refine_seconds is not None:
+        _check_refinement(refine_seconds, photos)
     area = PRESETS[preset].native_area if size is None else _area(size)
     with run.stage("photos"):
         files = [Path(photo) for photo in photos]
         views = load_views(
-            files, fov=fov, intrinsics=intrinsics, area=area,
-            multiple=PRESETS[preset].patch, square=PRESETS[preset].square,
-        )  # fmt: skip
+            files,
+            fov=fov,
+            intrinsics=intrinsics,
+            area=area,
+            multiple=PRESETS[preset].patch,
+            square=PRESETS[preset].square,
+            check=run.check,
+        )
     with run.stage("weights"):
         network = _network(preset, weights, device, precision)
         atoms = _atoms(network, aggregation, views)
@@ -103,6 +116,11 @@ def reconstruct(
         scene = assemble(prediction, views, preset=preset)
     with run.stage("prune"), torch.no_grad():
         scene = prune(scene)
+    if refine_seconds is not None:
+        placed = [v for v in range(views.num_views) if v not in prediction.unplaced]
+        with run.stage("refine"):
+            scene = _refined(scene, views.images[placed], refine_seconds, device, run.within("refine"))
+        scene = scene.with_metadata(timings={**scene.metadata["timings"], "fitting": run.timings["refine"]})
     run.check()
     run.report("done", 1.0)
     return _with_record(scene, network, run.timings)
@@ -172,6 +190,25 @@ def select(scene: Scene, prompts: Sequence[str], *, threshold: float | None = No
     return kept(scene, passing)
 
 
+def best_pair(
+    photos: Sequence[Path | str], *, cancelled: Callable[[], bool] | None = None
+) -> tuple[int, int] | None:
+    """The two photos that make the best scene together: much in common, seen from different places.
+
+    Returns:
+        Their places in `photos`; None where no two photos match.
+
+    Raises:
+        ImageError: a photo cannot be used. Cancelled: `cancelled()` became true.
+    """
+    run = _Run(None, cancelled)
+    greys = []
+    for photo in photos:
+        run.check()
+        greys.append(grey_photo(Path(photo)))
+    return choose_pair(greys, run.check)
+
+
 @dataclass
 class _Run:
     """One reconstruction under way: times its stages, reports them, stops between them."""
@@ -219,6 +256,46 @@ def _with_record(scene: Scene, network: LangFlashNet, timings: dict[str, float])
     if network.calibration:
         record["calibration"] = dict(network.calibration)
     return scene.with_metadata(**record)
+
+
+def _check_refinement(seconds: float, photos: Sequence) -> None:
+    if not 0 < seconds <= LONGEST_REFINEMENT:
+        raise InputError(
+            f"A refinement of {seconds:g} seconds is out of range: choose up to {LONGEST_REFINEMENT}."
+        )
+    if len(photos) < 2:
+        raise InputError("A refinement compares photos with each other: give at least two that overlap.")
+
+
+def _refined(scene: Scene, images: Tensor, seconds: float, device: str, progress: Progress) -> Scene:
+    """The scene fitted to its photos, or as it was with a warning that says why; on the CPU again."""
+    try:
+        result = refine(_moved(scene, device), images.to(device), Budget(seconds), progress)
+    except InputError as reason:
+        return scene.with_metadata(warnings=[*scene.metadata["warnings"], f"not refined: {reason}"])
+    record = {
+        "kept": result.kept,
+        "held_out": scene.metadata["photos"][result.view],
+        "held_out_psnr_db": [round(value, 2) for value in result.held_out],
+        "photos_psnr_db": [round(value, 2) for value in result.photos],
+        "steps": list(result.steps),
+    }
+    warnings = scene.metadata["warnings"]
+    if not result.kept:
+        before, after = record["held_out_psnr_db"]
+        note = f"not refined: {record['held_out']}, held out, came no closer ({before} dB, then {after} dB)"
+        warnings = [*warnings, note]
+    return _moved(result.scene, "cpu").with_metadata(refinement=record, warnings=warnings)
+
+
+def _moved(scene: Scene, device: str) -> Scene:
+    """Gaussians and cameras on a device."""
+    return replace(
+        scene,
+        gaussians=scene.gaussians.map(lambda values: values.to(device)),
+        viewmats=scene.viewmats.to(device),
+        Ks=scene.Ks.to(device),
+    )
 
 
 def peak_memory_mb() -> int | None:

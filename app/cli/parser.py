@@ -113,6 +113,12 @@ def _add_reconstruct(commands) -> None:
     command.add_argument(
         "--precision", choices=("auto", "float32", "bfloat16"), default="auto", help="(default: auto)"
     )
+    command.add_argument(
+        "--refine",
+        type=above_zero,
+        metavar="SECONDS",
+        help="then fit poses and Gaussians to the photos, and keep that if a held-out view improves",
+    )
     lens = command.add_mutually_exclusive_group()
     lens.add_argument("--fov", type=open_fov, metavar="DEG", help="field of view of the photos' longer side")
     lens.add_argument(
@@ -179,14 +185,20 @@ def _add_export(commands) -> None:
         command,
         "FILE",
         ".png: a picture, or a cut-out with --prompt; .ply, .splat, .langflash: Gaussians; "
-        ".json: COCO masks of --prompt; .npz: a view as numbers; .mp4: a flight",
+        ".json: COCO masks of --prompt; .csv: their boxes; .npz: a view as numbers; .mp4: a flight",
     )
     command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="keep only what answers one of these")
     command.add_argument(
         "--threshold", type=kept_fraction, metavar="T", help="relevancy to keep, between 0 and 1"
     )
     command.add_argument(
-        "--what", choices=("labels",), help="labels: a .png of phrase numbers, with its legend as .json"
+        "--what",
+        choices=("rgb", "heat", "mask", "cutout", "labels", "boxes"),
+        help="of a .png: colours, a heat-map, a mask, a cut-out with transparency (default with --prompt), "
+        "or phrase numbers with a legend as .json; boxes: a .json or .csv of places and sizes",
+    )
+    command.add_argument(
+        "--all-views", action="store_true", help="from every photo: FILE_0, FILE_1 and so on"
     )
     command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of an .mp4 (default: 6)")
     _add_camera(command)

@@ -1,6 +1,7 @@
 """What a command says: one sentence for an error, warnings, one JSON document, a progress bar."""
 
 import json
+import os
 import sys
 import time
 from collections.abc import Iterable
@@ -37,6 +38,9 @@ def write_json(document: dict[str, Any], stream: TextIO) -> None:
 class ProgressBar:
     """A bar on stderr where stderr is a terminal, silence otherwise.
 
+    With `LANGFLASH_PROGRESS=lines` in the environment it writes a line of `progress`, the fraction
+    and the stage, separated by tabs, for another program to read.
+
     Call it with a stage's name and the fraction in [0, 1] that is done; as a context manager
     it leaves a clean line behind, also after an error.
     """
@@ -45,11 +49,15 @@ class ProgressBar:
 
     def __init__(self, stream: TextIO | None = None):
         self.stream = sys.stderr if stream is None else stream
-        self.live = self.stream.isatty()
+        self.lines = os.environ.get("LANGFLASH_PROGRESS") == "lines"
+        self.live = self.stream.isatty() and not self.lines
         self.start = time.monotonic()
         self.drawn = 0  # characters on the line now
 
     def __call__(self, stage: str, fraction: float) -> None:
+        if self.lines:
+            self.stream.write(f"progress\t{fraction:.4f}\t{stage}\n")
+            self.stream.flush()
         if not self.live:
             return
         done = round(self.WIDTH * min(max(fraction, 0.0), 1.0))

@@ -226,6 +226,17 @@ class QueryPasses:
         with drawing(target):
             self._screen.draw(program)
 
+    def paint_features(
+        self, weights: LayerTarget, columns: np.ndarray, version: int, target: moderngl.Framebuffer
+    ) -> None:
+        """sum_k W_k c_k / sum_k W_k into `target` for columns (Ka, 4), the last of ones."""
+        self._pack(weights, len(columns), version)
+        program = self._program("show_features.frag", columns)
+        self._peaks.use(1)
+        set_uniforms(program, peaks=1)
+        with drawing(target):
+            self._screen.draw(program)
+
     def _drop_relevance(self) -> None:
         if self.relevance is not None:
             self.relevance.release()

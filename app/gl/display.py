@@ -7,14 +7,20 @@ import moderngl
 import numpy as np
 
 from langflash_core.query.answers import COVERED_ALPHA
+from langflash_core.types import Camera
 
 from .combine import Screen
+from .photos import SAME, WORST, PhotoDepths
 from .programs import Programs, set_uniforms
 from .targets import ColourTarget, LayerTarget, drawing
 
 COLOUR_MAPS = ("turbo", "inferno", "grey")
 _HEAT_OPACITY = 0.7
 _LABEL_OPACITY = 0.6
+_TRUST_OPACITY = 0.7
+MASK_STYLES = ("flat", "isolate", "hide", "dim")
+COUNT_COLOURS = ((0.86, 0.20, 0.55), (0.95, 0.70, 0.20), (0.25, 0.62, 0.55))
+"""Coverage: no photo saw it, one, several."""
 
 
 class Display:
@@ -129,6 +135,102 @@ class Display:
             self._screen.draw(program)
         target.release()
 
+    def paint_masks(
+        self,
+        into: moderngl.Framebuffer,
+        target: ColourTarget,
+        relevance: LayerTarget,
+        style: str,
+        colours: np.ndarray,
+        thresholds: np.ndarray,
+        background: tuple[float, float, float],
+    ) -> None:
+        """What passes, in one of `MASK_STYLES`; colours (P, 3) and thresholds (P,) of the prompts."""
+        count = len(thresholds)
+        capacity = max(16, 1 << (count - 1).bit_length())
+        defines = {"COVERED_ALPHA": COVERED_ALPHA, "MAX_PROMPTS": capacity}
+        self._paint(
+            into,
+            "show_masks.frag",
+            defines,
+            {"colour": target.colour, "depth": target.depth, "relevance": relevance.array},
+            num_prompts=count,
+            style=MASK_STYLES.index(style),
+            background=background,
+            thresholds=np.pad(thresholds, (0, capacity - count)),
+            label_colours=np.pad(colours, ((0, capacity - count), (0, 0))),
+        )
+
+    def paint_margin(
+        self,
+        into: moderngl.Framebuffer,
+        target: ColourTarget,
+        relevance: LayerTarget,
+        num_prompts: int,
+        threshold: float,
+        span: tuple[float, float],
+        which: int,
+        over_rgb: bool,
+    ) -> None:
+        self._paint(
+            into,
+            "show_margin.frag",
+            {"COVERED_ALPHA": COVERED_ALPHA},
+            {"colour": target.colour, "relevance": relevance.array},
+            num_prompts=num_prompts,
+            threshold=threshold,
+            span=span,
+            which_map=which,
+            opacity=_TRUST_OPACITY if over_rgb else 1.0,
+        )
+
+    def paint_weight(self, into: moderngl.Framebuffer, weights: LayerTarget, place: int, which: int) -> None:
+        self._paint(
+            into, "show_weight.frag", {}, {"weight_maps": weights.array}, place=place, which_map=which
+        )
+
+    def paint_transmittance(self, into: moderngl.Framebuffer, target: ColourTarget, which: int) -> None:
+        self._paint(into, "show_transmittance.frag", {}, {"depth": target.depth}, which_map=which)
+
+    def paint_trust(
+        self,
+        into: moderngl.Framebuffer,
+        target: ColourTarget,
+        photos: PhotoDepths,
+        camera: Camera,
+        own: bool,
+        which: int,
+    ) -> None:
+        """Agreement of the photos' own depths, or else how many photos see each pixel."""
+        defines: dict[str, float] = {"COVERED_ALPHA": COVERED_ALPHA, "MAX_PHOTOS": photos.capacity}
+        name = "show_agreement.frag" if own else "show_coverage.frag"
+        self._paint(
+            into,
+            name,
+            {**defines, **({"WORST": WORST} if own else {"SAME": SAME})},
+            {"colour": target.colour, "depth": target.depth, "photo_depths": photos.texture},
+            count_colours=np.array(COUNT_COLOURS),
+            which_map=which,
+            opacity=_TRUST_OPACITY,
+            **photos.uniforms(camera),
+        )
+
+    def _paint(
+        self,
+        into: moderngl.Framebuffer,
+        fragment: str,
+        defines: dict[str, float],
+        textures: dict[str, moderngl.Texture | moderngl.TextureArray],
+        **uniforms: float | int | tuple | np.ndarray,
+    ) -> None:
+        """Fill `into` by a fragment shader that reads `textures` by their names."""
+        program = self._programs.get("screen.vert", fragment, defines)
+        for unit, texture in enumerate(textures.values()):
+            texture.use(unit)
+        set_uniforms(program, **{name: unit for unit, name in enumerate(textures)}, **uniforms)
+        with drawing(into):
+            self._screen.draw(program)
+
     @property
     def label_ids(self) -> moderngl.Texture:
         """(H, W) float16: 0 for none, 1 + prompt elsewhere; exact up to 2,048 prompts."""
@@ -167,3 +269,24 @@ def atom_colours(dictionary: np.ndarray) -> np.ndarray:
     flat = high - low < 1e-9  # one atom, or all alike: mid grey on that axis
     shares = np.where(flat, 0.5, (scores - low) / np.where(flat, 1.0, high - low))
     return (0.1 + 0.85 * shares).astype(np.float32)
+
+
+def feature_axes(dictionary: np.ndarray, masses: np.ndarray) -> np.ndarray:
+    """Affine colours (K, 4) of atoms (K, C): three principal axes, and ones for `show_features.frag`.
+
+    The axes are of the atoms as often as the scene carries them, masses (K,) >= 0. Two deviations
+    along an axis span its colour; each axis' sign makes its largest entry positive.
+    """
+    finite = np.where(np.isfinite(dictionary).all(1, keepdims=True), dictionary, 0.0)
+    shares = masses / max(masses.sum(), 1e-12)
+    centred = finite - shares @ finite
+    _, values, axes = np.linalg.svd(np.sqrt(shares)[:, None] * centred, full_matrices=False)
+    columns = np.ones((len(finite), 4))
+    columns[:, :3] = 0.5
+    for place in range(min(3, len(values))):
+        if values[place] < 1e-9:  # fewer directions than colours: mid grey
+            continue
+        along = centred @ axes[place]
+        sign = np.sign(along[np.abs(along).argmax()])
+        columns[:, place] += sign * along / (4 * values[place])
+    return columns

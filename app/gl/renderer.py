@@ -16,14 +16,15 @@ from torch import Tensor
 
 from langflash_core.errors import GraphicsError
 from langflash_core.query.relevance import CompiledQuery, finite_atoms
-from langflash_core.scene import thin
-from langflash_core.splat.projection import ALPHA_MIN
+from langflash_core.scene.thin import thin_with_rows
+from langflash_core.splat.projection import ALPHA_MIN, NEAR
 from langflash_core.types import Camera, Frame, Scene
 
 from .combine import QueryPasses, Screen
-from .display import COLOUR_MAPS, Display, atom_colours
+from .display import COLOUR_MAPS, MASK_STYLES, Display, atom_colours, feature_axes
 from .fast import MAX_PHRASES, NUMBERS, FastPasses, splat_norms, splat_numbers
 from .host import HostQueryPasses, draws_in_software
+from .photos import PhotoDepths
 from .programs import Programs, set_uniforms
 from .splats import SplatBuffers
 from .targets import MAX_LAYERS_AT_ONCE, PREMULTIPLIED, ColourTarget, LayerTarget, context_lives, drawing
@@ -78,12 +79,15 @@ class SplatRenderer:
         self._screen = Screen(ctx)
         self._scene: Scene | None = None
         self._levels: dict[float, SplatBuffers] = {}  # by share of the Gaussians
+        self._rows: dict[float, np.ndarray] = {}  # of the scene, that a level draws
         self._splats: SplatBuffers | None = None  # the level in use
         self._background: Background = (0.0, 0.0, 0.0)
         self._compiled: CompiledQuery | None = None
         self._asked = 0  # how often; names the current query in keys
         self._drawn: dict[str, tuple] = {}  # what the colour and weight textures show
         self._version = 0  # of the weight maps
+        self._marks: tuple[np.ndarray, np.ndarray] | None = None  # shown, tints
+        self._marked = 0  # how often; names the current marks in keys
         self._atoms = np.zeros(0, np.int64)
         self._atom_colours = np.zeros((0, 3), np.float32)
         self._size: tuple[int, int] | None = None
@@ -95,6 +99,8 @@ class SplatRenderer:
         self._numbers: tuple[int, np.ndarray] | None = None  # `_asked` and what its Gaussians carry
         self._norms: tuple[bytes, np.ndarray] | None = None  # factor and |f_i|
         self._display: Display | None = None
+        self._camera: Camera | None = None
+        self._photos: dict[bool, PhotoDepths] = {}  # by whether each sees its own Gaussians alone
 
     # --- what to draw -----------------------------------------------------------------------
 
@@ -104,11 +110,35 @@ class SplatRenderer:
             return
         self._release_scene()
         self._splats = SplatBuffers(self._ctx, self._programs, scene)
-        self._levels = {1.0: self._splats}
+        self._levels, self._rows = {1.0: self._splats}, {1.0: np.arange(len(scene.gaussians))}
+        self._marks = None
         self._scene = scene
         self._atom_colours = atom_colours(scene.semantics.dictionary.detach().cpu().double().numpy())
         if self._compiled is not None and self._compiled.factor.shape[0] != scene.semantics.num_atoms:
             self._compiled = None
+
+    def mark(self, shown: np.ndarray, tints: np.ndarray) -> None:
+        """Draw only some Gaussians, and some in a tint (`splats.TINTS`); holds until `set_scene`.
+
+        Args:
+            shown: (N,) bool. tints: (N,) uint8, 0 for the own colour.
+
+        Raises:
+            ValueError: there is no scene, or N is another.
+        """
+        count = len(self._scene.gaussians) if self._scene else 0
+        if self._splats is None or shown.shape != (count,) or tints.shape != (count,):
+            raise ValueError(f"mark: expected {count} rows, received {shown.shape} and {tints.shape}")
+        self._marks = (shown, tints)
+        changed = [self._mark_level(share) for share in self._levels]
+        if any(changed):
+            self._drawn = {}
+        self._marked += 1
+
+    def _mark_level(self, share: float) -> bool:
+        """Bring the marks to a level; returns whether it shows other Gaussians now."""
+        rows = self._rows[share]
+        return self._marks is not None and self._levels[share].mark(*(part[rows] for part in self._marks))
 
     @property
     def num_dropped(self) -> int:
@@ -147,18 +177,23 @@ class SplatRenderer:
         if self._splats is None:
             raise ValueError("draw: expected set_scene before, received no scene")
         self._resize(camera)
+        self._camera = camera
         self._use_level(share)
         key = _camera_key(camera)
         if self._drawn.get("sorted") != key:
             self._splats.sort(camera)
-            if len(self._splats.order):
-                self._splats.project(camera)
             self._drawn = {"sorted": key}
         self._background = background
+        if self._drawn.get("projected") != (key, self._marked):
+            if len(self._splats.order):
+                self._splats.project(camera)
+            self._drawn.pop("colour", None)
+            self._drawn.pop("numbers", None)
+            self._drawn["projected"] = (key, self._marked)
         self._is_fast = fast
         if self._answers_fast():
             self._ensure_numbers()
-        if self._drawn.get("colour") != key:
+        if "colour" not in self._drawn:
             self._draw_colour()
         if weight_maps and not fast:
             self._ensure_weights()
@@ -190,6 +225,32 @@ class SplatRenderer:
         under = np.asarray(self._background, np.float32)
         rgb = torch.from_numpy(colour[..., :3] + (1 - alphas[..., None]) * under)
         return Frame(rgb, torch.from_numpy(alphas.copy()), torch.from_numpy(depths), maps)
+
+    def pixel(self, x: int, y: int) -> tuple[float, float, np.ndarray | None]:
+        """Alpha, depth (scene units, 0 where empty) and weights (K,) of one pixel of the view.
+
+        The weights are None until the weight maps of this view are drawn. Reads a few texels.
+        """
+        viewport = (x, y, 1, 1)
+        content = self._drawn_target().framebuffer.read(viewport, 2, attachment=1, dtype="f4")
+        total, alpha = np.frombuffer(content, np.float32).tolist()
+        depth = total / alpha if alpha >= ALPHA_MIN else 0.0
+        if self._drawn.get("weights") != self._drawn["sorted"]:
+            return alpha, depth, None
+        assert self._scene is not None
+        weights = np.zeros(self._scene.semantics.num_atoms, np.float32)
+        num_layers = -(-len(self._atoms) // _ATOMS_PER_LAYER)
+        texels: list[np.ndarray] = []
+        for first in range(0, num_layers, MAX_LAYERS_AT_ONCE):
+            count = min(MAX_LAYERS_AT_ONCE, num_layers - first)
+            assert self._weights is not None
+            layers = self._weights.layers(first, count)
+            for layer in range(count):
+                read = layers.read(viewport, 4, attachment=layer, dtype=self._dtype)
+                texels.append(np.frombuffer(read, _NUMPY[self._dtype])[:_ATOMS_PER_LAYER])
+        if texels:
+            weights[self._atoms] = np.concatenate(texels)[: len(self._atoms)]
+        return alpha, depth, weights
 
     def relevance(self) -> Tensor:
         """Relevance (P, H, W) float32 of the phrases asked, 0 where the view is empty.
@@ -306,6 +367,107 @@ class SplatRenderer:
         key = (self._drawn["colour"], colormap)
         return display.picture(("depth",), key, lambda into: display.paint_depth(into, target, span, which))
 
+    def mask_texture(self, style: str, colours: np.ndarray, thresholds: np.ndarray) -> moderngl.Texture:
+        """What passes its own prompt's threshold.
+
+        Args:
+            style: "flat" in the prompt's colour, "isolate" alone, "hide" left out, "dim" the rest dimmed.
+            colours: (P, 3) in [0, 1]. thresholds: (P,).
+        """
+        layers, compiled, key = self._ensure_relevance()
+        expected = ((compiled.prompts.shape[0], 3), (compiled.prompts.shape[0],))
+        if (colours.shape, thresholds.shape) != expected or style not in MASK_STYLES:
+            raise ValueError(f"masks: expected {expected} and one of {MASK_STYLES}, received {style!r}")
+        target, display, background = self._drawn_target(), self._shown(), self._background
+        key = (*key, background, colours.tobytes(), thresholds.tobytes())
+        return display.picture(
+            ("masks", style),
+            key,
+            lambda into: display.paint_masks(into, target, layers, style, colours, thresholds, background),
+        )
+
+    def margin_texture(
+        self,
+        threshold: float,
+        span: tuple[float, float],
+        colormap: str = "turbo",
+        over_rgb: bool = True,
+    ) -> moderngl.Texture:
+        """The best prompt's relevance less the second best's; of one prompt, less `threshold`."""
+        layers, compiled, key = self._ensure_relevance()
+        target, display, which = self._drawn_target(), self._shown(), COLOUR_MAPS.index(colormap)
+        count = compiled.prompts.shape[0]
+        return display.picture(
+            ("margin",),
+            (*key, threshold, span, which, over_rgb),
+            lambda into: display.paint_margin(into, target, layers, count, threshold, span, which, over_rgb),
+        )
+
+    def weight_texture(self, atom: int, colormap: str = "inferno") -> moderngl.Texture:
+        """One atom's weight map, 0 to 1.
+
+        Raises:
+            ValueError: there is no such atom.
+        """
+        self._drawn_target()
+        self._ensure_weights()
+        count = 0 if self._scene is None else self._scene.semantics.num_atoms
+        if not 0 <= atom < count:
+            raise ValueError(f"atom: expected 0 to {count - 1}, received {atom}")
+        weights, display, which = self._weights, self._shown(), COLOUR_MAPS.index(colormap)
+        places = np.flatnonzero(self._atoms == atom)
+
+        def paint(into: moderngl.Framebuffer) -> None:
+            into.clear(0.0, 0.0, 0.0, 1.0)
+            if len(places) and weights is not None:
+                display.paint_weight(into, weights, int(places[0]), which)
+
+        return display.picture(("weight",), (self._version, atom, which), paint)
+
+    def transmittance_texture(self, colormap: str = "inferno") -> moderngl.Texture:
+        """What passes every splat, 0 to 1."""
+        target, display, which = self._drawn_target(), self._shown(), COLOUR_MAPS.index(colormap)
+        key = (self._drawn["colour"], which)
+        return display.picture(
+            ("transmittance",), key, lambda into: display.paint_transmittance(into, target, which)
+        )
+
+    def feature_texture(self) -> moderngl.Texture:
+        """Principal axes of F(p) = W D as colours, the same in every view; empty pixels black."""
+        self._drawn_target()
+        self._ensure_weights()
+        return self._shown().picture(("features",), (self._version,), self._paint_features)
+
+    def coverage_texture(self) -> moderngl.Texture:
+        """How many photos saw what each pixel shows, in `COUNT_COLOURS`; the first call draws their views."""
+        return self._trust_texture(own=False)
+
+    def agreement_texture(self) -> moderngl.Texture:
+        """How well the photos' own depths agree at each pixel; grey where fewer than two can tell.
+
+        Raises:
+            ValueError: the scene does not say which photo made which Gaussian.
+        """
+        return self._trust_texture(own=True)
+
+    def colour_bar(self, colormap: str) -> np.ndarray:
+        """A colour map from left to right, (1, 256, 3) uint8."""
+        texture = self._ctx.texture((256, 1), 4)
+        framebuffer = self._ctx.framebuffer([texture])
+        program = self._programs.get("screen.vert", "show_bar.frag")
+        set_uniforms(program, width=256.0, which_map=COLOUR_MAPS.index(colormap))
+        with drawing(framebuffer):
+            self._screen.draw(program)
+        shown = np.frombuffer(texture.read(), np.uint8).reshape(1, 256, 4)[..., :3].copy()
+        framebuffer.release()
+        texture.release()
+        return shown
+
+    @property
+    def depth_range(self) -> tuple[float, float]:
+        """Depths of the first and the last colour of `depth_texture`, scene units."""
+        return (NEAR, 1.0) if self._splats is None else self._splats.depth_range
+
     # --- inside -------------------------------------------------------------------------------
 
     def _resize(self, camera: Camera) -> None:
@@ -329,7 +491,10 @@ class SplatRenderer:
     def _use_level(self, share: float) -> None:
         assert self._scene is not None
         if share not in self._levels:
-            self._levels[share] = SplatBuffers(self._ctx, self._programs, thin(self._scene, share))
+            thinner, rows = thin_with_rows(self._scene, share)
+            self._levels[share] = SplatBuffers(self._ctx, self._programs, thinner)
+            self._rows[share] = rows
+            self._mark_level(share)
         if self._levels[share] is not self._splats:
             self._splats = self._levels[share]
             self._drawn = {}
@@ -351,7 +516,7 @@ class SplatRenderer:
             if len(self._splats.order):
                 carried = None if numbers is None else self._splats.in_order(numbers)
                 self._splats.draw(program, carried, layers)
-        self._drawn["colour"] = self._drawn["sorted"]
+        self._drawn["colour"] = self._drawn["projected"]
         self.passes["colour"] += 1
 
     def _answers_fast(self) -> bool:
@@ -436,6 +601,31 @@ class SplatRenderer:
         if len(self._atoms) and self._weights is not None:
             self._query.paint_atoms(self._weights, self._atom_colours[self._atoms], self._version, into)
 
+    def _paint_features(self, into: moderngl.Framebuffer) -> None:
+        assert self._query is not None and self._scene is not None
+        into.clear(0.0, 0.0, 0.0, 1.0)
+        if not len(self._atoms) or self._weights is None:
+            return
+        semantics = self._scene.semantics
+        masses = np.zeros(semantics.num_atoms)
+        carried = semantics.weight_values.double() * self._scene.gaussians.opacities.double()[:, None]
+        np.add.at(masses, semantics.weight_ids.numpy(), carried.nan_to_num(0, 0, 0).numpy())
+        columns = feature_axes(semantics.dictionary.double().numpy(), masses)[self._atoms]
+        self._query.paint_features(self._weights, columns, self._version, into)
+
+    def _trust_texture(self, own: bool) -> moderngl.Texture:
+        target, display, camera = self._drawn_target(), self._shown(), self._camera
+        assert self._scene is not None and camera is not None
+        if own not in self._photos:
+            self._photos[own] = PhotoDepths(self._ctx, self._programs, self._scene, own)
+        photos = self._photos[own]
+        which = COLOUR_MAPS.index("turbo")
+        return display.picture(
+            ("trust", own),
+            (self._drawn["colour"],),
+            lambda into: display.paint_trust(into, target, photos, camera, own, which),
+        )
+
     def _read_weights(self, height: int, width: int) -> np.ndarray:
         self._ensure_weights()
         assert self._scene is not None
@@ -481,6 +671,9 @@ class SplatRenderer:
         for level in self._levels.values():
             level.release()
         self._levels = {}
+        for photos in self._photos.values():
+            photos.release()
+        self._photos = {}
         self._splats = self._scene = self._numbers = self._norms = None
         self._drawn = {}
 

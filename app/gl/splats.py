@@ -17,6 +17,7 @@ from .programs import Programs, set_uniforms
 
 _ROW_TEXELS = 4096
 _ROWS_AT_ONCE = 1 << 16  # Gaussians: 12 MB of coefficients of degree 3
+TINTS = ((0.16, 0.56, 1.0), (1.0, 0.22, 0.20))  # colours of tint 1, selected, and tint 2, to be deleted
 _PLACE_FLOATS = 11  # place (4), shape (4), colour (3)
 _WIDEST = 1e12  # scene units: wider Gaussians are flat over any view, and float32 squares end at 1e38
 
@@ -39,6 +40,8 @@ class SplatBuffers:
         gaussians = replace(gaussians, sh=sh[:, :0]).map(lambda v: v[kept])
         gaussians = replace(gaussians, scales=gaussians.scales.clamp(-_WIDEST, _WIDEST))
         self.num_dropped = int((~finite).sum())
+        self._kept = kept.numpy()
+        self._shown = np.ones(len(gaussians), bool)
         self.num_gaussians = len(gaussians)
         self.order = np.zeros(0, np.uint32)
         self.depth_range = (NEAR, 1.0)
@@ -62,6 +65,7 @@ class SplatBuffers:
             self._own(self._ctx.buffer(np.ascontiguousarray(f).tobytes())) for f in fields
         ]
         self._vertex_buffers.append(self._upload_harmonics(sh.numpy(), rows))
+        self._tints = self._own(self._ctx.buffer(bytes(count)))
         self._order_buffer = self._own(self._ctx.buffer(reserve=4 * count))
         self.places = self._own(self._ctx.buffer(reserve=4 * _PLACE_FLOATS * count))
         self._sparse = self._upload_weights() if self._num_atoms and self._ids.shape[1] else None
@@ -98,6 +102,17 @@ class SplatBuffers:
         self._owned.append(created)
         return created
 
+    def mark(self, shown: np.ndarray, tints: np.ndarray) -> bool:
+        """What of the scene's N Gaussians to draw: shown (N,) bool; tints (N,) uint8, 0 for none.
+
+        Nothing is uploaded again but one byte a Gaussian. Project after this; whether to sort again,
+        because other Gaussians are shown now, is returned.
+        """
+        before, self._shown = self._shown, shown[self._kept]
+        if self.num_gaussians:
+            self._tints.write(np.ascontiguousarray(tints[self._kept], np.uint8).tobytes())
+        return not np.array_equal(before, self._shown)
+
     def sort(self, camera: Camera) -> None:
         """Choose the Gaussians that may touch the image and order them back to front.
 
@@ -109,7 +124,7 @@ class SplatBuffers:
         row = viewmat[2]
         z = across * row[0] + down * row[1] + along * row[2] + row[3]
         with np.errstate(over="ignore", invalid="ignore"):  # places beyond float32 are beside any image
-            rows = np.flatnonzero(self._may_touch(camera, viewmat, z))
+            rows = np.flatnonzero(self._may_touch(camera, viewmat, z) & self._shown)
         depths = z[rows]
         nearest_first = rows[stable_order(depths)]
         self.order = nearest_first[::-1].astype(np.uint32)
@@ -166,10 +181,12 @@ class SplatBuffers:
             eye_rest=eye - eye.astype(np.float32),
             pinhole=np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2]]),
             image_size=(float(camera.width), float(camera.height)),
+            tint_colours=np.array(TINTS),
         )
-        formats = ("4f", "4f", "3f", f"{4 * self._sh_vec4s}f")
-        names = ("in_mean", "in_quat", "in_scale", "in_sh")
-        content = [(b, f, n) for b, f, n in zip(self._vertex_buffers, formats, names, strict=True)]
+        formats = ("4f", "4f", "3f", f"{4 * self._sh_vec4s}f", "1f1")
+        names = ("in_mean", "in_quat", "in_scale", "in_sh", "in_tint")
+        buffers = (*self._vertex_buffers, self._tints)
+        content = [(b, f, n) for b, f, n in zip(buffers, formats, names, strict=True)]
         self._transform(program, content, self.places)
 
     def expand(self, atoms: np.ndarray, first: int, num_layers: int) -> moderngl.Buffer:

@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Protocol
 
 from app.window import poses
+from app.window.asking import PROMPT_DIALOGS, PROMPTS_SUFFIX
 from app.window.drops import MAX_PHOTOS, SCENE_SUFFIX
+from app.window.edit_commands import fresh
 from app.window.poses import Pose
 from app.window.state import (
     FLIGHT_SECONDS,
@@ -25,6 +27,7 @@ from app.window.state import (
     Stats,
     Toast,
 )
+from langflash_core.edits import Marks
 
 _NOTHING_TO_SAVE = "There is no scene to save; drop photos on the window first."
 
@@ -152,12 +155,14 @@ class Reconstruct:
 
 @dataclass(frozen=True)
 class OpenScene:
-    """Read a scene file; replaces a job under way."""
+    """Read a scene file; replaces a job under way. edits: kept by an earlier session."""
 
     path: Path
+    edits: Path | None = None
 
     def apply(self, state: State) -> State:
-        return replace(state, job=Job(f"Opening {self.path.name}", "reading", started=state.now))
+        title = "Restoring" if self.edits else f"Opening {self.path.name}"
+        return replace(state, job=Job(title, "reading", started=state.now))
 
 
 @dataclass(frozen=True)
@@ -184,7 +189,7 @@ class OpenPaths:
 
 @dataclass(frozen=True)
 class ShowDialog:
-    """`which` is "save", "open", "help" or "leave"; None closes."""
+    """`which` is a key of `panels.overlays.TITLES`; None closes."""
 
     which: str | None
 
@@ -192,6 +197,8 @@ class ShowDialog:
         if self.which == "save" and state.info is None:
             return Notify(_NOTHING_TO_SAVE).apply(state)
         path = str(_place_to_save(state)) if self.which == "save" else ""
+        if self.which in PROMPT_DIALOGS:
+            path = str(state.asking.prompts_path or Path.home() / f"my{PROMPTS_SUFFIX}")
         return replace(state, dialog=self.which, dialog_path=path)
 
 
@@ -264,7 +271,7 @@ class EditPrompt:
     text: str
 
     def apply(self, state: State) -> State:
-        after = _change_prompt(state, self.key, text=self.text, score=None)
+        after = _change_prompt(state, self.key, text=self.text, score=None, like=b"")
         first = not state.asked and bool(after.asked)
         mode = Mode.HEAT if first and state.mode is Mode.RGB else after.mode
         return replace(after, mode=mode, active=self.key)
@@ -374,6 +381,16 @@ class JumpTo:
 
 
 @dataclass(frozen=True)
+class FlyTo:
+    """Fly to a pose that is no photo's."""
+
+    pose: Pose
+
+    def apply(self, state: State) -> State:
+        return replace(state, flight=Flight(state.pose, self.pose, state.now), view=None)
+
+
+@dataclass(frozen=True)
 class Home:
     """Fly back to the first photo's view."""
 
@@ -432,8 +449,12 @@ class SceneArrived:
 
     def apply(self, state: State) -> State:
         prompts = tuple(replace(p, score=None) for p in state.prompts)
+        history = self.info.history
+        saved = None if history is None else history.moved_to(0).marks
         return replace(
             state,
+            editing=fresh(state.editing, history, saved),
+            asking=state.asking.without_scene(),
             info=self.info,
             prompts=prompts,
             job=None,
@@ -445,13 +466,16 @@ class SceneArrived:
 
 @dataclass(frozen=True)
 class SceneSaved:
-    """The scene on show now lives at `path`."""
+    """The scene on show, edited up to `marks`, now lives at `path`."""
 
     path: Path
+    marks: Marks | None = None
 
     def apply(self, state: State) -> State:
         info = None if state.info is None else replace(state.info, path=self.path, name=self.path.name)
-        return Notify(f"Saved {self.path}", "info").apply(replace(state, info=info))
+        saved = self.marks or state.editing.saved
+        state = replace(state, info=info, editing=replace(state.editing, saved=saved))
+        return Notify(f"Saved {self.path}", "info").apply(state)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from app.window import ask_messages, edit_messages
 from app.window.state import SceneInfo
+from langflash_core.edits import Marks
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -23,16 +25,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ReconstructPhotos:
-    """Make a scene of photos."""
+    """Make a scene of photos. fovs: degrees of the longer side, one per photo; None: its record."""
 
     paths: tuple[Path, ...]
+    fovs: tuple[float | None, ...] = ()
 
 
 @dataclass(frozen=True)
 class LoadScene:
-    """Read a scene file."""
+    """Read a scene file; or, with `edits`, the scene and the history that an earlier session kept."""
 
     path: Path
+    edits: Path | None = None
 
 
 # Requests: small ones, answered between the stages of a job
@@ -40,21 +44,27 @@ class LoadScene:
 
 @dataclass(frozen=True)
 class WriteScene:
-    """Write a scene file."""
+    """Write a scene file of the scene as edited."""
 
     scene: "Scene"
     path: Path
+    marks: Marks | None = None
 
 
 @dataclass(frozen=True)
 class Encode:
-    """Compile prompts against a scene; only the newest one counts."""
+    """Compile prompts against a scene; only the newest one counts.
+
+    likes: per prompt a language vector as float32 bytes, asked instead of the text, or none.
+    """
 
     serial: int
     scene: "Scene"
     keys: tuple[int, ...]
     texts: tuple[str, ...]
     negatives: tuple[str, ...]
+    likes: tuple[bytes, ...] = ()
+    marks: Marks | None = None
 
 
 @dataclass(frozen=True)
@@ -76,8 +86,33 @@ class MakeThumbnails:
     paths: tuple[Path, ...]
 
 
+@dataclass(frozen=True)
+class KeepCopy:
+    """Write a scene that nobody saved where a crash cannot take it."""
+
+    serial: int
+    scene: "Scene"
+    path: Path
+
+
+@dataclass(frozen=True)
+class FindPair:
+    """The two photos that make the best scene."""
+
+    paths: tuple[Path, ...]
+
+
 Job = ReconstructPhotos | LoadScene
-Errand = WriteScene | Encode | Answer | MakeThumbnails
+Errand = (
+    WriteScene
+    | Encode
+    | Answer
+    | MakeThumbnails
+    | KeepCopy
+    | FindPair
+    | ask_messages.Request
+    | edit_messages.Request
+)
 
 
 # Results
@@ -100,9 +135,10 @@ class SceneReady:
 
 @dataclass(frozen=True)
 class SceneWritten:
-    """A scene file is complete."""
+    """A scene file is complete; it holds the edits up to `marks`."""
 
     path: Path
+    marks: Marks | None = None
 
 
 @dataclass(frozen=True)
@@ -137,11 +173,46 @@ class Scored:
 
 @dataclass(frozen=True)
 class Thumbnail:
-    """rgb (h, w, 3) uint8, or None with the reason; `key` names the texture."""
+    """rgb (h, w, 3) uint8, or None with the reason; `key` names the texture.
+
+    fov: recorded in the file, degrees of the longer side. notes: triage.
+    """
 
     key: str
     rgb: np.ndarray | None
     problem: str = ""
+    fov: float | None = None
+    notes: tuple[str, ...] = ()
 
 
-Result = Progress | SceneReady | SceneWritten | Failed | Stopped | Compiled | Scored | Thumbnail
+@dataclass(frozen=True)
+class CopyKept:
+    """The copy is there."""
+
+    serial: int
+    path: Path
+
+
+@dataclass(frozen=True)
+class PairFound:
+    """`pair`: places in `paths`; None where no two match, with a problem where it could not be told."""
+
+    paths: tuple[Path, ...]
+    pair: tuple[int, int] | None
+    problem: str = ""
+
+
+Result = (
+    Progress
+    | SceneReady
+    | SceneWritten
+    | Failed
+    | Stopped
+    | Compiled
+    | Scored
+    | Thumbnail
+    | edit_messages.Result
+    | ask_messages.Result
+    | CopyKept
+    | PairFound
+)

@@ -19,6 +19,7 @@ UP = np.array([0.0, -1.0, 0.0])
 MIN_REACH = 0.02  # scene units; nearer than this the pivot is inside the lens
 MIN_POLE_DEGREES = 4.0  # how near to straight up or down an orbit may come
 FOV_RANGE = (15.0, 120.0)
+FRAME_MARGIN = 1.08  # around what is framed
 
 
 class Vector(NamedTuple):
@@ -164,6 +165,19 @@ def with_fov(pose: Pose, degrees: float) -> Pose:
 def units_per_pixel(pose: Pose, width: int, height: int) -> float:
     """Scene units that one pixel spans at the pivot's depth."""
     return pose.reach / float(intrinsics(pose, width, height)[0, 0])
+
+
+def framing(pose: Pose, low: Vector, high: Vector) -> Pose:
+    """The pose that looks the same way and shows the whole box from `low` to `high`, with a margin."""
+    corners = np.array([[x, y, z] for x in (low.x, high.x) for y in (low.y, high.y) for z in (low.z, high.z)])
+    middle = (np.array(low) + np.array(high)) / 2
+    offsets = (corners - middle) @ pose.axes  # (8, 3) right, down, forward
+    half = math.tan(math.radians(pose.fov) / 2)
+    half_x, half_y = (half, half / pose.aspect) if pose.aspect >= 1 else (half * pose.aspect, half)
+    needed = np.maximum(abs(offsets[:, 0]) / half_x, abs(offsets[:, 1]) / half_y) - offsets[:, 2]
+    reach = max(float(FRAME_MARGIN * needed.max()), MIN_REACH)
+    centre = middle - reach * pose.axes[:, 2]
+    return replace(pose, centre=Vector(*centre.tolist()), reach=reach)
 
 
 def blend(start: Pose, end: Pose, fraction: float) -> Pose:

@@ -15,14 +15,20 @@ from typing import Any
 
 import glfw
 import moderngl
-from imgui_bundle import imgui
+from imgui_bundle import imgui, implot
 from imgui_bundle.python_backends.glfw_backend import GlfwRenderer
 
+from app.window import ask_commands as ask
+from app.window import ask_messages, desktop, edit_messages, messages, preferences, theme
 from app.window import commands as do
-from app.window import messages, theme
+from app.window import desk_commands as desk
+from app.window import edit_commands as edit
+from app.window.citizen import Citizen
 from app.window.drops import sort_drop
+from app.window.editor import Editor
 from app.window.panels import Look, draw_all
-from app.window.panels.canvas import SHORTCUTS
+from app.window.panels.canvas import EDIT_SHORTCUTS, SHORTCUTS
+from app.window.prompt_sets import PromptSet
 from app.window.state import State, Stats
 from app.window.textures import Thumbnails
 from app.window.viewport import BACKGROUND, Viewport
@@ -36,6 +42,7 @@ MOST_AWAKE = 16  # of a burst of events, which ImGui takes in a frame or two eac
 DEBOUNCE_SECONDS = 0.12  # of typing
 BLINK_SECONDS = 0.4  # of the text cursor
 LONGEST_NAP = 60.0
+COLORMAPS = ("turbo", "inferno")  # of colour-bars
 MIN_SIZE = (900, 560)  # design pixels; below this the panels would overlap
 
 
@@ -66,9 +73,11 @@ class Session:
         GraphicsError: no display, or no OpenGL 3.3.
     """
 
-    def __init__(self, paths: Sequence[str | Path] = (), size: tuple[int, int] = (1280, 800)) -> None:
+    def __init__(self, paths: Sequence[str | Path] = (), size: tuple[int, int] | None = None) -> None:
+        remembered, complaint = preferences.load()
         self.state = State()
         self.gl_errors: list[str] = []
+        self.longest_frame = 0.0  # seconds, without drawing the scene
         self._born = time.perf_counter()
         self._inbox: list[do.Command] = []
         self._awake = AWAKE_FRAMES
@@ -78,19 +87,27 @@ class Session:
         self._frame_seconds = 0.0
         self._panel = (0, 0)
         self._closed = False
-        self._window = _open_window(size)
+        self._window = _open_window(size or desktop.size_of(remembered))
+        if size is None:
+            desktop.place(self._window, remembered)
         self._ctx = moderngl.create_context(require=330, **_LOADER)
         imgui.create_context()
+        implot.create_context()
         self._scale = _interface_scale(self._window)
-        theme.set_up(self._scale)
+        theme.set_up(self._scale * remembered.scale, remembered.theme)
         self._backend = GlfwRenderer(self._window, attach_callbacks=False)
         self._attach()
         self._thumbnails = Thumbnails(self._ctx)
         self._viewport = Viewport(self._ctx)
         self._worker = Worker(glfw.post_empty_event)
         self._renderer_name = _short_name(self._ctx.info["GL_RENDERER"])
+        self._editor = Editor(self._worker.submit, self._viewport, self._perform)
+        self._citizen = Citizen(self._perform, self._post, self._worker.submit)
+        self._citizen.begin(remembered, complaint)
         if paths:
             self.dispatch(do.OpenPaths(tuple(str(p) for p in paths)))
+        elif self.state.desk.offer is None:  # a session holds its edits
+            self._worker.submit(edit_messages.LookForEdits(0))
 
     # Life
 
@@ -99,8 +116,10 @@ class Session:
         try:
             while not self.should_close:
                 self.step()
-        finally:
-            self.close()
+        except BaseException:
+            self.close(crashed=True)
+            raise
+        self.close()
         return 0
 
     @property
@@ -123,20 +142,26 @@ class Session:
         now = self._now()
         if now >= self._encode_at:
             self._encode()
+        self._editor.keep_if_due(self.state, now)
+        self._citizen.tick(self.state, now)
         if not self._inbox and not self._due(now):
             return False
         self._frame(now)
         return True
 
-    def close(self) -> None:
-        """Release everything; may be called twice."""
+    def close(self, crashed: bool = False) -> None:
+        """Release everything; may be called twice. After a crash the session is kept for the next one."""
         if self._closed:
             return
+        self._remember_window()
         self._closed = True
         self._worker.stop()
+        self._editor.close(self.state)
+        self._citizen.close(self.state, crashed)
         self._viewport.release()
         self._thumbnails.release()
         self._backend.shutdown()
+        implot.destroy_context()
         imgui.destroy_context()
         self._ctx.release()
         glfw.destroy_window(self._window)
@@ -146,6 +171,16 @@ class Session:
         """Queue a command for the next frame."""
         self._inbox.append(command)
         self._awake = AWAKE_FRAMES
+
+    def _post(self, command: do.Command) -> None:
+        """Queue a command from any thread."""
+        self.dispatch(command)
+        glfw.post_empty_event()
+
+    def _remember_window(self) -> None:
+        wanted = desktop.remembering(self._window, self.state.desk.preferences)
+        if wanted != self.state.desk.preferences:
+            self._perform(desk.Prefer(wanted))
 
     # The loop
 
@@ -165,7 +200,8 @@ class Session:
         if self._awake > 0 or self._inbox or self.state.flight is not None:
             return 0.0
         now = self._now()
-        moments = [self._viewport_wants, self._encode_at, *(t.until for t in self.state.toasts)]
+        moments = [self._viewport_wants, self._encode_at, self._editor.keep_at, self._citizen.due]
+        moments += [t.until for t in self.state.toasts]
         if imgui.get_io().want_text_input:
             moments.append(self.state.now + BLINK_SECONDS)
         if self.state.job is not None:
@@ -177,14 +213,16 @@ class Session:
         self._awake = max(self._awake - 1, 0)
         for command in (do.Tick(now), *self._take()):
             self._perform(command)
-        self._update_picture(now)
+        drawing = self._update_picture(now)
         self._backend.process_inputs()
         imgui.new_frame()
-        look = Look(self._scale, self._viewport.texture, self._thumbnails)
+        scale = self._scale * self.state.desk.preferences.scale
+        look = Look(scale, self._viewport.texture, self._thumbnails)
         issued, self._panel = draw_all(self.state, look)
         imgui.render()
         self._present()
         self._frame_seconds = time.perf_counter() - start
+        self.longest_frame = max(self.longest_frame, self._frame_seconds - drawing)
         if issued:
             self._awake = AWAKE_FRAMES
         for command in issued:
@@ -194,13 +232,18 @@ class Session:
         taken, self._inbox = self._inbox, []
         return taken
 
-    def _update_picture(self, now: float) -> None:
+    def _update_picture(self, now: float) -> float:
+        """Returns the seconds that drawing took."""
+        began = time.perf_counter()
         try:
+            self._editor.mark(self.state)
             wait = self._viewport.update(self.state, self._panel, self._touched)
         except LangFlashError as error:
             self._perform(do.Notify(str(error)))
             wait = float("inf")
+        drawing = time.perf_counter() - began
         self._viewport_wants = self._now() + wait
+        self._editor.point(self.state)
         view = self._viewport.view(self.state)
         if view is not None:
             self._worker.submit(
@@ -211,9 +254,11 @@ class Session:
             self._viewport.picture_seconds,
             self._viewport.picture_size,
             self._renderer_name,
+            self._viewport.depth_range,
             self._viewport.passes,
         )
         self._perform(do.Measured(stats))
+        return drawing
 
     def _present(self) -> None:
         self._note_gl_error("picture")  # PyOpenGL would raise it in the middle of the panels
@@ -238,22 +283,35 @@ class Session:
         match command:
             case do.OpenPaths(paths):
                 self._open(paths)
+            case desk.Prefer() if self.state.desk.preferences != before.desk.preferences:
+                chosen = self.state.desk.preferences
+                theme.restyle(self._scale * chosen.scale, chosen.theme)
             case do.AddPhotos(paths):
                 self._worker.submit(messages.MakeThumbnails(paths))
             case do.Reconstruct() if self.state.photos:
-                self._worker.submit(messages.ReconstructPhotos(tuple(p.path for p in self.state.photos)))
-            case do.OpenScene(path):
-                self._worker.submit(messages.LoadScene(path))
+                photos = self.state.photos
+                paths, fovs = tuple(p.path for p in photos), tuple(p.fov for p in photos)
+                self._worker.submit(messages.ReconstructPhotos(paths, fovs))
+            case do.OpenScene(path, edits):
+                self._worker.submit(messages.LoadScene(path, edits))
             case do.SaveScene(path) if self.state.info is not None:
-                self._worker.submit(messages.WriteScene(self.state.info.scene, path))
+                marks = self.state.editing.marks
+                self._worker.submit(messages.WriteScene(self.state.info.scene, path, marks))
             case do.CancelJob():
                 self._worker.cancel()
             case do.CopyText(text):
                 glfw.set_clipboard_string(self._window, text)
             case do.SceneArrived(info):
                 self._show_scene(info)
+            case ask.SavePrompts(path):
+                chosen = PromptSet(self.state.prompts, self.state.negatives)
+                self._worker.submit(ask_messages.WritePrompts(chosen, path))
+            case ask.LoadPrompts(path):
+                self._worker.submit(ask_messages.ReadPrompts(path))
             case _:
                 pass
+        self._editor.follow(command, before, self.state)
+        self._citizen.follow(command, before, self.state)
         if _question(before) != _question(self.state):
             pause = DEBOUNCE_SECONDS if isinstance(command, do.EditPrompt | do.SetNegatives) else 0.0
             self._encode_at = self._now() + pause
@@ -264,7 +322,8 @@ class Session:
             self._perform(do.Notify(sentence))
         if drop.photos:
             self._perform(do.AddPhotos(drop.photos))
-            self._perform(do.Reconstruct())
+            if self.state.desk.preferences.start_at_once:
+                self._perform(do.Reconstruct())
         elif drop.scenes:
             self._perform(do.OpenScene(drop.scenes[0]))
 
@@ -276,6 +335,9 @@ class Session:
         for index, photo in enumerate(info.scene.photos):
             with suppress(OSError):  # a scene whose small photos are damaged still shows; buttons get numbers
                 self._thumbnails.put_encoded(f"view {index}", photo)
+        for colormap in COLORMAPS:
+            self._thumbnails.put(f"bar {colormap}", self._viewport.colour_bar(colormap))
+        self._worker.submit(ask_messages.DescribeAtoms(info.serial, info.scene))
         glfw.set_window_title(self._window, f"{info.name} - LangFlash")
 
     def _encode(self) -> None:
@@ -286,22 +348,26 @@ class Session:
             self._viewport.ask((), None)
             return
         keys, texts = tuple(p.key for p in asked), tuple(p.text.strip() for p in asked)
-        self._worker.submit(messages.Encode(info.serial, info.scene, keys, texts, self.state.negatives))
+        likes, marks = tuple(p.like for p in asked), self.state.editing.marks
+        negatives = self.state.negatives
+        self._worker.submit(messages.Encode(info.serial, info.scene, keys, texts, negatives, likes, marks))
 
     # Results of the worker
 
     def _hear(self, result: messages.Result) -> None:
         serial = self.state.info.serial if self.state.info else 0
+        self._citizen.hear(result, serial)
         self._awake = AWAKE_FRAMES
         match result:
             case messages.Progress(stage, fraction):
                 self.dispatch(do.Progressed(stage, fraction))
             case messages.SceneReady(info):
                 self.dispatch(do.SceneArrived(info))
-            case messages.SceneWritten(path):
-                self.dispatch(do.SceneSaved(path))
+            case messages.SceneWritten(path, marks):
+                self.dispatch(do.SceneSaved(path, marks))
             case messages.Failed(sentence, job):
                 self.dispatch(do.JobFailed(sentence) if job else do.Notify(sentence))
+                self.dispatch(edit.StopWaiting())
             case messages.Stopped():
                 self.dispatch(do.JobCancelled())
             case messages.Compiled(of, keys, query) if of == serial:
@@ -309,11 +375,36 @@ class Session:
                 self.dispatch(do.Calibrated(query.threshold))
             case messages.Scored(of, scores) if of == serial:
                 self.dispatch(do.Answered(scores))
+            case ask_messages.Histograms(of, histograms) if of == serial:
+                self.dispatch(ask.Binned(histograms))
+            case ask_messages.PromptsLoaded(path, chosen):
+                self.dispatch(ask.PromptsRead(path, chosen))
+            case ask_messages.PromptsWritten(path):
+                self.dispatch(do.Notify(f"Saved {path}", "info"))
+            case ask_messages.Described(of, insight, pictures) if of == serial:
+                for k, rgb in enumerate(pictures):
+                    if rgb is not None:
+                        self._thumbnails.put(f"atom {k}", rgb)
+                self.dispatch(ask.AtomsDescribed(insight))
             case messages.Thumbnail(key, rgb, problem):
                 if rgb is None:
                     self.dispatch(do.PhotoFailed(Path(key), problem))
                 else:
                     self._thumbnails.put(key, rgb)
+            case edit_messages.SelectionFound(of, mask, combine, what) if of == serial:
+                self.dispatch(edit.Found(mask, combine, what))
+            case edit_messages.FloatersScored(of, scores) if of == serial:
+                self.dispatch(edit.FloatersFound(scores))
+            case edit_messages.Weighed(of, reading) if of == serial:
+                self.dispatch(edit.ReadingTaken(reading))
+            case edit_messages.PlaceNamed(of, asked, reading, words, vector) if of == serial:
+                self.dispatch(edit.Named(asked, reading, words, vector))
+            case edit_messages.AtomWords(of, names) if of == serial:
+                self.dispatch(edit.AtomsNamed(names))
+            case edit_messages.EditsFound(of, offer) if of == serial:
+                self.dispatch(edit.OfferEdits(offer))
+            case edit_messages.EditsKept(of, file) if of == serial:
+                self.dispatch(edit.EditsKept(file))
             case _:
                 pass  # an answer about a scene that is gone
 
@@ -351,16 +442,26 @@ class Session:
         glfw.set_window_refresh_callback(window, waking(lambda _window: None))
         glfw.set_window_focus_callback(window, waking(focus))
         glfw.set_drop_callback(window, waking(self._dropped))
+        glfw.set_window_content_scale_callback(window, waking(self._moved_to_another_screen))
         imgui.get_platform_io().platform_get_clipboard_text_fn = lambda _ctx: _clipboard(window)
 
     def _key(self, window, key: int, scancode: int, action: int, mods: int) -> None:
         """Shortcuts by the letter that the keyboard's layout puts there; the rest is ImGui's."""
         if action == glfw.PRESS and mods & (glfw.MOD_CONTROL | glfw.MOD_SUPER):
             letter = glfw.get_key_name(key, scancode)
+            edits = EDIT_SHORTCUTS.get((letter or "", bool(mods & glfw.MOD_SHIFT)))
+            if edits is not None and not imgui.get_io().want_text_input and not self.state.dialog:
+                self.dispatch(edits)
+                return
             if letter in SHORTCUTS:
                 self.dispatch(SHORTCUTS[letter])
                 return
         self._backend.keyboard_callback(window, key, scancode, action, mods)
+
+    def _moved_to_another_screen(self, window, _x: float, _y: float) -> None:
+        self._scale = _interface_scale(window)
+        chosen = self.state.desk.preferences
+        theme.restyle(self._scale * chosen.scale, chosen.theme)
 
     def _dropped(self, _window, paths: Sequence[str]) -> None:
         self.dispatch(do.OpenPaths(tuple(paths)))
@@ -369,7 +470,8 @@ class Session:
 def _question(state: State) -> tuple:
     """What an encoding depends on."""
     serial = state.info.serial if state.info else 0
-    return serial, tuple((p.key, p.text.strip()) for p in state.asked), state.negatives
+    atoms = state.editing.marks.atoms if state.editing.marks else ()
+    return serial, tuple((p.key, p.text.strip(), p.like) for p in state.asked), state.negatives, atoms
 
 
 def _open_window(size: tuple[int, int]):

@@ -5,9 +5,13 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.window.poses import START, Pose
+from app.window.asking import NO_ASKING, Asking, usable
+from app.window.desk import Desk
+from app.window.editing import NO_EDITING, Editing
+from app.window.poses import START, Pose, Vector
 
 if TYPE_CHECKING:
+    from langflash_core.edits import History
     from langflash_core.types import Scene
 
 NEGATIVES = ("object", "things", "stuff", "texture")
@@ -35,14 +39,49 @@ class Mode(Enum):
     LABELS = "Labels"
     ATOMS = "Atoms"
     DEPTH = "Depth"
+    MASKS = "Masks"
+    ISOLATE = "Only these"
+    HIDE = "Without these"
+    DIM = "Dim the rest"
+    FEATURES = "Features"
+    WEIGHT = "One atom"
+    TRANSMITTANCE = "Transmittance"
+    COVERAGE = "Coverage"
+    AGREEMENT = "Agreement"
+    MARGIN = "Margin"
+
+    @property
+    def answers(self) -> bool:
+        """Whether it shows relevance."""
+        return self in _ANSWERING
+
+    @property
+    def of_atoms(self) -> bool:
+        """Whether it shows weight maps whatever is asked."""
+        return self in (Mode.ATOMS, Mode.FEATURES, Mode.WEIGHT)
+
+    def possible(self, info: "SceneInfo | None") -> bool:
+        """Whether a scene has what it shows."""
+        if info is None or (self in (Mode.WEIGHT, Mode.FEATURES) and info.num_atoms == 0):
+            return False
+        return bool(info.views) if self is Mode.COVERAGE else self is not Mode.AGREEMENT or info.own_views
+
+
+_ANSWERING = (Mode.HEAT, Mode.LABELS, Mode.MASKS, Mode.ISOLATE, Mode.HIDE, Mode.DIM, Mode.MARGIN)
 
 
 @dataclass(frozen=True)
 class Photo:
-    """A photo in the tray; `problem` is a sentence when it could not be shown."""
+    """A photo in the tray; `problem` is a sentence when it could not be shown.
+
+    fov: the person's own, degrees of the longer side. recorded: what the file says. notes: triage.
+    """
 
     path: Path
     problem: str = ""
+    fov: float | None = None
+    recorded: float | None = None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -50,6 +89,7 @@ class Prompt:
     """One phrase. `key` never changes; `score` is None until the view on show is answered.
 
     threshold: the person's own, or None for the calibrated one. calibrated: what None means.
+    like: a language vector as float32 bytes that is asked instead of the words.
     """
 
     key: int
@@ -59,6 +99,7 @@ class Prompt:
     calibrated: float = 0.5
     visible: bool = True
     score: float | None = None
+    like: bytes = field(default=b"", repr=False)
 
     @property
     def found(self) -> bool | None:
@@ -95,7 +136,12 @@ class Toast:
 
 @dataclass(frozen=True)
 class SceneInfo:
-    """The scene on show. `scene` is the immutable snapshot; `views` are poses of its photos."""
+    """The scene on show. `scene` is the immutable snapshot; `views` are poses of its photos.
+
+    history: edits that came with it, none of them or those of an earlier session.
+    own_views: whether it says which photo made which Gaussian, so that photos can be compared.
+    extent: corners (low, high) of the box around nearly all of it, world axes, scene units.
+    """
 
     serial: int
     name: str
@@ -106,6 +152,9 @@ class SceneInfo:
     space: str
     warnings: tuple[str, ...] = ()
     path: Path | None = None
+    history: "History | None" = field(default=None, compare=False, repr=False)
+    own_views: bool = False
+    extent: tuple[Vector, Vector] | None = None
 
 
 @dataclass(frozen=True)
@@ -125,10 +174,12 @@ class Stats:
     picture_seconds: float = 0.0
     picture_size: tuple[int, int] = (0, 0)
     renderer: str = ""
+    depth_range: tuple[float, float] = (0.0, 1.0)
     passes: tuple[tuple[str, int], ...] = ()
 
 
 NO_STATS = Stats()
+NO_DESK = Desk()
 FIRST_PROMPT = Prompt(key=0)
 
 
@@ -152,12 +203,15 @@ class State:
     dialog: str | None = None
     dialog_path: str = ""
     stats: Stats = NO_STATS
+    editing: Editing = NO_EDITING
+    asking: Asking = NO_ASKING
+    desk: Desk = NO_DESK
     leaving: bool = False
 
     @property
     def asked(self) -> tuple[Prompt, ...]:
-        """Prompts to answer: visible ones that say something."""
-        return tuple(p for p in self.prompts if p.visible and p.text.strip())
+        """Prompts to answer: visible ones that say something whole."""
+        return tuple(p for p in self.prompts if p.visible and usable(p.text))
 
     @property
     def active_prompt(self) -> Prompt | None:
@@ -168,4 +222,4 @@ class State:
     @property
     def wants_maps(self) -> bool:
         """Whether the picture needs the weight maps and not only colour and depth."""
-        return self.mode is Mode.ATOMS or (self.mode in (Mode.HEAT, Mode.LABELS) and bool(self.asked))
+        return self.mode.of_atoms or (self.mode.answers and bool(self.asked))

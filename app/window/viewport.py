@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
+from app.window.asking import margin_span
+from app.window.editing import Point, Reading, strongest
 from app.window.pace import SETTLE_AFTER, Kind, Pace, Plan
 from app.window.poses import START, Pose, to_camera
-from app.window.state import Mode, State
+from app.window.state import Mode, Prompt, State
+from langflash_core.edits import Marks, Mask
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -24,6 +27,8 @@ if TYPE_CHECKING:
 
 BACKGROUND = (0.055, 0.06, 0.07)  # the theme's canvas
 COLORMAP = "turbo"
+SHOWN_ALPHA = 0.5  # as in the answers: from here on a pixel shows the scene
+MASKS = {Mode.MASKS: "flat", Mode.ISOLATE: "isolate", Mode.HIDE: "hide", Mode.DIM: "dim"}
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,7 @@ class _Drawn:
     pose: Pose
     size: tuple[int, int]  # of the panel, pixels
     plan: Plan
+    marked: int
 
 
 @dataclass(frozen=True)
@@ -62,6 +68,8 @@ class Viewport:
         self._pose = START
         self._size = (0, 0)  # of the panel, pixels
         self._moved = 0.0
+        self._marks: tuple[Marks | None, Mask | None] = (None, None)
+        self._marked = 0  # how often; names the marks in what is drawn
         self._answered: tuple | None = None
         self._colouring: tuple | None = None
         self._texture: moderngl.Texture | None = None
@@ -79,6 +87,16 @@ class Viewport:
         """Passes run so far, by kind."""
         return () if self._renderer is None else tuple(sorted(self._renderer.passes.items()))
 
+    @property
+    def depth_range(self) -> tuple[float, float]:
+        """Depths of the first and the last colour of the depth picture, scene units."""
+        return (0.0, 1.0) if self._renderer is None else self._renderer.depth_range
+
+    def colour_bar(self, colormap: str) -> np.ndarray:
+        """A colour map from left to right, (1, n, 3) uint8; after the first scene."""
+        assert self._renderer is not None
+        return self._renderer.colour_bar(colormap)
+
     def set_scene(self, serial: int, scene: "Scene") -> None:
         """Upload a scene; the first one builds the renderer.
 
@@ -94,6 +112,7 @@ class Viewport:
         renderer.ask(None)
         self._serial, self._query, self._keys = serial, None, ()
         self._drawn = self._texture = self._colouring = self._answered = None
+        self._marks = (None, None)
         self.pace = Pace(len(scene.gaussians))
 
     def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None") -> None:
@@ -102,6 +121,54 @@ class Viewport:
         self._colouring = self._answered = None
         if self._renderer is not None:
             self._renderer.ask(query)
+
+    def mark(self, marks: Marks | None, doomed: Mask | None) -> None:
+        """Show the scene as marked: without what is deleted or hidden, the selection in a tint.
+
+        doomed: what a preview would delete, in another tint.
+        """
+        if self._renderer is None or marks is None or (marks, doomed) == self._marks:
+            return
+        self._marks = (marks, doomed)
+        tints = marks.selected.rows().astype(np.uint8)
+        if doomed is not None:
+            tints[doomed.rows()] = 2
+        self._renderer.mark(marks.visible.rows(), tints)
+        self._marked += 1
+
+    @property
+    def pose(self) -> Pose:
+        """Where the picture was asked for from, last."""
+        return self._pose
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Of the picture's place, framebuffer pixels."""
+        return self._size
+
+    @property
+    def drawn(self) -> object:
+        """Names the picture that is drawn; another value, another picture."""
+        return self._drawn
+
+    def read(self, at: Point) -> tuple[Reading, np.ndarray | None] | None:
+        """What the picture shows at a point of its place, and the weights (K,) there.
+
+        The weights are None where the weight maps are not drawn; all is None before a picture.
+        """
+        if self._renderer is None or self._drawn is None or self._camera is None:
+            return None
+        width, height = self.picture_size
+        x = min(max(int(at[0] * width / self._drawn.size[0]), 0), width - 1)
+        y = min(max(int(at[1] * height / self._drawn.size[1]), 0), height - 1)
+        alpha, depth, weights = self._renderer.pixel(x, y)
+        if alpha < SHOWN_ALPHA:
+            return Reading(at, atoms=None if weights is None else ()), weights
+        K, viewmat = self._camera.K.double().numpy(), self._camera.viewmat.double().numpy()
+        pos_c = depth * np.array([(x + 0.5 - K[0, 2]) / K[0, 0], (y + 0.5 - K[1, 2]) / K[1, 1], 1.0])
+        place = viewmat[:3, :3].T @ (pos_c - viewmat[:3, 3])
+        point = (float(place[0]), float(place[1]), float(place[2]))
+        return Reading(at, point, depth, None if weights is None else strongest(weights)), weights
 
     def update(self, state: State, size: tuple[int, int], touched: float) -> float:
         """Bring the picture up to date; returns seconds until it wants to be called again.
@@ -116,7 +183,7 @@ class Viewport:
         still = state.now - max(self._moved, touched)
         kind = _kind(state)
         resting = self.pace.resting(kind, still)
-        wanted = _Drawn(self._serial, state.pose, size, resting or self.pace.moving(kind))
+        wanted = _Drawn(self._serial, state.pose, size, resting or self.pace.moving(kind), self._marked)
         if not self._covers(wanted):
             self._draw(wanted, moving=resting is None)
         self._colour(state)
@@ -177,29 +244,50 @@ class Viewport:
         shown = {p.key: p for p in state.prompts}
         asked = [shown[key] for key in self._keys if key in shown]
         mode = state.mode if drawn.plan.covers(replace(drawn.plan, kind=_kind(state))) else Mode.RGB
-        if mode in (Mode.HEAT, Mode.LABELS) and (not asked or len(asked) != len(self._keys)):
+        if (mode.answers and (not asked or len(asked) != len(self._keys))) or not mode.possible(state.info):
             mode = Mode.RGB
         active = next((i for i, p in enumerate(asked) if p.key == state.active), 0)
-        colouring = (mode, active, tuple((p.colour, p.cut) for p in asked))
-        if colouring == self._colouring:
-            return
-        self._colouring = colouring
-        if mode is Mode.HEAT:
-            self._texture = renderer.heat_texture(active, COLORMAP, asked[active].cut, True)
-        elif mode is Mode.LABELS:
-            self._texture = renderer.label_texture(
-                np.array([p.colour for p in asked], np.float32), min(p.cut for p in asked)
-            )
-        elif mode is Mode.ATOMS:
-            self._texture = renderer.atom_texture()
-        elif mode is Mode.DEPTH:
-            self._texture = renderer.depth_texture()
-        else:
-            self._texture = renderer.rgb_texture
+        colouring = (mode, active, state.asking.atom, tuple((p.colour, p.cut) for p in asked))
+        if colouring != self._colouring:
+            self._colouring = colouring
+            self._texture = _picture(renderer, mode, asked, active, state.asking.atom)
+
+
+def _picture(
+    renderer: "SplatRenderer", mode: Mode, asked: list[Prompt], active: int, atom: int
+) -> moderngl.Texture:
+    """The texture that shows a mode; `asked` in the order of the query, not empty where it `answers`."""
+    colours = np.array([p.colour for p in asked], np.float32)
+    cuts = np.array([p.cut for p in asked], np.float32)
+    match mode:
+        case Mode.HEAT:
+            return renderer.heat_texture(active, COLORMAP, asked[active].cut, True)
+        case Mode.LABELS:
+            return renderer.label_texture(colours, min(p.cut for p in asked))
+        case Mode.MASKS | Mode.ISOLATE | Mode.HIDE | Mode.DIM:
+            return renderer.mask_texture(MASKS[mode], colours, cuts)
+        case Mode.MARGIN:
+            return renderer.margin_texture(asked[0].cut, margin_span(len(asked)), COLORMAP)
+        case Mode.ATOMS:
+            return renderer.atom_texture()
+        case Mode.WEIGHT:
+            return renderer.weight_texture(atom)
+        case Mode.FEATURES:
+            return renderer.feature_texture()
+        case Mode.TRANSMITTANCE:
+            return renderer.transmittance_texture()
+        case Mode.COVERAGE:
+            return renderer.coverage_texture()
+        case Mode.AGREEMENT:
+            return renderer.agreement_texture()
+        case Mode.DEPTH:
+            return renderer.depth_texture()
+        case Mode.RGB:
+            return renderer.rgb_texture
 
 
 def _kind(state: State) -> Kind:
     """What a picture must hold to show what is wanted while the camera moves."""
     if not state.wants_maps or state.info is None or state.info.num_atoms == 0:
         return Kind.COLOUR
-    return Kind.MAPS if state.mode is Mode.ATOMS else Kind.FAST
+    return Kind.MAPS if state.mode.of_atoms else Kind.FAST

@@ -5,21 +5,31 @@ A *job* makes a scene; the newest replaces and cancels the one before, which the
 between the stages of one. Of `Encode` and `Answer` only the newest is ever run.
 """
 
+import ctypes
+import gc
 import logging
+import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
 import numpy as np
 
+from app.window import ask_messages, chores, desk_chores, insight
+from app.window.edit_messages import Weigh
 from app.window.messages import (
     Answer,
     Compiled,
+    CopyKept,
     Encode,
     Errand,
     Failed,
+    FindPair,
     Job,
+    KeepCopy,
     LoadScene,
     MakeThumbnails,
     Progress,
@@ -32,12 +42,14 @@ from app.window.messages import (
     Thumbnail,
     WriteScene,
 )
+from app.window.state import SceneInfo
+from langflash_core.edits import History
 from langflash_core.errors import Cancelled, ImageError, LangFlashError
 
 log = logging.getLogger(__name__)
 
 THUMBNAIL_SIDE = 320  # pixels of the longer side
-_ANSWERS_REPLACE = (Encode, Answer)  # a newer one of these makes an older one pointless
+_ANSWERS_REPLACE = (Encode, Answer, Weigh)  # a newer one of these makes an older one pointless
 
 
 class Worker:
@@ -53,7 +65,7 @@ class Worker:
         self._errands: list[Errand] = []
         self._job: Job | None = None
         self._token = 0  # of the newest job; an older one is silent
-        self._cancelled = False
+        self._busy = False  # with a job that speaks
         self._stopping = False
         self._results: SimpleQueue[Result] = SimpleQueue()
         self._serial = 0
@@ -66,7 +78,6 @@ class Worker:
             if isinstance(request, ReconstructPhotos | LoadScene):
                 self._job = request
                 self._token += 1
-                self._cancelled = False
             else:
                 kept = self._errands
                 if isinstance(request, _ANSWERS_REPLACE):
@@ -75,9 +86,13 @@ class Worker:
             self._changed.notify()
 
     def cancel(self) -> None:
-        """Stop the job, at the latest after its present stage; `Stopped` follows."""
+        """Stop the job; `Stopped` comes at once, and the job ends within a layer of the network."""
         with self._changed:
-            self._cancelled = True
+            busy = self._busy or self._job is not None
+            self._token += 1  # from here on the job is silent
+            self._job, self._busy = None, False
+        if busy:
+            self._put(Stopped())
 
     def poll(self) -> list[Result]:
         """Results that have arrived since the last call, oldest first."""
@@ -92,7 +107,6 @@ class Worker:
         """End the thread. A stage that takes longer than `patience` dies with the process."""
         with self._changed:
             self._stopping = True
-            self._cancelled = True
             self._changed.notify()
         self._thread.join(patience)
 
@@ -112,7 +126,7 @@ class Worker:
                     return
                 job, token = self._job, self._token
                 if not self._errands:
-                    self._job = None
+                    self._job, self._busy = None, job is not None
             if self._errands:
                 self._run_errands()
             elif job is not None:
@@ -138,21 +152,34 @@ class Worker:
                 self._put(compile_prompts(errand))
             case Answer():
                 self._put(score_prompts(errand))
-            case WriteScene(scene, path):
+                self._put(insight.bin_scores(errand))
+            case WriteScene(scene, path, marks):
                 from langflash_core.export import export
+                from langflash_core.scene.edited import edited_scene
 
-                export(scene, path)
-                self._put(SceneWritten(path))
+                export(scene if marks is None else edited_scene(scene, marks), path)
+                self._put(SceneWritten(path, marks))
             case MakeThumbnails(paths):
                 for path in paths:
                     self._put(make_thumbnail(path))
+            case ask_messages.WritePrompts() | ask_messages.ReadPrompts() | ask_messages.DescribeAtoms():
+                self._put(insight.run(errand))
+            case KeepCopy(serial, scene, path):
+                desk_chores.keep_copy(scene, path)
+                self._put(CopyKept(serial, path))
+            case FindPair(paths):
+                self._put(desk_chores.find_pair(paths, lambda: self._stopping))
+            case _:
+                answer = chores.run(errand)
+                if answer is not None:
+                    self._put(answer)
 
     def _run_job(self, job: Job, token: int) -> None:
         def stale() -> bool:
             return self._token != token
 
         def cancelled() -> bool:
-            return self._cancelled or self._stopping or stale()
+            return self._stopping or stale()
 
         def progress(stage: str, fraction: float) -> None:
             if not stale():
@@ -162,15 +189,20 @@ class Worker:
         self._serial += 1
         try:
             ready = make_scene(job, self._serial, progress, cancelled)
-            outcome: Result = Stopped() if self._cancelled else ready
+            outcome: Result | None = ready
         except Cancelled:
-            outcome = Stopped()
+            outcome = None  # whoever stopped it has been told
         except LangFlashError as error:
             outcome = Failed(str(error), job=True)
         except Exception as error:
             outcome = Failed(_unexpected(error), job=True)
-        if not stale():
+        with self._changed:
+            spoken = outcome is not None and not stale()
+            self._busy = self._busy and stale()
+        if spoken and outcome is not None:
             self._put(outcome)
+        else:
+            _give_back_memory()
 
 
 def make_scene(
@@ -185,18 +217,36 @@ def make_scene(
         from langflash_core.export import read
 
         scene = read(job.path)
+        if job.edits is not None:
+            return SceneReady(_restored(describe_scene(scene, serial, ""), job.edits))
         return SceneReady(describe_scene(scene, serial, job.path.name, job.path))
     from langflash_core.pipeline import reconstruct
 
-    scene = reconstruct(job.paths, progress=progress, cancelled=cancelled)
+    scene = reconstruct(job.paths, fov=job.fovs or None, progress=progress, cancelled=cancelled)
     name = " + ".join(path.stem for path in job.paths[:3]) + (" ..." if len(job.paths) > 3 else "")
     return SceneReady(describe_scene(scene, serial, name))
 
 
-def describe_scene(scene, serial: int, name: str, path: Path | None = None):
+def _restored(info: SceneInfo, edits: Path) -> SceneInfo:
+    """The scene with the edits of an earlier session, its name and its place.
+
+    Raises:
+        SceneFileError: the edits cannot be read.
+    """
+    from langflash_core.scene.edits_file import load_history, read_about
+
+    assert info.history is not None
+    history = load_history(edits, info.scene, info.history.marks)
+    about = read_about(edits)[1]
+    path = Path(about["path"]) if about.get("path") else None
+    return replace(info, name=str(about.get("name", "")), path=path, history=history)
+
+
+def describe_scene(scene, serial: int, name: str, path: Path | None = None) -> SceneInfo:
     """`SceneInfo` of a `Scene`: counts, warnings, and a pose per input view."""
+    from app.gl.photos import gaussians_per_view
     from app.window.poses import from_view, median_reach
-    from app.window.state import SceneInfo
+    from langflash_core.scene.edited import first_marks
     from langflash_core.types import NO_LANGUAGE
 
     mute = scene.semantics.space == NO_LANGUAGE
@@ -215,19 +265,41 @@ def describe_scene(scene, serial: int, name: str, path: Path | None = None):
         space=scene.semantics.space,
         warnings=(*said, *(str(w) for w in scene.metadata.get("warnings", ()))),
         path=path,
+        history=History(first_marks(scene)),
+        own_views=scene.num_views > 1 and gaussians_per_view(scene) is not None,
+        extent=_extent(means),
     )
+
+
+def _extent(means: np.ndarray):
+    """Corners of the box around the middle 98 % of the means (N, 3) along each axis."""
+    from app.window.poses import Vector
+
+    if not len(means):
+        return None
+    low, high = np.percentile(means, (1, 99), axis=0)
+    return Vector(*low.tolist()), Vector(*high.tolist())
 
 
 def compile_prompts(request: Encode) -> Compiled:
     """Text towers and the reduced dictionary; milliseconds once the tower is loaded."""
     from langflash_core.query.relevance import compile_query
     from langflash_core.query.spaces import language_space
+    from langflash_core.query.words import with_vectors
+    from langflash_core.scene.edited import spoken_scene
 
-    space = language_space(request.scene.semantics.space)
-    query = compile_query(
-        request.scene, space, list(request.texts), negatives=list(request.negatives) or None
-    )
+    scene = request.scene if request.marks is None else spoken_scene(request.scene, request.marks)
+    space = language_space(scene.semantics.space)
+    query = compile_query(scene, space, list(request.texts), negatives=list(request.negatives) or None)
+    likes = {row: _vector(like) for row, like in enumerate(request.likes) if like}
+    query = with_vectors(query, scene.semantics.dictionary, likes)
     return Compiled(request.serial, request.keys, query)
+
+
+def _vector(content: bytes):
+    import torch
+
+    return torch.from_numpy(np.frombuffer(content, np.float32).copy())
 
 
 def score_prompts(request: Answer) -> Scored:
@@ -242,15 +314,17 @@ def score_prompts(request: Answer) -> Scored:
 
 
 def make_thumbnail(path: Path) -> Thumbnail:
-    """A small upright picture of a photo; an unreadable one gives its problem instead."""
+    """A small upright picture of a photo and what its file says; an unreadable one gives its problem."""
     from langflash_core.images.decode import read_photo
 
     try:
-        small = read_photo(path).image.copy()
+        photo = read_photo(path)
     except ImageError as error:
         return Thumbnail(str(path), None, str(error))
+    small = photo.image.copy()
     small.thumbnail((THUMBNAIL_SIDE, THUMBNAIL_SIDE))
-    return Thumbnail(str(path), np.asarray(small.convert("RGB")))
+    fov, notes = desk_chores.look_at(photo)
+    return Thumbnail(str(path), np.asarray(small.convert("RGB")), fov=fov, notes=notes)
 
 
 def _import_heavy() -> None:
@@ -258,9 +332,18 @@ def _import_heavy() -> None:
     import torch  # noqa: F401
 
     import app.gl
+    import langflash_core.network
     import langflash_core.query.spaces  # noqa: F401
 
     log.debug("loaded %s", app.gl.__name__)
+
+
+def _give_back_memory() -> None:
+    """What a stopped job held goes back to the system, where the allocator would keep it."""
+    gc.collect()
+    if sys.platform == "linux":
+        with suppress(OSError, AttributeError):
+            ctypes.CDLL(None).malloc_trim(0)
 
 
 def _unexpected(error: Exception) -> str:

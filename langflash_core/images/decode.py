@@ -81,6 +81,15 @@ def read_photo(path: Path, name: str | None = None) -> Photo:
         raise ImageError(f"{name} is damaged or incomplete ({error}); copy or export it again") from error
 
 
+def grey_photo(path: Path) -> np.ndarray:
+    """The upright photo as (H, W) uint8, maybe decoded smaller.
+
+    Raises:
+        ImageError: as `read_photo`.
+    """
+    return np.asarray(read_photo(path).image.convert("L"))
+
+
 def _read_bytes(path: Path, name: str) -> bytes:
     if path.is_dir():
         raise ImageError(f"{name} is a folder; name the photos inside it instead")

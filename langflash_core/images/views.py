@@ -6,7 +6,7 @@ scale s maps it onto the output: x' = (x - left) s, hence f' = f s and c' = (c -
 
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -30,20 +30,23 @@ Box = tuple[float, float, float, float]
 def load_views(
     photos: Sequence[Path | str],
     *,
-    fov: float | None = None,
+    fov: float | Sequence[float | None] | None = None,
     intrinsics: tuple[float, float, float, float] | None = None,
     area: int = 224 * 224,
     multiple: int = 14,
     square: bool = False,
+    check: Callable[[], None] = lambda: None,
 ) -> Views:
     """Photos as the network sees them: the first one's shape, the others centre-cropped to it.
 
     Args:
         photos: 1 to 32 files.
-        fov: degrees of each photo's longer side; None: EXIF, else 65 with a note.
+        fov: degrees of each photo's longer side, one for all or one per photo; None: EXIF, else
+            65 with a note.
         intrinsics: (fx, fy, cx, cy) in pixels of the upright photos, the same for all.
         area: about this many pixels per view. multiple: of which both sides are multiples.
         square: the centre square of every photo instead of the first one's shape.
+        check: called before each photo; what it raises ends the work.
 
     Returns:
         Views with triage notes in `warnings`, one sentence each.
@@ -54,19 +57,22 @@ def load_views(
     """
     if multiple < 1 or area < multiple**2:
         raise ValueError(f"area, multiple: expected area >= multiple^2 >= 1, received {area}, {multiple}")
-    check_lens(fov, intrinsics)
     paths = _paths(photos)
+    fovs = _fovs(fov, len(paths))
+    for each in dict.fromkeys(fovs):
+        check_lens(each, intrinsics)
     names = _names(paths)
     size, first = (0, 0), (0, 0)
     images, Ks, sources, notes, assumed = [], [], [], [], []
-    for path, name in zip(paths, names, strict=True):
+    for path, name, own_fov in zip(paths, names, fovs, strict=True):
+        check()
         photo = read_photo(path, name)
         if not images:
             first = (photo.width, photo.height)
             size = fitting_size(*((1, 1) if square else first), area, multiple)
         elif intrinsics is not None:
             _check_same_size(photo, first)
-        K, guessed = photo_intrinsics(photo, fov, intrinsics)
+        K, guessed = photo_intrinsics(photo, own_fov, intrinsics)
         box = centre_box(photo.width, photo.height, size)
         images.append(_resized(photo, box, size))
         Ks.append(cropped_intrinsics(K, box, size))
@@ -144,6 +150,15 @@ def _paths(photos: Sequence[Path | str]) -> list[Path]:
     if len(listed) > MAX_PHOTOS:
         raise InputError(f"{len(listed)} photos are too many; choose at most {MAX_PHOTOS} that overlap well")
     return [Path(photo) for photo in listed]
+
+
+def _fovs(fov: float | Sequence[float | None] | None, count: int) -> list[float | None]:
+    """One per photo."""
+    if fov is None or isinstance(fov, int | float):
+        return [fov] * count
+    if len(fov) != count:
+        raise InputError(f"{len(fov)} fields of view were given for {count} photos; give one each, or one")
+    return list(fov)
 
 
 def _names(paths: list[Path]) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ from langflash_core.network.build import build_network
 from langflash_core.network.checkpoints import initial_network, load_network, save_network
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.model import LangFlashNet
+from langflash_core.network.pairs import choose_pair
 from langflash_core.network.pointmaps import PointMapNet
 from langflash_core.network.presets import FULL, MINI, PRESETS, Preset
 
@@ -16,6 +17,7 @@ __all__ = [
     "PointMapNet",
     "Preset",
     "build_network",
+    "choose_pair",
     "initial_network",
     "load_network",
     "save_network",

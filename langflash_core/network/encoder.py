@@ -29,6 +29,10 @@ class Tokens:
         """Hook `index` as feature maps (B*V, C, h, w)."""
         return tokens_to_maps(self.hooks[index].flatten(0, 1), self.grid)
 
+    def scene(self, index: int) -> "Tokens":
+        """Those of one scene of the batch, B = 1."""
+        return Tokens(tuple(hook[index : index + 1] for hook in self.hooks), self.grid)
+
 
 def tokens_to_maps(tokens: Tensor, grid: tuple[int, int]) -> Tensor:
     """(n, h*w, C) -> (n, C, h, w)."""

@@ -91,7 +91,7 @@ class GuidedDepthNet(LangFlashNet):
             prior = self.depth_head(levels, tokens)
         with run.stage("poses"):
             local = self.local(images[0])
-            poses = estimate_poses(self._pose_inputs(views, prior, local))
+            poses = estimate_poses(self._pose_inputs(views, prior, local), run.check)
             viewmats = torch.from_numpy(poses.viewmats).to(images)[None]
         with run.stage("refinement"):
             maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)

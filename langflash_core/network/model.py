@@ -2,8 +2,8 @@
 
 import time
 from abc import abstractmethod
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 
 import torch
@@ -109,7 +109,16 @@ class LangFlashNet(nn.Module):
             return self.aggregation(small, features)[0]
         return averaged_atoms(small, features, self.preset.eps)[0]
 
-    @torch.inference_mode()
+    @contextmanager
+    def stopping(self, check: Callable[[], None]) -> Iterator[None]:
+        """Calls `check` before every layer, so that what it raises ends the work within one layer."""
+        handles = [part.register_forward_pre_hook(lambda *_: check()) for part in self.modules()]
+        try:
+            yield
+        finally:
+            for handle in handles:
+                handle.remove()
+
     def predict(
         self,
         views: Views,
@@ -124,32 +133,91 @@ class LangFlashNet(nn.Module):
                 None: `dictionary`.
 
         Raises:
-            Cancelled: `cancelled()` became true between two stages.
+            Cancelled: `cancelled()` became true; asked before every layer and every pair of photos.
         """
+        return self.predict_scenes([views], progress, cancelled, atoms)[0]
+
+    @torch.inference_mode()
+    def predict_scenes(
+        self,
+        scenes: Sequence[Views],
+        progress: Progress | None = None,
+        cancelled: Callable[[], bool] | None = None,
+        atoms: Atoms | None = None,
+    ) -> list[Prediction]:
+        """Several scenes of equally many photos of one size: the transformers see them as one batch.
+
+        `timings` of each are its share of the whole. Everything else as `predict`.
+
+        Raises:
+            Cancelled: as `predict`. ValueError: the scenes differ in shape.
+        """
+        shapes = {tuple(views.images.shape) for views in scenes}
+        if len(shapes) != 1:
+            raise ValueError(f"scenes: expected one shape of (V, 3, H, W), received {sorted(shapes)}")
         run = Run(self.stages, progress, cancelled)
+        with nullcontext() if cancelled is None else self.stopping(run.check):
+            return self._predict(scenes, run, atoms or self.dictionary)
+
+    def _predict(self, scenes: Sequence[Views], run: "Run", atoms: Atoms) -> list[Prediction]:
+        """The stages, timed by `run`; B scenes."""
         device = next(self.parameters()).device
-        images, Ks = views.images[None].to(device), views.Ks[None].to(device)
+        images = torch.stack([views.images for views in scenes]).to(device)
+        Ks = torch.stack([views.Ks for views in scenes]).to(device)
+        size = (images.shape[-2], images.shape[-1])
         with run.stage("encoder"):
             tokens = self.encode(images, Ks)
-        geometry = self.reconstruct(views, images, Ks, tokens, run)
+        language = _beside(lambda: self.language(tokens, images), device)
+        each = [(images[b : b + 1], Ks[b : b + 1], tokens.scene(b)) for b in range(len(scenes))]
+        geometries = [
+            self.reconstruct(s, x, K, own, run) for s, (x, K, own) in zip(scenes, each, strict=True)
+        ]
         with run.stage("language features"):
-            features = self.language(tokens, images)
+            features = language()
         with run.stage("grouping"):
-            weights = self.parts(tokens, images, (images.shape[-2], images.shape[-1]), features)
+            weights = [
+                self.parts(own, x, size, f[None]) for (x, _, own), f in zip(each, features, strict=True)
+            ]
         with run.stage("aggregation"):
-            dictionary = (atoms or self.dictionary)(weights, features)
-        return Prediction(
-            gaussians=geometry.gaussians,
-            weights=weights,
-            dictionary=dictionary,
-            space=self.preset.space,
-            viewmats=geometry.viewmats,
-            depths=geometry.depths,
-            confidences=geometry.confidences,
-            unplaced=geometry.unplaced,
-            warnings=tuple(_left_out(views.names[v]) for v in geometry.unplaced),
-            timings=run.timings,
-        )
+            dictionaries = [atoms(w, f[None]) for w, f in zip(weights, features, strict=True)]
+        timings = {name: seconds / len(scenes) for name, seconds in run.timings.items()}
+        return [
+            Prediction(
+                gaussians=geometry.gaussians,
+                weights=own_weights,
+                dictionary=dictionary,
+                space=self.preset.space,
+                viewmats=geometry.viewmats,
+                depths=geometry.depths,
+                confidences=geometry.confidences,
+                unplaced=geometry.unplaced,
+                warnings=tuple(_left_out(views.names[v]) for v in geometry.unplaced),
+                timings=dict(timings),
+            )
+            for views, geometry, own_weights, dictionary in zip(
+                scenes, geometries, weights, dictionaries, strict=True
+            )
+        ]
+
+
+def _beside(work: Callable[[], Tensor], device: torch.device) -> Callable[[], Tensor]:
+    """Starts work on a second CUDA stream, beside what follows; elsewhere it waits until it is asked for.
+
+    What the work reads must stay referenced until it is asked for.
+    """
+    if device.type != "cuda":
+        return work
+    here, side = torch.cuda.current_stream(device), torch.cuda.Stream(device)
+    side.wait_stream(here)
+    with torch.cuda.stream(side):
+        answer = work()
+
+    def joined() -> Tensor:
+        here.wait_stream(side)
+        answer.record_stream(here)
+        return answer
+
+    return joined
 
 
 def pooled_weights(weights: Tensor, features: Tensor) -> Tensor:
@@ -175,17 +243,16 @@ class Run:
     cancelled: Callable[[], bool] | None = None
     timings: dict[str, float] = field(default_factory=dict)
 
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Around one stage.
-
-        Raises:
-            Cancelled: `cancelled()` is true.
-        """
+    def check(self) -> None:
+        """Stop here if asked to."""
         if self.cancelled is not None and self.cancelled():
             raise Cancelled("The reconstruction was cancelled")
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        self.check()
         if self.progress is not None:
             self.progress(name, len(self.timings) / len(self.stages))
         start = time.perf_counter()
         yield
-        self.timings[name] = time.perf_counter() - start
+        self.timings[name] = self.timings.get(name, 0.0) + time.perf_counter() - start

@@ -1,5 +1,6 @@
 """Poses of V views: pairwise relative poses, chained along the best-connected tree from view 0."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -53,18 +54,23 @@ class Poses:
     guessed: tuple[int, ...]
 
 
-def estimate_poses(views: list[PoseInput]) -> Poses:
+def estimate_poses(views: list[PoseInput], check: Callable[[], None] = lambda: None) -> Poses:
     """Poses of all views, deterministic.
 
-    A view that matches nothing keeps view 0's pose and is reported in `guessed`.
+    A view that matches nothing keeps view 0's pose and is reported in `guessed`. `check` is called
+    before each photo and each pair; what it raises ends the work.
     """
     num_views = len(views)
     limit = 4000 if num_views <= _MANY_VIEWS else 1500
-    features = [detect(_working_size(view.grey), limit) for view in views]
+    features = []
+    for view in views:
+        check()
+        features.append(detect(_working_size(view.grey), limit))
     pairs: dict[tuple[int, int], RelativePose] = {}
     agreed: dict[tuple[int, int], Matches] = {}
     for i in range(num_views):
         for j in range(i + 1, num_views):
+            check()
             matches = _key_point_matches(views, features, i, j)
             pose = _pair_pose(views[i], views[j], matches)
             if pose is None or pose.num_inliers < _FEW:

@@ -131,7 +131,7 @@ def compile_query(
     against = tuple(calibration.negatives if negatives is None else negatives) if mode == "relevancy" else ()
     if mode == "relevancy" and not against:
         raise PromptError("Relevancy needs a negative phrase to compare with: name one, or use 'cosine'.")
-    factor, basis = reduce_dictionary(semantics.dictionary)
+    factor, basis = reduce_dictionary(_spoken_dictionary(scene))
     return CompiledQuery(
         factor=factor,
         prompts=encode_prompts(space, texts).to(basis) @ basis.T,
@@ -226,6 +226,22 @@ def _cosines(weights: Tensor, factor: Tensor, phrases: Tensor, eps: float) -> tu
     # Dividing by 1 where empty keeps gradients finite, too; rounding may leave [-1, 1] by an ulp.
     cosines = (features @ phrases.T) / torch.where(empty, 1.0, norms)
     return torch.where(empty, 0.0, cosines).clamp(-1, 1), empty
+
+
+def _spoken_dictionary(scene: Scene | Semantics) -> Tensor:
+    """The dictionary (K, C) with a scene's `metadata["silent_atoms"]`, which answer nothing, at 0.
+
+    Raises:
+        SceneFileError: the list names atoms that there are not.
+    """
+    if isinstance(scene, Semantics):
+        return scene.dictionary
+    silent = scene.metadata.get("silent_atoms") or []
+    dictionary = scene.semantics.dictionary
+    if not all(isinstance(k, int) and 0 <= k < len(dictionary) for k in silent):
+        raise SceneFileError(f"The scene's silent atoms are out of range ({silent}): make it again.")
+    rows = torch.tensor(silent, dtype=torch.int64, device=dictionary.device)
+    return dictionary.index_fill(0, rows, 0.0) if silent else dictionary
 
 
 def _check_spoken(semantics: Semantics, space: LanguageSpace, prompts: Sequence[str], mode: str) -> None:

@@ -29,10 +29,15 @@ def thin(scene: Scene, share: float) -> Scene:
 
     Source: systematic sampling with probabilities proportional to size (Madow 1949); Z-order of Morton 1966.
     """
+    return thin_with_rows(scene, share)[0]
+
+
+def thin_with_rows(scene: Scene, share: float) -> tuple[Scene, np.ndarray]:
+    """`thin`, and the rows of the scene that were kept, ascending."""
     if not 0 < share <= 1:
         raise ValueError(f"share: expected a number in (0, 1], received {share}")
     if share == 1 or not len(scene.gaussians):
-        return scene
+        return scene, np.arange(len(scene.gaussians))
     chances = inclusion(covered_areas(scene.gaussians), share * len(scene.gaussians))
     along = z_order(scene.gaussians.means.detach().cpu().numpy())
     ends = np.floor(np.cumsum(chances[along]) + 1e-9)
@@ -49,7 +54,8 @@ def thin(scene: Scene, share: float) -> Scene:
     )
     said = scene.semantics
     semantics = Semantics(said.weight_ids[kept], said.weight_values[kept], said.dictionary, said.space)
-    return Scene(wider, semantics, scene.viewmats, scene.Ks, scene.view_size, scene.photos, scene.metadata)
+    views = (scene.viewmats, scene.Ks, scene.view_size, scene.photos, scene.metadata)
+    return Scene(wider, semantics, *views), rows
 
 
 def covered_areas(gaussians: Gaussians) -> np.ndarray:

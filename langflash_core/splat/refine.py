@@ -23,10 +23,17 @@ from langflash_core.splat.projection import NEAR, view_colours
 from langflash_core.splat.reference import rasterize
 from langflash_core.types import Camera, Gaussians, Scene
 
-# Adam's steps. Means and turns: about a tenth of a pixel at 250 pixels for one scene unit; colours:
-# three of 255 steps. The ratios are those of Kerbl et al. 2023, all some four times as large,
-# because seconds on a processor are tens of steps, not thousands.
-RATES = {"means": 5e-4, "quats": 2e-3, "log_scales": 1e-2, "logit_opacities": 5e-2, "sh": 1e-2, "twists": 5e-4}
+# Adam's steps. Means: about a tenth of a pixel at 250 pixels for one scene unit; turns and shifts of a
+# camera four times that, because one pose answers for all its pixels; colours: three of 255 steps.
+# Kerbl et al. 2023 take smaller ones; seconds on a processor are tens of steps, not thousands.
+RATES = {
+    "means": 5e-4,
+    "quats": 2e-3,
+    "log_scales": 1e-2,
+    "logit_opacities": 5e-2,
+    "sh": 1e-2,
+    "twists": 2e-3,
+}
 _COVERED = 0.5  # alpha from which a pixel counts as shown by the start
 _MIN_COVERED = 0.05  # of the held-out view; less says nothing about it
 Report = Callable[[str, float], None]
@@ -78,7 +85,7 @@ def refine(scene: Scene, photos: Tensor, budget: Budget, report: Report | None =
     if float(shown.float().mean()) < _MIN_COVERED:
         raise InputError("The photos overlap too little to judge a refinement: leave --refine out.")
     tried, first = _fit(start, photos, others, half, _share(report, "trial", 0.0))
-    held_out = tuple(psnr(_draw(s.gaussians, s.camera(view))[0], photos[view], shown) for s in (start, tried))
+    held_out = (_view_psnr(start, view, photos, shown), _view_psnr(tried, view, photos, shown))
     before = _mean_psnr(scene, photos)
     if held_out[1] <= held_out[0]:
         return Refinement(scene, False, view, held_out, (before, before), (first, 0))
@@ -92,11 +99,14 @@ def psnr(rgb: Tensor, photo: Tensor, shown: Tensor) -> float:
     return -10 * math.log10(max(float(error), 1e-10))
 
 
+@torch.no_grad()
+def _view_psnr(scene: Scene, view: int, photos: Tensor, shown: Tensor) -> float:
+    return psnr(_draw(scene.gaussians, scene.camera(view))[0], photos[view], shown)
+
+
 def _mean_psnr(scene: Scene, photos: Tensor) -> float:
     everywhere = torch.ones_like(photos[0, 0], dtype=torch.bool)
-    with torch.no_grad():
-        pictures = [_draw(scene.gaussians, scene.camera(v))[0] for v in range(scene.num_views)]
-    return sum(psnr(rgb, photo, everywhere) for rgb, photo in zip(pictures, photos, strict=True)) / len(photos)
+    return sum(_view_psnr(scene, v, photos, everywhere) for v in range(len(photos))) / len(photos)
 
 
 def _without(scene: Scene, view: int) -> Scene:
@@ -106,7 +116,9 @@ def _without(scene: Scene, view: int) -> Scene:
     return replace(scene, gaussians=scene.gaussians.map(lambda values: values[keep]))
 
 
-def _fit(scene: Scene, photos: Tensor, views: list[int] | range, budget: Budget, report: Report) -> tuple[Scene, int]:
+def _fit(
+    scene: Scene, photos: Tensor, views: list[int] | range, budget: Budget, report: Report
+) -> tuple[Scene, int]:
     """Poses (but the first view's, which is the world) and Gaussians fitted to some photos; steps taken."""
     values = _leaves(scene)
     adam = torch.optim.Adam([{"params": [v], "lr": RATES[name]} for name, v in values.items()], eps=1e-15)
@@ -152,7 +164,9 @@ def _scene_of(scene: Scene, values: dict[str, Tensor]) -> Scene:
         values["means"], normalize(values["quats"], dim=-1), values["log_scales"].exp(),
         values["logit_opacities"].sigmoid(), values["sh"],
     )  # fmt: skip
-    return replace(scene, gaussians=gaussians, viewmats=_moved(scene.viewmats.to(values["twists"]), values["twists"]))
+    return replace(
+        scene, gaussians=gaussians, viewmats=_moved(scene.viewmats.to(values["twists"]), values["twists"])
+    )
 
 
 def _moved(viewmats: Tensor, twists: Tensor) -> Tensor:

@@ -9,7 +9,9 @@
 in vec4 in_mean;   // xyz world, w opacity
 in vec4 in_quat;   // wxyz, unit
 in vec3 in_scale;  // standard deviations, world
+in float in_tint;  // 0 none, n / 255 for colour n - 1
 
+const float TINTED = 0.75;       // share of the tint; the rest and the shading stay, so that shapes can be seen
 const float HALF_MAX = 65504.0;  // of float16: sums of T alpha c stay finite in every target
 
 uniform mat4 viewmat;      // world to camera
@@ -17,6 +19,7 @@ uniform vec3 eye;          // camera centre, world; what float32 rounds off it i
 uniform vec3 eye_rest;     // scenes far from their origin lose no digits
 uniform vec4 pinhole;      // fx, fy, cx, cy in pixels
 uniform vec2 image_size;   // pixels
+uniform vec3 tint_colours[2];
 
 out vec4 out_place;   // centre (pixels), opacity, z-depth
 out vec4 out_shape;   // l11, l21, l22 (pixels), radius of the alpha cut in deviations
@@ -32,4 +35,9 @@ void main() {
     out_place = vec4(pos_c.xy / pos_c.z * pinhole.xy + pinhole.zw, opacity, pos_c.z);
     out_shape = vec4(root, sqrt(2.0 * log(max(opacity / ALPHA_MIN, 1.0))));
     out_colour = min(sh_colour(normalize(from_eye)), HALF_MAX);
+    int tint = int(255.0 * in_tint + 0.5);
+    if (tint > 0) {
+        float grey = dot(min(out_colour, 1.0), vec3(0.299, 0.587, 0.114));
+        out_colour = mix(out_colour, tint_colours[tint - 1] * (0.35 + 0.75 * grey), TINTED);
+    }
 }

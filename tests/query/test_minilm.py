@@ -98,7 +98,7 @@ def test_fast_enough_to_type_with(tower):
         start = time.process_time()
         tower.encode([f"a red armchair {i}"])
         seconds.append(time.process_time() - start)
-    assert min(seconds) < 0.010  # measured 5 ms
+    assert min(seconds) < 0.050  # a fast typist's keys are 100 ms apart; measured 5 to 12 ms by machine
 
 
 def test_loads_in_a_second():

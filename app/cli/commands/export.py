@@ -2,15 +2,13 @@
 
 from argparse import Namespace
 from collections.abc import Callable
+from pathlib import Path
 from typing import TextIO
 
-from torch import Tensor
-
-from app.cli import pictures
+from app.cli import shots
 from app.cli.cameras import CameraChoice, chosen_camera
 from app.cli.commands.query import spoken
 from app.cli.files import check_output_file, readable_file, staged_folder
-from app.cli.pictures import write_picture
 from app.cli.renderers import Renderer, open_renderer
 from app.cli.report import ProgressBar
 from app.cli.scenes import open_scene
@@ -18,7 +16,9 @@ from langflash_core.errors import InputError, PromptError, SceneFileError
 from langflash_core.types import Camera, QueryResult, Scene
 
 SCENES = (".langflash", ".ply", ".splat")
-SUFFIXES = (".png", *SCENES, ".json", ".mp4", ".npz")
+SUFFIXES = (".png", *SCENES, ".json", ".csv", ".mp4", ".npz")
+TABLES = {".json": ".json of masks", ".csv": ".csv of boxes"}
+NEED_A_PHRASE = ("heat", "mask", "cutout", "labels", "boxes")
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -40,11 +40,13 @@ def run(args: Namespace, out: TextIO) -> None:
         check_encoder()
         write = _write_video
     elif suffix == ".json":
-        write = _write_masks
+        write = _write_boxes if args.what == "boxes" else _write_masks
+    elif suffix == ".csv":
+        write = _write_boxes
     elif suffix == ".npz":
         write = _write_numbers
     elif suffix == ".png":
-        write = _write_labels if args.what == "labels" else _write_picture
+        write = _write_pictures
     print(f"{args.output}: {write(args, open_scene(args.scene), prompts, choice)}", file=out)
 
 
@@ -56,18 +58,33 @@ def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
     """
     if args.threshold is not None and not prompts:
         raise PromptError('--threshold needs a phrase; add --prompt "armchair"')
-    if not prompts and (suffix == ".json" or args.what == "labels"):
-        what = "a .json of masks" if suffix == ".json" else "--what labels"
+    if not prompts and (suffix in (".json", ".csv") or args.what in NEED_A_PHRASE):
+        what = f"--what {args.what}" if args.what in NEED_A_PHRASE else f"a {TABLES.get(suffix)}"
         raise PromptError(f'{what} needs a phrase; add --prompt "armchair"')
-    if args.what == "labels" and suffix != ".png":
-        raise InputError(f"--what labels is a picture; name a .png instead of {args.output.name}")
+    if args.what == "heat" and len(prompts) > 1:
+        raise PromptError("--what heat draws one phrase; use --what labels for several")
+    if args.what == "rgb" and prompts:
+        raise PromptError("--what rgb takes no --prompt; use --what cutout, mask, heat or labels")
+    if args.what == "boxes" and suffix not in TABLES:
+        raise InputError(f"--what boxes is a table; name a .json or .csv instead of {args.output.name}")
+    if args.what not in (None, "boxes") and suffix != ".png":
+        raise InputError(f"--what {args.what} is a picture; name a .png instead of {args.output.name}")
     if args.seconds is not None and suffix != ".mp4":
         raise InputError("--seconds is for videos; name an .mp4, or leave it away")
+    _check_camera_words(args, suffix)
+
+
+def _check_camera_words(args: Namespace, suffix: str) -> None:
     looked_at = [name for name in ("view", "camera", "size") if getattr(args, name) is not None]
+    if args.all_views:
+        if set(looked_at) - {"size"}:
+            raise InputError(f"--all-views looks from every photo; leave --{looked_at[0]} away")
+        looked_at.append("all-views")
     if suffix in SCENES and looked_at:
         raise InputError(f"a {suffix} holds the whole scene, not a view of it; leave --{looked_at[0]} away")
-    if suffix == ".mp4" and set(looked_at) - {"size"}:
-        raise InputError(f"a video moves between the views by itself; leave --{looked_at[0]} away")
+    extra = [name for name in looked_at if name != "size"]
+    if suffix == ".mp4" and extra:
+        raise InputError(f"a video moves between the views by itself; leave --{extra[0]} away")
 
 
 def _write_scene(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
@@ -87,20 +104,26 @@ def _selected(args: Namespace, scene: Scene, prompts: list[str]) -> Scene:
     return pipeline.select(scene, prompts, threshold=args.threshold) if prompts else scene
 
 
-def _write_picture(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
-    from langflash_core.export.png import to_8bit
-
-    camera = choice.of(scene)
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
-        progress("drawing", 0.2)
+def _write_pictures(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
+    """A picture per camera: colours, one phrase's heat-map, a mask, a cut-out, or labels with a legend."""
+    cameras, targets = _shots(args, scene, choice)
+    with (
+        ProgressBar() as progress,
+        open_renderer(args.backend) as renderer,
+        staged_folder(args.output.parent) as staging,
+    ):
+        results = []
+        for index, (camera, target) in enumerate(zip(cameras, targets, strict=True)):
+            progress("drawing", index / len(cameras))
+            place = staging / target.name
+            if prompts:
+                results.append(_answer(args, scene, prompts, camera, renderer))
+                shots.write_answered(args.what or "cutout", place, results[-1])
+            else:
+                shots.write_plain(place, renderer(scene, camera, weight_maps=False))
         if prompts:
-            result = _answer(args, scene, prompts, camera, renderer)
-            _check_found([result])
-            pixels = pictures.cut_out(result.frame, _found(result))
-        else:
-            pixels = to_8bit(renderer(scene, camera, weight_maps=False).rgb)
-    write_picture(args.output, pixels)
-    return f"{camera.width} x {camera.height}"
+            _check_found(results)
+    return _told(args, prompts, results, cameras, targets)
 
 
 def _write_numbers(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
@@ -119,19 +142,49 @@ def _write_numbers(args: Namespace, scene: Scene, prompts: list[str], choice: Ca
     return f"{camera.width} x {camera.height} with {scene.semantics.num_atoms} weight maps"
 
 
-def _write_labels(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
-    """A palette PNG, 0 for nothing and i for the i-th phrase, and its legend as .json beside it."""
-    from langflash_core.export.png import label_map, write_labels
+def _shots(args: Namespace, scene: Scene, choice: CameraChoice) -> tuple[list[Camera], list[Path]]:
+    """Cameras, and the file of each: -o itself, or with --all-views NAME_0, NAME_1 and so on.
 
-    legend = check_output_file(args.output.with_suffix(".json"), inputs=[args.scene])
+    Raises:
+        OutputError: one of them cannot be written.
+    """
+    output = args.output
+    if args.all_views:
+        cameras = [scene.camera(view, *(args.size or (None, None))) for view in range(scene.num_views)]
+        names = [f"{output.stem}_{view}{output.suffix}" for view in range(scene.num_views)]
+        targets = [output.with_name(name) for name in names]
+    else:
+        cameras, targets = [choice.of(scene)], [output]
+    legends = [target.with_suffix(".json") for target in targets] if args.what == "labels" else []
+    for target in (*targets, *legends):
+        check_output_file(target, inputs=[args.scene])
+    return cameras, targets
+
+
+def _told(args: Namespace, prompts: list[str], results: list[QueryResult], cameras, targets) -> str:
+    size = f"{cameras[0].width} x {cameras[0].height}"
+    if args.all_views:
+        size += f", {', '.join(target.name for target in targets)}"
+    if args.what != "labels":
+        return size
+    found = len({a.prompt for result in results for a in result.answers if a.found})
+    legends = ", ".join(target.with_suffix(".json").name for target in targets)
+    return f"{found} of {len(prompts)} phrases, legend in {legends}"
+
+
+def _write_boxes(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
+    """Where each phrase is and how large, as JSON or CSV; a row per phrase and view."""
+    cameras = _shots(args, scene, choice)[0] if args.all_views else [choice.of(scene)]
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
-        progress("drawing", 0.2)
-        result = _answer(args, scene, prompts, choice.of(scene), renderer)
-        _check_found([result])
-        with staged_folder(args.output.parent) as staging:
-            write_labels(staging / args.output.name, label_map(result), prompts)
-    found = sum(answer.found for answer in result.answers)
-    return f"{found} of {len(prompts)} phrases, legend in {legend.name}"
+        results = []
+        for index, camera in enumerate(cameras):
+            progress("drawing", index / len(cameras))
+            results.append(_answer(args, scene, prompts, camera, renderer))
+    views = [None] if args.camera is not None else [args.view or 0]
+    rows = shots.box_rows(results, range(scene.num_views) if args.all_views else views, scene)
+    shots.write_boxes(args.output, rows)
+    found = sum(row["found"] for row in rows)
+    return f"{found} of {len(rows)} found"
 
 
 def _write_masks(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
@@ -192,8 +245,3 @@ def _check_found(results: list[QueryResult]) -> None:
         where = "this view" if len(results) == 1 else "any view"
         best = max(answer.score for answer in answers)
         raise PromptError(f"not found in {where}: {asked} (best score {best:.3f}); lower --threshold")
-
-
-def _found(result: QueryResult) -> Tensor:
-    """Masks (P, H, W) of the phrases that are there."""
-    return result.masks[[answer.found for answer in result.answers]]

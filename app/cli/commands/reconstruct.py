@@ -36,6 +36,7 @@ def run(args: Namespace, out: TextIO) -> None:
             device=args.device,
             precision=args.precision,
             aggregation=args.aggregation,
+            refine_seconds=args.refine,
             progress=progress,
         )
         progress("writing", 1.0)

@@ -4,7 +4,23 @@ from imgui_bundle import ImVec2, imgui
 
 from app.window import commands as do
 from app.window import theme
-from app.window.panels import canvas, overlays, photos, prompts, status, toolbar, widgets
+from app.window.panels import (
+    canvas,
+    desk_dialogs,
+    dictionary,
+    edits,
+    exporting,
+    legend,
+    overlays,
+    photos,
+    pointing,
+    prompts,
+    splitter,
+    status,
+    toolbar,
+    tools,
+    widgets,
+)
 from app.window.panels.look import Look
 from app.window.state import State
 
@@ -22,21 +38,31 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
     """
     io = imgui.get_io()
     width, height = io.display_size.x, io.display_size.y
-    left, bar, top = look.px(theme.PANEL_WIDTH), look.px(theme.STATUS_HEIGHT), look.px(CANVAS_TOP)
+    left, bar, top = splitter.width(state, look, width), look.px(theme.STATUS_HEIGHT), look.px(CANVAS_TOP)
     place, size = ImVec2(left, top), ImVec2(max(width - left, 1), max(height - bar - top, 1))
     issued = _picture(state, look, place, size)
-    with widgets.window("##panel", ImVec2(0, 0), ImVec2(left, height - bar)):
+    with widgets.window("##panel", ImVec2(0, 0), ImVec2(left, height - bar), scrolls=True):
+        issued += exporting.draw_progress(state, look)
         issued += photos.draw(state, look)
         widgets.gap(look.px(6))
         imgui.separator()
         widgets.gap(look.px(6))
         issued += prompts.draw(state, look)
+        issued += edits.draw(state, look)
     with widgets.window("##toolbar", ImVec2(left, 0), ImVec2(size.x, top)):
         imgui.set_cursor_pos_y((top - imgui.get_frame_height()) / 2)
         issued += toolbar.draw(state, look)
     with widgets.window("##status", ImVec2(0, height - bar), ImVec2(width, bar)):
         imgui.set_cursor_pos_y((bar - imgui.get_text_line_height()) / 2)
         status.draw(state, look)
+    issued += splitter.draw(state, look, left, height - bar)
+    legend.draw(state, look, place, size)
+    if state.info is not None:
+        issued += tools.draw(state, look, place)
+        issued += pointing.draw(state, look, place, size)
+        issued += dictionary.draw(state, look, place, size)
+    issued += desk_dialogs.draw_offer(state, look, place, size)
+    issued += edits.draw_offer(state, look, place, size)
     issued += overlays.draw_toasts(state, look, ImVec2(width, height - bar))
     issued += overlays.draw_dialog(state, look)
     issued += canvas.keys(state)

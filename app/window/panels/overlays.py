@@ -3,14 +3,32 @@
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from app.window import ask_commands as ask
 from app.window import commands as do
+from app.window import desk_commands as desk
 from app.window import theme
 from app.window.drops import typed_path, typed_scene
-from app.window.panels import widgets
+from app.window.panels import desk_dialogs, exporting, widgets
 from app.window.panels.look import Look
 from app.window.state import State, Toast
 
-TITLES = {"save": "Save the scene", "open": "Open", "help": "Mouse and keys", "leave": "Leave?"}
+TITLES = {
+    "save": "Save the scene",
+    "open": "Open",
+    "help": "Mouse and keys",
+    "leave": "Leave?",
+    "save prompts": "Save the phrases",
+    "load prompts": "Load phrases",
+    "export": "Export",
+    "settings": "Preferences",
+    "log": "Log",
+}
+WIDTHS = {  # design pixels; others 520
+    "export": exporting.WIDTH,
+    "settings": 560.0,
+    "log": 640.0,
+    "help": 600.0,
+}
 HELP = (
     ("Left drag", "orbit"),
     ("Middle drag, Shift + left drag", "pan"),
@@ -18,10 +36,24 @@ HELP = (
     ("Right drag", "look around"),
     ("W A S D, Q E", "fly, down and up; Shift is faster"),
     ("H or Home", "back to the first photo's view"),
+    ("Z, F", "show all of the scene, the selection"),
+    ("P, K", "compare with the photo; show the cameras"),
     ("1 to 5", "colour, heat-map, labels, atoms, depth"),
-    ("Ctrl + O, Ctrl + S", "open, save"),
+    ("6 to 0", "masks, only these, without these, dim, features"),
+    ("Up, Down in a phrase", "recent phrases"),
+    ("V, X", "move; ask what is there"),
+    ("R, B, C", "select with a box, a brush, a click"),
+    ("Shift, Ctrl while selecting", "add, remove;  Alt: orbit"),
+    ("[ and ]", "a smaller, a larger brush"),
+    ("Ctrl + A, D, I", "select all, nothing, the rest"),
+    ("G, Delete", "grow, delete the selection"),
+    ("Ctrl + Z, Ctrl + Shift + Z", "undo, redo"),
+    ("Ctrl + O, Ctrl + S, Ctrl + E", "open, save, export"),
+    ("Ctrl + P, F2", "preferences, log"),
     ("Ctrl + Q", "leave"),
 )
+
+_CLOSING = do.ShowDialog | do.SaveScene | do.OpenPaths | ask.SavePrompts | ask.LoadPrompts | desk.Export
 
 
 def draw_toasts(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
@@ -71,16 +103,27 @@ def draw_dialog(state: State, look: Look) -> list[do.Command]:
         imgui.open_popup(title)
     middle = imgui.get_main_viewport().get_center()
     imgui.set_next_window_pos(middle, imgui.Cond_.appearing, ImVec2(0.5, 0.5))
-    imgui.set_next_window_size(ImVec2(look.px(520), 0))
+    width = min(look.px(WIDTHS.get(state.dialog, 520.0)), imgui.get_io().display_size.x - look.px(24))
+    imgui.set_next_window_size(ImVec2(width, 0))
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     opened, kept = imgui.begin_popup_modal(title, True, imgui.WindowFlags_.no_resize)
     issued: list[do.Command] = []
     if opened:
-        body = {"save": _save, "open": _open, "help": _help, "leave": _leave}[state.dialog]
-        issued = body(state, look)
+        bodies = {
+            "save": _save,
+            "open": _open,
+            "help": _help,
+            "leave": _leave,
+            "save prompts": _save_prompts,
+            "load prompts": _load_prompts,
+            "export": exporting.draw,
+            "settings": desk_dialogs.draw_settings,
+            "log": desk_dialogs.draw_log,
+        }
+        issued = bodies[state.dialog](state, look)
         if not kept:
             issued.append(do.ShowDialog(None))
-        if any(isinstance(c, do.ShowDialog | do.SaveScene | do.OpenPaths) for c in issued):
+        if any(isinstance(c, _CLOSING) for c in issued):
             imgui.close_current_popup()
         imgui.end_popup()
     imgui.pop_style_var()
@@ -109,6 +152,29 @@ def _open(state: State, look: Look) -> list[do.Command]:
     imgui.end_disabled()
     if text and (pressed or confirmed):
         issued.append(do.OpenPaths((str(typed_path(text)),)))
+    return issued
+
+
+def _save_prompts(state: State, look: Look) -> list[do.Command]:
+    issued, confirmed = _path_field(state, "Where to write them")
+    text = state.dialog_path.strip()
+    exists = bool(text) and typed_path(text).is_file()
+    imgui.begin_disabled(not text)
+    pressed = widgets.primary_button("Replace" if exists else "Save", look.vec(120, 0))
+    imgui.end_disabled()
+    if text and (pressed or confirmed):
+        issued.append(ask.SavePrompts(typed_path(text)))
+    return issued
+
+
+def _load_prompts(state: State, look: Look) -> list[do.Command]:
+    issued, confirmed = _path_field(state, "A set of phrases (.prompts.json); they replace the present ones")
+    text = state.dialog_path.strip()
+    imgui.begin_disabled(not text)
+    pressed = widgets.primary_button("Load", look.vec(120, 0))
+    imgui.end_disabled()
+    if text and (pressed or confirmed):
+        issued.append(ask.LoadPrompts(typed_path(text)))
     return issued
 
 

@@ -4,12 +4,13 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from app.window import commands as do
+from app.window import edit_commands as edit
 from app.window import theme
-from app.window.panels import widgets
+from app.window.asking import usable
+from app.window.panels import asking, scores, widgets
 from app.window.panels.look import Look
 from app.window.state import NEGATIVES, Prompt, State
 
-MAX_PROMPTS = 8
 _SWATCH = imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label | imgui.ColorEditFlags_.no_tooltip
 
 
@@ -21,10 +22,8 @@ def draw(state: State, look: Look) -> list[do.Command]:
         imgui.push_id(prompt.key)
         issued += _row(state, prompt, look)
         imgui.pop_id()
-    imgui.begin_disabled(len(state.prompts) >= MAX_PROMPTS)
-    if imgui.button(f"{fa.ICON_FA_PLUS}  Add a phrase"):
-        issued.append(do.AddPrompt())
-    imgui.end_disabled()
+    issued += asking.tools(state, look)
+    issued += scores.draw(state, look)
     widgets.gap(look.px(2))
     issued += _negatives(state)
     return issued
@@ -38,8 +37,13 @@ def _row(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
         red, green, blue = colour
         issued.append(do.ColourPrompt(prompt.key, (red, green, blue)))
     imgui.same_line()
-    imgui.set_next_item_width(imgui.get_content_region_avail().x - 2 * look.px(38))
-    changed, text = imgui.input_text_with_hint("##text", "a thing, e.g. armchair", prompt.text)
+    imgui.set_next_item_width(imgui.get_content_region_avail().x - 3 * look.px(38))
+    frame = theme.LINE if prompt.like else theme.RAISED  # a chip that stands for a place, not for its words
+    with widgets.colours(frame_bg=frame):
+        changed, text = asking.field(state, prompt)
+    issued += asking.remembered(text)
+    if prompt.like:
+        widgets.tooltip("Asks for what the place you clicked says; type to ask for words instead")
     if imgui.is_item_activated() and state.active != prompt.key:
         issued.append(do.SelectPrompt(prompt.key))
     if changed:
@@ -48,6 +52,12 @@ def _row(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     eye = fa.ICON_FA_EYE if prompt.visible else fa.ICON_FA_EYE_SLASH
     if widgets.quiet_button(f"{eye}##eye", "Ask, or leave out"):
         issued.append(do.ShowPrompt(prompt.key, not prompt.visible))
+    imgui.same_line(0, look.px(2))
+    tip = "Select the Gaussians that this phrase means; Shift adds, Ctrl removes"
+    if widgets.quiet_button(f"{fa.ICON_FA_DRAW_POLYGON}##select", tip) and prompt.text.strip():
+        io = imgui.get_io()
+        combine = "add" if io.key_shift else "remove" if io.key_ctrl else state.editing.combine
+        issued.append(edit.SelectByPhrase(prompt.key, combine))
     imgui.same_line(0, look.px(2))
     if widgets.quiet_button(f"{fa.ICON_FA_XMARK}##remove", "Remove"):
         issued.append(do.RemovePrompt(prompt.key))
@@ -65,6 +75,10 @@ def _verdict(prompt: Prompt, look: Look) -> list[do.Command]:
     """Found or not with the score, then the threshold slider."""
     issued: list[do.Command] = []
     imgui.indent(look.px(36))
+    if not usable(prompt.text):
+        asking.unfinished_hint()
+        imgui.unindent(look.px(36))
+        return issued
     imgui.align_text_to_frame_padding()
     if prompt.score is None:
         imgui.text_colored(theme.MUTED, "...")

@@ -27,6 +27,10 @@ def _figures(state: State) -> list[str]:
             f"{state.info.num_gaussians:,} Gaussians",
             f"{state.info.num_atoms} atoms",
         ]
+        hover = state.editing.hover
+        if hover is not None and hover.point is not None:
+            x, y, z = hover.point
+            figures.append(f"x {x:.3f}  y {y:.3f}  z {z:.3f}  depth {hover.depth:.3f}")
     figures.append(stats.renderer)
     if stats.passes:
         figures.append("passes: " + ", ".join(f"{kind} {count}" for kind, count in stats.passes))

@@ -1,50 +1,34 @@
-"""Above the picture: what it shows, the field of view, home, open and save."""
+"""Above the picture: what it shows, the field of view, home, all of it, export, the menu."""
+
+from dataclasses import replace
 
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from app.window import commands as do
+from app.window import desk_commands as desk
 from app.window import theme
-from app.window.panels import widgets
+from app.window.panels import dictionary, in_space, menu, modes, widgets
 from app.window.panels.look import Look
 from app.window.poses import FOV_RANGE
-from app.window.state import Mode, State
+from app.window.state import State
 
-TIPS = {
-    Mode.RGB: "Colour  (1)",
-    Mode.HEAT: "Where the active phrase fits, over the colours  (2)",
-    Mode.LABELS: "Every phrase in its own colour  (3)",
-    Mode.ATOMS: "The groups the scene is made of  (4)",
-    Mode.DEPTH: "Distance, near to far  (5)",
-}
 _FOV = 150.0  # design pixels of the slider; left out where the window is too narrow
-_BUTTONS = 4 * 44.0
+_BUTTONS = 5 * 44.0
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
     """The strip above the picture."""
     issued: list[do.Command] = []
-    imgui.begin_disabled(state.info is None)
-    imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 0))
-    for mode in Mode:
-        if _choice(mode.value, state.mode is mode):
-            issued.append(do.SetMode(mode))
-        widgets.tooltip(TIPS[mode])
-        imgui.same_line()
-    imgui.pop_style_var()
-    imgui.end_disabled()
-    modes = imgui.get_cursor_pos_x()
+    issued += modes.draw(state, look, imgui.get_window_width() - look.px(_BUTTONS + 40))
+    imgui.same_line()
+    used = imgui.get_cursor_pos_x()
     width = look.px(_FOV + _BUTTONS)
-    roomy = modes + width < imgui.get_window_width() - look.px(24)
+    roomy = used + width < imgui.get_window_width() - look.px(24)
     width = width if roomy else look.px(_BUTTONS)
     imgui.same_line(imgui.get_window_width() - width - look.px(8))
-    return issued + (_fov(state, look) if roomy else []) + _home(state) + _files(state)
-
-
-def _choice(label: str, chosen: bool) -> bool:
-    if chosen:
-        return widgets.primary_button(label)
-    return imgui.button(label)
+    issued += _fov(state, look) if roomy else []
+    return issued + dictionary.button(state) + _home(state) + _files(state)
 
 
 def _fov(state: State, look: Look) -> list[do.Command]:
@@ -59,6 +43,7 @@ def _fov(state: State, look: Look) -> list[do.Command]:
 
 def _home(state: State) -> list[do.Command]:
     issued: list[do.Command] = []
+    imgui.same_line()
     imgui.begin_disabled(state.info is None)
     if imgui.button(fa.ICON_FA_HOUSE):
         issued.append(do.Home())
@@ -70,20 +55,17 @@ def _home(state: State) -> list[do.Command]:
 def _files(state: State) -> list[do.Command]:
     issued: list[do.Command] = []
     imgui.same_line()
-    if imgui.button(fa.ICON_FA_FOLDER_OPEN):
-        issued.append(do.ShowDialog("open"))
-    widgets.tooltip("Open photos or a scene  (Ctrl+O)")
-    imgui.same_line()
     imgui.begin_disabled(state.info is None)
-    if imgui.button(fa.ICON_FA_FLOPPY_DISK):
-        issued.append(do.ShowDialog("save"))
-    widgets.tooltip("Save the scene  (Ctrl+S)")
+    if imgui.button(fa.ICON_FA_EXPAND):
+        issued.append(desk.FrameAll())
+    widgets.tooltip("Show all of the scene  (Z)")
+    imgui.same_line()
+    if imgui.button(fa.ICON_FA_FILE_EXPORT):
+        issued.append(desk.ShowExport())
+    widgets.tooltip("Export pictures, masks, videos, splats  (Ctrl+E)")
     imgui.end_disabled()
     imgui.same_line()
-    if imgui.button(fa.ICON_FA_QUESTION):
-        issued.append(do.ShowDialog("help"))
-    widgets.tooltip("Mouse and keys  (F1)")
-    return issued
+    return issued + menu.draw(state)
 
 
 def draw_views(state: State, look: Look) -> list[do.Command]:
@@ -110,4 +92,28 @@ def draw_views(state: State, look: Look) -> list[do.Command]:
         if pressed:
             issued.append(do.JumpTo(view))
         imgui.pop_id()
+    imgui.same_line(0, look.px(12))
+    return issued + _in_space(state, look)
+
+
+def _in_space(state: State, look: Look) -> list[do.Command]:
+    """Two switches beside the photos: compare with the photo, and the cameras in the scene."""
+    issued: list[do.Command] = []
+    size, wanted = look.vec(34, 30), state.desk.preferences
+    imgui.begin_group()
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(4, 4))
+    imgui.begin_disabled(state.view is None)
+    if _switch(fa.ICON_FA_LEFT_RIGHT, in_space.comparing(state), size):
+        issued.append(desk.Compare(None if in_space.comparing(state) else 0.5))
+    imgui.end_disabled()
+    widgets.tooltip("Compare with the photo, at a photo's own view  (P)")
+    if _switch(fa.ICON_FA_CAMERA, wanted.photos_in_space, size):
+        issued.append(desk.Prefer(replace(wanted, photos_in_space=not wanted.photos_in_space)))
+    widgets.tooltip("Show the photos' cameras in the scene  (K)")
+    imgui.pop_style_var()
+    imgui.end_group()
     return issued
+
+
+def _switch(icon: str, on: bool, size: ImVec2) -> bool:
+    return widgets.primary_button(icon, size) if on else imgui.button(icon, size)

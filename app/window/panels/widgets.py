@@ -1,7 +1,8 @@
 """Small pieces that several panels share."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import TypeVar
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
@@ -14,13 +15,16 @@ PLAIN = (
     | imgui.WindowFlags_.no_nav
 )
 
+_Value = TypeVar("_Value")
+
 
 @contextmanager
-def window(name: str, pos: ImVec2, size: ImVec2, flags: int = 0) -> Iterator[None]:
-    """A fixed window without decoration."""
+def window(name: str, pos: ImVec2, size: ImVec2, flags: int = 0, scrolls: bool = False) -> Iterator[None]:
+    """A fixed window without decoration; with a scroll bar when it `scrolls`."""
+    plain = PLAIN & ~imgui.WindowFlags_.no_scrollbar if scrolls else PLAIN
     imgui.set_next_window_pos(pos)
     imgui.set_next_window_size(size)
-    imgui.begin(name, None, PLAIN | imgui.WindowFlags_.no_bring_to_front_on_focus | flags)
+    imgui.begin(name, None, plain | imgui.WindowFlags_.no_bring_to_front_on_focus | flags)
     try:
         yield
     finally:
@@ -59,6 +63,16 @@ def primary_button(label: str, size: ImVec2 | None = None) -> bool:
         return imgui.button(label, size or ImVec2(0, 0))
 
 
+def choice(options: Sequence[tuple[str, _Value]], chosen: _Value) -> _Value:
+    """One of several values, a button each in a row; returns the one that now holds."""
+    for index, (label, value) in enumerate(options):
+        if index:
+            imgui.same_line(0, 0.5 * imgui.get_style().item_spacing.x)
+        if primary_button(label) if value == chosen else imgui.button(label):
+            chosen = value
+    return chosen
+
+
 def quiet_button(label: str, tip: str = "") -> bool:
     """An icon without a frame; `tip` explains it on hover."""
     clear = ImVec4(0, 0, 0, 0)
@@ -89,6 +103,16 @@ def tooltip(text: str) -> None:
         imgui.set_tooltip(text)
 
 
+def shortened(text: str, width: float) -> str:
+    """The text, cut with an ellipsis where it is wider than `width` interface pixels."""
+    if imgui.calc_text_size(text).x <= width:
+        return text
+    kept = len(text)
+    while kept > 1 and imgui.calc_text_size(text[:kept].rstrip() + "...").x > width:
+        kept -= 1
+    return text[:kept].rstrip() + "..."
+
+
 def rgba(colour: tuple[float, float, float], alpha: float = 1.0) -> ImVec4:
     """An ImGui colour of an RGB triple."""
     return ImVec4(*colour, alpha)
@@ -102,3 +126,10 @@ def u32(colour: ImVec4) -> int:
 def gap(height: float) -> None:
     """Vertical space, interface pixels."""
     imgui.dummy(ImVec2(0, height))
+
+
+def at_right_edge(text: str) -> None:
+    """Text on the last item's line, flush right."""
+    edge = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x
+    imgui.same_line(edge - imgui.calc_text_size(text).x)
+    imgui.text(text)

@@ -264,7 +264,8 @@ def test_output_folder_that_cannot_be_written(refused, scene_file, photo):
 
 def test_unknown_words(refused):
     assert "COMMAND" in refused()
-    assert "bench" in refused("bench")
+    assert "scene to measure" in refused("bench")
+    assert "frobnicate" in refused("frobnicate")
     assert "--jsn" in refused("info", "x", "--jsn")
 
 

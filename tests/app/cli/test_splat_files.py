@@ -204,7 +204,7 @@ def test_video_without_its_package(refused, scene_file, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("name", "words", "hint"),
     [
-        ("a.obj", [], ".png, .langflash, .ply, .splat, .json, .mp4"),
+        ("a.obj", [], ".png, .langflash, .ply, .splat, .json, .csv, .mp4"),
         ("a", [], ".png"),
         ("a.json", [], "--prompt"),
         ("a.png", ["--what", "labels"], "--prompt"),

@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from langflash_core.scene import thin
+from langflash_core.scene.thin import thin_with_rows
 from langflash_core.splat import render
 from tests.app.gl.questions import full_relevance, question
 from tests.splat.scenes import camera, cloud, maps_of
@@ -39,7 +40,9 @@ def test_back_to_all_gaussians(renderer, scene):
 
 def test_a_level_is_made_once(renderer, scene, monkeypatch):
     made = []
-    monkeypatch.setattr("app.gl.renderer.thin", lambda *given: made.append(given) or thin(*given))
+    monkeypatch.setattr(
+        "app.gl.renderer.thin_with_rows", lambda *given: made.append(given) or thin_with_rows(*given)
+    )
     renderer.set_scene(scene)
     for share in (0.25, 1.0, 0.25, 1.0, 0.25):
         renderer.draw(camera(), share=share)

@@ -2,13 +2,36 @@
 
     python driver.py WIDTH HEIGHT [PATHS...]
 
-A line is printed when anything a test may wait for has changed. The last one has "closed".
+A line is printed when anything a test may wait for has changed, with the seconds that each frame
+since the last line took. The last one has "closed".
 """
 
 import json
 import sys
 
+from app.window.editing import Editing
 from app.window.session import Session
+
+
+def editing(now: Editing) -> dict:
+    history, card, preview = now.history, now.card, now.floaters
+    return {
+        "tool": now.tool.name,
+        "selected": now.num_selected,
+        "deleted": len(history.marks.deleted) if history else 0,
+        "hidden": len(history.marks.hidden) if history else 0,
+        "edits": [edit.label for edit in history.done] if history else [],
+        "undone": len(history.undone) if history else 0,
+        "waiting": now.waiting,
+        "unsaved": now.unsaved,
+        "hover": None if now.hover is None else now.hover.point,
+        "shares": None if now.hover is None or now.hover.atoms is None else dict(now.hover.atoms),
+        "words": None if card is None or card.words is None else [word for word, _ in card.words],
+        "floaters": None
+        if preview is None or not preview.scores or history is None
+        else len(preview.mask(history.marks.visible)),
+        "offer": None if now.offer is None else now.offer.count,
+    }
 
 
 def summary(session: Session) -> dict:
@@ -21,9 +44,12 @@ def summary(session: Session) -> dict:
         "view": state.view,
         "flying": state.flight is not None,
         "job": None if state.job is None else state.job.stage,
-        "prompts": [[p.text, p.score, p.found] for p in state.prompts],
+        "prompts": [[p.text, p.score, p.found, p.cut] for p in state.prompts],
+        "recent": list(state.asking.recent),
+        "binned": [h.key for h in state.asking.histograms],
         "toasts": [toast.text for toast in state.toasts],
         "dialog": state.dialog,
+        **editing(state.editing),
         "maps": dict(state.stats.passes).get("weights", 0),
         "picture": list(state.stats.picture_size),
         "splats": sum(n for kind, n in state.stats.passes if kind in ("colour", "weights")),
@@ -37,14 +63,18 @@ def main() -> int:
     session = Session(paths, (int(width), int(height)))
     last = None
     frames = 0
+    seconds: list[float] = []
     try:
         while not session.should_close:
-            frames += session.step()
+            if session.step():
+                frames += 1
+                seconds.append(session.state.stats.frame_seconds)  # of the frame before
             now = summary(session)
             if now != last:
                 last = now
-                sys.stdout.write(json.dumps({**now, "frames": frames}) + "\n")
+                sys.stdout.write(json.dumps({**now, "frames": frames, "seconds": seconds}) + "\n")
                 sys.stdout.flush()
+                seconds = []
     finally:
         session.close()
     return 0

@@ -1,0 +1,126 @@
+"""What each photo sees: the depths of a scene in the views of its own photos, drawn once per scene."""
+
+from dataclasses import replace
+
+import moderngl
+import numpy as np
+from torch import Tensor
+
+from langflash_core.query.answers import COVERED_ALPHA
+from langflash_core.scene.consistency import TOLERANCE
+from langflash_core.types import Camera, Scene
+
+from .programs import Programs, set_uniforms
+from .splats import SplatBuffers
+from .targets import PREMULTIPLIED, ColourTarget, drawing
+
+SAME = 0.05
+"""Relative depth within which a photo shows the very surface: a pixel of 1/200 of the focal length on a floor
+seen at 80 degrees from upright spans 0.03."""
+WORST = TOLERANCE
+"""Relative depth from which the depths of two photos disagree altogether."""
+MOST_PHOTOS = 32  # matrices of so many fit any driver's uniforms
+LONGEST_SIDE = 320  # pixels of a depth map
+_CAPACITIES = (2, 4, 8, 16, 32)
+
+
+def gaussians_per_view(scene: Scene) -> list[int] | None:
+    """How many Gaussians each photo made, in their order; None where the scene does not say."""
+    counts = scene.metadata.get("gaussians_per_view")
+    if not isinstance(counts, list | tuple) or len(counts) != scene.num_views:
+        return None
+    return list(counts) if sum(counts) == len(scene.gaussians) else None
+
+
+class PhotoDepths:
+    """Depth maps of at most `MOST_PHOTOS` photos as layers of one texture.
+
+    own: every photo sees only the Gaussians that it made itself.
+    """
+
+    def __init__(self, ctx: moderngl.Context, programs: Programs, scene: Scene, own: bool):
+        self.cameras = tuple(_small(scene.camera(v)) for v in range(min(scene.num_views, MOST_PHOTOS)))
+        whole = None if own else SplatBuffers(ctx, programs, scene)
+        maps = []
+        for view, camera in enumerate(self.cameras):
+            splats = whole or SplatBuffers(ctx, programs, _own_scene(scene, view))
+            maps.append(_depths(ctx, programs, splats, camera))
+            if splats is not whole:
+                splats.release()
+        if whole is not None:
+            whole.release()
+        size = (self.cameras[0].width, self.cameras[0].height)
+        self.texture = ctx.texture_array((*size, len(maps)), 1, np.stack(maps).tobytes(), dtype="f4")
+        self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+
+    @property
+    def capacity(self) -> int:
+        """Photos that a program is compiled for: a few sizes only."""
+        return next(size for size in _CAPACITIES if len(self.cameras) <= size)
+
+    def uniforms(self, camera: Camera) -> dict[str, np.ndarray | int]:
+        """Values of photos.glsl for a picture drawn by `camera`."""
+        back = np.linalg.inv(_numbers(camera.viewmat))
+        pinholes = np.zeros((self.capacity, 4))
+        matrices = np.tile(np.eye(4), (self.capacity, 1, 1))
+        for photo, seen in enumerate(self.cameras):
+            pinholes[photo] = _pinhole(seen)
+            matrices[photo] = (_numbers(seen.viewmat) @ back).T  # OpenGL's order
+        return {
+            "num_photos": len(self.cameras),
+            "pinhole": _pinhole(camera),
+            "pinholes": pinholes,
+            "to_photos": matrices,
+        }
+
+    def release(self) -> None:
+        self.texture.release()
+
+
+def _small(camera: Camera) -> Camera:
+    ratio = min(1.0, LONGEST_SIDE / max(camera.width, camera.height))
+    return camera.resized(max(1, round(camera.width * ratio)), max(1, round(camera.height * ratio)))
+
+
+def _pinhole(camera: Camera) -> np.ndarray:
+    K = _numbers(camera.K)
+    return np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2]])
+
+
+def _numbers(values: Tensor) -> np.ndarray:
+    return values.detach().cpu().double().numpy()
+
+
+def _own_scene(scene: Scene, view: int) -> Scene:
+    """The Gaussians that photo `view` made.
+
+    Raises:
+        ValueError: the scene does not say which.
+    """
+    counts = gaussians_per_view(scene)
+    if counts is None:
+        raise ValueError("scene: expected gaussians_per_view in its metadata, received none that fits")
+    rows = slice(sum(counts[:view]), sum(counts[: view + 1]))
+    semantics = scene.semantics
+    semantics = replace(
+        semantics, weight_ids=semantics.weight_ids[rows], weight_values=semantics.weight_values[rows]
+    )
+    return replace(scene, gaussians=scene.gaussians.map(lambda v: v[rows]), semantics=semantics)
+
+
+def _depths(ctx: moderngl.Context, programs: Programs, splats: SplatBuffers, camera: Camera) -> np.ndarray:
+    """z (H, W) float32 of covered pixels, 0 elsewhere."""
+    target = ColourTarget(ctx, (camera.width, camera.height), "f2")
+    target.framebuffer.clear()
+    if splats.num_gaussians:
+        splats.sort(camera)
+    if len(splats.order):
+        splats.project(camera)
+        program = programs.get("quad.vert", "colour.frag", {"COLOUR": 1})
+        set_uniforms(program, image_size=(float(camera.width), float(camera.height)))
+        with drawing(target.framebuffer, PREMULTIPLIED):
+            splats.draw(program)
+    sums = np.frombuffer(target.depth.read(), np.float32).reshape(camera.height, camera.width, 2)
+    target.release()
+    alphas = sums[..., 1]
+    return np.where(alphas >= COVERED_ALPHA, sums[..., 0] / np.maximum(alphas, COVERED_ALPHA), 0).astype("f4")

@@ -1,0 +1,188 @@
+"""The export dialog as a value, and the command line that does what it says.
+
+The window runs that very command in a process of its own, so what is shown is what is done.
+"""
+
+import shlex
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from app.window.state import State
+
+LARGEST_SIDE = 8192  # pixels, as on the command line
+SECONDS = (1.0, 60.0)
+
+
+class What(Enum):
+    """What to write: the label of the choice, the ending, and the word for `--what`."""
+
+    RGB = ("Picture", ".png", "rgb")
+    HEAT = ("Heat-map", ".png", "heat")
+    MASK = ("Mask", ".png", "mask")
+    CUTOUT = ("Cut-out", ".png", "cutout")
+    LABELS = ("Label map", ".png", "labels")
+    COCO = ("COCO masks", ".json", "")
+    BOXES_JSON = ("Boxes, JSON", ".json", "boxes")
+    BOXES_CSV = ("Boxes, CSV", ".csv", "boxes")
+    VIDEO = ("Turntable", ".mp4", "")
+    PLY = ("Splats, .ply", ".ply", "")
+    SPLAT = ("Splats, .splat", ".splat", "")
+    SCENE = ("Scene", ".langflash", "")
+
+    @property
+    def label(self) -> str:
+        return self.value[0]
+
+    @property
+    def suffix(self) -> str:
+        return self.value[1]
+
+    @property
+    def word(self) -> str:
+        return self.value[2]
+
+    @property
+    def needs_phrases(self) -> bool:
+        """Whether there is nothing to write without a phrase."""
+        return self in (
+            What.HEAT, What.MASK, What.CUTOUT, What.LABELS, What.COCO, What.BOXES_JSON, What.BOXES_CSV
+        )  # fmt: skip
+
+    @property
+    def takes_phrases(self) -> bool:
+        """Whether phrases may narrow it down."""
+        return self is not What.RGB
+
+    @property
+    def looks(self) -> bool:
+        """Whether it is seen from a camera."""
+        return self not in (What.VIDEO, What.PLY, What.SPLAT, What.SCENE)
+
+    @property
+    def sized(self) -> bool:
+        """Whether it has a size in pixels."""
+        return self.looks or self is What.VIDEO
+
+
+@dataclass(frozen=True)
+class ExportForm:
+    """all_views: from every photo instead of the view on show. only_found: just what answers the
+    phrases. size: of the longer side in pixels. path: as typed; an ending is added."""
+
+    what: What = What.RGB
+    all_views: bool = False
+    only_found: bool = False
+    side: int = 1024
+    seconds: float = 6.0
+    path: str = ""
+
+
+@dataclass(frozen=True)
+class Order:
+    """What the dialog comes to: the words after `langflash`, and a camera file to write first."""
+
+    words: tuple[str, ...]
+    target: Path
+    camera_file: Path | None = None
+
+    @property
+    def line(self) -> str:
+        """To paste into a shell."""
+        return shlex.join(("langflash", *self.words))
+
+
+def order(state: "State") -> Order | str:
+    """The command for the form as it stands, or a sentence that says what is missing."""
+    form, info = state.desk.form, state.info
+    if info is None:
+        return "There is no scene to export; drop photos on the window first."
+    scene_file = info.path or state.desk.copy
+    if scene_file is None:
+        return "The scene has no file yet; save it first."
+    target = typed_target(form)
+    if target is None:
+        return "Type a file name."
+    if target.resolve() == scene_file.resolve():
+        return "This file is the scene itself; choose another name."
+    phrases, problem = _phrases(state)
+    if problem:
+        return problem
+    words = ["export", str(scene_file), "-o", str(target)]
+    if form.what.word:
+        words += ["--what", form.what.word]
+    if phrases:
+        words += ["--prompt", *phrases, *_threshold(state)]
+    camera_file = None
+    if form.what.looks and form.all_views:
+        words.append("--all-views")
+    elif form.what.looks and state.view is not None:
+        words += ["--view", str(state.view)]
+    elif form.what.looks:
+        camera_file = target.with_name(f"{target.stem}.camera.json")
+        words += ["--camera", str(camera_file)]
+    if form.what.sized:
+        words += ["--size", "{}x{}".format(*pixels(form.side, state.pose.aspect))]
+    if form.what is What.VIDEO:
+        words += ["--seconds", f"{form.seconds:g}"]
+    return Order(tuple(words), target, camera_file)
+
+
+def typed_target(form: ExportForm) -> Path | None:
+    """The file as typed, with the ending of what is written; None while it names none."""
+    text = form.path.strip()
+    path = Path(text).expanduser() if text and not text.startswith("~~") else Path(text)
+    if not text or not path.name or path.is_dir():
+        return None
+    return path if path.suffix.lower() == form.what.suffix else path.with_name(path.name + form.what.suffix)
+
+
+def pixels(side: int, aspect: float) -> tuple[int, int]:
+    """(width, height) of a picture whose longer side is `side`."""
+    if aspect >= 1:
+        return side, max(1, round(side / aspect))
+    return max(1, round(side * aspect)), side
+
+
+def _phrases(state: "State") -> tuple[tuple[str, ...], str]:
+    """Those that take part, and what is wrong with them."""
+    what = state.desk.form.what
+    asked = tuple(prompt.text.strip() for prompt in state.asked)
+    if what.needs_phrases and not asked:
+        return (), f"{what.label} needs a phrase; type one under Find first."
+    if what is What.HEAT:
+        active = state.active_prompt
+        return ((active.text.strip(),) if active else asked[:1]), ""
+    wanted = what.needs_phrases or (what.takes_phrases and state.desk.form.only_found)
+    if wanted and not asked:
+        return (), "There is no phrase to keep only the answers of; type one under Find first."
+    return (asked if wanted else ()), ""
+
+
+def _threshold(state: "State") -> list[str]:
+    """The person's own threshold, where all phrases that take part share one."""
+    active = state.active_prompt
+    part = [active] if state.desk.form.what is What.HEAT and active else list(state.asked)
+    own = {prompt.threshold for prompt in part}
+    threshold = next(iter(own)) if len(own) == 1 else None
+    if threshold is None or not 0.0 < threshold < 1.0:
+        return []
+    return ["--threshold", f"{threshold:.4g}"]
+
+
+def remarks(state: "State") -> list[str]:
+    """What the command cannot carry over from the window."""
+    from app.window.state import NEGATIVES
+
+    form, notes = state.desk.form, []
+    if state.info is not None and state.info.path is None:
+        notes.append("The scene is not saved: the command reads a copy that goes when the window closes.")
+    if not (form.what.needs_phrases or form.only_found):
+        return notes
+    if form.what is not What.HEAT and len({prompt.threshold for prompt in state.asked}) > 1:
+        notes.append("The thresholds differ, so the calibrated one is used for all.")
+    if state.negatives != NEGATIVES:
+        notes.append("Phrases are compared with the usual ones, not with your own.")
+    return notes

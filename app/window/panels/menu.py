@@ -1,0 +1,66 @@
+"""The menu behind the button in the upper right: files, samples, preferences, help."""
+
+from pathlib import Path
+
+from imgui_bundle import icons_fontawesome_6 as fa
+from imgui_bundle import imgui
+
+from app.window import commands as do
+from app.window import desk_commands as desk
+from app.window import samples
+from app.window.state import State
+
+
+def draw(state: State) -> list[do.Command]:
+    """The button and its menu."""
+    if imgui.button(fa.ICON_FA_BARS):
+        imgui.open_popup("menu")
+    if not imgui.begin_popup("menu"):
+        return []
+    issued: list[do.Command] = []
+    shown = state.info is not None
+    issued += _item(fa.ICON_FA_FOLDER_OPEN, "Open ...", "Ctrl+O", do.ShowDialog("open"))
+    issued += _recent(state)
+    issued += _samples()
+    imgui.separator()
+    issued += _item(fa.ICON_FA_FLOPPY_DISK, "Save ...", "Ctrl+S", do.ShowDialog("save"), shown)
+    issued += _item(fa.ICON_FA_FILE_EXPORT, "Export ...", "Ctrl+E", desk.ShowExport(), shown)
+    imgui.separator()
+    issued += _item(fa.ICON_FA_GEAR, "Preferences", "Ctrl+P", do.ShowDialog("settings"))
+    issued += _item(fa.ICON_FA_LIST, "Log", "F2", do.ShowDialog("log"))
+    issued += _item(fa.ICON_FA_KEYBOARD, "Mouse and keys", "F1", do.ShowDialog("help"))
+    imgui.separator()
+    issued += _item(fa.ICON_FA_RIGHT_FROM_BRACKET, "Leave", "Ctrl+Q", do.Leave())
+    imgui.end_popup()
+    return issued
+
+
+def _item(icon: str, label: str, key: str, command: do.Command, enabled: bool = True) -> list[do.Command]:
+    pressed = imgui.menu_item(f"{icon}   {label}", key, False, enabled)[0]
+    return [command] if pressed else []
+
+
+def _recent(state: State) -> list[do.Command]:
+    issued: list[do.Command] = []
+    recent = state.desk.preferences.recent
+    if imgui.begin_menu(f"{fa.ICON_FA_CLOCK_ROTATE_LEFT}   Recent scenes", bool(recent)):
+        for place, path in enumerate(recent):
+            if imgui.menu_item(f"{Path(path).name}##{place}", "", False, True)[0]:
+                issued.append(do.OpenPaths((path,)))
+            if imgui.is_item_hovered():
+                imgui.set_tooltip(path)
+        imgui.separator()
+        if imgui.menu_item("Forget these", "", False, True)[0]:
+            issued.append(desk.ForgetRecent())
+        imgui.end_menu()
+    return issued
+
+
+def _samples() -> list[do.Command]:
+    issued: list[do.Command] = []
+    if imgui.begin_menu(f"{fa.ICON_FA_IMAGES}   Sample photos", True):
+        for label, photos in samples.pairs():
+            if imgui.menu_item(label, "", False, True)[0]:
+                issued += [do.ClearPhotos(), do.OpenPaths(tuple(map(str, photos))), do.Reconstruct()]
+        imgui.end_menu()
+    return issued

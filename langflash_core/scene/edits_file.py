@@ -1,0 +1,119 @@
+"""A history of edits as JSON: small, readable, whole or refused.
+
+    {"format": "langflash-edits", "version": 1, "digest": of the scene, "gaussians": N, "atoms": K,
+     "about": {...}, "done": [...], "undone": [...]}
+
+An edit is {"label", "flips": {mask: base64 of zlib}, "swaps": [[atom, [into, name, on], [...]]]}.
+"""
+
+import base64
+import hashlib
+import json
+import zlib
+from pathlib import Path
+
+from langflash_core.edits import MASKS, Atom, Edit, History, Marks
+from langflash_core.errors import SceneFileError
+from langflash_core.files import write_atomically
+from langflash_core.types import Scene
+
+FORMAT, VERSION = "langflash-edits", 1
+_LARGEST = 256 * 2**20  # bytes of one file; a mask of a million Gaussians has 125,000
+
+
+def scene_digest(scene: Scene) -> str:
+    """Names a scene by what edits are about: its means and dictionary, which files keep exactly."""
+    total = hashlib.sha256(f"{len(scene.gaussians)} {tuple(scene.semantics.dictionary.shape)}".encode())
+    for values in (scene.gaussians.means, scene.semantics.dictionary):
+        total.update(values.detach().cpu().float().contiguous().numpy().tobytes())
+    return total.hexdigest()
+
+
+def save_history(history: History, digest: str, about: dict, path: Path) -> None:
+    """Write a history; `about` holds plain JSON values of the caller's own.
+
+    Raises:
+        OutputError: the path cannot be written.
+    """
+    content = {
+        "format": FORMAT,
+        "version": VERSION,
+        "digest": digest,
+        "gaussians": history.marks.deleted.count,
+        "atoms": len(history.marks.atoms),
+        "about": about,
+        "done": [_encoded(edit) for edit in history.done],
+        "undone": [_encoded(edit) for edit in history.undone],
+    }
+    write_atomically(path, json.dumps(content).encode())
+
+
+def read_about(path: Path) -> tuple[str, dict, int]:
+    """The digest of the scene that a file's edits are about, what `about` held, and how many are done.
+
+    Raises:
+        SceneFileError: as `load_history`.
+    """
+    content = _read(path)
+    return content["digest"], content["about"], len(content["done"])
+
+
+def load_history(path: Path, scene: Scene, first: Marks) -> History:
+    """The history in a file, over a scene whose marks were `first`.
+
+    Raises:
+        SceneFileError: missing, damaged, or about another scene.
+    """
+    content = _read(path)
+    if content["digest"] != scene_digest(scene):
+        raise SceneFileError(f"{path.name} holds edits of another scene; open the scene they were made in")
+    try:
+        done = tuple(_decoded(entry) for entry in content["done"])
+        undone = tuple(_decoded(entry) for entry in content["undone"])
+        history = History(first, (), tuple(reversed(done))).moved_to(len(done))
+        whole = History(history.marks, history.done, undone)
+        whole.moved_to(len(done) + len(undone))  # what can be redone must fit as well
+    except (ValueError, LookupError, TypeError, AttributeError, zlib.error) as error:
+        raise SceneFileError(f"{path.name} is damaged ({error}); edit the scene again") from error
+    return whole
+
+
+def _encoded(edit: Edit) -> dict:
+    return {
+        "label": edit.label,
+        "flips": {name: base64.b64encode(packed).decode() for name, packed in edit.flips},
+        "swaps": [[k, *([atom.into, atom.name, atom.on] for atom in pair)] for k, *pair in edit.swaps],
+    }
+
+
+def _decoded(entry: dict) -> Edit:
+    flips = tuple((name, base64.b64decode(packed, validate=True)) for name, packed in entry["flips"].items())
+    if any(name not in MASKS for name, _ in flips):
+        raise ValueError(f"flips: expected {', '.join(MASKS)}, received {', '.join(entry['flips'])}")
+    swaps = tuple((int(k), _atom(*before), _atom(*after)) for k, before, after in entry["swaps"])
+    return Edit(str(entry["label"]), flips, swaps)
+
+
+def _atom(into: int, name: str, on: bool) -> Atom:
+    return Atom(int(into), str(name), bool(on))
+
+
+def _read(path: Path) -> dict:
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise ValueError("it is too large")
+        content = json.loads(path.read_bytes())
+        if content["format"] != FORMAT or not isinstance(content["about"], dict):
+            raise ValueError("it is no file of edits")
+        if int(content["version"]) > VERSION:
+            raise SceneFileError(f"{path.name} was written by a newer LangFlash; update LangFlash")
+        if not all(isinstance(content[part], list) for part in ("done", "undone")):
+            raise ValueError("its edits are no lists")
+        content["digest"] = str(content["digest"])
+    except FileNotFoundError as error:
+        raise SceneFileError(f"{path} does not exist; check the path") from error
+    except OSError as error:
+        raise SceneFileError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
+    except (ValueError, LookupError, TypeError, RecursionError) as error:
+        raise SceneFileError(f"{path.name} is damaged ({error}); edit the scene again") from error
+    return content

@@ -1,0 +1,34 @@
+// Purpose: where the surface of a pixel lies in every photo, and what depth that photo has there.
+// Frames: camera axes are OpenCV's; `pinhole` of the picture's pixels, `pinholes` of the photos' depth maps.
+//         MAX_PHOTOS and COVERED_ALPHA are set by the program.
+
+uniform sampler2D colour;
+uniform sampler2D depth;                 // of the picture: sum of T alpha z, sum of T alpha
+uniform sampler2DArray photo_depths;     // z, 0 where a photo shows nothing
+uniform int num_photos;
+uniform vec4 pinhole;                    // fx, fy, cx, cy
+uniform vec4 pinholes[MAX_PHOTOS];
+uniform mat4 to_photos[MAX_PHOTOS];      // the picture's camera to a photo's
+
+// The pixel's surface in camera axes; z = 0 where the picture shows none.
+vec3 surface(ivec2 pixel) {
+    vec2 sums = texelFetch(depth, pixel, 0).rg;
+    if (sums.y < COVERED_ALPHA) return vec3(0.0);
+    float z = sums.x / sums.y;
+    return vec3((vec2(pixel) + 0.5 - pinhole.zw) / pinhole.xy * z, z);
+}
+
+// (z of the point in this photo) / (depth of the photo there); 0 where the photo does not frame it.
+float depth_ratio(vec3 pos_c, int photo) {
+    vec3 seen = (to_photos[photo] * vec4(pos_c, 1.0)).xyz;
+    if (seen.z <= 0.0) return 0.0;
+    ivec2 texel = ivec2(floor(seen.xy / seen.z * pinholes[photo].xy + pinholes[photo].zw));
+    ivec2 size = textureSize(photo_depths, 0).xy;
+    if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, size))) return 0.0;
+    float z = texelFetch(photo_depths, ivec3(texel, photo), 0).r;
+    return z > 0.0 ? seen.z / z : 0.0;
+}
+
+vec3 grey_photo(ivec2 pixel) {
+    return vec3(dot(clamp(texelFetch(colour, pixel, 0).rgb, 0.0, 1.0), vec3(0.299, 0.587, 0.114)));
+}

@@ -1,0 +1,16 @@
+#version 330 core
+// Purpose: one atom's weight map W_k in [0, 1] as a colour.
+// Frames: texel = pixel.
+
+#include "colormaps.glsl"
+
+uniform sampler2DArray weight_maps;  // three atoms a layer
+uniform int place;                   // of the atom among those in view
+uniform int which_map;
+
+out vec4 out_colour;
+
+void main() {
+    float weight = texelFetch(weight_maps, ivec3(gl_FragCoord.xy, place / 3), 0)[place % 3];
+    out_colour = vec4(colour_map(which_map, weight), 1.0);
+}

@@ -1,0 +1,242 @@
+"""Edits and their exact undoing; the scene they describe; their file."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from langflash_core.edits import (
+    History,
+    Marks,
+    Mask,
+    delete,
+    hide,
+    invert,
+    isolate,
+    merge_atoms,
+    rename_atom,
+    select,
+    show_all,
+    toggle_atom,
+)
+from langflash_core.errors import SceneFileError
+from langflash_core.query.relevance import compile_query, relevance_maps
+from langflash_core.query.spaces import LanguageSpace
+from langflash_core.scene import load, save
+from langflash_core.scene.edited import NAMES, edited_scene, first_marks, spoken_scene
+from langflash_core.scene.edits_file import load_history, read_about, save_history, scene_digest
+from langflash_core.splat import render
+from langflash_core.types import Scene
+from tests.splat.scenes import camera, cloud
+
+COUNT, ATOMS = 1003, 9  # not a multiple of 8
+
+
+def random_history(seed: int, steps: int) -> tuple[History, list[Marks]]:
+    """A history of random edits of every kind, with the marks after each."""
+    generator = np.random.default_rng(seed)
+    history = History(Marks.untouched(COUNT, ATOMS))
+    passed = [history.marks]
+    while len(history.done) < steps:
+        marks = history.marks
+        found = Mask.of(generator.random(COUNT) < generator.choice([0.01, 0.3, 0.9]))
+        atom, other = (int(k) for k in generator.choice(ATOMS, 2, replace=False))
+        choices = (
+            ("select", select(marks, found)),
+            ("add", select(marks, found, "add")),
+            ("remove", select(marks, found, "remove")),
+            ("invert", invert(marks)),
+            ("delete", delete(marks, found & marks.selected)),
+            ("hide", hide(marks, marks.selected)),
+            ("isolate", isolate(marks, marks.selected)),
+            ("show", show_all(marks)),
+            ("rename", rename_atom(marks, atom, f"thing {generator.integers(9)}")),
+            ("toggle", toggle_atom(marks, atom)),
+            ("merge", merge_atoms(marks, (atom, other))),
+        )
+        history = history.edited(*choices[generator.integers(len(choices))])
+        if len(history.done) == len(passed):
+            passed.append(history.marks)
+    return history, passed
+
+
+def test_masks_are_sets():
+    generator = np.random.default_rng(0)
+    a, b = generator.random(COUNT) < 0.5, generator.random(COUNT) < 0.2
+    pairs = ((Mask.of(a) | Mask.of(b), a | b), (Mask.of(a) & Mask.of(b), a & b))
+    pairs = (*pairs, (Mask.of(a) ^ Mask.of(b), a ^ b), (Mask.of(a) - Mask.of(b), a & ~b))
+    for mask, expected in pairs:
+        assert (mask.rows() == expected).all() and len(mask) == expected.sum()
+        assert mask == Mask.of(expected)  # also the bits that fill the last byte
+    assert len(Mask.full(COUNT)) == COUNT and not Mask.none(COUNT) and not Mask.none(0)
+    with pytest.raises(ValueError, match="expected 1003 rows"):
+        _ = Mask.none(COUNT) | Mask.none(COUNT + 1)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_200_random_edits_undone_give_the_first_state_bit_for_bit(seed):
+    history, passed = random_history(seed, 200)
+    assert len({m.selected.bits for m in passed}) > 50, "the edits change things"
+    assert any(m.deleted for m in passed) and any(not a.on for m in passed for a in m.atoms)
+    back = history
+    for marks in reversed(passed[:-1]):
+        back = back.undo()
+        assert back.marks == marks
+    assert back.done == () and back.undo() == back
+    forth = back.moved_to(200)
+    assert forth == history and forth.redo() == forth
+    assert history.moved_to(77).marks == passed[77] and back.moved_to(77) == history.moved_to(77)
+    # A kilobyte of masks a scene: an edit stays within its three masks, and most are smaller.
+    assert max(sum(len(bits) for _, bits in edit.flips) for edit in history.done) < 3 * (COUNT // 8 + 32)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nothing_deleted_or_hidden_is_ever_selected(seed):
+    for marks in random_history(seed + 10, 100)[1]:
+        assert not marks.selected & (marks.deleted | marks.hidden)
+
+
+def test_a_new_edit_forgets_what_was_undone_and_no_change_is_no_edit():
+    history = History(Marks.untouched(16, 0)).edited("all", select(Marks.untouched(16, 0), Mask.full(16)))
+    assert history.edited("again", history.marks) is history
+    undone = history.undo()
+    assert undone.undone and undone.edited("hide", hide(undone.marks, Mask.full(16))).undone == ()
+
+
+def test_an_edit_of_another_scene_is_refused():
+    edit = History(Marks.untouched(16, 2)).edited("x", invert(Marks.untouched(16, 2))).done[0]
+    with pytest.raises(ValueError, match="rows"):
+        edit.apply(Marks.untouched(800, 2))
+    rename = History(Marks.untouched(8, 2)).edited("x", rename_atom(Marks.untouched(8, 2), 1, "sofa")).done[0]
+    with pytest.raises(ValueError, match="atom 1"):
+        rename.apply(Marks.untouched(8, 1))
+
+
+# The scene that edits describe
+
+
+class Tower:
+    """Phrases as rows of a fixed random table."""
+
+    def encode(self, texts):
+        generator = torch.Generator().manual_seed(sum(map(ord, texts[0])))
+        rows = torch.randn(len(texts), 16, generator=generator, dtype=torch.float64)
+        return torch.nn.functional.normalize(rows, dim=-1)
+
+
+SPACE = LanguageSpace("test", 16, 10.0, 0.5, 0.2, Tower)
+
+
+@pytest.fixture
+def scene() -> Scene:
+    made = cloud(200, num_atoms=5, size=0.1)
+    return replace(made, semantics=replace(made.semantics, space="test")).with_metadata(
+        gaussians_per_view=[200]
+    )
+
+
+def relevance(scene: Scene, frame_of: Scene) -> torch.Tensor:
+    maps = render(frame_of, camera()).weight_maps
+    assert maps is not None
+    return relevance_maps(maps, compile_query(scene, SPACE, ["chair", "door"], negatives=["thing"]))
+
+
+def test_untouched_marks_give_the_scene_itself(scene):
+    marks = first_marks(scene)
+    assert edited_scene(scene, marks) is scene and spoken_scene(scene, marks) is scene
+    assert edited_scene(scene, hide(select(marks, Mask.full(200)), Mask.full(200))) is scene
+
+
+def test_deleted_gaussians_are_left_out(scene):
+    rows = np.zeros(200, bool)
+    rows[10:60] = True
+    smaller = edited_scene(scene, delete(first_marks(scene), Mask.of(rows)))
+    assert len(smaller.gaussians) == 150 and smaller.metadata["gaussians_per_view"] == [150]
+    assert torch.equal(smaller.gaussians.means, scene.gaussians.means[~torch.from_numpy(rows)])
+    everything = edited_scene(scene, delete(first_marks(scene), Mask.full(200)))
+    assert len(everything.gaussians) == 0 and everything.semantics.num_atoms == 5
+
+
+def test_merged_atoms_answer_the_same_from_the_window_and_from_the_file(scene):
+    marks = merge_atoms(first_marks(scene), (1, 3))
+    spoken, saved = spoken_scene(scene, marks), edited_scene(scene, marks)
+    assert saved.semantics.num_atoms == 4 and spoken.semantics.num_atoms == 5
+    # Two float64 paths through the same sums; QR of matrices of different height.
+    torch.testing.assert_close(relevance(spoken, scene), relevance(saved, saved), rtol=0, atol=1e-9)
+    assert abs(relevance(spoken, scene) - relevance(scene, scene)).max() > 0.01
+    merged = saved.semantics.dictionary[1]
+    assert float(merged.norm()) == pytest.approx(1, abs=1e-12)
+
+
+def test_a_silent_atom_answers_nothing_and_comes_back(scene):
+    marks = toggle_atom(rename_atom(first_marks(scene), 2, " my chair "), 2)
+    spoken, saved = spoken_scene(scene, marks), edited_scene(scene, marks)
+    expected = relevance(spoken, scene)
+    torch.testing.assert_close(relevance(saved, saved), expected, rtol=0, atol=1e-9)
+    assert saved.metadata[NAMES] == {"2": "my chair"} and torch.equal(
+        saved.semantics.dictionary, scene.semantics.dictionary
+    )
+    again = first_marks(saved)
+    assert again.atoms == marks.atoms
+    loud = spoken_scene(saved, toggle_atom(again, 2))
+    torch.testing.assert_close(relevance(loud, saved), relevance(scene, scene), rtol=0, atol=1e-12)
+
+
+def test_silent_atoms_out_of_range_are_refused(scene):
+    with pytest.raises(SceneFileError, match="silent atoms"):
+        compile_query(scene.with_metadata(silent_atoms=[9]), SPACE, ["chair"])
+
+
+def test_an_edited_scene_can_be_saved_and_read(scene, tmp_path: Path):
+    single = replace(scene, gaussians=scene.gaussians.map(lambda v: v.float()))
+    unit = torch.nn.functional.normalize(single.gaussians.quats, dim=-1)
+    single = replace(single, gaussians=replace(single.gaussians, quats=unit))
+    marks = delete(merge_atoms(first_marks(single), (0, 4, 2)), Mask.of(np.arange(200) < 50))
+    save(edited_scene(single, marks), tmp_path / "s.langflash")
+    again = load(tmp_path / "s.langflash")
+    assert (len(again.gaussians), again.semantics.num_atoms) == (150, 3)
+
+
+# The file
+
+
+def test_a_history_survives_its_file(scene, tmp_path: Path):
+    history = History(first_marks(scene))
+    history = history.edited("select", select(history.marks, Mask.of(np.arange(200) % 3 == 0)))
+    history = history.edited("delete", delete(history.marks, history.marks.selected))
+    history = history.edited("name", rename_atom(history.marks, 1, "café")).undo()
+    path = tmp_path / "edits.json"
+    save_history(history, scene_digest(scene), {"name": "my room"}, path)
+    assert load_history(path, scene, first_marks(scene)) == history
+    assert read_about(path) == (scene_digest(scene), {"name": "my room"}, 2)
+    with pytest.raises(SceneFileError, match="another scene"):
+        load_history(path, cloud(200, seed=5), first_marks(scene))
+
+
+def with_done(text: str, **changes) -> str:
+    """The file with one more edit in it, of these fields."""
+    return json.dumps({**json.loads(text), "done": [{"label": "x", "flips": {}, "swaps": [], **changes}]})
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda text: text[: len(text) // 2],
+        lambda text: "[]",
+        lambda text: text.replace("langflash-edits", "something"),
+        lambda text: json.dumps({**json.loads(text), "done": [{"label": "x"}]}),
+        lambda text: with_done(text, flips={"deleted": "AAAA"}),
+        lambda text: with_done(text, flips={"gone": ""}),
+        lambda text: with_done(text, swaps=[[7, [1, "", True], [1, "", False]]]),
+        lambda text: json.dumps({**json.loads(text), "version": 99}),
+    ],
+)
+def test_a_damaged_history_is_refused(scene, tmp_path: Path, spoil):
+    path = tmp_path / "edits.json"
+    save_history(History(first_marks(scene)), scene_digest(scene), {}, path)
+    path.write_text(spoil(path.read_text()))
+    with pytest.raises(SceneFileError, match="edits\\.json"):
+        load_history(path, scene, first_marks(scene))
