@@ -136,8 +136,7 @@ def _fit(
         _keep_finite(values)
         adam.step()
         steps += 1
-    with torch.no_grad():
-        return _scene_of(scene, values), steps
+    return _scene_of(scene, {name: value.detach() for name, value in values.items()}), steps
 
 
 def _rounds(views: list[int] | range) -> Iterator[int]:
