@@ -18,11 +18,14 @@ from torch import Tensor
 from langflash_core.errors import Cancelled, InputError, PromptError, ViewError, WeightsError
 from langflash_core.images import grey_photo, load_views
 from langflash_core.images.views import source_pictures
+from langflash_core.labels.segments import Sam2, sam2_checkpoint
 from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_network
 from langflash_core.network.aggregation import averaged_atoms
 from langflash_core.network.build import network_class
 from langflash_core.network.crops import crop_atoms
-from langflash_core.network.model import Atoms, pooled_weights
+from langflash_core.network.grouping import Groups
+from langflash_core.network.lifting import lifted_weights
+from langflash_core.network.model import Atoms, Geometry, Lifted, pooled_weights
 from langflash_core.network.precision import has_bfloat16
 from langflash_core.network.store import part_folder
 from langflash_core.query.answers import answer
@@ -41,6 +44,7 @@ Progress = Callable[[str, float], None]
 STAGES = {"photos": 0.0, "weights": 0.1, "network": 0.2, "assemble": 0.85, "prune": 0.95, "refine": 0.97}
 PRECISIONS = ("auto", "float32", "bfloat16")
 AGGREGATIONS = ("lfa", "average", "crops")
+GROUPINGS = ("queries", "sam2")
 SIZES = (56, 1024)  # pixels: below, the encoder's grid is 4 patches; above, attention's memory runs away
 LARGEST_PICTURE = 8192
 LONGEST_REFINEMENT = 3600  # seconds
@@ -57,6 +61,7 @@ def reconstruct(
     device: str = "auto",
     precision: str = "auto",
     aggregation: str | None = None,
+    grouping: str | None = None,
     refine_seconds: float | None = None,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
@@ -75,6 +80,9 @@ def reconstruct(
         aggregation: how a group gets its vector: "lfa" (trained), "average" (of dense features),
             "crops" (CLIP on a cut-out; presets of its space); None: lfa where it has weights,
             else average.
+        grouping: where groups come from: "queries" (trained), "sam2" (its masks of each photo, lifted
+            to the scene); None: queries where they have weights, else sam2 where it is installed,
+            else clusters of the language features.
         refine_seconds: so long poses and Gaussians are fitted to the photos afterwards, and kept so
             if that brings a view closer that was held out; None: not at all.
         device: "auto" takes CUDA where there is one; "cpu"; "cuda".
@@ -110,8 +118,9 @@ def reconstruct(
     with run.stage("weights"):
         network = _network(preset, weights, device, precision)
         atoms = _atoms(network, aggregation, views)
+        groups = _groups(network, grouping, device)
     with run.stage("network"):
-        prediction = _on_cpu(network.predict(views, run.within("network"), cancelled, atoms))
+        prediction = _on_cpu(network.predict(views, run.within("network"), cancelled, atoms, groups))
     with run.stage("assemble"), torch.no_grad():
         scene = assemble(prediction, views, preset=preset)
     with run.stage("prune"), torch.no_grad():
@@ -331,6 +340,30 @@ def _atoms(network: LangFlashNet, way: str | None, views: Views) -> Atoms | None
         )
     tower, photos = load_clip_images(), source_pictures(views)
     return lambda weights, _: crop_atoms(weights, photos, lambda p: tower.encode(p.cpu()).to(weights))
+
+
+def _groups(network: LangFlashNet, way: str | None, device: str) -> Lifted | None:
+    """Where groups come from; None: the network's own parts.
+
+    Raises:
+        InputError: an unknown way. WeightsError: no weights for it.
+    """
+    if way not in (None, *GROUPINGS):
+        raise InputError(f"The grouping '{way}' is unknown: choose {', '.join(GROUPINGS)}.")
+    if way == "queries" and not network.grouped:
+        raise WeightsError(
+            "The grouping has no weights here; `langflash weights get langflash` fetches them."
+        )
+    if way == "queries" or (way is None and (network.grouped or sam2_checkpoint() is None)):
+        return None
+    oracle = Sam2(device)
+
+    def lifted(geometry: Geometry, views: Views) -> Tensor:
+        found = [oracle(photo) for photo in views.images]
+        groups = [Groups(s.logits[None, None], s.scores.clamp(1e-6, 1 - 1e-6).logit()[None]) for s in found]
+        return lifted_weights(groups, geometry, views.Ks)
+
+    return lifted
 
 
 def _bfloat16(preset: str, precision: str, device: str) -> bool:

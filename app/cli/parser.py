@@ -111,6 +111,12 @@ def _add_reconstruct(commands) -> None:
         "(default: lfa where it has weights, else average)",
     )
     command.add_argument(
+        "--grouping",
+        choices=("queries", "sam2"),
+        help="where groups come from: trained queries, or masks of SAM 2 lifted to the scene (default: "
+        "queries where they have weights, else sam2 where it is installed, else the language features)",
+    )
+    command.add_argument(
         "--precision", choices=("auto", "float32", "bfloat16"), default="auto", help="(default: auto)"
     )
     command.add_argument(

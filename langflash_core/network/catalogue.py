@@ -61,6 +61,13 @@ CLIP = Published(
     "clip", "full", "text", "open_clip:openai", "CLIP ViT-B/32, text and pictures, through open_clip", "MIT"
 )
 """Not a part of the network; LSeg's checkpoint brings it along."""
+SAM2 = Published(
+    "sam2", "full", "masks",
+    "https://dl.fbaipublicfiles.com/segment_anything_2/092824/sam2.1_hiera_large.pt",
+    "SAM 2.1, masks for groups where no grouping is installed; needs its package too", "Apache-2.0",
+)  # fmt: skip
+"""Not a part of the network, and kept as it is: SAM 2's own package reads it."""
+OTHERS = (CLIP, SAM2)
 
 
 def published(name: str) -> Published:
@@ -69,8 +76,8 @@ def published(name: str) -> Published:
     Raises:
         InputError: there is none.
     """
-    for entry in (*CATALOGUE, CLIP):
+    for entry in (*CATALOGUE, *OTHERS):
         if entry.name == name:
             return entry
-    names = ", ".join(entry.name for entry in (*CATALOGUE, CLIP))
+    names = ", ".join(entry.name for entry in (*CATALOGUE, *OTHERS))
     raise InputError(f"There is no published checkpoint '{name}' here; choose one of {names}")

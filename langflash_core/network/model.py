@@ -19,6 +19,7 @@ from langflash_core.types import Gaussians, Prediction, Views
 
 Progress = Callable[[str, float], None]
 Atoms = Callable[[Tensor, Tensor], Tensor]
+Lifted = Callable[["Geometry", Views], Tensor]
 MEANING_STAGES = ("language features", "grouping", "aggregation")
 
 
@@ -99,6 +100,8 @@ class LangFlashNet(nn.Module):
         memories, finest = self.semantic_maps(tokens, images)
         return self.grouping(memories, finest, tokens.shape[1])
 
+    grouped = True
+    """The grouping has weights."""
     aggregated = True
     """The aggregation has weights; else atoms are plain averages."""
 
@@ -125,17 +128,19 @@ class LangFlashNet(nn.Module):
         progress: Progress | None = None,
         cancelled: Callable[[], bool] | None = None,
         atoms: Atoms | None = None,
+        groups: Lifted | None = None,
     ) -> Prediction:
         """One scene from V photos of one size (sides multiples of the patch).
 
         Args:
             atoms: weights (V, K, H, W) and features (1, V, C, h, w) to atoms (K, C) of unit norm;
                 None: `dictionary`.
+            groups: geometry and views to w_k(x), (V, K, H, W), sums to 1 over K; None: `parts`.
 
         Raises:
             Cancelled: `cancelled()` became true; asked before every layer and every pair of photos.
         """
-        return self.predict_scenes([views], progress, cancelled, atoms)[0]
+        return self.predict_scenes([views], progress, cancelled, atoms, groups)[0]
 
     @torch.inference_mode()
     def predict_scenes(
@@ -144,6 +149,7 @@ class LangFlashNet(nn.Module):
         progress: Progress | None = None,
         cancelled: Callable[[], bool] | None = None,
         atoms: Atoms | None = None,
+        groups: Lifted | None = None,
     ) -> list[Prediction]:
         """Several scenes of equally many photos of one size: the transformers see them as one batch.
 
@@ -157,9 +163,11 @@ class LangFlashNet(nn.Module):
             raise ValueError(f"scenes: expected one shape of (V, 3, H, W), received {sorted(shapes)}")
         run = Run(self.stages, progress, cancelled)
         with nullcontext() if cancelled is None else self.stopping(run.check):
-            return self._predict(scenes, run, atoms or self.dictionary)
+            return self._predict(scenes, run, atoms or self.dictionary, groups)
 
-    def _predict(self, scenes: Sequence[Views], run: "Run", atoms: Atoms) -> list[Prediction]:
+    def _predict(
+        self, scenes: Sequence[Views], run: "Run", atoms: Atoms, groups: Lifted | None
+    ) -> list[Prediction]:
         """The stages, timed by `run`; B scenes."""
         device = next(self.parameters()).device
         images = torch.stack([views.images for views in scenes]).to(device)
@@ -175,9 +183,12 @@ class LangFlashNet(nn.Module):
         with run.stage("language features"):
             features = language()
         with run.stage("grouping"):
-            weights = [
-                self.parts(own, x, size, f[None]) for (x, _, own), f in zip(each, features, strict=True)
-            ]
+            if groups is not None:
+                weights = [groups(found, views) for found, views in zip(geometries, scenes, strict=True)]
+            else:
+                weights = [
+                    self.parts(own, x, size, f[None]) for (x, _, own), f in zip(each, features, strict=True)
+                ]
         with run.stage("aggregation"):
             dictionaries = [atoms(w, f[None]) for w, f in zip(weights, features, strict=True)]
         timings = {name: seconds / len(scenes) for name, seconds in run.timings.items()}

@@ -101,7 +101,7 @@ def test_poses_come_closer():
     scene, photos = _wall(noise=0.0, placed=TRUE)
     far = _twisted(TRUE, [[0.0] * 6, [0.024, 0, 0.016, 0, 0.04, 0], [0, 0.032, 0, 0.04, 0, 0]])
     found = refine(replace(scene, viewmats=far), photos, Budget(seconds=600, steps=50))
-    # Seen: 1.31 to 1.13 pixels in fifty steps. Gaussians move as well, and those that came from a photo move with it.
+    # Seen: 1.31 to 1.13 pixels in fifty steps: the Gaussians give way as well.
     assert found.kept
     assert _pixels_off(found.scene.viewmats) < 0.95 * _pixels_off(far)
 

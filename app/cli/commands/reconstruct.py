@@ -36,6 +36,7 @@ def run(args: Namespace, out: TextIO) -> None:
             device=args.device,
             precision=args.precision,
             aggregation=args.aggregation,
+            grouping=args.grouping,
             refine_seconds=args.refine,
             progress=progress,
         )

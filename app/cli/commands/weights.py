@@ -12,7 +12,7 @@ from app.cli.files import readable_file
 from app.cli.report import ProgressBar, write_json
 from langflash_core.errors import WeightsError
 from langflash_core.network import PRESETS, load_network
-from langflash_core.network.catalogue import CATALOGUE, CLIP, published
+from langflash_core.network.catalogue import CATALOGUE, CLIP, OTHERS, SAM2, published
 from langflash_core.network.download import download
 from langflash_core.network.store import FORMAT, install, part_folder, read_part, verify_part
 from langflash_core.resources import asset_path, weights_folder
@@ -39,7 +39,7 @@ def _list(args: Namespace, out: TextIO) -> None:
             "licence": p.licence,
             "url": p.url,
         }
-        for p in (*CATALOGUE, CLIP)
+        for p in (*CATALOGUE, *OTHERS)
     ]
     if args.json:
         write_json({"weights": entries, "available": available, "folder": str(weights_folder())}, out)
@@ -71,11 +71,11 @@ def _get(args: Namespace, out: TextIO) -> None:
     if entry is CLIP:
         from langflash_core.query.clip import fetch_clip
 
-        path = fetch_clip()
-        if args.json:
-            write_json({"weights": [{"path": str(path), "bytes": path.stat().st_size}]}, out)
-        else:
-            print(path, file=out)
+        _say_file(args, out, fetch_clip())
+        return
+    if entry is SAM2:
+        with ProgressBar() as progress:
+            _say_file(args, out, download(args.url or entry.url, weights_folder() / entry.file, progress))
         return
     target = weights_folder() / "downloads" / f"{entry.name}-{entry.file}"
     with ProgressBar() as progress:
@@ -85,6 +85,13 @@ def _get(args: Namespace, out: TextIO) -> None:
         _installed(args, out, target, None)
     if not args.keep:
         target.unlink()
+
+
+def _say_file(args: Namespace, out: TextIO, path: Path) -> None:
+    if args.json:
+        write_json({"weights": [{"path": str(path), "bytes": path.stat().st_size}]}, out)
+    else:
+        print(path, file=out)
 
 
 def _installed(args: Namespace, out: TextIO, checkpoint: Path, output: Path | None) -> None:
