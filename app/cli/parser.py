@@ -333,6 +333,7 @@ def _add_bench_network(commands) -> None:
     command.add_argument(
         "--float32", action="store_true", help="leave bfloat16 out, which is slow where a CPU lacks it"
     )
+    command.add_argument("--compile", action="store_true", help="through torch.compile")
     command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
     command.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the numbers as .json")
     _add_json(command)

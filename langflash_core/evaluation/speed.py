@@ -55,12 +55,31 @@ class Row:
 
 @dataclass
 class _Pass:
-    """One run through all stages: what they took and what they gave."""
+    """One run through stages: what they took and what they gave; chosen: queries that became groups."""
 
     seconds: dict[str, float] = field(default_factory=dict)
     cpu_seconds: dict[str, float] = field(default_factory=dict)
     given: dict[str, Tensor] = field(default_factory=dict)
     chosen: Tensor | None = None
+
+    def timed(self, stage: str, work: Callable, device: torch.device):
+        """What `work` gives; its time is added to the stage's."""
+        _settle(device)
+        clock, cpu = time.perf_counter(), time.process_time()
+        answer = work()
+        _settle(device)
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - clock
+        self.cpu_seconds[stage] = self.cpu_seconds.get(stage, 0.0) + time.process_time() - cpu
+        return answer
+
+
+@dataclass(frozen=True)
+class _Shared:
+    """What does not depend on the number of groups: its times, the queries' answer, and L(x)."""
+
+    done: _Pass
+    groups: Groups
+    features: Tensor
 
 
 def measure_network(
@@ -68,21 +87,24 @@ def measure_network(
 ) -> list[Row]:
     """Rows of every precision, number of views and number of groups.
 
-    The network ends in bfloat16 where it has a rule for that: the change has no way back.
+    What does not depend on the groups is run once for all numbers of them. The network ends in
+    bfloat16 where it has a rule for that: the change has no way back.
     """
     rows: list[Row] = []
     exact: dict[tuple[int, int], _Pass] = {}
     precisions = ("float32", "bfloat16") if network.mixes and plan.bfloat16 else ("float32",)
-    steps = [(p, v, k) for p in precisions for v in plan.views for k in plan.atoms]
-    for number, (precision, num_views, atoms) in enumerate(steps):
+    steps = [(p, v) for p in precisions for v in plan.views]
+    for number, (precision, num_views) in enumerate(steps):
         if progress is not None:
-            progress(f"{precision}, {num_views} views, {atoms} groups", number / len(steps))
+            progress(f"{precision}, {num_views} views", number / len(steps))
         if precision == "bfloat16" and number == len(steps) // 2:
             network.use_bfloat16()
-        reference = exact.get((num_views, atoms))
-        passes = [_run(network, plan.side, num_views, atoms, reference) for _ in range(plan.repeats)]
-        exact.setdefault((num_views, atoms), passes[0])
-        rows += _rows(precision, num_views, atoms, passes, reference)
+        shared = [_share(network, plan.side, num_views) for _ in range(plan.repeats)]
+        for atoms in plan.atoms:
+            reference = exact.get((num_views, atoms))
+            passes = [_finish(network, one, atoms, plan.side, reference) for one in shared]
+            exact.setdefault((num_views, atoms), passes[0])
+            rows += _rows(precision, num_views, atoms, passes, reference)
     return rows
 
 
@@ -115,57 +137,47 @@ def random_views(num_views: int, side: int) -> Views:
 
 
 @torch.inference_mode()
-def _run(network: LangFlashNet, side: int, num_views: int, atoms: int, reference: _Pass | None) -> _Pass:
-    """All stages once; groups are the `atoms` of the highest scores, the reference's where there is one."""
+def _share(network: LangFlashNet, side: int, num_views: int) -> _Shared:
+    """All stages, without what the number of groups changes."""
     device = next(network.parameters()).device
     views = random_views(num_views, side)
     images, Ks = views.images[None].to(device), views.Ks[None].to(device)
     done = _Pass()
-    tokens = _timed(done, "shared encoder", lambda: network.encode(images, Ks), device)
-    features = _timed(done, "language features", lambda: network.language(tokens, images), device)
-    weights = _timed(
-        done,
-        "grouping",
-        lambda: _groups(network.group(tokens, images)[-1], atoms, side, done, reference),
-        device,
-    )
-    dictionary = _timed(done, "aggregation", lambda: network.dictionary(weights, features), device)
+    tokens = done.timed("shared encoder", lambda: network.encode(images, Ks), device)
+    features = done.timed("language features", lambda: network.language(tokens, images), device)
+    groups = done.timed("grouping", lambda: network.group(tokens, images)[-1], device)
     run = Run(network.stages)
-    geometry = _timed(
-        done, "Gaussian decoder", lambda: network.reconstruct(views, images, Ks, tokens, run), device
+    geometry = done.timed(
+        "Gaussian decoder", lambda: network.reconstruct(views, images, Ks, tokens, run), device
     )
-    done.seconds["all"] = sum(done.seconds.values())
-    done.cpu_seconds["all"] = sum(done.cpu_seconds.values())
     gaussians = geometry.gaussians
     done.given |= {
         "shared encoder": torch.cat([hook.flatten().float() for hook in tokens.hooks]),
         "language features": features.float(),
-        "grouping": weights.float(),
-        "aggregation": dictionary.float(),
         "Gaussian decoder": torch.cat(
             (gaussians.means, gaussians.scales, gaussians.opacities[:, None]), 1
         ).float(),
     }
-    return done
+    return _Shared(done, groups, features)
 
 
-def _groups(groups: Groups, atoms: int, side: int, done: _Pass, reference: _Pass | None) -> Tensor:
-    """w_k(x) of K groups, (V, K, side, side)."""
+@torch.inference_mode()
+def _finish(network: LangFlashNet, shared: _Shared, atoms: int, side: int, reference: _Pass | None) -> _Pass:
+    """Groups are the `atoms` of the highest scores, the reference's where there is one."""
+    device = shared.features.device
+    done = _Pass(dict(shared.done.seconds), dict(shared.done.cpu_seconds), dict(shared.done.given))
     if reference is not None and reference.chosen is not None:
-        done.chosen = reference.chosen
+        chosen = reference.chosen
     else:
-        scores = groups.existence_logits[0]
-        done.chosen = scores.topk(min(atoms, len(scores))).indices
-    return group_weights(groups, done.chosen, (side, side))
-
-
-def _timed(done: _Pass, stage: str, work: Callable, device: torch.device):
-    _settle(device)
-    clock, cpu = time.perf_counter(), time.process_time()
-    answer = work()
-    _settle(device)
-    done.seconds[stage], done.cpu_seconds[stage] = time.perf_counter() - clock, time.process_time() - cpu
-    return answer
+        scores = shared.groups.existence_logits[0]
+        chosen = scores.topk(min(atoms, len(scores))).indices
+    weights = done.timed("grouping", lambda: group_weights(shared.groups, chosen, (side, side)), device)
+    dictionary = done.timed("aggregation", lambda: network.dictionary(weights, shared.features), device)
+    done.chosen = chosen
+    done.given |= {"grouping": weights.float(), "aggregation": dictionary.float()}
+    done.seconds["all"] = sum(done.seconds.values())
+    done.cpu_seconds["all"] = sum(done.cpu_seconds.values())
+    return done
 
 
 def _settle(device: torch.device) -> None:

@@ -7,6 +7,7 @@ the same questions, but it leaves the choice to the caller (N masks, H W pixels)
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ CONFIGS = {
 """Published file names and the package's own configurations of them."""
 GRID = 16  # points along each side; the package's 32 finds little more at 256 pixels
 _POINTS_AT_ONCE = 64
-_BROKEN = (RuntimeError, OSError, EOFError, ValueError, KeyError, AttributeError, TypeError)
+_BROKEN = (UnpicklingError, RuntimeError, OSError, EOFError, ValueError, KeyError, AttributeError, TypeError)
 
 
 @dataclass(frozen=True)

@@ -63,6 +63,12 @@ class LangFlashNet(nn.Module):
         """Matrix products in bfloat16 where the network has a rule for it; else nothing changes."""
         return self
 
+    def compiled(self, backend: str = "inductor") -> "LangFlashNet":
+        """Every part through torch.compile; the first pass of each size then takes minutes."""
+        for part in self.children():
+            part.compile(backend=backend)
+        return self
+
     def complete(self, filled: set[str], remedy: str) -> None:
         """Settle what has no weights after those of `filled` were read.
 

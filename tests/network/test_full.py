@@ -64,6 +64,45 @@ def test_any_number_of_views(tiny, num_views):
     assert tuple(prediction.timings) == tiny.stages
 
 
+def test_scenes_in_a_batch_are_the_scenes_alone(tiny):
+    scenes = [_views(2), replace(_views(2), images=_views(2).images.flip(-1))]
+    both = tiny.predict_scenes(scenes)
+    for views, found in zip(scenes, both, strict=True):
+        alone = tiny.predict(views)
+        # The same sums in another order: float32, and e^|v| on top for the points.
+        torch.testing.assert_close(found.gaussians.means, alone.gaussians.means, rtol=1e-4, atol=1e-4)
+        torch.testing.assert_close(found.weights, alone.weights, rtol=0, atol=1e-4)
+        torch.testing.assert_close(found.dictionary, alone.dictionary, rtol=0, atol=1e-4)
+    assert not torch.allclose(both[0].gaussians.opacities, both[1].gaussians.opacities)
+    with pytest.raises(ValueError, match="one shape"):
+        tiny.predict_scenes([_views(2), _views(3)])
+
+
+def test_compiled_parts_give_the_same_numbers(tiny):
+    """Through dynamo's capture; its code generation is torch's own and needs a compiler."""
+    views = _views(2)
+    network = build_network(TINY).eval().compiled("eager")
+    network.load_state_dict(tiny.state_dict())
+    with torch.inference_mode():
+        found, expected = (n.encode(views.images[None], views.Ks[None]) for n in (network, tiny))
+    for compiled, plain in zip(found.hooks, expected.hooks, strict=True):
+        torch.testing.assert_close(compiled, plain)
+
+
+def test_groups_may_come_from_elsewhere(tiny):
+    seen = []
+
+    def halves(geometry, views):
+        seen.append((geometry.depths.shape, views.num_views))
+        left = torch.zeros(2, 2, 64, 64)
+        left[:, 0, :, :32], left[:, 1, :, 32:] = 1, 1
+        return left
+
+    prediction = tiny.predict(_views(2), groups=halves)
+    assert seen == [((2, 64, 64), 2)]
+    assert prediction.weights[0, :, 0, 0].tolist() == [1, 0] and prediction.dictionary.shape == (2, 512)
+
+
 @pytest.mark.parametrize("size", [(48, 80), (80, 48), (16, 16)])
 def test_any_shape_of_whole_patches(tiny, size):
     prediction = tiny.predict(_views(2, *size))

@@ -37,6 +37,8 @@ def run(args: Namespace, out: TextIO) -> None:
             raise InputError(
                 f"The size {args.size} does not fit: choose a multiple of {network.preset.patch} pixels."
             )
+        if args.compile:
+            network.compiled()
         rows = measure_network(network, plan, progress)
     memory = torch.cuda.max_memory_allocated() / 1e6 if device == "cuda" else peak_memory_mb()
     document = {
@@ -48,6 +50,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "threads": torch.get_num_threads(),
         "torch": torch.__version__,
         "size": args.size,
+        "compiled": args.compile,
         "peak_memory_mb": None if memory is None else round(memory),
         "rows": [asdict(row) for row in rows],
     }
