@@ -259,7 +259,7 @@ def test_the_package_is_light_and_its_functions_keep_their_names():
 
 
 def test_a_refinement_is_kept_only_if_it_helps(weights, photos, scene):
-    refined = lf.reconstruct(photos, weights=weights, size=SMALL, refine_seconds=4)
+    refined = lf.reconstruct(photos, weights=weights, size=SMALL, refine_seconds=2)
     record = refined.metadata["refinement"]
     before, after = record["held_out_psnr_db"]
     assert record["held_out"] == "books_right.jpg" and record["steps"][0] >= 1

@@ -1,8 +1,16 @@
 """The paper's network in small: every part there, few channels, so that tests are fast."""
 
+import os
 from dataclasses import replace
 
+import pytest
+
 from langflash_core.network.presets import FULL, LSegSizes
+
+large = pytest.mark.skipif(
+    "LANGFLASH_LARGE_TESTS" not in os.environ,
+    reason="minutes and gigabytes: set LANGFLASH_LARGE_TESTS=1 to run it",
+)
 
 TINY = replace(
     FULL,

@@ -10,11 +10,12 @@ from langflash_core.geometry.cameras import invert_rigid, rays
 from langflash_core.network import FULL, PointMapNet, build_network
 from langflash_core.network.grouping import Groups
 from langflash_core.network.point_heads import exponential_points
+from langflash_core.network.precision import has_bfloat16
 from langflash_core.network.presets import MaskFilter
 from langflash_core.network.resection import depths_and_confidences, resect
 from langflash_core.network.residual import filtered
 from langflash_core.types import Views
-from tests.network.sizes import TINY
+from tests.network.sizes import TINY, large
 
 UNUSED_UNIT = 2 * (256 * 256 * 9 + 256)
 """The published DPTs carry one residual unit at the coarsest level that nothing reads."""
@@ -78,6 +79,7 @@ def test_scenes_in_a_batch_are_the_scenes_alone(tiny):
         tiny.predict_scenes([_views(2), _views(3)])
 
 
+@large
 def test_compiled_parts_give_the_same_numbers(tiny):
     """Through dynamo's capture; its code generation is torch's own and needs a compiler."""
     views = _views(2)
@@ -238,11 +240,13 @@ def test_masks_add_up_over_the_layers(tiny):
     assert not torch.equal(every[0].mask_logits, every[-1].mask_logits)
 
 
-@pytest.mark.slow
+@large
 def test_the_real_size_runs_at_256():
     """Random weights: shapes, finite numbers, and 131,072 Gaussians of degree 4."""
     torch.manual_seed(0)
-    network = build_network(FULL).eval().use_bfloat16()
+    network = build_network(FULL).eval()
+    if has_bfloat16():
+        network.use_bfloat16()
     prediction = network.predict(_views(2, 256, 256))
     assert len(prediction.gaussians) == 2 * 256 * 256
     assert prediction.gaussians.sh.shape[1:] == (25, 3)

@@ -12,7 +12,7 @@ from langflash_core.network.importing import convert
 from langflash_core.network.point_heads import activated
 from langflash_core.network.presets import PointMaps
 from tests.network import published
-from tests.network.sizes import TINY
+from tests.network.sizes import TINY, large
 
 # The bound. float32 keeps 1e-7 a step; some thirty layers and sums of a thousand terms
 # leave a few 1e-6 of the largest value.
@@ -55,8 +55,8 @@ def _loaded(state: published.State, sizes: PointMaps, tmp_path) -> PointMapNet:
         (2, 160, 96),
         (3, 80, 112),
         (3, 112, 80),
-        pytest.param(2, 512, 512, marks=pytest.mark.slow),
-        pytest.param(3, 512, 512, marks=pytest.mark.slow),
+        pytest.param(2, 512, 512, marks=large),
+        pytest.param(3, 512, 512, marks=large),
     ],
 )
 @torch.inference_mode()

@@ -16,8 +16,8 @@ from tests.training.test_stages import loss_of
 
 # As `full`, but with masks by tau_exist: a freshly trained existence head knows no predicted IoU.
 SIZES = replace(TINY, mask_filter=None, language_dim=384)
-# Steps, learning rate, and the share of the first loss that must be left: about twice what was seen.
-OVERFIT = {"points": (50, 5e-3, 0.65), "grouping": (12, 1e-2, 0.88), "aggregation": (15, 1e-2, 0.95)}
+# Steps, learning rate, and the share of the first loss that may be left; seen: .49, .8, .30.
+OVERFIT = {"points": (20, 1.5e-2, 0.65), "grouping": (12, 1e-2, 0.88), "aggregation": (8, 1e-2, 0.6)}
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def test_a_stage_overfits_four_rooms(name, rooms, words, tiny, tmp_path: Path):
     steps, rate, share = OVERFIT[name]
     if name == "aggregation":  # reads groups, which need masks first
         first = POINT_STAGES["grouping"]
-        options = LoopOptions(minutes=10, max_steps=OVERFIT["grouping"][0], pictures=4, learning_rate=1e-2)
+        options = LoopOptions(minutes=10, max_steps=6, pictures=4, learning_rate=1e-2)
         train_stage(tiny, first, rooms, words, tmp_path, replace(options, ema_decay=0.5, save_s=1e9))
     before = loss_of(tiny, stage, rooms, words)
     kept = {k: v.clone() for k, v in tiny.state_dict().items()}
