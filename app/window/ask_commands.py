@@ -115,12 +115,13 @@ class Binned:
 
 @dataclass(frozen=True)
 class OpenDictionary:
-    """Show the atoms, or no longer."""
+    """Show the atoms, or no longer; the next session begins so too."""
 
     opened: bool
 
     def apply(self, state: State) -> State:
-        return change(state, opened=self.opened)
+        wanted = replace(state.desk.preferences, dictionary_open=self.opened)
+        return replace(state, desk=replace(state.desk, preferences=wanted))
 
 
 @dataclass(frozen=True)

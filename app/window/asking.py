@@ -3,12 +3,8 @@
 import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from app.window.state import State
 
 MOST_RECENT = 20
 PROMPT_DIALOGS = ("save prompts", "load prompts")
@@ -45,7 +41,7 @@ class Asking:
     """The asking half of the state.
 
     recent: phrases asked, the newest first. atom: whose weight map is on show. chosen: atoms to
-    merge. opened: whether the dictionary is on show. prompts_path: where the last set was.
+    merge. prompts_path: where the last set was.
     """
 
     recent: tuple[str, ...] = ()
@@ -53,7 +49,6 @@ class Asking:
     insight: Insight | None = None
     atom: int = 0
     chosen: tuple[int, ...] = ()
-    opened: bool = False
     prompts_path: Path | None = None
 
     def histogram(self, key: int, text: str) -> Histogram | None:
@@ -82,8 +77,3 @@ def usable(text: str) -> bool:
 def margin_span(num_prompts: int) -> tuple[float, float]:
     """Margins shown as the first and the last colour: of one prompt it may be negative."""
     return (-0.5, 0.5) if num_prompts == 1 else (0.0, 0.5)
-
-
-def atom_name(state: "State", k: int) -> str:
-    """What an atom is called."""
-    return f"atom {k}"

@@ -26,7 +26,8 @@ class Preferences:
     """theme: of THEMES. scale: of the interface, on top of the monitor's. speed: of flying, a
     factor. touch_pad: two fingers turn, with Ctrl they zoom. photos_in_space: the cameras' frusta
     are drawn. start_at_once: dropped photos are reconstructed without asking. panel_width: design
-    pixels. window: x, y, width, height in screen pixels, or none. recent: newest first."""
+    pixels. window: x, y, width, height in screen pixels, or none. dictionary: the same of the
+    dictionary's window inside it, design pixels, and whether it is open. recent: newest first."""
 
     theme: str = "dark"
     scale: float = 1.0
@@ -37,6 +38,8 @@ class Preferences:
     panel_width: float = 348.0
     window: tuple[int, ...] = ()
     maximised: bool = False
+    dictionary: tuple[int, ...] = ()
+    dictionary_open: bool = False
     recent: tuple[str, ...] = ()
 
     def opened(self, path: Path) -> "Preferences":

@@ -43,6 +43,9 @@ DEBOUNCE_SECONDS = 0.12  # of typing
 BLINK_SECONDS = 0.4  # of the text cursor
 LONGEST_NAP = 60.0
 COLORMAPS = ("turbo", "inferno")  # of colour-bars
+MODIFIERS = frozenset(
+    (glfw.KEY_LEFT_CONTROL, glfw.KEY_RIGHT_CONTROL, glfw.KEY_LEFT_SUPER, glfw.KEY_RIGHT_SUPER)
+)
 MIN_SIZE = (900, 560)  # design pixels; below this the panels would overlap
 
 
@@ -310,6 +313,8 @@ class Session:
                 self._worker.submit(ask_messages.ReadPrompts(path))
             case _:
                 pass
+        if self.state.dialog != before.dialog:
+            self._awake = MOST_AWAKE  # while what is behind it darkens
         self._editor.follow(command, before, self.state)
         self._citizen.follow(command, before, self.state)
         if _question(before) != _question(self.state):
@@ -456,6 +461,11 @@ class Session:
             if letter in SHORTCUTS:
                 self.dispatch(SHORTCUTS[letter])
                 return
+        if action == glfw.RELEASE and key in MODIFIERS:
+            # ImGui would take Ctrl+A and the release of Ctrl, come in one frame, for a bare A. It ends a
+            # frame's events before a key that changes twice, so one that no keyboard has parts the two.
+            for down in (True, False):
+                self._backend.io.add_key_event(imgui.Key.f24, down)
         self._backend.keyboard_callback(window, key, scancode, action, mods)
 
     def _moved_to_another_screen(self, window, _x: float, _y: float) -> None:

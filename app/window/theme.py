@@ -133,7 +133,8 @@ def _sizes(style: imgui.Style) -> None:
     style.scrollbar_rounding = 6.0
     style.grab_min_size = 8.0
     style.window_border_size = style.frame_border_size = 0.0
-    style.popup_border_size = 1.0
+    style.popup_border_size = style.tab_bar_border_size = style.tab_bar_overline_size = 1.0
+    style.tab_rounding = 6.0
 
 
 def _colours(style: imgui.Style) -> None:
@@ -141,17 +142,23 @@ def _colours(style: imgui.Style) -> None:
     clear = ImVec4(0, 0, 0, 0)
     p = _chosen["palette"]
     accent_soft = ImVec4(p.ACCENT.x, p.ACCENT.y, p.ACCENT.z, 0.35)
+    grab = ImVec4(p.ACCENT.x, p.ACCENT.y, p.ACCENT.z, 0.8)
     table = {
         col.text: p.TEXT, col.text_disabled: p.MUTED, col.window_bg: p.PANEL, col.child_bg: clear,
         col.popup_bg: p.POPUP, col.border: p.LINE, col.separator: p.LINE,
         col.frame_bg: p.RAISED, col.frame_bg_hovered: p.HOVER, col.frame_bg_active: p.HOVER,
         col.button: p.RAISED, col.button_hovered: p.HOVER, col.button_active: p.PRESSED,
         col.header: p.RAISED, col.header_hovered: p.HOVER, col.header_active: p.PRESSED,
-        col.slider_grab: accent_soft, col.slider_grab_active: p.ACCENT, col.check_mark: p.ACCENT,
+        col.slider_grab: grab, col.slider_grab_active: p.ACCENT, col.check_mark: p.ACCENT,
         col.plot_histogram: p.ACCENT, col.text_selected_bg: accent_soft, col.nav_cursor: p.ACCENT,
         col.scrollbar_bg: clear, col.scrollbar_grab: p.HOVER, col.scrollbar_grab_hovered: p.PRESSED,
         col.scrollbar_grab_active: p.PRESSED, col.modal_window_dim_bg: ImVec4(0, 0, 0, 0.55),
         col.title_bg: p.PANEL, col.title_bg_active: p.PANEL, col.input_text_cursor: p.ACCENT,
+        col.tab: clear, col.tab_hovered: p.HOVER, col.tab_selected: p.RAISED, col.tab_dimmed: clear,
+        col.tab_dimmed_selected: p.RAISED, col.tab_selected_overline: p.ACCENT,
+        col.tab_dimmed_selected_overline: p.ACCENT, col.drag_drop_target: p.ACCENT,
+        col.resize_grip: p.LINE, col.resize_grip_hovered: p.ACCENT, col.resize_grip_active: p.ACCENT,
+        col.separator_hovered: p.ACCENT, col.separator_active: p.ACCENT,
     }  # fmt: skip
     for which, colour in table.items():
         style.set_color_(which, colour)

@@ -58,7 +58,7 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
     issued += splitter.draw(state, look, left, height - bar)
     legend.draw(state, look, place, size)
     if state.info is not None:
-        issued += tools.draw(state, look, place)
+        issued += tools.draw(state, look, place, size)
         issued += pointing.draw(state, look, place, size)
         issued += dictionary.draw(state, look, place, size)
     issued += desk_dialogs.draw_offer(state, look, place, size)

@@ -179,7 +179,9 @@ def _pointed(state: State, look: Look, size: ImVec2) -> Pose:
     """The pose after this frame's dragging and wheel; with a selecting tool Alt orbits."""
     io, pose, selecting = imgui.get_io(), state.pose, state.editing.tool.selects
     dx, dy = io.mouse_delta.x, io.mouse_delta.y
-    if (imgui.is_item_active() or imgui.is_item_deactivated()) and (dx or dy):
+    held = imgui.is_item_active() or imgui.is_item_deactivated()
+    # On a slow machine the way to the place and the press share a frame: that way is no drag.
+    if held and not imgui.is_item_activated() and (dx or dy):
         turn = TURN / look.scale
         if _held(1):
             pose = poses.look(pose, -dx * turn, -dy * turn)

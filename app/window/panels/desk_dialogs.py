@@ -36,7 +36,7 @@ def draw_settings(state: State, look: Look) -> list[do.Command]:
         ("Show the photos' cameras in the scene", "photos_in_space"),
         ("Reconstruct as soon as photos are dropped", "start_at_once"),
     ):
-        changed, value = imgui.checkbox(text, getattr(old, name))
+        changed, value = widgets.checkbox(text, getattr(old, name))
         if changed:
             new = replace(new, **{name: value})
     widgets.gap(look.px(4))

@@ -1,11 +1,14 @@
 """The dictionary: every atom with its picture, share, name and words, and how alike the atoms are."""
 
+from dataclasses import replace
+
 import numpy as np
 from imgui_bundle import ImVec2, imgui, implot
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from app.window import ask_commands as ask
 from app.window import commands as do
+from app.window import desk_commands as desk
 from app.window import edit_commands as edit
 from app.window import theme
 from app.window.asking import Insight
@@ -14,9 +17,9 @@ from app.window.panels.look import Look
 from app.window.state import Mode, State
 from langflash_core.edits import Atom
 
-_SIZE = (372.0, 620.0)  # design pixels
-_PICTURE = 46.0
-_FEW = 26  # atoms whose names fit beside the similarity matrix
+_SIZE = (380.0, 620.0)  # design pixels
+_LEAST = (320.0, 240.0)
+_LEGEND = 130.0  # that the legend below may need
 _MATRIX = implot.Flags_.canvas_only | implot.Flags_.no_frame
 _AXIS = implot.AxisFlags_.lock | implot.AxisFlags_.no_grid_lines | implot.AxisFlags_.no_tick_marks
 
@@ -24,7 +27,7 @@ _AXIS = implot.AxisFlags_.lock | implot.AxisFlags_.no_grid_lines | implot.AxisFl
 def button(state: State) -> list[do.Command]:
     """Opens the dictionary, or closes it."""
     imgui.begin_disabled(state.info is None or state.info.num_atoms == 0)
-    opened = state.asking.opened
+    opened = state.desk.preferences.dictionary_open
     label = f"{fa.ICON_FA_BOOK}##dictionary"
     pressed = widgets.primary_button(label) if opened else imgui.button(label)
     imgui.end_disabled()
@@ -34,16 +37,19 @@ def button(state: State) -> list[do.Command]:
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
     """The window over the picture, whose corner is `place`."""
-    marks = state.editing.marks
-    if not state.asking.opened or state.info is None or marks is None or not marks.atoms:
+    marks, wanted = state.editing.marks, state.desk.preferences
+    if not wanted.dictionary_open or state.info is None or marks is None or not marks.atoms:
         return []
-    width, height = (min(look.px(side), room - look.px(24)) for side, room in zip(_SIZE, size, strict=True))
-    corner = ImVec2(place.x + size.x - width - look.px(12), place.y + look.px(12))
-    imgui.set_next_window_pos(corner, imgui.Cond_.appearing)
-    imgui.set_next_window_size(ImVec2(width, height), imgui.Cond_.appearing)
-    imgui.set_next_window_size_constraints(look.vec(320, 240), ImVec2(width * 3, height * 3))
+    left, top, width, height = wanted.dictionary or _usual(look, place, size)
+    display = imgui.get_io().display_size
+    extent = ImVec2(min(look.px(width), display.x), min(look.px(height), display.y))
+    corner = ImVec2(min(look.px(left), display.x - extent.x), min(look.px(top), display.y - extent.y))
+    imgui.set_next_window_pos(ImVec2(max(corner.x, 0), max(corner.y, 0)), imgui.Cond_.appearing)
+    imgui.set_next_window_size(extent, imgui.Cond_.appearing)
+    imgui.set_next_window_size_constraints(look.vec(*_LEAST), display)
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     flags = imgui.WindowFlags_.no_collapse | imgui.WindowFlags_.no_saved_settings
+    flags |= imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
     issued: list[do.Command] = []
     shown, kept = imgui.begin("Dictionary", True, flags)
     if shown and imgui.begin_tab_bar("##tabs"):
@@ -54,9 +60,31 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
             _similarity(state, marks.atoms, look)
             imgui.end_tab_item()
         imgui.end_tab_bar()
+    issued += _moved(state, look, (left, top, width, height))
     imgui.end()
     imgui.pop_style_var()
     return issued if kept else [*issued, ask.OpenDictionary(False)]
+
+
+def _usual(look: Look, place: ImVec2, size: ImVec2) -> tuple[int, ...]:
+    """At the picture's right, above the legend; (left, top, width, height) in design pixels."""
+    across, down = size.x / look.scale, size.y / look.scale
+    width, height = min(_SIZE[0], across - 24), max(min(_SIZE[1], down - 24 - _LEGEND), _LEAST[1])
+    left = place.x / look.scale + across - width - 12
+    return round(left), round(place.y / look.scale + 12), round(width), round(height)
+
+
+def _moved(state: State, look: Look, before: tuple[int, ...]) -> list[do.Command]:
+    """Where the person has put the window, once the hand lets go of it."""
+    corner, size = imgui.get_window_pos(), imgui.get_window_size()
+    now = tuple(round(side / look.scale) for side in (corner.x, corner.y, size.x, size.y))
+    storage, key = imgui.get_state_storage(), imgui.get_id("dragged")
+    dragged = imgui.is_mouse_down(0) and imgui.is_window_focused(imgui.FocusedFlags_.child_windows)
+    let_go = storage.get_bool(key) and not dragged
+    storage.set_bool(key, dragged)
+    if not let_go or max(abs(a - b) for a, b in zip(now, before, strict=True)) <= 1:
+        return []
+    return [desk.Prefer(replace(state.desk.preferences, dictionary=now))]
 
 
 def _atoms(state: State, atoms: tuple[Atom, ...], look: Look) -> list[do.Command]:
@@ -65,7 +93,7 @@ def _atoms(state: State, atoms: tuple[Atom, ...], look: Look) -> list[do.Command
     heads = [k for k, atom in enumerate(atoms) if atom.into == k]
     shares = _shares(state.asking.insight, atoms)
     heads.sort(key=lambda k: -shares[k])
-    footer = imgui.get_frame_height() + look.px(14)
+    footer = imgui.get_frame_height() + look.px(2) + 2 * imgui.get_style().item_spacing.y
     imgui.begin_child("##rows", ImVec2(0, -footer))
     for k in heads:
         imgui.push_id(k)
@@ -89,9 +117,7 @@ def _row(state: State, k: int, atoms: tuple[Atom, ...], share: float, look: Look
     imgui.same_line(0, look.px(10))
     imgui.begin_group()
     atom, side = atoms[k], imgui.get_frame_height()
-    room = imgui.get_content_region_avail().x
-    figure = f"{100 * share:.1f} %"
-    edge = imgui.get_cursor_pos_x() + room
+    start, room = imgui.get_cursor_pos_x(), imgui.get_content_region_avail().x - look.px(6)
     imgui.set_next_item_width(room - look.px(62))
     with widgets.colours(text=theme.TEXT if atom.on else theme.MUTED):
         changed, name = imgui.input_text_with_hint(
@@ -100,27 +126,35 @@ def _row(state: State, k: int, atoms: tuple[Atom, ...], share: float, look: Look
     if changed or (imgui.is_item_deactivated_after_edit() and name != atom.name):
         issued.append(edit.RenameAtom(k, name))
     widgets.tooltip(f"Atom {k}; type to name it")
-    imgui.same_line(edge - imgui.calc_text_size(figure).x)
+    figure = f"{100 * share:.1f} %"
+    _column(start + room - imgui.calc_text_size(figure).x)
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, figure)
-    imgui.align_text_to_frame_padding()
     words = ", ".join(state.editing.names[k]) if k < len(state.editing.names) else "..."
     merged = sum(other.into == k for other in atoms) - 1
     tail = f"  +{merged} merged" if merged else ""
-    left = room - 2 * side - look.px(18) - imgui.calc_text_size(tail).x
+    buttons = 2 * side + look.px(14)
+    imgui.align_text_to_frame_padding()
+    left = room - buttons - look.px(4) - imgui.calc_text_size(tail).x
     imgui.text_colored(theme.MUTED, widgets.shortened(words, left) + tail)
-    imgui.same_line(edge - 2 * side - look.px(6))
+    _column(start + room - buttons)
     voice = fa.ICON_FA_VOLUME_HIGH if atom.on else fa.ICON_FA_VOLUME_XMARK
     tip = "It answers phrases; click to silence it" if atom.on else "Silent; click to let it answer phrases"
     if widgets.quiet_button(f"{voice}##voice", tip):
         issued.append(edit.ToggleAtom(k))
-    imgui.same_line(edge - side)
-    ticked, chosen = imgui.checkbox("##chosen", k in state.asking.chosen)
+    _column(start + room - side)
+    ticked, chosen = widgets.checkbox("##chosen", k in state.asking.chosen)
     widgets.tooltip("Tick to merge")
     if ticked:
         issued.append(ask.ChooseAtom(k, chosen))
     imgui.end_group()
     return issued
+
+
+def _column(x: float) -> None:
+    """Go on in the same line at `x` of the window, as the cursor counts it."""
+    imgui.same_line()
+    imgui.set_cursor_pos_x(x)
 
 
 def _picture(state: State, k: int, look: Look) -> list[do.Command]:

@@ -92,7 +92,7 @@ def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
             form = replace(form, seconds=float(round(seconds)))
     if what.takes_phrases and not what.needs_phrases:
         imgui.begin_disabled(not state.asked)
-        changed, only = imgui.checkbox("Only what the phrases find", form.only_found)
+        changed, only = widgets.checkbox("Only what the phrases find", form.only_found)
         imgui.end_disabled()
         if changed:
             form = replace(form, only_found=only)

@@ -3,7 +3,7 @@
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.window import theme
-from app.window.asking import atom_name, margin_span
+from app.window.asking import margin_span
 from app.window.panels import widgets
 from app.window.panels.look import Look
 from app.window.state import Mode, State
@@ -54,7 +54,7 @@ def _body(state: State, look: Look) -> None:
         middle = 2 / (1 / max(near, 1e-9) + 1 / max(far, 1e-9))
         _bar("Depth, scene units", "turbo", (f"{far:.2f}", f"{middle:.2f}", f"{near:.2f}"), look)
     elif mode is Mode.WEIGHT:
-        _bar(f"Weight of {atom_name(state, state.asking.atom)}", "inferno", ("0", "0.5", "1"), look)
+        _bar(f"Weight of {state.editing.atom_name(state.asking.atom)}", "inferno", ("0", "0.5", "1"), look)
     elif mode is Mode.TRANSMITTANCE:
         _bar("Light that passes every splat", "inferno", ("0", "0.5", "1"), look)
     elif mode is Mode.FEATURES:
@@ -96,7 +96,7 @@ def _atoms(state: State, look: Look) -> None:
     largest = sorted(range(len(insight.shares)), key=lambda k: -insight.shares[k])[:_ATOMS_NAMED]
     for k in largest:
         _swatch(insight.colours[k], look)
-        _fitted(atom_name(state, k))
+        _fitted(state.editing.atom_name(k))
 
 
 def _trust(state: State, look: Look) -> None:

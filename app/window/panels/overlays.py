@@ -103,7 +103,9 @@ def draw_dialog(state: State, look: Look) -> list[do.Command]:
         imgui.open_popup(title)
     middle = imgui.get_main_viewport().get_center()
     imgui.set_next_window_pos(middle, imgui.Cond_.appearing, ImVec2(0.5, 0.5))
-    width = min(look.px(WIDTHS.get(state.dialog, 520.0)), imgui.get_io().display_size.x - look.px(24))
+    room, margin = imgui.get_io().display_size, look.px(24)
+    width = min(look.px(WIDTHS.get(state.dialog, 520.0)), room.x - margin)
+    imgui.set_next_window_size_constraints(ImVec2(width, 0), ImVec2(width, room.y - margin))  # then scrolls
     imgui.set_next_window_size(ImVec2(width, 0))
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     opened, kept = imgui.begin_popup_modal(title, True, imgui.WindowFlags_.no_resize)

@@ -1,5 +1,8 @@
 """The bottom line: how fast, how much, on what."""
 
+from collections.abc import Sequence
+from itertools import accumulate
+
 from imgui_bundle import imgui
 
 from app.window import theme
@@ -9,12 +12,23 @@ from app.window.state import State
 
 
 def draw(state: State, look: Look) -> None:
-    """The status bar; issues nothing."""
+    """As many figures as fit, the rest on hover; issues nothing."""
+    figures, space = _figures(state), look.px(26)
+    width = imgui.get_content_region_avail().x
+    shown = fitting([imgui.calc_text_size(text).x for text in figures], space, width)
     with widgets.colours(text=theme.MUTED):
-        for index, text in enumerate(_figures(state)):
+        for index, text in enumerate(figures[:shown]):
             if index:
-                imgui.same_line(0, look.px(26))
+                imgui.same_line(0, space)
             imgui.text(text)
+    if shown < len(figures) and imgui.is_window_hovered():
+        imgui.set_tooltip("\n".join(figures[shown:]))
+
+
+def fitting(widths: Sequence[float], space: float, room: float) -> int:
+    """How many of the first fit side by side into `room`."""
+    ends = list(accumulate(width + space for width in widths))
+    return sum(end - space <= room for end in ends)
 
 
 def _figures(state: State) -> list[str]:

@@ -14,7 +14,9 @@ from app.window.poses import FOV_RANGE
 from app.window.state import State
 
 _FOV = 150.0  # design pixels of the slider; left out where the window is too narrow
+_LABEL = 40.0  # of its name
 _BUTTONS = 5 * 44.0
+_VIEW = 54.0  # of a photo to jump to
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
@@ -23,7 +25,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     issued += modes.draw(state, look, imgui.get_window_width() - look.px(_BUTTONS + 40))
     imgui.same_line()
     used = imgui.get_cursor_pos_x()
-    width = look.px(_FOV + _BUTTONS)
+    width = look.px(_LABEL + _FOV + _BUTTONS)
     roomy = used + width < imgui.get_window_width() - look.px(24)
     width = width if roomy else look.px(_BUTTONS)
     imgui.same_line(imgui.get_window_width() - width - look.px(8))
@@ -33,6 +35,9 @@ def draw(state: State, look: Look) -> list[do.Command]:
 
 def _fov(state: State, look: Look) -> list[do.Command]:
     imgui.begin_disabled(state.info is None)
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.MUTED, "FOV")
+    imgui.same_line()
     tip = "Field of view over the longer side of the photo"
     degrees = f"{state.pose.fov:.0f}°"
     changed, fov = widgets.slider("##fov", state.pose.fov, FOV_RANGE, degrees, tip, look.px(_FOV))
@@ -73,7 +78,7 @@ def draw_views(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     if state.info is None:
         return issued
-    height = look.px(54)
+    height = look.px(_VIEW)
     for view in range(len(state.info.views)):
         if view:
             imgui.same_line()
@@ -99,9 +104,10 @@ def draw_views(state: State, look: Look) -> list[do.Command]:
 def _in_space(state: State, look: Look) -> list[do.Command]:
     """Two switches beside the photos: compare with the photo, and the cameras in the scene."""
     issued: list[do.Command] = []
-    size, wanted = look.vec(34, 30), state.desk.preferences
+    size, wanted = look.vec(34, (_VIEW + 6 - 4) / 2), state.desk.preferences  # together as high as a photo
     imgui.begin_group()
     imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(4, 4))
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
     imgui.begin_disabled(state.view is None)
     if _switch(fa.ICON_FA_LEFT_RIGHT, in_space.comparing(state), size):
         issued.append(desk.Compare(None if in_space.comparing(state) else 0.5))
@@ -110,7 +116,7 @@ def _in_space(state: State, look: Look) -> list[do.Command]:
     if _switch(fa.ICON_FA_CAMERA, wanted.photos_in_space, size):
         issued.append(desk.Prefer(replace(wanted, photos_in_space=not wanted.photos_in_space)))
     widgets.tooltip("Show the photos' cameras in the scene  (K)")
-    imgui.pop_style_var()
+    imgui.pop_style_var(2)
     imgui.end_group()
     return issued
 

@@ -26,44 +26,49 @@ _COMBINES: tuple[tuple[Combine, str, str], ...] = (
 )
 _BUTTON = 36.0  # design pixels of a tool's side
 _MARGIN = 12.0
+_LONG = 610.0  # width of everything a selection can do, in one line
 _BAR = (
     widgets.PLAIN | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
 )  # a small window over the picture
 
 
-def draw(state: State, look: Look, place: ImVec2) -> list[do.Command]:
-    """Strip and bars over the picture, whose corner is `place`."""
+def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
+    """Strip and bars over the picture at `place`."""
     corner = ImVec2(place.x + look.px(_MARGIN), place.y + look.px(_MARGIN))
-    issued = _panel("##tools", corner, look, lambda: _strip(state, look), tight=True)
+    issued, _ = _panel("##tools", corner, look, lambda: _strip(state, look), tight=True)
+    room = size.x - look.px(_BUTTON + 22 + 2 * _MARGIN)
     corner = ImVec2(corner.x + look.px(_BUTTON + 22), corner.y)
     bars = []
     if state.editing.tool.selects:
         bars.append(lambda: _options(state, look))
     if state.editing.num_selected or state.editing.waiting:
-        bars.append(lambda: _selection(state, look))
+        bars.append(lambda: _selection(state, look, room))
     if state.editing.floaters is not None:
         found = state.editing.floaters
-        bars.append(lambda: _floaters(state, found, look))
+        bars.append(lambda: _floaters(state, found, look, room))
     hidden = state.editing.marks is not None and bool(state.editing.marks.hidden)
     if hidden and not state.editing.num_selected:
         bars.append(lambda: _hidden(state))
     for number, bar in enumerate(bars):
-        issued += _panel(f"##bar{number}", corner, look, bar)
-        corner = ImVec2(corner.x, corner.y + look.px(_BUTTON + 18))
+        wanted, height = _panel(f"##bar{number}", corner, look, bar)
+        issued += wanted
+        corner = ImVec2(corner.x, corner.y + height + look.px(8))
     return issued
 
 
-def _panel(name: str, corner: ImVec2, look: Look, body, tight: bool = False) -> list[do.Command]:
-    """A rounded window that holds what `body` draws."""
+def _panel(
+    name: str, corner: ImVec2, look: Look, body, tight: bool = False
+) -> tuple[list[do.Command], float]:
+    """A rounded window that holds what `body` draws; also its height."""
     imgui.set_next_window_pos(corner)
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     imgui.push_style_var(imgui.StyleVar_.window_padding, look.vec(6, 6) if tight else look.vec(10, 7))
     with widgets.colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
         imgui.begin(name, None, _BAR)
-        issued = body()
+        issued, height = body(), imgui.get_window_height()
         imgui.end()
     imgui.pop_style_var(2)
-    return issued
+    return issued, height
 
 
 def _strip(state: State, look: Look) -> list[do.Command]:
@@ -131,8 +136,8 @@ def _options(state: State, look: Look) -> list[do.Command]:
     return issued
 
 
-def _selection(state: State, look: Look) -> list[do.Command]:
-    """How much is selected, and what can be done with it."""
+def _selection(state: State, look: Look, room: float) -> list[do.Command]:
+    """How much is selected, and what can be done with it; in two lines where `room` is short."""
     issued: list[do.Command] = []
     editing = state.editing
     imgui.align_text_to_frame_padding()
@@ -156,7 +161,10 @@ def _selection(state: State, look: Look) -> list[do.Command]:
             issued.append(command)
         widgets.tooltip(tip)
         imgui.same_line()
-    imgui.same_line(0, look.px(14))
+    if room < look.px(_LONG):
+        imgui.new_line()
+    else:
+        imgui.same_line(0, look.px(14))
     if imgui.button(f"{fa.ICON_FA_MAXIMIZE}  Grow"):
         issued.append(edit.Grow())
     widgets.tooltip(f"Add everything within {editing.reach:.0f} spacings  (G)")
@@ -177,7 +185,7 @@ def _selection(state: State, look: Look) -> list[do.Command]:
     return issued
 
 
-def _floaters(state: State, found: Floaters, look: Look) -> list[do.Command]:
+def _floaters(state: State, found: Floaters, look: Look, room: float) -> list[do.Command]:
     """The preview of floaters, in red in the picture."""
     issued: list[do.Command] = []
     imgui.align_text_to_frame_padding()
@@ -193,7 +201,12 @@ def _floaters(state: State, found: Floaters, look: Look) -> list[do.Command]:
     tip = "How far a Gaussian must stand out from its surroundings; right is stricter"
     text = f"{found.strictness:.1f}"
     changed, strictness = widgets.slider(
-        "##strict", found.strictness, STRICTNESS_RANGE, text, tip, look.px(170)
+        "##strict",
+        found.strictness,
+        STRICTNESS_RANGE,
+        text,
+        tip,
+        look.px(170 if room > look.px(_LONG) else 110),
     )
     if changed:
         issued.append(edit.SetStrictness(strictness))

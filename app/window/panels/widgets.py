@@ -73,6 +73,15 @@ def choice(options: Sequence[tuple[str, _Value]], chosen: _Value) -> _Value:
     return chosen
 
 
+def checkbox(label: str, on: bool) -> tuple[bool, bool]:
+    """A box with an edge, so that it is seen while empty."""
+    imgui.push_style_var(imgui.StyleVar_.frame_border_size, 1.0)
+    with colours(border=theme.PRESSED):
+        changed = imgui.checkbox(label, on)
+    imgui.pop_style_var()
+    return changed
+
+
 def quiet_button(label: str, tip: str = "") -> bool:
     """An icon without a frame; `tip` explains it on hover."""
     clear = ImVec4(0, 0, 0, 0)

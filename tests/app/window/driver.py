@@ -3,7 +3,7 @@
     python driver.py WIDTH HEIGHT [PATHS...]
 
 A line is printed when anything a test may wait for has changed, with the seconds that each frame
-since the last line took. The last one has "closed".
+since the last line took. "items" tells where the things to click are. The last line has "closed".
 """
 
 import json
@@ -11,6 +11,7 @@ import sys
 
 from app.window.editing import Editing
 from app.window.session import Session
+from tests.app.window.items import Items
 
 
 def editing(now: Editing) -> dict:
@@ -60,6 +61,7 @@ def summary(session: Session) -> dict:
 
 def main() -> int:
     width, height, *paths = sys.argv[1:]
+    items = Items()
     session = Session(paths, (int(width), int(height)))
     last = None
     frames = 0
@@ -69,7 +71,7 @@ def main() -> int:
             if session.step():
                 frames += 1
                 seconds.append(session.state.stats.frame_seconds)  # of the frame before
-            now = summary(session)
+            now = {**summary(session), "items": items.now()}
             if now != last:
                 last = now
                 sys.stdout.write(json.dumps({**now, "frames": frames, "seconds": seconds}) + "\n")

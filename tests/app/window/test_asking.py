@@ -124,7 +124,7 @@ def test_atoms_are_shown_and_chosen(info) -> None:
     state = after(State(), do.SceneArrived(info))
     assert after(state, ask.ShowAtom(3)) == state and after(State(), ask.ShowAtom(0)) == State()
     state = after(state, ask.ShowAtom(2), ask.OpenDictionary(True))
-    assert (state.mode, state.asking.atom, state.asking.opened) == (Mode.WEIGHT, 2, True)
+    assert (state.mode, state.asking.atom, state.desk.preferences.dictionary_open) == (Mode.WEIGHT, 2, True)
     state = after(state, ask.ChooseAtom(2, True), ask.ChooseAtom(0, True), ask.ChooseAtom(2, True))
     assert state.asking.chosen == (0, 2)
     assert after(state, ask.ChooseAtom(0, False)).asking.chosen == (2,)
@@ -279,8 +279,9 @@ def test_a_thumbnail_shows_where_a_photo_carries_the_atom(scene) -> None:
     stream = io.BytesIO()
     photo.save(stream, "PNG")
     pictures = insight.thumbnails(replace(scene, photos=(stream.getvalue(),) * 2))
-    assert all(picture is not None and picture.shape == (96, 96, 3) for picture in pictures)
-    chair, wall, floor = (picture[..., :2].mean((0, 1)) for picture in pictures)
+    shown = [picture for picture in pictures if picture is not None]
+    assert [picture.shape for picture in shown] == 3 * [(96, 96, 3)]
+    chair, wall, floor = (picture[..., :2].mean((0, 1)) for picture in shown)
     places = []
     for seen in (scene.camera(view) for view in range(2)):
         viewmat = seen.viewmat.numpy()

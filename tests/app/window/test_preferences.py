@@ -13,7 +13,8 @@ from app.window.preferences import DEFAULTS, MOST_RECENT, Preferences
 def test_they_come_back_as_they_were_left(folders: Path) -> None:
     left = Preferences(
         theme="light", scale=1.5, speed=2.0, touch_pad=True, panel_width=420.0,
-        window=(-30, 40, 1000, 700), maximised=True, recent=("/a b/ä.langflash",),
+        window=(-30, 40, 1000, 700), maximised=True, dictionary=(400, 60, 372, 430),
+        dictionary_open=True, recent=("/a b/ä.langflash",),
     )  # fmt: skip
     preferences.save(left)
     assert preferences.load() == (left, "")
@@ -38,7 +39,8 @@ def test_a_damaged_file_gives_defaults_and_a_sentence(folders: Path, content: by
     [
         ("theme", "pink"), ("scale", 9), ("scale", "1"), ("scale", True), ("speed", -1), ("touch_pad", 1),
         ("window", [1, 2, 3]), ("window", [0, 0, 10, 10]), ("window", [1e9, 0, 900, 600]),
-        ("recent", [1]), ("recent", "room"), ("panel_width", None),
+        ("dictionary", [0, 0, 300]), ("dictionary_open", 1), ("recent", [1]), ("recent", "room"),
+        ("panel_width", None),
     ],
 )  # fmt: skip
 def test_one_bad_value_costs_only_itself(folders: Path, name: str, value: object) -> None:

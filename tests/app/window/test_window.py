@@ -131,6 +131,28 @@ class Program:
             assert time.monotonic() < end, "the picture stays the same"
             time.sleep(0.1)
 
+    def box(self, label: str, place: int = 0) -> list[int]:
+        """Left, top, right, bottom of an item by the end of its label; `place` counts equal ones."""
+        items = self.state["items"]
+        found = [box for name, boxes in items.items() if name.endswith(label) for box in boxes]
+        assert len(found) > place, f"no item {label!r} among {sorted(items)}"
+        return found[place]
+
+    def item(self, label: str, place: int = 0) -> tuple[int, int]:
+        """The middle of an item."""
+        left, top, right, bottom = self.box(label, place)
+        return (left + right) // 2, (top + bottom) // 2
+
+    def click(self, label: str, place: int = 0) -> None:
+        """Click an item once it is there and stands still; a new window finds its size in two frames."""
+        self.until(lambda s: any(name.endswith(label) for name in s["items"]), f"the item {label}")
+        place_before = None
+        while (at := self.item(label, place)) != place_before:
+            place_before = at
+            # The pause also lets a busy machine see the pointer arrive before the click.
+            self.xdotool("mousemove", *map(str, at), "sleep", "0.25")
+        self.xdotool("click", "1")
+
     def type_prompt(self, text: str) -> None:
         """Click the first prompt's field and type."""
         x, y = self.field
@@ -152,11 +174,8 @@ class Program:
 
     @property
     def field(self) -> tuple[int, int]:
-        """Where the first prompt's field is, found by its colour swatch's accent in the panel."""
-        panel = self.client.picture(LEFT, SIZE[1] - 40).astype(int)
-        accent = np.array([255 * c for c in (0.96, 0.62, 0.16)])
-        swatch = np.argwhere(abs(panel[:, 18:40] - accent).max((1, 2)) < 6)
-        return 140, int(swatch.mean())
+        """Where the first prompt's field is."""
+        return self.item("##text")
 
     def leave(self) -> int:
         self.client.close()

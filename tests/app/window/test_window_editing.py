@@ -156,8 +156,7 @@ def test_a_crash_loses_no_edit(display: str, scene_file: Path, state_folder: Pat
     again = Program(display, scene_file)
     again.until(lambda s: s["offer"] == 2, "the offer")
     again.at_rest()
-    # "Restore" is the offer's first button: left in a window of 470 in the picture's middle.
-    again.xdotool("mousemove", str(MIDDLE[0] - 235 + 70), str(CANVAS[0].stop - 14 - 30), "click", "1")
+    again.click("Restore")
     state = again.until(lambda s: s["deleted"] == 12_300 and s["job"] is None, "the restored edits")
     assert state["edits"] == ["Select all", "Delete 12,300"] and state["scene"] == "room.langflash"
     again.xdotool("mousemove", *map(str, MIDDLE), "key", "ctrl+z")
