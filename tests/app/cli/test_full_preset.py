@@ -71,7 +71,7 @@ def test_what_cannot_be_done_is_one_sentence(run, checkpoints, tmp_path):
 
 def test_the_stage_table_of_the_network(run, tmp_path):
     out = tmp_path / "network.json"
-    words = ("--random", "--views", 2, 3, "--atoms", 4, 9, "--repeats", 1, "--size", 32, "-o", out)
+    words = ("--random", "--views", 2, 3, "--atoms", 4, 9, "--repeats", 1, "--size", 64, "-o", out)
     document = run("bench", "network", *words, "--json").json()
     rows = {(r["precision"], r["views"], r["atoms"], r["stage"]): r for r in document["rows"]}
     assert len(rows) == 2 * 2 * 2 * 6 and out.is_file()
