@@ -272,6 +272,8 @@ class Watched:
             self.process.kill()
             code = self.process.wait()
         self._reader.join(PATIENCE)
+        assert self.process.stdout is not None
+        self.process.stdout.close()
         self._errors.close()
         return code
 
