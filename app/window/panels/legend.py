@@ -6,6 +6,7 @@ from app.window import theme
 from app.window.asking import margin_span
 from app.window.panels import widgets
 from app.window.panels.look import Look
+from app.window.panels.photos import said_here
 from app.window.state import Mode, State
 
 _WIDTH = 244.0  # design pixels
@@ -115,7 +116,7 @@ def _trust(state: State, look: Look) -> None:
         imgui.text_colored(theme.MUTED, "fewer than two can tell")
     assert state.info is not None
     for sentence in state.info.warnings[:2]:
-        widgets.muted(sentence)
+        widgets.muted(said_here(sentence))
 
 
 def _swatch(colour: tuple[float, float, float], look: Look) -> None:

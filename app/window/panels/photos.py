@@ -42,12 +42,12 @@ def _sentences(state: State) -> list[str]:
     said = [photo.problem for photo in state.photos if photo.problem]
     said += [note for photo in state.photos for note in photo.notes]
     said += state.info.warnings if state.info else ()
-    # What the core says of its command line is said here in the window's words.
-    said = [each.replace("on the command line, --fov tells it", HOW_TO_TELL) for each in said]
-    return list(dict.fromkeys(_sentence(each) for each in said))
+    return list(dict.fromkeys(said_here(each) for each in said))
 
 
-def _sentence(text: str) -> str:
+def said_here(text: str) -> str:
+    """A warning as a sentence; what the core says of its command line in the window's words."""
+    text = text.replace("on the command line, --fov tells it", HOW_TO_TELL)
     return text[:1].upper() + text[1:].rstrip(".") + "."
 
 
@@ -204,7 +204,7 @@ def _details(state: State, index: int, photo: Photo, look: Look) -> list[do.Comm
         imgui.close_current_popup()
     widgets.tooltip("Take it out of the tray")
     for note in photo.notes:
-        _warning(_sentence(note))
+        _warning(said_here(note))
     imgui.end_popup()
     return issued
 
