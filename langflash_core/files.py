@@ -15,10 +15,10 @@ def write_atomically(path: Path, content: bytes | Iterable[bytes]) -> None:
         OutputError: the folder is missing, is a file, or cannot be written.
     """
     folder = path.parent
-    if path.is_dir():
+    if os.path.isdir(path):  # unlike Path, without an error for a name that is too long
         raise OutputError(f"cannot write {path}: it is a folder; name a file in it")
-    if not folder.is_dir():
-        state = "is a file" if folder.exists() else "does not exist"
+    if not os.path.isdir(folder):
+        state = "is a file" if os.path.exists(folder) else "does not exist"
         raise OutputError(f"cannot write {path}: {folder} {state}; create that folder first")
     temporary = folder / f".{path.name[:100]}.{secrets.token_hex(6)}.part"
     try:

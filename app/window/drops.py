@@ -1,4 +1,7 @@
-"""What a person drops on the window, sorted: photos, folders of photos, scenes, the rest."""
+"""What a person drops on the window, sorted: photos, folders of photos, scenes, the rest.
+
+`os.path` asks the disk here, because people type paths that `Path` would raise on: too long, say.
+"""
 
 import os
 from collections.abc import Iterable
@@ -30,7 +33,7 @@ def typed_path(text: str) -> Path:
 def typed_scene(text: str) -> Path | None:
     """Where to write the scene that a person typed a name for; None while it names no file."""
     path = typed_path(text)
-    if not text.strip() or not path.name or path.is_dir():
+    if not text.strip() or not path.name or os.path.isdir(path):
         return None
     return path if path.suffix else path.with_suffix(SCENE_SUFFIX)
 
@@ -41,15 +44,19 @@ def sort_drop(paths: Iterable[str | Path]) -> Drop:
     scenes: list[Path] = []
     rejected: list[str] = []
     for path in map(Path, paths):
-        if path.is_dir():
-            inside = sorted(p for p in path.iterdir() if p.is_file() and not p.name.startswith("."))
+        if os.path.isdir(path):
+            try:
+                inside = sorted(p for p in path.iterdir() if p.is_file() and not p.name.startswith("."))
+            except OSError as error:
+                rejected.append(f"The folder {path.name} cannot be read: {error.strerror or error}.")
+                continue
             found = [p for p in inside if p.suffix.lower() in PHOTO_SUFFIXES]
             kept = [p for p in inside if p.suffix.lower() in SCENE_SUFFIXES]
             if not found and not kept:
                 rejected.append(f"The folder {path.name} holds no photo; drop a folder of JPEG or PNG files.")
             photos += found
             scenes += [] if found else kept
-        elif not path.exists():
+        elif not os.path.exists(path):
             rejected.append(f"{path} does not exist; check the path.")
         elif path.suffix.lower() in SCENE_SUFFIXES:
             scenes.append(path)

@@ -3,11 +3,14 @@
 The window runs that very command in a process of its own, so what is shown is what is done.
 """
 
+import os
 import shlex
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from app.window.drops import typed_path
 
 if TYPE_CHECKING:
     from app.window.state import State
@@ -133,8 +136,8 @@ def order(state: "State") -> Order | str:
 def typed_target(form: ExportForm) -> Path | None:
     """The file as typed, with the ending of what is written; None while it names none."""
     text = form.path.strip()
-    path = Path(text).expanduser() if text and not text.startswith("~~") else Path(text)
-    if not text or not path.name or path.is_dir():
+    path = typed_path(text)
+    if not text or not path.name or os.path.isdir(path):
         return None
     return path if path.suffix.lower() == form.what.suffix else path.with_name(path.name + form.what.suffix)
 

@@ -7,6 +7,7 @@ awake; a resting window draws nothing.
 
 import ctypes
 import logging
+import sys
 import time
 from collections.abc import Sequence
 from contextlib import suppress
@@ -46,6 +47,9 @@ COLORMAPS = ("turbo", "inferno")  # of colour-bars
 MODIFIERS = frozenset(
     (glfw.KEY_LEFT_CONTROL, glfw.KEY_RIGHT_CONTROL, glfw.KEY_LEFT_SUPER, glfw.KEY_RIGHT_SUPER)
 )
+SWITCH_SECONDS = 0.0005
+"""How long the worker may hold the interpreter while a frame waits for it. A frame lets go of it some
+dozen times, at every call into OpenGL; at Python's own 5 ms each, frames would take 100 ms more."""
 MIN_SIZE = (900, 560)  # design pixels; below this the panels would overlap
 
 
@@ -78,9 +82,10 @@ class Session:
 
     def __init__(self, paths: Sequence[str | Path] = (), size: tuple[int, int] | None = None) -> None:
         remembered, complaint = preferences.load()
+        sys.setswitchinterval(SWITCH_SECONDS)
         self.state = State()
         self.gl_errors: list[str] = []
-        self.longest_frame = 0.0  # seconds, without drawing the scene
+        self.lag = 0.0  # seconds that the last step took, without its nap and without drawing the scene
         self._born = time.perf_counter()
         self._inbox: list[do.Command] = []
         self._awake = AWAKE_FRAMES
@@ -102,7 +107,7 @@ class Session:
         self._attach()
         self._thumbnails = Thumbnails(self._ctx)
         self._viewport = Viewport(self._ctx)
-        self._worker = Worker(glfw.post_empty_event)
+        self._worker = Worker(glfw.post_empty_event, begins=False)  # loads torch: the first frame is first
         self._renderer_name = _short_name(self._ctx.info["GL_RENDERER"])
         self._editor = Editor(self._worker.submit, self._viewport, self._perform)
         self._citizen = Citizen(self._perform, self._post, self._worker.submit)
@@ -135,6 +140,7 @@ class Session:
 
         Returns whether a frame was drawn.
         """
+        start = time.perf_counter()
         nap = self._nap() if patience is None else min(patience, self._nap())
         if nap > 0:
             glfw.wait_events_timeout(nap)
@@ -149,7 +155,9 @@ class Session:
         self._citizen.tick(self.state, now)
         if not self._inbox and not self._due(now):
             return False
-        self._frame(now)
+        drawing = self._frame(now)
+        self._worker.begin()
+        self.lag = time.perf_counter() - start - nap - drawing
         return True
 
     def close(self, crashed: bool = False) -> None:
@@ -211,7 +219,8 @@ class Session:
             moments.append(self.state.now + 0.1)
         return min(max(min(moments) - now, 0.0), LONGEST_NAP)
 
-    def _frame(self, now: float) -> None:
+    def _frame(self, now: float) -> float:
+        """Returns the seconds that drawing the scene took."""
         start = time.perf_counter()
         self._awake = max(self._awake - 1, 0)
         for command in (do.Tick(now), *self._take()):
@@ -225,11 +234,11 @@ class Session:
         imgui.render()
         self._present()
         self._frame_seconds = time.perf_counter() - start
-        self.longest_frame = max(self.longest_frame, self._frame_seconds - drawing)
         if issued:
             self._awake = AWAKE_FRAMES
         for command in issued:
             self._perform(command)
+        return drawing
 
     def _take(self) -> list[do.Command]:
         taken, self._inbox = self._inbox, []

@@ -8,15 +8,19 @@ between the stages of one. Of `Encode` and `Answer` only the newest is ever run.
 import ctypes
 import gc
 import logging
+import os
 import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
 import numpy as np
+from PIL import Image
 
 from app.window import ask_messages, chores, desk_chores, insight
 from app.window.edit_messages import Weigh
@@ -48,6 +52,9 @@ from langflash_core.errors import Cancelled, ImageError, LangFlashError
 
 log = logging.getLogger(__name__)
 
+AHEAD = ("torch._dynamo", "torchvision", "timm", "langflash_core.pipeline")
+"""What a reconstruction imports, some seconds of it, in the order in which one needs the next."""
+IDLE = 0.5  # seconds without a request until the next of them is imported
 THUMBNAIL_SIDE = 320  # pixels of the longer side
 _ANSWERS_REPLACE = (Encode, Answer, Weigh)  # a newer one of these makes an older one pointless
 
@@ -56,10 +63,10 @@ class Worker:
     """A thread with a mailbox. `notify` is called, from the thread, after each result.
 
     `submit` and `cancel` return at once. `stop` cancels, waits at most `patience` seconds, and
-    may be called twice.
+    may be called twice. Unless `begins`, what is asked of it waits for `begin`.
     """
 
-    def __init__(self, notify: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, notify: Callable[[], None] = lambda: None, begins: bool = True) -> None:
         self._notify = notify
         self._changed = threading.Condition()
         self._errands: list[Errand] = []
@@ -70,7 +77,13 @@ class Worker:
         self._results: SimpleQueue[Result] = SimpleQueue()
         self._serial = 0
         self._thread = threading.Thread(target=self._run, name="langflash-worker", daemon=True)
-        self._thread.start()
+        if begins:
+            self.begin()
+
+    def begin(self) -> None:
+        """Start the thread, once; it takes seconds to load what it needs."""
+        if self._thread.ident is None:
+            self._thread.start()
 
     def submit(self, request: Job | Errand) -> None:
         """Queue a request; a job cancels the job under way."""
@@ -108,7 +121,8 @@ class Worker:
         with self._changed:
             self._stopping = True
             self._changed.notify()
-        self._thread.join(patience)
+        if self._thread.ident is not None:
+            self._thread.join(patience)
 
     def _put(self, result: Result) -> None:
         self._results.put(result)
@@ -119,9 +133,10 @@ class Worker:
             _import_heavy()
         except Exception as error:  # a broken installation: say so, and let each request say it again
             self._put(Failed(_unexpected(error), job=False))
+        foresight = list(AHEAD)
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._stopping or self._errands or self._job)
+                self._changed.wait_for(self._asked, IDLE if foresight else None)
                 if self._stopping:
                     return
                 job, token = self._job, self._token
@@ -131,6 +146,11 @@ class Worker:
                 self._run_errands()
             elif job is not None:
                 self._run_job(job, token)
+            elif foresight:
+                _import_ahead(foresight.pop(0))
+
+    def _asked(self) -> bool:
+        return bool(self._stopping or self._errands or self._job)
 
     def _run_errands(self) -> None:
         """Run what is queued now, oldest first."""
@@ -329,18 +349,52 @@ def make_thumbnail(path: Path) -> Thumbnail:
 
 def _import_heavy() -> None:
     """Load torch and the renderer's module here, while the window is already up."""
+    _link_torch()
     import torch  # noqa: F401
 
     import app.gl
     import langflash_core.network
     import langflash_core.query.spaces  # noqa: F401
 
+    Image.preinit()  # else the first thumbnail of the window does
+    gc.freeze()
     log.debug("loaded %s", app.gl.__name__)
 
 
+def _link_torch() -> None:
+    """Link torch's largest library through a foreign call, which lets go of the interpreter.
+
+    `import torch` would hold on to it for about half a second, and so hold up a frame.
+    """
+    spec = find_spec("torch")
+    if sys.platform != "linux" or spec is None or spec.origin is None:
+        return
+    library = Path(spec.origin).parent / "lib" / "libtorch_cpu.so"
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).dlopen(os.fsencode(library), os.RTLD_NOW)  # 0 where it fails: torch will say why
+
+
+def _import_ahead(name: str) -> None:
+    """Import what the first reconstruction would wait for, while nobody waits."""
+    from langflash_core.torchvision_fix import ensure_torchvision
+
+    try:
+        if name == "torchvision":
+            ensure_torchvision()
+        else:
+            import_module(name)
+    except Exception:  # who needs it will say so
+        log.debug("%s cannot be imported", name, exc_info=True)
+    # What modules hold stays for good. The collector, which stops every thread, need not look at it
+    # again: that took a fifth of a second each time.
+    gc.freeze()
+
+
 def _give_back_memory() -> None:
-    """What a stopped job held goes back to the system, where the allocator would keep it."""
-    gc.collect()
+    """What a stopped job held goes back to the system, where the allocator would keep it.
+
+    Its tensors are gone by now, without the collector, which would stop the window for a while.
+    """
     if sys.platform == "linux":
         with suppress(OSError, AttributeError):
             ctypes.CDLL(None).malloc_trim(0)

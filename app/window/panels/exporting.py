@@ -1,5 +1,6 @@
 """The export dialog, and the export under way."""
 
+import os
 from dataclasses import replace
 
 from imgui_bundle import ImVec2, imgui
@@ -107,7 +108,7 @@ def _order(state: State, look: Look) -> list[do.Command]:
     if isinstance(order, str):
         widgets.muted(order)
     else:
-        exists = order.target.exists() and not state.desk.form.all_views
+        exists = os.path.exists(order.target) and not state.desk.form.all_views
         widgets.muted(f"{order.target} will be replaced." if exists else "The same on the command line:")
         _command_line(order.line, look)
         issued += _copy(order.line)

@@ -1,5 +1,7 @@
 """Over everything: toasts with a remedy, and the few dialogs."""
 
+import os
+
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
@@ -135,7 +137,7 @@ def draw_dialog(state: State, look: Look) -> list[do.Command]:
 def _save(state: State, look: Look) -> list[do.Command]:
     issued, confirmed = _path_field(state, "Where to write it")
     path = typed_scene(state.dialog_path)
-    exists = path is not None and path.is_file()
+    exists = path is not None and os.path.isfile(path)
     consequence = f"{path} will be replaced." if exists else f"Writes {path}"
     widgets.muted("Type a file name." if path is None else consequence)
     imgui.begin_disabled(path is None)
@@ -160,7 +162,7 @@ def _open(state: State, look: Look) -> list[do.Command]:
 def _save_prompts(state: State, look: Look) -> list[do.Command]:
     issued, confirmed = _path_field(state, "Where to write them")
     text = state.dialog_path.strip()
-    exists = bool(text) and typed_path(text).is_file()
+    exists = bool(text) and os.path.isfile(typed_path(text))
     imgui.begin_disabled(not text)
     pressed = widgets.primary_button("Replace" if exists else "Save", look.vec(120, 0))
     imgui.end_disabled()

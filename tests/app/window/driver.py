@@ -3,7 +3,8 @@
     python driver.py WIDTH HEIGHT [PATHS...]
 
 A line is printed when anything a test may wait for has changed, with the seconds that each frame
-since the last line took. "items" tells where the things to click are. The last line has "closed".
+since the last line took and by how much each came late. "items" tells where the things to click are.
+The last line has "closed".
 """
 
 import json
@@ -66,17 +67,20 @@ def main() -> int:
     last = None
     frames = 0
     seconds: list[float] = []
+    lags: list[float] = []
     try:
         while not session.should_close:
             if session.step():
                 frames += 1
                 seconds.append(session.state.stats.frame_seconds)  # of the frame before
+                lags.append(session.lag)
             now = {**summary(session), "items": items.now()}
             if now != last:
                 last = now
-                sys.stdout.write(json.dumps({**now, "frames": frames, "seconds": seconds}) + "\n")
+                line = {**now, "frames": frames, "seconds": seconds, "lags": lags}
+                sys.stdout.write(json.dumps(line) + "\n")
                 sys.stdout.flush()
-                seconds = []
+                seconds, lags = [], []
     finally:
         session.close()
     return 0

@@ -12,6 +12,8 @@ from app.window.drops import MAX_PHOTOS, sort_drop, typed_path, typed_scene
 from app.window.poses import Pose
 from app.window.state import FLIGHT_SECONDS, NEGATIVES, TOAST_SECONDS, Mode, State
 from app.window.worker import describe_scene
+from langflash_core.errors import OutputError
+from langflash_core.files import write_atomically
 from tests.app.window.scenes import room
 
 
@@ -151,6 +153,16 @@ def test_the_save_dialog_proposes_a_place(shown: State) -> None:
     saved = after(state, do.SceneSaved(Path("/q/s.langflash")), do.ShowDialog("save"))
     assert saved.dialog_path == str(Path("/q/s.langflash"))
     assert "no scene to save" in after(State(), do.SaveScene(Path("s"))).toasts[0].text
+
+
+def test_paths_that_no_disk_takes_are_said_to_be_missing() -> None:
+    long = "a" * 300  # of a name most file systems take 255 bytes
+    assert typed_scene(long) == Path(f"{long}.langflash")  # writing it fails, with a sentence
+    assert sort_drop([long, "nul\0"]).rejected == tuple(
+        f"{path} does not exist; check the path." for path in (long, "nul\0")
+    )
+    with pytest.raises(OutputError, match="too long; choose another place"):
+        write_atomically(Path(f"{long}.langflash"), b"")
 
 
 def test_typed_paths_name_a_scene_or_nothing(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -36,28 +37,28 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-@pytest.fixture(scope="module")
-def display() -> Iterator[str]:
-    """An X server of our own; it picks a free number itself."""
+@contextmanager
+def x_server(width: int, height: int) -> Iterator[str]:
+    """An X server of our own and its display; it picks a free number itself."""
     reader, writer = os.pipe()
-    command = [
-        "Xvfb",
-        "-displayfd",
-        str(writer),
-        "-screen",
-        "0",
-        f"{SIZE[0]}x{SIZE[1]}x24",
-        "-nolisten",
-        "tcp",
-    ]
+    screen = ["-screen", "0", f"{width}x{height}x24"]
+    command = ["Xvfb", "-displayfd", str(writer), *screen, "-nolisten", "tcp"]
     server = subprocess.Popen(command, pass_fds=[writer], stderr=subprocess.DEVNULL)
     os.close(writer)
     with os.fdopen(reader) as numbers:
         number = numbers.readline().strip()
     assert number, "Xvfb did not start"
-    yield f":{number}"
-    server.terminate()
-    server.wait(PATIENCE)
+    try:
+        yield f":{number}"
+    finally:
+        server.terminate()
+        server.wait(PATIENCE)
+
+
+@pytest.fixture(scope="module")
+def display() -> Iterator[str]:
+    with x_server(*SIZE) as name:
+        yield name
 
 
 @pytest.fixture(scope="module")
@@ -70,11 +71,11 @@ def scene_file(tmp_path_factory) -> Path:
 class Program:
     """The window in a process of its own, and the hands on it."""
 
-    def __init__(self, display: str, *paths: Path) -> None:
+    def __init__(self, display: str, *paths: Path, size: tuple[int, int] = SIZE) -> None:
         self._environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}
         self._environment.pop("WAYLAND_DISPLAY", None)
         driver = Path(__file__).with_name("driver.py")
-        command = [sys.executable, str(driver), *map(str, SIZE), *map(str, paths)]
+        command = [sys.executable, str(driver), *map(str, size), *map(str, paths)]
         self._process = subprocess.Popen(command, env=self._environment, stdout=subprocess.PIPE, text=True)
         self._lines: list[dict] = []
         self._changed = threading.Condition()

@@ -1,0 +1,348 @@
+"""Random hands on a real window: moves, clicks, drags, keys, typing, drops, resizes, from a seed.
+
+    python -m tests.app.window.monkey [--minutes 10] [--seed 1] [--screen 1000x700]
+
+Ends with 0 when the window lived through it without an exception, an OpenGL error or a hang, and its
+memory stayed. The window can write only in a temporary folder (guarded.py); leaving is refused, so
+that the run goes on. Every minute the same scene is opened, and memory is compared there.
+"""
+
+import argparse
+import json
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import glfw
+import numpy as np
+
+from app.window.session import Session
+from tests.app.window.guarded import REFUSED, environment
+from tests.app.window.test_window import ROOT, x_server
+from tests.app.window.x11 import Client
+
+PATIENCE = 120.0  # seconds without any sign of life that count as a hang, also on a busy machine
+STEPS_AT_ONCE = 12
+KEYS = (
+    *"wasdqehzfpkvxrbcg1234567890", "bracketleft", "bracketright", "Delete", "BackSpace", "Escape", "Return",
+    "Tab", "shift+Tab", "Up", "Down", "Left", "Right", "Home", "End", "space", "F1", "F2", "minus", "plus",
+    *(f"ctrl+{letter}" for letter in "zyadisoepqvc"), "ctrl+shift+z", "F11",
+)  # fmt: skip
+WORDS = (
+    "armchair",
+    "wall - floor",
+    "sofa + cushion",
+    "plant",
+    "+",
+    "élan 椅子",
+    "a " * 200,
+    "0.5",
+    "-3",
+    "room",
+)
+PHOTOS = ("living_room_left.png", "living_room_right.png", "books_left.jpg")
+
+
+@dataclass
+class Outcome:
+    """What a run has seen. checkpoints: (minutes, MB) with the same scene open and at rest."""
+
+    steps: int = 0
+    frames: int = 0
+    checkpoints: list[tuple[float, float]] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
+    latest: float = 0.0  # seconds, of the frame that came latest
+
+    def slope(self) -> float:
+        """MB a minute over the checkpoints after the first two, when caches have filled; 0 of fewer."""
+        late = np.array(self.checkpoints[2:])
+        return float(np.polyfit(late[:, 0], late[:, 1], 1)[0]) if len(late) > 2 else 0.0
+
+
+class Staying(Session):
+    """A window that is not to be left."""
+
+    @property
+    def should_close(self) -> bool:
+        if self.state.leaving:
+            self.state = replace(self.state, leaving=False)
+        glfw.set_window_should_close(self._window, False)
+        return False
+
+
+def inside(width: int, height: int) -> None:
+    """The process of the window: a line of JSON about it twice a second, until stdin ends."""
+    ended = threading.Event()
+    threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
+    session = Staying((), (width, height))
+    frames, said, latest = 0, 0.0, 0.0
+    while not ended.is_set() and not session.should_close:
+        if session.step(0.25):
+            frames, latest = frames + 1, max(latest, session.lag)
+        if time.monotonic() - said > 0.5:
+            said, state = time.monotonic(), session.state
+            line = {
+                "frames": frames,
+                "latest": latest,
+                "rss": resident_mb(os.getpid()),
+                "scene": state.info.name if state.info and state.job is None else None,
+                "unexpected": [t.text for t in state.toasts if "unexpected" in t.text],
+                "gl_errors": session.gl_errors,
+            }
+            sys.stdout.write(json.dumps(line) + "\n")
+            sys.stdout.flush()
+    session.close()
+
+
+def resident_mb(process: int) -> float:
+    """Memory of a process, MB."""
+    for line in Path(f"/proc/{process}/status").read_text().splitlines():
+        if line.startswith("VmRSS:"):
+            return int(line.split()[1]) / 1024
+    raise ValueError("status: expected a line VmRSS")
+
+
+class Hands:
+    """The random input; `scene` is opened at every checkpoint."""
+
+    def __init__(self, display: str, folder: Path, scene: Path, size: tuple[int, int], seed: int) -> None:
+        self._random = random.Random(seed)
+        self._size = size
+        self._scene = scene
+        self._environment = {**os.environ, "DISPLAY": display}
+        self._display = display
+        self._folder = folder
+        self._droppable = self._fill(folder / "things")
+
+    def _fill(self, things: Path) -> list[list[Path]]:
+        """Files to drop, of every sort."""
+        things.mkdir()
+        for name in PHOTOS:
+            shutil.copy(ROOT / "assets" / "photos" / name, things / name)
+        (things / "notes.txt").write_text("no photo")
+        (things / "broken.jpg").write_bytes(b"\xff\xd8\xff\xe0 cut short")
+        (things / "broken.langflash").write_bytes(b"\0" * 100)
+        left, right, books = (things / name for name in PHOTOS)
+        names = ([left, right], [left, right], [books], [things], [things / "notes.txt"], [self._scene])
+        return [*names, [things / "broken.jpg"], [things / "broken.langflash"], [things / "gone.png"]]
+
+    def find(self, patience: float = PATIENCE) -> None:
+        """Wait for the window and give it the keyboard."""
+        end = time.monotonic() + patience
+        while time.monotonic() < end:
+            found = self._xdotool("search", "--name", "LangFlash").split()
+            if found:
+                self.window = int(found[0])
+                self._xdotool("windowmove", found[0], "0", "0", "windowfocus", "--sync", found[0])
+                return
+            time.sleep(0.2)
+        raise TimeoutError("no window")
+
+    def act(self) -> None:
+        """Some random steps, or one drop, resize or close."""
+        chosen = self._random.random()
+        if chosen < 0.06:
+            self.drop(self._random.choice(self._droppable))
+        elif chosen < 0.09:
+            width, height = (self._random.randint(side * 2 // 3, side) for side in self._size)
+            self._xdotool("windowsize", str(self.window), str(width), str(height))
+        elif chosen < 0.10:
+            with self._client() as client:
+                client.ask_to_close(self.window)
+        else:
+            steps = [self._step() for _ in range(STEPS_AT_ONCE)]
+            self._xdotool(*(word for step in steps for word in step))
+            if chosen > 0.7:  # to xdotool all words after "type" are text
+                self._xdotool("type", "--delay", "5", self._random.choice(WORDS))
+            self._xdotool("keyup", "shift", "keyup", "ctrl", "mouseup", "1", "mouseup", "2", "mouseup", "3")
+
+    def drop(self, paths: list[Path]) -> None:
+        """Files onto the window."""
+        at = (self._size[0] // 2, self._size[1] // 2)
+        with self._client() as client:
+            client.drop(self.window, paths, at, PATIENCE)
+
+    def open_scene(self) -> None:
+        """The scene of the checkpoints, whatever is going on."""
+        self.drop([self._scene])
+        self._xdotool("mousemove", "5", str(self._size[1] - 5))
+
+    def _step(self) -> list[str]:
+        r = self._random
+        place = [str(r.randrange(side)) for side in self._size]
+        button = r.choice("11123")
+        match r.choices(("move", "click", "drag", "wheel", "key"), (2, 5, 3, 2, 5))[0]:
+            case "move":
+                return ["mousemove", *place]
+            case "click":
+                return ["mousemove", *place, "sleep", "0.03", "click", button]
+            case "drag":
+                held = r.choice(("", "", "shift", "ctrl"))
+                there = [str(r.randrange(side)) for side in self._size]
+                drag = ["mousemove", *place, "mousedown", button, "sleep", "0.03", "mousemove", *there]
+                drag += ["sleep", "0.03", "mouseup", button]
+                return [*(["keydown", held] if held else []), *drag, *(["keyup", held] if held else [])]
+            case "wheel":
+                return ["mousemove", *place, "click", "--repeat", str(r.randint(1, 5)), r.choice("45")]
+        return ["key", r.choice(KEYS)]
+
+    @contextmanager
+    def _client(self):
+        client = Client(self._display)
+        try:
+            yield client
+        finally:
+            client.close()
+
+    def _xdotool(self, *words: str) -> str:
+        return subprocess.run(
+            ["xdotool", *words], env=self._environment, capture_output=True, text=True
+        ).stdout
+
+
+class Watched:
+    """The window's process and what it says."""
+
+    def __init__(self, display: str, folder: Path, size: tuple[int, int]) -> None:
+        program = [sys.executable, "-m", "tests.app.window.monkey", "--inside", *map(str, size)]
+        own = {**environment(folder, ROOT), "DISPLAY": display}
+        own.pop("WAYLAND_DISPLAY", None)
+        self._errors = (folder / "stderr.txt").open("w+")
+        self.process = subprocess.Popen(
+            program,
+            env=own,
+            cwd=folder,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+            text=True,
+        )
+        self.last: dict = {}
+        self.heard = time.monotonic()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self.last, self.heard = json.loads(line), time.monotonic()
+
+    def problems(self) -> list[str]:
+        """What has gone wrong so far."""
+        said = self.last
+        found = [*said.get("gl_errors", []), *said.get("unexpected", [])]
+        if self.process.poll() is not None:
+            found.append(f"the window ended with {self.process.returncode}")
+        if time.monotonic() - self.heard > PATIENCE:
+            found.append(f"no sign of life for {PATIENCE:.0f} s")
+        self._errors.seek(0)
+        errors = self._errors.read()
+        if "Traceback" in errors or "rror" in errors:
+            found.append(errors[-3000:])
+        return found
+
+    def until_scene(self, name: str) -> bool:
+        """Wait for a scene at rest."""
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end and self.process.poll() is None:
+            if self.last.get("scene") == name:
+                time.sleep(2.0)  # for what follows a scene: words of its atoms, files kept
+                return self.last.get("scene") == name
+            time.sleep(0.2)
+        return False
+
+    def end(self) -> int:
+        """Ask the process to end, and wait."""
+        assert self.process.stdin is not None
+        with suppress(BrokenPipeError):
+            self.process.stdin.close()
+        try:
+            code = self.process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            code = self.process.wait()
+        self._reader.join(PATIENCE)
+        self._errors.close()
+        return code
+
+
+def run(
+    seconds: float, seed: int, size: tuple[int, int], every: float = 60.0, say=lambda text: None
+) -> Outcome:
+    """Random input for some seconds, a checkpoint `every` so many."""
+    from langflash_core.query.spaces import language_space
+    from langflash_core.scene import save
+    from tests.app.window.scenes import PHRASES, room
+
+    outcome = Outcome()
+    with tempfile.TemporaryDirectory(prefix="monkey-") as place, x_server(*size) as display:
+        folder = Path(place).resolve()
+        scene = folder / "room.langflash"
+        save(room(language_space("minilm").encode(list(PHRASES))), scene)
+        watched = Watched(display, folder, size)
+        try:
+            hands = Hands(display, folder, scene, size, seed)
+            hands.find()
+            start = time.monotonic()
+            checkpoint = 0.0
+            while not outcome.problems:
+                now = time.monotonic() - start
+                if now >= checkpoint or now >= seconds:
+                    hands.open_scene()
+                    if not watched.until_scene(scene.name):
+                        outcome.problems.append("the scene did not open")
+                    outcome.checkpoints.append((now / 60, watched.last.get("rss", 0.0)))
+                    say(f"{now / 60:5.1f} min  {watched.last.get('rss', 0):6.0f} MB  {outcome.steps} steps")
+                    checkpoint = now + every
+                if now >= seconds:
+                    break
+                hands.act()
+                outcome.steps += 1
+                outcome.problems += watched.problems()
+            outcome.problems += [p for p in watched.problems() if p not in outcome.problems]
+        finally:
+            code = watched.end()
+        if code and not outcome.problems:
+            outcome.problems.append(f"the window ended with {code}")
+        outcome.frames, outcome.latest = watched.last.get("frames", 0), watched.last.get("latest", 0.0)
+        notes = folder / REFUSED
+        outcome.refused = notes.read_text().splitlines() if notes.is_file() else []
+    return outcome
+
+
+def main() -> int:
+    if sys.argv[1:2] == ["--inside"]:
+        inside(*map(int, sys.argv[2:]))
+        return 0
+    parser = argparse.ArgumentParser(description="Random input into a real window.")
+    parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--screen", default="1000x700")
+    args = parser.parse_args()
+    width, height = map(int, args.screen.split("x"))
+
+    def say(text: str) -> None:
+        sys.stdout.write(text + "\n")
+        sys.stdout.flush()
+
+    outcome = run(60 * args.minutes, args.seed, (width, height), say=say)
+    say(f"{outcome.steps} batches, {outcome.frames} frames, the latest by {outcome.latest:.2f} s")
+    say(f"memory {outcome.slope():+.2f} MB a minute; refused outside the folder: {len(outcome.refused)}")
+    for line in sorted(set(outcome.refused))[:20]:
+        say(f"  {line}")
+    for problem in outcome.problems:
+        say(f"PROBLEM {problem}")
+    return 1 if outcome.problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
