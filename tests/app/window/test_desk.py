@@ -20,6 +20,7 @@ from app.window.poses import Pose, Vector
 from app.window.preferences import PANEL_WIDTHS
 from app.window.recovery import Kept
 from app.window.state import Mode, SceneInfo, State
+from langflash_core.edits import Atom, History, Marks, Mask
 from langflash_core.scene import save
 from tests.app.window.scenes import room
 
@@ -157,6 +158,26 @@ def test_a_new_kind_takes_its_own_ending_and_an_unsaved_scene_its_copy() -> None
     order = export_form.order(state)
     assert not isinstance(order, str) and order.words[1] == "/state/copy.langflash"
     assert "copy" in export_form.remarks(state)[0]
+
+
+def test_unsaved_edits_and_a_selection_are_read_from_their_copies() -> None:
+    plain = scene()
+    marks = Marks.untouched(8, 3)
+    selected = replace(marks, selected=Mask.full(8), atoms=(Atom(0, "sofa"), *marks.atoms[1:]))
+    editing = replace(plain.editing, history=History(selected), saved=marks)
+    state = form(replace(plain, editing=editing), what=What.PLY, path="/x")
+    assert state.editing.unsaved and "save it first" in str(export_form.order(state))  # before the copies
+    state = after(state, desk.CopiesAt(Path("/s/edited.langflash"), Path("/s/selection.langflash")))
+    order = export_form.order(state)
+    assert not isinstance(order, str) and order.words[1] == "/s/edited.langflash"
+    assert "edits are not saved" in export_form.remarks(state)[0]
+    state = form(state, only_selected=True)
+    order = export_form.order(state)
+    assert not isinstance(order, str) and order.words[1] == "/s/selection.langflash"
+    assert "selection is not saved" in export_form.remarks(state)[0]
+    nothing = replace(state.editing, history=History(marks))
+    again = after(replace(state, editing=nothing), desk.ShowExport())
+    assert not again.desk.form.only_selected and again.dialog == "export"
 
 
 def test_an_export_is_followed_to_its_end() -> None:
