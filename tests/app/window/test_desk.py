@@ -60,7 +60,8 @@ def test_photos_take_a_lens_notes_and_another_place() -> None:
     state = after(State(), do.AddPhotos(PATHS), desk.PhotoRead(PATHS[1], 50.0, ("it is dark",)))
     state = after(state, desk.SetPhotoFov(0, 500.0), desk.MovePhoto(2, 0), desk.MovePhoto(9, 0))
     assert [photo.path.stem for photo in state.photos] == ["c", "a", "b"]
-    assert 0 < state.photos[1].fov < 180  # within what a lens can have
+    fov = state.photos[1].fov
+    assert fov is not None and 0 < fov < 180  # within what a lens can have
     assert (state.photos[2].recorded, state.photos[2].notes) == (50.0, ("it is dark",))
     state = after(state, desk.SetPhotoFov(1, None))
     assert state.photos[1].fov is None
@@ -131,14 +132,21 @@ def test_every_kind_says_the_command_that_does_it(what: What) -> None:
     assert ("--size" in words) == what.sized and ("--seconds" in words) == (what is What.VIDEO)
 
 
+def wrong(state: State) -> str:
+    """What the form lacks."""
+    order = export_form.order(state)
+    assert isinstance(order, str), order
+    return order
+
+
 def test_what_is_missing_is_said() -> None:
-    assert "no scene" in export_form.order(State())
-    assert "file name" in export_form.order(form(scene(), path=" "))
-    assert "is the scene itself" in export_form.order(form(scene(), what=What.SCENE, path="/rooms/my room"))
+    assert "no scene" in wrong(State())
+    assert "file name" in wrong(form(scene(), path=" "))
+    assert "is the scene itself" in wrong(form(scene(), what=What.SCENE, path="/rooms/my room"))
     silent = after(scene(), do.EditPrompt(0, ""))
-    assert "needs a phrase" in export_form.order(form(silent, what=What.MASK, path="/x"))
-    assert "no phrase to keep" in export_form.order(form(silent, what=What.PLY, only_found=True, path="/x"))
-    assert "save it first" in export_form.order(form(scene(None), path="/x"))
+    assert "needs a phrase" in wrong(form(silent, what=What.MASK, path="/x"))
+    assert "no phrase to keep" in wrong(form(silent, what=What.PLY, only_found=True, path="/x"))
+    assert "save it first" in wrong(form(scene(None), path="/x"))
 
 
 def test_the_view_on_show_a_camera_of_its_own_or_all_photos() -> None:
