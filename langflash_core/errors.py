@@ -41,6 +41,10 @@ class WeightsError(InputError):
     """A checkpoint is missing, damaged, or does not fit the network."""
 
 
+class DownloadError(LangFlashError):
+    """A file could not be fetched from the network."""
+
+
 class GraphicsError(LangFlashError):
     """OpenGL is not available or too old for what was asked."""
 

@@ -2,7 +2,8 @@
 
 import os
 import secrets
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from langflash_core.errors import OutputError
@@ -27,6 +28,25 @@ def write_atomically(path: Path, content: bytes | Iterable[bytes]) -> None:
                 stream.write(part)
             stream.flush()
             os.fsync(stream.fileno())
+        os.replace(temporary, path)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(f"cannot write {path}: {reason}; choose another place for it") from error
+    finally:
+        _remove(temporary)
+
+
+@contextmanager
+def written_atomically(path: Path) -> Iterator[Path]:
+    """A path beside `path` to write to, moved onto it when the block ends well; for large files.
+
+    Raises:
+        OutputError: the folder cannot be made or written, or the disk is full.
+    """
+    make_folder(path.parent)
+    temporary = path.parent / f".{path.name[:100]}.{secrets.token_hex(6)}.part"
+    try:
+        yield temporary
         os.replace(temporary, path)
     except OSError as error:
         reason = error.strerror or str(error)

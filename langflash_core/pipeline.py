@@ -17,21 +17,37 @@ from torch import Tensor
 
 from langflash_core.errors import Cancelled, InputError, PromptError, ViewError, WeightsError
 from langflash_core.images import grey_photo, load_views
+from langflash_core.images.views import source_pictures
+from langflash_core.labels.segments import Sam2, sam2_checkpoint
 from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_network
+from langflash_core.network.aggregation import averaged_atoms
+from langflash_core.network.build import network_class
+from langflash_core.network.crops import crop_atoms
+from langflash_core.network.grouping import Groups
+from langflash_core.network.lifting import lifted_weights
+from langflash_core.network.model import Atoms, Geometry, Lifted, pooled_weights
+from langflash_core.network.precision import has_bfloat16
+from langflash_core.network.store import part_folder
 from langflash_core.query.answers import answer
+from langflash_core.query.clip import load_clip_images
 from langflash_core.query.gaussians import gaussian_relevance, kept
 from langflash_core.query.relevance import Mode, compile_query, relevance_maps
 from langflash_core.query.spaces import language_space
 from langflash_core.scene import assemble, prune
 from langflash_core.splat import render as render_reference
-from langflash_core.types import Camera, Frame, Prediction, QueryResult, Scene
+from langflash_core.splat.refine import Budget, refine
+from langflash_core.types import Camera, Frame, Prediction, QueryResult, Scene, Views
 
 Progress = Callable[[str, float], None]
 
 # Where each stage begins in the whole, from its measured share of the time on two CPU cores.
-STAGES = {"photos": 0.0, "weights": 0.1, "network": 0.2, "assemble": 0.85, "prune": 0.95}
+STAGES = {"photos": 0.0, "weights": 0.1, "network": 0.2, "assemble": 0.85, "prune": 0.95, "refine": 0.97}
+PRECISIONS = ("auto", "float32", "bfloat16")
+AGGREGATIONS = ("lfa", "average", "crops")
+GROUPINGS = ("queries", "sam2")
 SIZES = (56, 1024)  # pixels: below, the encoder's grid is 4 patches; above, attention's memory runs away
 LARGEST_PICTURE = 8192
+LONGEST_REFINEMENT = 3600  # seconds
 
 
 def reconstruct(
@@ -43,6 +59,10 @@ def reconstruct(
     intrinsics: tuple[float, float, float, float] | None = None,
     size: int | None = None,
     device: str = "auto",
+    precision: str = "auto",
+    aggregation: str | None = None,
+    grouping: str | None = None,
+    refine_seconds: float | None = None,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Scene:
@@ -55,6 +75,16 @@ def reconstruct(
             (fx, fy, cx, cy) in pixels of the photos as given, the same for all. Neither: EXIF, else
             an assumption with a warning.
         size: the network sees about size x size pixels per photo, whatever their shape.
+        precision: "float32"; "bfloat16", for presets with a rule for it; "auto" takes it where
+            there is one and the processor is quick at it.
+        aggregation: how a group gets its vector: "lfa" (trained), "average" (of dense features),
+            "crops" (CLIP on a cut-out; presets of its space); None: lfa where it has weights,
+            else average.
+        grouping: where groups come from: "queries" (trained), "sam2" (its masks of each photo, lifted
+            to the scene); None: queries where they have weights, else sam2 where it is installed,
+            else clusters of the language features.
+        refine_seconds: so long poses and Gaussians are fitted to the photos afterwards, and kept so
+            if that brings a view closer that was held out; None: not at all.
         device: "auto" takes CUDA where there is one; "cpu"; "cuda".
         progress: called with the stage and the fraction of the whole in [0, 1].
         cancelled: asked between stages, photos and pairs of photos, and before every layer.
@@ -71,6 +101,8 @@ def reconstruct(
     if preset not in PRESETS:
         raise WeightsError(f"There is no preset '{preset}': choose one of {', '.join(PRESETS)}.")
     device = _device(device)
+    if refine_seconds is not None:
+        _check_refinement(refine_seconds, photos)
     area = PRESETS[preset].native_area if size is None else _area(size)
     with run.stage("photos"):
         files = [Path(photo) for photo in photos]
@@ -80,16 +112,24 @@ def reconstruct(
             intrinsics=intrinsics,
             area=area,
             multiple=PRESETS[preset].patch,
+            square=PRESETS[preset].square,
             check=run.check,
         )
     with run.stage("weights"):
-        network = _network(preset, weights, device)
+        network = _network(preset, weights, device, precision)
+        atoms = _atoms(network, aggregation, views)
+        groups = _groups(network, grouping, device)
     with run.stage("network"):
-        prediction = _on_cpu(network.predict(views, run.within("network"), cancelled))
+        prediction = _on_cpu(network.predict(views, run.within("network"), cancelled, atoms, groups))
     with run.stage("assemble"), torch.no_grad():
         scene = assemble(prediction, views, preset=preset)
     with run.stage("prune"), torch.no_grad():
         scene = prune(scene)
+    if refine_seconds is not None:
+        placed = [v for v in range(views.num_views) if v not in prediction.unplaced]
+        with run.stage("refine"):
+            scene = _refined(scene, views.images[placed], refine_seconds, device, run.within("refine"))
+        scene = scene.with_metadata(timings={**scene.metadata["timings"], "fitting": run.timings["refine"]})
     run.check()
     run.report("done", 1.0)
     return _with_record(scene, network, run.timings)
@@ -227,6 +267,46 @@ def _with_record(scene: Scene, network: LangFlashNet, timings: dict[str, float])
     return scene.with_metadata(**record)
 
 
+def _check_refinement(seconds: float, photos: Sequence) -> None:
+    if not 0 < seconds <= LONGEST_REFINEMENT:
+        raise InputError(
+            f"A refinement of {seconds:g} seconds is out of range: choose up to {LONGEST_REFINEMENT}."
+        )
+    if len(photos) < 2:
+        raise InputError("A refinement compares photos with each other: give at least two that overlap.")
+
+
+def _refined(scene: Scene, images: Tensor, seconds: float, device: str, progress: Progress) -> Scene:
+    """The scene fitted to its photos, or as it was with a warning that says why; on the CPU again."""
+    try:
+        result = refine(_moved(scene, device), images.to(device), Budget(seconds), progress)
+    except InputError as reason:
+        return scene.with_metadata(warnings=[*scene.metadata["warnings"], f"not refined: {reason}"])
+    record = {
+        "kept": result.kept,
+        "held_out": scene.metadata["photos"][result.view],
+        "held_out_psnr_db": [round(value, 2) for value in result.held_out],
+        "photos_psnr_db": [round(value, 2) for value in result.photos],
+        "steps": list(result.steps),
+    }
+    warnings = scene.metadata["warnings"]
+    if not result.kept:
+        before, after = record["held_out_psnr_db"]
+        note = f"not refined: {record['held_out']}, held out, came no closer ({before} dB, then {after} dB)"
+        warnings = [*warnings, note]
+    return _moved(result.scene, "cpu").with_metadata(refinement=record, warnings=warnings)
+
+
+def _moved(scene: Scene, device: str) -> Scene:
+    """Gaussians and cameras on a device."""
+    return replace(
+        scene,
+        gaussians=scene.gaussians.map(lambda values: values.to(device)),
+        viewmats=scene.viewmats.to(device),
+        Ks=scene.Ks.to(device),
+    )
+
+
 def peak_memory_mb() -> int | None:
     """The most memory that this process has held so far, in MB; None where it cannot be asked."""
     try:
@@ -237,17 +317,82 @@ def peak_memory_mb() -> int | None:
     return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6)
 
 
-def _network(preset: str, weights: Path | str | None, device: str) -> LangFlashNet:
+def _atoms(network: LangFlashNet, way: str | None, views: Views) -> Atoms | None:
+    """How groups get their vectors; None: as the network does it.
+
+    Raises:
+        InputError: an unknown way, or one that this preset does not have. WeightsError: no weights for it.
+    """
+    if way is None:
+        return None
+    if way == "average":
+        return lambda weights, features: averaged_atoms(pooled_weights(weights, features), features)[0]
+    if way == "lfa":
+        if not network.aggregated:
+            raise WeightsError("The aggregation has no weights here; choose --aggregation average or crops")
+        return None
+    if way != "crops":
+        raise InputError(f"The aggregation '{way}' is unknown: choose {', '.join(AGGREGATIONS)}.")
+    if network.preset.space != "clip":
+        raise InputError(
+            f"Crops are embedded by CLIP, but the preset '{network.preset.name}' speaks "
+            f"'{network.preset.space}': choose --aggregation lfa or average."
+        )
+    tower, photos = load_clip_images(), source_pictures(views)
+    return lambda weights, _: crop_atoms(weights, photos, lambda p: tower.encode(p.cpu()).to(weights))
+
+
+def _groups(network: LangFlashNet, way: str | None, device: str) -> Lifted | None:
+    """Where groups come from; None: the network's own parts.
+
+    Raises:
+        InputError: an unknown way. WeightsError: no weights for it.
+    """
+    if way not in (None, *GROUPINGS):
+        raise InputError(f"The grouping '{way}' is unknown: choose {', '.join(GROUPINGS)}.")
+    if way == "queries" and not network.grouped:
+        raise WeightsError(
+            "The grouping has no weights here; `langflash weights get langflash` fetches them."
+        )
+    if way == "queries" or (way is None and (network.grouped or sam2_checkpoint() is None)):
+        return None
+    oracle = Sam2(device)
+
+    def lifted(geometry: Geometry, views: Views) -> Tensor:
+        found = [oracle(photo) for photo in views.images]
+        groups = [Groups(s.logits[None, None], s.scores.clamp(1e-6, 1 - 1e-6).logit()[None]) for s in found]
+        return lifted_weights(groups, geometry, views.Ks)
+
+    return lifted
+
+
+def _bfloat16(preset: str, precision: str, device: str) -> bool:
+    if precision not in PRECISIONS:
+        raise InputError(f"The precision '{precision}' is unknown: choose {', '.join(PRECISIONS)}.")
+    can = network_class(PRESETS[preset]).mixes
+    if precision == "bfloat16" and not can:
+        raise InputError(
+            f"The preset '{preset}' computes in float32 only: choose --precision float32 or auto."
+        )
+    quick = device != "cpu" or has_bfloat16()
+    return can and (precision == "bfloat16" or (precision == "auto" and quick))
+
+
+def _network(preset: str, weights: Path | str | None, device: str, precision: str) -> LangFlashNet:
     """The network, read once; a checkpoint that changed on disk is read again."""
     path = None if weights is None else Path(weights).resolve()
     changed = path.stat().st_mtime_ns if path is not None and path.is_file() else 0
-    return _read_network(preset, path, device, changed)
+    folder = part_folder(PRESETS[preset])
+    installed = tuple((p.name, p.stat().st_mtime_ns) for p in sorted(folder.glob("*.safetensors")))
+    return _read_network(preset, path, device, _bfloat16(preset, precision, device), (changed, installed))
 
 
 @lru_cache(maxsize=1)
-def _read_network(preset: str, path: Path | None, device: str, changed: int) -> LangFlashNet:
+def _read_network(
+    preset: str, path: Path | None, device: str, bfloat16: bool, changed: tuple
+) -> LangFlashNet:
     """`changed` is only part of the key."""
-    return load_network(preset, path, device)
+    return load_network(preset, path, device, bfloat16=bfloat16)
 
 
 def _on_cpu(prediction: Prediction) -> Prediction:

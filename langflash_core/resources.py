@@ -1,5 +1,10 @@
-"""Where shaders and assets live: beside the package in a checkout, inside it in a wheel."""
+"""Where shaders and assets live: beside the package in a checkout, inside it in a wheel.
 
+And where the user's own weights live: `LANGFLASH_HOME`, else the platform's cache folder.
+"""
+
+import os
+import sys
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent
@@ -15,6 +20,27 @@ def shader_path(name: str) -> Path:
 def asset_path(name: str) -> Path:
     """Path of `assets/<name>`, e.g. `asset_path("photos/books_left.jpg")`."""
     return _existing(_ROOT / "assets" / name)
+
+
+def home_folder() -> Path:
+    """The folder of what was downloaded or converted; it may not exist yet.
+
+    The environment variable LANGFLASH_HOME names it; else the platform does: XDG_CACHE_HOME or
+    ~/.cache on Linux, ~/Library/Caches on macOS, LOCALAPPDATA on Windows.
+    """
+    named = os.environ.get("LANGFLASH_HOME")
+    if named:
+        return Path(named).expanduser()
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "langflash"
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "langflash"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "langflash"
+
+
+def weights_folder() -> Path:
+    """Where imported weights live, under `home_folder`."""
+    return home_folder() / "weights"
 
 
 def _existing(path: Path) -> Path:

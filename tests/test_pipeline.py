@@ -10,8 +10,7 @@ import torch
 
 import langflash_core as lf
 from langflash_core.errors import Cancelled, ImageError, InputError, PromptError, ViewError, WeightsError
-from langflash_core.network import PRESETS, LangFlashNet, save_network
-from langflash_core.network import STAGES as NETWORK_STAGES
+from langflash_core.network import PRESETS, GuidedDepthNet, build_network, save_network
 from langflash_core.query.spaces import language_space
 from langflash_core.resources import asset_path
 from langflash_core.splat import render
@@ -37,7 +36,7 @@ def weights(tmp_path_factory) -> Path:
     except FileNotFoundError:
         torch.manual_seed(0)
         path = tmp_path_factory.mktemp("weights") / "mini.safetensors"
-        save_network(LangFlashNet(PRESETS["mini"]), path)
+        save_network(build_network(PRESETS["mini"]), path)
         return path
 
 
@@ -69,12 +68,12 @@ def test_the_scene_records_how_it_was_made(scene):
     record = scene.metadata
     assert record["preset"] == "mini"
     assert record["photos"] == ["books_left.jpg", "books_right.jpg"]
-    stages = ["photos", "weights", *NETWORK_STAGES, "assembly", "pruning"]
+    stages = ["photos", "weights", *GuidedDepthNet.stages, "assembly", "pruning"]
     assert list(record["timings"]) == stages
     assert all(seconds > 0 for seconds in record["timings"].values())
     # The stages are all that is done: between them lie bookkeeping, one copy, and what a busy machine takes.
     assert sum(record["timings"].values()) == pytest.approx(record["seconds"]["total"], rel=0.2)
-    network = sum(record["timings"][stage] for stage in NETWORK_STAGES)
+    network = sum(record["timings"][stage] for stage in GuidedDepthNet.stages)
     assert network == pytest.approx(record["seconds"]["network"], rel=0.2)
     assert sys.platform == "win32" or 100 < record["peak_memory_mb"] < 100_000
     assert len(set(record["warnings"])) == len(record["warnings"])
@@ -257,3 +256,22 @@ def test_the_package_is_light_and_its_functions_keep_their_names():
     subprocess.run([sys.executable, "-c", program], check=True, cwd=Path(lf.__file__).parents[1])
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         lf.nothing  # noqa: B018 (the access is the test)  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_a_refinement_is_kept_only_if_it_helps(weights, photos, scene):
+    refined = lf.reconstruct(photos, weights=weights, size=SMALL, refine_seconds=2)
+    record = refined.metadata["refinement"]
+    before, after = record["held_out_psnr_db"]
+    assert record["held_out"] == "books_right.jpg" and record["steps"][0] >= 1
+    assert record["kept"] == (after > before)
+    assert "fitting" in refined.metadata["timings"]
+    same = torch.equal(refined.gaussians.means, scene.gaussians.means)
+    assert same != record["kept"]
+    assert any("came no closer" in note for note in refined.metadata["warnings"]) != record["kept"]
+
+
+def test_a_refinement_needs_seconds_and_two_photos(weights, photos):
+    with pytest.raises(InputError, match="out of range"):
+        lf.reconstruct(photos, weights=weights, refine_seconds=0)
+    with pytest.raises(InputError, match="at least two"):
+        lf.reconstruct(photos[:1], weights=weights, refine_seconds=5)

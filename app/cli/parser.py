@@ -1,6 +1,7 @@
 """The words of the command line. Only the standard library is imported here."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -60,6 +61,7 @@ def build_parser() -> Parser:
         _add_export,
         _add_info,
         _add_bench,
+        _add_bench_network,
         _add_rooms,
         _add_train,
         _add_eval,
@@ -67,6 +69,11 @@ def build_parser() -> Parser:
     ):
         add(commands)
     return parser
+
+
+def joined(words: Sequence[str]) -> list[str]:
+    """`bench network` is a command of its own, though `bench` takes a scene; ./network names a file."""
+    return ["bench-network", *words[2:]] if list(words[:2]) == ["bench", "network"] else list(words)
 
 
 def _command(commands, name: str, purpose: str, **more) -> argparse.ArgumentParser:
@@ -91,9 +98,32 @@ def _add_reconstruct(commands) -> None:
     command = _command(commands, "reconstruct", "photos of one place to a scene file")
     command.add_argument("photos", nargs="+", type=Path, metavar="PHOTO")
     _add_output(command, "SCENE", "the scene to write")
-    command.add_argument("--preset", choices=("mini",), default="mini", help="which network (default: mini)")
     command.add_argument(
-        "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped one"
+        "--preset", choices=("mini", "full"), default="mini", help="which network (default: mini)"
+    )
+    command.add_argument(
+        "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped or imported ones"
+    )
+    command.add_argument(
+        "--aggregation",
+        choices=("lfa", "average", "crops"),
+        help="how a group gets its vector: trained, the average of dense features, or CLIP on a cut-out "
+        "(default: lfa where it has weights, else average)",
+    )
+    command.add_argument(
+        "--grouping",
+        choices=("queries", "sam2"),
+        help="where groups come from: trained queries, or masks of SAM 2 lifted to the scene (default: "
+        "queries where they have weights, else sam2 where it is installed, else the language features)",
+    )
+    command.add_argument(
+        "--precision", choices=("auto", "float32", "bfloat16"), default="auto", help="(default: auto)"
+    )
+    command.add_argument(
+        "--refine",
+        type=above_zero,
+        metavar="SECONDS",
+        help="then fit poses and Gaussians to the photos, and keep that if a held-out view improves",
     )
     lens = command.add_mutually_exclusive_group()
     lens.add_argument("--fov", type=open_fov, metavar="DEG", help="field of view of the photos' longer side")
@@ -104,7 +134,10 @@ def _add_reconstruct(commands) -> None:
         help="in pixels of the photos as given, after EXIF orientation",
     )
     command.add_argument(
-        "--size", type=pixel_side, metavar="PX", help="the network sees about PX x PX pixels (default: 224)"
+        "--size",
+        type=pixel_side,
+        metavar="PX",
+        help="the network sees about PX x PX pixels (default: 224; full: 256)",
     )
     command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
     _add_json(command)
@@ -277,6 +310,35 @@ def _add_bench(commands) -> None:
     _add_json(command)
 
 
+def _add_bench_network(commands) -> None:
+    command = _command(
+        commands, "bench-network", "how long each stage of the network takes (also: bench network)"
+    )
+    command.add_argument("--preset", choices=("mini", "full"), default="full", help="(default: full)")
+    weights = command.add_mutually_exclusive_group()
+    weights.add_argument(
+        "--weights", type=Path, metavar="PATH", help="(default: the shipped or imported ones)"
+    )
+    weights.add_argument("--random", action="store_true", help="draw them: the times are the same")
+    command.add_argument(
+        "--views", type=whole_count, nargs="+", default=[2], metavar="V", help="(default: 2)"
+    )
+    command.add_argument(
+        "--atoms", type=whole_count, nargs="+", default=[128], metavar="K", help="(default: 128)"
+    )
+    command.add_argument(
+        "--repeats", type=whole_count, default=3, metavar="N", help="the median counts (default: 3)"
+    )
+    command.add_argument("--size", type=pixel_side, default=256, metavar="PX", help="(default: 256)")
+    command.add_argument(
+        "--float32", action="store_true", help="leave bfloat16 out, which is slow where a CPU lacks it"
+    )
+    command.add_argument("--compile", action="store_true", help="through torch.compile")
+    command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the numbers as .json")
+    _add_json(command)
+
+
 def _add_eval(commands) -> None:
     actions = _actions(commands, "eval", "how good a checkpoint is on rooms it has never seen")
     rooms = _command(actions, "rooms", "geometry, pictures, labels and phrases, with trivial answers beside")
@@ -313,9 +375,23 @@ def _add_start(command: argparse.ArgumentParser) -> None:
 
 
 def _add_weights(commands) -> None:
-    actions = _actions(commands, "weights", "the checkpoints this installation holds")
-    listing = _command(actions, "list", "name, size and origin of each checkpoint")
+    actions = _actions(commands, "weights", "the checkpoints this installation holds, and published ones")
+    listing = _command(actions, "list", "name, size and origin of each checkpoint, and what can be had")
     _add_json(listing)
+    get = _command(
+        actions, "get", "download a published checkpoint and convert it; continues where it stopped"
+    )
+    get.add_argument("name", metavar="NAME", help="as `langflash weights list` has it")
+    get.add_argument("--url", metavar="URL", help="fetch it from there instead")
+    get.add_argument("--keep", action="store_true", help="keep the file as it was downloaded")
+    _add_json(get)
+    imported = _command(actions, "import", "convert a published checkpoint that is already here")
+    imported.add_argument("path", type=Path, metavar="PATH", help=".ckpt, .pt or .safetensors")
+    imported.add_argument("--preset", choices=("full",), default="full", help="(default: full)")
+    imported.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="(default: in the cache folder, where it is found)"
+    )
+    _add_json(imported)
     verify = _command(actions, "verify", "read every number and check that it fits its network")
     verify.add_argument(
         "paths", nargs="*", type=Path, metavar="PATH", help="checkpoints (default: the shipped ones)"

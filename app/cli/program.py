@@ -8,7 +8,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 
-from app.cli.parser import build_parser
+from app.cli.parser import build_parser, joined
 from app.cli.report import say_error
 from langflash_core.errors import LangFlashError
 
@@ -55,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: Sequence[str] | None) -> int:
     try:
-        args = build_parser().parse_args(argv)
+        args = build_parser().parse_args(joined(sys.argv[1:] if argv is None else argv))
     except SystemExit as done:  # --help and --version
         return int(done.code or 0)
     if os.environ.get("LANGFLASH_PROGRESS"):

@@ -333,6 +333,12 @@ def visible_groups(record: RoomRecord, view: int) -> list[str]:
     return sorted(group for group, share in shares.items() if share >= MIN_SHARE)
 
 
+def language_maps(network: LangFlashNet, views: Views) -> Tensor:
+    """L(x) of views, (1, V, C, h, w)."""
+    images = views.images[None]
+    return network.language(network.encode(images, views.Ks[None]), images)
+
+
 def judge_views(
     setting: Setting, record: RoomRecord, prediction: Prediction, scale: float, tally: Tally
 ) -> None:
@@ -340,14 +346,14 @@ def judge_views(
     network = setting.network
     source, target = views_of(record, (0, 1)), views_of(record, (2,))
     with torch.no_grad():
-        features = network.language_head(network.encoder(source.images[None]))  # (1, V, C, h, w)
+        features = language_maps(network, source)  # (1, V, C, h, w)
         size = (features.shape[-2], features.shape[-1])
         small = F.adaptive_avg_pool2d(prediction.weights, size)[None]
         averaged = average_atoms(small, features)[0]
         masks = true_masks(record, (0, 1))  # (V, G', H, W)
         true_small = F.adaptive_avg_pool2d(masks, size)[None]
         true_atoms = network.aggregation(true_small, features)[0]
-        alone = network.language_head(network.encoder(target.images[None]))[0, 0]
+        alone = language_maps(network, target)[0, 0]
     rgb, maps, true_maps = _rendered(record, prediction, masks, scale)
     photo = record.rgb[2].permute(1, 2, 0).float() / 255
     seen = seen_by_photos(record)

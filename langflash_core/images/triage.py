@@ -46,14 +46,17 @@ def photo_notes(photo: Photo, image: Tensor) -> list[str]:
     return notes
 
 
-def crop_notes(photo: Photo, box: tuple[float, float, float, float], first: str) -> list[str]:
-    """A panorama, or a photo whose shape differs so much from the first that much is cut off."""
+def crop_notes(photo: Photo, box: tuple[float, float, float, float] | None, first: str) -> list[str]:
+    """A panorama, or a photo whose shape differs so much from the first that much is cut off;
+    box None: all photos are cut to squares, which is no news."""
     aspect = max(photo.width / photo.height, photo.height / photo.width)
     if aspect > 2.0:
         return [
             f"{photo.name} is {aspect:.1f} times as long as it is wide, only its centre is used; "
             "panoramas do not follow one lens, use plain photos"
         ]
+    if box is None:
+        return []
     kept = (box[2] - box[0]) * (box[3] - box[1]) / (photo.width * photo.height)
     if 1 - kept > LOST_SHARE:
         return [

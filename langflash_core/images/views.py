@@ -34,6 +34,7 @@ def load_views(
     intrinsics: tuple[float, float, float, float] | None = None,
     area: int = 224 * 224,
     multiple: int = 14,
+    square: bool = False,
     check: Callable[[], None] = lambda: None,
 ) -> Views:
     """Photos as the network sees them: the first one's shape, the others centre-cropped to it.
@@ -44,6 +45,7 @@ def load_views(
             65 with a note.
         intrinsics: (fx, fy, cx, cy) in pixels of the upright photos, the same for all.
         area: about this many pixels per view. multiple: of which both sides are multiples.
+        square: the centre square of every photo instead of the first one's shape.
         check: called before each photo; what it raises ends the work.
 
     Returns:
@@ -66,7 +68,8 @@ def load_views(
         check()
         photo = read_photo(path, name)
         if not images:
-            size, first = fitting_size(photo.width, photo.height, area, multiple), (photo.width, photo.height)
+            first = (photo.width, photo.height)
+            size = fitting_size(*((1, 1) if square else first), area, multiple)
         elif intrinsics is not None:
             _check_same_size(photo, first)
         K, guessed = photo_intrinsics(photo, own_fov, intrinsics)
@@ -74,7 +77,9 @@ def load_views(
         images.append(_resized(photo, box, size))
         Ks.append(cropped_intrinsics(K, box, size))
         sources.append(_source_jpeg(photo, box, size))
-        notes += triage.photo_notes(photo, images[-1]) + triage.crop_notes(photo, box, names[0])
+        notes += triage.photo_notes(photo, images[-1]) + triage.crop_notes(
+            photo, None if square else box, names[0]
+        )
         if guessed:
             assumed.append(name)
         else:
@@ -83,6 +88,14 @@ def load_views(
     if assumed:
         notes.append(_assumption(assumed, len(names)))
     return Views(torch.stack(images), torch.stack(Ks), names, tuple(sources), tuple(notes))
+
+
+def source_pictures(views: Views) -> list[Tensor]:
+    """The largest version of every photo at hand, (3, h, w) in [0, 1]; the same crop as the views."""
+    if not views.sources:
+        return list(views.images)
+    opened = [Image.open(io.BytesIO(source)).convert("RGB") for source in views.sources]
+    return [torch.from_numpy(np.array(image, dtype=np.float32)).permute(2, 0, 1) / 255 for image in opened]
 
 
 def fitting_size(width: int, height: int, area: int, multiple: int) -> tuple[int, int]:

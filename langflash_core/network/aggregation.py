@@ -23,6 +23,11 @@ def average_atoms(weights: Tensor, features: Tensor, eps: float = 1e-6) -> Tenso
     return total / (weights.sum((1, 3, 4))[..., None] + eps)
 
 
+def averaged_atoms(weights: Tensor, features: Tensor, eps: float = 1e-6) -> Tensor:
+    """`average_atoms` of unit norm; a group without agreement points nowhere."""
+    return F.normalize(average_atoms(weights, features, eps), dim=-1)
+
+
 class Aggregation(nn.Module):
     """Blocks in which groups read L(x) and each other; starts as the plain average."""
 

@@ -34,11 +34,11 @@ def rotate(tokens: Tensor, code: Tensor) -> Tensor:
 class Attention(nn.Module):
     """Multi-head attention; rotary codes and additive position codes are the caller's choice."""
 
-    def __init__(self, dim: int, heads: int):
+    def __init__(self, dim: int, heads: int, *, bias: bool = True):
         super().__init__()
         self.heads = heads
-        self.query, self.key, self.value = (nn.Linear(dim, dim) for _ in range(3))
-        self.out = nn.Linear(dim, dim)
+        self.query, self.key, self.value = (nn.Linear(dim, dim, bias=bias) for _ in range(3))
+        self.out = nn.Linear(dim, dim, bias=bias)
 
     def forward(
         self, query: Tensor, key: Tensor, value: Tensor, codes: tuple[Tensor, Tensor] | None = None
@@ -61,25 +61,25 @@ class MLP(nn.Sequential):
 
 
 class SelfBlock(nn.Module):
-    """Self-attention with rotary codes, then an MLP."""
+    """Self-attention, with rotary codes where there are any, then an MLP."""
 
-    def __init__(self, dim: int, heads: int):
+    def __init__(self, dim: int, heads: int, eps: float = 1e-5):
         super().__init__()
-        self.norm1, self.norm2 = nn.LayerNorm(dim), nn.LayerNorm(dim)
+        self.norm1, self.norm2 = nn.LayerNorm(dim, eps), nn.LayerNorm(dim, eps)
         self.attn, self.mlp = Attention(dim, heads), MLP(dim, 4 * dim)
 
-    def forward(self, tokens: Tensor, code: Tensor) -> Tensor:
+    def forward(self, tokens: Tensor, code: Tensor | None = None) -> Tensor:
         x = self.norm1(tokens)
-        tokens = tokens + self.attn(x, x, x, (code, code))
+        tokens = tokens + self.attn(x, x, x, None if code is None else (code, code))
         return tokens + self.mlp(self.norm2(tokens))
 
 
 class CrossBlock(nn.Module):
     """Self-attention, cross-attention to a memory, MLP; rotary codes on both sides."""
 
-    def __init__(self, dim: int, heads: int):
+    def __init__(self, dim: int, heads: int, eps: float = 1e-5):
         super().__init__()
-        self.norm1, self.norm2, self.norm3, self.norm_memory = (nn.LayerNorm(dim) for _ in range(4))
+        self.norm1, self.norm2, self.norm3, self.norm_memory = (nn.LayerNorm(dim, eps) for _ in range(4))
         self.attn, self.cross, self.mlp = Attention(dim, heads), Attention(dim, heads), MLP(dim, 4 * dim)
 
     def forward(self, tokens: Tensor, memory: Tensor, code: Tensor, memory_code: Tensor) -> Tensor:
@@ -96,10 +96,11 @@ class QueryBlock(nn.Module):
     Positions are added to queries and keys, never to values (DETR, Carion et al. 2020).
     """
 
-    def __init__(self, dim: int, heads: int):
+    def __init__(self, dim: int, heads: int, *, bias: bool = True):
         super().__init__()
         self.norm1, self.norm2, self.norm3, self.norm_memory = (nn.LayerNorm(dim) for _ in range(4))
-        self.attn, self.cross, self.mlp = Attention(dim, heads), Attention(dim, heads), MLP(dim, 4 * dim)
+        self.attn, self.cross = Attention(dim, heads, bias=bias), Attention(dim, heads, bias=bias)
+        self.mlp = MLP(dim, 4 * dim)
 
     def forward(
         self,

@@ -7,6 +7,7 @@ A matrix or convolution is stored as int8 with one float16 scale per output row 
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import overload
 
 import torch
 from safetensors import SafetensorError, safe_open
@@ -15,9 +16,12 @@ from torch import Tensor
 
 from langflash_core.errors import WeightsError
 from langflash_core.files import make_folder, write_atomically
+from langflash_core.network.build import build_network, network_class
+from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.local import convert
 from langflash_core.network.model import LangFlashNet
-from langflash_core.network.presets import PRESETS, Preset
+from langflash_core.network.presets import PRESETS, GuidedDepth, Preset
+from langflash_core.network.store import assemble_network, write_part
 from langflash_core.resources import asset_path
 
 FORMAT = "langflash-weights-1"
@@ -25,18 +29,27 @@ _MIN_QUANTISED = 4096  # numbers; smaller tensors are not worth a scale per row
 
 
 def load_network(
-    preset: str = "mini", weights: Path | None = None, device: str | torch.device = "cpu"
+    preset: str = "mini",
+    weights: Path | None = None,
+    device: str | torch.device = "cpu",
+    *,
+    bfloat16: bool = False,
 ) -> LangFlashNet:
     """The network of a preset with trained weights, in evaluation mode.
 
     Args:
-        weights: a file written by `save_network`; None takes the embedded one.
+        weights: a file written by `save_network` or `weights import`; None takes the embedded one,
+            or what has been imported.
+        bfloat16: compute in it where the network has a rule for that.
 
     Raises:
         WeightsError: the file is missing, damaged, of another preset, or does not fit.
     """
     if preset not in PRESETS:
         raise WeightsError(f"There is no preset '{preset}'; choose one of {', '.join(PRESETS)}")
+    if not network_class(PRESETS[preset]).compact:
+        named = None if weights is None else Path(weights)
+        return assemble_network(PRESETS[preset], named, device, bfloat16=bfloat16)
     path = _embedded(preset) if weights is None else Path(weights)
     tensors, metadata = read_weights(path)
     if metadata.get("preset") != preset:
@@ -44,8 +57,8 @@ def load_network(
             f"{path.name} holds weights of preset '{metadata.get('preset')}', not '{preset}'; "
             "choose --preset to match"
         )
-    network = LangFlashNet(PRESETS[preset])
-    _load_strictly(network, tensors, path)
+    network = build_network(PRESETS[preset])
+    load_strictly(network, tensors, path)
     network.calibration = metadata.get("calibration", {})
     return network.eval().to(device)
 
@@ -57,25 +70,25 @@ def _embedded(preset: str) -> Path:
         raise WeightsError(f"{error}, or name a checkpoint with --weights") from None
 
 
-FROZEN = ("encoder", "local")
-"""Parts of the network that this project takes as they are and never trains."""
-
-
+@overload
+def initial_network(preset: GuidedDepth, frozen: Path, seed: int = 0) -> GuidedDepthNet: ...
+@overload
+def initial_network(preset: Preset, frozen: Path, seed: int = 0) -> LangFlashNet: ...
 def initial_network(preset: Preset, frozen: Path, seed: int = 0) -> LangFlashNet:
     """A network to train: the frozen parts from a file, every head freshly drawn from `seed`.
 
-    They go through the int8 rows they will be shipped in, so that the heads learn on what they
-    will see.
+    What is stored as int8 rows goes through them, so that the heads learn on what they will see.
 
     Args:
         frozen: a file of `save_network` (see `adopt_frozen` for the published files).
     """
     torch.manual_seed(seed)
-    network = LangFlashNet(preset)
+    network = build_network(preset)
     tensors, _ = read_weights(frozen)
-    for name in FROZEN:
+    for name in network.frozen:
         own = {k.removeprefix(f"{name}."): v for k, v in tensors.items() if k.startswith(f"{name}.")}
-        _load_strictly(getattr(network, name), dequantise(quantise(own)), frozen)
+        own = dequantise(quantise(own)) if network.compact else own
+        load_strictly(getattr(network, name), own, frozen)
     return network
 
 
@@ -83,9 +96,13 @@ def adopt_frozen(preset: Preset, encoder: Path, local: Path, out: Path, seed: in
     """Write a file to train from out of published weights: a timm state dict of the preset's
     encoder, and XFeat's. The heads in it are untrained."""
     torch.manual_seed(seed)
-    network = LangFlashNet(preset)
-    _load_strictly(network.encoder.vit, read_weights(encoder)[0], encoder)
-    _load_strictly(network.local, convert(read_weights(local)[0]), local)
+    network = build_network(preset)
+    if not isinstance(network, GuidedDepthNet):
+        raise WeightsError(
+            f"The preset '{preset.name}' takes published weights as they are; use `langflash weights import`"
+        )
+    load_strictly(network.encoder.vit, read_weights(encoder)[0], encoder)
+    load_strictly(network.local, convert(read_weights(local)[0]), local)
     save_network(network, out)
 
 
@@ -108,6 +125,9 @@ def start_from(network: LangFlashNet, weights: Path, modules: Sequence[str]) -> 
 
 def save_network(network: LangFlashNet, path: Path, metadata: Mapping | None = None) -> None:
     """Write all weights atomically. `metadata` is plain JSON: data, steps, hours, metrics, calibration."""
+    if not network.compact:
+        write_part(path, network.state_dict(), network.preset, "trained here", path.name)
+        return
     header = {
         "format": FORMAT,
         "preset": network.preset.name,
@@ -166,7 +186,12 @@ def dequantise(stored: Mapping[str, Tensor]) -> dict[str, Tensor]:
     return tensors
 
 
-def _load_strictly(module: torch.nn.Module, tensors: dict[str, Tensor], path: Path) -> None:
+def load_strictly(module: torch.nn.Module, tensors: dict[str, Tensor], path: Path) -> None:
+    """Fill a module with exactly its tensors.
+
+    Raises:
+        WeightsError: tensors are missing, surplus, misshaped or not finite; lists the first five.
+    """
     expected = {k: tuple(v.shape) for k, v in module.state_dict().items()}
     found = {k: tuple(v.shape) for k, v in tensors.items()}
     problems = [f"missing {k}" for k in expected.keys() - found.keys()]

@@ -35,8 +35,9 @@ class ResidualUnit(nn.Module):
 class Fusion(nn.Module):
     """Add the finer level, mix, double the size."""
 
-    def __init__(self, feature: int, *, coarsest: bool = False):
+    def __init__(self, feature: int, *, coarsest: bool = False, align_corners: bool = False):
         super().__init__()
+        self.align_corners = align_corners
         self.lateral = None if coarsest else ResidualUnit(feature)
         self.mix = ResidualUnit(feature)
         self.out = nn.Conv2d(feature, feature, 1)
@@ -45,16 +46,24 @@ class Fusion(nn.Module):
         if self.lateral is not None and lateral is not None:
             coarse = coarse[..., : lateral.shape[-2], : lateral.shape[-1]] + self.lateral(lateral)
         # The 1x1 convolution commutes with the bilinear resize and is four times cheaper before it.
-        return F.interpolate(
-            self.out(self.mix(coarse)), scale_factor=2.0, mode="bilinear", align_corners=False
-        )
+        return double(self.out(self.mix(coarse)), align_corners=self.align_corners)
+
+
+def double(maps: Tensor, *, align_corners: bool) -> Tensor:
+    """Maps (n, C, h, w) -> (n, C, 2h, 2w), bilinear."""
+    return F.interpolate(maps, scale_factor=2.0, mode="bilinear", align_corners=align_corners)
 
 
 class DPT(nn.Module):
-    """Four token levels -> `Paths`."""
+    """Four token levels -> `Paths`. `align_corners` is how the published heads double their maps."""
 
     def __init__(
-        self, token_dims: tuple[int, int, int, int], level_dims: tuple[int, int, int, int], feature: int
+        self,
+        token_dims: tuple[int, int, int, int],
+        level_dims: tuple[int, int, int, int],
+        feature: int,
+        *,
+        align_corners: bool = False,
     ):
         super().__init__()
         a, b, _, d = level_dims
@@ -68,7 +77,9 @@ class DPT(nn.Module):
             )
         )
         self.level = nn.ModuleList(nn.Conv2d(n, feature, 3, padding=1, bias=False) for n in level_dims)
-        self.fuse = nn.ModuleList(Fusion(feature, coarsest=i == 3) for i in range(4))
+        self.fuse = nn.ModuleList(
+            Fusion(feature, coarsest=i == 3, align_corners=align_corners) for i in range(4)
+        )
 
     def forward(self, maps: tuple[Tensor, Tensor, Tensor, Tensor]) -> Paths:
         """Fuse token maps (n, C_i, h, w), shallow first."""

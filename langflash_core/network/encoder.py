@@ -6,7 +6,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from langflash_core.network.presets import Preset
+from langflash_core.network.presets import GuidedDepth
 from langflash_core.torchvision_fix import ensure_torchvision
 
 _MEAN = (0.485, 0.456, 0.406)
@@ -29,6 +29,10 @@ class Tokens:
         """Hook `index` as feature maps (B*V, C, h, w)."""
         return tokens_to_maps(self.hooks[index].flatten(0, 1), self.grid)
 
+    def scene(self, index: int) -> "Tokens":
+        """Those of one scene of the batch, B = 1."""
+        return Tokens(tuple(hook[index : index + 1] for hook in self.hooks), self.grid)
+
 
 def tokens_to_maps(tokens: Tensor, grid: tuple[int, int]) -> Tensor:
     """(n, h*w, C) -> (n, C, h, w)."""
@@ -41,7 +45,7 @@ class Encoder(nn.Module):
     mean: Tensor
     std: Tensor
 
-    def __init__(self, preset: Preset):
+    def __init__(self, preset: GuidedDepth):
         super().__init__()
         ensure_torchvision()
         import timm  # heavy, and only importable after the line above

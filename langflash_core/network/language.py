@@ -5,13 +5,13 @@ from torch.nn import functional as F
 
 from langflash_core.network.dpt import DPT
 from langflash_core.network.encoder import Tokens
-from langflash_core.network.presets import Preset
+from langflash_core.network.presets import GuidedDepth
 
 
 class LanguageHead(nn.Module):
     """Encoder tokens -> unit vectors of the language space at four times the token grid."""
 
-    def __init__(self, preset: Preset):
+    def __init__(self, preset: GuidedDepth):
         super().__init__()
         feature = preset.language_feature
         e = preset.encoder_dim

@@ -1,92 +1,122 @@
-"""The whole network: photos in, `Prediction` out. Stages run once, in order, and are timed."""
+"""A network whatever its geometry: photos in, `Prediction` out. Stages run once, in order, timed."""
 
-import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 
-import cv2
-import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from langflash_core.errors import Cancelled
-from langflash_core.geometry.cameras import rays
-from langflash_core.network.aggregation import Aggregation
-from langflash_core.network.alignment import Correction
-from langflash_core.network.decoder import SiameseDecoder, TwoStackDecoder
-from langflash_core.network.depth import DepthHead, DepthMaps
-from langflash_core.network.encoder import Encoder, Tokens, tokens_to_maps
-from langflash_core.network.gaussians import GaussianHead, assemble_gaussians
-from langflash_core.network.grouping import (
-    Groups,
-    ScratchHead,
-    SemanticGrouping,
-    group_weights,
-    surviving,
-)
-from langflash_core.network.language import LanguageHead
-from langflash_core.network.local import LocalFeatures
-from langflash_core.network.poses import PoseInput, Poses, estimate_poses
+from langflash_core.errors import Cancelled, WeightsError
+from langflash_core.network.aggregation import Aggregation, averaged_atoms
+from langflash_core.network.encoder import Tokens
+from langflash_core.network.grouping import Groups
 from langflash_core.network.presets import Preset
-from langflash_core.network.refiner import DepthRefiner
-from langflash_core.network.splitting import split_groups
-from langflash_core.types import Prediction, Views
+from langflash_core.types import Gaussians, Prediction, Views
 
 Progress = Callable[[str, float], None]
-STAGES = (
-    "encoder", "depth", "poses", "refinement", "Gaussians", "language features", "grouping", "aggregation",
-)  # fmt: skip
+Atoms = Callable[[Tensor, Tensor], Tensor]
+Lifted = Callable[["Geometry", Views], Tensor]
+MEANING_STAGES = ("language features", "grouping", "aggregation")
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """What the geometry stages hand over; fields as in `Prediction`."""
+
+    gaussians: Gaussians
+    viewmats: Tensor
+    depths: Tensor
+    confidences: Tensor
+    unplaced: tuple[int, ...]
 
 
 class LangFlashNet(nn.Module):
-    """Learned parts of every stage; `predict` composes them with the exact ones.
+    """What both kinds of geometry share: the order of stages, grouping, and the dictionary.
 
-    Trained stage by stage: `depth` = decoder + depth_head, `refine` = refiner, `gaussians` =
-    gaussian_head, `language` = language_head, `grouping` = siamese + scratch + grouping,
-    `aggregation` = aggregation. The encoder and the local features stay frozen.
+    A subclass builds its own parts and gives `encode`, `reconstruct`, `language`,
+    `semantic_maps` and `parts`; every stage of training reads the network through these.
     """
+
+    stages: tuple[str, ...]
+    """Names of the timed steps, in order."""
+    frozen: tuple[str, ...]
+    """Parts that this project takes as they are and never trains."""
+    compact: bool
+    """Weights are stored as int8 rows; else as they are."""
+    mixes: bool = False
+    """`use_bfloat16` does something."""
+    caches_tokens: bool
+    """Training may read tokens from disk, because nothing that is trained changes them."""
+    grouping: nn.Module
+    aggregation: Aggregation
 
     def __init__(self, preset: Preset):
         super().__init__()
         self.preset = preset
         self.calibration: dict = {}
-        self.encoder = Encoder(preset)
-        self.local = LocalFeatures()
-        self.decoder = TwoStackDecoder(preset)
-        self.depth_head = DepthHead(preset)
-        self.refiner = DepthRefiner(preset)
-        self.gaussian_head = GaussianHead(preset)
-        self.language_head = LanguageHead(preset)
-        self.siamese = SiameseDecoder(preset)
-        self.scratch = ScratchHead(preset)
-        self.grouping = SemanticGrouping(preset)
-        self.aggregation = Aggregation(preset)
 
-    def levels(self, tokens: Tokens, Ks: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Level maps (B*V, C_i, h, w) of the geometry heads: two encoder hooks, two decoder depths."""
-        decoded = self.decoder(tokens, Ks)
-        deep = tuple(tokens_to_maps(t.flatten(0, 1), tokens.grid) for t in decoded)
-        return tokens.maps(0), tokens.maps(1), deep[0], deep[1]
+    def use_bfloat16(self) -> "LangFlashNet":
+        """Matrix products in bfloat16 where the network has a rule for it; else nothing changes."""
+        return self
 
-    def monocular_depth(self, tokens: Tokens, Ks: Tensor) -> DepthMaps:
-        """Prior depth in metres, (B, V, H, W)."""
-        return self.depth_head(self.levels(tokens, Ks), tokens)
+    def compiled(self, backend: str = "inductor") -> "LangFlashNet":
+        """Every part through torch.compile; the first pass of each size then takes minutes."""
+        for part in self.children():
+            part.compile(backend=backend)
+        return self
+
+    def complete(self, filled: set[str], remedy: str) -> None:
+        """Settle what has no weights after those of `filled` were read.
+
+        Raises:
+            WeightsError: a module cannot do without; ends with `remedy`.
+        """
+        missing = [name for name, _ in self.named_children() if name not in filled]
+        if missing:
+            raise WeightsError(f"There are no weights for {', '.join(missing)}; {remedy}")
+
+    @abstractmethod
+    def encode(self, images: Tensor, Ks: Tensor) -> Tokens:
+        """Shared tokens of images (B, V, 3, H, W) in [0, 1]; Ks (B, V, 3, 3) in their pixels."""
+
+    @abstractmethod
+    def reconstruct(self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: "Run") -> Geometry:
+        """The geometry stages of one scene (B = 1)."""
+
+    @abstractmethod
+    def language(self, tokens: Tokens, images: Tensor) -> Tensor:
+        """L(x), (B, V, C, h, w), unit channel norm."""
+
+    @abstractmethod
+    def semantic_maps(self, tokens: Tokens, images: Tensor) -> tuple[tuple[Tensor, ...], Tensor]:
+        """What queries read, coarse to fine (B*V, f, h, w) each, and the map that masks are read from."""
+
+    @abstractmethod
+    def parts(
+        self, tokens: Tokens, images: Tensor, size: tuple[int, int], features: Tensor | None = None
+    ) -> Tensor:
+        """w_k(x) of one scene (B = 1), (V, K, *size), sums to 1 over K; features: of `language`."""
 
     def group(self, tokens: Tokens, images: Tensor) -> tuple[Groups, ...]:
-        """Groups after each scale; the last is the answer."""
-        memories, finest = self.scratch(tokens, self.siamese(tokens), images)
+        """Groups after each scale or layer; the last is the answer."""
+        memories, finest = self.semantic_maps(tokens, images)
         return self.grouping(memories, finest, tokens.shape[1])
 
-    def parts(self, tokens: Tokens, images: Tensor, size: tuple[int, int]) -> Tensor:
-        """w_k(x) of one scene (B = 1), (V, K, *size): the surviving groups, cut into parts."""
-        memories, finest = self.scratch(tokens, self.siamese(tokens), images)
-        groups = self.grouping(memories, finest, tokens.shape[1])[-1]
-        survivors = surviving(groups, self.preset.tau_exist)
-        whole = group_weights(groups, survivors, (finest.shape[-2], finest.shape[-1]))
-        return split_groups(whole, finest, self.preset.splitting, size)
+    grouped = True
+    """The grouping has weights."""
+    aggregated = True
+    """The aggregation has weights; else atoms are plain averages."""
+
+    def dictionary(self, weights: Tensor, features: Tensor) -> Tensor:
+        """Atoms (K, C) of unit norm of one scene: weights (V, K, H, W), features (1, V, C, h, w)."""
+        small = pooled_weights(weights, features)
+        if self.aggregated:
+            return self.aggregation(small, features)[0]
+        return averaged_atoms(small, features, self.preset.eps)[0]
 
     @contextmanager
     def stopping(self, check: Callable[[], None]) -> Iterator[None]:
@@ -98,110 +128,123 @@ class LangFlashNet(nn.Module):
             for handle in handles:
                 handle.remove()
 
-    @torch.inference_mode()
     def predict(
-        self, views: Views, progress: Progress | None = None, cancelled: Callable[[], bool] | None = None
+        self,
+        views: Views,
+        progress: Progress | None = None,
+        cancelled: Callable[[], bool] | None = None,
+        atoms: Atoms | None = None,
+        groups: Lifted | None = None,
     ) -> Prediction:
         """One scene from V photos of one size (sides multiples of the patch).
+
+        Args:
+            atoms: weights (V, K, H, W) and features (1, V, C, h, w) to atoms (K, C) of unit norm;
+                None: `dictionary`.
+            groups: geometry and views to w_k(x), (V, K, H, W), sums to 1 over K; None: `parts`.
 
         Raises:
             Cancelled: `cancelled()` became true; asked before every layer and every pair of photos.
         """
-        run = _Run(progress, cancelled)
-        with self.stopping(run.check):
-            return self._predict(views, run)
+        return self.predict_scenes([views], progress, cancelled, atoms, groups)[0]
 
-    def _predict(self, views: Views, run: "_Run") -> Prediction:
-        """The stages, timed by `run`."""
+    @torch.inference_mode()
+    def predict_scenes(
+        self,
+        scenes: Sequence[Views],
+        progress: Progress | None = None,
+        cancelled: Callable[[], bool] | None = None,
+        atoms: Atoms | None = None,
+        groups: Lifted | None = None,
+    ) -> list[Prediction]:
+        """Several scenes of equally many photos of one size: the transformers see them as one batch.
+
+        `timings` of each are its share of the whole. Everything else as `predict`.
+
+        Raises:
+            Cancelled: as `predict`. ValueError: the scenes differ in shape.
+        """
+        shapes = {tuple(views.images.shape) for views in scenes}
+        if len(shapes) != 1:
+            raise ValueError(f"scenes: expected one shape of (V, 3, H, W), received {sorted(shapes)}")
+        run = Run(self.stages, progress, cancelled)
+        with nullcontext() if cancelled is None else self.stopping(run.check):
+            return self._predict(scenes, run, atoms or self.dictionary, groups)
+
+    def _predict(
+        self, scenes: Sequence[Views], run: "Run", atoms: Atoms, groups: Lifted | None
+    ) -> list[Prediction]:
+        """The stages, timed by `run`; B scenes."""
         device = next(self.parameters()).device
-        images, Ks = views.images[None].to(device), views.Ks[None].to(device)
+        images = torch.stack([views.images for views in scenes]).to(device)
+        Ks = torch.stack([views.Ks for views in scenes]).to(device)
+        size = (images.shape[-2], images.shape[-1])
         with run.stage("encoder"):
-            tokens = self.encoder(images)
-        with run.stage("depth"):
-            levels = self.levels(tokens, Ks)
-            prior = self.depth_head(levels, tokens)
-        with run.stage("poses"):
-            local = self.local(images[0])
-            poses = estimate_poses(self._pose_inputs(views, prior, local), run.check)
-            viewmats = torch.from_numpy(poses.viewmats).to(images)[None]
-        with run.stage("refinement"):
-            maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)
-        with run.stage("Gaussians"):
-            raw = self.gaussian_head(levels, images)
-            gaussians = assemble_gaussians(raw[0], images[0], maps, viewmats[0], Ks[0])
+            tokens = self.encode(images, Ks)
+        language = _beside(lambda: self.language(tokens, images), device)
+        each = [(images[b : b + 1], Ks[b : b + 1], tokens.scene(b)) for b in range(len(scenes))]
+        geometries = [
+            self.reconstruct(s, x, K, own, run) for s, (x, K, own) in zip(scenes, each, strict=True)
+        ]
         with run.stage("language features"):
-            features = self.language_head(tokens)
+            features = language()
         with run.stage("grouping"):
-            weights = self.parts(tokens, images, (images.shape[-2], images.shape[-1]))
+            if groups is not None:
+                weights = [groups(found, views) for found, views in zip(geometries, scenes, strict=True)]
+            else:
+                weights = [
+                    self.parts(own, x, size, f[None]) for (x, _, own), f in zip(each, features, strict=True)
+                ]
         with run.stage("aggregation"):
-            pooled = F.adaptive_avg_pool2d(weights, (features.shape[-2], features.shape[-1]))
-            dictionary = self.aggregation(pooled[None], features)[0]
-        return Prediction(
-            gaussians=gaussians,
-            weights=weights,
-            dictionary=dictionary,
-            space=self.preset.space,
-            viewmats=viewmats[0],
-            depths=maps.depths,
-            confidences=maps.confidences,
-            unplaced=poses.guessed,
-            warnings=tuple(_guess_warning(views.names[v]) for v in poses.guessed),
-            timings=run.timings,
-        )
-
-    def _refine(self, images, tokens, local, prior: DepthMaps, poses: Poses, viewmats, Ks) -> DepthMaps:
-        """Refined maps (V, H, W), in view 0's unit; a view of unknown pose keeps its prior."""
-        logs = [
-            _corrected(prior.log_depths[0, v], K, correction) + math.log(scale)
-            for v, (K, scale, correction) in enumerate(
-                zip(Ks[0], poses.depth_scales, poses.corrections, strict=True)
-            )
-        ]
-        scaled = DepthMaps(torch.stack(logs)[None], prior.log_errors)
-        keep = [v for v in range(images.shape[1]) if v not in poses.guessed]
-        maps = DepthMaps(scaled.log_depths[0], scaled.log_errors[0])
-        if len(keep) < 2:
-            return maps
-        chosen = Tokens(tuple(h[:, keep] for h in tokens.hooks), tokens.grid)
-        part = DepthMaps(scaled.log_depths[:, keep], scaled.log_errors[:, keep])
-        refined = self.refiner(images[:, keep], chosen, local[keep], part, viewmats[:, keep], Ks[:, keep])
-        log_depths, log_errors = maps.log_depths.clone(), maps.log_errors.clone()
-        log_depths[keep], log_errors[keep] = refined.log_depths[0], refined.log_errors[0]
-        return DepthMaps(log_depths, log_errors)
-
-    @staticmethod
-    def _pose_inputs(views: Views, prior: DepthMaps, local: Tensor) -> list[PoseInput]:
+            dictionaries = [atoms(w, f[None]) for w, f in zip(weights, features, strict=True)]
+        timings = {name: seconds / len(scenes) for name, seconds in run.timings.items()}
         return [
-            PoseInput(
-                grey=_grey(views, v),
-                K=views.Ks[v].double().numpy(),
-                size=views.size,
-                depth=prior.depths[0, v].cpu().numpy(),
-                local=local[v].cpu().numpy(),
+            Prediction(
+                gaussians=geometry.gaussians,
+                weights=own_weights,
+                dictionary=dictionary,
+                space=self.preset.space,
+                viewmats=geometry.viewmats,
+                depths=geometry.depths,
+                confidences=geometry.confidences,
+                unplaced=geometry.unplaced,
+                warnings=tuple(_left_out(views.names[v]) for v in geometry.unplaced),
+                timings=dict(timings),
             )
-            for v in range(views.num_views)
+            for views, geometry, own_weights, dictionary in zip(
+                scenes, geometries, weights, dictionaries, strict=True
+            )
         ]
 
 
-def _corrected(log_depths: Tensor, K: Tensor, correction: Correction) -> Tensor:
-    """Log depths (H, W) straightened by the matches."""
-    height, width = log_depths.shape
-    x = rays(K, width, height)[..., :2].cpu().numpy()
-    change = correction.at(x, log_depths.cpu().numpy())
-    return log_depths + torch.from_numpy(change).to(log_depths)
+def _beside(work: Callable[[], Tensor], device: torch.device) -> Callable[[], Tensor]:
+    """Starts work on a second CUDA stream, beside what follows; elsewhere it waits until it is asked for.
+
+    What the work reads must stay referenced until it is asked for.
+    """
+    if device.type != "cuda":
+        return work
+    here, side = torch.cuda.current_stream(device), torch.cuda.Stream(device)
+    side.wait_stream(here)
+    with torch.cuda.stream(side):
+        answer = work()
+
+    def joined() -> Tensor:
+        here.wait_stream(side)
+        answer.record_stream(here)
+        return answer
+
+    return joined
 
 
-def _grey(views: Views, view: int) -> np.ndarray:
-    """The largest version of the photo at hand, as (h, w) uint8."""
-    if views.sources:
-        grey = cv2.imdecode(np.frombuffer(views.sources[view], np.uint8), cv2.IMREAD_GRAYSCALE)
-        assert grey is not None, "sources are JPEG bytes that images/ wrote"
-        return grey
-    rgb = (views.images[view].movedim(0, -1).cpu().numpy() * 255).round().astype(np.uint8)
-    return cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
+def pooled_weights(weights: Tensor, features: Tensor) -> Tensor:
+    """Weights (V, K, H, W) at the size of features (1, V, C, h, w), as a batch of one scene."""
+    if weights.shape[1] == 0:
+        return weights.new_zeros(1, len(weights), 0, features.shape[-2], features.shape[-1])
+    return F.adaptive_avg_pool2d(weights, (features.shape[-2], features.shape[-1]))[None]
 
 
-def _guess_warning(name: str) -> str:
+def _left_out(name: str) -> str:
     return (
         f"{name}: too little of it could be matched with the other photos, so it is left out; "
         "take photos that share at least a third of the picture"
@@ -209,11 +252,12 @@ def _guess_warning(name: str) -> str:
 
 
 @dataclass
-class _Run:
+class Run:
     """Times stages, reports them, and stops between them."""
 
-    progress: Progress | None
-    cancelled: Callable[[], bool] | None
+    stages: tuple[str, ...]
+    progress: Progress | None = None
+    cancelled: Callable[[], bool] | None = None
     timings: dict[str, float] = field(default_factory=dict)
 
     def check(self) -> None:
@@ -225,7 +269,7 @@ class _Run:
     def stage(self, name: str) -> Iterator[None]:
         self.check()
         if self.progress is not None:
-            self.progress(name, len(self.timings) / len(STAGES))
+            self.progress(name, len(self.timings) / len(self.stages))
         start = time.perf_counter()
         yield
-        self.timings[name] = time.perf_counter() - start
+        self.timings[name] = self.timings.get(name, 0.0) + time.perf_counter() - start

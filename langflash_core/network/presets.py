@@ -1,7 +1,7 @@
 """Sizes of the network. One code path; a preset is data and nothing asks for its name.
 
-`hooks` are 0-based encoder blocks. The heads read (hook 0, hook 1, decoder middle, decoder
-end): shallow tokens carry edges and correspondence, deep ones layout and meaning.
+Two frozen dataclasses, one per kind of geometry: `GuidedDepth` (matches and depth maps) and
+`PointMaps` (points of every pixel in the first camera's frame). What both share is `Preset`.
 """
 
 from dataclasses import dataclass
@@ -22,23 +22,53 @@ class Splitting:
 
 
 @dataclass(frozen=True)
+class MaskFilter:
+    """Which of N masks are groups, as the released LangFlash decides it (SAM's recipe).
+
+    min_score: predicted IoU in (0, 1). min_stability: IoU of the mask cut at +-`offset` logits.
+    min_area: pixels of all views' mask maps together. max_overlap: IoU above which the mask of
+    the lower score goes.
+    """
+
+    min_score: float = 0.15
+    min_stability: float = 0.8
+    offset: float = 0.5
+    min_area: int = 200
+    max_overlap: float = 0.6
+
+
+@dataclass(frozen=True)
+class LSegSizes:
+    """LSeg's image tower: a ViT with a class token, and a DPT with batch norms.
+
+    trained_grid: side of the grid its position codes were trained on. hooks: 0-based blocks.
+    """
+
+    dim: int = 1024
+    depth: int = 24
+    heads: int = 16
+    patch: int = 16
+    trained_grid: int = 24
+    hooks: tuple[int, int, int, int] = (5, 11, 17, 23)
+    dpt_dims: tuple[int, int, int, int] = (256, 512, 1024, 1024)
+    dpt_feature: int = 256
+
+
+@dataclass(frozen=True, kw_only=True)
 class Preset:
-    """Everything that fixes shapes, and what the paper leaves open (blueprint section 3)."""
+    """What fixes shapes whatever the geometry, and what the paper leaves open (blueprint section 3)."""
 
     name: str
     space: str
     """Language space of the dictionary; fixes C."""
     language_dim: int
 
-    encoder: str
-    """timm model name."""
     patch: int
     encoder_dim: int
-    hooks: tuple[int, int, int, int]
-    match_hook: int
-    """Index into `hooks` of the tokens that correspondence reads (blocks 3-6 match best)."""
     native_area: int
     """Pixels of a photo as the network sees it by default."""
+    square: bool = False
+    """Photos are cut to their centre square."""
 
     decoder_dim: int
     decoder_depth: int
@@ -47,21 +77,12 @@ class Preset:
 
     dpt_dims: tuple[int, int, int, int]
     dpt_feature: int
-    language_feature: int
     sh_degree: int
-
-    sweep_planes: int
-    sweep_range: float
-    """Plane-sweep hypotheses span prior depth times exp(+-sweep_range)."""
-    sweep_groups: int
-    refiner_widths: tuple[int, int, int]
-    """Channels at 4, 2 and 1 times the token grid."""
 
     num_queries: int
     grouping_dim: int
     grouping_layers: int
     grouping_heads: int
-    semantic_depth: int
     aggregation_blocks: int
     aggregation_heads: int
 
@@ -70,7 +91,48 @@ class Preset:
     eps: float = 1e-6
 
 
-MINI = Preset(
+@dataclass(frozen=True, kw_only=True)
+class GuidedDepth(Preset):
+    """Depth maps, matches and a plane sweep give the geometry.
+
+    `hooks` are 0-based encoder blocks. The heads read (hook 0, hook 1, decoder middle, decoder
+    end): shallow tokens carry edges and correspondence, deep ones layout and meaning.
+    """
+
+    encoder: str
+    """timm model name."""
+    hooks: tuple[int, int, int, int]
+    match_hook: int
+    """Index into `hooks` of the tokens that correspondence reads (blocks 3-6 match best)."""
+    language_feature: int
+
+    sweep_planes: int
+    sweep_range: float
+    """Plane-sweep hypotheses span prior depth times exp(+-sweep_range)."""
+    sweep_groups: int
+    refiner_widths: tuple[int, int, int]
+    """Channels at 4, 2 and 1 times the token grid."""
+
+    semantic_depth: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class PointMaps(Preset):
+    """The paper's geometry: a point per pixel, all in the first camera's frame.
+
+    `decoder_hooks`: after how many decoder layers the heads look, besides the encoder's output.
+    `mask_filter`: which masks become groups; None: `tau_exist`, as the paper has it.
+    """
+
+    encoder_depth: int
+    encoder_heads: int
+    decoder_hooks: tuple[int, int, int]
+    norm_eps: float = 1e-6
+    language: LSegSizes = LSegSizes()
+    mask_filter: MaskFilter | None = MaskFilter()
+
+
+MINI = GuidedDepth(
     name="mini",
     space="minilm",
     language_dim=384,
@@ -101,4 +163,30 @@ MINI = Preset(
     aggregation_heads=8,
 )
 
-PRESETS = {MINI.name: MINI}
+FULL = PointMaps(
+    name="full",
+    space="clip",
+    language_dim=512,
+    patch=16,
+    encoder_dim=1024,
+    encoder_depth=24,
+    encoder_heads=16,
+    native_area=256 * 256,
+    square=True,
+    decoder_dim=768,
+    decoder_depth=12,
+    decoder_heads=12,
+    decoder_hooks=(6, 9, 12),
+    rope_base=100.0,
+    dpt_dims=(96, 192, 384, 768),
+    dpt_feature=256,
+    sh_degree=4,
+    num_queries=256,
+    grouping_dim=256,
+    grouping_layers=6,
+    grouping_heads=8,
+    aggregation_blocks=3,
+    aggregation_heads=8,
+)
+
+PRESETS: dict[str, Preset] = {preset.name: preset for preset in (MINI, FULL)}

@@ -16,7 +16,7 @@ from langflash_core.geometry.cameras import invert_rigid, rays
 from langflash_core.network.depth import LOG_ERROR_RANGE, DepthMaps, resize
 from langflash_core.network.dpt import ResidualUnit
 from langflash_core.network.encoder import Tokens
-from langflash_core.network.presets import Preset
+from langflash_core.network.presets import GuidedDepth
 
 _TYPICAL_LOG_ERROR = -1.5  # centres the error channel that the network reads
 
@@ -118,7 +118,7 @@ class DepthRefiner(nn.Module):
 
     offsets: Tensor  # (P,) log-depth hypotheses around the prior
 
-    def __init__(self, preset: Preset):
+    def __init__(self, preset: GuidedDepth):
         super().__init__()
         planes, widths = preset.sweep_planes, preset.refiner_widths
         self.match_hook, self.groups = preset.match_hook, preset.sweep_groups

@@ -7,7 +7,7 @@ The weights are not shipped. They are searched, in this order:
 2. the environment variable LANGFLASH_CLIP,
    both a file (open_clip or plain state dict, .safetensors or .pt; image weights are ignored)
    or a tag that open_clip downloads ("openai"),
-3. `weights/clip_vitb32.safetensors` (or .pt) under LANGFLASH_HOME, by default ~/.langflash.
+3. `weights/clip_vitb32.safetensors` (or .pt) in the cache folder (`resources.home_folder`).
 
 LSeg was trained with OpenAI's weights and plain phrases: "openai", and no prompt template.
 """
@@ -15,6 +15,7 @@ LSeg was trained with OpenAI's weights and plain phrases: "openai", and no promp
 import importlib
 import os
 import pickle
+import shutil
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -26,16 +27,34 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from langflash_core.errors import PromptError, WeightsError
+from langflash_core.files import written_atomically
+from langflash_core.resources import weights_folder
 from langflash_core.torchvision_fix import ensure_torchvision
 
 DIMENSION = 512
 ARCHITECTURE = "ViT-B-32-quickgelu"  # OpenAI's weights were trained with the approximate GELU
 _FILES = ("clip_vitb32.safetensors", "clip_vitb32.pt")
+_MEAN, _STD = (0.48145466, 0.4578275, 0.40821073), (0.26862954, 0.26130258, 0.27577711)
 # A small image tower costs nothing to build; it is thrown away at once.
 _TINY_VISION = {"image_size": 32, "patch_size": 32, "width": 64, "layers": 1}
 _REMEDY = (
     "put OpenAI's ViT-B/32 at {place}, or set LANGFLASH_CLIP to such a file or to the open_clip tag 'openai'"
 )
+
+
+class ClipImages:
+    """open_clip's ViT-B/32 image tower: whole pictures to the space of `ClipText`."""
+
+    def __init__(self, model: Any) -> None:
+        self.model = model.requires_grad_(False).eval()
+
+    def encode(self, pictures: Tensor) -> Tensor:
+        """Unit embeddings (n, 512) float32 of pictures (n, 3, 224, 224) in [0, 1]."""
+        if len(pictures) == 0:
+            return torch.zeros(0, DIMENSION)
+        mean, std = (torch.tensor(values)[:, None, None].to(pictures) for values in (_MEAN, _STD))
+        with torch.no_grad():
+            return normalize(self.model.encode_image((pictures - mean) / std).float(), dim=-1)
 
 
 class ClipText:
@@ -88,18 +107,46 @@ def load_clip(source: str | None = None) -> ClipText:
     return tower
 
 
-def _home() -> Path:
-    return Path(os.environ.get("LANGFLASH_HOME") or Path.home() / ".langflash") / "weights"
+@lru_cache(maxsize=1)
+def load_clip_images(source: str | None = None) -> ClipImages:
+    """The image tower with its weights, found as `load_clip` finds them.
+
+    Raises:
+        WeightsError: no weights are there, or they lack the image half.
+    """
+    path = _locate(source or os.environ.get("LANGFLASH_CLIP"))
+    ensure_torchvision()
+    open_clip = importlib.import_module("open_clip")
+    model = open_clip.CLIP(**open_clip.get_model_config(ARCHITECTURE))
+    try:
+        model.load_state_dict(_read(path))
+    except (RuntimeError, AttributeError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise WeightsError(f"{path} does not hold all of CLIP ViT-B/32 ({reason}): {_remedy()}.") from error
+    return ClipImages(model)
+
+
+def fetch_clip(tag: str = "openai") -> Path:
+    """Put CLIP's weights where `load_clip` looks, downloaded by open_clip; the file.
+
+    Raises:
+        WeightsError: they cannot be had.
+    """
+    source = _locate(tag)
+    target = weights_folder() / (_FILES[0] if source.suffix == ".safetensors" else _FILES[1])
+    with written_atomically(target) as temporary:
+        shutil.copyfile(source, temporary)
+    return target
 
 
 def _remedy() -> str:
-    return _REMEDY.format(place=_home() / _FILES[0])
+    return _REMEDY.format(place=weights_folder() / _FILES[0])
 
 
 def _locate(source: str | None) -> Path:
     """The file that `source` names, downloaded where it is an open_clip tag."""
     if source is None:
-        found = [_home() / name for name in _FILES if (_home() / name).is_file()]
+        found = [weights_folder() / name for name in _FILES if (weights_folder() / name).is_file()]
         if not found:
             raise WeightsError(f"The 'clip' language space needs CLIP's text weights: {_remedy()}.")
         return found[0]

@@ -16,7 +16,8 @@ def describe(scene: Scene) -> dict:
         photos, preset, source (the splat file it came from, or None), space, bytes {field: bytes,
         total}, bounding_box and core_box {min, max} in scene units (None when empty), metric_scale
         (metres per unit or None), counts, pruning (as `prune` left it, with `psnr_db` and
-        `relevance_error` where they were measured), timings {stage: seconds, total}, warnings`.
+        `relevance_error` where they were measured), refinement (None, or kept, held_out and the PSNR
+        before and after), timings {stage: seconds, total}, warnings`.
     """
     known = scene.metadata
     sizes = field_bytes(scene)
@@ -40,6 +41,7 @@ def describe(scene: Scene) -> dict:
         "metric_scale": known.get("metric_scale"),
         "counts": dict(known.get("counts", {})),
         "pruning": known.get("pruning"),
+        "refinement": known.get("refinement"),
         "timings": {**timings, "total": sum(timings.values())},
         "warnings": list(known.get("warnings", [])),
     }

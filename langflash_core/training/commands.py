@@ -25,7 +25,7 @@ from langflash_core.training.cache import (
     rooms_renderer,
 )
 from langflash_core.training.loop import LoopOptions, load_averaged, train_stage
-from langflash_core.training.stages import STAGES, Words
+from langflash_core.training.stages import STAGES, Words, guided
 from langflash_core.training.validation import MEASURES, Validator
 from langflash_core.training.words import PhraseSampler, PhraseTable, build_table
 
@@ -75,12 +75,12 @@ def run_cache(
     """
     torch.set_num_threads(1)
     plan = cache_plan(kind, scenes, first_seed)
-    network = initial_network(PRESETS[preset], start) if plan.with_tokens else None
+    encoder = guided(initial_network(PRESETS[preset], start)).encoder if plan.with_tokens else None
     furniture = load_pack(pack)
     began = time.perf_counter()
     with RoomRenderer(furniture) as renderer:
         render = rooms_renderer(furniture, renderer, held_out=plan.held_out)
-        written = fill_cache(out / kind, plan, render, network.encoder if network else None, part)
+        written = fill_cache(out / kind, plan, render, encoder, part)
     log.info("%d scenes in %.0f s", written, time.perf_counter() - began)
     return written
 

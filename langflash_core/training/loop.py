@@ -19,7 +19,7 @@ from torch import Tensor, nn
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.precision import mixed
 from langflash_core.training.batches import RoomSet
-from langflash_core.training.stages import Stage, Words
+from langflash_core.training.stages import Stage, Words, modules_of
 
 log = logging.getLogger(__name__)
 
@@ -60,7 +60,7 @@ class LoopState:
 
 def stage_parameters(network: LangFlashNet, stage: Stage) -> dict[str, Tensor]:
     """Every parameter and buffer that the stage owns, by its name in the network."""
-    prefixes = tuple(f"{name}." for name in stage.modules)
+    prefixes = tuple(f"{name}." for name in modules_of(network, stage))
     return {k: v for k, v in network.state_dict().items() if k.startswith(prefixes)}
 
 
@@ -95,7 +95,7 @@ def _freeze_all_but(network: LangFlashNet, stage: Stage) -> list[nn.Parameter]:
     network.requires_grad_(False)
     network.eval()
     trained = []
-    for name in stage.modules:
+    for name in modules_of(network, stage):
         module = getattr(network, name)
         module.requires_grad_(True).train()
         trained += list(module.parameters())
@@ -225,7 +225,7 @@ class _Run:
         with torch.inference_mode():
             metrics = self.validate(self.network) if self.validate is not None else {}
         self.network.load_state_dict(own, strict=False)
-        for name in self.stage.modules:
+        for name in modules_of(self.network, self.stage):
             getattr(self.network, name).train()
         self._write({"kind": "validation", **{k: round(v, 5) for k, v in metrics.items()}})
 

@@ -74,6 +74,29 @@ def gradient_loss(log_depths: Tensor, targets: Tensor, *, scales: int = 4) -> Te
     return total / scales
 
 
+def point_loss(points: Tensor, targets: Tensor, valid: Tensor) -> Tensor:
+    """Mean distance of points after each scene's mean distance from the first camera is made 1.
+
+    mean_x | X(x) / s - X*(x) / s* |, s and s* the mean norms over all valid pixels of all views.
+
+    Args:
+        points, targets: (B, V, H, W, 3) in view 0's frame. valid: (B, V, H, W) bool.
+
+    Returns:
+        Scalar; 0 where nothing is valid.
+
+    Source: Wang et al. 2024 (DUSt3R), its regression loss.
+    """
+    count = valid.flatten(1).sum(1).clamp_min(1)
+
+    def unit(values: Tensor) -> Tensor:
+        norms = torch.where(valid, values.norm(dim=-1), 0.0)
+        return values / (norms.flatten(1).sum(1) / count).clamp_min(EPS)[:, None, None, None, None]
+
+    kept = torch.where(valid[..., None], targets, torch.zeros_like(targets))
+    return masked_mean((unit(points) - unit(kept)).norm(dim=-1), valid)
+
+
 def error_loss(
     log_depths: Tensor, log_errors: Tensor, targets: Tensor, *, shared_offset: bool = True
 ) -> Tensor:

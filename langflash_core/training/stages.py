@@ -14,12 +14,16 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from langflash_core.errors import InputError
+from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.network.aggregation import average_atoms
 from langflash_core.network.depth import DepthMaps, resize
 from langflash_core.network.encoder import Tokens
 from langflash_core.network.gaussians import assemble_gaussians
+from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.language import LanguageHead
 from langflash_core.network.model import LangFlashNet
+from langflash_core.network.pointmaps import PointMapNet
 from langflash_core.splat import rasterize, view_colours
 from langflash_core.training.batches import SceneBatch
 from langflash_core.training.grouping import (
@@ -38,6 +42,7 @@ from langflash_core.training.losses import (
     language_loss,
     log_residual,
     photometric_loss,
+    point_loss,
 )
 from langflash_core.training.shards import NOTHING
 from langflash_core.training.words import PhraseSampler
@@ -90,7 +95,7 @@ class Stage:
 
 def depth_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
     """Monocular log depth and its expected error, from the decoder and the depth head."""
-    maps = network.monocular_depth(_tokens(batch), batch.Ks)
+    maps = guided(network).monocular_depth(tokens_of(network, batch), batch.Ks)
     logs, errors, truth = (t.flatten(0, 1).float() for t in (maps.log_depths, maps.log_errors, batch.depths))
     shape, slope = depth_loss(logs, truth), gradient_loss(logs, truth)
     error = error_loss(logs, errors, truth)
@@ -99,12 +104,13 @@ def depth_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
 
 def refine_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
     """Plane-sweep refinement of the frozen prior, with the small errors that poses will have."""
+    network = guided(network)
     with torch.no_grad():
         prior = scaled_prior(network, batch)
         prior = replace(prior, log_depths=prior.log_depths + 0.05 * _noise(batch, (1, 1), words.generator))
         viewmats = perturbed_poses(batch.viewmats, words.generator, *_pose_noise(words.generator))
         local = network.local(batch.images.flatten(0, 1))
-    maps = network.refiner(batch.images, _tokens(batch), local, prior, viewmats, batch.Ks)
+    maps = network.refiner(batch.images, tokens_of(network, batch), local, prior, viewmats, batch.Ks)
     logs, errors, truth = (t.flatten(0, 1).float() for t in (maps.log_depths, maps.log_errors, batch.depths))
     shape, slope = depth_loss(logs, truth, absolute=1.0), gradient_loss(logs, truth)
     error = error_loss(logs, errors, truth, shared_offset=False)
@@ -116,7 +122,7 @@ def scaled_prior(network: LangFlashNet, batch: SceneBatch) -> DepthMaps:
 
     At run time matches tie the two; here the truth stands in for them.
     """
-    prior = network.monocular_depth(_tokens(batch), batch.Ks)
+    prior = guided(network).monocular_depth(tokens_of(network, batch), batch.Ks)
     residuals, valid = log_residual(prior.log_depths.float(), batch.depths)
     shift = (
         torch.where(valid, -residuals, torch.full_like(residuals, torch.nan)).flatten(2).nanmedian(-1).values
@@ -172,17 +178,18 @@ def novel_views(network: LangFlashNet, batch: SceneBatch) -> list[tuple[Tensor, 
     A scene of two views renders view 1 from view 0 alone. Pixels that no Gaussian covers show the
     photo's mean colour, so that holes cost little and opacity is not pushed up to fill them.
     """
+    network = guided(network)
     context = _views(batch, range(batch.images.shape[1] - 1))
     with torch.no_grad():
         maps = network.refiner(
             context.images,
-            _tokens(context),
+            tokens_of(network, context),
             network.local(context.images.flatten(0, 1)),
             scaled_prior(network, context),
             context.viewmats,
             context.Ks,
         )
-        levels = network.levels(_tokens(context), context.Ks)
+        levels = network.levels(tokens_of(network, context), context.Ks)
     raw = network.gaussian_head(levels, context.images)
     size = (batch.size[0] // GAUSSIAN_STRIDE, batch.size[1] // GAUSSIAN_STRIDE)
     ratio = torch.tensor([1 / GAUSSIAN_STRIDE, 1 / GAUSSIAN_STRIDE, 1.0]).to(batch.Ks)[:, None]
@@ -207,8 +214,9 @@ def language_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Lo
     nothing changes. Channels of the tokens are dropped, so that the head names things by more
     than what gives away one piece of furniture.
     """
-    tokens = thinned(_tokens(batch), TOKEN_DROPOUT, words.generator)
-    hidden = language_hidden(network.language_head, tokens)  # (B*V, F, h, w)
+    head = guided(network).language_head
+    tokens = thinned(tokens_of(network, batch), TOKEN_DROPOUT, words.generator)
+    hidden = language_hidden(head, tokens)  # (B*V, F, h, w)
     scenes = [words.sampler.draw(labels, words.generator) for labels in batch.labels]
     bank = phrase_bank(torch.cat(scenes), words)
     features, rows, true = [], [], []
@@ -222,7 +230,7 @@ def language_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Lo
             named = ids.flatten()[chosen].cpu()
             rows.append(scenes[b][named])
             true.append(holds[named])
-    last = network.language_head.out
+    last = head.out
     vectors = F.linear(F.gelu(torch.cat(features)), last.weight[:, :, 0, 0], last.bias)
     texts = words.sampler.table.embeddings.to(vectors.device)
     targets = texts[torch.cat(rows).to(vectors.device)]
@@ -281,7 +289,7 @@ def grouping_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Lo
 
     Without a dense teacher its term is `instance_contrast` on the map that masks are read from.
     """
-    memories, finest = network.scratch(_tokens(batch), network.siamese(_tokens(batch)), batch.images)
+    memories, finest = network.semantic_maps(tokens_of(network, batch), batch.images)
     offset_y, offset_x = torch.randint(2, (2,), generator=words.generator).tolist()
     size = (finest.shape[-2], finest.shape[-1])
     sampled = finest[..., offset_y::2, offset_x::2]
@@ -357,9 +365,10 @@ class NamedParts:
 def named_parts(network: LangFlashNet, batch: SceneBatch) -> NamedParts | None:
     """The atoms of one scene (B = 1) made as at run time, and the instance each mostly covers."""
     with torch.no_grad():
-        features = network.language_head(_tokens(batch)).float()
+        tokens = tokens_of(network, batch)
+        features = network.language(tokens, batch.images).float()
         size = (features.shape[-2], features.shape[-1])
-        weights = network.parts(_tokens(batch), batch.images, size)[None]
+        weights = network.parts(tokens, batch.images, size, features)[None]
         masks, instances = group_masks(nearest(batch.instances[0], size))  # (G, V*h*w), (G,)
         if weights.shape[2] == 0 or len(instances) == 0:
             return None
@@ -374,10 +383,54 @@ def named_parts(network: LangFlashNet, batch: SceneBatch) -> NamedParts | None:
     )
 
 
-def _tokens(batch: SceneBatch) -> Tokens:
+def tokens_of(network: LangFlashNet, batch: SceneBatch) -> Tokens:
+    """The batch's cached tokens, or those the network gives now where its tokens may change."""
+    if not network.caches_tokens:
+        return network.encode(batch.images, batch.Ks)
     if batch.tokens is None:
         raise ValueError("batch: expected cached tokens, received none; cache with tokens")
     return batch.tokens
+
+
+def guided(network: LangFlashNet) -> GuidedDepthNet:
+    """The network, for stages that only guided depth has.
+
+    Raises:
+        InputError: it predicts point maps.
+    """
+    if not isinstance(network, GuidedDepthNet):
+        raise InputError(
+            f"The preset '{network.preset.name}' has no such stage; train {', '.join(POINT_STAGES)} instead"
+        )
+    return network
+
+
+def pointed(network: LangFlashNet) -> PointMapNet:
+    """The network, for stages that only point maps have.
+
+    Raises:
+        InputError: it predicts depth.
+    """
+    if not isinstance(network, PointMapNet):
+        raise InputError(
+            f"The preset '{network.preset.name}' predicts depth, not point maps; train depth and refine"
+        )
+    return network
+
+
+def modules_of(network: LangFlashNet, stage: Stage) -> tuple[str, ...]:
+    """Those of the stage's modules that this kind of network has."""
+    return tuple(name for name in stage.modules if hasattr(network, name))
+
+
+def points_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
+    """Point maps of all views in view 0's frame; one unit of length per scene, as no photo tells more."""
+    points = pointed(network).point_maps(tokens_of(network, batch), batch.images).float()
+    poses = invert_rigid(batch.viewmats)
+    pos_c = unproject(batch.depths, batch.Ks)
+    truth = torch.einsum("bvij,bvhwj->bvhwi", poses[..., :3, :3], pos_c) + poses[..., None, None, :3, 3]
+    loss = point_loss(points.movedim(2, -1), truth, batch.depths > 0)
+    return Loss(loss, _numbers(points=loss))
 
 
 def _noise(batch: SceneBatch, size: tuple[int, int], generator: torch.Generator) -> Tensor:
@@ -439,4 +492,11 @@ STAGES = {
             aggregation_stage,
         ),
     )
+}
+"""What `mini` trains; `full` trains `POINT_STAGES`, of which grouping and aggregation are the same."""
+
+POINT_STAGES = {
+    "points": Stage("points", ("decoder", "point_heads"), (), {2: 0.8, 3: 0.2}, 8, 2e-4, points_stage),
+    "grouping": STAGES["grouping"],
+    "aggregation": replace(STAGES["aggregation"], needs=("grouping",)),
 }

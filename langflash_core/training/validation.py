@@ -23,11 +23,13 @@ from langflash_core.training.measures import (
 from langflash_core.training.stages import (
     Words,
     group_masks,
+    guided,
     named_parts,
     nearest,
     novel_views,
     one_scene,
     scaled_prior,
+    tokens_of,
 )
 
 Measure = Callable[[LangFlashNet, SceneBatch, Words], dict[str, float | Tensor]]
@@ -67,13 +69,14 @@ def _summary(rows: list[dict[str, float | Tensor]]) -> dict[str, float]:
 def measure_depth(network: LangFlashNet, batch: SceneBatch, words: Words) -> dict[str, float | Tensor]:
     """AbsRel and delta1 after one scale per picture, and AbsRel in metres as predicted."""
     assert batch.tokens is not None
-    depths = network.monocular_depth(batch.tokens, batch.Ks).depths.float()
+    depths = guided(network).monocular_depth(batch.tokens, batch.Ks).depths.float()
     return _depth_rows(depths, batch.depths, metric=True)
 
 
 def measure_refine(network: LangFlashNet, batch: SceneBatch, words: Words) -> dict[str, float | Tensor]:
     """AbsRel of the refined and of the scale-aligned prior depth, true poses, no alignment after."""
     assert batch.tokens is not None
+    network = guided(network)
     prior = scaled_prior(network, batch)
     local = network.local(batch.images.flatten(0, 1))
     maps = network.refiner(batch.images, batch.tokens, local, prior, batch.viewmats, batch.Ks)
@@ -105,8 +108,7 @@ def measure_gaussians(network: LangFlashNet, batch: SceneBatch, words: Words) ->
 
 def measure_language(network: LangFlashNet, batch: SceneBatch, words: Words) -> dict[str, float | Tensor]:
     """Argmax of L(x) over the class groups against the truth: counts of pixels."""
-    assert batch.tokens is not None
-    features = network.language_head(batch.tokens).float()
+    features = network.language(tokens_of(network, batch), batch.images).float()
     table = words.sampler.table
     texts = table.embeddings[table.group_rows()].to(features)
     predicted = torch.einsum("bvchw,gc->bvghw", features, texts).argmax(2)
@@ -126,8 +128,7 @@ def group_map(batch: SceneBatch, words: Words, size: tuple[int, int]) -> Tensor:
 
 def measure_grouping(network: LangFlashNet, batch: SceneBatch, words: Words) -> dict[str, float | Tensor]:
     """Mean best IoU of each true instance among surviving masks, recall at 0.5, and their number."""
-    assert batch.tokens is not None
-    groups = network.group(batch.tokens, batch.images)[-1]
+    groups = network.group(tokens_of(network, batch), batch.images)[-1]
     size = (groups.mask_logits.shape[-2], groups.mask_logits.shape[-1])
     best, counts = [], []
     for b in range(batch.images.shape[0]):

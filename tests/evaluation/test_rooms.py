@@ -12,7 +12,7 @@ from langflash_core.evaluation import rooms
 from langflash_core.evaluation.tables import markdown
 from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.geometry.harmonics import colour_to_sh
-from langflash_core.network import MINI, LangFlashNet, load_network, save_network
+from langflash_core.network import MINI, GuidedDepthNet, load_network, save_network
 from langflash_core.query.spaces import language_space
 from langflash_core.training.shards import Label, write_shard
 from langflash_core.types import Gaussians, Prediction
@@ -36,7 +36,7 @@ def cache(tmp_path_factory) -> Path:
 def weights(tmp_path_factory) -> Path:
     torch.manual_seed(0)
     path = tmp_path_factory.mktemp("weights") / "mini.safetensors"
-    save_network(LangFlashNet(MINI), path)
+    save_network(GuidedDepthNet(MINI), path)
     return path
 
 
@@ -100,7 +100,7 @@ def perfect(record) -> Prediction:
     return Prediction(gaussians, weights, dictionary, "minilm", viewmats, depths, torch.ones_like(depths))
 
 
-class Knowing(LangFlashNet):
+class Knowing(GuidedDepthNet):
     """Hands out a prediction that is known beforehand; everything else is the network's own."""
 
     answer: Prediction
@@ -132,7 +132,7 @@ def test_the_truth_scores_as_the_truth():
 
 
 def test_other_words_are_judged_by_all_they_are_true_of():
-    net = LangFlashNet(MINI).eval()
+    net = GuidedDepthNet(MINI).eval()
     setting = rooms.Setting.of(net, ["chair", "lamp", "sofa", "wall"], 2.5)
     truth = torch.arange(4).repeat_interleave(25)
     maps = setting.texts[truth].reshape(10, 10, -1)

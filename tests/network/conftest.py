@@ -3,10 +3,10 @@
 import pytest
 import torch
 
-from langflash_core.network import MINI, LangFlashNet
+from langflash_core.network import MINI, GuidedDepthNet
 
 
 @pytest.fixture(scope="session")
-def untrained() -> LangFlashNet:
+def untrained() -> GuidedDepthNet:
     torch.manual_seed(0)
-    return LangFlashNet(MINI).eval()
+    return GuidedDepthNet(MINI).eval()

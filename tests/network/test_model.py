@@ -6,7 +6,7 @@ import torch
 from safetensors.torch import save_file
 
 from langflash_core.errors import Cancelled, WeightsError
-from langflash_core.network import MINI, STAGES, LangFlashNet, initial_network, load_network, save_network
+from langflash_core.network import MINI, GuidedDepthNet, initial_network, load_network, save_network
 from langflash_core.network.checkpoints import dequantise, quantise, start_from
 from langflash_core.types import Prediction, Views
 
@@ -39,7 +39,7 @@ def _assert_sound(prediction: Prediction, num_views: int, pixels: int) -> None:
     assert torch.isfinite(prediction.viewmats).all() and torch.isfinite(prediction.weights).all()
     assert torch.equal(prediction.viewmats[0], torch.eye(4))
     assert torch.allclose(prediction.dictionary.norm(dim=-1), torch.ones(1), atol=1e-5)
-    assert tuple(prediction.timings) == STAGES
+    assert tuple(prediction.timings) == GuidedDepthNet.stages
 
 
 @pytest.mark.parametrize("num_views", [1, 2, 3, 8])
@@ -79,7 +79,7 @@ def test_cancelling_stops_between_stages(untrained):
         untrained.predict(
             _views(_pattern(1)), progress=lambda s, _: seen.append(s), cancelled=lambda: len(seen) == 2
         )
-    assert tuple(seen) == STAGES[:2]
+    assert tuple(seen) == GuidedDepthNet.stages[:2]
 
 
 def test_weights_survive_a_round_trip(untrained, tmp_path):
@@ -105,7 +105,7 @@ def test_quantised_rows_of_zeros_stay_zero():
 def test_heads_of_another_shape_are_not_started_from(untrained, tmp_path):
     tensors = {f"depth_head.{k}": v + 1 for k, v in untrained.depth_head.state_dict().items()}
     save_file({**tensors, "refiner.sharpness": torch.zeros(3)}, tmp_path / "w.safetensors")
-    network = LangFlashNet(MINI)
+    network = GuidedDepthNet(MINI)
     before = network.refiner.sharpness.detach().clone()
     assert not start_from(network, tmp_path / "w.safetensors", ("refiner",))
     assert torch.equal(network.refiner.sharpness.detach(), before)
@@ -118,11 +118,12 @@ def test_initial_network_takes_the_frozen_parts_and_draws_the_rest(untrained, tm
     save_network(untrained, tmp_path / "w.safetensors")
     fresh = initial_network(MINI, tmp_path / "w.safetensors", seed=7)
     stored = load_network("mini", tmp_path / "w.safetensors")
+    assert isinstance(stored, GuidedDepthNet)
     key = "encoder.vit.blocks.0.attn.qkv.weight"
     assert torch.allclose(fresh.state_dict()[key], stored.state_dict()[key], rtol=1e-3)
     assert torch.allclose(fresh.local.skip.weight, stored.local.skip.weight)
     assert not torch.equal(fresh.decoder.embed.weight, stored.decoder.embed.weight)
-    assert isinstance(fresh, LangFlashNet)
+    assert isinstance(fresh, GuidedDepthNet)
 
 
 def _damaged(path, kind, network):

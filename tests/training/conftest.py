@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.network import MINI, LangFlashNet
+from langflash_core.network import MINI, GuidedDepthNet
 from langflash_core.training.batches import RoomSet
 from langflash_core.training.shards import Label, RoomRecord, quantise_tokens, write_shard
 from langflash_core.training.stages import Words
@@ -76,11 +76,11 @@ def words(rooms: RoomSet) -> Words:
 
 
 @pytest.fixture
-def network() -> Callable[[], LangFlashNet]:
+def network() -> Callable[[], GuidedDepthNet]:
     """Draws a fresh network; heads start alike every time."""
 
-    def draw() -> LangFlashNet:
+    def draw() -> GuidedDepthNet:
         torch.manual_seed(0)
-        return LangFlashNet(MINI)
+        return GuidedDepthNet(MINI)
 
     return draw

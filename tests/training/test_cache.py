@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from langflash_core.errors import GraphicsError, InputError
-from langflash_core.network import MINI, LangFlashNet, load_network, save_network
+from langflash_core.network import MINI, GuidedDepthNet, load_network, save_network
 from langflash_core.network.checkpoints import read_weights
 from langflash_core.rooms import RoomRenderer, load_pack
 from langflash_core.training import commands
@@ -40,7 +40,7 @@ def encoder(tmp_path_factory) -> Path:
     """A weights file with a randomly drawn encoder."""
     torch.manual_seed(0)
     path = tmp_path_factory.mktemp("weights") / "start.safetensors"
-    save_network(LangFlashNet(MINI), path)
+    save_network(GuidedDepthNet(MINI), path)
     return path
 
 
@@ -129,6 +129,7 @@ def test_from_furniture_to_weights(tmp_path: Path, encoder: Path):
     assert shard.record(0).tokens is None
     (cache / "train").mkdir()
     net = load_network("mini", encoder)
+    assert isinstance(net, GuidedDepthNet)
     renderer = RoomRenderer(load_pack(TINY_PACK))
     plan = CachePlan(0, 1, scenes_per_shard=1, three_view_every=1)
     fill_cache(

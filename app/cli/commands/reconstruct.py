@@ -34,6 +34,10 @@ def run(args: Namespace, out: TextIO) -> None:
             intrinsics=args.intrinsics,
             size=args.size,
             device=args.device,
+            precision=args.precision,
+            aggregation=args.aggregation,
+            grouping=args.grouping,
+            refine_seconds=args.refine,
             progress=progress,
         )
         progress("writing", 1.0)

@@ -1,4 +1,4 @@
-"""`langflash weights`: the checkpoints this installation holds, and whether they are sound."""
+"""`langflash weights`: the checkpoints at hand, those that can be had, and whether they are sound."""
 
 import hashlib
 import json
@@ -9,32 +9,118 @@ from typing import Any, TextIO
 from safetensors import SafetensorError, safe_open
 
 from app.cli.files import readable_file
-from app.cli.report import write_json
+from app.cli.report import ProgressBar, write_json
 from langflash_core.errors import WeightsError
 from langflash_core.network import PRESETS, load_network
-from langflash_core.resources import asset_path
+from langflash_core.network.catalogue import CATALOGUE, CLIP, OTHERS, SAM2, published
+from langflash_core.network.download import download
+from langflash_core.network.store import FORMAT, install, part_folder, read_part, verify_part
+from langflash_core.resources import asset_path, weights_folder
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """List the shipped checkpoints, or verify those named (the shipped ones when none is).
+    """List, verify, import or get checkpoints.
 
     Raises:
         WeightsError: a checkpoint is missing, damaged, or fits no network of this version.
+        DownloadError: it could not be fetched.
     """
-    paths = args.paths if args.action == "verify" and args.paths else _shipped()
+    {"list": _list, "verify": _verify, "import": _import, "get": _get}[args.action](args, out)
+
+
+def _list(args: Namespace, out: TextIO) -> None:
+    entries = [_entry(path) for path in _present()]
+    available = [
+        {
+            "name": p.name,
+            "preset": p.preset,
+            "part": p.part,
+            "about": p.about,
+            "licence": p.licence,
+            "url": p.url,
+        }
+        for p in (*CATALOGUE, *OTHERS)
+    ]
+    if args.json:
+        write_json({"weights": entries, "available": available, "folder": str(weights_folder())}, out)
+        return
+    lines = [*map(_line, entries), "", "to be had with `langflash weights get NAME`:"]
+    lines += [f"  {p['name']:<24}{p['part']:<10}{p['about']}; licence: {p['licence']}" for p in available]
+    print("\n".join(lines), file=out)
+
+
+def _verify(args: Namespace, out: TextIO) -> None:
+    paths = args.paths or _present()
     entries = [_entry(path) for path in paths]
-    if args.action == "verify":
-        for path, entry in zip(paths, entries, strict=True):
+    for path, entry in zip(paths, entries, strict=True):
+        if "modules" in entry:
+            verify_part(path, PRESETS[entry["preset"]])
+        else:
             load_network(entry["preset"], path)
-            entry["sound"] = True
+        entry["sound"] = True
+    _say(args, out, entries)
+
+
+def _import(args: Namespace, out: TextIO) -> None:
+    readable_file(args.path, "checkpoint", WeightsError)
+    _installed(args, out, args.path, args.output)
+
+
+def _get(args: Namespace, out: TextIO) -> None:
+    entry = published(args.name)
+    if entry is CLIP:
+        from langflash_core.query.clip import fetch_clip
+
+        _say_file(args, out, fetch_clip())
+        return
+    if entry is SAM2:
+        with ProgressBar() as progress:
+            _say_file(args, out, download(args.url or entry.url, weights_folder() / entry.file, progress))
+        return
+    target = weights_folder() / "downloads" / f"{entry.name}-{entry.file}"
+    with ProgressBar() as progress:
+        if not target.is_file():
+            download(args.url or entry.url, target, progress)
+        progress("converting", 1.0)
+        _installed(args, out, target, None)
+    if not args.keep:
+        target.unlink()
+
+
+def _say_file(args: Namespace, out: TextIO, path: Path) -> None:
+    if args.json:
+        write_json({"weights": [{"path": str(path), "bytes": path.stat().st_size}]}, out)
+    else:
+        print(path, file=out)
+
+
+def _installed(args: Namespace, out: TextIO, checkpoint: Path, output: Path | None) -> None:
+    preset = PRESETS[args.preset] if "preset" in args else PRESETS[published(args.name).preset]
+    written = install(checkpoint, preset, output)
+    _say(args, out, [_entry(written[0]), *({"path": str(p), "bytes": p.stat().st_size} for p in written[1:])])
+
+
+def _present() -> list[Path]:
+    """Shipped checkpoints, then imported parts."""
+    shipped = [asset_path(f"weights/{name}.safetensors") for name in PRESETS if _is_shipped(name)]
+    return shipped + [
+        p for preset in PRESETS.values() for p in sorted(part_folder(preset).glob("*.safetensors"))
+    ]
+
+
+def _is_shipped(name: str) -> bool:
+    try:
+        asset_path(f"weights/{name}.safetensors")
+    except FileNotFoundError:
+        return False
+    return True
+
+
+def _say(args: Namespace, out: TextIO, entries: list[dict[str, Any]]) -> None:
     if args.json:
         write_json({"weights": entries}, out)
     else:
         print("\n".join(_line(entry) for entry in entries), file=out)
-
-
-def _shipped() -> list[Path]:
-    return [asset_path(f"weights/{preset}.safetensors") for preset in PRESETS]
 
 
 def _entry(path: Path) -> dict[str, Any]:
@@ -44,17 +130,24 @@ def _entry(path: Path) -> dict[str, Any]:
             header = json.loads((file.metadata() or {}).get("langflash", "{}"))
     except (SafetensorError, ValueError, OSError) as problem:
         raise WeightsError(
-            f"{path} is not a readable safetensors file ({problem}); train or copy it again"
+            f"{path} is not a readable safetensors file ({problem}); train, import or copy it again"
         ) from None
     preset = header.get("preset")
     if preset not in PRESETS:
         raise WeightsError(f"{path} is no checkpoint of LangFlash: it names no preset; choose another file")
     with path.open("rb") as stream:
         checksum = hashlib.file_digest(stream, "sha256").hexdigest()
-    return {"path": str(path), "preset": preset, "bytes": path.stat().st_size, "sha256": checksum}
+    entry = {"path": str(path), "preset": preset, "bytes": path.stat().st_size, "sha256": checksum}
+    if header.get("format") == FORMAT:
+        part = read_part(path)
+        entry |= {"modules": list(part.modules), "origin": part.origin, "source": part.source}
+    return entry
 
 
 def _line(entry: dict[str, Any]) -> str:
+    size = f"{entry['bytes'] / 1e6:,.1f} MB"
+    if "preset" not in entry:
+        return f"      {size}  {entry['path']}"
     sound = "  sound" if entry.get("sound") else ""
-    size = f"{entry['bytes'] / 1e6:.1f} MB"
-    return f"{entry['preset']}  {size}  sha256 {entry['sha256'][:16]}...  {entry['path']}{sound}"
+    origin = f"  ({entry['origin']}, {entry['source']})" if entry.get("origin") else ""
+    return f"{entry['preset']}  {size}  sha256 {entry['sha256'][:16]}...  {entry['path']}{origin}{sound}"

@@ -6,7 +6,7 @@ import torch
 from PIL import Image
 
 from app.cli.parser import build_parser
-from langflash_core.network import MINI, LangFlashNet, save_network
+from langflash_core.network import MINI, GuidedDepthNet, save_network
 from tests.rooms.conftest import TINY_PACK
 
 
@@ -14,7 +14,7 @@ from tests.rooms.conftest import TINY_PACK
 def checkpoint(tmp_path_factory):
     torch.manual_seed(0)
     path = tmp_path_factory.mktemp("weights") / "drawn.safetensors"
-    save_network(LangFlashNet(MINI), path)
+    save_network(GuidedDepthNet(MINI), path)
     return path
 
 

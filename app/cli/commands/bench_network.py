@@ -1,0 +1,85 @@
+"""`langflash bench-network`: how long each stage of the network takes, and what bfloat16 costs."""
+
+import platform
+from argparse import Namespace
+from dataclasses import asdict
+from pathlib import Path
+from typing import TextIO
+
+from app.cli.files import check_output_file, readable_file
+from app.cli.report import ProgressBar, write_json
+from langflash_core.errors import InputError, WeightsError
+
+
+def run(args: Namespace, out: TextIO) -> None:
+    """Measure, print the paper's table or JSON.
+
+    Raises:
+        LangFlashError: the weights or the device cannot be used.
+    """
+    if args.weights is not None:
+        readable_file(args.weights, "checkpoint", WeightsError)
+    if args.output is not None:
+        check_output_file(args.output, (".json",))
+    import torch
+
+    from langflash_core.evaluation.speed import Plan, measure_network, speed_table
+    from langflash_core.pipeline import peak_memory_mb
+
+    device = args.device if args.device != "auto" else ("cuda" if torch.cuda.is_available() else "cpu")
+    if device == "cuda" and not torch.cuda.is_available():
+        raise InputError("There is no CUDA device that torch can use: choose --device cpu or auto.")
+    plan = Plan(tuple(args.views), tuple(args.atoms), args.repeats, args.size, not args.float32)
+    with ProgressBar() as progress:
+        progress("weights", 0.0)
+        network = _network(args, device)
+        if args.size % network.preset.patch:
+            raise InputError(
+                f"The size {args.size} does not fit: choose a multiple of {network.preset.patch} pixels."
+            )
+        if args.compile:
+            network.compiled()
+        rows = measure_network(network, plan, progress)
+    memory = torch.cuda.max_memory_allocated() / 1e6 if device == "cuda" else peak_memory_mb()
+    document = {
+        "preset": args.preset,
+        "weights": "random" if args.random else str(args.weights or "default"),
+        "device": torch.cuda.get_device_name()
+        if device == "cuda"
+        else platform.processor() or platform.machine(),
+        "threads": torch.get_num_threads(),
+        "torch": torch.__version__,
+        "size": args.size,
+        "compiled": args.compile,
+        "peak_memory_mb": None if memory is None else round(memory),
+        "rows": [asdict(row) for row in rows],
+    }
+    if args.output is not None:
+        _write(args.output, document)
+    if args.json:
+        write_json(document, out)
+    else:
+        print(f"{speed_table(rows)}\n\npeak memory {document['peak_memory_mb']} MB", file=out)
+
+
+def _network(args: Namespace, device: str):
+    """Loaded, or drawn at random: time does not depend on what the numbers are."""
+    import torch
+
+    from langflash_core.network import PRESETS, build_network, load_network
+
+    if not args.random:
+        return load_network(args.preset, args.weights, device)
+    torch.manual_seed(0)
+    return build_network(PRESETS[args.preset]).eval().to(device)
+
+
+def _write(path: Path, document: dict) -> None:
+    import io
+
+    from langflash_core.files import make_folder, write_atomically
+
+    stream = io.StringIO()
+    write_json(document, stream)
+    make_folder(path.parent)
+    write_atomically(path, stream.getvalue().encode())

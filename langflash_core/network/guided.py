@@ -1,0 +1,152 @@
+"""The network with guided depth: depth maps, matches, poses and a plane sweep give the geometry."""
+
+import math
+
+import cv2
+import numpy as np
+import torch
+from torch import Tensor
+
+from langflash_core.geometry.cameras import rays
+from langflash_core.network.aggregation import Aggregation
+from langflash_core.network.alignment import Correction
+from langflash_core.network.decoder import SiameseDecoder, TwoStackDecoder
+from langflash_core.network.depth import DepthHead, DepthMaps
+from langflash_core.network.encoder import Encoder, Tokens, tokens_to_maps
+from langflash_core.network.gaussians import GaussianHead, assemble_gaussians
+from langflash_core.network.grouping import ScratchHead, SemanticGrouping, group_weights, surviving
+from langflash_core.network.language import LanguageHead
+from langflash_core.network.local import LocalFeatures
+from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Run
+from langflash_core.network.poses import PoseInput, Poses, estimate_poses
+from langflash_core.network.presets import GuidedDepth
+from langflash_core.network.refiner import DepthRefiner
+from langflash_core.network.splitting import split_groups
+from langflash_core.types import Views
+
+
+class GuidedDepthNet(LangFlashNet):
+    """Learned parts of every stage; `reconstruct` composes them with the exact ones.
+
+    Trained stage by stage: `depth` = decoder + depth_head, `refine` = refiner, `gaussians` =
+    gaussian_head, `language` = language_head, `grouping` = siamese + scratch + grouping,
+    `aggregation` = aggregation. The encoder and the local features stay frozen.
+    """
+
+    frozen = ("encoder", "local")
+    compact = True
+    caches_tokens = True
+    stages = ("encoder", "depth", "poses", "refinement", "Gaussians", *MEANING_STAGES)
+
+    def __init__(self, preset: GuidedDepth):
+        super().__init__(preset)
+        self.encoder = Encoder(preset)
+        self.local = LocalFeatures()
+        self.decoder = TwoStackDecoder(preset)
+        self.depth_head = DepthHead(preset)
+        self.refiner = DepthRefiner(preset)
+        self.gaussian_head = GaussianHead(preset)
+        self.language_head = LanguageHead(preset)
+        self.siamese = SiameseDecoder(preset)
+        self.scratch = ScratchHead(preset)
+        self.grouping = SemanticGrouping(preset)
+        self.aggregation = Aggregation(preset)
+
+    def encode(self, images: Tensor, Ks: Tensor) -> Tokens:
+        """Four hooks of the frozen encoder; the intrinsics join later."""
+        return self.encoder(images)
+
+    def levels(self, tokens: Tokens, Ks: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Level maps (B*V, C_i, h, w) of the geometry heads: two encoder hooks, two decoder depths."""
+        decoded = self.decoder(tokens, Ks)
+        deep = tuple(tokens_to_maps(t.flatten(0, 1), tokens.grid) for t in decoded)
+        return tokens.maps(0), tokens.maps(1), deep[0], deep[1]
+
+    def monocular_depth(self, tokens: Tokens, Ks: Tensor) -> DepthMaps:
+        """Prior depth in metres, (B, V, H, W)."""
+        return self.depth_head(self.levels(tokens, Ks), tokens)
+
+    def language(self, tokens: Tokens, images: Tensor) -> Tensor:
+        """L(x) from the shared tokens, at four times their grid."""
+        return self.language_head(tokens)
+
+    def semantic_maps(self, tokens: Tokens, images: Tensor) -> tuple[tuple[Tensor, ...], Tensor]:
+        """Memories at 1, 2 and 4 times the grid, and the mask map at 8 times."""
+        return self.scratch(tokens, self.siamese(tokens), images)
+
+    def parts(
+        self, tokens: Tokens, images: Tensor, size: tuple[int, int], features: Tensor | None = None
+    ) -> Tensor:
+        """The surviving groups, cut into parts."""
+        memories, finest = self.semantic_maps(tokens, images)
+        groups = self.grouping(memories, finest, tokens.shape[1])[-1]
+        survivors = surviving(groups, self.preset.tau_exist)
+        whole = group_weights(groups, survivors, (finest.shape[-2], finest.shape[-1]))
+        return split_groups(whole, finest, self.preset.splitting, size)
+
+    def reconstruct(self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: Run) -> Geometry:
+        """Depth, poses, refined depth, Gaussians."""
+        with run.stage("depth"):
+            levels = self.levels(tokens, Ks)
+            prior = self.depth_head(levels, tokens)
+        with run.stage("poses"):
+            local = self.local(images[0])
+            poses = estimate_poses(self._pose_inputs(views, prior, local), run.check)
+            viewmats = torch.from_numpy(poses.viewmats).to(images)[None]
+        with run.stage("refinement"):
+            maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)
+        with run.stage("Gaussians"):
+            raw = self.gaussian_head(levels, images)
+            gaussians = assemble_gaussians(raw[0], images[0], maps, viewmats[0], Ks[0])
+        return Geometry(gaussians, viewmats[0], maps.depths, maps.confidences, poses.guessed)
+
+    def _refine(self, images, tokens, local, prior: DepthMaps, poses: Poses, viewmats, Ks) -> DepthMaps:
+        """Refined maps (V, H, W), in view 0's unit; a view of unknown pose keeps its prior."""
+        logs = [
+            _corrected(prior.log_depths[0, v], K, correction) + math.log(scale)
+            for v, (K, scale, correction) in enumerate(
+                zip(Ks[0], poses.depth_scales, poses.corrections, strict=True)
+            )
+        ]
+        scaled = DepthMaps(torch.stack(logs)[None], prior.log_errors)
+        keep = [v for v in range(images.shape[1]) if v not in poses.guessed]
+        maps = DepthMaps(scaled.log_depths[0], scaled.log_errors[0])
+        if len(keep) < 2:
+            return maps
+        chosen = Tokens(tuple(h[:, keep] for h in tokens.hooks), tokens.grid)
+        part = DepthMaps(scaled.log_depths[:, keep], scaled.log_errors[:, keep])
+        refined = self.refiner(images[:, keep], chosen, local[keep], part, viewmats[:, keep], Ks[:, keep])
+        log_depths, log_errors = maps.log_depths.clone(), maps.log_errors.clone()
+        log_depths[keep], log_errors[keep] = refined.log_depths[0], refined.log_errors[0]
+        return DepthMaps(log_depths, log_errors)
+
+    @staticmethod
+    def _pose_inputs(views: Views, prior: DepthMaps, local: Tensor) -> list[PoseInput]:
+        return [
+            PoseInput(
+                grey=_grey(views, v),
+                K=views.Ks[v].double().numpy(),
+                size=views.size,
+                depth=prior.depths[0, v].cpu().numpy(),
+                local=local[v].cpu().numpy(),
+            )
+            for v in range(views.num_views)
+        ]
+
+
+def _corrected(log_depths: Tensor, K: Tensor, correction: Correction) -> Tensor:
+    """Log depths (H, W) straightened by the matches."""
+    height, width = log_depths.shape
+    x = rays(K, width, height)[..., :2].cpu().numpy()
+    change = correction.at(x, log_depths.cpu().numpy())
+    return log_depths + torch.from_numpy(change).to(log_depths)
+
+
+def _grey(views: Views, view: int) -> np.ndarray:
+    """The largest version of the photo at hand, as (h, w) uint8."""
+    if views.sources:
+        grey = cv2.imdecode(np.frombuffer(views.sources[view], np.uint8), cv2.IMREAD_GRAYSCALE)
+        assert grey is not None, "sources are JPEG bytes that images/ wrote"
+        return grey
+    rgb = (views.images[view].movedim(0, -1).cpu().numpy() * 255).round().astype(np.uint8)
+    return cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)

@@ -1,0 +1,89 @@
+"""Where was the camera that sees these points at these pixels? One view, H x W points.
+
+A point map tells every pixel's place in the first camera's frame; with the intrinsics known that
+is more than enough to place the view's own camera (PnP). Source: Lepetit et al. 2009 for the
+problem, SQPnP (Terzakis and Lourakis 2020) for its solution, as OpenCV has them.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import torch
+from torch import Tensor
+
+from langflash_core.geometry.cameras import pixel_grid, project, transform
+
+_POINTS = 4000  # a regular sample; more change the pose by less than its error
+_TOLERANCE = 2.0  # pixels at 256: how far points stray in a good map
+_MIN_SHARE = 0.25  # of the sample must agree, or the map is no picture of one place
+_HALF_TRUST = 3.0  # pixels of error that count as confidence 1/2
+_NEAREST = 1e-4  # share of the median depth; points behind the camera are put there
+
+
+@dataclass(frozen=True)
+class Resection:
+    """viewmat (4, 4); share of the sampled points that agree with it, in [0, 1]."""
+
+    viewmat: np.ndarray
+    share: float
+
+    @property
+    def trusted(self) -> bool:
+        return self.share >= _MIN_SHARE
+
+
+def resect(points: Tensor, K: Tensor) -> Resection:
+    """The pose from which points (3, H, W) are seen at their own pixels; deterministic.
+
+    Args:
+        points: world, any unit. K: (3, 3) pixels.
+    """
+    height, width = points.shape[-2:]
+    step = max(1, int((height * width / _POINTS) ** 0.5))
+    grid = pixel_grid(width, height, like=points)[::step, ::step].reshape(-1, 2)
+    sample = points[:, ::step, ::step].flatten(1).T
+    usable = torch.isfinite(sample).all(1)
+    pos_w, pixels = sample[usable].double().cpu().numpy(), grid[usable].double().cpu().numpy()
+    if len(pos_w) < 6:
+        return Resection(np.eye(4), 0.0)
+    spread = float(np.median(np.linalg.norm(pos_w - np.median(pos_w, 0), axis=1)))
+    unit = spread if spread > 0 else 1.0
+    tolerance = _TOLERANCE * max(height, width) / 256
+    cv2.setRNGSeed(0)
+    found, turn, shift, inliers = cv2.solvePnPRansac(
+        pos_w / unit, pixels, K.double().cpu().numpy(), None,
+        iterationsCount=200, reprojectionError=tolerance, confidence=0.9999, flags=cv2.SOLVEPNP_SQPNP,
+    )  # fmt: skip
+    if not found or inliers is None or len(inliers) < 6:
+        return Resection(np.eye(4), 0.0)
+    keep = inliers[:, 0].astype(np.int64)
+    turn, shift = cv2.solvePnPRefineLM(
+        pos_w[keep] / unit, pixels[keep], K.double().cpu().numpy(), None, turn, shift
+    )
+    viewmat = np.eye(4)
+    viewmat[:3, :3], viewmat[:3, 3] = cv2.Rodrigues(turn)[0], shift[:, 0] * unit
+    if not np.isfinite(viewmat).all():
+        return Resection(np.eye(4), 0.0)
+    return Resection(viewmat, len(keep) / len(pos_w))
+
+
+def depths_and_confidences(points: Tensor, viewmats: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor]:
+    """z > 0 of every point in its own view, and how well it falls on its own pixel, in [0, 1].
+
+    Args:
+        points: (V, 3, H, W) world. viewmats: (V, 4, 4). Ks: (V, 3, 3), pixels.
+
+    Returns:
+        depths and confidences, (V, H, W): 1 / (1 + error / 3 px), 0 behind the camera.
+    """
+    _, _, height, width = points.shape
+    pos_c = transform(viewmats, points.flatten(2).transpose(1, 2))  # (V, H*W, 3)
+    z = pos_c[..., 2].unflatten(1, (height, width))
+    errors = project(pos_c, Ks[:, None]).unflatten(1, (height, width)) - pixel_grid(
+        width, height, like=points
+    )
+    trust = 1 / (1 + errors.norm(dim=-1) / (_HALF_TRUST * max(height, width) / 256))
+    ahead = (z > 0) & torch.isfinite(trust)
+    floor = _NEAREST * z[ahead].median() if bool(ahead.any()) else z.new_tensor(_NEAREST)
+    return torch.where(ahead, z, floor).clamp_min(floor), torch.where(ahead, trust, 0.0)

@@ -1,0 +1,88 @@
+"""Published checkpoints in, a scene out: the commands of the preset `full`, at a size for tests."""
+
+from pathlib import Path
+
+import pytest
+import torch
+
+from langflash_core.network import PRESETS
+from langflash_core.resources import asset_path
+from langflash_core.scene import load
+from tests.network import published
+from tests.network.sizes import TINY
+
+PHOTOS = [asset_path(f"photos/books_{side}.jpg") for side in ("left", "right")]
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path, monkeypatch) -> Path:
+    monkeypatch.setenv("LANGFLASH_HOME", str(tmp_path / "home"))
+    monkeypatch.setitem(PRESETS, "full", TINY)
+    return tmp_path / "home"
+
+
+@pytest.fixture
+def checkpoints(tmp_path) -> list[Path]:
+    drawn = {
+        "mixRe10kDl3dv.ckpt": published.draw_noposplat(TINY),
+        "demo_e200.ckpt": published.draw_lseg(TINY, channels=512),
+        "re10k.ckpt": published.draw_langflash(TINY),
+    }
+    for name, state in drawn.items():
+        torch.save({"state_dict": state}, tmp_path / name)
+    return [tmp_path / name for name in drawn]
+
+
+def test_imported_checkpoints_make_a_scene(run, checkpoints, tmp_path):
+    for path in checkpoints:
+        assert run("weights", "import", path).code == 0
+    listed = run("weights", "list", "--json").json()
+    parts = [Path(entry["path"]).stem for entry in listed["weights"] if entry["preset"] == "full"]
+    assert parts == ["geometry", "grouping", "language"]
+    assert {"noposplat-mix", "lseg", "langflash", "clip"} <= {entry["name"] for entry in listed["available"]}
+    assert run("weights", "verify").out.count("sound") >= 3
+    scene = tmp_path / "room.langflash"
+    made = run("reconstruct", *PHOTOS, "--preset", "full", "--size", 64, "-o", scene, "--json").json()
+    assert made["preset"] == "full" and made["space"] == "clip" and made["channels"] == 512
+    assert made["view_size"] == [64, 64] and made["sh_degree"] == 4
+    assert load(scene).metadata["photos"][0] == "books_left.jpg"
+
+
+def test_what_cannot_be_done_is_one_sentence(run, checkpoints, tmp_path):
+    scene = tmp_path / "room.langflash"
+    words = ("reconstruct", *PHOTOS, "--preset", "full", "--size", 64, "-o", scene)
+    nothing = run(*words)
+    assert nothing.code == 2 and "weights get NAME" in nothing.err
+    for path in checkpoints[:2]:
+        run("weights", "import", path)
+    for more, said in (
+        (("--aggregation", "lfa"), "aggregation has no weights"),
+        (("--grouping", "queries"), "grouping has no weights"),
+        (("--grouping", "sam2"), "SAM 2 is not at hand"),
+        (("--refine", 99999), "out of range"),
+        (("--preset", "mini", "--precision", "bfloat16"), "float32 only"),
+        (("--preset", "mini", "--aggregation", "crops"), "Crops are embedded by CLIP"),
+    ):
+        refused = run(*words, *more)
+        assert refused.code == 2 and said in refused.err and refused.err.count("\n") == 1, refused
+    assert "at least two" in run("reconstruct", PHOTOS[0], "--refine", 1, "-o", scene).err
+    assert not scene.exists()
+
+
+def test_the_stage_table_of_the_network(run, tmp_path):
+    out = tmp_path / "network.json"
+    words = ("--random", "--views", 2, 3, "--atoms", 4, 9, "--repeats", 1, "--size", 64, "-o", out)
+    document = run("bench", "network", *words, "--json").json()
+    rows = {(r["precision"], r["views"], r["atoms"], r["stage"]): r for r in document["rows"]}
+    assert len(rows) == 2 * 2 * 2 * 6 and out.is_file()
+    for (precision, views, atoms, stage), row in rows.items():
+        assert row["seconds"] > 0
+        whole = rows[precision, views, atoms, "all"]["seconds"]
+        assert row["seconds"] <= whole
+        if precision == "bfloat16" and stage != "all":
+            # 8 bits a number, and some thirty layers of random weights: a few per cent.
+            assert 0 <= row["error"] < 0.3
+    table = run("bench", "network", *words, "--float32").out
+    assert "| float32 | 3 | 9 | aggregation |" in table and "bfloat16" not in table
+    refused = run("bench", "network", "--random", "--size", 100)
+    assert refused.code == 2 and "multiple of 16" in refused.err

@@ -1,0 +1,32 @@
+"""The paper's network in small: every part there, few channels, so that tests are fast."""
+
+import os
+from dataclasses import replace
+
+import pytest
+
+from langflash_core.network.presets import FULL, LSegSizes
+
+large = pytest.mark.skipif(
+    "LANGFLASH_LARGE_TESTS" not in os.environ,
+    reason="minutes and gigabytes: set LANGFLASH_LARGE_TESTS=1 to run it",
+)
+
+TINY = replace(
+    FULL,
+    encoder_dim=48,
+    encoder_depth=3,
+    encoder_heads=4,
+    decoder_dim=32,
+    decoder_depth=4,
+    decoder_heads=2,
+    decoder_hooks=(2, 3, 4),
+    dpt_dims=(6, 8, 12, 16),
+    dpt_feature=16,
+    num_queries=12,
+    grouping_dim=16,
+    grouping_heads=4,
+    language=LSegSizes(
+        dim=32, depth=4, heads=2, trained_grid=6, hooks=(0, 1, 2, 3), dpt_dims=(6, 8, 12, 16), dpt_feature=16
+    ),
+)
