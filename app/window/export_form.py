@@ -115,8 +115,8 @@ def order(state: "State") -> Order | str:
     target = typed_target(form)
     if target is None:
         return "Type a file name."
-    own = [file.resolve() for file in (scene_file, info.path) if file is not None]
-    if target.resolve() in own:
+    own = [os.path.realpath(file) for file in (scene_file, info.path) if file is not None]
+    if os.path.realpath(target) in own:
         return "This file is the scene itself; choose another name."
     phrases, problem = _phrases(state)
     if problem:

@@ -4,9 +4,8 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.window import theme
 from app.window.asking import margin_span
-from app.window.panels import widgets
+from app.window.panels import photos, widgets
 from app.window.panels.look import Look
-from app.window.panels.photos import said_here
 from app.window.state import Mode, State
 
 _WIDTH = 244.0  # design pixels
@@ -115,8 +114,8 @@ def _trust(state: State, look: Look) -> None:
         _swatch((0.3, 0.3, 0.3), look)
         imgui.text_colored(theme.MUTED, "fewer than two can tell")
     assert state.info is not None
-    for sentence in state.info.warnings[:2]:
-        widgets.muted(said_here(sentence))
+    for sentence in photos.sentences(state.info.warnings)[:2]:
+        widgets.muted(sentence)
 
 
 def _swatch(colour: tuple[float, float, float], look: Look) -> None:

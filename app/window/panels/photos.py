@@ -1,6 +1,8 @@
 """The tray: photos with their lenses and notes, the reconstruct button, a job's progress and, at its
 end, what each stage cost."""
 
+from collections.abc import Iterable
+
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
@@ -42,6 +44,11 @@ def _sentences(state: State) -> list[str]:
     said = [photo.problem for photo in state.photos if photo.problem]
     said += [note for photo in state.photos for note in photo.notes]
     said += state.info.warnings if state.info else ()
+    return sentences(said)
+
+
+def sentences(said: Iterable[str]) -> list[str]:
+    """Warnings as sentences, each once."""
     return list(dict.fromkeys(said_here(each) for each in said))
 
 

@@ -31,6 +31,7 @@ from tests.app.window.x11 import Client
 
 PATIENCE = 120.0  # seconds without any sign of life that count as a hang, also on a busy machine
 STEPS_AT_ONCE = 12
+SLOPE_MB = 8.0  # a minute; a scene that leaked at each opening would be 20, a reconstruction hundreds
 KEYS = (
     *"wasdqehzfpkvxrbcg1234567890", "bracketleft", "bracketright", "Delete", "BackSpace", "Escape", "Return",
     "Tab", "shift+Tab", "Up", "Down", "Left", "Right", "Home", "End", "space", "F1", "F2", "minus", "plus",
@@ -271,6 +272,8 @@ class Watched:
             self.process.kill()
             code = self.process.wait()
         self._reader.join(PATIENCE)
+        assert self.process.stdout is not None
+        self.process.stdout.close()
         self._errors.close()
         return code
 
@@ -339,6 +342,8 @@ def main() -> int:
     say(f"memory {outcome.slope():+.2f} MB a minute; refused outside the folder: {len(outcome.refused)}")
     for line in sorted(set(outcome.refused))[:20]:
         say(f"  {line}")
+    if outcome.slope() > SLOPE_MB:
+        outcome.problems.append("memory grows")
     for problem in outcome.problems:
         say(f"PROBLEM {problem}")
     return 1 if outcome.problems else 0

@@ -54,8 +54,11 @@ def rehearsed():
 
 
 def cancelled_in(worker: Worker, stage: str, wait: float) -> tuple[float, float, float]:
-    """Cancel `wait` seconds into a stage. Seconds until the person hears of it, until the worker is free,
-    and MB that stayed."""
+    """Cancel `wait` seconds into a stage.
+
+    Returns:
+        Seconds until the person hears of it, until the worker is free; and MB that stayed.
+    """
     gc.collect()
     _give_back_memory()
     before = resident_mb()

@@ -1,0 +1,50 @@
+"""A short run of random input into a real window; ten minutes of it: python -m tests.app.window.monkey."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.app.window import monkey, test_window
+from tests.app.window.guarded import REFUSED, environment
+
+pytestmark = test_window.pytestmark
+SECONDS = 15.0
+
+
+def test_random_input_breaks_nothing() -> None:
+    outcome = monkey.run(SECONDS, seed=5, size=(1000, 700))
+    assert outcome.problems == []
+    assert outcome.steps > 3 and outcome.frames > 20  # it lived, however busy the machine
+    assert len(outcome.checkpoints) == 2
+
+
+def test_what_the_window_may_not_do_under_random_input(tmp_path: Path) -> None:
+    inside, outside = tmp_path / "inside", tmp_path / "outside"
+    outside.mkdir()
+    (outside / "dear.txt").write_text("dear")
+    code = f"""
+import os, pathlib, subprocess
+outside = pathlib.Path({str(outside)!r})
+for attempt in (
+    lambda: (outside / "new.txt").write_text("x"),
+    lambda: (outside / "dear.txt").open("a"),
+    lambda: (outside / "dear.txt").unlink(),
+    lambda: os.open(outside / "low.txt", os.O_CREAT | os.O_WRONLY),
+    lambda: (outside / "dear.txt").rename("taken.txt"),
+    lambda: (outside / "folder").mkdir(),
+    lambda: subprocess.run(["rm", outside / "dear.txt"]),
+):
+    try:
+        attempt()
+    except PermissionError:
+        continue
+    raise SystemExit("allowed")
+pathlib.Path("mine.txt").write_text("mine")
+"""
+    own = environment(inside, test_window.ROOT)
+    done = subprocess.run([sys.executable, "-c", code], env=own, cwd=inside, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert (inside / "mine.txt").read_text() == "mine"
+    assert os.listdir(outside) == ["dear.txt"] and (outside / "dear.txt").read_text() == "dear"
+    assert len((inside / REFUSED).read_text().splitlines()) == 7

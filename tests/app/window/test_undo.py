@@ -1,0 +1,210 @@
+"""No command takes away what a person did: each can be undone, bit for bit, or changes no edit at all."""
+
+import typing
+from dataclasses import fields, is_dataclass, replace
+from datetime import datetime
+from enum import Enum
+from pathlib import Path
+from types import NoneType, UnionType
+
+import numpy as np
+import pytest
+import torch
+
+from app.window import ask_commands, chores, commands, desk_commands, edit_commands, edit_messages
+from app.window import commands as do
+from app.window import edit_commands as edit
+from app.window.commands import apply
+from app.window.editing import Region
+from app.window.editor import _errand
+from app.window.poses import Pose
+from app.window.state import SceneInfo, State
+from app.window.worker import describe_scene
+from langflash_core.edits import Mask
+from langflash_core.query.spaces import language_space
+from langflash_core.scene.edited import edited_scene
+from tests.app.window.scenes import PHRASES, room
+
+MODULES = (commands, edit_commands, ask_commands, desk_commands)
+ARRIVES = do.SceneArrived  # another scene; the edits of the one before are kept on the disk
+SAYS_WHICH = {
+    "combine": ("replace", "add", "remove"),
+    "kind": ("info", "error"),
+    "then": ("", "delete", "select"),
+}
+GIVEN = {("mode", str): "RGB", ("pair", tuple[int, int] | None): None}  # what else would be no answer
+SIZE = (64, 48)  # pixels of the picture that regions are drawn on
+
+
+def command_classes() -> list[type]:
+    return [
+        cls
+        for module in MODULES
+        for cls in vars(module).values()
+        if isinstance(cls, type)
+        and cls.__module__ == module.__name__
+        and is_dataclass(cls)
+        and cls is not ARRIVES
+    ]
+
+
+@pytest.fixture(scope="module")
+def shown() -> State:
+    info = describe_scene(room(language_space("minilm").encode(list(PHRASES))), serial=1, name="room")
+    state = apply(State(), do.SceneArrived(info))
+    for key, phrase in enumerate(PHRASES):
+        state = apply(apply(state, do.AddPrompt()), do.EditPrompt(key, phrase))
+    return state
+
+
+@pytest.fixture(scope="module")
+def edited(shown: State) -> State:
+    """With something deleted, hidden, selected, named and merged, and something to redo."""
+    rows = np.arange(12_300)
+    for command in (
+        edit.Found(Mask.of(rows % 7 == 0), "replace", "here"), edit.Delete(),
+        edit.Found(Mask.of(rows % 5 == 0), "replace", "here"), edit.Hide(),
+        edit.RenameAtom(1, "my wall"), edit.MergeAtoms((0, 2)), edit.ToggleAtom(1),
+        edit.Found(Mask.of(rows % 3 == 0), "replace", "here"), edit.Invert(), edit.Undo(),
+        edit.FindFloaters(), edit.FloatersFound(np.linspace(0, 6, 12_300, dtype=np.float32).tobytes()),
+    ):  # fmt: skip
+        shown = apply(shown, command)
+    return shown
+
+
+def arguments(cls: type, chance: np.random.Generator, state: State) -> dict:
+    hints = typing.get_type_hints(cls, {**vars(__import__(cls.__module__, fromlist=["x"])), "State": State})
+    return {f.name: value(f.name, hints[f.name], chance, state) for f in fields(cls)}
+
+
+def value(name: str, hint, chance: np.random.Generator, state: State):
+    """Something of a type that a command may be given."""
+    origin, parts = typing.get_origin(hint), typing.get_args(hint)
+    if (name, hint) in GIVEN:
+        return GIVEN[name, hint]
+    if name in SAYS_WHICH:
+        return SAYS_WHICH[name][chance.integers(len(SAYS_WHICH[name]))]
+    if origin in (typing.Union, UnionType):
+        return value(name, parts[chance.integers(len(parts))], chance, state)
+    if hint is NoneType:
+        return None
+    if origin is tuple:
+        if parts[-1] is Ellipsis:
+            return tuple(value("", parts[0], chance, state) for _ in range(chance.integers(4)))
+        return tuple(value("", part, chance, state) for part in parts)
+    if hint is Mask:
+        return Mask.of(chance.random(12_300) < 0.3)
+    if hint is commands.Marks:
+        return state.editing.marks
+    if hint is SceneInfo:
+        return state.info
+    if hint is Pose:
+        return state.pose
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return list(hint)[chance.integers(len(list(hint)))]
+    if is_dataclass(hint) and isinstance(hint, type):
+        return hint(**arguments(hint, chance, state))
+    simple = {
+        bool: bool(chance.integers(2)), int: int(chance.integers(-1, 5)), float: float(chance.normal()),
+        str: ("", "wall", "an armchair")[chance.integers(3)], np.ndarray: np.eye(3),
+        bytes: chance.random(12_300, np.float32).tobytes(), datetime: datetime(2026, 1, 1),
+        Path: Path(f"/nowhere/{chance.integers(5)}.langflash"),
+    }  # fmt: skip
+    if hint in simple:
+        return simple[hint]
+    raise TypeError(f"a command takes {hint}: say here how to make one")
+
+
+def bits(state: State) -> tuple:
+    """All that edits hold."""
+    marks = state.editing.marks
+    assert marks is not None
+    return marks.deleted.bits, marks.hidden.bits, marks.selected.bits, marks.atoms
+
+
+@pytest.mark.parametrize("cls", command_classes(), ids=lambda cls: cls.__name__)
+def test_a_command_can_be_undone_or_changes_no_edit(cls: type, edited: State) -> None:
+    chance = np.random.default_rng(11)
+    before, history = bits(edited), edited.editing.history
+    assert history is not None
+    for _ in range(8):
+        after = apply(edited, cls(**arguments(cls, chance, edited)))
+        now = after.editing.history
+        assert now is not None and after.info is not None and edited.info is not None
+        assert after.info.scene is edited.info.scene  # the scene itself never changes
+        if now == history:
+            continue
+        there = apply(after, edit.GoTo(len(history.done)))
+        assert bits(there) == before
+        # Nothing that was done is gone: the entries before are still there, done or to redo.
+        assert (
+            now.done[: len(history.done)] == history.done
+            or now.undone[: len(history.undone)] == history.undone
+        )
+
+
+def answered(state: State, command: do.Command) -> State:
+    """A command, and what the worker finds for it."""
+    after = apply(state, command)
+    info, marks = after.info, after.editing.marks
+    assert info is not None and marks is not None
+    errand = _errand(command, after, info, marks, SIZE)
+    if isinstance(command, edit.FindFloaters):
+        errand = edit_messages.ScoreFloaters(info.serial, info.scene, marks)
+    found = None if errand is None else chores.run(errand)
+    match found:
+        case edit_messages.SelectionFound(_, mask, combine, what):
+            return apply(after, edit.Found(mask, combine, what))
+        case edit_messages.FloatersScored(_, scores):
+            return apply(after, edit.FloatersFound(scores))
+    return after
+
+
+def random_command(chance: np.random.Generator, state: State) -> do.Command:
+    """Something that a person does while editing."""
+    combine = SAYS_WHICH["combine"][chance.integers(3)]
+    points = tuple((float(x), float(y)) for x, y in chance.uniform((0, 0), SIZE, (2, 2)))
+    atom, key = int(chance.integers(3)), int(chance.integers(3))
+    choices: tuple[do.Command, ...] = (
+        edit.SelectRegion(Region(points), combine), edit.SelectRegion(Region(points, 6.0), combine),
+        edit.SelectRegion(Region(points[:1], 4.0), combine), edit.SelectByPhrase(key, combine),
+        edit.SelectAtom(atom, combine), edit.Grow(), edit.Grow(phrase=True), edit.Invert(), edit.SelectAll(),
+        edit.Deselect(), edit.Delete(), edit.Hide(), edit.Isolate(), edit.ShowAll(), edit.FindFloaters(),
+        edit.SetStrictness(float(chance.uniform(1, 6))), edit.EndFloaters("select"),
+        edit.EndFloaters("delete"), edit.SetThrough(bool(chance.integers(2))),
+        edit.RenameAtom(atom, f"thing {key}"), edit.ToggleAtom(atom), edit.MergeAtoms((atom, key)),
+        edit.Undo(), edit.Redo(), edit.GoTo(int(chance.integers(0, 200))),
+    )  # fmt: skip
+    command = choices[chance.integers(len(choices))]
+    if isinstance(command, edit.GoTo) and chance.random() < 0.9:
+        return edit.Redo()  # rarely: it may take all of them back
+    if isinstance(command, edit.Delete) and state.editing.num_selected > 200:
+        return edit.Hide()  # deleting everything early would leave nothing to edit
+    return command
+
+
+def test_200_random_edits_undone_give_the_first_state_bit_for_bit(shown: State) -> None:
+    chance = np.random.default_rng(3)
+    state, names = shown, set()
+    while len(state.editing.history.done) < 200:  # type: ignore[union-attr]
+        command = random_command(chance, state)
+        after = answered(state, command)
+        if after.editing.history != state.editing.history:
+            names.add(type(command).__name__)
+        state = after
+    assert names >= {
+        "SelectRegion", "SelectByPhrase", "SelectAtom", "Grow", "Invert", "SelectAll", "Deselect", "Delete",
+        "Hide", "Isolate", "ShowAll", "EndFloaters", "RenameAtom", "ToggleAtom", "MergeAtoms", "Undo", "Redo",
+    }  # fmt: skip
+    last, scene = bits(state), shown.info.scene  # type: ignore[union-attr]
+    assert last != bits(shown)
+    back = state
+    for _ in range(200):
+        back = apply(back, edit.Undo())
+    assert bits(back) == bits(shown) and back.editing.history.done == ()  # type: ignore[union-attr]
+    assert replace(back.editing.history, undone=()) == shown.editing.history  # type: ignore[type-var]
+    for name, tensor in vars(edited_scene(scene, back.editing.marks).gaussians).items():  # type: ignore[arg-type]
+        assert torch.equal(tensor, getattr(scene.gaussians, name)), name
+    for _ in range(200):
+        back = apply(back, edit.Redo())
+    assert bits(back) == last
