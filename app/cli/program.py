@@ -58,6 +58,11 @@ def _run(argv: Sequence[str] | None) -> int:
         args = build_parser().parse_args(joined(sys.argv[1:] if argv is None else argv))
     except SystemExit as done:  # --help and --version
         return int(done.code or 0)
+    if os.environ.get("LANGFLASH_PROGRESS"):
+        # Another program runs this one and stops it by Ctrl-C's signal. A shell starts what it runs in the
+        # background with that signal ignored, and every child inherits it.
+        with contextlib.suppress(ValueError):  # not the main thread
+            signal.signal(signal.SIGINT, signal.default_int_handler)
     command = importlib.import_module(f"app.cli.commands.{args.command.replace('-', '_')}")
     if not getattr(args, "json", False):
         return command.run(args, sys.stdout) or 0

@@ -7,6 +7,7 @@ Files are written by a thread of one, because waiting for a disk is no business 
 import logging
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from app.window.exporter import Exporter, camera_json
 from app.window.preferences import Preferences
 from app.window.recovery import Keeper, Kept
 from app.window.state import SceneInfo, State
+from langflash_core.edits import Marks, Mask
 from langflash_core.errors import LangFlashError
 from langflash_core.files import make_folder, write_atomically
 
@@ -45,7 +47,8 @@ class Citizen:
         self._restoring: Kept | None = None  # and whose scene is being opened
         self._outlived: Path | None = None
         self._copied = False  # whether the copy of an unsaved scene is complete
-        self._export_waits = False  # for that copy
+        self._export_waits = False  # for a copy
+        self._ready: set[Path] = set()  # copies for the export that are complete
         self._snapshot: tuple = ()
         self._keep_at = self._save_at = float("inf")
         self._log = _LogToWindow(dispatch)
@@ -103,6 +106,8 @@ class Citizen:
                 self._perform(desk.Opened(path))
             case desk.ChoosePair() if state.desk.choosing and not before.desk.choosing:
                 self._submit(messages.FindPair(tuple(photo.path for photo in state.photos)))
+            case desk.ShowExport() if state.dialog == "export":
+                self._copy_for_export(state)
             case desk.Export():
                 self._export(state)
             case desk.CancelExport():
@@ -124,10 +129,12 @@ class Citizen:
     def hear(self, result: messages.Result, serial: int) -> None:
         """A result of the worker."""
         match result:
-            case messages.CopyKept(of, _) if of == serial:
-                self._copied = True
-                self._snapshot = ()  # the session now has a scene to name
-                self._drop_outlived()
+            case messages.CopyKept(of, path) if of == serial:
+                if path == self._keeper.scene_file:
+                    self._copied = True
+                    self._snapshot = ()  # the session now has a scene to name
+                    self._drop_outlived()
+                self._ready.add(path)
                 if self._export_waits:
                     self._export_waits = False
                     self._dispatch(desk.Export())
@@ -148,6 +155,7 @@ class Citizen:
         if info.path is not None and not unsaved:
             self._perform(desk.Opened(info.path))
         self._copied = False
+        self._ready.clear()
         if unsaved:
             self._perform(desk.CopyAt(self._keeper.scene_file))
             self._submit(messages.KeepCopy(info.serial, info.scene, self._keeper.scene_file))
@@ -179,6 +187,25 @@ class Citizen:
 
     # Export
 
+    def _copy_for_export(self, state: State) -> None:
+        """Write what the scene's own file does not hold: unsaved edits, and the selection."""
+        info, marks = state.info, state.editing.marks
+        self._export_waits = False
+        if info is None or marks is None:
+            return
+        edited, selection = self._keeper.edited_file, self._keeper.selection_file
+        copies: dict[Path, Marks] = {}
+        if state.editing.unsaved:
+            copies[edited] = marks
+        if marks.selected:
+            rest = Mask.full(marks.selected.count) - marks.selected
+            copies[selection] = replace(marks, deleted=rest)
+        self._ready -= {edited, selection}
+        for path, wanted in copies.items():
+            self._submit(messages.KeepCopy(info.serial, info.scene, path, wanted))
+        there = (path if path in copies else None for path in (edited, selection))
+        self._perform(desk.CopiesAt(*there))
+
     def _export(self, state: State) -> None:
         if self._exporter.running:
             self._perform(do.Notify("An export is under way; wait for it, or stop it."))
@@ -187,7 +214,8 @@ class Citizen:
         if isinstance(order, str):
             self._perform(do.Notify(order))
             return
-        if state.info is not None and state.info.path is None and not self._copied:
+        source = export_form.source(state)
+        if state.info is not None and source != state.info.path and source not in self._ready:
             self._export_waits = True  # goes on when the copy is complete
             return
         try:

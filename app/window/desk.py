@@ -37,8 +37,9 @@ NO_FORM = ExportForm()
 @dataclass(frozen=True)
 class Desk:
     """compare: where the photo begins, 0 to 1 across the picture; None: not compared. choosing:
-    the best pair is being looked for. copy: where a scene that nobody saved is kept. offer: a
-    session that ended badly."""
+    the best pair is being looked for. copy: where a scene that nobody saved is kept. edited,
+    selection: copies that an export reads, of the scene with unsaved edits and of what is selected.
+    offer: a session that ended badly."""
 
     preferences: Preferences = NO_PREFERENCES
     lines: tuple[Line, ...] = ()
@@ -47,4 +48,6 @@ class Desk:
     compare: float | None = None
     choosing: bool = False
     copy: Path | None = None
+    edited: Path | None = None
+    selection: Path | None = None
     offer: Kept | None = None

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.window.messages import PairFound
+from langflash_core.edits import Marks
 from langflash_core.errors import LangFlashError
 
 if TYPE_CHECKING:
@@ -31,17 +32,18 @@ def look_at(photo: "Photo") -> tuple[float | None, tuple[str, ...]]:
     return fov, tuple(photo_notes(photo, image))
 
 
-def keep_copy(scene: "Scene", path: Path) -> None:
-    """Write a scene where a crash cannot take it.
+def keep_copy(scene: "Scene", path: Path, marks: Marks | None = None) -> None:
+    """Write a scene where a crash cannot take it, as `marks` edit it.
 
     Raises:
         OutputError: the folder cannot be written.
     """
     from langflash_core.files import make_folder
     from langflash_core.scene import save
+    from langflash_core.scene.edited import edited_scene
 
     make_folder(path.parent)
-    save(scene, path)
+    save(scene if marks is None else edited_scene(scene, marks), path)
 
 
 def find_pair(paths: tuple[Path, ...], cancelled: Callable[[], bool]) -> PairFound:

@@ -205,9 +205,11 @@ class ShowExport:
         if state.info is None:
             text = "There is no scene to export; drop photos on the window first."
             return Notify(text).apply(state)
-        if not state.desk.form.path:
-            form = replace(state.desk.form, path=str(_place(state).with_suffix(What.RGB.suffix)))
-            state = change(state, form=form)
+        form = state.desk.form
+        if not form.path:
+            form = replace(form, path=str(_place(state).with_suffix(What.RGB.suffix)))
+        selected = form.only_selected and state.editing.num_selected > 0
+        state = change(state, form=replace(form, only_selected=selected))
         return replace(state, dialog="export")
 
 
@@ -279,6 +281,17 @@ class CopyAt:
 
     def apply(self, state: State) -> State:
         return change(state, copy=self.path)
+
+
+@dataclass(frozen=True)
+class CopiesAt:
+    """Where the export reads a scene with unsaved edits, and its selection; None: there are none."""
+
+    edited: Path | None
+    selection: Path | None
+
+    def apply(self, state: State) -> State:
+        return change(state, edited=self.edited, selection=self.selection)
 
 
 # A session that ended badly

@@ -65,6 +65,11 @@ class What(Enum):
         return self not in (What.VIDEO, What.PLY, What.SPLAT, What.SCENE)
 
     @property
+    def splats(self) -> bool:
+        """Whether Gaussians are written, not pictures of them."""
+        return self in (What.PLY, What.SPLAT, What.SCENE)
+
+    @property
     def sized(self) -> bool:
         """Whether it has a size in pixels."""
         return self.looks or self is What.VIDEO
@@ -73,11 +78,13 @@ class What(Enum):
 @dataclass(frozen=True)
 class ExportForm:
     """all_views: from every photo instead of the view on show. only_found: just what answers the
-    phrases. size: of the longer side in pixels. path: as typed; an ending is added."""
+    phrases. only_selected: just the selection, where Gaussians are written. side: the longer one in
+    pixels. path: as typed; an ending is added."""
 
     what: What = What.RGB
     all_views: bool = False
     only_found: bool = False
+    only_selected: bool = False
     side: int = 1024
     seconds: float = 6.0
     path: str = ""
@@ -102,13 +109,14 @@ def order(state: "State") -> Order | str:
     form, info = state.desk.form, state.info
     if info is None:
         return "There is no scene to export; drop photos on the window first."
-    scene_file = info.path or state.desk.copy
+    scene_file = source(state)
     if scene_file is None:
         return "The scene has no file yet; save it first."
     target = typed_target(form)
     if target is None:
         return "Type a file name."
-    if os.path.realpath(target) == os.path.realpath(scene_file):
+    own = [os.path.realpath(file) for file in (scene_file, info.path) if file is not None]
+    if os.path.realpath(target) in own:
         return "This file is the scene itself; choose another name."
     phrases, problem = _phrases(state)
     if problem:
@@ -131,6 +139,16 @@ def order(state: "State") -> Order | str:
     if form.what is What.VIDEO:
         words += ["--seconds", f"{form.seconds:g}"]
     return Order(tuple(words), target, camera_file)
+
+
+def source(state: "State") -> Path | None:
+    """The scene file that the command reads: the person's own, or a copy with what it does not hold."""
+    form, desk = state.desk.form, state.desk
+    if form.only_selected and form.what.splats:
+        return desk.selection
+    if state.editing.unsaved:
+        return desk.edited
+    return None if state.info is None else state.info.path or desk.copy
 
 
 def typed_target(form: ExportForm) -> Path | None:
@@ -180,8 +198,10 @@ def remarks(state: "State") -> list[str]:
     from app.window.state import NEGATIVES
 
     form, notes = state.desk.form, []
-    if state.info is not None and state.info.path is None:
-        notes.append("The scene is not saved: the command reads a copy that goes when the window closes.")
+    if state.info is not None and source(state) != state.info.path:
+        unsaved = "edits are" if state.editing.unsaved else "scene is"
+        why = "selection is" if form.only_selected and form.what.splats else unsaved
+        notes.append(f"The {why} not saved: the command reads a copy that goes when the window closes.")
     if not (form.what.needs_phrases or form.only_found):
         return notes
     if form.what is not What.HEAT and len({prompt.threshold for prompt in state.asked}) > 1:

@@ -88,11 +88,12 @@ class MakeThumbnails:
 
 @dataclass(frozen=True)
 class KeepCopy:
-    """Write a scene that nobody saved where a crash cannot take it."""
+    """Write a scene that nobody saved where a crash cannot take it; with `marks` as they edit it."""
 
     serial: int
     scene: "Scene"
     path: Path
+    marks: Marks | None = None
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,8 @@ from langflash_core.errors import OutputError
 from langflash_core.files import make_folder, write_atomically
 
 _PREFIX = "session-"
+_EDITED, _SELECTION = f".edited{SCENE_SUFFIX}", f".selection{SCENE_SUFFIX}"
+_CONTENTS = (".json", SCENE_SUFFIX, _EDITED, _SELECTION)
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,16 @@ class Keeper:
         """Where the copy of a scene that was never saved belongs."""
         return self._folder / f"{self._stem}{SCENE_SUFFIX}"
 
+    @property
+    def edited_file(self) -> Path:
+        """Where an export finds the scene with its unsaved edits."""
+        return self._folder / f"{self._stem}{_EDITED}"
+
+    @property
+    def selection_file(self) -> Path:
+        """Where an export finds what is selected."""
+        return self._folder / f"{self._stem}{_SELECTION}"
+
     def keep(self, kept: Kept) -> None:
         """Write the session where it has changed.
 
@@ -87,7 +99,7 @@ class Keeper:
     def close(self) -> None:
         """The session has ended well."""
         self._ended = True
-        for suffix in (".json", SCENE_SUFFIX):
+        for suffix in _CONTENTS:
             with suppress(OSError):
                 (self._folder / f"{self._stem}{suffix}").unlink(missing_ok=True)
         if self._lock is not None:
@@ -141,7 +153,7 @@ def read(path: Path) -> Kept | None:
 
 def forget(path: Path) -> None:
     """Remove a kept session with its scene and its lock."""
-    for suffix in (".json", SCENE_SUFFIX, ".lock"):
+    for suffix in (*_CONTENTS, ".lock"):
         with suppress(OSError):
             path.with_suffix(suffix).unlink(missing_ok=True)
 

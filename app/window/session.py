@@ -133,7 +133,7 @@ class Session:
     @property
     def should_close(self) -> bool:
         """Whether the person has asked to leave."""
-        return self._closed or self.state.leaving or bool(glfw.window_should_close(self._window))
+        return self._closed or self.state.leaving
 
     def step(self, patience: float | None = None) -> bool:
         """Wait for something to happen, at most `patience` seconds, then draw if it did.
@@ -455,6 +455,7 @@ class Session:
         glfw.set_window_size_callback(window, waking(backend.resize_callback))
         glfw.set_window_refresh_callback(window, waking(lambda _window: None))
         glfw.set_window_focus_callback(window, waking(focus))
+        glfw.set_window_close_callback(window, waking(self._asked_to_close))
         glfw.set_drop_callback(window, waking(self._dropped))
         glfw.set_window_content_scale_callback(window, waking(self._moved_to_another_screen))
         imgui.get_platform_io().platform_get_clipboard_text_fn = lambda _ctx: _clipboard(window)
@@ -481,6 +482,11 @@ class Session:
         self._scale = _interface_scale(window)
         chosen = self.state.desk.preferences
         theme.restyle(self._scale * chosen.scale, chosen.theme)
+
+    def _asked_to_close(self, window) -> None:
+        """The close button asks before an unsaved scene is lost, as Ctrl+Q does."""
+        glfw.set_window_should_close(window, False)
+        self.dispatch(do.Leave())
 
     def _dropped(self, _window, paths: Sequence[str]) -> None:
         self.dispatch(do.OpenPaths(tuple(paths)))

@@ -184,8 +184,8 @@ class Worker:
                     self._put(make_thumbnail(path))
             case ask_messages.WritePrompts() | ask_messages.ReadPrompts() | ask_messages.DescribeAtoms():
                 self._put(insight.run(errand))
-            case KeepCopy(serial, scene, path):
-                desk_chores.keep_copy(scene, path)
+            case KeepCopy(serial, scene, path, marks):
+                desk_chores.keep_copy(scene, path, marks)
                 self._put(CopyKept(serial, path))
             case FindPair(paths):
                 self._put(desk_chores.find_pair(paths, lambda: self._stopping))

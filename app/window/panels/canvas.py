@@ -93,7 +93,7 @@ def keys(state: State) -> list[do.Command]:
     if imgui.is_key_pressed(imgui.Key.f2, False):
         issued.append(do.ShowDialog("log"))
     if imgui.is_key_pressed(imgui.Key.escape, False) and not io.want_text_input:
-        issued.append(_escape(state))
+        issued += _escape(state)
     if io.want_text_input or io.key_ctrl or state.dialog or state.info is None:
         return issued
     if imgui.is_key_pressed(imgui.Key.h, False) or imgui.is_key_pressed(imgui.Key.home, False):
@@ -115,18 +115,20 @@ def keys(state: State) -> list[do.Command]:
     return issued
 
 
-def _escape(state: State) -> do.Command:
-    """One step back: a dialog, an answer, a preview, a tool; then out."""
+def _escape(state: State) -> list[do.Command]:
+    """One step back: a menu, a dialog, an answer, a preview, a tool. Never out: one press too many would
+    end the program."""
     editing = state.editing
     if state.dialog:
-        return do.ShowDialog(None)
+        return [do.ShowDialog(None)]
+    if imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
+        imgui.internal.close_popups_except_modals()
+        return []
     if editing.card is not None or editing.asked is not None:
-        return edit.CloseCard()
+        return [edit.CloseCard()]
     if editing.floaters is not None:
-        return edit.EndFloaters()
-    if editing.tool is not Tool.MOVE:
-        return edit.SetTool(Tool.MOVE)
-    return do.Leave()
+        return [edit.EndFloaters()]
+    return [] if editing.tool is Tool.MOVE else [edit.SetTool(Tool.MOVE)]
 
 
 def _pointer(corner: ImVec2) -> Point:

@@ -60,7 +60,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
             _similarity(state, marks.atoms, look)
             imgui.end_tab_item()
         imgui.end_tab_bar()
-    issued += _moved(state, look, (left, top, width, height))
+    issued += _moved(state, look)
     imgui.end()
     imgui.pop_style_var()
     return issued if kept else [*issued, ask.OpenDictionary(False)]
@@ -74,16 +74,19 @@ def _usual(look: Look, place: ImVec2, size: ImVec2) -> tuple[int, ...]:
     return round(left), round(place.y / look.scale + 12), round(width), round(height)
 
 
-def _moved(state: State, look: Look, before: tuple[int, ...]) -> list[do.Command]:
+def _moved(state: State, look: Look) -> list[do.Command]:
     """Where the person has put the window, once the hand lets go of it."""
     corner, size = imgui.get_window_pos(), imgui.get_window_size()
     now = tuple(round(side / look.scale) for side in (corner.x, corner.y, size.x, size.y))
-    storage, key = imgui.get_state_storage(), imgui.get_id("dragged")
-    dragged = imgui.is_mouse_down(0) and imgui.is_window_focused(imgui.FocusedFlags_.child_windows)
-    let_go = storage.get_bool(key) and not dragged
-    storage.set_bool(key, dragged)
-    if not let_go or max(abs(a - b) for a, b in zip(now, before, strict=True)) <= 1:
+    storage, keys = imgui.get_state_storage(), [imgui.get_id(f"side {n}") for n in range(4)]
+    moved, before = imgui.get_id("moved"), tuple(storage.get_int(key) for key in keys)
+    for key, side in zip(keys, now, strict=True):
+        storage.set_int(key, side)
+    if now != before and not imgui.is_window_appearing():
+        storage.set_bool(moved, True)
+    if imgui.is_mouse_down(0) or not storage.get_bool(moved):
         return []
+    storage.set_bool(moved, False)
     return [desk.Prefer(replace(state.desk.preferences, dictionary=now))]
 
 
@@ -211,6 +214,7 @@ def _similarity(state: State, atoms: tuple[Atom, ...], look: Look) -> None:
                 imgui.set_tooltip(f"{first} and {second}: {matrix[row, column]:.2f}")
         implot.end_plot()
     imgui.same_line()
+    implot.push_style_var(implot.StyleVar_.plot_padding, look.vec(2, 8))  # half a number at either end
     implot.colormap_scale("##scale", -0.2, 1.0, ImVec2(scale, side), "%.1f")
-    implot.pop_style_var()
+    implot.pop_style_var(2)
     implot.pop_colormap()

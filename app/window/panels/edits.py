@@ -26,7 +26,6 @@ def draw(state: State, look: Look) -> list[do.Command]:
     widgets.heading("Edits")
     if state.editing.unsaved:
         imgui.same_line()
-        imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.MUTED, "not saved yet")
         widgets.tooltip("Kept across a crash; Ctrl+S writes the edited scene")
     labels = [

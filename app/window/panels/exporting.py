@@ -97,6 +97,13 @@ def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
         imgui.end_disabled()
         if changed:
             form = replace(form, only_found=only)
+    if what.splats:
+        imgui.same_line(0, look.px(26))
+        imgui.begin_disabled(state.desk.selection is None)
+        changed, only = widgets.checkbox("Only what is selected", form.only_selected)
+        imgui.end_disabled()
+        if changed:
+            form = replace(form, only_selected=only)
     return form
 
 
@@ -163,4 +170,7 @@ def draw_progress(state: State, look: Look) -> list[do.Command]:
     imgui.begin_disabled(now.cancelling)
     pressed = imgui.button(f"{fa.ICON_FA_STOP}  Stop the export", ImVec2(-1, 0))
     imgui.end_disabled()
+    widgets.gap(look.px(2))
+    imgui.separator()
+    widgets.gap(look.px(2))
     return [desk.CancelExport()] if pressed else []

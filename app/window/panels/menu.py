@@ -2,21 +2,29 @@
 
 from pathlib import Path
 
+from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
-from imgui_bundle import imgui
 
 from app.window import commands as do
 from app.window import desk_commands as desk
 from app.window import samples
+from app.window.panels.look import Look
 from app.window.state import State
 
 
-def draw(state: State) -> list[do.Command]:
+def draw(state: State, look: Look) -> list[do.Command]:
     """The button and its menu."""
     if imgui.button(fa.ICON_FA_BARS):
         imgui.open_popup("menu")
-    if not imgui.begin_popup("menu"):
-        return []
+    corner = ImVec2(imgui.get_item_rect_max().x, imgui.get_item_rect_max().y + look.px(6))
+    imgui.set_next_window_pos(corner, imgui.Cond_.appearing, ImVec2(1, 0))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, look.vec(12, 10))
+    issued = _items(state) if imgui.begin_popup("menu") else []
+    imgui.pop_style_var()
+    return issued
+
+
+def _items(state: State) -> list[do.Command]:
     issued: list[do.Command] = []
     shown = state.info is not None
     issued += _item(fa.ICON_FA_FOLDER_OPEN, "Open ...", "Ctrl+O", do.ShowDialog("open"))

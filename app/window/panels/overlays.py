@@ -52,7 +52,7 @@ HELP = (
     ("Ctrl + Z, Ctrl + Shift + Z", "undo, redo"),
     ("Ctrl + O, Ctrl + S, Ctrl + E", "open, save, export"),
     ("Ctrl + P, F2", "preferences, log"),
-    ("Ctrl + Q", "leave"),
+    ("Esc, Ctrl + Q", "one step back, leave"),
 )
 
 _CLOSING = do.ShowDialog | do.SaveScene | do.OpenPaths | ask.SavePrompts | ask.LoadPrompts | desk.Export
@@ -68,6 +68,8 @@ def draw_toasts(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
         imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
         imgui.push_style_color(imgui.Col_.window_bg, imgui.get_style().color_(imgui.Col_.popup_bg))
         imgui.begin(f"##toast{toast.key}", None, widgets.PLAIN | imgui.WindowFlags_.no_focus_on_appearing)
+        if not imgui.is_popup_open("", imgui.PopupFlags_.any_popup):  # menus and dialogs stay in front
+            imgui.internal.bring_window_to_display_front(imgui.internal.get_current_window())
         issued += _toast(toast, look)
         bottom -= imgui.get_window_height() + look.px(8)
         imgui.end()

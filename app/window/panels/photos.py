@@ -48,12 +48,13 @@ def _sentences(state: State) -> list[str]:
 
 
 def sentences(said: Iterable[str]) -> list[str]:
-    """Warnings as sentences, each once; what the core says of its command line in the window's words."""
-    own = (each.replace("on the command line, --fov tells it", HOW_TO_TELL) for each in said)
-    return list(dict.fromkeys(_sentence(each) for each in own))
+    """Warnings as sentences, each once."""
+    return list(dict.fromkeys(said_here(each) for each in said))
 
 
-def _sentence(text: str) -> str:
+def said_here(text: str) -> str:
+    """A warning as a sentence; what the core says of its command line in the window's words."""
+    text = text.replace("on the command line, --fov tells it", HOW_TO_TELL)
     return text[:1].upper() + text[1:].rstrip(".") + "."
 
 
@@ -210,7 +211,7 @@ def _details(state: State, index: int, photo: Photo, look: Look) -> list[do.Comm
         imgui.close_current_popup()
     widgets.tooltip("Take it out of the tray")
     for note in photo.notes:
-        _warning(_sentence(note))
+        _warning(said_here(note))
     imgui.end_popup()
     return issued
 

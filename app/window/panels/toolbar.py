@@ -30,7 +30,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     width = width if roomy else look.px(_BUTTONS)
     imgui.same_line(imgui.get_window_width() - width - look.px(8))
     issued += _fov(state, look) if roomy else []
-    return issued + dictionary.button(state) + _home(state) + _files(state)
+    return issued + dictionary.button(state) + _home(state) + _files(state, look)
 
 
 def _fov(state: State, look: Look) -> list[do.Command]:
@@ -57,7 +57,7 @@ def _home(state: State) -> list[do.Command]:
     return issued
 
 
-def _files(state: State) -> list[do.Command]:
+def _files(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     imgui.same_line()
     imgui.begin_disabled(state.info is None)
@@ -70,7 +70,7 @@ def _files(state: State) -> list[do.Command]:
     widgets.tooltip("Export pictures, masks, videos, splats  (Ctrl+E)")
     imgui.end_disabled()
     imgui.same_line()
-    return issued + menu.draw(state)
+    return issued + menu.draw(state, look)
 
 
 def draw_views(state: State, look: Look) -> list[do.Command]:
@@ -91,7 +91,7 @@ def draw_views(state: State, look: Look) -> list[do.Command]:
                 pressed = imgui.button(str(view), ImVec2(height, height))
             else:
                 imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(3, 3))
-                pressed = imgui.image_button("view", picture[0], ImVec2(height * picture[1], height))
+                pressed = imgui.image_button("view", picture[0], ImVec2(round(height * picture[1]), height))
                 imgui.pop_style_var()
         widgets.tooltip(f"Stand where photo {view} was taken")
         if pressed:

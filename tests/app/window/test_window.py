@@ -326,6 +326,9 @@ def test_drops_a_real_drop_and_escape(program: Program, scene_file: Path, tmp_pa
     assert any(broken.name in toast for toast in state["toasts"])
     assert state["scene"] == "room.langflash"  # the old scene is still there
     program.xdotool("key", "Escape")
+    program.at_rest()
+    assert not program.state["closed"]  # one press too many ends nothing
+    program.xdotool("key", "ctrl+q")
     state = program.until(lambda s: s["closed"], "the end")
     assert state["gl_errors"] == []
     assert program._process.wait(PATIENCE) == 0
