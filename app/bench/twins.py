@@ -85,8 +85,8 @@ class SwitchedRenderer(SplatRenderer):
 
 class _ThreeSigmaPrograms(Programs):
     def get(self, vertex, fragment=None, defines=None, varyings=()):
-        chosen = "bench/project_three_sigma.vert" if vertex == "project.vert" else vertex
-        return super().get(chosen, fragment, defines, varyings)
+        cut = {"CUT": 3.0} if vertex == "project.vert" else {}
+        return super().get(vertex, fragment, {**(defines or {}), **cut}, varyings)
 
 
 class ThreeSigma(SplatBuffers):
