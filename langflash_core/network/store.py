@@ -132,10 +132,15 @@ def assemble_network(
             _fill(network, name, part.path, device)
         filled.update(fresh)
     network.complete(filled, _advice(preset))
+    return channels_last(network).to(device)
+
+
+def channels_last(network: LangFlashNet) -> LangFlashNet:
+    """The same numbers in another order: convolutions are a fifth to a third faster on a CPU."""
     for parameter in network.parameters():
-        if parameter.ndim == 4:  # convolutions are a fifth to a third faster on a CPU with channels last
+        if parameter.ndim == 4:
             parameter.data = parameter.data.contiguous(memory_format=torch.channels_last)
-    return network.to(device)
+    return network
 
 
 def verify_part(path: Path, preset: Preset) -> None:

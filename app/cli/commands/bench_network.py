@@ -67,11 +67,13 @@ def _network(args: Namespace, device: str):
     import torch
 
     from langflash_core.network import PRESETS, build_network, load_network
+    from langflash_core.network.store import channels_last
 
     if not args.random:
         return load_network(args.preset, args.weights, device)
     torch.manual_seed(0)
-    return build_network(PRESETS[args.preset]).eval().to(device)
+    network = build_network(PRESETS[args.preset]).eval()
+    return (network if network.compact else channels_last(network)).to(device)
 
 
 def _write(path: Path, document: dict) -> None:
