@@ -110,6 +110,14 @@ class Guide:
         self._client.close()
 
 
+def hero(guide: Guide, folder: Path) -> None:
+    """The first picture of the README."""
+    guide.ask("plant")
+    guide.tell(do.SetMode(Mode.HEAT))
+    guide.rest()
+    write_picture(guide.screen(), folder / "hero.png")
+
+
 def modes(guide: Guide, folder: Path) -> None:
     """One sheet of every mode."""
     guide.ask(*PHRASES)
@@ -193,7 +201,7 @@ def recovery(guide: Guide, folder: Path) -> None:
     guide.tell(desk.EndSessionOffer(False))
 
 
-TOUR = (modes, asking, pointing, editing, dictionary, trust, exporting)
+TOUR = (hero, modes, asking, pointing, editing, dictionary, trust, exporting)
 
 
 def main() -> int:
