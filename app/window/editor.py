@@ -35,6 +35,7 @@ class Editor:
         self._perform = perform
         self._token = secrets.token_hex(4)
         self._kept = False  # whether edits of the scene on show lie on the disk
+        self._wrote = False  # or have ever, and what removes them may not have come to it
         self._restoring: Path | None = None  # a file of edits
         self._read: tuple | None = None  # what the last reading under the pointer was of
         self.keep_at = float("inf")
@@ -119,7 +120,7 @@ class Editor:
             if before.info.path is None or before.editing.history is None or before.editing.history.done:
                 text = f"The edits of {before.info.name} are kept; open it again to go on with them."
                 self._perform(do.Notify(text, "info"))
-        self._kept, self.keep_at = False, float("inf")
+        self._kept, self._wrote, self.keep_at = False, False, float("inf")
         if info.num_atoms and info.history is not None:
             self._submit(edit_messages.NameAtoms(info.serial, info.scene, info.history.marks))
         if self._restoring is not None and info.history is not None and info.history.done:
@@ -169,7 +170,7 @@ class Editor:
     def _write(self, info: SceneInfo, history: History) -> None:
         place = (info.name, info.path, self._token)
         self._submit(edit_messages.KeepEdits(info.serial, info.scene, history, *place))
-        self._kept = True
+        self._kept = self._wrote = True
 
     def close(self, state: State) -> None:
         """At the end, when the worker is gone: edits that a saved file would miss are kept."""
@@ -179,7 +180,7 @@ class Editor:
         try:
             if state.editing.unsaved and history.done:
                 autosave.keep(info.scene, history, info.name, info.path, self._token)
-            elif self._kept or history.done:
+            elif self._wrote or history.done:
                 autosave.forget(info.scene, self._token)
         except LangFlashError:
             return  # there is no window left to say it in

@@ -156,7 +156,8 @@ class Session:
         if not self._inbox and not self._due(now):
             return False
         drawing = self._frame(now)
-        self._worker.begin()
+        if imgui.get_frame_count() >= AWAKE_FRAMES:  # what appeared first has found its place by now
+            self._worker.begin()
         self.lag = time.perf_counter() - start - nap - drawing
         return True
 

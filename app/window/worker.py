@@ -56,6 +56,8 @@ AHEAD = ("torch._dynamo", "torchvision", "timm", "langflash_core.pipeline")
 """What a reconstruction imports, some seconds of it, in the order in which one needs the next."""
 IDLE = 0.5  # seconds without a request until the next of them is imported
 THUMBNAIL_SIDE = 320  # pixels of the longer side
+_SAVES = (WriteScene, ask_messages.WritePrompts)  # what a person asked for and `stop` waits for
+SAVING_SECONDS = 60.0  # at the most
 _ANSWERS_REPLACE = (Encode, Answer, Weigh)  # a newer one of these makes an older one pointless
 
 
@@ -70,6 +72,7 @@ class Worker:
         self._notify = notify
         self._changed = threading.Condition()
         self._errands: list[Errand] = []
+        self._errand: Errand | None = None  # under way
         self._job: Job | None = None
         self._token = 0  # of the newest job; an older one is silent
         self._busy = False  # with a job that speaks
@@ -117,9 +120,14 @@ class Worker:
                 return results
 
     def stop(self, patience: float = 2.0) -> None:
-        """End the thread. A stage that takes longer than `patience` dies with the process."""
+        """End the thread, after what it was told to save. A stage that takes longer than `patience`
+        dies with the process."""
         with self._changed:
             self._stopping = True
+            self._errands = [errand for errand in self._errands if isinstance(errand, _SAVES)]
+            if self._errands or isinstance(self._errand, _SAVES):
+                patience = SAVING_SECONDS
+                self.begin()
             self._changed.notify()
         if self._thread.ident is not None:
             self._thread.join(patience)
@@ -137,7 +145,7 @@ class Worker:
         while True:
             with self._changed:
                 self._changed.wait_for(self._asked, IDLE if foresight else None)
-                if self._stopping:
+                if self._stopping and not self._errands:
                     return
                 job, token = self._job, self._token
                 if not self._errands:
@@ -156,9 +164,11 @@ class Worker:
         """Run what is queued now, oldest first."""
         while True:
             with self._changed:
-                if self._stopping or not self._errands:
+                if not self._errands:
+                    self._errand = None
                     return
                 errand, *self._errands = self._errands
+                self._errand = errand
             try:
                 self._put_all(errand)
             except LangFlashError as error:

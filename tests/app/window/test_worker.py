@@ -135,3 +135,15 @@ def test_stop_is_quick_and_repeatable(scene_file: Path) -> None:
     worker.stop(patience=PATIENCE)
     worker.stop()
     assert time.monotonic() - start < PATIENCE
+
+
+@pytest.mark.parametrize("began", [True, False])
+def test_what_was_to_be_saved_is_saved_before_the_end(scene_file: Path, tmp_path: Path, began: bool) -> None:
+    """Behind other errands, and even where the thread has not started yet."""
+    scene = load(scene_file)
+    worker = Worker(begins=began)
+    worker.submit(messages.MakeThumbnails((scene_file,) * 50))
+    worker.submit(messages.WriteScene(scene, tmp_path / "saved.langflash"))
+    worker.stop()
+    assert len(load(tmp_path / "saved.langflash").gaussians) == len(scene.gaussians)
+    assert not [file for file in tmp_path.iterdir() if file.name != "saved.langflash"]
