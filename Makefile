@@ -38,9 +38,9 @@ run: $(STAMP)-package $(STAMP)-gl
 	mkdir -p out; \
 	$(BIN)/langflash reconstruct $(PHOTOS) -o out/living_room.langflash; \
 	for what in rgb depth atoms; do \
-		$(BIN)/langflash render out/living_room.langflash --size 798x588 --what $$what -o out/$$what.png; \
+		$(BIN)/langflash render out/living_room.langflash --size 756x588 --what $$what -o out/$$what.png; \
 	done; \
-	$(BIN)/langflash query out/living_room.langflash plant floor window --size 798x588 -o out/query; \
+	$(BIN)/langflash query out/living_room.langflash plant floor window --size 756x588 -o out/query; \
 	echo "The pictures are in $(CURDIR)/out and $(CURDIR)/out/query."
 
 test: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window

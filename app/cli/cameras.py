@@ -74,7 +74,11 @@ def read_camera(path: Path) -> Camera:
         raise ViewError(
             f"{path} has no {missing}; a camera file holds viewmat, K, width and height"
         ) from None
-    except (ValueError, TypeError, RecursionError) as problem:
+    except (json.JSONDecodeError, UnicodeDecodeError, TypeError, RecursionError):
+        raise ViewError(
+            f"{path} is not a camera file: expected a JSON object with viewmat, K, width and height"
+        ) from None
+    except ValueError as problem:
         raise ViewError(
             f"{path} is not a camera file: {problem}; it holds viewmat, K, width and height"
         ) from None

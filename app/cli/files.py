@@ -55,12 +55,12 @@ def check_output_file(path: Path, suffixes: tuple[str, ...] = (), inputs: Iterab
     Raises:
         OutputError: wrong ending, a folder, an input of the same command, or not writable.
     """
-    if suffixes and path.suffix.lower() not in suffixes:
-        raise OutputError(f"cannot write {path.name}: this version writes {', '.join(suffixes)}; rename -o")
     if path.is_dir():
         raise OutputError(f"cannot write {path}: it is a folder; give a file name")
     if any(path.exists() and other.exists() and path.samefile(other) for other in inputs):
         raise OutputError(f"{path} is also an input; choose another -o")
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise OutputError(f"cannot write {path.name}: this command writes {', '.join(suffixes)}; rename -o")
     check_folder(path.parent)
     return path
 

@@ -329,7 +329,7 @@ def _add_bench_network(commands) -> None:
     command.add_argument(
         "--repeats", type=whole_count, default=3, metavar="N", help="the median counts (default: 3)"
     )
-    command.add_argument("--size", type=pixel_side, default=256, metavar="PX", help="(default: 256)")
+    command.add_argument("--size", type=pixel_side, metavar="PX", help="(default: 224; full: 256)")
     command.add_argument(
         "--float32", action="store_true", help="leave bfloat16 out, which is slow where a CPU lacks it"
     )

@@ -358,11 +358,12 @@ class StandAgain:
 
 
 def _place(state: State) -> Path:
-    """Beside the scene, or beside its first photo."""
+    """Beside the scene, or beside its first photo, by a name of its own."""
     assert state.info is not None
-    if state.info.path is not None:
-        return state.info.path
-    return state.photos[0].path if state.photos else Path.home() / "scene.langflash"
+    beside = state.info.path
+    if beside is None:
+        beside = state.photos[0].path if state.photos else Path.home() / "scene"
+    return beside.with_name(f"{beside.stem}_view")
 
 
 def _change_photo(state: State, path: Path, **changes: Any) -> State:

@@ -115,9 +115,14 @@ def order(state: "State") -> Order | str:
     target = typed_target(form)
     if target is None:
         return "Type a file name."
-    own = [os.path.realpath(file) for file in (scene_file, info.path) if file is not None]
-    if os.path.realpath(target) in own:
+    if os.path.realpath(target) in _real(scene_file, info.path):
         return "This file is the scene itself; choose another name."
+    written = (
+        target,
+        *(target.with_name(f"{target.stem}_{v}{target.suffix}") for v in range(len(info.views))),
+    )
+    if _real(*written) & _real(*(photo.path for photo in state.photos)):
+        return "This would replace a photo of the tray; choose another name."
     phrases, problem = _phrases(state)
     if problem:
         return problem
@@ -139,6 +144,10 @@ def order(state: "State") -> Order | str:
     if form.what is What.VIDEO:
         words += ["--seconds", f"{form.seconds:g}"]
     return Order(tuple(words), target, camera_file)
+
+
+def _real(*files: Path | None) -> set[str]:
+    return {os.path.realpath(file) for file in files if file is not None}
 
 
 def source(state: "State") -> Path | None:

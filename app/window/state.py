@@ -221,5 +221,7 @@ class State:
 
     @property
     def wants_maps(self) -> bool:
-        """Whether the picture needs the weight maps and not only colour and depth."""
-        return self.mode.of_atoms or (self.mode.answers and bool(self.asked))
+        """Whether the picture needs the weight maps and not only colour and depth: to show them, or
+        for a phrase that has no score yet."""
+        waiting = any(prompt.score is None for prompt in self.asked)
+        return self.mode.of_atoms or waiting or (self.mode.answers and bool(self.asked))

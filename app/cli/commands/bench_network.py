@@ -1,5 +1,6 @@
 """`langflash bench-network`: how long each stage of the network takes, and what bfloat16 costs."""
 
+import math
 import platform
 from argparse import Namespace
 from dataclasses import asdict
@@ -24,18 +25,20 @@ def run(args: Namespace, out: TextIO) -> None:
     import torch
 
     from langflash_core.evaluation.speed import Plan, measure_network, speed_table
+    from langflash_core.network import PRESETS
     from langflash_core.pipeline import peak_memory_mb
 
     device = args.device if args.device != "auto" else ("cuda" if torch.cuda.is_available() else "cpu")
     if device == "cuda" and not torch.cuda.is_available():
         raise InputError("There is no CUDA device that torch can use: choose --device cpu or auto.")
-    plan = Plan(tuple(args.views), tuple(args.atoms), args.repeats, args.size, not args.float32)
+    side = args.size or math.isqrt(PRESETS[args.preset].native_area)
+    plan = Plan(tuple(args.views), tuple(args.atoms), args.repeats, side, not args.float32)
     with ProgressBar() as progress:
         progress("weights", 0.0)
         network = _network(args, device)
-        if args.size % network.preset.patch:
+        if side % network.preset.patch:
             raise InputError(
-                f"The size {args.size} does not fit: choose a multiple of {network.preset.patch} pixels."
+                f"The size {side} does not fit: choose a multiple of {network.preset.patch} with --size."
             )
         if args.compile:
             network.compiled()
@@ -49,7 +52,7 @@ def run(args: Namespace, out: TextIO) -> None:
         else platform.processor() or platform.machine(),
         "threads": torch.get_num_threads(),
         "torch": torch.__version__,
-        "size": args.size,
+        "size": side,
         "compiled": args.compile,
         "peak_memory_mb": None if memory is None else round(memory),
         "rows": [asdict(row) for row in rows],
@@ -70,7 +73,10 @@ def _network(args: Namespace, device: str):
     from langflash_core.network.store import channels_last
 
     if not args.random:
-        return load_network(args.preset, args.weights, device)
+        try:
+            return load_network(args.preset, args.weights, device)
+        except WeightsError as error:
+            raise WeightsError(f"{error}; --random measures without weights") from None
     torch.manual_seed(0)
     network = build_network(PRESETS[args.preset]).eval()
     return (network if network.compact else channels_last(network)).to(device)

@@ -21,7 +21,7 @@ def run(args: Namespace, out: TextIO) -> None:
         readable_file(photo, "photo", ImageError)
     if args.weights is not None:
         readable_file(args.weights, "checkpoint", WeightsError)
-    check_output_file(args.output, inputs=args.photos)
+    check_output_file(args.output, (".langflash",), inputs=args.photos)
     from langflash_core import pipeline
     from langflash_core.scene import describe, save
 

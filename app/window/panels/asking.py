@@ -37,6 +37,15 @@ def field(state: State, prompt: Prompt) -> tuple[bool, str]:
     return changed, text
 
 
+def take_caret(state: State) -> bool:
+    """Whether the last field is a new one that should have the caret now; true once."""
+    storage, place = imgui.get_state_storage(), imgui.get_id("caret")
+    wanted = storage.get_int(place, 0) == len(state.prompts)
+    if wanted:
+        storage.set_int(place, 0)
+    return wanted
+
+
 def remembered(text: str) -> list[do.Command]:
     """To call after a field: what was typed there becomes a recent phrase."""
     return [ask.Remember(text)] if imgui.is_item_deactivated_after_edit() and text.strip() else []
@@ -55,6 +64,7 @@ def tools(state: State, look: Look) -> list[do.Command]:
     imgui.begin_disabled(full)
     if imgui.button(f"{fa.ICON_FA_PLUS}  Add a phrase"):
         issued.append(do.AddPrompt())
+        imgui.get_state_storage().set_int(imgui.get_id("caret"), len(state.prompts) + 1)
     imgui.end_disabled()
     imgui.same_line(0, look.px(6))
     imgui.begin_disabled(not state.asking.recent)

@@ -18,9 +18,10 @@ def draw(state: State, look: Look) -> list[do.Command]:
     """The prompts section."""
     issued: list[do.Command] = []
     widgets.heading("Find")
+    caret = state.prompts[-1].key if asking.take_caret(state) else None
     for prompt in state.prompts:
         imgui.push_id(prompt.key)
-        issued += _row(state, prompt, look)
+        issued += _row(state, prompt, look, prompt.key == caret)
         imgui.pop_id()
     issued += asking.tools(state, look)
     issued += scores.draw(state, look)
@@ -29,7 +30,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     return issued
 
 
-def _row(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
+def _row(state: State, prompt: Prompt, look: Look, caret: bool) -> list[do.Command]:
     issued: list[do.Command] = []
     corner = imgui.get_cursor_screen_pos()
     changed, colour = imgui.color_edit3("##colour", list(prompt.colour), _SWATCH)
@@ -39,6 +40,8 @@ def _row(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     imgui.same_line()
     imgui.set_next_item_width(imgui.get_content_region_avail().x - 3 * look.px(38))
     frame = theme.LINE if prompt.like else theme.RAISED  # a chip that stands for a place, not for its words
+    if caret:
+        imgui.set_keyboard_focus_here()
     with widgets.colours(frame_bg=frame):
         changed, text = asking.field(state, prompt)
     issued += asking.remembered(text)

@@ -81,7 +81,9 @@ def test_what_each_mode_needs() -> None:
     for mode in Mode:
         silent, spoken = (replace(state, mode=mode) for state in (State(), asked("door")))
         assert silent.wants_maps == mode.of_atoms
-        assert spoken.wants_maps == (mode.of_atoms or mode.answers)
+        assert spoken.wants_maps  # to be answered
+        answered = replace(spoken, prompts=tuple(replace(p, score=0.9) for p in spoken.prompts))
+        assert answered.wants_maps == (mode.of_atoms or mode.answers)
     assert not any(mode.of_atoms and mode.answers for mode in Mode)
 
 

@@ -129,7 +129,9 @@ def test_negatives_and_what_needs_weight_maps() -> None:
     assert not after(State(), do.SetMode(Mode.HEAT)).wants_maps
     assert after(State(), do.SetMode(Mode.ATOMS)).wants_maps
     asked = after(State(), do.EditPrompt(0, "door"))
-    assert asked.wants_maps and not after(asked, do.SetMode(Mode.DEPTH)).wants_maps
+    assert asked.wants_maps and after(asked, do.SetMode(Mode.DEPTH)).wants_maps  # it has no score yet
+    answered = after(asked, do.Answered(((0, "door", 0.9),)), do.SetMode(Mode.DEPTH))
+    assert answered.prompts[0].score == 0.9 and not answered.wants_maps
 
 
 def test_toasts_are_shown_once_expire_and_close() -> None:

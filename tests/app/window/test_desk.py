@@ -19,7 +19,7 @@ from app.window.panels.status import fitting
 from app.window.poses import Pose, Vector
 from app.window.preferences import PANEL_WIDTHS
 from app.window.recovery import Kept
-from app.window.state import Mode, SceneInfo, State
+from app.window.state import Mode, Photo, SceneInfo, State
 from langflash_core.edits import Atom, History, Marks, Mask
 from langflash_core.scene import save
 from tests.app.window.scenes import room
@@ -257,3 +257,16 @@ def test_a_restored_session_has_its_photos_phrases_camera_and_mode() -> None:
     assert shown.info is not None and (shown.info.name, shown.info.path) == ("kitchen", None)
     turned_down = after(State(), desk.OfferSession(kept), desk.EndSessionOffer(restore=False))
     assert turned_down == State()
+
+
+def test_an_export_never_replaces_a_photo() -> None:
+    """Neither by the name it offers, nor by one that is typed, nor by one of several views' files."""
+    photos = (Photo(Path("/p/left.png")), Photo(Path("/p/left_1.png")))
+    state = replace(scene(None), photos=photos)
+    state = after(state, desk.CopyAt(Path("/state/copy.langflash")), desk.ShowExport())
+    assert state.desk.form.path == "/p/left_view.png"
+    assert not isinstance(export_form.order(state), str)
+    for path in ("/p/left.png", "/p/left"):
+        assert "photo" in str(export_form.order(form(state, path=path)))
+    views = form(state, path="/p/left.png", all_views=True)
+    assert "photo" in str(export_form.order(replace(views, photos=photos[1:])))

@@ -148,3 +148,16 @@ def test_typing_never_holds_a_frame_up(program: Program) -> None:
             break
     assert min(excess) <= SLOWER, f"slowest frame over idle: {[round(1000 * e) for e in excess]} ms"
     assert program.state["gl_errors"] == []
+
+
+def test_a_new_phrase_has_the_caret_and_is_answered_in_any_mode(program: Program) -> None:
+    click(program, 30, SIZE[1] - 12)
+    program.xdotool("key", "1")
+    program.until(lambda s: s["mode"] == "RGB", "the colours")
+    rows = len(program.state["prompts"])
+    program.click("Add a phrase")
+    program.until(lambda s: len(s["prompts"]) == rows + 1, "another row")
+    time.sleep(0.5)
+    program.xdotool("type", "--delay", "60", "lamp")
+    program.until(lambda s: s["prompts"][-1][0] == "lamp", "the phrase in its field")
+    program.until(lambda s: s["prompts"][-1][1] is not None and s["mode"] == "RGB", "its score")
