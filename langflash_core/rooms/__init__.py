@@ -6,6 +6,7 @@ World of a room: metres, y up. World of a sample: its first camera, OpenCV axes.
 from langflash_core.rooms.catalogue import (
     HELD_OUT_LIBRARIES,
     TRAIN_LIBRARIES,
+    VALIDATION_LIBRARIES,
     Catalogue,
     Item,
     load_catalogue,
@@ -19,6 +20,7 @@ from langflash_core.rooms.sample import RoomViews, render_room
 __all__ = [
     "HELD_OUT_LIBRARIES",
     "TRAIN_LIBRARIES",
+    "VALIDATION_LIBRARIES",
     "Catalogue",
     "Instance",
     "Item",

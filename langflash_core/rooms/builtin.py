@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from langflash_core.rooms.catalogue import Item
 from langflash_core.rooms.objfile import Material, Soup, smooth_normals
+from langflash_core.rooms.solids import box, grid_triangles
 
 KIND_PLAIN, KIND_ART, KIND_RUG, KIND_FABRIC, KIND_MIRROR = 0, 1, 2, 3, 4
 LIBRARY = "builtin"
@@ -48,20 +49,6 @@ def builtin_models() -> tuple[Builtin, ...]:
         _window("french window", (1.50, 2.12), 0.0, 2),
         _door((0.88, 2.05)),
     )
-
-
-def box(size: tuple[float, float, float], centre: tuple[float, float, float]) -> Float[np.ndarray, "12 3 3"]:
-    """Triangles of an axis-aligned box, facing out."""
-    half = np.array(size) / 2
-    sides = []
-    for axis in range(3):
-        for sign in (-1.0, 1.0):
-            u, v = (axis + 1) % 3, (axis + 2) % 3
-            quad = np.zeros((4, 3))
-            quad[:, axis] = sign
-            quad[:, u], quad[:, v] = np.array([-1, 1, 1, -1]) * sign, [-1, -1, 1, 1]
-            sides += [quad[[0, 1, 2]], quad[[0, 2, 3]]]
-    return np.array(sides) * half + np.array(centre)
 
 
 def _item(
@@ -136,7 +123,7 @@ def _curtain(name: str, face: tuple[float, float]) -> Builtin:
     rows = np.linspace(0.0, 1.0, 7)
     depth = 0.05 * np.sin(x * 2 * np.pi * 6.0)[None] * (0.6 + 0.4 * (1 - rows))[:, None]
     grid = np.stack(np.broadcast_arrays(x[None] * width, rows[:, None] * height, depth), axis=-1)
-    cloth = _grid_triangles(grid)
+    cloth = grid_triangles(grid)
     looks = {"cloth": (Material((0.8, 0.78, 0.74)), KIND_FABRIC)}
     return Builtin(
         _item(name, ("drapes",), "curtain", (width, height, 0.10), "1"),
@@ -153,7 +140,7 @@ def _cushion(name: str, tags: tuple[str, ...], size: tuple[float, float, float])
     top = np.stack([x * pinch * size[0] / 2, size[1] / 2 * (1 + bulge), z * pinch * size[2] / 2], axis=-1)
     bottom = top * [1, -1, 1] + [0, size[1], 0]
     looks = {"cloth": (Material((0.75, 0.72, 0.7)), KIND_FABRIC)}
-    body = np.concatenate([_grid_triangles(top), _grid_triangles(bottom)])
+    body = np.concatenate([grid_triangles(top), grid_triangles(bottom)])
     return Builtin(_item(name, tags, "cushion", size, "1"), _soup([(body, 0)], ("cloth",), (0, 2)), looks)
 
 
@@ -226,11 +213,4 @@ def _door(face: tuple[float, float]) -> Builtin:
     }
     return Builtin(
         _item("door", (), "door", (width, height, 0.14), "1"), _soup(parts, tuple(looks), (0, 1)), looks
-    )
-
-
-def _grid_triangles(grid: Float[np.ndarray, "R C 3"]) -> Float[np.ndarray, "F 3 3"]:
-    a, b, c, d = grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]
-    return np.concatenate(
-        [np.stack([a, b, c], 2).reshape(-1, 3, 3), np.stack([a, c, d], 2).reshape(-1, 3, 3)]
     )

@@ -15,7 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-TRAIN_LIBRARIES = ("default", "Scopia", "BlendSwap-CC-BY", "KatorLegaz", "Reallusion")
+PARAMETRIC = "parametric"
+"""Models that rules draw (`parametric`); like a library, but made here."""
+TRAIN_LIBRARIES = ("default", "Scopia", "BlendSwap-CC-BY", "KatorLegaz", "Reallusion", PARAMETRIC)
+UNSEEN = "parametric-unseen"
+"""Models that the same rules draw from other seeds."""
+VALIDATION_LIBRARIES = (UNSEEN,)
 HELD_OUT_LIBRARIES = ("BlendSwap-CC-0",)
 
 _TABLES = Path(__file__).resolve().parent / "tables"

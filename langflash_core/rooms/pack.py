@@ -18,15 +18,17 @@ from PIL import Image
 from langflash_core.errors import InputError
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.rooms.builtin import KIND_PLAIN, LIBRARY, builtin_models
-from langflash_core.rooms.catalogue import Archive, Item, default_materials, load_catalogue
+from langflash_core.rooms.catalogue import UNSEEN, Archive, Item, default_materials, load_catalogue
 from langflash_core.rooms.mesh import Mesh, index, pose
 from langflash_core.rooms.objfile import PANE, Material, Soup, parse_mtl, parse_obj
+from langflash_core.rooms.parametric import parametric_models, wood_textures
 
 FORMAT = 1
 TEXTURE_SIZE = 128
 MAX_SOURCE_FACES = 130_000
 MAX_FACES = 4_500
 _PANE_OPACITY = 0.4
+_UNSEEN_SHARE = 0.5  # of as many makes as are trained on: enough to validate, and the file stays small
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,8 @@ def build_pack(root: Path, out: Path, keys: frozenset[str] | None = None, max_fa
     for item in catalogue.items:
         if keys is None or item.key in keys:
             _add_item(draft, item, catalogue.archives[item.library], members[item.library], max_faces)
+    if keys is None:
+        _add_parametric(draft, max_faces)
     _write(draft, out)
     return len(draft.items)
 
@@ -137,6 +141,22 @@ def _add_item(draft: _Draft, item: Item, archive: Archive, members: dict[str, st
     _append(draft, item, index(soup, max_faces), rows)
 
 
+def _add_parametric(draft: _Draft, max_faces: int) -> None:
+    layers = {name: _layer(draft, encoded) for name, encoded in wood_textures().items()}
+    made = [*parametric_models(), *parametric_models(_UNSEEN_SHARE, UNSEEN)]
+    for item, soup, looks in made:
+        rows = [_row(look, layers.get(look.texture, -1), kind) for look, kind in looks]
+        _append(draft, item, index(pose(soup, item.size, item.rotation), max_faces), rows)
+
+
+def _layer(draft: _Draft, encoded: bytes) -> int:
+    """The layer of a texture file of the right size, stored once."""
+    if encoded not in draft.texture_ids:
+        draft.texture_ids[encoded] = len(draft.textures)
+        draft.textures.append(encoded)
+    return draft.texture_ids[encoded]
+
+
 def _materials(
     soup: Soup, libraries: tuple[str, ...], folder: str, archive: Archive, members: dict[str, str]
 ) -> list[Material]:
@@ -173,11 +193,7 @@ def _texture(draft: _Draft, look: Material, folder: str, archive: Archive, membe
         image.save(stream, "PNG", optimize=True)
     else:
         image.convert("RGB").save(stream, "JPEG", quality=85)
-    encoded = stream.getvalue()
-    if encoded not in draft.texture_ids:
-        draft.texture_ids[encoded] = len(draft.textures)
-        draft.textures.append(encoded)
-    return draft.texture_ids[encoded]
+    return _layer(draft, stream.getvalue())
 
 
 def _row(look: Material, layer: int, kind: int) -> tuple[float, ...]:

@@ -18,7 +18,6 @@ from torch import Tensor
 from langflash_core.network.encoder import Encoder
 from langflash_core.network.precision import mixed
 from langflash_core.rooms import (
-    HELD_OUT_LIBRARIES,
     TRAIN_LIBRARIES,
     Pack,
     RoomRenderer,
@@ -38,7 +37,7 @@ OPENINGS = frozenset({"window", "door"})
 
 @dataclass(frozen=True)
 class CachePlan:
-    """What is rendered: scenes `first_seed` to `first_seed + scenes - 1` of some libraries.
+    """What is rendered: scenes `first_seed` to `first_seed + scenes - 1`, furnished from `libraries`.
 
     with_tokens False keeps pictures only (evaluation encodes itself). One shard in
     `three_view_every` holds three views a scene, the rest two; 0 means never.
@@ -46,7 +45,7 @@ class CachePlan:
 
     first_seed: int
     scenes: int
-    held_out: bool = False
+    libraries: tuple[str, ...] = TRAIN_LIBRARIES
     with_tokens: bool = True
     augment: bool = True
     scenes_per_shard: int = 32
@@ -150,9 +149,8 @@ def photometric(rgb: Tensor, seed: int) -> Tensor:
     return (images.clamp(0, 1) * 255).round().to(torch.uint8)
 
 
-def rooms_renderer(pack: Pack, renderer: RoomRenderer, *, held_out: bool = False) -> RenderScene:
-    """A `RenderScene` that draws furnished rooms; held_out takes the libraries no training sees."""
-    libraries = HELD_OUT_LIBRARIES if held_out else TRAIN_LIBRARIES
+def rooms_renderer(pack: Pack, renderer: RoomRenderer, libraries: tuple[str, ...]) -> RenderScene:
+    """A `RenderScene` that draws rooms furnished from some libraries."""
 
     def render(seed: int, shard: ShardPlan) -> RoomRecord:
         width, height = shard.size

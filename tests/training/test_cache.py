@@ -11,7 +11,7 @@ import torch
 from langflash_core.errors import GraphicsError, InputError
 from langflash_core.network import MINI, GuidedDepthNet, load_network, save_network
 from langflash_core.network.checkpoints import read_weights
-from langflash_core.rooms import RoomRenderer, load_pack
+from langflash_core.rooms import HELD_OUT_LIBRARIES, RoomRenderer, load_pack
 from langflash_core.training import commands
 from langflash_core.training.batches import RoomSet
 from langflash_core.training.cache import (
@@ -133,7 +133,7 @@ def test_from_furniture_to_weights(tmp_path: Path, encoder: Path):
     renderer = RoomRenderer(load_pack(TINY_PACK))
     plan = CachePlan(0, 1, scenes_per_shard=1, three_view_every=1)
     fill_cache(
-        cache / "train", plan, rooms_renderer(load_pack(TINY_PACK), renderer, held_out=True), net.encoder
+        cache / "train", plan, rooms_renderer(load_pack(TINY_PACK), renderer, HELD_OUT_LIBRARIES), net.encoder
     )
     renderer.release()
     options = LoopOptions(minutes=1, max_steps=1, pictures=2)
