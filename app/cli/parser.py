@@ -259,6 +259,15 @@ def _add_train(commands) -> None:
         "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
     )
     _add_start(cache)
+    parts = _command(actions, "parts", "find the parts of cached rooms, for the stage naming")
+    parts.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
+    parts.add_argument(
+        "--run", type=Path, metavar="RUN", help="folder of train run whose stages are used (default: none)"
+    )
+    parts.add_argument(
+        "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
+    )
+    _add_start(parts)
     run = _command(actions, "run", "train stages, one after the other; continues where a run stopped")
     run.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
     _add_output(run, "RUN", "folder of checkpoints and logs")

@@ -32,6 +32,8 @@ from langflash_core.evaluation.words import OTHER, PAPER_LABELS, PARAPHRASES, ab
 from langflash_core.geometry.cameras import unproject
 from langflash_core.network import LangFlashNet, load_network
 from langflash_core.network.aggregation import average_atoms
+from langflash_core.network.encoder import Tokens
+from langflash_core.network.model import Seen
 from langflash_core.query.answers import presence_scores
 from langflash_core.query.relevance import relevancy
 from langflash_core.query.spaces import LanguageSpace, encode_cached, language_space
@@ -158,10 +160,11 @@ def calibrate(network: LangFlashNet, data: Path, *, limit: int | None = None) ->
     """One threshold for "found" and for masks, for the weights' header, from `data/validation`.
 
     Scores are relevancies at the space's temperature against its negatives; the sets "there" and
-    "not there" are those of `judge_scene`, on rooms of training furniture with unseen seeds. Every
-    second question uses another word of the vocabulary instead of the plain name, because people
-    do. The threshold maximises F1 of presence plus mean IoU of the masks of what is there: F1
-    alone is flat over a wide range in which masks differ a lot.
+    "not there" are those of `judge_scene`, on rooms of furniture that no training saw. Every second
+    question uses another word of the vocabulary instead of the plain name, because people do. The
+    threshold maximises the lower of precision and recall plus mean IoU of the masks of what is
+    there: one who trusts "found" must be able to trust "not found", and masks decide where the two
+    are level.
 
     Returns:
         {"temperature", "threshold", "negatives", "validation": precision, recall, f1, phrases, and
@@ -176,7 +179,8 @@ def calibrate(network: LangFlashNet, data: Path, *, limit: int | None = None) ->
         ask_phrases(plain, record, network.predict(views), tally, varied=True)
     scores, truths, ious = torch.cat(tally.scores), torch.cat(tally.truths), torch.stack(tally.mask_ious)
     trials = [presence(scores, truths, threshold) for threshold in MASK_THRESHOLDS]
-    best = int((torch.tensor([t.f1 for t in trials]) + ious.mean(0)).argmax())
+    level = torch.tensor([(t.precision, t.recall) for t in trials]).nan_to_num(0).amin(1)
+    best = int((level + ious.mean(0)).argmax())
     return {
         "temperature": plain.temperature,
         "threshold": MASK_THRESHOLDS[best],
@@ -333,10 +337,11 @@ def visible_groups(record: RoomRecord, view: int) -> list[str]:
     return sorted(group for group, share in shares.items() if share >= MIN_SHARE)
 
 
-def language_maps(network: LangFlashNet, views: Views) -> Tensor:
-    """L(x) of views, (1, V, C, h, w)."""
+def language_maps(network: LangFlashNet, views: Views) -> tuple[Tensor, Tokens]:
+    """L(x) of views, (1, V, C, h, w), and the tokens it was read from."""
     images = views.images[None]
-    return network.language(network.encode(images, views.Ks[None]), images)
+    tokens = network.encode(images, views.Ks[None])
+    return network.language(tokens, images), tokens
 
 
 def judge_views(
@@ -346,25 +351,25 @@ def judge_views(
     network = setting.network
     source, target = views_of(record, (0, 1)), views_of(record, (2,))
     with torch.no_grad():
-        features = language_maps(network, source)  # (1, V, C, h, w)
+        features, tokens = language_maps(network, source)  # (1, V, C, h, w)
         size = (features.shape[-2], features.shape[-1])
         small = F.adaptive_avg_pool2d(prediction.weights, size)[None]
         averaged = average_atoms(small, features)[0]
         masks = true_masks(record, (0, 1))  # (V, G', H, W)
-        true_small = F.adaptive_avg_pool2d(masks, size)[None]
-        true_atoms = network.aggregation(true_small, features)[0]
-        alone = language_maps(network, target)[0, 0]
+        seen = Seen(tokens, prediction.depths, prediction.viewmats, source.Ks)
+        true_atoms = network.dictionary(masks, features, seen)
+        alone = language_maps(network, target)[0][0, 0]
     rgb, maps, true_maps = _rendered(record, prediction, masks, scale)
     photo = record.rgb[2].permute(1, 2, 0).float() / 255
-    seen = seen_by_photos(record)
-    flat = photo[seen].mean(0).expand_as(photo)
-    if bool(seen.any()):
+    shown = seen_by_photos(record)
+    flat = photo[shown].mean(0).expand_as(photo)
+    if bool(shown.any()):
         tally.note(
-            psnr=psnr(rgb[seen], photo[seen]),
-            ssim=float(ssim_map(rgb.clamp(0, 1), photo)[seen].mean()),
-            psnr_mean_colour=psnr(flat[seen], photo[seen]),
+            psnr=psnr(rgb[shown], photo[shown]),
+            ssim=float(ssim_map(rgb.clamp(0, 1), photo)[shown].mean()),
+            psnr_mean_colour=psnr(flat[shown], photo[shown]),
         )
-    tally.note(psnr_whole_picture=psnr(rgb, photo), target_seen_share=float(seen.float().mean()))
+    tally.note(psnr_whole_picture=psnr(rgb, photo), target_seen_share=float(shown.float().mean()))
     for view, own, weights, exact in (
         (0, features[0, 0], prediction.weights[0], masks[0]),
         (2, alone, maps, true_maps),
@@ -375,7 +380,7 @@ def judge_views(
             "lfa": torch.einsum("khw,kc->hwc", weights, prediction.dictionary),
             "true_masks_lfa": torch.einsum("khw,kc->hwc", exact, true_atoms),
         }
-        _count_labels(setting, record, view, vectors, tally, torch.ones_like(seen) if view == 0 else seen)
+        _count_labels(setting, record, view, vectors, tally, torch.ones_like(shown) if view == 0 else shown)
 
 
 def seen_by_photos(record: RoomRecord, tolerance: float = 0.04) -> Tensor:

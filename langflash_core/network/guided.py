@@ -17,7 +17,8 @@ from langflash_core.network.gaussians import GaussianHead, assemble_gaussians
 from langflash_core.network.grouping import ScratchHead, SemanticGrouping, group_weights, surviving
 from langflash_core.network.language import LanguageHead
 from langflash_core.network.local import LocalFeatures
-from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Run
+from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Run, Seen, pooled_weights
+from langflash_core.network.naming import PartNamer, describe, places
 from langflash_core.network.poses import PoseInput, Poses, estimate_poses
 from langflash_core.network.presets import GuidedDepth
 from langflash_core.network.refiner import DepthRefiner
@@ -30,7 +31,7 @@ class GuidedDepthNet(LangFlashNet):
 
     Trained stage by stage: `depth` = decoder + depth_head, `refine` = refiner, `gaussians` =
     gaussian_head, `language` = language_head, `grouping` = siamese + scratch + grouping,
-    `aggregation` = aggregation. The encoder and the local features stay frozen.
+    `aggregation` = aggregation, `naming` = namer. The encoder and the local features stay frozen.
     """
 
     frozen = ("encoder", "local")
@@ -51,6 +52,7 @@ class GuidedDepthNet(LangFlashNet):
         self.scratch = ScratchHead(preset)
         self.grouping = SemanticGrouping(preset)
         self.aggregation = Aggregation(preset)
+        self.namer = PartNamer(preset)
 
     def encode(self, images: Tensor, Ks: Tensor) -> Tokens:
         """Four hooks of the frozen encoder; the intrinsics join later."""
@@ -83,6 +85,15 @@ class GuidedDepthNet(LangFlashNet):
         survivors = surviving(groups, self.preset.tau_exist)
         whole = group_weights(groups, survivors, (finest.shape[-2], finest.shape[-1]))
         return split_groups(whole, finest, self.preset.splitting, size)
+
+    def dictionary(self, weights: Tensor, features: Tensor, seen: Seen | None = None) -> Tensor:
+        """Aggregated atoms, corrected by what `seen` tells of each part."""
+        atoms = super().dictionary(weights, features)
+        if seen is None or len(atoms) == 0:
+            return atoms
+        small = pooled_weights(weights, features)[0]
+        where = places(small, seen.depths, seen.viewmats, seen.Ks)
+        return self.namer(atoms, describe(small, seen.tokens), where)
 
     def reconstruct(self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: Run) -> Geometry:
         """Depth, poses, refined depth, Gaussians."""

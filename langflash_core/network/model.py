@@ -34,6 +34,17 @@ class Geometry:
     unplaced: tuple[int, ...]
 
 
+@dataclass(frozen=True)
+class Seen:
+    """What tells a part's name besides language features: tokens of the scene (B = 1), depths (V, H, W),
+    viewmats (V, 4, 4) and Ks (V, 3, 3) of all its views."""
+
+    tokens: Tokens
+    depths: Tensor
+    viewmats: Tensor
+    Ks: Tensor
+
+
 class LangFlashNet(nn.Module):
     """What both kinds of geometry share: the order of stages, grouping, and the dictionary.
 
@@ -111,8 +122,11 @@ class LangFlashNet(nn.Module):
     aggregated = True
     """The aggregation has weights; else atoms are plain averages."""
 
-    def dictionary(self, weights: Tensor, features: Tensor) -> Tensor:
-        """Atoms (K, C) of unit norm of one scene: weights (V, K, H, W), features (1, V, C, h, w)."""
+    def dictionary(self, weights: Tensor, features: Tensor, seen: Seen | None = None) -> Tensor:
+        """Atoms (K, C) of unit norm of one scene: weights (V, K, H, W), features (1, V, C, h, w).
+
+        seen: for networks that name parts by more than their language features.
+        """
         small = pooled_weights(weights, features)
         if self.aggregated:
             return self.aggregation(small, features)[0]
@@ -140,7 +154,7 @@ class LangFlashNet(nn.Module):
 
         Args:
             atoms: weights (V, K, H, W) and features (1, V, C, h, w) to atoms (K, C) of unit norm;
-                None: `dictionary`.
+                None: `dictionary`, with all that was seen.
             groups: geometry and views to w_k(x), (V, K, H, W), sums to 1 over K; None: `parts`.
 
         Raises:
@@ -169,10 +183,10 @@ class LangFlashNet(nn.Module):
             raise ValueError(f"scenes: expected one shape of (V, 3, H, W), received {sorted(shapes)}")
         run = Run(self.stages, progress, cancelled)
         with nullcontext() if cancelled is None else self.stopping(run.check):
-            return self._predict(scenes, run, atoms or self.dictionary, groups)
+            return self._predict(scenes, run, atoms, groups)
 
     def _predict(
-        self, scenes: Sequence[Views], run: "Run", atoms: Atoms, groups: Lifted | None
+        self, scenes: Sequence[Views], run: "Run", atoms: Atoms | None, groups: Lifted | None
     ) -> list[Prediction]:
         """The stages, timed by `run`; B scenes."""
         device = next(self.parameters()).device
@@ -196,7 +210,12 @@ class LangFlashNet(nn.Module):
                     self.parts(own, x, size, f[None]) for (x, _, own), f in zip(each, features, strict=True)
                 ]
         with run.stage("aggregation"):
-            dictionaries = [atoms(w, f[None]) for w, f in zip(weights, features, strict=True)]
+            dictionaries = [
+                self.dictionary(w, f[None], Seen(own, found.depths, found.viewmats, K[0]))
+                if atoms is None
+                else atoms(w, f[None])
+                for w, f, found, (_, K, own) in zip(weights, features, geometries, each, strict=True)
+            ]
         timings = {name: seconds / len(scenes) for name, seconds in run.timings.items()}
         return [
             Prediction(

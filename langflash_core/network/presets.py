@@ -16,9 +16,9 @@ class Splitting:
     """
 
     max_parts: int = 48
-    max_cosine: float = 0.9
+    max_cosine: float = 0.85
     agreement: float = 0.6
-    sharpness: float = 25.0
+    sharpness: float = 15.0
 
 
 @dataclass(frozen=True)
@@ -114,6 +114,10 @@ class GuidedDepth(Preset):
     """Channels at 4, 2 and 1 times the token grid."""
 
     semantic_depth: int
+    naming_dim: int
+    naming_blocks: int
+    naming_heads: int
+    """Of what corrects atoms by tokens, places and each other."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,6 +163,9 @@ MINI = GuidedDepth(
     grouping_layers=6,
     grouping_heads=8,
     semantic_depth=4,
+    naming_dim=384,
+    naming_blocks=2,
+    naming_heads=6,
     aggregation_blocks=3,
     aggregation_heads=8,
 )

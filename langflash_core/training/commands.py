@@ -15,7 +15,7 @@ from langflash_core.errors import InputError
 from langflash_core.network.checkpoints import adopt_frozen, initial_network, save_network, start_from
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.presets import PRESETS
-from langflash_core.rooms import RoomRenderer, load_pack
+from langflash_core.rooms import HELD_OUT_LIBRARIES, VALIDATION_LIBRARIES, RoomRenderer, load_pack
 from langflash_core.training.batches import RoomSet
 from langflash_core.training.cache import (
     HELD_OUT_SEED,
@@ -25,11 +25,15 @@ from langflash_core.training.cache import (
     rooms_renderer,
 )
 from langflash_core.training.loop import LoopOptions, load_averaged, train_stage
+from langflash_core.training.naming import NAMING
+from langflash_core.training.parts import PartSet, run_parts
 from langflash_core.training.stages import STAGES, Words, guided
 from langflash_core.training.validation import MEASURES, Validator
 from langflash_core.training.words import PhraseSampler, PhraseTable, build_table
 
 log = logging.getLogger(__name__)
+
+ALL_STAGES = {**STAGES, NAMING.name: NAMING}
 
 Encode = Callable[[Sequence[str]], Tensor]
 SETS = ("train", "validation", "held_out")
@@ -38,8 +42,8 @@ VALIDATION_SCENES = 48
 
 
 def cache_plan(kind: str, scenes: int, first_seed: int | None = None) -> CachePlan:
-    """The plan of one set: train (tokens, augmented), validation (tokens, unseen seeds), held_out
-    (pictures only, furniture that no training sees; two views, seeds from 900000000).
+    """The plan of one set: train (tokens, augmented), validation (tokens; furniture that rules drew
+    from other seeds), held_out (pictures only; models by people whose library no training sees).
 
     Raises:
         InputError: there is no such set.
@@ -47,10 +51,22 @@ def cache_plan(kind: str, scenes: int, first_seed: int | None = None) -> CachePl
     if kind == "train":
         return CachePlan(first_seed or 0, scenes)
     if kind == "validation":
-        return CachePlan(first_seed or VALIDATION_SEED, scenes, augment=False, three_view_every=1)
+        return CachePlan(
+            first_seed or VALIDATION_SEED,
+            scenes,
+            libraries=VALIDATION_LIBRARIES,
+            augment=False,
+            three_view_every=1,
+        )
     if kind == "held_out":
-        seed = first_seed or HELD_OUT_SEED
-        return CachePlan(seed, scenes, held_out=True, with_tokens=False, augment=False, three_view_every=1)
+        return CachePlan(
+            first_seed or HELD_OUT_SEED,
+            scenes,
+            libraries=HELD_OUT_LIBRARIES,
+            with_tokens=False,
+            augment=False,
+            three_view_every=1,
+        )
     raise InputError(f"There is no set '{kind}'; choose one of {', '.join(SETS)}")
 
 
@@ -79,7 +95,7 @@ def run_cache(
     furniture = load_pack(pack)
     began = time.perf_counter()
     with RoomRenderer(furniture) as renderer:
-        render = rooms_renderer(furniture, renderer, held_out=plan.held_out)
+        render = rooms_renderer(furniture, renderer, plan.libraries)
         written = fill_cache(out / kind, plan, render, encoder, part)
     log.info("%d scenes in %.0f s", written, time.perf_counter() - began)
     return written
@@ -115,26 +131,33 @@ def run_train(
             f"{len(stages)} stages need as many minutes, received {len(minutes)}; give one number per stage"
         )
     for name in stages:
-        if name not in STAGES:
-            raise InputError(f"There is no stage '{name}'; choose among {', '.join(STAGES)}")
+        if name not in ALL_STAGES:
+            raise InputError(f"There is no stage '{name}'; choose among {', '.join(ALL_STAGES)}")
     options = options or LoopOptions(minutes=0)
     rooms = _open(folder / "train")
     table = phrase_table(folder, encode)
     network = initial_network(PRESETS[preset], start, options.seed)
     done = _load_trained(network, run_dir)
     if not from_scratch:
-        done |= dict.fromkeys(_begin(network, start, STAGES.keys() - done.keys()), 0)
+        done |= dict.fromkeys(_begin(network, start, ALL_STAGES.keys() - done.keys()), 0)
     for name, budget in zip(stages, minutes, strict=True):
-        stage = STAGES[name]
+        stage = ALL_STAGES[name]
         missing = [need for need in stage.needs if need not in done]
         if missing:
             raise InputError(
                 f"Stage '{name}' reads {', '.join(missing)}; train that first with the same run folder"
             )
-        seed = options.seed + 1000 * list(STAGES).index(name) + done.get(name, 0)
+        seed = options.seed + 1000 * list(ALL_STAGES).index(name) + done.get(name, 0)
         words = Words(PhraseSampler(table), torch.Generator().manual_seed(seed))
         own = LoopOptions(**{**options.__dict__, "minutes": budget})
-        state = train_stage(network, stage, rooms, words, run_dir, own, _validator(name, folder, table, own))
+        learned: RoomSet | PartSet = rooms
+        if stage is NAMING:
+            learned = _parts(folder / "train")
+            if name not in done:
+                namer = guided(network).namer
+                namer.mean, namer.std = learned.statistics()
+        check = _validator(name, folder, table, own)
+        state = train_stage(network, stage, learned, words, run_dir, own, check)
         done[name] = state.step
     return network.eval()
 
@@ -151,7 +174,49 @@ def _validator(name: str, folder: Path, table: PhraseTable, options: LoopOptions
         return None
     measure, views = MEASURES[name]
     words = Words(PhraseSampler(table), torch.Generator().manual_seed(1))
-    return Validator(_open(folder / "validation", VALIDATION_SCENES), words, measure, views, options.device)
+    judged = (
+        _parts(folder / "validation")
+        if name == NAMING.name
+        else _open(folder / "validation", VALIDATION_SCENES)
+    )
+    return Validator(judged, words, measure, views, options.device)
+
+
+def _parts(rooms: Path) -> PartSet:
+    try:
+        return PartSet(rooms / "parts")
+    except ValueError as error:
+        raise InputError(str(error)) from None
+
+
+def run_find_parts(
+    folder: Path,
+    start: Path,
+    run_dir: Path | None = None,
+    *,
+    part: tuple[int, int] = (0, 1),
+    preset: str = "mini",
+) -> int:
+    """Find the parts of every cached training and validation room, for the stage `naming`; how many.
+
+    They lie in `parts` beside the shards. Single-threaded, resumable and divisible as `run_cache`.
+
+    Args:
+        start: weights file. run_dir: stages trained there replace its heads.
+
+    Raises:
+        InputError: no cache.
+    """
+    torch.set_num_threads(1)
+    network = initial_network(PRESETS[preset], start)
+    done = _load_trained(network, run_dir) if run_dir is not None else {}
+    _begin(network, start, ALL_STAGES.keys() - done.keys())
+    count = 0
+    for name in ("validation", "train"):
+        if (folder / name).is_dir():
+            _open(folder / name)
+            count += run_parts(guided(network.eval()), folder / name, folder / name / "parts", part)
+    return count
 
 
 def phrase_table(folder: Path, encode: Encode) -> PhraseTable:
@@ -178,13 +243,13 @@ def phrase_table(folder: Path, encode: Encode) -> PhraseTable:
 
 
 def _load_trained(network: LangFlashNet, run_dir: Path) -> dict[str, int]:
-    found = {name: load_averaged(network, run_dir, name) for name in STAGES}
+    found = {name: load_averaged(network, run_dir, name) for name in ALL_STAGES}
     return {name: counts[0] for name, counts in found.items() if counts is not None}
 
 
 def _begin(network: LangFlashNet, start: Path, names: Iterable[str]) -> list[str]:
     """The stages among `names` whose modules could be filled from `start`."""
-    return [name for name in names if start_from(network, start, STAGES[name].modules)]
+    return [name for name in names if start_from(network, start, ALL_STAGES[name].modules)]
 
 
 def run_adopt(encoder: Path, local: Path, out: Path, *, preset: str = "mini") -> Path:
@@ -206,7 +271,7 @@ def run_export(
         InputError: no stage has been trained.
     """
     network = initial_network(PRESETS[preset], start)
-    trained = {name: load_averaged(network, run_dir, name) for name in STAGES}
+    trained = {name: load_averaged(network, run_dir, name) for name in ALL_STAGES}
     _begin(network, start, [name for name, counts in trained.items() if counts is None])
     report = {
         name: {

@@ -19,6 +19,7 @@ from torch import Tensor, nn
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.precision import mixed
 from langflash_core.training.batches import RoomSet
+from langflash_core.training.parts import PartSet
 from langflash_core.training.stages import Stage, Words, modules_of
 
 log = logging.getLogger(__name__)
@@ -67,7 +68,7 @@ def stage_parameters(network: LangFlashNet, stage: Stage) -> dict[str, Tensor]:
 def train_stage(
     network: LangFlashNet,
     stage: Stage,
-    rooms: RoomSet,
+    rooms: RoomSet | PartSet,
     words: Words,
     run_dir: Path,
     options: LoopOptions,
@@ -109,7 +110,7 @@ def _freeze_all_but(network: LangFlashNet, stage: Stage) -> list[nn.Parameter]:
 class _Run:
     network: LangFlashNet
     stage: Stage
-    rooms: RoomSet
+    rooms: RoomSet | PartSet
     words: Words
     options: LoopOptions
     optimiser: torch.optim.Optimizer

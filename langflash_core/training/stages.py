@@ -9,6 +9,7 @@ Sizes: B scenes, V views, H W pixels, h w the head's own size, N queries, G grou
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -76,7 +77,8 @@ class Loss:
     parts: dict[str, float] = field(default_factory=dict)
 
 
-StageLoss = Callable[[LangFlashNet, SceneBatch, Words], Loss]
+StageLoss = Callable[[LangFlashNet, Any, Words], Loss]
+"""Network, what the stage's set draws (a `SceneBatch`; for naming a `PartBatch`), words -> loss."""
 
 
 @dataclass(frozen=True)

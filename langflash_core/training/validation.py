@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -20,6 +21,8 @@ from langflash_core.training.measures import (
     nan_mean,
     psnr,
 )
+from langflash_core.training.naming import measure_naming
+from langflash_core.training.parts import PartSet
 from langflash_core.training.stages import (
     Words,
     group_masks,
@@ -32,14 +35,14 @@ from langflash_core.training.stages import (
     tokens_of,
 )
 
-Measure = Callable[[LangFlashNet, SceneBatch, Words], dict[str, float | Tensor]]
+Measure = Callable[[LangFlashNet, Any, Words], dict[str, float | Tensor]]
 
 
 @dataclass(frozen=True)
 class Validator:
     """Runs a stage's measure over a set of rooms and averages; confusion matrices are summed."""
 
-    rooms: RoomSet
+    rooms: RoomSet | PartSet
     words: Words
     measure: Measure
     views: int = 2
@@ -175,4 +178,5 @@ MEASURES: dict[str, tuple[Measure, int]] = {
     "language": (measure_language, 1),
     "grouping": (measure_grouping, 2),
     "aggregation": (measure_aggregation, 2),
+    "naming": (measure_naming, 2),
 }

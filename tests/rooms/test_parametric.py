@@ -1,6 +1,5 @@
 """Furniture by rules: the same at every call, sound to draw, of sizes that people use, for training only."""
 
-import functools
 import io
 import zipfile
 from collections import defaultdict
@@ -10,9 +9,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from langflash_core.rooms import HELD_OUT_LIBRARIES, TRAIN_LIBRARIES, build_pack, load_pack
+from langflash_core.rooms import (
+    HELD_OUT_LIBRARIES,
+    TRAIN_LIBRARIES,
+    VALIDATION_LIBRARIES,
+    build_pack,
+    load_pack,
+)
 from langflash_core.rooms import pack as pack_module
-from langflash_core.rooms.catalogue import PARAMETRIC, Item
+from langflash_core.rooms.catalogue import PARAMETRIC, UNSEEN, Item
 from langflash_core.rooms.makers_common import Look
 from langflash_core.rooms.mesh import HEIGHT_CELLS, height_map, pose
 from langflash_core.rooms.objfile import Soup
@@ -179,14 +184,22 @@ def test_packs_by_key_leave_them_out(library: Path, tmp_path: Path) -> None:
 def test_full_packs_hold_them(
     library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, models: list[Model]
 ) -> None:
-    some = models[::10]
-    monkeypatch.setattr(pack_module, "parametric_models", functools.partial(list, some))
+    some, others = models[::10], parametric_models(0.0, UNSEEN)[::10]
+    made_of = {PARAMETRIC: some, UNSEEN: others}
+    monkeypatch.setattr(
+        pack_module, "parametric_models", lambda copies=1.0, library=PARAMETRIC: made_of[library]
+    )
     build_pack(library, tmp_path / "pack.npz")
     pack = load_pack(tmp_path / "pack.npz")
     numbers = [i for i, item in enumerate(pack.items) if item.library == PARAMETRIC]
     assert len(numbers) == len(some)
     assert set(numbers) <= set(pack.select(TRAIN_LIBRARIES))
     assert not set(numbers) & set(pack.select(HELD_OUT_LIBRARIES))
+    assert not set(numbers) & set(pack.select(VALIDATION_LIBRARIES))
+    unseen = {i for i, item in enumerate(pack.items) if item.library == UNSEEN}
+    assert len(unseen) == len(others)
+    assert unseen <= set(pack.select(VALIDATION_LIBRARIES))
+    assert not unseen & {*pack.select(TRAIN_LIBRARIES), *pack.select(HELD_OUT_LIBRARIES)}
     made = {item.key: (item, looks) for item, _, looks in some}
     for i in numbers:
         item, looks = made[pack.items[i].key]
@@ -196,3 +209,13 @@ def test_full_packs_hold_them(
         rows = pack.material_table[pack.material_ids[first : first + count]]
         assert (rows[:, 1, 0] >= 0).any() == any(look.texture for look, _ in looks), item.key
     assert len(pack.textures) == len(wood_textures())
+
+
+def test_the_two_libraries_have_no_model_in_common(models: list[Model]) -> None:
+    def shapes(made: list[Model]) -> set[bytes]:
+        return {soup.positions.tobytes() for _, soup, _ in made}
+
+    others = parametric_models(FEW, UNSEEN)
+    assert len(others) == len(models)
+    assert {item.library for item, _, _ in others} == {UNSEEN}
+    assert not shapes(others) & shapes(models)

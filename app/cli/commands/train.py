@@ -12,7 +12,7 @@ from langflash_core.errors import InputError, WeightsError
 from langflash_core.network import PRESETS
 from langflash_core.query.spaces import language_space
 from langflash_core.resources import asset_path
-from langflash_core.training.commands import run_adopt, run_cache, run_export, run_train
+from langflash_core.training.commands import run_adopt, run_cache, run_export, run_find_parts, run_train
 from langflash_core.training.loop import LoopOptions
 
 
@@ -23,7 +23,9 @@ def run(args: Namespace, out: TextIO) -> None:
         LangFlashError: the furniture, the encoder, the cache or the output cannot be used.
     """
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s", stream=sys.stderr)
-    {"adopt": _adopt, "cache": _cache, "run": _run, "export": _export}[args.action](args, out)
+    {"adopt": _adopt, "cache": _cache, "parts": _parts, "run": _run, "export": _export}[args.action](
+        args, out
+    )
 
 
 def _adopt(args: Namespace, out: TextIO) -> None:
@@ -47,6 +49,15 @@ def _cache(args: Namespace, out: TextIO) -> None:
         preset=args.preset,
     )
     print(f"{args.output / args.set}: {count} new rooms", file=out)
+
+
+def _parts(args: Namespace, out: TextIO) -> None:
+    if not args.cache.is_dir():
+        raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
+    if args.run is not None and not args.run.is_dir():
+        raise InputError(f"there is no folder {args.run}; make it with langflash train run")
+    count = run_find_parts(args.cache, _start(args), args.run, part=args.part, preset=args.preset)
+    print(f"{args.cache}: {count} new parts", file=out)
 
 
 def _run(args: Namespace, out: TextIO) -> None:
