@@ -28,8 +28,8 @@ _MEASURES = (
 _METHODS = {
     "features": "2D features per view, no 3D",
     "averaged": "averaged atoms",
-    "lfa": "aggregated atoms (LFA)",
-    "true_masks_lfa": "true masks + LFA",
+    "lfa": "aggregated and named atoms (LFA)",
+    "true_masks_lfa": "true masks, aggregated and named",
     "majority": 'always "wall"',
 }
 _COLUMNS = (

@@ -11,14 +11,14 @@ from langflash_core.training.measures import confusion
 from langflash_core.training.parts import PartBatch
 from langflash_core.training.stages import Loss, Stage, Words, guided, phrase_bank
 
-NOISE = 0.3
+NOISE = 0.25
 """Of standardised inputs; stands for makes of furniture that are not there to learn from."""
 HIDDEN = 0.15
 """Share of a room's token channels that are hidden from the namer."""
-BLIND = 0.2
+BLIND = 0.35
 """How often a part's place, and how often its atom, are hidden altogether: lengths may be wrong, and
 on furniture that the language head learned from its atoms are better than on any other."""
-DROPPED = 0.5
+DROPPED = 0.3
 """Share of the namer's own channels that are left out at a time."""
 
 
@@ -79,5 +79,5 @@ def measure_naming(network: LangFlashNet, batch: PartBatch, words: Words) -> dic
 
 
 NAMING = Stage(
-    "naming", ("namer",), ("language", "grouping", "aggregation"), {1: 1.0}, 12, 5e-4, naming_stage
+    "naming", ("namer",), ("language", "grouping", "aggregation"), {1: 1.0}, 12, 1.2e-3, naming_stage
 )
