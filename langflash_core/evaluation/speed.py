@@ -17,7 +17,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.network.grouping import Groups, group_weights
-from langflash_core.network.model import LangFlashNet, Run
+from langflash_core.network.model import LangFlashNet, Run, Seen
 from langflash_core.types import Views
 
 STAGES = ("language features", "shared encoder", "grouping", "aggregation", "Gaussian decoder", "all")
@@ -75,11 +75,13 @@ class _Pass:
 
 @dataclass(frozen=True)
 class _Shared:
-    """What does not depend on the number of groups: its times, the queries' answer, and L(x)."""
+    """What does not depend on the number of groups: its times, the queries' answer, L(x), and what
+    names groups besides."""
 
     done: _Pass
     groups: Groups
     features: Tensor
+    seen: Seen
 
 
 def measure_network(
@@ -158,7 +160,7 @@ def _share(network: LangFlashNet, side: int, num_views: int) -> _Shared:
             (gaussians.means, gaussians.scales, gaussians.opacities[:, None]), 1
         ).float(),
     }
-    return _Shared(done, groups, features)
+    return _Shared(done, groups, features, Seen(tokens, geometry.depths, geometry.viewmats, Ks[0]))
 
 
 @torch.inference_mode()
@@ -172,7 +174,9 @@ def _finish(network: LangFlashNet, shared: _Shared, atoms: int, side: int, refer
         scores = shared.groups.existence_logits[0]
         chosen = scores.topk(min(atoms, len(scores))).indices
     weights = done.timed("grouping", lambda: group_weights(shared.groups, chosen, (side, side)), device)
-    dictionary = done.timed("aggregation", lambda: network.dictionary(weights, shared.features), device)
+    dictionary = done.timed(
+        "aggregation", lambda: network.dictionary(weights, shared.features, shared.seen), device
+    )
     done.chosen = chosen
     done.given |= {"grouping": weights.float(), "aggregation": dictionary.float()}
     done.seconds["all"] = sum(done.seconds.values())

@@ -98,7 +98,7 @@ def places(weights: Tensor, depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Ten
     border[:, :, [0, -1]] = True
     spread = up.new_tensor([0.03, 0.97])
     for k in range(parts):
-        own = owner == k
+        own = (owner == k) & (weights[:, k] > 0)  # masks may leave pixels to nobody
         points = pos_r[own & valid]
         if len(points) < _MIN_POINTS:
             continue

@@ -199,7 +199,8 @@ def run_find_parts(
 ) -> int:
     """Find the parts of every cached training and validation room, for the stage `naming`; how many.
 
-    They lie in `parts` beside the shards. Single-threaded, resumable and divisible as `run_cache`.
+    They lie in `parts` beside the shards. Single-threaded, resumable and divisible as `run_cache`;
+    files of an earlier network have to be taken away first.
 
     Args:
         start: weights file. run_dir: stages trained there replace its heads.
@@ -213,9 +214,9 @@ def run_find_parts(
     _begin(network, start, ALL_STAGES.keys() - done.keys())
     count = 0
     for name in ("validation", "train"):
-        if (folder / name).is_dir():
-            _open(folder / name)
-            count += run_parts(guided(network.eval()), folder / name, folder / name / "parts", part)
+        if name == "train" or (folder / name).is_dir():
+            rooms = _open(folder / name).folder
+            count += run_parts(guided(network.eval()), rooms, rooms / "parts", part)
     return count
 
 

@@ -20,8 +20,6 @@ BLIND = 0.35
 on furniture that the language head learned from its atoms are better than on any other."""
 DROPPED = 0.3
 """Share of the namer's own channels that are left out at a time."""
-
-
 DRAWN = 256
 """Parts of a batch that the loss is taken over, by quality, rare classes more often."""
 

@@ -15,20 +15,20 @@ from pathlib import Path
 
 import torch
 from safetensors import safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 from torch import Tensor
 
+from langflash_core.files import make_folder, write_atomically
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.naming import describe, places
 from langflash_core.training.batches import SceneBatch, collate
 from langflash_core.training.shards import Label, open_shards
-from langflash_core.training.stages import group_masks, nearest, tokens_of
+from langflash_core.training.stages import group_masks, mostly, nearest, tokens_of
 
 log = logging.getLogger(__name__)
 
 MIN_QUALITY = 0.3
 """Parts of which less is one thing teach nothing."""
-
 
 _TENSORS = ("atoms", "looks", "places", "quality")
 
@@ -72,7 +72,10 @@ def _batch(
 def run_parts(network: GuidedDepthNet, rooms: Path, out: Path, part: tuple[int, int] = (0, 1)) -> int:
     """Write the missing part files of a folder of room shards, one each; returns how many parts.
 
-    part: (i, n) takes shards i, i + n, ... so that n processes share a folder.
+    A file that is there is left alone: take it away first when the network has changed.
+
+    Args:
+        part: (i, n) takes shards i, i + n, ... so that n processes share a folder.
     """
     count = 0
     for shard in open_shards(rooms)[part[0] :: part[1]]:
@@ -84,7 +87,8 @@ def run_parts(network: GuidedDepthNet, rooms: Path, out: Path, part: tuple[int, 
             for i in range(len(shard))
             for room in parts_of(network, collate([shard.record(i, views=(0, 1))]))
         ]
-        _write(path, joined(found))
+        if found:
+            _write(path, joined(found))
         count += sum(len(room.labels) for room in found)
         log.info("%s: %d parts", path.name, sum(len(room.labels) for room in found))
     return count
@@ -106,9 +110,7 @@ def parts_of(network: GuidedDepthNet, batch: SceneBatch) -> list[PartBatch]:
     for weights in (network.parts(tokens, batch.images, size, features), truth):
         if weights.shape[1] == 0:
             continue
-        shared = weights.transpose(0, 1).flatten(1).float() @ masks.T  # (K, G)
-        overlap, majority = shared.max(1)
-        quality = overlap / (weights.sum((0, 2, 3)) + network.preset.eps)
+        quality, majority = mostly(weights, masks, network.preset.eps)
         kept = quality > MIN_QUALITY
         if not bool(kept.any()):
             continue
@@ -144,7 +146,6 @@ def guessed_geometry(network: GuidedDepthNet, batch: SceneBatch) -> tuple[Tensor
 
 
 def _write(path: Path, batch: PartBatch) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
     tensors = {
         name: getattr(batch, name)
         .to(torch.float16 if name in ("atoms", "looks") else torch.float32)
@@ -156,9 +157,8 @@ def _write(path: Path, batch: PartBatch) -> None:
         "sizes": batch.sizes,
         "seeds": batch.seeds,
     }
-    temporary = path.with_suffix(".part")
-    save_file(tensors, temporary, metadata={"parts": json.dumps(header)})
-    temporary.replace(path)
+    make_folder(path.parent)
+    write_atomically(path, save(tensors, {"parts": json.dumps(header)}))
 
 
 class PartSet:

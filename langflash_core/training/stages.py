@@ -374,15 +374,23 @@ def named_parts(network: LangFlashNet, batch: SceneBatch) -> NamedParts | None:
         masks, instances = group_masks(nearest(batch.instances[0], size))  # (G, V*h*w), (G,)
         if weights.shape[2] == 0 or len(instances) == 0:
             return None
-        shared = weights[0].transpose(0, 1).flatten(1) @ masks.T  # (K, G)
-        overlap, majority = shared.max(1)
-        quality = overlap / (weights.sum((0, 1, 3, 4)) + network.preset.eps)
-        named = overlap > 0
+        quality, majority = mostly(weights[0], masks, network.preset.eps)
+        named = quality > 0
         pooled = average_atoms(weights, features, network.preset.eps)[0]
     atoms = network.aggregation(weights, features)[0]
     return NamedParts(
         atoms[named], F.normalize(pooled[named], dim=-1), quality[named], instances[majority[named]]
     )
+
+
+def mostly(weights: Tensor, masks: Tensor, eps: float) -> tuple[Tensor, Tensor]:
+    """Of each part, (K,), the share that lies on the group it covers most, and that group's row.
+
+    Args:
+        weights: w_k(x), (V, K, h, w). masks: (G, V*h*w) of 0 and 1, G >= 1.
+    """
+    overlap, majority = (weights.transpose(0, 1).flatten(1).float() @ masks.T).max(1)
+    return overlap / (weights.sum((0, 2, 3)) + eps), majority
 
 
 def tokens_of(network: LangFlashNet, batch: SceneBatch) -> Tokens:

@@ -77,6 +77,16 @@ def test_a_second_view_of_the_same_part_changes_nothing_but_its_share():
     torch.testing.assert_close(one, two, atol=1e-3, rtol=1e-3)  # quantiles between other neighbours
 
 
+def test_pixels_of_nobody_count_for_nobody():
+    depths, _ = tilted_floor(20.0)
+    weights = torch.zeros(1, 2, SIDE, SIDE)
+    weights[0, 0, 40:50, 20:30] = 1
+    weights[0, 1, 50:60, 20:30] = 1
+    found = places(weights, depths, torch.eye(4)[None], KS)
+    assert float(found[0, 7].exp()) == pytest.approx(100 / SIDE**2, rel=1e-4)  # float32
+    assert float(found[0, 8]) == 0
+
+
 @pytest.mark.parametrize("bad", [0.0, math.nan, math.inf])
 def test_unknown_depths_say_nothing(bad):
     weights = torch.rand(2, 3, SIDE, SIDE)

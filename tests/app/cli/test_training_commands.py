@@ -65,6 +65,8 @@ def test_weights_verify_notices_damage(run, checkpoint, tmp_path):
             "there is no folder gone",
         ),
         (["train", "run", "gone", "-o", "out", "--stages", "depth", "--minutes", "0"], "--minutes"),
+        (["train", "parts", "gone"], "there is no folder gone"),
+        (["train", "parts", ".", "--run", "gone"], "there is no folder gone"),
         (["train", "export", "gone", "-o", "w.safetensors"], "there is no folder gone"),
         (["eval", "rooms", "gone"], "there is no folder gone"),
         (["eval", "calibrate", "gone"], "there is no folder gone"),
