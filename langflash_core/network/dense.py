@@ -6,6 +6,8 @@ exactly (a cell is about 3 pixels). n matches; h x w cells.
 
 import numpy as np
 
+from langflash_core.network.matching import mutual
+
 MIN_COSINE = 0.8
 
 
@@ -20,9 +22,8 @@ def match_cells(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.nda
     """
     height, width = right.shape[1:]
     cosines = left.reshape(len(left), -1).T @ right.reshape(len(right), -1)
-    best = cosines.argmax(1)
-    rows = np.arange(len(cosines))
-    keep = (cosines.argmax(0)[best] == rows) & (cosines[rows, best] > MIN_COSINE)
+    rows, best = mutual(cosines)
+    keep = cosines[rows, best] > MIN_COSINE
     rows, best = rows[keep], best[keep]
     own = np.stack((rows % left.shape[2], rows // left.shape[2]), 1) + 0.5
     x, y = best % width, best // width

@@ -126,7 +126,7 @@ class GuidedDepthNet(LangFlashNet):
             return maps
         chosen = Tokens(tuple(h[:, keep] for h in tokens.hooks), tokens.grid)
         part = DepthMaps(scaled.log_depths[:, keep], scaled.log_errors[:, keep])
-        refined = self.refiner(images[:, keep], chosen, local[keep], part, viewmats[:, keep], Ks[:, keep])
+        refined = self.refiner(images[:, keep], chosen, local[keep], part, viewmats[:, keep], Ks[:, keep])[-1]
         log_depths, log_errors = maps.log_depths.clone(), maps.log_errors.clone()
         log_depths[keep], log_errors[keep] = refined.log_depths[0], refined.log_errors[0]
         return DepthMaps(log_depths, log_errors)

@@ -11,16 +11,18 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from langflash_core.network.alignment import INDEPENDENT
+
 _MAX_FEATURES = 4000
 _CONTRAST = 0.01  # walls have little: the default of 0.04 finds nothing on them
 _RATIO = 0.8  # Lowe's test
 _MIN_INLIERS = 15
 _DEPTH_SIGMA = 0.25  # log-depth error expected of a monocular map
-_INDEPENDENT = 50  # errors of one map go together: all its matches count as this many
 _SCALE_SIGMA = 0.3  # log ratio expected between the scales of two monocular maps
 _INLIER = 3.0  # sigmas of reprojection
 _CAUCHY = 2.0  # residuals beyond this many sigma lose weight
 _ITERATIONS = 40
+_CONVERGED = 1e-5  # share of the cost below which a step's gain ends the search: 1e-3 of the pose's own error
 
 
 @dataclass(frozen=True)
@@ -79,20 +81,25 @@ def detect(grey: np.ndarray, num_features: int = _MAX_FEATURES) -> tuple[np.ndar
     return positions, np.sqrt(descriptors / np.maximum(descriptors.sum(1, keepdims=True), 1e-7))
 
 
+def mutual(similarity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows (n,) and columns (n,) of (A, B) that choose each other; of several equal ones the first."""
+    best = similarity.argmax(1)
+    rows = np.flatnonzero(similarity[np.arange(len(best)), best] >= similarity.max(0)[best])
+    firsts = np.sort(np.unique(best[rows], return_index=True)[1])
+    return rows[firsts], best[rows[firsts]]
+
+
 def match_descriptors(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Index pairs (n, 2) that pass the ratio test and choose each other."""
     if len(left) < 2 or len(right) < 2:
         return np.zeros((0, 2), int)
     similarity = left @ right.T  # both rows have unit norm
-    best = similarity.argmax(1)
-    rows = np.arange(len(left))
+    rows, best = mutual(similarity)
     first = similarity[rows, best]
-    masked = similarity.copy()
-    masked[rows, best] = -1
-    second = masked.max(1)
+    similarity[rows, best] = -1
+    second = similarity[rows].max(1)
     distances = np.sqrt(np.maximum(2 - 2 * np.stack((first, second)), 0))
-    mutual = similarity.argmax(0)[best] == rows
-    keep = mutual & (distances[0] < _RATIO * distances[1])
+    keep = distances[0] < _RATIO * distances[1]
     return np.stack((rows[keep], best[keep]), 1)
 
 
@@ -180,7 +187,7 @@ class DepthPriors:
     @staticmethod
     def of(depth_i: np.ndarray, depth_j: np.ndarray) -> "DepthPriors":
         """From depths (n,) > 0."""
-        return DepthPriors(np.log(depth_i), np.log(depth_j), min(1.0, _INDEPENDENT / len(depth_i)))
+        return DepthPriors(np.log(depth_i), np.log(depth_j), min(1.0, INDEPENDENT / len(depth_i)))
 
     def weigh(self, terms: np.ndarray) -> np.ndarray:
         """Terms (n, 4) of the residuals, those of depth times `share`."""
@@ -206,11 +213,12 @@ def refine_pose(
         cost = _robust_cost(residuals, priors)
         step = _solve(residuals, weights, jac_pose, jac_depth, state.log_scale, damping)
         trial = state.moved(*step)
-        if _robust_cost(_residuals(trial, matches, priors), priors) < cost:
+        gain = cost - _robust_cost(_residuals(trial, matches, priors), priors)
+        if gain > 0:
             state, damping = trial, max(damping / 5, 1e-9)
         else:
             damping *= 8
-        if np.abs(step[0]).max() < 1e-8 or damping > 1e8:
+        if np.abs(step[0]).max() < 1e-8 or damping > 1e8 or 0 < gain < _CONVERGED * cost:
             break
     agrees = np.linalg.norm(_residuals(state, matches, priors)[:, :2], axis=1) < _INLIER
     return RelativePose(state.rotation, state.translation, state.log_scale, agrees, cost)

@@ -110,6 +110,8 @@ class GuidedDepth(Preset):
     sweep_range: float
     """Plane-sweep hypotheses span prior depth times exp(+-sweep_range)."""
     sweep_groups: int
+    sweep_passes: int
+    """How often the sweep is done, each time around the answer before."""
     refiner_widths: tuple[int, int, int]
     """Channels at 4, 2 and 1 times the token grid."""
 
@@ -157,6 +159,7 @@ MINI = GuidedDepth(
     sweep_planes=24,
     sweep_range=0.45,
     sweep_groups=2,
+    sweep_passes=2,
     refiner_widths=(64, 128, 192),
     num_queries=64,
     grouping_dim=128,

@@ -112,8 +112,9 @@ def _double(maps: Tensor) -> Tensor:
 class DepthRefiner(nn.Module):
     """Corrects the prior by what the sweep shows.
 
-    The answer is a soft-argmax over the hypotheses, so it can never leave their range; with no
-    other view (or none that sees a pixel) correlations are 0 and the prior speaks alone.
+    Each pass answers with a soft-argmax over the hypotheses, so it can never leave their range, and
+    the next looks around that answer; with no other view (or none that sees a pixel) correlations
+    are 0 and the prior speaks alone.
     """
 
     offsets: Tensor  # (P,) log-depth hypotheses around the prior
@@ -122,6 +123,7 @@ class DepthRefiner(nn.Module):
         super().__init__()
         planes, widths = preset.sweep_planes, preset.refiner_widths
         self.match_hook, self.groups = preset.match_hook, preset.sweep_groups
+        self.num_passes = preset.sweep_passes
         offsets = torch.linspace(-preset.sweep_range, preset.sweep_range, planes)
         self.register_buffer("offsets", offsets, persistent=False)
         inputs = (self.groups + 1) * planes + 6  # correlations; how much is seen, depth, error, colour
@@ -131,14 +133,23 @@ class DepthRefiner(nn.Module):
 
     def forward(
         self, images: Tensor, tokens: Tokens, local: Tensor, prior: DepthMaps, viewmats: Tensor, Ks: Tensor
-    ) -> DepthMaps:
-        """Refined maps of the prior's size.
+    ) -> tuple[DepthMaps, ...]:
+        """Refined maps of the prior's size after each pass; the last are the answer.
 
         Args:
             images: (B, V, 3, H, W). local: `LocalFeatures` of them, (n, C, h', w').
             prior: (B, V, H, W), of the viewmats' length unit.
             viewmats: (B, V, 4, 4). Ks: (B, V, 3, 3), pixels of the images.
         """
+        passes = []
+        for _ in range(self.num_passes):
+            prior = self._once(images, tokens, local, prior, viewmats, Ks)
+            passes.append(prior)
+        return tuple(passes)
+
+    def _once(
+        self, images: Tensor, tokens: Tokens, local: Tensor, prior: DepthMaps, viewmats: Tensor, Ks: Tensor
+    ) -> DepthMaps:
         size, shape = _size(prior.log_depths), prior.log_depths.shape[:2]
         small_size = (4 * tokens.grid[0], 4 * tokens.grid[1])
         pictures = images.flatten(0, 1)

@@ -9,12 +9,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float
 
-from langflash_core.rooms.catalogue import TRAIN_LIBRARIES, Item
+from langflash_core.rooms.catalogue import PARAMETRIC, TRAIN_LIBRARIES, UNSEEN, Item
 from langflash_core.rooms.pack import Pack
-from langflash_core.rooms.plan import ON_TOP, ROOM_PLANS, Step, hang_height, role
+from langflash_core.rooms.plan import ODDS, ON_TOP, ROOM_PLANS, Step, hang_height, role
 from langflash_core.rooms.shell import Opening, Shell, Style, Wall, make_shell, random_style
 
 SLACK = 0.01
+_MOST_ODDS = 4
 _MAX_INSTANCES = 200
 # Things made in any colour: their models are often plain white.
 _DYED = frozenset(
@@ -101,6 +102,7 @@ def make_room(seed: int, pack: Pack, libraries: tuple[str, ...] = TRAIN_LIBRARIE
     for step in ROOM_PLANS[kind]:
         _do_step(site, step)
     _fill_surfaces(site)
+    _scatter_odds(site)
     style = _sun_through_window(rng, random_style(rng, kind), site.shell)
     structure = [_structural(name, site.shell) for name in ("wall", "floor", "ceiling")]
     return Room(kind, site.shell, style, tuple(structure + site.placed)[:_MAX_INSTANCES], seed)
@@ -483,6 +485,23 @@ def _fill_surfaces(site: _Site) -> None:
             index = _draw(site, rule[0])
             if index is not None and len(site.placed) < _MAX_INSTANCES - 10:
                 _stand_on(site, anchor, index)
+
+
+def _scatter_odds(site: _Site) -> None:
+    """A few things that no rule asks for, each where it may be (`ODDS`)."""
+    drawn = {PARAMETRIC, UNSEEN}
+    known = [r for r in ODDS if any(site.pack.items[i].library in drawn for i in site.roles.get(r, ()))]
+    if not known:
+        return
+    for _ in range(int(site.rng.integers(0, _MOST_ODDS + 1))):
+        word = known[int(site.rng.integers(len(known)))]
+        index = int(site.rng.choice([i for i in site.roles[word] if site.pack.items[i].library in drawn]))
+        if ODDS[word] == "floor":
+            _on_floor(site, index)
+        elif ODDS[word] == "hang":
+            _hang(site, index)
+        elif tops := [n for n, placed in enumerate(site.placed) if placed.group in ON_TOP]:
+            _stand_on(site, tops[int(site.rng.integers(len(tops)))], index)
 
 
 def _stand_on(site: _Site, anchor: int, index: int, tries: int = 10) -> None:

@@ -12,16 +12,35 @@ import numpy as np
 from jaxtyping import Float
 from PIL import Image
 
-from langflash_core.rooms import makers_fittings as fittings
-from langflash_core.rooms import makers_furniture as furniture
-from langflash_core.rooms import makers_small as small
 from langflash_core.rooms.catalogue import PARAMETRIC, UNSEEN, Item
-from langflash_core.rooms.makers_common import NUM_WOODS, Design, Draw, Look, Maker
+from langflash_core.rooms.makers import (
+    animals,
+    appliances,
+    beds,
+    fittings,
+    furniture,
+    greens,
+    hall,
+    kitchen,
+    play,
+    seats,
+    small,
+    storage,
+    study,
+    textiles,
+    toys,
+    trifles,
+    washing,
+    water,
+    wheels,
+)
+from langflash_core.rooms.makers.common import NUM_WOODS, Design, Draw, Look, Maker
 from langflash_core.rooms.objfile import Soup, smooth_normals
 from langflash_core.rooms.solids import Triangles
 
 _TEXTURE_SIDE = 128
 _TILES_PER_M = 1.3
+_STRETCH = 0.04  # less than one sees on what is round
 _FIRST_UNSEEN = 1000  # copies are counted from here; no maker makes as many
 _WOOD_TONES = (
     ((0.62, 0.45, 0.28), (0.78, 0.62, 0.43)),
@@ -81,6 +100,136 @@ MAKERS: tuple[tuple[Maker, int], ...] = (
     (small.trash_bin, 14),
     (small.clock, 12),
     (small.toy, 14),
+    (washing.towel, 10),
+    (washing.towel_rack, 8),
+    (washing.toilet_paper_holder, 8),
+    (washing.toilet_brush, 8),
+    (washing.bidet, 8),
+    (washing.urinal, 8),
+    (washing.potty, 8),
+    (washing.scale, 8),
+    (washing.soap, 8),
+    (washing.brush, 8),
+    (washing.comb, 8),
+    (washing.cosmetics, 8),
+    (washing.sponge, 8),
+    (washing.drying_rack, 8),
+    (washing.broom, 8),
+    (washing.mat, 8),
+    (washing.water_heater, 8),
+    (washing.mirror, 12),
+    (hall.hanging_clothes, 8),
+    (hall.clothes, 10),
+    (hall.coat_hanger, 8),
+    (hall.fire_extinguisher, 8),
+    (hall.air_conditioner, 8),
+    (hall.fan, 8),
+    (hall.ceiling_fan, 8),
+    (hall.water_cooler, 8),
+    (hall.ladder, 8),
+    (hall.umbrella, 8),
+    (hall.bag, 12),
+    (hall.suitcase, 8),
+    (hall.room_divider, 8),
+    (hall.mannequin, 8),
+    (hall.person, 10),
+    (hall.christmas_tree, 8),
+    (hall.gift, 8),
+    (hall.safe, 8),
+    (hall.aquarium, 8),
+    (kitchen.dishwasher, 8),
+    (kitchen.range_hood, 8),
+    (kitchen.kitchen_island, 10),
+    (kitchen.coffee_machine, 10),
+    (kitchen.kettle, 8),
+    (kitchen.teapot, 8),
+    (kitchen.toaster, 8),
+    (kitchen.kitchen_appliance, 10),
+    (kitchen.pan, 8),
+    (kitchen.kitchen_utensil, 8),
+    (kitchen.jar, 8),
+    (kitchen.tray, 8),
+    (kitchen.salt_shaker, 8),
+    (kitchen.paper_towel_holder, 8),
+    (kitchen.candle, 8),
+    (kitchen.ashtray, 8),
+    (kitchen.bread, 8),
+    (kitchen.barrel, 8),
+    (kitchen.high_chair, 8),
+    (kitchen.firewood, 8),
+    (kitchen.fireplace, 10),
+    (kitchen.piano, 10),
+    (textiles.dressing_table, 8),
+    (textiles.bunk_bed, 8),
+    (textiles.mattress, 8),
+    (textiles.rug, 12),
+    (textiles.curtain, 10),
+    (textiles.blanket, 8),
+    (textiles.cushion, 10),
+    (textiles.picture, 14),
+    (textiles.book, 12),
+    (textiles.chair_more, 16),
+    (textiles.table_more, 14),
+    (textiles.lamp_more, 16),
+    (textiles.bookcase_more, 12),
+    (textiles.cabinet_more, 12),
+    (study.keyboard, 8),
+    (study.phone, 10),
+    (study.printer, 8),
+    (study.tablet, 8),
+    (study.headphones, 8),
+    (study.game_controller, 8),
+    (study.remote_control, 8),
+    (study.player, 8),
+    (study.camera, 8),
+    (study.projector, 8),
+    (study.whiteboard, 8),
+    (study.calendar, 8),
+    (study.newspaper, 8),
+    (study.stationery, 8),
+    (study.flashlight, 8),
+    (study.keys, 8),
+    (study.glasses, 8),
+    (study.watch, 8),
+    (study.switch, 8),
+    (study.socket, 8),
+    (study.dartboard, 8),
+    (study.tool, 8),
+    (play.musical_instrument, 12),
+    (play.game_table, 10),
+    (play.fitness_machine, 8),
+    (play.sports_gear, 10),
+    (wheels.bicycle, 10),
+    (wheels.tricycle, 8),
+    (wheels.skateboard, 8),
+    (wheels.stroller, 8),
+    (wheels.wheelchair, 8),
+    (animals.teddy_bear, 8),
+    (animals.cat, 8),
+    (animals.dog, 8),
+    (animals.rabbit, 8),
+    (animals.sleeping_bag, 8),
+    (toys.toy_more, 12),
+    (beds.bed_more, 16),
+    (seats.sofa_more, 16),
+    (seats.armchair_more, 14),
+    (storage.desk_more, 12),
+    (storage.wardrobe_more, 12),
+    (storage.dresser_more, 12),
+    (storage.tv_stand_more, 10),
+    (water.sink_more, 10),
+    (water.toilet_more, 8),
+    (water.bathtub_more, 8),
+    (water.shower_more, 8),
+    (appliances.stove_more, 10),
+    (appliances.refrigerator_more, 8),
+    (appliances.tv_more, 8),
+    (greens.plant_more, 14),
+    (trifles.vase_more, 8),
+    (trifles.clock_more, 8),
+    (trifles.box_more, 8),
+    (trifles.cup_more, 8),
+    (trifles.trash_bin_more, 8),
 )
 """What is made and how many of each: the more of it homes hold and the more its makes differ, the more."""
 
@@ -99,8 +248,9 @@ def parametric_models(copies: float = 1.0, library: str = PARAMETRIC) -> list[tu
     models, first = [], {PARAMETRIC: 0, UNSEEN: _FIRST_UNSEEN}[library]
     for row, (maker, count) in enumerate(MAKERS):
         for copy in range(first, first + max(1, round(count * copies))):
-            design = maker(Draw(np.random.default_rng([row, copy])))
-            models.append(_finished(design, f"{design.group}-{row}-{copy}", library))
+            rng = np.random.default_rng([row, copy])
+            design = maker(Draw(rng))
+            models.append(_finished(design, f"{design.group}-{row}-{copy}", library, rng))
     return models
 
 
@@ -126,8 +276,12 @@ def _wood(rng: np.random.Generator) -> bytes:
     return stream.getvalue()
 
 
-def _finished(design: Design, copy: str, library: str) -> tuple[Item, Soup, list[Look]]:
-    positions = np.concatenate([triangles for triangles, _ in design.parts])
+def _finished(
+    design: Design, copy: str, library: str, rng: np.random.Generator
+) -> tuple[Item, Soup, list[Look]]:
+    """The design as a model, a little wider or narrower, so that no two have one shape."""
+    width, depth = rng.uniform(1 - _STRETCH, 1 + _STRETCH, 2)
+    positions = np.concatenate([triangles for triangles, _ in design.parts]) * [width, 1.0, depth]
     looks = list(dict.fromkeys(look for _, look in design.parts))
     materials = np.concatenate([np.full(len(t), looks.index(look)) for t, look in design.parts])
     names = tuple(f"m{k}" for k in range(len(looks)))

@@ -250,6 +250,31 @@ ON_TOP: dict[str, tuple[tuple[str, ...], int]] = {
     "dressing table": (("cosmetics", "brush", "comb", "bottle", "lamp", "soap"), 3),
 }
 
+# What no rule above asks for, and where it may be. Only makes of the libraries drawn by rules are
+# scattered so: rooms of the catalogues stay as they are, and figures of different versions compare.
+ODDS: dict[str, str] = {
+    "ashtray": "top",
+    "barrel": "floor",
+    "coat hanger": "floor",
+    "curtain": "hang",
+    "dartboard": "hang",
+    "fan": "floor",
+    "flashlight": "top",
+    "gift": "floor",
+    "hob": "top",
+    "keys": "top",
+    "mattress": "floor",
+    "paper towel holder": "top",
+    "projector": "top",
+    "rabbit": "floor",
+    "salt shaker": "top",
+    "sleeping bag": "floor",
+    "sponge": "top",
+    "sports gear": "floor",
+    "tool": "top",
+    "tricycle": "floor",
+}
+
 # Openings and things of these groups are drawn at the item's own place, never by the rules above.
 STRUCTURE = frozenset({"window", "door"})
 

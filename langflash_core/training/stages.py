@@ -105,18 +105,22 @@ def depth_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
 
 
 def refine_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
-    """Plane-sweep refinement of the frozen prior, with the small errors that poses will have."""
+    """Plane-sweep refinement of the frozen prior, every pass of it, with the errors that poses will have."""
     network = guided(network)
     with torch.no_grad():
         prior = scaled_prior(network, batch)
         prior = replace(prior, log_depths=prior.log_depths + 0.05 * _noise(batch, (1, 1), words.generator))
         viewmats = perturbed_poses(batch.viewmats, words.generator, *_pose_noise(words.generator))
         local = network.local(batch.images.flatten(0, 1))
-    maps = network.refiner(batch.images, tokens_of(network, batch), local, prior, viewmats, batch.Ks)
-    logs, errors, truth = (t.flatten(0, 1).float() for t in (maps.log_depths, maps.log_errors, batch.depths))
-    shape, slope = depth_loss(logs, truth, absolute=1.0), gradient_loss(logs, truth)
-    error = error_loss(logs, errors, truth, shared_offset=False)
-    return Loss(shape + slope + 0.05 * error, _numbers(shape=shape, slope=slope, error=error))
+    passes = network.refiner(batch.images, tokens_of(network, batch), local, prior, viewmats, batch.Ks)
+    truth = batch.depths.flatten(0, 1).float()
+    total = truth.new_zeros(())
+    for maps in passes:
+        logs, errors = (t.flatten(0, 1).float() for t in (maps.log_depths, maps.log_errors))
+        shape, slope = depth_loss(logs, truth, absolute=1.0), gradient_loss(logs, truth)
+        error = error_loss(logs, errors, truth, shared_offset=False)
+        total = total + (shape + slope + 0.05 * error) / len(passes)
+    return Loss(total, _numbers(shape=shape, slope=slope, error=error))
 
 
 def scaled_prior(network: LangFlashNet, batch: SceneBatch) -> DepthMaps:
@@ -190,7 +194,7 @@ def novel_views(network: LangFlashNet, batch: SceneBatch) -> list[tuple[Tensor, 
             scaled_prior(network, context),
             context.viewmats,
             context.Ks,
-        )
+        )[-1]
         levels = network.levels(tokens_of(network, context), context.Ks)
     raw = network.gaussian_head(levels, context.images)
     size = (batch.size[0] // GAUSSIAN_STRIDE, batch.size[1] // GAUSSIAN_STRIDE)

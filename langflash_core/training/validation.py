@@ -82,7 +82,7 @@ def measure_refine(network: LangFlashNet, batch: SceneBatch, words: Words) -> di
     network = guided(network)
     prior = scaled_prior(network, batch)
     local = network.local(batch.images.flatten(0, 1))
-    maps = network.refiner(batch.images, batch.tokens, local, prior, batch.viewmats, batch.Ks)
+    maps = network.refiner(batch.images, batch.tokens, local, prior, batch.viewmats, batch.Ks)[-1]
     flat = batch.depths.flatten(0, 1)
     refined, before = (d.float().flatten(0, 1) for d in (maps.depths, prior.depths))
     return {

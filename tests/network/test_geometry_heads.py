@@ -1,5 +1,7 @@
 """Guided depth and the per-pixel Gaussians against slow twins."""
 
+import itertools
+
 import numpy as np
 import pytest
 import torch
@@ -105,11 +107,12 @@ def test_refiner_stays_in_its_range_and_is_finite(untrained):
     viewmats = torch.eye(4).expand(1, 2, 4, 4)
     Ks = torch.tensor([[60.0, 0, 35], [0, 60.0, 28], [0, 0, 1]]).expand(1, 2, 3, 3)
     local = untrained.local(images[0])
-    refined = untrained.refiner(images, tokens, local, prior, viewmats, Ks)
-    assert torch.isfinite(refined.depths).all()
-    assert (
-        refined.log_depths - prior.log_depths
-    ).abs().max() <= untrained.preset.sweep_range + 1e-5  # float32
+    passes = untrained.refiner(images, tokens, local, prior, viewmats, Ks)
+    assert len(passes) == untrained.preset.sweep_passes
+    for before, after in itertools.pairwise((prior, *passes)):
+        assert torch.isfinite(after.depths).all()
+        change = (after.log_depths - before.log_depths).abs().max()
+        assert change <= untrained.preset.sweep_range + 1e-5  # float32
 
 
 def _plane(tilt: float) -> torch.Tensor:

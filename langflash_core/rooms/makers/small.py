@@ -1,9 +1,9 @@
-"""Makers of plants, vessels, boxes and toys (see `makers_common`). Metres, y up, front +z."""
+"""Makers of plants, vessels, boxes and toys (see `makers.common`). Metres, y up, front +z."""
 
 import numpy as np
 
 from langflash_core.rooms.builtin import KIND_FABRIC
-from langflash_core.rooms.makers_common import BLACK, DARK, WHITE, Design, Draw, Look, plain, polar
+from langflash_core.rooms.makers.common import BLACK, DARK, WHITE, Design, Draw, Look, plain, polar
 from langflash_core.rooms.objfile import Material
 from langflash_core.rooms.solids import Triangles, Vector, box, rounded, scaled, shifted, turned
 

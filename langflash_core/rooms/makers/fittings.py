@@ -1,8 +1,8 @@
-"""Makers for kitchens and baths, of lamps and of screens (see `makers_common`). Metres, y up, front +z."""
+"""Makers for kitchens and baths, of lamps and of screens (see `makers.common`). Metres, y up, front +z."""
 
 import numpy as np
 
-from langflash_core.rooms.makers_common import (
+from langflash_core.rooms.makers.common import (
     BLACK,
     DARK,
     SIDES,

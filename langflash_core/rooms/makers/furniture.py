@@ -1,10 +1,10 @@
-"""Makers of seats, tables, beds and cupboards (see `makers_common`). Metres, y up, front +z."""
+"""Makers of seats, tables, beds and cupboards (see `makers.common`). Metres, y up, front +z."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from langflash_core.rooms.makers_common import (
+from langflash_core.rooms.makers.common import (
     BLACK,
     DARK,
     LINEN,
