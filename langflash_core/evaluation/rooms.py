@@ -357,6 +357,7 @@ def judge_views(
         averaged = average_atoms(small, features)[0]
         masks = true_masks(record, (0, 1))  # (V, G', H, W)
         seen = Seen(tokens, prediction.depths, prediction.viewmats, source.Ks)
+        renamed = network.named(averaged, small[0], seen)
         true_atoms = network.dictionary(masks, features, seen)
         alone = language_maps(network, target)[0][0, 0]
     rgb, maps, true_maps = _rendered(record, prediction, masks, scale)
@@ -377,6 +378,7 @@ def judge_views(
         vectors = {
             "features": _upsampled(own, (photo.shape[0], photo.shape[1])),
             "averaged": torch.einsum("khw,kc->hwc", weights, averaged),
+            "averaged_named": torch.einsum("khw,kc->hwc", weights, renamed),
             "lfa": torch.einsum("khw,kc->hwc", weights, prediction.dictionary),
             "true_masks_lfa": torch.einsum("khw,kc->hwc", exact, true_atoms),
         }

@@ -28,6 +28,7 @@ _MEASURES = (
 _METHODS = {
     "features": "2D features per view, no 3D",
     "averaged": "averaged atoms",
+    "averaged_named": "averaged and named atoms",
     "lfa": "aggregated and named atoms (LFA)",
     "true_masks_lfa": "true masks, aggregated and named",
     "majority": 'always "wall"',

@@ -17,7 +17,7 @@ from langflash_core.network.gaussians import GaussianHead, assemble_gaussians
 from langflash_core.network.grouping import ScratchHead, SemanticGrouping, group_weights, surviving
 from langflash_core.network.language import LanguageHead
 from langflash_core.network.local import LocalFeatures
-from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Run, Seen, pooled_weights
+from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Run, Seen
 from langflash_core.network.naming import PartNamer, describe, places
 from langflash_core.network.poses import PoseInput, Poses, estimate_poses
 from langflash_core.network.presets import GuidedDepth
@@ -86,14 +86,12 @@ class GuidedDepthNet(LangFlashNet):
         whole = group_weights(groups, survivors, (finest.shape[-2], finest.shape[-1]))
         return split_groups(whole, finest, self.preset.splitting, size)
 
-    def dictionary(self, weights: Tensor, features: Tensor, seen: Seen | None = None) -> Tensor:
-        """Aggregated atoms, corrected by what `seen` tells of each part."""
-        atoms = super().dictionary(weights, features)
-        if seen is None or len(atoms) == 0:
+    def named(self, atoms: Tensor, weights: Tensor, seen: Seen) -> Tensor:
+        """Atoms corrected by deep tokens, places and each other."""
+        if len(atoms) == 0:
             return atoms
-        small = pooled_weights(weights, features)[0]
-        where = places(small, seen.depths, seen.viewmats, seen.Ks)
-        return self.namer(atoms, describe(small, seen.tokens), where)
+        where = places(weights, seen.depths, seen.viewmats, seen.Ks)
+        return self.namer(atoms, describe(weights, seen.tokens), where)
 
     def reconstruct(self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: Run) -> Geometry:
         """Depth, poses, refined depth, Gaussians."""

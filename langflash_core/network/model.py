@@ -129,8 +129,14 @@ class LangFlashNet(nn.Module):
         """
         small = pooled_weights(weights, features)
         if self.aggregated:
-            return self.aggregation(small, features)[0]
-        return averaged_atoms(small, features, self.preset.eps)[0]
+            atoms = self.aggregation(small, features)[0]
+        else:
+            atoms = averaged_atoms(small, features, self.preset.eps)[0]
+        return atoms if seen is None else self.named(atoms, small[0], seen)
+
+    def named(self, atoms: Tensor, weights: Tensor, seen: Seen) -> Tensor:
+        """Atoms (K, C) of one scene, corrected by what is seen of their parts; weights (V, K, h, w)."""
+        return atoms
 
     @contextmanager
     def stopping(self, check: Callable[[], None]) -> Iterator[None]:

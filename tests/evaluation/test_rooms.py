@@ -46,7 +46,14 @@ def test_a_run_measures_everything(cache: Path, weights: Path):
     assert result["scenes"] == 2
     assert result["seeds"] == [0, 1]
     json.dumps(result, allow_nan=False)
-    assert set(result["labels"]) == {"features", "averaged", "lfa", "true_masks_lfa", "majority"}
+    assert set(result["labels"]) == {
+        "features",
+        "averaged",
+        "averaged_named",
+        "lfa",
+        "true_masks_lfa",
+        "majority",
+    }
     measures = result["measures"]
     # The toy rooms: a constant depth is wrong by what the wall, floor and boxes differ.
     assert 0.1 < measures["depth_abs_rel_constant"] < 0.4

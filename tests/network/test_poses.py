@@ -10,6 +10,7 @@ from langflash_core.network.matching import (
     Matches,
     RelativePose,
     match_descriptors,
+    mutual,
     refine_pose,
     relative_pose,
 )
@@ -147,6 +148,19 @@ def test_descriptors_match_mutually_and_uniquely():
 
 def _agree(count: int) -> np.ndarray:
     return np.ones(count, bool)
+
+
+def test_mutual_pairs_are_first_in_their_row_and_in_their_column():
+    rng = np.random.default_rng(0)
+    similarity = rng.normal(size=(60, 80)).round(1)  # many ties
+    rows, columns = mutual(similarity)
+    best, first = similarity.argmax(1), similarity.max(0)
+    expected: dict[int, int] = {}
+    for row in range(60):
+        if similarity[row, best[row]] == first[best[row]]:
+            expected.setdefault(int(best[row]), row)
+    assert dict(zip(columns.tolist(), rows.tolist(), strict=True)) == expected
+    assert len(rows) > 10 and np.all(np.diff(rows) > 0)
 
 
 def test_views_chain_through_the_best_connected_tree():

@@ -1,11 +1,13 @@
 """Rooms by rules: splits, boxes, outline."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from langflash_core.rooms import HELD_OUT_LIBRARIES, TRAIN_LIBRARIES, Pack, make_room
+from langflash_core.rooms.catalogue import UNSEEN
 from langflash_core.rooms.layout import SLACK
 from langflash_core.rooms.plan import ON_TOP, ROOM_PLANS
 from langflash_core.rooms.shell import CEILING, FLOOR, make_shell, shell_triangles
@@ -36,6 +38,22 @@ def test_rooms_follow_from_the_seed(pack: Pack) -> None:
     for a, b in zip(first.instances, again.instances, strict=True):
         np.testing.assert_array_equal(a.model, b.model)
     assert first.style == again.style != other.style
+
+
+def test_odds_come_from_makes_drawn_by_rules_alone(pack: Pack) -> None:
+    """Rooms of the catalogues stay as they are: what no rule asks for is scattered from `UNSEEN` only."""
+    place = next(n for n, item in enumerate(pack.items) if item.library != "builtin" and max(item.size) < 1)
+
+    def named(library: str) -> Pack:
+        odd = replace(pack.items[place], group="fan", library=library)
+        return replace(pack, items=(*pack.items[:place], odd, *pack.items[place + 1 :]))
+
+    def fans(library: str) -> int:
+        rooms = [make_room(seed, named(library), (library, *HELD_OUT_LIBRARIES)) for seed in range(20)]
+        return sum(thing.group == "fan" for room in rooms for thing in room.instances)
+
+    assert fans(UNSEEN) > 5
+    assert fans(HELD_OUT_LIBRARIES[0]) == 0
 
 
 @pytest.mark.parametrize("seed", range(0, 60, 3))
