@@ -80,7 +80,13 @@ class _Draft:
     texture_ids: dict[bytes, int] = field(default_factory=dict)
 
 
-def build_pack(root: Path, out: Path, keys: frozenset[str] | None = None, max_faces: int = MAX_FACES) -> int:
+def build_pack(
+    root: Path,
+    out: Path,
+    keys: frozenset[str] | None = None,
+    max_faces: int = MAX_FACES,
+    copies: float = 1.0,
+) -> int:
     """Pack the catalogues under a folder.
 
     Args:
@@ -88,6 +94,7 @@ def build_pack(root: Path, out: Path, keys: frozenset[str] | None = None, max_fa
         out: file to write, `.npz`, atomically.
         keys: items to keep; all when None. Models made here are always kept.
         max_faces: decimate larger models to about this many triangles.
+        copies: share of the makes drawn by rules (see `parametric_models`).
 
     Returns:
         Number of items packed. Models that cannot be read, or are larger than any decimation
@@ -104,7 +111,7 @@ def build_pack(root: Path, out: Path, keys: frozenset[str] | None = None, max_fa
         if keys is None or item.key in keys:
             _add_item(draft, item, catalogue.archives[item.library], members[item.library], max_faces)
     if keys is None:
-        _add_parametric(draft, max_faces)
+        _add_parametric(draft, max_faces, copies)
     _write(draft, out)
     return len(draft.items)
 
@@ -118,7 +125,7 @@ def load_pack(path: Path) -> Pack:
     if not path.is_file():
         raise InputError(f"There is no room pack at {path}: build one with `langflash rooms pack`.")
     try:
-        with np.load(path) as arrays:
+        with path.open("rb") as file, np.load(file) as arrays:
             stored = {name: arrays[name] for name in arrays.files}
         header = json.loads(stored["header"].tobytes())
     except (ValueError, KeyError, OSError, zipfile.BadZipFile, lzma.LZMAError) as error:
@@ -143,9 +150,9 @@ def _add_item(draft: _Draft, item: Item, archive: Archive, members: dict[str, st
     _append(draft, item, index(soup, max_faces), rows)
 
 
-def _add_parametric(draft: _Draft, max_faces: int) -> None:
+def _add_parametric(draft: _Draft, max_faces: int, copies: float) -> None:
     layers = {name: _layer(draft, encoded) for name, encoded in wood_textures().items()}
-    made = [*parametric_models(), *parametric_models(_UNSEEN_SHARE, UNSEEN)]
+    made = [*parametric_models(copies), *parametric_models(copies * _UNSEEN_SHARE, UNSEEN)]
     for item, soup, looks in made:
         rows = [_row(look, layers.get(look.texture, -1), kind) for look, kind in looks]
         _append(draft, item, index(pose(soup, item.size, item.rotation), max_faces), rows)

@@ -68,7 +68,7 @@ def test_empty_folder_is_refused(tmp_path: Path) -> None:
 
 def test_pack_round_trip(library: Path, tmp_path: Path) -> None:
     out = tmp_path / "pack.npz"
-    count = build_pack(library, out)
+    count = build_pack(library, out, copies=0.0)  # one make of each kind
     pack = load_pack(out)
     assert len(pack.items) == count
     number = next(i for i, item in enumerate(pack.items) if item.name == "oak chair")
@@ -87,10 +87,16 @@ def test_pack_round_trip(library: Path, tmp_path: Path) -> None:
     assert out.read_bytes() == out.read_bytes() and not list(tmp_path.glob(".pack*"))
 
 
-def test_foreign_and_missing_packs_are_refused(tmp_path: Path) -> None:
+def test_foreign_and_missing_packs_are_refused(library: Path, tmp_path: Path) -> None:
     bad = tmp_path / "bad.npz"
     bad.write_bytes(b"not a pack")
-    for path in (bad, tmp_path / "none.npz"):
+    whole = tmp_path / "pack.npz"
+    build_pack(library, whole, keys=frozenset())
+    data = whole.read_bytes()
+    half, spoilt = tmp_path / "half.npz", tmp_path / "spoilt.npz"
+    half.write_bytes(data[: len(data) // 2])
+    spoilt.write_bytes(data[: len(data) // 2] + bytes(64) + data[len(data) // 2 + 64 :])
+    for path in (bad, half, spoilt, tmp_path / "none.npz"):
         with pytest.raises(InputError, match="langflash rooms pack"):
             load_pack(path)
 
