@@ -21,14 +21,16 @@ on furniture that the language head learned from its atoms are better than on an
 DROPPED = 0.3
 """Share of the namer's own channels that are left out at a time."""
 DRAWN = 256
-"""Parts of a batch that the loss is taken over, by quality, rare classes more often."""
+"""Parts of a batch that the loss is taken over, by quality and by rarity."""
+RARITY = 0.5
+"""0: as classes come; 1: every class of a batch as often as any other."""
 
 
 def naming_stage(network: LangFlashNet, batch: PartBatch, words: Words) -> Loss:
     """Contrast of corrected atoms against phrases that are true and false of the parts."""
     vectors = torch.cat([_renamed(network, room, words.generator) for room in batch.rooms()])
     counts = words.sampler.groups(batch.labels)
-    rare = torch.bincount(counts.clamp_min(0)).float()[counts.clamp_min(0)].rsqrt()
+    rare = torch.bincount(counts.clamp_min(0)).float()[counts.clamp_min(0)] ** -RARITY
     drawn = torch.multinomial(batch.quality.cpu() * rare, DRAWN, replacement=True, generator=words.generator)
     labels = tuple(batch.labels[i] for i in drawn.tolist())
     phrases = words.sampler.draw(labels, words.generator)
