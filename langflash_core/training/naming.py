@@ -11,14 +11,14 @@ from langflash_core.training.measures import confusion
 from langflash_core.training.parts import PartBatch
 from langflash_core.training.stages import Loss, Stage, Words, guided, phrase_bank
 
-NOISE = 0.25
+NOISE = 0.15
 """Of standardised inputs; stands for makes of furniture that are not there to learn from."""
-HIDDEN = 0.15
+HIDDEN = 0.1
 """Share of a room's token channels that are hidden from the namer."""
-BLIND = 0.35
+BLIND = 0.25
 """How often a part's place, and how often its atom, are hidden altogether: lengths may be wrong, and
 on furniture that the language head learned from its atoms are better than on any other."""
-DROPPED = 0.3
+DROPPED = 0.2
 """Share of the namer's own channels that are left out at a time."""
 DRAWN = 256
 """Parts of a batch that the loss is taken over, by quality and by rarity."""
