@@ -1,4 +1,4 @@
-"""Makers of animals, living and plush, and of what one sleeps in outdoors (see `makers.common`).
+"""Makers of animals, living and plush (see `makers.common`).
 
 Metres, y up, front +z.
 """
@@ -9,16 +9,14 @@ import numpy as np
 
 from langflash_core.rooms.makers.common import (
     BLACK,
-    DARK,
     SIDES,
     WHITE,
     Design,
     Draw,
     Look,
     plain,
-    spread,
 )
-from langflash_core.rooms.makers.shapes import across, ball, dappled, loft, mixed, pad, torus, vivid
+from langflash_core.rooms.makers.shapes import ball, dappled, loft, mixed, torus, vivid
 from langflash_core.rooms.solids import (
     Triangles,
     Vector,
@@ -290,35 +288,4 @@ def rabbit(draw: Draw) -> Design:
     ball(d, (0.2 * s, 0.2 * s, 0.18 * s), (0, 0.32 * s, -0.7 * s), WHITE, 5)
     at, big = (0.0, 0.66 * s, 0.5 * s), 0.42 * s
     _head(d, draw, at, big, 0.08, coats, 2)
-    return d
-
-
-def sleeping_bag(draw: Draw) -> Design:
-    """Rolled up with straps, or spread out with its hood open."""
-    d = Design("sleeping bag", "sleeping bag", ("camping bag",))
-    look, lining = plain(draw.colour(0.8, 0.3)), plain(draw.colour(0.5, 0.5))
-    if draw.chance(0.5):
-        radius, long = draw.between(0.11, 0.17), draw.between(0.3, 0.5)
-        d.add(loft(((-long / 2, radius, 0), (long / 2, radius, 0)), (radius, radius), 16), look)
-        for s in SIDES:
-            for r, part in ((0.75, lining), (0.5, look), (0.25, lining)):
-                place = (s * (long / 2 + radius * 0.62 - 0.05 * r), radius, 0)
-                d.add(across(radius * r, 0.03, place, 0, 12), part)
-            d.add(torus(radius, 0.012, (s * long * 0.3, radius, 0), 0, 16), DARK)
-        path = (
-            (-long * 0.3, 2 * radius, 0),
-            (-long * 0.2, 2.3 * radius, 0),
-            (long * 0.2, 2.3 * radius, 0),
-            (long * 0.3, 2 * radius, 0),
-        )
-        d.tube(path, 0.01, DARK, 5)
-        return d
-    wide, long = draw.between(0.65, 0.8), draw.between(1.8, 2.1)
-    for k, z in enumerate(spread(-long * 0.3, long * 0.5, 10)):
-        narrow = wide * (1 - 0.4 * k / 9)
-        pad(d, (narrow, 0.13 - 0.004 * k, long * 0.095), (0, 0.065, z), look, 0.05)
-    pad(d, (wide * 0.9, 0.06, long * 0.25), (0, 0.03, -long * 0.42), lining, 0.03)
-    pad(d, (wide * 0.8, 0.09, 0.1), (0, 0.13, -long * 0.33), lining, 0.04)
-    d.add(torus(wide * 0.36, 0.05, (0, 0.06, -long * 0.45), 1, 16), look)
-    d.tube(((wide * 0.49, 0.08, -long * 0.33), (wide * 0.3, 0.08, long * 0.5)), 0.008, DARK, 4)
     return d

@@ -7,6 +7,7 @@ import numpy as np
 from langflash_core.rooms import solids
 from langflash_core.rooms.makers import common
 from langflash_core.rooms.makers.common import BLACK, QUARTER, SIDES, STEEL, WHITE, Design, Draw, Look, plain
+from langflash_core.rooms.makers.shapes import boxes
 from langflash_core.rooms.makers.small import cup
 from langflash_core.rooms.solids import Triangles, Vector, cylinder, lathe, shifted, turned
 
@@ -28,11 +29,6 @@ def _any(draw: Draw, group: str, *names: str) -> tuple[int, Design]:
 
 def _shell(draw: Draw) -> Look:
     return draw.one_of((STEEL, BLACK, WHITE, draw.painted(), plain(draw.colour(0.9, 0.4), 0.6)))
-
-
-def _boxes(d: Design, look: Look, *rows: tuple[float, float, float, float, float, float]) -> None:
-    for w, h, depth, x, y, z in rows:
-        d.box((w, h, depth), (x, y, z), look)
 
 
 def _blob(d: Design, size: Vector, centre: Vector, look: Look, squareness: float = 2.0) -> None:
@@ -71,23 +67,23 @@ def dishwasher(draw: Draw) -> Design:
     look = draw.body() if draw.chance(0.25) else _shell(draw)
     panel, door = draw.one_of((look, BLACK, STEEL)), h - 0.22
     dark = STEEL if panel is BLACK else BLACK
-    _boxes(d, look, (w, h - 0.1, 2 * z, 0, h / 2 + 0.05, 0))
-    _boxes(d, panel, (w - 0.01, 0.105, 0.03, 0, h - 0.056, z + 0.014))
-    _boxes(
+    boxes(d, look, (w, h - 0.1, 2 * z, 0, h / 2 + 0.05, 0))
+    boxes(d, panel, (w - 0.01, 0.105, 0.03, 0, h - 0.056, z + 0.014))
+    boxes(
         d, dark, (w * 0.96, 0.1, z * 1.8, 0, 0.05, -0.02), (0.1, 0.03, 0.006, -w * 0.28, h - 0.055, z + 0.03)
     )
     for k in range(draw.count(3, 6)):
         d.roll(0.009, 0.006, (w * 0.4 - 0.035 * k, h - 0.055, z + 0.03), dark, 8)
     if draw.chance(0.3):
-        _boxes(d, plain((0.25, 0.25, 0.26), 0.5), (w - 0.05, door - 0.02, 0.01, 0, 0.1 + door / 2, z))
-        _boxes(d, look, (w - 0.01, 0.03, door, 0, 0.11, z + door / 2))
+        boxes(d, plain((0.25, 0.25, 0.26), 0.5), (w - 0.05, door - 0.02, 0.01, 0, 0.1 + door / 2, z))
+        boxes(d, look, (w - 0.01, 0.03, door, 0, 0.11, z + door / 2))
         for out in common.spread(z + 0.03, z + door * 0.7, 7):
             d.tube(((-w * 0.4, 0.3, out), (-w * 0.4, 0.16, out), (w * 0.4, 0.16, out)), 0.006, STEEL, 4)
             d.roll(draw.between(0.09, 0.12), 0.012, (0.05, 0.28, out), WHITE, 12)
         return d
     bar, y, out = draw.chance(0.5), door + 0.05, 0.05 * draw.chance(0.5)
-    _boxes(d, look, (w - 0.01, door, 0.025, 0, 0.1 + door / 2, z + 0.012))
-    _boxes(
+    boxes(d, look, (w - 0.01, door, 0.025, 0, 0.1 + door / 2, z + 0.012))
+    boxes(
         d, STEEL if bar else BLACK, (w * draw.between(0.3, 0.9), 0.03, 0.02 + out, 0, y, z + 0.025 + out / 2)
     )
     return d
@@ -102,15 +98,15 @@ def range_hood(draw: Draw) -> Design:
     if style == 2:
         pane = turned(solids.box((w, 0.04, 0.55), (0, 0, 0)), 0, draw.between(0.7, 1.0))
         d.add(shifted(pane, (0, 0.22, 0.02)), BLACK if draw.chance(0.6) else look)
-        _boxes(d, look, (w * 0.9, 0.3, z * 0.35, 0, 0.2, -z * 0.3))
+        boxes(d, look, (w * 0.9, 0.3, z * 0.35, 0, 0.2, -z * 0.3))
     else:
-        _boxes(d, look, (w, rim, z, 0, rim / 2, 0))
+        boxes(d, look, (w, rim, z, 0, rim / 2, 0))
         size = (w * (0.6 if style == 3 else 1), 0.1 if style == 1 else rise, z)
         d.add(
             _tapered(size, (0, rim + size[1] / 2, 0), 0.95 if style == 1 else pipe / w, 0.5, z * 0.25), look
         )
     if style != 1:
-        _boxes(d, look, (pipe, draw.between(0.5, 0.8), pipe * 0.8, 0, 0.5, pipe * 0.4 - z / 2))
+        boxes(d, look, (pipe, draw.between(0.5, 0.8), pipe * 0.8, 0, 0.5, pipe * 0.4 - z / 2))
     return d
 
 
@@ -124,18 +120,18 @@ def kitchen_island(draw: Draw) -> Design:
         draw.one_of((draw.wooden(), WHITE, BLACK, STEEL)),
     )
     shelf, foot = draw.between(0.25, 0.4) * (draw.chance(0.4) and not legs), h - 0.2 if legs else 0.1
-    _boxes(d, top, (w + 0.05, draw.between(0.025, 0.07), z + over, 0, h, -over / 2 + 0.02))
+    boxes(d, top, (w + 0.05, draw.between(0.025, 0.07), z + over, 0, h, -over / 2 + 0.02))
     for sx, sz in _CORNERS if legs else ():
-        _boxes(d, look, (0.07, h, 0.07, sx * (w / 2 - 0.04), h / 2, sz * (z / 2 - 0.04)))
-    _boxes(d, look, (w - 0.06, 0.05, z - 0.08, 0, 0.2 if legs else 0.05, 0))
-    _boxes(d, look, (w - shelf, h - foot, z, -shelf / 2, (h + foot) / 2, 0))
+        boxes(d, look, (0.07, h, 0.07, sx * (w / 2 - 0.04), h / 2, sz * (z / 2 - 0.04)))
+    boxes(d, look, (w - 0.06, 0.05, z - 0.08, 0, 0.2 if legs else 0.05, 0))
+    boxes(d, look, (w - shelf, h - foot, z, -shelf / 2, (h + foot) / 2, 0))
     for y in common.spread(0.115, h - 0.03, 4) if shelf else ():
-        _boxes(d, look, (shelf, 0.025, z, (w - shelf) / 2, y, 0))
+        boxes(d, look, (shelf, 0.025, z, (w - shelf) / 2, y, 0))
     face, doors = common.Face(-w / 2, foot, w - shelf, h - foot - 0.03, z / 2), draw.chance(0.5) and not legs
     rows, columns = 1 if doors or legs else draw.count(2, 4), max(2, round((w - shelf) / 0.5))
     common.fronts(d, draw, face, rows, columns, draw.body(), draw.metal(), doors)
     if draw.chance(0.3):
-        _boxes(d, plain((0.45, 0.45, 0.46), 0.6), (0.5, 0.012, 0.38, 0, h + 0.032, 0.02))
+        boxes(d, plain((0.45, 0.45, 0.46), 0.6), (0.5, 0.012, 0.38, 0, h + 0.032, 0.02))
         d.tube(((0, h, -0.2), (0, h + 0.3, -0.2), (0, h + 0.3, -0.03), (0, h + 0.2, -0.03)), 0.012, STEEL)
     return d
 
@@ -155,8 +151,8 @@ def coffee_machine(draw: Draw) -> Design:
         d.tube(((w * 0.8, h * 0.52, 0), (w * 2, h * 0.53, 0), (w * 1.9, h * 0.27, 0)), 0.009, BLACK, 6)
         d.add(_tapered((w, 0.03, w * 0.5), (-w * 0.8, h * 0.52, 0), 1.3, 1.0), STEEL)
         return d
-    _boxes(d, look, (w, 0.05, 0.28, 0, 0.025, 0), (w, h - 0.02, 0.12, 0, h / 2, -0.08))
-    _boxes(d, dark, (w * 0.8, 0.008, 0.14, 0, 0.052, 0.056))
+    boxes(d, look, (w, 0.05, 0.28, 0, 0.025, 0), (w, h - 0.02, 0.12, 0, h / 2, -0.08))
+    boxes(d, dark, (w * 0.8, 0.008, 0.14, 0, 0.052, 0.056))
     _blob(d, (w, h * 0.34, 0.28), (0, h * 0.85, 0), look, 4.0 if style == 2 else 20.0)
     d.add(cylinder(0.035, h * 0.12, (0, h * 0.58, 0.056), 0.055, 12), dark)
     for k in range(draw.count(2, 4) if style < 2 else 0):
@@ -218,20 +214,20 @@ def toaster(draw: Draw) -> Design:
     )
     z, dark = 0.3 if oven else 0.09 + 0.06 * rows, STEEL if look is BLACK else BLACK
     _blob(d, (w, h, z), (0, h / 2 + 0.01, 0), look, 30.0 if oven else draw.between(6, 14))
-    _boxes(d, dark, (w * 0.9, 0.02, z * 0.9, 0, 0.01, 0))
+    boxes(d, dark, (w * 0.9, 0.02, z * 0.9, 0, 0.01, 0))
     if oven:
-        _boxes(d, plain((0.08, 0.06, 0.05), 0.9), (w * 0.7, h * 0.75, 0.015, -w * 0.11, h * 0.5, z / 2))
-        _boxes(d, STEEL, (w * 0.6, 0.014, 0.014, -w * 0.11, h * 0.8, z / 2 + 0.035))
+        boxes(d, plain((0.08, 0.06, 0.05), 0.9), (w * 0.7, h * 0.75, 0.015, -w * 0.11, h * 0.5, z / 2))
+        boxes(d, STEEL, (w * 0.6, 0.014, 0.014, -w * 0.11, h * 0.8, z / 2 + 0.035))
         for k in range(3):
             d.roll(0.02, 0.02, (w * 0.37, h * (0.25 + 0.27 * k), z / 2), dark, 10)
         return d
     toast = draw.chance(0.5)
     for at in (0.0,) if rows == 1 else (-0.033, 0.033):
-        _boxes(d, BLACK, (w * 0.7, 0.006, 0.032, 0, h + 0.009, at))
-        _boxes(
+        boxes(d, BLACK, (w * 0.7, 0.006, 0.032, 0, h + 0.009, at))
+        boxes(
             d, _CRUST if toast else dark, (w * 0.42, 0.06 if toast else 0.01, 0.018, 0, h + 0.03 * toast, at)
         )
-    _boxes(
+    boxes(
         d, dark, (0.03, 0.018, 0.05, w / 2 + 0.012, h * 0.7, 0), (0.02, 0.03, 0.03, w / 2, h * 0.25, z * 0.2)
     )
     return d
@@ -252,7 +248,7 @@ def kitchen_appliance(draw: Draw) -> Design:
     if style == 4:
         _turn(d, r * 1.4, h * 0.65, look, "0 0 85 0 100 25 100 65 94 80 60 97 0 100", n=18)
         _turn(d, r * 1.4, h * 0.65, dark, "102 63 102 69", n=18)
-        _boxes(d, dark, (r, h * 0.2, 0.02, 0, h * 0.22, r * 1.4))
+        boxes(d, dark, (r, h * 0.2, 0.02, 0, h * 0.22, r * 1.4))
         d.tube(_arc(0, h * 0.48, r * 1.33, h * 0.3, -QUARTER, QUARTER), 0.01, dark, 6)
         return d
     d.add(_tapered((2 * r, foot, 2 * r), (0, foot / 2, 0), 0.85, 0.85), look)
@@ -310,7 +306,7 @@ def _tool(draw: Draw, kind: int) -> list[tuple[Triangles, Look]]:
         _blob(d, (0.075, 0.016, 0.046), (long + 0.035, 0.009, 0), head)
     wide = (0, 0.015, 0, 0.035)[kind]
     for z in common.spread(-wide, wide, 4) if wide else ():
-        _boxes(
+        boxes(
             d,
             head,
             (0.04, 0.005, wide * 0.7, long + 0.02, 0.009, z),
@@ -327,9 +323,9 @@ def kitchen_utensil(draw: Draw) -> Design:
     if style < 4:
         _put(d, _tool(draw, style), (-0.13, 0, 0))
     elif style == 4:
-        _boxes(d, draw.one_of((wood, BLACK, draw.painted())), (0.11, 0.22, 0.1, 0, 0.11, 0))
+        boxes(d, draw.one_of((wood, BLACK, draw.painted())), (0.11, 0.22, 0.1, 0, 0.11, 0))
         for k in range(draw.count(4, 7)):
-            _boxes(d, BLACK, (0.016, 0.1, 0.024, 0.035 * (k % 3 - 1), 0.26, 0.032 * (k // 3 - 1)))
+            boxes(d, BLACK, (0.016, 0.1, 0.024, 0.035 * (k % 3 - 1), 0.26, 0.032 * (k // 3 - 1)))
         d.parts = [(turned(part, 0, -0.35), look) for part, look in d.parts]
     elif style == 5:
         _turn(
@@ -346,7 +342,7 @@ def kitchen_utensil(draw: Draw) -> Design:
             ]
             _put(d, tool, (0, 0.07, 0), 0.9 * k)
     elif style == 6:
-        _boxes(d, wood, (w, 0.022, w * 0.65, 0, 0.011, 0), (0.08, 0.022, 0.05, w / 2 + 0.03, 0.011, 0))
+        boxes(d, wood, (w, 0.022, w * 0.65, 0, 0.011, 0), (0.08, 0.022, 0.05, w / 2 + 0.03, 0.011, 0))
         _put(d, _tool(draw, 0) if draw.chance(0.5) else (), (-0.15, 0.02, w * 0.12))
     else:
         _along(d, 0.03, 0.24, (0, 0.03, 0), wood)
@@ -386,8 +382,8 @@ def tray(draw: Draw) -> Design:
     if disc:
         _turn(d, w / 2, rim, look, "0 0 95 0 100 100 96 100 90 15 0 15", n=24)
     for s in () if disc else SIDES:
-        _boxes(d, look, (w, rim, 0.012, 0, rim / 2, s * z / 2), (0.012, rim, z, s * w / 2, rim / 2, 0))
-        _boxes(d, look, (w / 2, 0.01, z, s * w / 4, 0.005, 0))
+        boxes(d, look, (w, rim, 0.012, 0, rim / 2, s * z / 2), (0.012, rim, z, s * w / 2, rim / 2, 0))
+        boxes(d, look, (w / 2, 0.01, z, s * w / 4, 0.005, 0))
         grip = [(s * (w / 2 + y * 0.3), rim + y, x) for x, y, _ in _arc(0, 0, 0.06, 0.04, -QUARTER, QUARTER)]
         d.tube(grip, 0.006, look, 5)
     for k in range(draw.count(-2, 3)):
@@ -415,12 +411,12 @@ def paper_towel_holder(draw: Draw) -> Design:
     look, r, long, y = draw.legs(), draw.between(0.045, 0.07), draw.between(0.22, 0.27), 0.1
     for wide, high, part in ((r, long, WHITE), (0.022, long + 0.006, _CRUST), (0.007, long + 0.07, look)):
         d.cylinder(wide, high, (0, 0.016, 0), part)
-    _boxes(d, WHITE, (r, long, 0.003, r / 2, 0.016 + long / 2, r))
+    boxes(d, WHITE, (r, long, 0.003, r / 2, 0.016 + long / 2, r))
     if draw.chance(0.3):
         d.parts = [(shifted(turned(part, 2, QUARTER), (long / 2, y, 0)), p) for part, p in d.parts]
-        _boxes(d, look, (long + 0.06, 0.015, 0.13, -0.016, 0.0075, 0))
+        boxes(d, look, (long + 0.06, 0.015, 0.13, -0.016, 0.0075, 0))
         for sx in SIDES:
-            _boxes(d, look, (0.015, y + 0.03, 0.05, sx * (long / 2 + 0.015) - 0.016, y / 2 + 0.015, 0))
+            boxes(d, look, (0.015, y + 0.03, 0.05, sx * (long / 2 + 0.015) - 0.016, y / 2 + 0.015, 0))
         return d
     _turn(d, draw.between(0.07, 0.09), 0.016, look, "0 0 100 0 100 100 0 100")
     return d
@@ -482,7 +478,7 @@ def bread(draw: Draw) -> Design:
         long, high, deep = ((w, 0.11, w * 0.45), (w * 1.7, 0.06, 0.065))[style]
         _blob(d, (long, high, deep), (0, high / 2, 0.068 * k), _CRUST, 2.5)
         for x in common.spread(-long * 0.3, long * 0.3, 5):
-            _boxes(d, _CREAM, (0.012, 0.01, deep * 0.5, x, high * 0.94, 0.068 * k))
+            boxes(d, _CREAM, (0.012, 0.01, deep * 0.5, x, high * 0.94, 0.068 * k))
     if style == 2:
         d.cylinder(r * 1.25, 0.012, (0, 0, 0), WHITE)
         for k, look in enumerate((sweet, _CREAM, sweet, _CREAM)):
@@ -490,7 +486,7 @@ def bread(draw: Draw) -> Design:
         for k in range(8):
             _blob(d, (0.026, 0.026, 0.026), common.polar(r * 0.75, 0.785 * k, 0.115), _RED)
     elif style == 3:
-        _boxes(d, draw.wooden(), (2.4 * r, 0.01, 1.9 * r, 0, 0.005, 0))
+        boxes(d, draw.wooden(), (2.4 * r, 0.01, 1.9 * r, 0, 0.005, 0))
         d.add(cylinder(r, r * 0.6, (0, 0.01, 0), segments=3) * np.array([1, 1, 0.7]), yellow)
         for x, y in ((-0.2, 0.2), (0.1, 0.42), (0.35, 0.25), (0.6, 0.4)):
             _blob(d, (0.02, 0.02, 0.02), (r * x, 0.01 + r * y, r * 0.404 * (1 - x)), brown)
@@ -525,7 +521,7 @@ def barrel(draw: Draw) -> Design:
         _turn(d, r, h, look if drum else metal, edge, n=18)
     if not drum and draw.chance(0.35):
         d.parts = [(common.laid(part, (0, r * 1.35, -h / 2)), p) for part, p in d.parts]
-        _boxes(d, look, *((r * 1.9, r * 0.45, 0.06, 0, r * 0.225, z) for z in (-h * 0.3, h * 0.3)))
+        boxes(d, look, *((r * 1.9, r * 0.45, 0.06, 0, r * 0.225, z) for z in (-h * 0.3, h * 0.3)))
     return d
 
 
@@ -539,8 +535,8 @@ def high_chair(draw: Draw) -> Design:
     for x in common.spread(-w, w, 6 if style == 0 else 2):
         d.tube(((x, y, -0.14), (x, y + 0.42, -0.19)), 0.01, frame, 6)
     for x in (-w - 0.01, w + 0.01):
-        _boxes(d, shell, (0.03, 0.025, 0.34, x, y + 0.18, 0), (0.03, 0.18, 0.025, x, y + 0.09, 0.1))
-    _boxes(d, frame, (2 * w + 0.06, 0.02, 0.1, 0, 0.22, 0.22), (2 * w, 0.035, 0.3, 0, y, 0))
+        boxes(d, shell, (0.03, 0.025, 0.34, x, y + 0.18, 0), (0.03, 0.18, 0.025, x, y + 0.09, 0.1))
+    boxes(d, frame, (2 * w + 0.06, 0.02, 0.1, 0, 0.22, 0.22), (2 * w, 0.035, 0.3, 0, y, 0))
     _blob(d, (2 * w + 0.12, 0.035, 0.27), (0, y + 0.2, 0.25), WHITE if draw.chance(0.5) else shell, 5.0)
     pad = (look, draw.cloth(), shell)[style]
     _blob(d, (2 * w, 0.46 if style else 0.09, 0.06), (0, y + (0.22 if style else 0.42), -0.17), pad, 4.0)
@@ -573,7 +569,7 @@ def firewood(draw: Draw) -> Design:
     for z in () if heap else (-long * 0.35, long * 0.35):
         d.tube(((-wide, high, z), (-wide, 0.02, z), (wide, 0.02, z), (wide, high, z)), 0.011, metal, 6)
     if not heap and draw.chance(0.5):
-        _boxes(d, metal, (2 * wide + 0.04, 0.025, long * 0.9, 0, high + 0.01, 0))
+        boxes(d, metal, (2 * wide + 0.04, 0.025, long * 0.9, 0, high + 0.01, 0))
     return d
 
 
@@ -592,9 +588,9 @@ def fireplace(draw: Draw) -> Design:
     w, h, z, flat = draw.between(1.1, 1.6), draw.between(1.0, 1.3), draw.between(0.15, 0.22), style == 2
     if style == 1:
         w, look = w * 0.37, _IRON if draw.chance(0.7) else plain(draw.colour(0.3, 0.3), 0.3)
-        _boxes(d, look, (w, h * 0.6, 0.4, 0, h * 0.3 + 0.15, 0), (w * 1.1, 0.04, 0.46, 0, h * 0.6 + 0.16, 0))
-        _boxes(d, look, *((0.05, 0.16, 0.36, sx * w * 0.4, 0.08, 0) for sx in SIDES))
-        _boxes(d, plain((0.15, 0.06, 0.03), 0.8), (w * 0.8, h * 0.4, 0.02, 0, h * 0.35 + 0.15, 0.2))
+        boxes(d, look, (w, h * 0.6, 0.4, 0, h * 0.3 + 0.15, 0), (w * 1.1, 0.04, 0.46, 0, h * 0.6 + 0.16, 0))
+        boxes(d, look, *((0.05, 0.16, 0.36, sx * w * 0.4, 0.08, 0) for sx in SIDES))
+        boxes(d, plain((0.15, 0.06, 0.03), 0.8), (w * 0.8, h * 0.4, 0.02, 0, h * 0.35 + 0.15, 0.2))
         d.cylinder(0.075, draw.between(1.0, 1.5), (0, h * 0.6 + 0.15, -0.05), look)
         _fire(d, draw, w * 0.7, h * 0.2 + 0.15, 0.2, 0.01)
         return d
@@ -606,8 +602,8 @@ def fireplace(draw: Draw) -> Design:
     )
     look = draw.body() if draw.chance(0.3) and not flat else plain(draw.colour(0.2, 0.5, 0.95), 0.2)
     rows, side, out = 10 if brick else 1, (w - wide) / 2, 0.0 if flat else 0.15
-    _boxes(d, plain((0.07, 0.06, 0.06)), (wide, top - low, 0.02, 0, (top + low) / 2, -z + 0.01))
-    _boxes(
+    boxes(d, plain((0.07, 0.06, 0.06)), (wide, top - low, 0.02, 0, (top + low) / 2, -z + 0.01))
+    boxes(
         d,
         look,
         (w, head - top, 2 * z, 0, (head + top) / 2, 0),
@@ -619,22 +615,22 @@ def fireplace(draw: Draw) -> Design:
             (top - low) / rows,
             (w - side) / 2 * (k % 2 * 2 - 1),
         )
-        _boxes(
+        boxes(
             d, tone if brick else look, (side, each - 0.01 * brick, 2 * z, x, low + each * (k // 2 + 0.5), 0)
         )
     if not flat:
-        _boxes(d, draw.wooden() if brick else look, (w + 0.16, 0.06, 2 * z + 0.12, 0, h, 0.05))
-        _boxes(d, look, (w * 0.8, tall := draw.one_of((0.02, 0.9)), z * 1.6, 0, h + tall / 2, -z * 0.2))
+        boxes(d, draw.wooden() if brick else look, (w + 0.16, 0.06, 2 * z + 0.12, 0, h, 0.05))
+        boxes(d, look, (w * 0.8, tall := draw.one_of((0.02, 0.9)), z * 1.6, 0, h + tall / 2, -z * 0.2))
     _fire(d, draw, wide * 0.8, low, 0, 0.06)
     return d
 
 
 def _keys(d: Design, w: float, y: float, z: float) -> None:
     """White keys with black ones in twos and threes."""
-    _boxes(d, WHITE, (w, 0.02, 0.15, 0, y, z))
+    boxes(d, WHITE, (w, 0.02, 0.15, 0, y, z))
     for k in range(49):
         if k % 7 not in (0, 3):
-            _boxes(d, BLACK, (w / 90, 0.016, 0.09, (k / 49 - 0.5) * w, y + 0.016, z - 0.03))
+            boxes(d, BLACK, (w / 90, 0.016, 0.09, (k / 49 - 0.5) * w, y + 0.016, z - 0.03))
 
 
 def _slab(outline: Sequence[tuple[float, float]], foot: float, thick: float) -> Triangles:
@@ -650,9 +646,9 @@ def piano(draw: Draw) -> Design:
     look = draw.one_of((plain((0.03, 0.03, 0.035), 0.9), BLACK, WHITE, draw.wooden()))
     w, h, y, z = draw.between(1.35, 1.5), draw.between(1.05, 1.3), draw.between(0.68, 0.74), 0.13
     if style == 0:
-        _boxes(d, look, (w, h, 0.34, 0, h / 2, -0.13), (w + 0.03, 0.03, 0.4, 0, h, -0.12))
+        boxes(d, look, (w, h, 0.34, 0, h / 2, -0.13), (w + 0.03, 0.03, 0.4, 0, h, -0.12))
         for x in (-w * 0.47, w * 0.47):
-            _boxes(
+            boxes(
                 d,
                 look,
                 (w * 0.06, 0.13, 0.28, x, y + 0.02, 0.17),
@@ -670,14 +666,12 @@ def piano(draw: Draw) -> Design:
         d.tube(((w * 0.42, y + 0.2, z * 0.4), (w * 0.22, y + 0.68, z * 0.4)), 0.01, look, 6)
         for x, out in ((-0.42, 0.85), (0.42, 0.85), (-0.2, -0.8)):
             d.add(cylinder(0.035, y, (x * w, 0, out * z), 0.06, 8), look)
-        _boxes(
-            d, look, (w * 0.5, 0.2, 0.015, 0, y + 0.34, z * 0.75), (0.16, y - 0.1, 0.04, 0, y / 2, z * 0.9)
-        )
+        boxes(d, look, (w * 0.5, 0.2, 0.015, 0, y + 0.34, z * 0.75), (0.16, y - 0.1, 0.04, 0, y / 2, z * 0.9))
     else:
-        _boxes(d, BLACK, (w * 0.4, 0.18, 0.01, 0, y + 0.12, 0.0), (w * 0.9, 0.2, 0.02, 0, y * 0.5, 0.05))
+        boxes(d, BLACK, (w * 0.4, 0.18, 0.01, 0, y + 0.12, 0.0), (w * 0.9, 0.2, 0.02, 0, y * 0.5, 0.05))
         for sx, sz in _CORNERS:
             d.tube(((sx * 0.6, 0.02, 0.1 + sz * 0.12), (sx * 0.5, y - 0.05, 0.1 + sz * 0.06)), 0.02, look, 6)
-    _boxes(d, look, (w, 0.08, 0.26, 0, y - 0.05, z + 0.05))
+    boxes(d, look, (w, 0.08, 0.26, 0, y - 0.05, z + 0.05))
     _keys(d, w * 0.88, y, z + 0.09)
-    _boxes(d, _GOLD, *((0.03, 0.015, 0.12, x, 0.06, z * 0.9 + 0.08) for x in (-0.07, 0, 0.07) if style < 2))
+    boxes(d, _GOLD, *((0.03, 0.015, 0.12, x, 0.06, z * 0.9 + 0.08) for x in (-0.07, 0, 0.07) if style < 2))
     return d

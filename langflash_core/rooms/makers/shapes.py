@@ -38,6 +38,7 @@ WATER = plain((0.55, 0.68, 0.75), 0.6)
 BARK = plain((0.36, 0.27, 0.18))
 MIRROR = Material((0.8, 0.8, 0.8), gloss=0.5), KIND_MIRROR
 PICTURE = Material((0.8, 0.8, 0.8), gloss=0.3), KIND_ART
+PAGES, BULB, LEAF = plain((0.93, 0.91, 0.84)), plain((1.0, 0.95, 0.8), 0.3), plain((0.2, 0.42, 0.16))
 
 
 def pad(d: Design, size: Vector, centre: Vector, look: Look, radius: float = 0.05, steps: int = 3) -> None:
@@ -207,3 +208,35 @@ def leaflet(
 def put(leaf: Triangles, pitch: float, yaw: float, place: Vector) -> Triangles:
     """A leaf raised by `pitch`, turned by `yaw`, and put at its place."""
     return shifted(turned(turned(leaf, 0, -pitch), 1, yaw), place)
+
+
+def between_all(draw: Draw, *ends: float) -> list[float]:
+    """Any numbers, one between each two ends."""
+    return [draw.between(low, high) for low, high in zip(ends[::2], ends[1::2], strict=True)]
+
+
+def twins(d: Design, size: Vector, centre: Vector, look: Look) -> None:
+    """A box, and its mirror image on the left."""
+    for sx in SIDES:
+        d.box(size, (sx * centre[0], centre[1], centre[2]), look)
+
+
+def displaced(d: Design, offset: Vector) -> Design:
+    """The same design, all of it moved."""
+    d.parts = [(shifted(triangles, offset), look) for triangles, look in d.parts]
+    return d
+
+
+def pillow_at(width: float, height: float, depth: float) -> np.ndarray:
+    """Two sheets sewn together at their edges and stuffed, lying."""
+    x, z = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9))
+    puff = height / 2 * ((1 - np.abs(x) ** 2.6) * (1 - np.abs(z) ** 2.6)) ** 0.55
+    wide, deep = width / 2 * (1 - 0.07 * (1 - z**2) * x**2), depth / 2 * (1 - 0.07 * (1 - x**2) * z**2)
+    halves = [np.stack([x * wide, height / 2 + s * puff, z * deep], -1) for s in SIDES]
+    return np.concatenate([grid_triangles(half) for half in halves])
+
+
+def boxes(d: Design, look: Look, *rows: tuple[float, float, float, float, float, float]) -> None:
+    """Boxes of one look: size and centre."""
+    for w, h, t, x, y, z in rows:
+        d.box((w, h, t), (x, y, z), look)

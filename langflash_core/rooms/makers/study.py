@@ -20,6 +20,7 @@ from langflash_core.rooms.makers.common import (
     Look,
     plain,
 )
+from langflash_core.rooms.makers.shapes import boxes
 from langflash_core.rooms.objfile import Material
 from langflash_core.rooms.solids import (
     Triangles,
@@ -85,12 +86,6 @@ def _put(d: Design, look: Look, triangles: Triangles, place: Vector, *turns: tup
 def _across(d: Design, look: Look, radius: float, length: float, at: Vector, top: float = 0.0) -> None:
     """A cylinder along x; `top` is its radius on the left."""
     _put(d, look, cylinder(radius, length, (0, -length / 2, 0), top or radius, 12), at, (2, QUARTER))
-
-
-def _boxes(d: Design, look: Look, *rows: tuple[float, float, float, float, float, float]) -> None:
-    """Boxes of one look: size and centre."""
-    for w, h, t, x, y, z in rows:
-        d.box((w, h, t), (x, y, z), look)
 
 
 def _leaf(d: Design, look: Look, size: Vector, hinge: Vector, angle: float) -> None:
@@ -166,24 +161,24 @@ def printer(draw: Draw) -> Design:
     h = (draw.between(0.13, 0.2), draw.between(0.22, 0.4), drawers * 0.14 + 0.2)[style]
     z = depth / 2
     if style == 2:
-        _boxes(d, look, (w, h, depth, 0, h / 2, 0), (w * 0.25, 0.2, depth, -w * 0.375, h + 0.1, 0))
-        _boxes(d, second, (w * 0.75, 0.2, 0.05, w * 0.12, h + 0.1, -z + 0.02))
-        _boxes(d, second, (w, 0.07, depth * 0.85, 0, h + 0.33, -0.04))
-        _boxes(d, look, (w, 0.1, depth, 0, h + 0.25, 0))
-        _boxes(d, look, *((w * 0.96, 0.125, 0.02, 0, 0.1 + k * 0.14, z) for k in range(drawers)))
-        _boxes(d, DARK, *((w * 0.3, 0.025, 0.02, 0, 0.13 + k * 0.14, z + 0.005) for k in range(drawers)))
-        _boxes(d, _PAPER, (0.3, 0.03, 0.22, w * 0.12, h + 0.015, 0.05))
+        boxes(d, look, (w, h, depth, 0, h / 2, 0), (w * 0.25, 0.2, depth, -w * 0.375, h + 0.1, 0))
+        boxes(d, second, (w * 0.75, 0.2, 0.05, w * 0.12, h + 0.1, -z + 0.02))
+        boxes(d, second, (w, 0.07, depth * 0.85, 0, h + 0.33, -0.04))
+        boxes(d, look, (w, 0.1, depth, 0, h + 0.25, 0))
+        boxes(d, look, *((w * 0.96, 0.125, 0.02, 0, 0.1 + k * 0.14, z) for k in range(drawers)))
+        boxes(d, DARK, *((w * 0.3, 0.025, 0.02, 0, 0.13 + k * 0.14, z + 0.005) for k in range(drawers)))
+        boxes(d, _PAPER, (0.3, 0.03, 0.22, w * 0.12, h + 0.015, 0.05))
         _leaf(d, second, (w * 0.45, 0.26, 0.012), (w * 0.1, h + 0.4, depth * 0.1), 1.1)
         _leaf(d, second, (w * 0.6, 0.16, 0.03), (0, h + 0.28, z), -0.9)
         _leaf(d, _BLUE, (w * 0.25, 0.1, 0.03), (0, h + 0.3, z + 0.01), -0.9)
         return d
     d.soft((w, h, depth), (0, h / 2, 0), look, 14)
-    _boxes(d, BLACK, (w * 0.62, h * 0.25, 0.02, 0, h * 0.3, z), (w * 0.96, 0.006, 0.02, 0, h * 0.46, z))
+    boxes(d, BLACK, (w * 0.62, h * 0.25, 0.02, 0, h * 0.3, z), (w * 0.96, 0.006, 0.02, 0, h * 0.46, z))
     _leaf(d, second, (w * 0.55, 0.13, 0.008), (0, h * 0.16, z - 0.01), -1.45)
     _leaf(d, second, (w * 0.6, 0.16 - 0.1 * style, 0.008), (0, h * 0.97, z * (style - 0.8)), 0.35)
     sheet = (0.21, 0.24 - 0.05 * style, 0.01)
     _leaf(d, _PAPER, sheet, (0, h * 0.98, z * (style * 1.2 - 0.75)), 0.35 + style * 1.2)
-    _boxes(d, _PAPER, (0.21, 0.006, 0.12, 0, h * 0.25, z + 0.04))
+    boxes(d, _PAPER, (0.21, 0.006, 0.12, 0, h * 0.25, z + 0.04))
     _leaf(d, _GLASS if style else _LIT, (w * 0.3, 0.06, 0.01), (-w * 0.1, h * 0.72, z), 0.5)
     _buttons(d, _GREEN if draw.chance(0.4) else STEEL, (w * 0.25, h * 0.8, z), 3, 2, 0.016)
     return d
@@ -200,15 +195,15 @@ def tablet(draw: Draw) -> Design:
     d.box((w - 2 * rim, h - 2.5 * rim, 0.002), (0, 0, 0.0055), _PAPER if reader else screen)
     if reader:
         lines = ((w * draw.between(0.5, 0.68), 0.003, 0.001, 0, h * k * 0.08, 0.0068) for k in range(-4, 5))
-        _boxes(d, _INK, *lines)
+        boxes(d, _INK, *lines)
     elif screen is _BLUE:
         _buttons(d, _vivid(draw), (0, 0.01, 0.006), 5, 3, 0.026)
     angle = draw.between(0.25, 0.7) if stands else QUARTER
     near = h / 2 * np.sin(angle)
     _turn(d, 0, -angle, 0.02 if stands else 0)
     if stands:
-        _boxes(d, look, (w * 0.6, 0.012, near * 2 + 0.06, 0, 0.006, 0))
-        _boxes(d, look, (w * 0.6, 0.035, 0.01, 0, 0.018, near + 0.02))
+        boxes(d, look, (w * 0.6, 0.012, near * 2 + 0.06, 0, 0.006, 0))
+        boxes(d, look, (w * 0.6, 0.035, 0.01, 0, 0.018, near + 0.02))
         _leaf(d, look, (w * 0.3, h * 0.7, 0.008), (0, 0.01, near - 0.02), angle)
     return d
 
@@ -247,7 +242,7 @@ def game_controller(draw: Draw) -> Design:
         _put(d, look, grip, (side * 0.062, -0.025, 0), (2, side * 0.35))
         d.roll(0.011, 0.016, (side * 0.028, -0.006, 0.016), BLACK if look is not BLACK else DARK, 10)
     z, keys = 0.01 if flat else 0.021, DARK if look is not DARK else STEEL
-    _boxes(d, keys, (0.024, 0.008, 0.008, -0.045, 0.018, z), (0.008, 0.024, 0.008, -0.045, 0.018, z))
+    boxes(d, keys, (0.024, 0.008, 0.008, -0.045, 0.018, z), (0.008, 0.024, 0.008, -0.045, 0.018, z))
     for k, colour in enumerate((_RED, _GREEN, _BLUE, _YELLOW)[: 2 if flat else 4]):
         x, y = 0.012 * float(np.cos(k * QUARTER)), 0.012 * float(np.sin(k * QUARTER))
         d.roll(0.006, 0.006, (0.045 + x, 0.018 + y, z - 0.001), colour, 8)
@@ -255,7 +250,7 @@ def game_controller(draw: Draw) -> Design:
     w, h, t = draw.one_of(((0.29, 0.06, 0.25), (0.08, 0.36, 0.25), (0.16, 0.3, 0.16), (0.24, 0.08, 0.2)))
     if console:
         _slab(d, body, (w, h, t), 0.012, (0, h / 2, -t / 2 - 0.09))
-        _boxes(d, DARK if body is BLACK else BLACK, (w * 0.9, 0.008, t, 0, h * 0.55, -t / 2 - 0.088))
+        boxes(d, DARK if body is BLACK else BLACK, (w * 0.9, 0.008, t, 0, h * 0.55, -t / 2 - 0.088))
         d.box((0.012, 0.006, 0.004), (w * 0.3, h * 0.75, -0.089), _BLUE)
     return d
 
@@ -285,11 +280,11 @@ def player(draw: Draw) -> Design:
     w, h, depth = (side * draw.between(0.85, 1.15) for side in sizes[style])
     look, trim, z = draw.body() if style > 2 else look, DARK if look is STEEL else STEEL, depth / 2
     d.box((w, h, depth), (0, h / 2 + 0.01, 0), look)
-    _boxes(d, BLACK, *((0.03, 0.012, z * 1.6, side * w * 0.4, 0.006, 0) for side in SIDES))
+    boxes(d, BLACK, *((0.03, 0.012, z * 1.6, side * w * 0.4, 0.006, 0) for side in SIDES))
     if style < 3:
-        _boxes(d, _GLASS, (w * 0.35, h * 0.25, 0.004, w * 0.05, h * 0.75, z))
-        _boxes(d, _GLASS, (w * 0.3, h * 0.12, 0.006, -w * 0.3, h * 0.5, z))
-        _boxes(d, _LIT, (w * 0.2, h * 0.1, 0.004, w * 0.05, h * 0.75, z + 0.002))
+        boxes(d, _GLASS, (w * 0.35, h * 0.25, 0.004, w * 0.05, h * 0.75, z))
+        boxes(d, _GLASS, (w * 0.3, h * 0.12, 0.006, -w * 0.3, h * 0.5, z))
+        boxes(d, _LIT, (w * 0.2, h * 0.1, 0.004, w * 0.05, h * 0.75, z + 0.002))
         _buttons(d, trim, (w * 0.35, h * 0.4, z), 4, 1 + (style > 0), w * 0.05, 0.4)
     for x, r in ((-0.15, 0.15), (0.0, 0.1), (0.36, 0.22)) if style in (1, 2) else ():
         d.roll(h * r, 0.02, (w * x, h * 0.4, z), trim, 12)
@@ -300,8 +295,8 @@ def player(draw: Draw) -> Design:
         d.roll(r, 0.006, (x, h * 0.42, z), STEEL, 14)
         d.roll(r * 0.85, 0.008, (x, h * 0.42, z), BLACK, 14)
     if style == 4:
-        _boxes(d, _PAPER, (w * 0.6, h * 0.14, 0.006, 0, h * 0.95, z))
-        _boxes(d, _RED, (0.003, h * 0.13, 0.008, w * draw.between(-0.2, 0.2), h * 0.95, z))
+        boxes(d, _PAPER, (w * 0.6, h * 0.14, 0.006, 0, h * 0.95, z))
+        boxes(d, _RED, (0.003, h * 0.13, 0.008, w * draw.between(-0.2, 0.2), h * 0.95, z))
         handle = ((-0.42, 1), (-0.4, 1.25), (0.4, 1.25), (0.42, 1))
         d.tube([(w * x, h * y, 0) for x, y in handle], 0.006, trim, 5)
         d.tube(((w * 0.4, h, -z), (w * 0.4 + draw.between(-0.2, 0.2), h + 0.25, -z)), 0.002, STEEL, 4)
@@ -356,10 +351,10 @@ def projector(draw: Draw) -> Design:
         d.roll(r * share, near, (x, y, z), part, 16)
     left = -w * 0.28 if x >= 0 else w * 0.28
     slits = [(w * 0.3, h * 0.035, 0.006, left, y + h * k * 0.09, z) for k in range(-3, 4)]
-    _boxes(d, BLACK, *slits, *((0.006, h * 0.5, 0.008, -w / 2, y, z * k * 0.2) for k in range(-3, 4)))
+    boxes(d, BLACK, *slits, *((0.006, h * 0.5, 0.008, -w / 2, y, z * k * 0.2) for k in range(-3, 4)))
     spots = ((0, 1), (1, 0), (-1, 0), (0, -1))
-    _boxes(d, trim, *((0.012, 0.006, 0.012, -x + k * 0.02, h + 0.016, -z * 0.5 + m * 0.02) for k, m in spots))
-    _boxes(d, BLACK, *((0.025, 0.016, depth * 0.8, side * w * 0.38, 0.008, 0) for side in SIDES))
+    boxes(d, trim, *((0.012, 0.006, 0.012, -x + k * 0.02, h + 0.016, -z * 0.5 + m * 0.02) for k, m in spots))
+    boxes(d, BLACK, *((0.025, 0.016, depth * 0.8, side * w * 0.38, 0.008, 0) for side in SIDES))
     return d
 
 
@@ -370,15 +365,15 @@ def whiteboard(draw: Draw) -> Design:
     w, h = (0.7, 1.0) if style == 2 else (draw.between(0.7, 1.9), draw.between(0.6, 1.1))
     frame = draw.wooden() if style == 3 else STEEL
     d.box((w, h, 0.02), (0, 0, 0), draw.one_of((_GREEN, DARK)) if style == 3 else WHITE)
-    _boxes(d, frame, *((w + 0.03, 0.025, 0.03, 0, s * h / 2, 0) for s in SIDES))
-    _boxes(d, frame, (w * 0.6, 0.012, 0.07, 0, -h / 2, 0.04))
-    _boxes(d, frame, *((0.025, h, 0.03, s * w / 2, 0, 0) for s in SIDES))
+    boxes(d, frame, *((w + 0.03, 0.025, 0.03, 0, s * h / 2, 0) for s in SIDES))
+    boxes(d, frame, (w * 0.6, 0.012, 0.07, 0, -h / 2, 0.04))
+    boxes(d, frame, *((0.025, h, 0.03, s * w / 2, 0, 0) for s in SIDES))
     inks = (_PAPER,) if style == 3 else (_INK, _BLUE, _RED, _GREEN)
     for k in range(draw.count(3, 12)):
         x, y, ink = w * (0.05 - 0.5 * (k % 2) + 0.02), h * (0.38 - 0.13 * (k // 2)), draw.one_of(inks)
         for start in np.arange(x, x + w * draw.between(0.1, 0.4), 0.14):
             d.tube([(start + m * 0.02, y + draw.between(0, 0.045), 0.011) for m in range(7)], 0.004, ink, 3)
-    _boxes(d, draw.one_of(inks), *((0.13, 0.016, 0.016, x * w, -h / 2 + 0.014, 0.05) for x in (-0.2, 0.0)))
+    boxes(d, draw.one_of(inks), *((0.13, 0.016, 0.016, x * w, -h / 2 + 0.014, 0.05) for x in (-0.2, 0.0)))
     d.box((0.12, 0.035, 0.045), (w * 0.2, -h / 2 + 0.02, 0.045), DARK)
     if style in (0, 3):
         d.elevation = draw.between(0.8, 1.0)
@@ -409,7 +404,7 @@ def calendar(draw: Draw) -> Design:
         for k in range(35):
             x, y = w * (k % 7 - 3) * 0.13, h * (low + tall * (0.1 + (k // 7) * 0.155))
             d.box((w * 0.06, h * tall * 0.08, 0.002), (x, y, 0.003), _RED if k % 7 == 6 else mark)
-    _boxes(d, draw.metal(), *((w * 0.03, 0.012, 0.014, w * k * 0.08, h / 2, 0) for k in range(-5, 6)))
+    boxes(d, draw.metal(), *((w * 0.03, 0.012, 0.014, w * k * 0.08, h / 2, 0) for k in range(-5, 6)))
     d.elevation = 0.0 if style == 2 else 1.55 - h / 2
     if style == 2:
         _turn(d, 0, -0.35)
@@ -425,10 +420,10 @@ def newspaper(draw: Draw) -> Design:
     for k in range(many):
         sheaf = box((w, h, thick * 0.9), (0, 0, (k - many + 0.5) * thick))
         d.add(turned(sheaf, 2, draw.between(-0.1, 0.1) * (k < many - 1)), grey)
-    _boxes(d, _INK, (w * 0.8, h * 0.09, 0.001, 0, h * 0.41, 0), (w * 0.94, 0.003, 0.001, 0, h * 0.34, 0))
+    boxes(d, _INK, (w * 0.8, h * 0.09, 0.001, 0, h * 0.41, 0), (w * 0.94, 0.003, 0.001, 0, h * 0.34, 0))
     columns, side = draw.count(3, 5), draw.one_of(SIDES)
     d.box((w * 0.45, h * 0.33, 0.001), (side * w * 0.23, h * 0.14, 0), _PICTURE)
-    _boxes(d, _INK, *((w * 0.42, h * 0.05, 0.001, -side * w * 0.23, h * y, 0) for y in (0.27, 0.17, 0.07)))
+    boxes(d, _INK, *((w * 0.42, h * 0.05, 0.001, -side * w * 0.23, h * y, 0) for y in (0.27, 0.17, 0.07)))
     for k in range(columns * 9):
         x, y = w * 0.94 * ((k % columns + 0.5) / columns - 0.5), -h * (0.08 + 0.045 * (k // columns))
         d.box((w * 0.8 / columns, h * 0.018, 0.001), (x, y, 0), DARK)
@@ -461,18 +456,18 @@ def stationery(draw: Draw) -> Design:
         _put(d, STEEL if k == 2 else look, bar, (0, y, 0), (0, angle))
     if style == 3:
         w, h = draw.one_of(((0.15, 0.21), (0.21, 0.29), (0.1, 0.15)))
-        _boxes(d, look, (w, 0.003, h, 0, 0.001, 0), (w, 0.003, h, 0, z, 0))
-        _boxes(d, _PAPER, (w * 0.97, z, h * 0.97, 0, z / 2, 0))
-        _boxes(d, STEEL, *((0.016, z + 0.008, 0.004, -w / 2, z / 2, h * k * 0.06) for k in range(-7, 8)))
+        boxes(d, look, (w, 0.003, h, 0, 0.001, 0), (w, 0.003, h, 0, z, 0))
+        boxes(d, _PAPER, (w * 0.97, z, h * 0.97, 0, z / 2, 0))
+        boxes(d, STEEL, *((0.016, z + 0.008, 0.004, -w / 2, z / 2, h * k * 0.06) for k in range(-7, 8)))
         _pen(d, draw, (0.02, z + 0.006, 0.07), (0, -QUARTER), (1, draw.between(-0.5, 0.5)))
     for k in range(draw.count(4, 10) if style == 4 else 0):
         sheet = box((0.21, 0.009, 0.297), (0, 0.005 + k * 0.009, 0))
         d.add(turned(sheet, 1, draw.between(-0.08, 0.08)), _PAPER)
     for k in range(draw.count(1, 4) if style == 5 else 0):
         cover, x = _vivid(draw), k * 0.075
-        _boxes(d, cover, (0.07, 0.32, 0.003, x, 0.16, 0.14))
-        _boxes(d, cover, *((0.003, 0.32, 0.28, x + s * 0.034, 0.16, 0) for s in SIDES))
-        _boxes(d, _PAPER, (0.06, 0.29, 0.25, x, 0.155, 0), (0.05, 0.13, 0.002, x, 0.2, 0.142))
+        boxes(d, cover, (0.07, 0.32, 0.003, x, 0.16, 0.14))
+        boxes(d, cover, *((0.003, 0.32, 0.28, x + s * 0.034, 0.16, 0) for s in SIDES))
+        boxes(d, _PAPER, (0.06, 0.29, 0.25, x, 0.155, 0), (0.05, 0.13, 0.002, x, 0.2, 0.142))
         d.roll(0.013, 0.002, (x, 0.07, 0.141), BLACK, 10)
     return _turn(d) if style == 1 else d
 
@@ -557,7 +552,7 @@ def watch(draw: Draw) -> Design:
         _put(d, strap, box((r * 1.05, 0.014, 0.003), (0, 0, 0.03)), (0, 0, -0.032), (0, k * 0.42))
     if closed:
         return _turn(d, 2, QUARTER)
-    _boxes(d, strap, *((r * 1.05, 0.085, 0.0025, 0, side * 0.055, -0.003) for side in SIDES))
+    boxes(d, strap, *((r * 1.05, 0.085, 0.0025, 0, side * 0.055, -0.003) for side in SIDES))
     _ring(d, rim, (r * 1.2, 0.014, 0.003), 0.0012, (0, 0.1, -0.003))
     return _turn(d)
 
@@ -600,7 +595,7 @@ def socket(draw: Draw) -> Design:
         for r, long, part in well if style == 0 else ():
             d.roll(r, long, (x, 0, 0.002), part, 14)
         _slab(d, look, (0.03, 0.034, 0.004), 0.008, (x, 0, 0.004))
-        _boxes(d, hole, *((w, h, 0.004, x + u, v, 0.0085) for u, v, w, h in (pins, slots, bars)[style]))
+        boxes(d, hole, *((w, h, 0.004, x + u, v, 0.0085) for u, v, w, h in (pins, slots, bars)[style]))
         if draw.chance(0.2) and style != 1:
             d.roll(0.019, 0.035, (x, 0, 0.009), BLACK, 12)
             d.tube(((x, 0, 0.04), (x, -0.02, 0.05), (x + 0.01, -0.2, 0.02)), 0.004, BLACK, 5)
@@ -628,7 +623,7 @@ def dartboard(draw: Draw) -> Design:
         x, y = draw.between(-0.1, 0.1), draw.between(-0.1, 0.1)
         d.tube(((x, y, 0), (x, y - 0.01, 0.08), (x, y - 0.02, 0.14)), 0.003, STEEL, 5)
         flights = ((0.035, 0.002), (0.002, 0.035))
-        _boxes(d, _vivid(draw), *((u, v, 0.035, x, y - 0.02, 0.13) for u, v in flights))
+        boxes(d, _vivid(draw), *((u, v, 0.035, x, y - 0.02, 0.13) for u, v in flights))
     wood, cabinet = draw.body(), draw.chance(0.3)
     for side in SIDES if cabinet else ():
         d.box((0.26, 0.56, 0.02), (side * 0.13, 0, -0.05), wood)
@@ -665,8 +660,8 @@ def tool(draw: Draw) -> Design:
         for r, length, x, top in front:
             _across(d, STEEL if r < 0.01 else BLACK, r, length, (x, 0.2, 0), top)
         _put(d, BLACK, rounded((0.042, 0.15, 0.036), (0, 0, 0), 5.0, 6), (-0.035, 0.11, 0), (2, -0.15))
-        _boxes(d, look, (0.12, 0.03, 0.075, -0.035, 0.045, 0))
-        _boxes(d, BLACK, (0.11, 0.03, 0.07, -0.03, 0.015, 0), (0.015, 0.03, 0.02, 0.0, 0.155, 0))
+        boxes(d, look, (0.12, 0.03, 0.075, -0.035, 0.045, 0))
+        boxes(d, BLACK, (0.11, 0.03, 0.07, -0.03, 0.015, 0), (0.015, 0.03, 0.02, 0.0, 0.155, 0))
         return d
     w, h, lid = long * 1.5, long * 0.5, draw.one_of((look, BLACK))
     d.box((w, h, 0.2), (0, h / 2, 0), look)
@@ -674,5 +669,5 @@ def tool(draw: Draw) -> Design:
     _put(d, lid, _prism(profile, w * 1.02), (0, h, 0), (1, QUARTER))
     handle = ((-0.09, 0.07), (-0.08, 0.11), (0.08, 0.11), (0.09, 0.07))
     d.tube([(x, h + y, 0) for x, y in handle], 0.011, BLACK, 6)
-    _boxes(d, draw.metal(), *((0.035, 0.06, 0.012, side * w * 0.3, h, 0.105) for side in SIDES))
+    boxes(d, draw.metal(), *((0.035, 0.06, 0.012, side * w * 0.3, h, 0.105) for side in SIDES))
     return d
