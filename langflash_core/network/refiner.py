@@ -8,6 +8,9 @@ matches at an edge also moves the blank wall beside it.
 Sizes: B batch, V views, P hypotheses, G channel groups, h x w the token grid, n = B*V.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
@@ -21,57 +24,83 @@ from langflash_core.network.presets import GuidedDepth
 _TYPICAL_LOG_ERROR = -1.5  # centres the error channel that the network reads
 
 
+@dataclass(frozen=True)
+class Compared:
+    """What a sweep compares: unit vectors of every view as they are, (V, C, h', w'), the same at the
+    size of the depth maps, (V, C, h, w), and in how many equal groups their channels are summed."""
+
+    maps: Tensor
+    own: Tensor
+    groups: int
+
+    @staticmethod
+    def of(maps: Tensor, size: tuple[int, int], groups: int = 1) -> "Compared":
+        """Vectors of any size, for depth maps of `size`; groups must divide C."""
+        return Compared(maps, maps if _size(maps) == size else resize(maps, size), groups)
+
+    def views(self, first: int, count: int) -> "Compared":
+        """The views of one scene out of several."""
+        part = slice(first, first + count)
+        return Compared(self.maps[part], self.own[part], self.groups)
+
+
 def sweep_correlation(
-    features: Tensor, log_depths: Tensor, offsets: Tensor, viewmats: Tensor, Ks: Tensor, groups: int = 1
-) -> tuple[Tensor, Tensor]:
+    compared: Sequence[Compared], log_depths: Tensor, offsets: Tensor, viewmats: Tensor, Ks: Tensor
+) -> tuple[list[Tensor], Tensor]:
     """Correlation of every view with the others over depth hypotheses.
 
     Args:
-        features: (V, C, h', w'), unit channel norm, of any size.
+        compared: vectors to correlate, one answer each.
         log_depths: (V, h, w) prior; hypothesis j of a pixel is prior * exp(offsets[j]).
         offsets: (P,). viewmats: (V, 4, 4) of one common length unit. Ks: (V, 3, 3), pixels of
             the maps of depth.
-        groups: channels are summed in G equal groups, which must divide C.
 
     Returns:
-        Correlations (V, G, P, h, w), the mean over the other views that see the point, their sum
-        over G is the cosine; and which share of the other views sees it (V, P, h, w).
+        Of each, correlations (V, G, P, h, w), the mean over the other views that see the point,
+        their sum over G is the cosine; and which share of the other views sees it (V, P, h, w).
 
     Source: plane sweep (Collins 1996) around a prior, as MVSplat does with given poses; groups as
     in Guo et al. 2019 (group-wise correlation).
     """
     num_views, height, width = log_depths.shape
-    own = features if _size(features) == (height, width) else resize(features, (height, width))
     directions = rays(Ks, width, height)  # (V, h, w, 3)
-    correlations, visibilities = [], []
+    correlations: list[list[Tensor]] = [[] for _ in compared]
+    visibilities = []
     for view in range(num_views):
         depths = (log_depths[view] + offsets[:, None, None]).exp()  # (P, h, w)
-        pos_c = directions[view] * depths[..., None]  # (P, h, w, 3)
-        total = features.new_zeros(groups, *depths.shape)
+        totals = [depths.new_zeros(c.groups, *depths.shape) for c in compared]
         count = torch.zeros_like(depths)
         for other in range(num_views):
             if other == view:
                 continue
             relative = viewmats[other] @ invert_rigid(viewmats[view])
-            pos_o = pos_c @ relative[:3, :3].T + relative[:3, 3]
-            warped, seen = _sample(features[other], pos_o, Ks[other], (height, width))
-            products = (warped * own[view]).unflatten(1, (groups, -1)).sum(2)  # (P, G, h, w)
-            total = total + products.movedim(1, 0) * seen
+            pos_o = directions[view] @ relative[:3, :3].T * depths[..., None] + relative[:3, 3]
+            ndc, seen = _projected(pos_o, Ks[other])
+            for c, total in zip(compared, totals, strict=True):
+                warped = _sample(c.maps[other], ndc)
+                products = (warped * c.own[view]).unflatten(1, (c.groups, -1)).sum(2)  # (P, G, h, w)
+                total += products.movedim(1, 0) * seen
             count = count + seen
-        correlations.append(total / count.clamp_min(1))
+        for found, total in zip(correlations, totals, strict=True):
+            found.append(total / count.clamp_min(1))
         visibilities.append(count / max(num_views - 1, 1))
-    return torch.stack(correlations), torch.stack(visibilities)
+    return [torch.stack(found) for found in correlations], torch.stack(visibilities)
 
 
-def _sample(features: Tensor, pos_c: Tensor, K: Tensor, size: tuple[int, int]) -> tuple[Tensor, Tensor]:
-    """Bilinear features (P, C, h, w) at projected points (P, h, w, 3), and (P, h, w) 1 where the point
-    is in view; K speaks of a picture of `size`, (height, width)."""
+def _projected(pos_c: Tensor, K: Tensor) -> tuple[Tensor, Tensor]:
+    """Where points (P, h, w, 3) lie in a picture of h x w, as (P, h, w, 2) of -1 to 1, and (P, h, w) 1
+    where they are in view."""
+    height, width = pos_c.shape[1:3]
     z = pos_c[..., 2]
     xy = pos_c[..., :2] / z.clamp_min(1e-4)[..., None] * K.diagonal()[:2] + K[:2, 2]
-    ndc = (xy / xy.new_tensor([size[1], size[0]]) * 2 - 1).clamp(-4, 4)
-    seen = ((z > 1e-4) & (ndc.abs() <= 1).all(-1)).to(features.dtype)
+    ndc = (xy / xy.new_tensor([width, height]) * 2 - 1).clamp(-4, 4)
+    return ndc, ((z > 1e-4) & (ndc.abs() <= 1).all(-1)).to(pos_c.dtype)
+
+
+def _sample(features: Tensor, ndc: Tensor) -> Tensor:
+    """Bilinear features (P, C, h, w) of one map (C, h', w') at (P, h, w, 2)."""
     batch = features[None].expand(len(ndc), -1, -1, -1)
-    return F.grid_sample(batch, ndc.to(features.dtype), align_corners=False), seen
+    return F.grid_sample(batch, ndc.to(features.dtype), align_corners=False)
 
 
 def patches(images: Tensor, reach: int = 2) -> Tensor:
@@ -141,44 +170,56 @@ class DepthRefiner(nn.Module):
             prior: (B, V, H, W), of the viewmats' length unit.
             viewmats: (B, V, 4, 4). Ks: (B, V, 3, 3), pixels of the images.
         """
+        grid, pictures = tokens.grid, images.flatten(0, 1)
+        size = (4 * grid[0], 4 * grid[1])
+        scale = torch.tensor([size[1] / images.shape[-1], size[0] / images.shape[-2], 1.0]).to(Ks)
+        with torch.no_grad():
+            compared = [Compared.of(local, size, self.groups), Compared.of(patches(pictures), size)]
+        read = (resize(pictures, size) - 0.5, tokens.maps(self.match_hook), tokens.maps(-1))
         passes = []
         for _ in range(self.num_passes):
-            prior = self._once(images, tokens, local, prior, viewmats, Ks)
+            prior = self._once(compared, read, prior, viewmats, Ks * scale[:, None])
             passes.append(prior)
         return tuple(passes)
 
     def _once(
-        self, images: Tensor, tokens: Tokens, local: Tensor, prior: DepthMaps, viewmats: Tensor, Ks: Tensor
+        self,
+        compared: list[Compared],
+        read: tuple[Tensor, Tensor, Tensor],
+        prior: DepthMaps,
+        viewmats: Tensor,
+        Ks: Tensor,
     ) -> DepthMaps:
-        size, shape = _size(prior.log_depths), prior.log_depths.shape[:2]
-        small_size = (4 * tokens.grid[0], 4 * tokens.grid[1])
-        pictures = images.flatten(0, 1)
-        start = resize(torch.stack((prior.log_depths, prior.log_errors), 2).flatten(0, 1), small_size)
+        """One pass; read: small pictures, shallow and deep tokens. Ks: pixels of the small pictures."""
+        colours, shallow, deep = read
+        shape = prior.log_depths.shape[:2]
+        start = resize(torch.stack((prior.log_depths, prior.log_errors), 2).flatten(0, 1), _size(colours))
         with torch.no_grad():
-            scale = torch.tensor([small_size[1] / size[1], small_size[0] / size[0], 1.0]).to(Ks)[:, None]
-            logs = start[:, 0].unflatten(0, shape)
-            described, seen = self._sweep(local, logs, viewmats, Ks * scale, self.groups)
-            plain, _ = self._sweep(patches(pictures), logs, viewmats, Ks * scale, 1)
+            (described, plain), seen = self._sweep(compared, start[:, 0].unflatten(0, shape), viewmats, Ks)
         likely = self.sharpness[0] * described.sum(1) + self.sharpness[1] * plain[:, 0]
         evidence = (described.flatten(1, 2), plain[:, 0], seen.mean(1, keepdim=True))
-        read = torch.cat((*evidence, _centred(start), resize(pictures, small_size) - 0.5), 1)
-        hidden = self.regularise(read, tokens.maps(self.match_hook), tokens.maps(-1))
+        hidden = self.regularise(torch.cat((*evidence, _centred(start), colours), 1), shallow, deep)
         raw = self.answer(F.relu(hidden)).float()
         shift = ((raw[:, :-1] + likely).softmax(1) * self.offsets[:, None, None]).sum(1)
-        change = resize(torch.stack((shift, raw[:, -1]), 1), size).unflatten(0, shape)
+        change = resize(torch.stack((shift, raw[:, -1]), 1), _size(prior.log_depths)).unflatten(0, shape)
         return DepthMaps(
             prior.log_depths + change[:, :, 0],
             (prior.log_errors + change[:, :, 1]).clamp(*LOG_ERROR_RANGE),
         )
 
     def _sweep(
-        self, features: Tensor, log_depths: Tensor, viewmats: Tensor, Ks: Tensor, groups: int
-    ) -> tuple[Tensor, Tensor]:
-        """`sweep_correlation` of every scene: (n, G, P, h, w) and (n, P, h, w)."""
-        scenes = zip(features.unflatten(0, log_depths.shape[:2]), log_depths, viewmats, Ks, strict=True)
-        pairs = [sweep_correlation(f, d, self.offsets, m, K, groups) for f, d, m, K in scenes]
-        correlations, seen = (torch.cat(part) for part in zip(*pairs, strict=True))
-        return correlations, seen
+        self, compared: list[Compared], log_depths: Tensor, viewmats: Tensor, Ks: Tensor
+    ) -> tuple[list[Tensor], Tensor]:
+        """`sweep_correlation` of every scene: (n, G, P, h, w) each, and (n, P, h, w)."""
+        count = log_depths.shape[1]
+        scenes = [
+            sweep_correlation(
+                [c.views(b * count, count) for c in compared], logs, self.offsets, viewmats[b], Ks[b]
+            )
+            for b, logs in enumerate(log_depths)
+        ]
+        volumes, seen = zip(*scenes, strict=True)
+        return [torch.cat(found) for found in zip(*volumes, strict=True)], torch.cat(seen)
 
 
 def _size(maps: Tensor) -> tuple[int, int]:

@@ -11,7 +11,7 @@ from langflash_core.geometry.cameras import invert_rigid, rays
 from langflash_core.geometry.quaternions import covariances, quats_to_matrices
 from langflash_core.network.depth import DepthMaps
 from langflash_core.network.gaussians import CHANNELS, assemble_gaussians, footprints
-from langflash_core.network.refiner import patches, sweep_correlation
+from langflash_core.network.refiner import Compared, patches, sweep_correlation
 
 K = torch.tensor([[40.0, 0, 16], [0, 40.0, 12], [0, 0, 1]], dtype=torch.float64)
 
@@ -43,13 +43,13 @@ def test_sweep_equals_its_twin():
     offsets = torch.linspace(-0.4, 0.4, 5, dtype=torch.float64)
     viewmats = torch.eye(4, dtype=torch.float64).repeat(2, 1, 1)
     viewmats[1, :3, 3] = torch.tensor([-0.3, 0.05, 0.1])
-    volume, _ = sweep_correlation(features, log_depths, offsets, viewmats, K.expand(2, 3, 3))
+    compared = [Compared.of(features, (24, 32), groups) for groups in (1, 3)]
+    (volume, grouped), _ = sweep_correlation(compared, log_depths, offsets, viewmats, K.expand(2, 3, 3))
     for plane, row, column in [(0, 3, 5), (2, 12, 20), (4, 23, 31), (1, 0, 0), (3, 20, 2)]:
         expected = _sweep_twin(
             features, log_depths, offsets, viewmats, K.expand(2, 3, 3), 0, 1, plane, row, column
         )
         assert volume[0, 0, plane, row, column].item() == pytest.approx(expected, abs=1e-10)
-    grouped, _ = sweep_correlation(features, log_depths, offsets, viewmats, K.expand(2, 3, 3), groups=3)
     assert grouped.shape == (2, 3, 5, 24, 32)
     torch.testing.assert_close(grouped.sum(1), volume[:, 0])
 
@@ -63,7 +63,8 @@ def test_sweep_peaks_at_the_true_depth():
     texture = F.normalize(torch.randn(1, 8, 24, 40, dtype=torch.float64), dim=1)
     features = torch.stack((texture[0, :, :, :32], texture[0, :, :, 8:]))
     log_depths = torch.full((2, 24, 32), np.log(2.0) - 0.2, dtype=torch.float64)
-    volume, _ = sweep_correlation(features, log_depths, offsets, viewmats, K.expand(2, 3, 3))
+    compared = [Compared.of(features, (24, 32))]
+    (volume,), _ = sweep_correlation(compared, log_depths, offsets, viewmats, K.expand(2, 3, 3))
     best = offsets[volume[0, 0, :, :, 8:].argmax(0)]  # the first 8 columns leave the other view
     assert (best - 0.2).abs().max() < 1e-9
 
@@ -73,8 +74,8 @@ def test_sweep_of_a_lonely_or_blind_view_is_zero():
     behind = torch.eye(4).repeat(2, 1, 1)
     behind[1, :3, :3] = torch.diag(torch.tensor([-1.0, 1.0, -1.0]))
     for count, viewmats in ((1, torch.eye(4)[None]), (2, behind)):
-        volume, seen = sweep_correlation(
-            features[:count],
+        (volume,), seen = sweep_correlation(
+            [Compared.of(features[:count], (6, 8))],
             torch.zeros(count, 6, 8),
             torch.tensor([0.0]),
             viewmats,
