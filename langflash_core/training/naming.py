@@ -8,7 +8,7 @@ from langflash_core.network.model import LangFlashNet
 from langflash_core.network.naming import PLACE
 from langflash_core.training.losses import language_loss
 from langflash_core.training.measures import confusion
-from langflash_core.training.parts import PartBatch
+from langflash_core.training.parts import PartBatch, joined
 from langflash_core.training.stages import Loss, Stage, Words, guided, phrase_bank
 
 NOISE = 0.15
@@ -22,13 +22,17 @@ DROPPED = 0.2
 """Share of the namer's own channels that are left out at a time."""
 DRAWN = 256
 """Parts of a batch that the loss is taken over, by quality and by rarity."""
+ABSENT = 0.3
+"""Share of a room's parts that are left out at a time, so that no room is learned by heart."""
 RARITY = 0.5
 """0: as classes come; 1: every class of a batch as often as any other."""
 
 
 def naming_stage(network: LangFlashNet, batch: PartBatch, words: Words) -> Loss:
     """Contrast of corrected atoms against phrases that are true and false of the parts."""
-    vectors = torch.cat([_renamed(network, room, words.generator) for room in batch.rooms()])
+    rooms = [_thinned(room, words.generator) for room in batch.rooms()]
+    vectors = torch.cat([_renamed(network, room, words.generator) for room in rooms])
+    batch = joined(rooms)
     counts = words.sampler.groups(batch.labels)
     rare = torch.bincount(counts.clamp_min(0)).float()[counts.clamp_min(0)] ** -RARITY
     drawn = torch.multinomial(batch.quality.cpu() * rare, DRAWN, replacement=True, generator=words.generator)
@@ -41,6 +45,12 @@ def naming_stage(network: LangFlashNet, batch: PartBatch, words: Words) -> Loss:
     chosen = vectors[drawn.to(vectors.device)]
     total = language_loss(chosen, targets, texts[bank.to(vectors.device)], true=true)
     return Loss(total, {"cosine": float(F.cosine_similarity(chosen.detach(), targets, dim=-1).mean())})
+
+
+def _thinned(room: PartBatch, generator: torch.Generator) -> PartBatch:
+    """Some parts of one room; at least one."""
+    chances = torch.rand(len(room.labels), generator=generator)
+    return room.subset((chances >= min(ABSENT, float(chances.max()))).nonzero()[:, 0])
 
 
 def _renamed(network: LangFlashNet, room: PartBatch, generator: torch.Generator) -> Tensor:

@@ -52,6 +52,11 @@ class PartBatch:
     def to(self, device: str | torch.device) -> "PartBatch":
         return replace(self, **{name: getattr(self, name).to(device) for name in _TENSORS})
 
+    def subset(self, rows: Tensor) -> "PartBatch":
+        """Some parts of one room; rows: (n,) indices, on the CPU."""
+        tensors = [getattr(self, name)[rows.to(self.quality.device)] for name in _TENSORS]
+        return _batch(tensors, tuple(self.labels[i] for i in rows.tolist()), (len(rows),), self.seeds)
+
     def rooms(self) -> list["PartBatch"]:
         """Each room's parts."""
         split = [getattr(self, name).split(list(self.sizes)) for name in _TENSORS]

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import torch
 
+from langflash_core.training import naming
 from langflash_core.training.loop import LoopOptions, train_stage
 from langflash_core.training.naming import NAMING, naming_stage
 from langflash_core.training.parts import PartSet, guessed_geometry, joined, parts_of, run_parts
@@ -52,6 +53,22 @@ def test_what_is_stored_comes_back(parts, rooms, network):
     again = joined(joined(parts.rooms).rooms())
     assert torch.equal(again.looks, written.looks)
     assert again.labels == written.labels
+
+
+@pytest.mark.parametrize(("absent", "left"), [(0.0, "all"), (0.5, "some"), (1.0, "one")])
+def test_a_thinned_room_keeps_whole_parts(parts, monkeypatch, absent, left):
+    """Every part that stays keeps its own numbers and name; one always stays."""
+    monkeypatch.setattr(naming, "ABSENT", absent)
+    room = joined(parts.rooms)  # all parts as one room, so that there are many
+    room = replace(room, sizes=(len(room.labels),), seeds=room.seeds[:1])
+    thin = naming._thinned(room, torch.Generator().manual_seed(3))
+    rows = [int((room.looks == look).all(1).nonzero()[0]) for look in thin.looks]
+    assert rows == sorted(set(rows))
+    assert [room.labels[i] for i in rows] == list(thin.labels)
+    assert torch.equal(room.places[rows], thin.places)
+    assert thin.sizes == (len(rows),)
+    expected = {"all": {len(room.labels)}, "some": range(2, len(room.labels)), "one": {1}}
+    assert len(rows) in expected[left]
 
 
 def test_finished_files_are_left_alone(parts, rooms, network, tmp_path: Path):
