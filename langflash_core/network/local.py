@@ -42,7 +42,7 @@ class LocalFeatures(nn.Module):
     def forward(self, images: Tensor) -> Tensor:
         """(n, 3, H, W) in [0, 1] -> unit descriptors (n, 64, about 3 H / 8, 3 W / 8)."""
         size = tuple(round(side * _ENLARGE / _STRIDE) * _STRIDE for side in images.shape[-2:])
-        grey = resize(images, (size[0], size[1])).mean(1, keepdim=True)
+        grey = resize(images.mean(1, keepdim=True), (size[0], size[1]))
         grey = F.instance_norm(grey)
         eighth = self.block3(self.block2(self.block1(grey) + self.skip(F.avg_pool2d(grey, 4))))
         sixteenth = self.block4(eighth)

@@ -106,7 +106,7 @@ def _sample(features: Tensor, ndc: Tensor) -> Tensor:
 def patches(images: Tensor, reach: int = 2) -> Tensor:
     """Grey patches (n, (2 reach + 1)^2, H/2, W/2) of mean 0 and unit norm: their products are
     normalised cross-correlations, which exposure cannot change. images (n, 3, H, W)."""
-    half = resize(images, (images.shape[-2] // 2, images.shape[-1] // 2)).mean(1, keepdim=True)
+    half = resize(images.mean(1, keepdim=True), (images.shape[-2] // 2, images.shape[-1] // 2))
     side = 2 * reach + 1
     columns = F.unfold(half, side, padding=reach).unflatten(2, (half.shape[-2], half.shape[-1]))
     return F.normalize(columns - columns.mean(1, keepdim=True), dim=1, eps=1e-3)
