@@ -18,7 +18,7 @@ HIDDEN = 0.1
 BLIND = 0.25
 """How often a part's place, and how often its atom, are hidden altogether: lengths may be wrong, and
 on furniture that the language head learned from its atoms are better than on any other."""
-DROPPED = 0.2
+DROPPED = 0.3
 """Share of the namer's own channels that are left out at a time."""
 DRAWN = 256
 """Parts of a batch that the loss is taken over, by quality and by rarity."""
