@@ -193,8 +193,8 @@ def select(scene: Scene, prompts: Sequence[str], *, threshold: float | None = No
     if not bool(passing.any()):
         asked, highest = ", ".join(prompts), float(best.max()) if len(best) else 0.0
         raise PromptError(
-            f"Nothing in the scene answers {asked} (best {highest:.3f}, threshold {limit:.3f}): "
-            "lower the threshold."
+            f"nothing in the scene answers {asked} (best score {highest:.3f}, threshold {limit:.3f}); "
+            "lower the threshold"
         )
     return kept(scene, passing)
 
