@@ -221,9 +221,15 @@ def test_interrupted_at_a_terminal(scene_file, tmp_path):
         "--size",
         "8192x8192",
     ]
-    child = subprocess.Popen(
-        [sys.executable, "-m", "app", *map(str, words)], stderr=side, start_new_session=True
-    )
+    # Tests that a shell runs in the background ignore Ctrl-C, and a child would inherit that;
+    # a handler of our own becomes the system's default in it.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        child = subprocess.Popen(
+            [sys.executable, "-m", "app", *map(str, words)], stderr=side, start_new_session=True
+        )
+    finally:
+        signal.signal(signal.SIGINT, before)
     try:
         os.close(side)
         shown, patience = b"", time.monotonic() + 60
@@ -235,6 +241,7 @@ def test_interrupted_at_a_terminal(scene_file, tmp_path):
         assert b"stopped" in os.read(terminal, 4096)
     finally:
         child.kill()
+        child.wait()
         os.close(terminal)
     assert not os.listdir(tmp_path)
 
