@@ -99,7 +99,7 @@ def reconstruct(
     """
     run = _Run(progress, cancelled)
     if preset not in PRESETS:
-        raise WeightsError(f"There is no preset '{preset}': choose one of {', '.join(PRESETS)}.")
+        raise WeightsError(f"there is no preset '{preset}'; choose one of {', '.join(PRESETS)}")
     device = _device(device)
     if refine_seconds is not None:
         _check_refinement(refine_seconds, photos)
@@ -187,7 +187,7 @@ def select(scene: Scene, prompts: Sequence[str], *, threshold: float | None = No
     compiled = compile_query(scene, language_space(scene.semantics.space), list(prompts))
     limit = compiled.threshold if threshold is None else threshold
     if not 0 <= limit <= 1:
-        raise PromptError(f"The threshold {limit} is out of range: relevancy needs 0 to 1.")
+        raise PromptError(f"the threshold {limit} is out of range; relevancy needs 0 to 1")
     best = gaussian_relevance(scene.semantics, compiled).amax(0)  # (N,)
     passing = best >= limit if scene.semantics.num_atoms else torch.zeros_like(best, dtype=torch.bool)
     if not bool(passing.any()):
@@ -270,10 +270,10 @@ def _with_record(scene: Scene, network: LangFlashNet, timings: dict[str, float])
 def _check_refinement(seconds: float, photos: Sequence) -> None:
     if not 0 < seconds <= LONGEST_REFINEMENT:
         raise InputError(
-            f"A refinement of {seconds:g} seconds is out of range: choose up to {LONGEST_REFINEMENT}."
+            f"a refinement of {seconds:g} seconds is out of range; choose up to {LONGEST_REFINEMENT}"
         )
     if len(photos) < 2:
-        raise InputError("A refinement compares photos with each other: give at least two that overlap.")
+        raise InputError("a refinement compares photos with each other; give at least two that overlap")
 
 
 def _refined(scene: Scene, images: Tensor, seconds: float, device: str, progress: Progress) -> Scene:
@@ -329,14 +329,14 @@ def _atoms(network: LangFlashNet, way: str | None, views: Views) -> Atoms | None
         return lambda weights, features: averaged_atoms(pooled_weights(weights, features), features)[0]
     if way == "lfa":
         if not network.aggregated:
-            raise WeightsError("The aggregation has no weights here; choose --aggregation average or crops")
+            raise WeightsError("the aggregation has no weights here; choose --aggregation average or crops")
         return None
     if way != "crops":
-        raise InputError(f"The aggregation '{way}' is unknown: choose {', '.join(AGGREGATIONS)}.")
+        raise InputError(f"the aggregation '{way}' is unknown; choose {', '.join(AGGREGATIONS)}")
     if network.preset.space != "clip":
         raise InputError(
-            f"Crops are embedded by CLIP, but the preset '{network.preset.name}' speaks "
-            f"'{network.preset.space}': choose --aggregation lfa or average."
+            f"crops are embedded by CLIP, but the preset '{network.preset.name}' speaks "
+            f"'{network.preset.space}'; choose --aggregation lfa or average"
         )
     tower, photos = load_clip_images(), source_pictures(views)
     return lambda weights, _: crop_atoms(weights, photos, lambda p: tower.encode(p.cpu()).to(weights))
@@ -349,11 +349,9 @@ def _groups(network: LangFlashNet, way: str | None, device: str) -> Lifted | Non
         InputError: an unknown way. WeightsError: no weights for it.
     """
     if way not in (None, *GROUPINGS):
-        raise InputError(f"The grouping '{way}' is unknown: choose {', '.join(GROUPINGS)}.")
+        raise InputError(f"the grouping '{way}' is unknown; choose {', '.join(GROUPINGS)}")
     if way == "queries" and not network.grouped:
-        raise WeightsError(
-            "The grouping has no weights here; `langflash weights get langflash` fetches them."
-        )
+        raise WeightsError("the grouping has no weights here; `langflash weights get langflash` fetches them")
     if way == "queries" or (way is None and (network.grouped or sam2_checkpoint() is None)):
         return None
     oracle = Sam2(device)
@@ -368,11 +366,11 @@ def _groups(network: LangFlashNet, way: str | None, device: str) -> Lifted | Non
 
 def _bfloat16(preset: str, precision: str, device: str) -> bool:
     if precision not in PRECISIONS:
-        raise InputError(f"The precision '{precision}' is unknown: choose {', '.join(PRECISIONS)}.")
+        raise InputError(f"the precision '{precision}' is unknown; choose {', '.join(PRECISIONS)}")
     can = network_class(PRESETS[preset]).mixes
     if precision == "bfloat16" and not can:
         raise InputError(
-            f"The preset '{preset}' computes in float32 only: choose --precision float32 or auto."
+            f"the preset '{preset}' computes in float32 only; choose --precision float32 or auto"
         )
     quick = device != "cpu" or has_bfloat16()
     return can and (precision == "bfloat16" or (precision == "auto" and quick))
@@ -402,16 +400,16 @@ def _on_cpu(prediction: Prediction) -> Prediction:
 
 def _device(name: str) -> str:
     if name not in ("auto", "cpu", "cuda"):
-        raise InputError(f"The device '{name}' is unknown: choose auto, cpu or cuda.")
+        raise InputError(f"the device '{name}' is unknown; choose auto, cpu or cuda")
     if name == "cuda" and not torch.cuda.is_available():
-        raise InputError("There is no CUDA device that torch can use: choose --device cpu or auto.")
+        raise InputError("there is no CUDA device that torch can use; choose --device cpu or auto")
     return ("cuda" if torch.cuda.is_available() else "cpu") if name == "auto" else name
 
 
 def _area(size: int) -> int:
     low, high = SIZES
     if not low <= size <= high:
-        raise InputError(f"The size {size} is out of range: choose {low} to {high} pixels.")
+        raise InputError(f"the size {size} is out of range; choose {low} to {high} pixels")
     return int(size) ** 2
 
 
@@ -419,10 +417,10 @@ def _camera(scene: Scene, view: int, camera: Camera | None, size: tuple[int, int
     """The camera asked for, at the size asked for."""
     if size is not None and not all(1 <= side <= LARGEST_PICTURE for side in size):
         raise ViewError(
-            f"A picture of {size[0]}x{size[1]} cannot be drawn: choose 1 to {LARGEST_PICTURE} pixels."
+            f"a picture of {size[0]}x{size[1]} cannot be drawn; choose 1 to {LARGEST_PICTURE} pixels"
         )
     if camera is None:
         if not 0 <= view < scene.num_views:
-            raise ViewError(f"There is no view {view}: the scene has views 0 to {scene.num_views - 1}.")
+            raise ViewError(f"there is no view {view}; the scene has views 0 to {scene.num_views - 1}")
         camera = scene.camera(view)
     return camera if size is None else camera.resized(*size)

@@ -61,7 +61,7 @@ def write(
             progress("drawing", index / len(cameras))
             film.send(to_8bit(renderer(scene, camera, weight_maps=False).rgb).tobytes())
     except OSError as error:
-        raise LangFlashError(f"the video encoder stopped ({error}): try another --size") from error
+        raise LangFlashError(f"the video encoder stopped ({error}); try another --size") from error
     finally:
         film.close()
 

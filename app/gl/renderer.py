@@ -67,8 +67,8 @@ class SplatRenderer:
             raise ValueError(f"queries: expected shader, host or None, received {queries!r}")
         if ctx.version_code < 330:
             raise GraphicsError(
-                f"OpenGL {ctx.version_code / 100:.1f} is too old for splatting, 3.3 is needed: "
-                "update the graphics driver."
+                f"OpenGL {ctx.version_code / 100:.1f} is too old for splatting, 3.3 is needed; "
+                "update the graphics driver"
             )
         self.passes: Counter[str] = Counter()
         self._ctx = ctx
@@ -173,7 +173,7 @@ class SplatRenderer:
             GraphicsError: the image is larger than the driver's textures, or the context is gone.
         """
         if not context_lives(self._ctx):
-            raise GraphicsError("The OpenGL context of this view is gone: open the scene again.")
+            raise GraphicsError("the OpenGL context of this view is gone; open the scene again")
         if self._splats is None:
             raise ValueError("draw: expected set_scene before, received no scene")
         self._resize(camera)
@@ -479,8 +479,8 @@ class SplatRenderer:
             raise ValueError(f"camera: expected at least 1 x 1 pixels, received {size[0]} x {size[1]}")
         if max(size) > limit:
             raise GraphicsError(
-                f"An image of {size[0]} x {size[1]} is larger than this driver's {limit} pixels a side: "
-                "choose a smaller size."
+                f"an image of {size[0]} x {size[1]} is larger than this driver's {limit} pixels a side; "
+                "choose a smaller size"
             )
         self._release_targets()
         self._target = ColourTarget(self._ctx, size, self._dtype)

@@ -225,7 +225,7 @@ class Citizen:
                 write_atomically(order.camera_file, camera_json(state.pose, *size))
             self._exporter.start(order.words)
         except LangFlashError as error:
-            self._perform(do.Notify(f"{error}."))
+            self._perform(do.Notify(str(error)))
             return
         except OSError as error:
             self._perform(do.Notify(f"The export cannot be started: {error.strerror or error}."))

@@ -270,7 +270,7 @@ class ExportEnded:
             return Notify("The export was stopped; nothing was written.", "info").apply(state)
         if self.code == 0:
             return Notify(f"Exported {self.said}", "info").apply(state)
-        return Notify(_sentence(self.error) or f"The export failed (code {self.code}).").apply(state)
+        return Notify(self.error or f"The export failed (code {self.code}).").apply(state)
 
 
 @dataclass(frozen=True)
@@ -373,8 +373,3 @@ def _change_photo(state: State, path: Path, **changes: Any) -> State:
 
 def _within(value: float, limits: tuple[float, float]) -> float:
     return min(max(value, limits[0]), limits[1])
-
-
-def _sentence(text: str) -> str:
-    """With a capital and a full stop."""
-    return "" if not text else text[0].upper() + text[1:] + ("" if text.endswith(".") else ".")

@@ -50,9 +50,9 @@ def read_prompts(path: Path) -> PromptSet:
             content = stream.read(MOST_BYTES + 1)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise PromptError(f"The prompt set {path} cannot be read ({reason}): choose another file.") from error
+        raise PromptError(f"the prompt set {path} cannot be read ({reason}); choose another file") from error
     if len(content) > MOST_BYTES:
-        raise PromptError(f"{path} is larger than a prompt set can be: choose another file.")
+        raise PromptError(f"{path} is larger than a prompt set can be; choose another file")
     try:
         document = json.loads(content.decode("utf-8"))
         return _parsed(document)

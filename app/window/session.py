@@ -508,13 +508,13 @@ def _open_window(size: tuple[int, int]):
         glfw.set_error_callback(lambda _code, text: problems.append(_text(text)))
         if not glfw.init():
             raise GraphicsError(
-                "There is no display to open a window on; use langflash render or query, or make run."
+                "there is no display to open a window on; use langflash render or query, or make run"
             )
         window = _create(size)
         if not window:
             why = f" ({problems[-1]})" if problems else ""
             glfw.terminate()
-            raise GraphicsError(f"OpenGL 3.3 is not available here{why}; update the graphics driver.")
+            raise GraphicsError(f"OpenGL 3.3 is not available here{why}; update the graphics driver")
     finally:
         glfw.ERROR_REPORTING = previous
     glfw.set_error_callback(lambda code, text: log.warning("glfw %s: %s", code, _text(text)))

@@ -58,8 +58,8 @@ class Sam2:
         checkpoint = sam2_checkpoint()
         if checkpoint is None:
             raise WeightsError(
-                "SAM 2 is not at hand: install its package (github.com/facebookresearch/sam2) and put a "
-                f"checkpoint of its own name, such as {next(iter(CONFIGS))}, into {weights_folder()}."
+                "SAM 2 is not at hand; install its package (github.com/facebookresearch/sam2) and put a "
+                f"checkpoint of its own name, such as {next(iter(CONFIGS))}, into {weights_folder()}"
             )
         self.predictor = _predictor(checkpoint, device)
 
@@ -91,4 +91,4 @@ def _predictor(checkpoint: Path, device: str) -> Any:
         return SAM2ImagePredictor(build_sam2(CONFIGS[checkpoint.name], str(checkpoint), device=device))
     except _BROKEN as error:
         reason = " ".join(str(error).split())[:120]
-        raise WeightsError(f"{checkpoint} is not a checkpoint of SAM 2 ({reason}); copy it again.") from None
+        raise WeightsError(f"{checkpoint} is not a checkpoint of SAM 2 ({reason}); copy it again") from None

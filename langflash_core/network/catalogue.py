@@ -80,4 +80,4 @@ def published(name: str) -> Published:
         if entry.name == name:
             return entry
     names = ", ".join(entry.name for entry in (*CATALOGUE, *OTHERS))
-    raise InputError(f"There is no published checkpoint '{name}' here; choose one of {names}")
+    raise InputError(f"there is no published checkpoint '{name}' here; choose one of {names}")

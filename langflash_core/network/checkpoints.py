@@ -46,7 +46,7 @@ def load_network(
         WeightsError: the file is missing, damaged, of another preset, or does not fit.
     """
     if preset not in PRESETS:
-        raise WeightsError(f"There is no preset '{preset}'; choose one of {', '.join(PRESETS)}")
+        raise WeightsError(f"there is no preset '{preset}'; choose one of {', '.join(PRESETS)}")
     if not network_class(PRESETS[preset]).compact:
         named = None if weights is None else Path(weights)
         return assemble_network(PRESETS[preset], named, device, bfloat16=bfloat16)
@@ -99,7 +99,7 @@ def adopt_frozen(preset: Preset, encoder: Path, local: Path, out: Path, seed: in
     network = build_network(preset)
     if not isinstance(network, GuidedDepthNet):
         raise WeightsError(
-            f"The preset '{preset.name}' takes published weights as they are; use `langflash weights import`"
+            f"the preset '{preset.name}' takes published weights as they are; use `langflash weights import`"
         )
     load_strictly(network.encoder.vit, read_weights(encoder)[0], encoder)
     load_strictly(network.local, convert(read_weights(local)[0]), local)
@@ -146,7 +146,7 @@ def read_weights(path: Path) -> tuple[dict[str, Tensor], dict]:
             header = json.loads((file.metadata() or {}).get("langflash", "{}"))
     except FileNotFoundError:
         raise WeightsError(
-            f"There is no weights file {path}; check the path or leave --weights out"
+            f"there is no weights file {path}; check the path or leave --weights out"
         ) from None
     except (SafetensorError, OSError, ValueError) as error:
         raise WeightsError(

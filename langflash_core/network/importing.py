@@ -50,7 +50,7 @@ def read_checkpoint(path: Path) -> dict[str, Tensor]:
         WeightsError: there is no such file, it cannot be read, or it holds something else.
     """
     if not path.is_file():
-        raise WeightsError(f"There is no checkpoint {path}; check the path")
+        raise WeightsError(f"there is no checkpoint {path}; check the path")
     if path.stat().st_size == 0:
         raise WeightsError(f"{path} is empty; {_REMEDY}")
     try:

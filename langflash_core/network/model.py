@@ -88,7 +88,7 @@ class LangFlashNet(nn.Module):
         """
         missing = [name for name, _ in self.named_children() if name not in filled]
         if missing:
-            raise WeightsError(f"There are no weights for {', '.join(missing)}; {remedy}")
+            raise WeightsError(f"there are no weights for {', '.join(missing)}; {remedy}")
 
     @abstractmethod
     def encode(self, images: Tensor, Ks: Tensor) -> Tokens:

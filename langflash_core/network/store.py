@@ -92,7 +92,7 @@ def read_part(path: Path) -> Part:
         with safe_open(str(path), framework="pt") as file:
             header = json.loads((file.metadata() or {}).get("langflash", "{}"))
     except FileNotFoundError:
-        raise WeightsError(f"There is no weights file {path}; check the path") from None
+        raise WeightsError(f"there is no weights file {path}; check the path") from None
     except (SafetensorError, OSError, ValueError) as error:
         raise WeightsError(f"{path} is not a readable safetensors file ({error}); {_REMEDY}") from None
     if header.get("format") != FORMAT or not isinstance(header.get("modules"), list):

@@ -28,9 +28,9 @@ def terms(prompt: str) -> list[tuple[int, str]]:
     operands = zip(rest[::2], rest[1::2], strict=True)
     pairs += [(1 if sign == "+" else -1, text.strip()) for sign, text in operands]
     if not rest and not pairs[0][1]:
-        raise PromptError("A prompt is empty: describe what to look for in a word or a short phrase.")
+        raise PromptError("a prompt is empty; describe what to look for in a word or a short phrase")
     if not all(text for _, text in pairs):
-        raise PromptError(f"The prompt {prompt!r} is incomplete: write a phrase on both sides of + and -.")
+        raise PromptError(f"the prompt {prompt!r} is incomplete; write a phrase on both sides of + and -")
     return pairs
 
 
@@ -50,7 +50,7 @@ def encode_prompts(space: LanguageSpace, prompts: Sequence[str]) -> Tensor:
         signs = torch.tensor([sign for sign, _ in pairs]).to(phrases)
         total = signs @ phrases[start : start + len(pairs)]
         if total.norm() < _CANCELLED:
-            raise PromptError(f"The prompt {prompts[row]!r} cancels itself out: take another phrase away.")
+            raise PromptError(f"the prompt {prompts[row]!r} cancels itself out; take another phrase away")
         embeddings[row] = phrases[start] if len(pairs) == 1 else total / total.norm()
         start += len(pairs)
     return embeddings

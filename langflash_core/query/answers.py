@@ -144,5 +144,5 @@ def _thinned(points: Tensor, most: int = 20_000) -> Tensor:
 def _checked(threshold: float, mode: str) -> float:
     low = 0.0 if mode == "relevancy" else -1.0
     if not low <= threshold <= 1.0:
-        raise PromptError(f"The threshold {threshold} is out of range: {mode} needs {low:g} to 1.")
+        raise PromptError(f"the threshold {threshold} is out of range; {mode} needs {low:g} to 1")
     return float(threshold)

@@ -71,7 +71,7 @@ class ClipText:
             PromptError: a phrase is empty.
         """
         if any(not text.strip() for text in texts):
-            raise PromptError("A prompt is empty: describe what to look for in a word or a short phrase.")
+            raise PromptError("a prompt is empty; describe what to look for in a word or a short phrase")
         if not texts:
             return torch.zeros(0, DIMENSION)
         tokens = self.tokenizer([text.encode("utf-8", "replace").decode("utf-8") for text in texts])
@@ -103,7 +103,7 @@ def load_clip(source: str | None = None) -> ClipText:
         tower.model.load_state_dict(state)
     except (RuntimeError, AttributeError) as error:
         reason = " ".join(str(error).split())[:200]
-        raise WeightsError(f"{path} does not hold CLIP ViT-B/32 ({reason}): {_remedy()}.") from error
+        raise WeightsError(f"{path} does not hold CLIP ViT-B/32 ({reason}); {_remedy()}") from error
     return tower
 
 
@@ -122,7 +122,7 @@ def load_clip_images(source: str | None = None) -> ClipImages:
         model.load_state_dict(_read(path))
     except (RuntimeError, AttributeError) as error:
         reason = " ".join(str(error).split())[:200]
-        raise WeightsError(f"{path} does not hold all of CLIP ViT-B/32 ({reason}): {_remedy()}.") from error
+        raise WeightsError(f"{path} does not hold all of CLIP ViT-B/32 ({reason}); {_remedy()}") from error
     return ClipImages(model)
 
 
@@ -148,7 +148,7 @@ def _locate(source: str | None) -> Path:
     if source is None:
         found = [weights_folder() / name for name in _FILES if (weights_folder() / name).is_file()]
         if not found:
-            raise WeightsError(f"The 'clip' language space needs CLIP's text weights: {_remedy()}.")
+            raise WeightsError(f"the 'clip' language space needs CLIP's text weights; {_remedy()}")
         return found[0]
     if Path(source).is_file():
         return Path(source)
@@ -156,11 +156,11 @@ def _locate(source: str | None) -> Path:
     open_clip = importlib.import_module("open_clip")
     config = open_clip.get_pretrained_cfg(ARCHITECTURE, source)
     if not config:
-        raise WeightsError(f"CLIP weights '{source}' are neither a file nor a tag of open_clip: {_remedy()}.")
+        raise WeightsError(f"CLIP weights '{source}' are neither a file nor a tag of open_clip; {_remedy()}")
     try:
         return Path(open_clip.download_pretrained(config))
     except (OSError, RuntimeError, ValueError) as error:  # no network, no such file on the hub
-        raise WeightsError(f"CLIP weights '{source}' could not be downloaded: {_remedy()}.") from error
+        raise WeightsError(f"CLIP weights '{source}' could not be downloaded; {_remedy()}") from error
 
 
 def _read(path: Path) -> dict[str, Tensor]:
@@ -169,4 +169,4 @@ def _read(path: Path) -> dict[str, Tensor]:
     try:
         return open_clip.load_state_dict(str(path), device="cpu", weights_only=True)
     except (OSError, RuntimeError, ValueError, SafetensorError, pickle.UnpicklingError, EOFError) as error:
-        raise WeightsError(f"{path} is damaged or is no plain state dict: {_remedy()}.") from error
+        raise WeightsError(f"{path} is damaged or is no plain state dict; {_remedy()}") from error

@@ -95,10 +95,10 @@ class MiniLM(nn.Module):
         # Command lines can carry undecodable bytes as lone surrogates, which no tokenizer takes.
         ids = self.tokenizer.encode(text.encode("utf-8", "replace").decode("utf-8")).ids
         if len(ids) <= _SPECIAL_TOKENS:
-            raise PromptError("A prompt is empty: describe what to look for in a word or a short phrase.")
+            raise PromptError("a prompt is empty; describe what to look for in a word or a short phrase")
         unknown = self.tokenizer.token_to_id("[UNK]")
         if all(token == unknown for token in ids[1:-1]):
-            raise PromptError(f"The prompt {text!r} holds no word the text model knows: use plain words.")
+            raise PromptError(f"the prompt {text!r} holds no word the text model knows; use plain words")
         return ids
 
     def forward(self, ids: Tensor, mask: Tensor) -> Tensor:
@@ -137,7 +137,7 @@ def read_minilm(weights: Path, vocabulary: Path) -> MiniLM:
         return MiniLM(load_file(weights), tokenizer)
     except (OSError, SafetensorError, KeyError, ValueError, RuntimeError) as error:
         raise WeightsError(
-            f"The text model {weights.name} or {vocabulary.name} is damaged ({error}): reinstall LangFlash."
+            f"the text model {weights.name} or {vocabulary.name} is damaged ({error}); reinstall LangFlash"
         ) from error
 
 

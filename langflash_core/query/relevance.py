@@ -97,9 +97,9 @@ def calibration_of(scene: Scene | None, space: LanguageSpace) -> Calibration:
             tuple(str(text) for text in own.get("negatives", space.negatives)),
         )
     except (TypeError, ValueError, AttributeError) as error:
-        raise SceneFileError(f"The scene's calibration is damaged ({error}): make it again.") from error
+        raise SceneFileError(f"the scene's calibration is damaged ({error}); make it again") from error
     if not (chosen.temperature > 0 and 0 <= chosen.threshold <= 1 and -1 <= chosen.cosine_threshold <= 1):
-        raise SceneFileError(f"The scene's calibration is out of range ({chosen}): make it again.")
+        raise SceneFileError(f"the scene's calibration is out of range ({chosen}); make it again")
     return chosen
 
 
@@ -130,7 +130,7 @@ def compile_query(
     texts = tuple(prompt.strip() for prompt in prompts)
     against = tuple(calibration.negatives if negatives is None else negatives) if mode == "relevancy" else ()
     if mode == "relevancy" and not against:
-        raise PromptError("Relevancy needs a negative phrase to compare with: name one, or use 'cosine'.")
+        raise PromptError("relevancy needs a negative phrase to compare with; name one, or use 'cosine'")
     factor, basis = reduce_dictionary(_spoken_dictionary(scene))
     return CompiledQuery(
         factor=factor,
@@ -239,19 +239,19 @@ def _spoken_dictionary(scene: Scene | Semantics) -> Tensor:
     silent = scene.metadata.get("silent_atoms") or []
     dictionary = scene.semantics.dictionary
     if not all(isinstance(k, int) and 0 <= k < len(dictionary) for k in silent):
-        raise SceneFileError(f"The scene's silent atoms are out of range ({silent}): make it again.")
+        raise SceneFileError(f"the scene's silent atoms are out of range ({silent}); make it again")
     rows = torch.tensor(silent, dtype=torch.int64, device=dictionary.device)
     return dictionary.index_fill(0, rows, 0.0) if silent else dictionary
 
 
 def _check_spoken(semantics: Semantics, space: LanguageSpace, prompts: Sequence[str], mode: str) -> None:
     if mode not in get_args(Mode):
-        raise PromptError(f"The mode '{mode}' is unknown: use 'relevancy' or 'cosine'.")
+        raise PromptError(f"the mode '{mode}' is unknown; use 'relevancy' or 'cosine'")
     if isinstance(prompts, str) or not prompts:
-        raise PromptError("There is no prompt: give a list with at least one word or short phrase.")
+        raise PromptError("there is no prompt; give a list with at least one word or short phrase")
     channels = semantics.dictionary.shape[1]
     if semantics.space != space.name or channels != space.dimension:
         raise PromptError(
-            f"The scene speaks '{semantics.space}' with {channels} numbers, the text tower "
-            f"'{space.name}' with {space.dimension}: query the scene in its own language space."
+            f"the scene speaks '{semantics.space}' with {channels} numbers, the text tower "
+            f"'{space.name}' with {space.dimension}; query the scene in its own language space"
         )

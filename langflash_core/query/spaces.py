@@ -89,14 +89,14 @@ def language_space(name: str = "minilm") -> LanguageSpace:
     """
     if name == NO_LANGUAGE:
         raise PromptError(
-            "This scene came from a splat file, which holds shapes and colours but no language, so it "
-            "answers no phrases: make a scene from photos with langflash reconstruct."
+            "this scene came from a splat file, which holds shapes and colours but no language, so it "
+            "answers no phrases; make a scene from photos with langflash reconstruct"
         )
     try:
         return _SPACES[name]
     except KeyError:
         known = " and ".join(_SPACES)
         raise PromptError(
-            f"The language space '{name}' is unknown here: this version speaks {known}, "
-            "so make the scene again or update LangFlash."
+            f"the language space '{name}' is unknown here; this version speaks {known}, "
+            "so make the scene again or update LangFlash"
         ) from None

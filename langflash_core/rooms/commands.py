@@ -25,7 +25,7 @@ def run_pack(root: Path, out: Path) -> int:
         return build_pack(Path(root), Path(out))
     except ValueError as error:
         raise InputError(
-            f"{root} holds no furniture library: give the folder with the .sh3f files."
+            f"{root} holds no furniture library; give the folder with the .sh3f files"
         ) from error
 
 

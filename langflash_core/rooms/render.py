@@ -366,7 +366,7 @@ def _standalone() -> moderngl.Context:
         return moderngl.create_standalone_context(backend="egl")  # pyright: ignore[reportArgumentType] - its stub is wrong
     except Exception as error:  # moderngl raises bare Exception
         raise GraphicsError(
-            "No OpenGL without a screen (EGL) here: install libegl1 and a Mesa driver."
+            "no OpenGL without a screen (EGL) here; install libegl1 and a Mesa driver"
         ) from error
 
 

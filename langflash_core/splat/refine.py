@@ -74,7 +74,7 @@ def refine(scene: Scene, photos: Tensor, budget: Budget, report: Report | None =
         ValueError: photos and views disagree.
     """
     if scene.num_views < 2:
-        raise InputError("A refinement compares photos with each other: give at least two that overlap.")
+        raise InputError("a refinement compares photos with each other; give at least two that overlap")
     if photos.shape != (scene.num_views, 3, scene.view_size[1], scene.view_size[0]):
         raise ValueError(f"photos: expected {scene.num_views} of {scene.view_size}, received {photos.shape}")
     photos = photos.to(scene.gaussians.means)
@@ -84,7 +84,7 @@ def refine(scene: Scene, photos: Tensor, budget: Budget, report: Report | None =
     start = _without(scene, view)
     shown = _draw(start.gaussians, start.camera(view))[1] >= _COVERED
     if float(shown.float().mean()) < _MIN_COVERED:
-        raise InputError("The photos overlap too little to judge a refinement: leave --refine out.")
+        raise InputError("the photos overlap too little to judge a refinement; leave --refine out")
     tried, first = _fit(start, photos, others, half, _share(report, "trial", 0.0))
     held_out = (_view_psnr(start, view, photos, shown), _view_psnr(tried, view, photos, shown))
     before = _mean_psnr(scene, photos)

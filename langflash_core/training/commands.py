@@ -67,7 +67,7 @@ def cache_plan(kind: str, scenes: int, first_seed: int | None = None) -> CachePl
             augment=False,
             three_view_every=1,
         )
-    raise InputError(f"There is no set '{kind}'; choose one of {', '.join(SETS)}")
+    raise InputError(f"there is no set '{kind}'; choose one of {', '.join(SETS)}")
 
 
 def run_cache(
@@ -132,7 +132,7 @@ def run_train(
         )
     for name in stages:
         if name not in ALL_STAGES:
-            raise InputError(f"There is no stage '{name}'; choose among {', '.join(ALL_STAGES)}")
+            raise InputError(f"there is no stage '{name}'; choose among {', '.join(ALL_STAGES)}")
     options = options or LoopOptions(minutes=0)
     rooms = _open(folder / "train")
     table = phrase_table(folder, encode)
@@ -145,7 +145,7 @@ def run_train(
         missing = [need for need in stage.needs if need not in done]
         if missing:
             raise InputError(
-                f"Stage '{name}' reads {', '.join(missing)}; train that first with the same run folder"
+                f"stage '{name}' reads {', '.join(missing)}; train that first with the same run folder"
             )
         seed = options.seed + 1000 * list(ALL_STAGES).index(name) + done.get(name, 0)
         words = Words(PhraseSampler(table), torch.Generator().manual_seed(seed))

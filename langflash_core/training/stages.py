@@ -414,7 +414,7 @@ def guided(network: LangFlashNet) -> GuidedDepthNet:
     """
     if not isinstance(network, GuidedDepthNet):
         raise InputError(
-            f"The preset '{network.preset.name}' has no such stage; train {', '.join(POINT_STAGES)} instead"
+            f"the preset '{network.preset.name}' has no such stage; train {', '.join(POINT_STAGES)} instead"
         )
     return network
 
@@ -427,7 +427,7 @@ def pointed(network: LangFlashNet) -> PointMapNet:
     """
     if not isinstance(network, PointMapNet):
         raise InputError(
-            f"The preset '{network.preset.name}' predicts depth, not point maps; train depth and refine"
+            f"the preset '{network.preset.name}' predicts depth, not point maps; train depth and refine"
         )
     return network
 

@@ -120,7 +120,7 @@ class _Code:
 
 KEY = "encoder.backbone.dec_blocks2.1.cross_attn.projk.weight"
 DAMAGE = {
-    "missing file": "There is no checkpoint",
+    "missing file": "there is no checkpoint",
     "empty file": "is empty",
     "text": "is not a plain checkpoint|damaged",
     "truncated": "damaged",

@@ -30,7 +30,7 @@ def run(args: Namespace, out: TextIO) -> None:
 
     device = args.device if args.device != "auto" else ("cuda" if torch.cuda.is_available() else "cpu")
     if device == "cuda" and not torch.cuda.is_available():
-        raise InputError("There is no CUDA device that torch can use: choose --device cpu or auto.")
+        raise InputError("there is no CUDA device that torch can use; choose --device cpu or auto")
     side = args.size or math.isqrt(PRESETS[args.preset].native_area)
     plan = Plan(tuple(args.views), tuple(args.atoms), args.repeats, side, not args.float32)
     with ProgressBar() as progress:
@@ -38,7 +38,7 @@ def run(args: Namespace, out: TextIO) -> None:
         network = _network(args, device)
         if side % network.preset.patch:
             raise InputError(
-                f"The size {side} does not fit: choose a multiple of {network.preset.patch} with --size."
+                f"the size {side} does not fit; choose a multiple of {network.preset.patch} with --size"
             )
         if args.compile:
             network.compiled()

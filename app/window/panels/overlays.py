@@ -85,7 +85,7 @@ def _toast(toast: Toast, look: Look) -> list[do.Command]:
     imgui.text_colored(theme.BAD if error else theme.GOOD, icon)
     imgui.same_line()
     imgui.push_text_wrap_pos(look.px(400 - 16 - (70 if error else 40)))
-    imgui.text_unformatted(toast.text)
+    imgui.text_unformatted(widgets.sentence(toast.text) if error else toast.text)
     imgui.pop_text_wrap_pos()
     right, top = look.px(400 - 16 - 30), imgui.get_style().window_padding.y - look.px(6)
     if error:

@@ -54,9 +54,7 @@ def sentences(said: Iterable[str]) -> list[str]:
 
 def said_here(text: str) -> str:
     """A warning as a sentence; what the core says of its command line in the window's words."""
-    text = text.replace("on the command line, --fov tells it", HOW_TO_TELL)
-    named = "." in text.partition(" ")[0]  # it begins with the name of a file
-    return (text if named else text[:1].upper() + text[1:]).rstrip(".") + "."
+    return widgets.sentence(text.replace("on the command line, --fov tells it", HOW_TO_TELL))
 
 
 def _hint(look: Look) -> None:

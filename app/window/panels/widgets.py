@@ -122,6 +122,12 @@ def shortened(text: str, width: float) -> str:
     return text[:kept].rstrip() + "..."
 
 
+def sentence(text: str) -> str:
+    """`text` with a full stop and a capital, unless it begins with the name of a file."""
+    named = any(mark in text.partition(" ")[0].rstrip(".") for mark in "./\\")
+    return (text if named else text[:1].upper() + text[1:]).rstrip(".") + "."
+
+
 def rgba(colour: tuple[float, float, float], alpha: float = 1.0) -> ImVec4:
     """An ImGui colour of an RGB triple."""
     return ImVec4(*colour, alpha)

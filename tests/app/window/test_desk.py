@@ -16,6 +16,7 @@ from app.window import export_form
 from app.window.export_form import What
 from app.window.exporter import Exporter
 from app.window.panels.status import fitting
+from app.window.panels.widgets import sentence
 from app.window.poses import Pose, Vector
 from app.window.preferences import PANEL_WIDTHS
 from app.window.recovery import Kept
@@ -194,7 +195,7 @@ def test_an_export_is_followed_to_its_end() -> None:
     state = after(state, desk.ExportProgressed("drawing", 1.5))
     assert state.desk.exporting is not None and state.desk.exporting.fraction == 1.0
     assert told(after(state, desk.ExportEnded(0, "/x.png", ""))) == "Exported /x.png"
-    assert told(after(state, desk.ExportEnded(2, "", "no room on the disk"))) == "No room on the disk."
+    assert told(after(state, desk.ExportEnded(2, "", "no room on the disk"))) == "no room on the disk"
     stopped = after(state, desk.CancelExport(), desk.ExportEnded(130, "", ""))
     assert stopped.desk.exporting is None and "nothing was written" in told(stopped)
     assert "no scene" in told(after(State(), desk.ShowExport()))
@@ -219,6 +220,20 @@ def scene_file(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("desk") / "room.langflash"
     save(room(torch.eye(3)), path)
     return path
+
+
+@pytest.mark.parametrize(
+    ("said", "shown"),
+    [
+        ("no room on the disk", "No room on the disk."),
+        ("The export cannot be started.", "The export cannot be started."),
+        ("Stopped.", "Stopped."),
+        ("photo.jpg is damaged; copy it again", "photo.jpg is damaged; copy it again."),
+        ("/tmp/set is larger than a prompt set can be", "/tmp/set is larger than a prompt set can be."),
+    ],
+)
+def test_problems_are_shown_as_sentences(said: str, shown: str) -> None:
+    assert sentence(said) == shown
 
 
 def test_a_real_export_writes_its_file(scene_file: Path, tmp_path: Path) -> None:

@@ -355,7 +355,7 @@ def test_without_a_display_there_is_one_sentence() -> None:
         text=True,
     )
     assert done.stderr.strip() == (
-        "said: There is no display to open a window on; use langflash render or query, or make run."
+        "said: there is no display to open a window on; use langflash render or query, or make run"
     )
 
 
