@@ -236,7 +236,7 @@ class _Run:
 
     def check(self) -> None:
         if self.cancelled is not None and self.cancelled():
-            raise Cancelled("The reconstruction was cancelled; nothing was written.")
+            raise Cancelled("the reconstruction was cancelled; nothing was written")
 
     def report(self, name: str, fraction: float) -> None:
         if self.progress is not None:

@@ -30,7 +30,7 @@ def offscreen_context() -> moderngl.Context:
 def _explain(error: Exception) -> str:
     if sys.platform.startswith("linux"):
         return (
-            f"OpenGL could not start without a screen ({error}): install the Debian packages "
-            "libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri, or use --backend torch."
+            f"OpenGL could not start without a screen ({error}); install the Debian packages "
+            "libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri, or use --backend torch"
         )
-    return f"OpenGL 3.3 could not start ({error}): update the graphics driver, or use --backend torch."
+    return f"OpenGL 3.3 could not start ({error}); update the graphics driver, or use --backend torch"

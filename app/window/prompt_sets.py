@@ -58,7 +58,7 @@ def read_prompts(path: Path) -> PromptSet:
         return _parsed(document)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         why = " ".join(str(error).split())[:120]
-        message = f"{path.name} is no usable prompt set ({why}): save one from the window."
+        message = f"{path.name} is no usable prompt set ({why}); save one from the window"
         raise PromptError(message) from error
 
 

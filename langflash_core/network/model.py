@@ -288,7 +288,7 @@ class Run:
     def check(self) -> None:
         """Stop here if asked to."""
         if self.cancelled is not None and self.cancelled():
-            raise Cancelled("The reconstruction was cancelled")
+            raise Cancelled("the reconstruction was cancelled")
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
