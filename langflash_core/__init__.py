@@ -10,9 +10,7 @@
 The four functions are read in at first use: importing the package alone costs no torch.
 """
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -29,21 +27,6 @@ _HOMES = {
     "save": ("export", "export"),
     "load": ("export", "read"),
 }
-
-
-class _Package(ModuleType):
-    """This package, in which `query` is the function even after the folder `query/` was imported.
-
-    The import system binds every imported sub-module to its package; that would hide a function
-    of the same name. `from langflash_core.query import ...` finds the folder all the same.
-    """
-
-    def __setattr__(self, name: str, value: object) -> None:
-        if not (name in _HOMES and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package
 
 
 def __getattr__(name: str) -> object:

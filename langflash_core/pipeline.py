@@ -18,21 +18,21 @@ from torch import Tensor
 from langflash_core.errors import Cancelled, InputError, PromptError, ViewError, WeightsError
 from langflash_core.images import grey_photo, load_views
 from langflash_core.images.views import source_pictures
-from langflash_core.labels.segments import Sam2, sam2_checkpoint
+from langflash_core.language.answers import answer
+from langflash_core.language.clip import load_clip_images
+from langflash_core.language.gaussians import gaussian_relevance, kept
+from langflash_core.language.relevance import Mode, compile_query, relevance_maps
+from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_network
-from langflash_core.network.aggregation import averaged_atoms
 from langflash_core.network.build import network_class
-from langflash_core.network.crops import crop_atoms
-from langflash_core.network.grouping import Groups
-from langflash_core.network.lifting import lifted_weights
+from langflash_core.network.checkpoints.store import part_folder
 from langflash_core.network.model import Atoms, Geometry, Lifted, pooled_weights
 from langflash_core.network.precision import has_bfloat16
-from langflash_core.network.store import part_folder
-from langflash_core.query.answers import answer
-from langflash_core.query.clip import load_clip_images
-from langflash_core.query.gaussians import gaussian_relevance, kept
-from langflash_core.query.relevance import Mode, compile_query, relevance_maps
-from langflash_core.query.spaces import language_space
+from langflash_core.network.semantics.aggregation import averaged_atoms
+from langflash_core.network.semantics.crops import crop_atoms
+from langflash_core.network.semantics.grouping import Groups
+from langflash_core.network.semantics.lifting import lifted_weights
+from langflash_core.network.semantics.sam2 import Sam2, sam2_checkpoint
 from langflash_core.scene import assemble, prune
 from langflash_core.splat import render as render_reference
 from langflash_core.splat.refine import Budget, refine

@@ -10,8 +10,8 @@ import torch
 
 import langflash_core as lf
 from langflash_core.errors import Cancelled, ImageError, InputError, PromptError, ViewError, WeightsError
+from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS, GuidedDepthNet, build_network, save_network
-from langflash_core.query.spaces import language_space
 from langflash_core.resources import asset_path
 from langflash_core.splat import render
 from langflash_core.types import Camera, Gaussians, Scene, Semantics
@@ -247,7 +247,7 @@ def test_the_package_is_light_and_its_functions_keep_their_names():
     program = (
         "import sys, langflash_core as lf\n"
         "assert 'torch' not in sys.modules\n"
-        "import langflash_core.query.relevance\n"
+        "import langflash_core.language.relevance\n"
         "assert callable(lf.query) and lf.query.__module__ == 'langflash_core.pipeline'\n"
         "from langflash_core import query, reconstruct, save, load\n"
         "assert query is lf.query\n"

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import torch
 
 from langflash_core.errors import InputError, PromptError
-from langflash_core.query.relevance import CompiledQuery, compile_query, reduce_dictionary
-from langflash_core.query.spaces import language_space
+from langflash_core.language.relevance import CompiledQuery, compile_query, reduce_dictionary
+from langflash_core.language.spaces import language_space
 from langflash_core.types import Scene
 
 from . import generated

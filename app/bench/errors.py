@@ -8,8 +8,8 @@ import torch
 from torch import Tensor
 from torch.nn.functional import interpolate
 
-from langflash_core.query.answers import COVERED_ALPHA
-from langflash_core.query.relevance import relevance_maps
+from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.relevance import relevance_maps
 from langflash_core.splat import render
 from langflash_core.types import Camera
 

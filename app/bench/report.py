@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from langflash_core.query.relevance import CompiledQuery
+from langflash_core.language.relevance import CompiledQuery
 from langflash_core.scene.prune import CUT
 
 from .cases import Case

@@ -9,7 +9,7 @@ from app.gl.programs import Programs, set_uniforms
 from app.gl.renderer import SplatRenderer
 from app.gl.splats import SplatBuffers
 from app.gl.targets import ADDED, LayerTarget, drawing
-from langflash_core.query.relevance import EMPTY_NORM, CompiledQuery
+from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
 from langflash_core.types import Camera, Scene
 
 _UNIFORMS = 960  # vec4s of columns in one program, of the 1,024 that drivers have

@@ -10,7 +10,7 @@ from collections import Counter
 import moderngl
 import numpy as np
 
-from langflash_core.query.relevance import EMPTY_NORM, CompiledQuery
+from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
 
 from .programs import Programs, set_uniforms
 from .targets import ADDED, MAXIMUM, LayerTarget, drawing

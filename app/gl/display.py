@@ -6,7 +6,7 @@ from collections.abc import Callable
 import moderngl
 import numpy as np
 
-from langflash_core.query.answers import COVERED_ALPHA
+from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.types import Camera
 
 from .combine import Screen

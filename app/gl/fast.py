@@ -12,7 +12,7 @@ that is on a scene, `langflash bench` says.
 import moderngl
 import numpy as np
 
-from langflash_core.query.relevance import EMPTY_NORM, CompiledQuery
+from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
 
 from .combine import PHRASES, Screen
 from .programs import Programs, set_uniforms

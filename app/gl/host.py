@@ -10,7 +10,7 @@ combine.py do the same without the maps leaving it.
 import moderngl
 import numpy as np
 
-from langflash_core.query.relevance import EMPTY_NORM, CompiledQuery
+from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
 
 from .combine import PHRASES, QueryPasses
 from .targets import LayerTarget

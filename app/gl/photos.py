@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 from torch import Tensor
 
-from langflash_core.query.answers import COVERED_ALPHA
+from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.scene.consistency import TOLERANCE
 from langflash_core.types import Camera, Scene
 

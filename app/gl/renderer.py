@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import GraphicsError
-from langflash_core.query.relevance import CompiledQuery, finite_atoms
+from langflash_core.language.relevance import CompiledQuery, finite_atoms
 from langflash_core.scene.thin import thin_with_rows
 from langflash_core.splat.projection import ALPHA_MIN, NEAR
 from langflash_core.types import Camera, Frame, Scene

@@ -10,7 +10,7 @@ MOST_RECENT = 20
 PROMPT_DIALOGS = ("save prompts", "load prompts")
 PROMPTS_SUFFIX = ".prompts.json"
 BINS = 50  # of a histogram of scores, over [0, 1]
-_OPERATOR = re.compile(r"\s+[+-]\s+")  # as langflash_core/query/algebra.py, which loads torch
+_OPERATOR = re.compile(r"\s+[+-]\s+")  # as langflash_core/language/algebra.py, which loads torch
 
 
 @dataclass(frozen=True)

@@ -162,7 +162,7 @@ def name_place(request: NamePlace) -> PlaceNamed:
     """The nearest words of F(p) = W D, of the household's and the person's own."""
     import torch
 
-    from langflash_core.query.words import feature_at, nearest_words
+    from langflash_core.language.words import feature_at, nearest_words
 
     scene = _spoken(request)
     weights = np.frombuffer(request.weights, np.float32).copy() if request.weights else weigh(request)
@@ -177,7 +177,7 @@ def name_place(request: NamePlace) -> PlaceNamed:
 
 def name_atoms(request: NameAtoms) -> AtomWords:
     """The nearest household words of every atom."""
-    from langflash_core.query.words import nearest_words
+    from langflash_core.language.words import nearest_words
 
     scene = _spoken(request)
     words, embeddings = _vocabulary(scene.semantics.space, ())
@@ -189,9 +189,9 @@ def _meant(request: FindByPhrase) -> np.ndarray:
     """(N,) bool: Gaussians whose own relevance reaches the threshold."""
     import torch
 
-    from langflash_core.query.relevance import compile_query
-    from langflash_core.query.spaces import language_space
-    from langflash_core.query.words import gaussian_relevance, with_vectors
+    from langflash_core.language.relevance import compile_query
+    from langflash_core.language.spaces import language_space
+    from langflash_core.language.words import gaussian_relevance, with_vectors
 
     scene = _spoken(request)
     space = language_space(scene.semantics.space)
@@ -210,14 +210,14 @@ def _spoken(request):
 
 def household_words() -> tuple[str, ...]:
     """The names of things in a room that the project knows."""
-    from langflash_core.training.vocabulary import OWN
+    from langflash_core.language.vocabulary import OWN
 
     return tuple(OWN)
 
 
 @lru_cache(maxsize=4)
 def _household(space: str):
-    from langflash_core.query.spaces import language_space
+    from langflash_core.language.spaces import language_space
 
     return language_space(space).encode(list(household_words()))
 
@@ -226,8 +226,8 @@ def _vocabulary(space: str, extra: tuple[str, ...]):
     """Words and unit embeddings (A, C): the household's, and the person's own."""
     import torch
 
-    from langflash_core.query.algebra import encode_prompts
-    from langflash_core.query.spaces import language_space
+    from langflash_core.language.algebra import encode_prompts
+    from langflash_core.language.spaces import language_space
 
     known = household_words()
     own = tuple(dict.fromkeys(text for text in extra if text and text not in known))

@@ -43,7 +43,7 @@ def run(request: Request) -> Result:
 
 def bin_scores(request: Answer) -> Histograms:
     """How many covered pixels of a view score how high, by phrase."""
-    from langflash_core.query.answers import COVERED_ALPHA
+    from langflash_core.language.answers import COVERED_ALPHA
 
     covered = request.frame.alphas >= COVERED_ALPHA
     rows = zip(request.keys, request.query.texts, request.relevance, strict=True)

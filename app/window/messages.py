@@ -16,7 +16,7 @@ from langflash_core.edits import Marks
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from langflash_core.query.relevance import CompiledQuery
+    from langflash_core.language.relevance import CompiledQuery
     from langflash_core.types import Camera, Frame, Scene
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from app.gl import SplatRenderer
-    from langflash_core.query.relevance import CompiledQuery
+    from langflash_core.language.relevance import CompiledQuery
     from langflash_core.types import Camera, Frame, Scene
 
 BACKGROUND = (0.055, 0.06, 0.07)  # the theme's canvas

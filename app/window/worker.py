@@ -313,9 +313,9 @@ def _extent(means: np.ndarray):
 
 def compile_prompts(request: Encode) -> Compiled:
     """Text towers and the reduced dictionary; milliseconds once the tower is loaded."""
-    from langflash_core.query.relevance import compile_query
-    from langflash_core.query.spaces import language_space
-    from langflash_core.query.words import with_vectors
+    from langflash_core.language.relevance import compile_query
+    from langflash_core.language.spaces import language_space
+    from langflash_core.language.words import with_vectors
     from langflash_core.scene.edited import spoken_scene
 
     scene = request.scene if request.marks is None else spoken_scene(request.scene, request.marks)
@@ -334,7 +334,7 @@ def _vector(content: bytes):
 
 def score_prompts(request: Answer) -> Scored:
     """Scores of the prompts in the view on show."""
-    from langflash_core.query.answers import answer
+    from langflash_core.language.answers import answer
 
     result = answer(request.relevance, request.frame, request.camera, request.query)
     scores = tuple(
@@ -363,8 +363,6 @@ def _import_heavy() -> None:
     import torch  # noqa: F401
 
     import app.gl
-    import langflash_core.network
-    import langflash_core.query.spaces  # noqa: F401
 
     Image.preinit()  # else the first thumbnail of the window does
     gc.freeze()

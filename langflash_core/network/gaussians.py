@@ -11,9 +11,9 @@ from torch.nn import functional as F
 from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.geometry.quaternions import matrices_to_quats
-from langflash_core.network.depth import DepthMaps, resize
-from langflash_core.network.dpt import DPT
+from langflash_core.network.layers.dpt import DPT
 from langflash_core.network.presets import Preset
+from langflash_core.network.stereo.prior import DepthMaps, resize
 from langflash_core.types import Gaussians
 
 _COVER = 0.6  # standard deviation in pixel spacings: neighbours blend into a closed surface

@@ -8,21 +8,21 @@ import torch
 from torch import Tensor
 
 from langflash_core.geometry.cameras import rays
-from langflash_core.network.aggregation import Aggregation
-from langflash_core.network.alignment import Correction
-from langflash_core.network.decoder import SiameseDecoder, TwoStackDecoder
-from langflash_core.network.depth import DepthHead, DepthMaps
-from langflash_core.network.encoder import Encoder, Tokens, tokens_to_maps
+from langflash_core.network.encoders.local import LocalFeatures
+from langflash_core.network.encoders.shared import Encoder, Tokens, tokens_to_maps
 from langflash_core.network.gaussians import GaussianHead, assemble_gaussians
-from langflash_core.network.grouping import ScratchHead, SemanticGrouping, group_weights, surviving
-from langflash_core.network.language import LanguageHead
-from langflash_core.network.local import LocalFeatures
+from langflash_core.network.layers.decoder import SiameseDecoder, TwoStackDecoder
 from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Run, Seen
-from langflash_core.network.naming import PartNamer, describe, places
-from langflash_core.network.poses import PoseInput, Poses, estimate_poses
 from langflash_core.network.presets import GuidedDepth
-from langflash_core.network.refiner import DepthRefiner
-from langflash_core.network.splitting import split_groups
+from langflash_core.network.semantics.aggregation import Aggregation
+from langflash_core.network.semantics.features import LanguageHead
+from langflash_core.network.semantics.grouping import ScratchHead, SemanticGrouping, group_weights, surviving
+from langflash_core.network.semantics.naming import PartNamer, describe, places
+from langflash_core.network.semantics.splitting import split_groups
+from langflash_core.network.stereo.alignment import Correction
+from langflash_core.network.stereo.poses import PoseInput, Poses, estimate_poses
+from langflash_core.network.stereo.prior import DepthHead, DepthMaps
+from langflash_core.network.stereo.sweep import DepthRefiner
 from langflash_core.types import Views
 
 

@@ -11,10 +11,10 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from langflash_core.errors import Cancelled, WeightsError
-from langflash_core.network.aggregation import Aggregation, averaged_atoms
-from langflash_core.network.encoder import Tokens
-from langflash_core.network.grouping import Groups
+from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.presets import Preset
+from langflash_core.network.semantics.aggregation import Aggregation, averaged_atoms
+from langflash_core.network.semantics.grouping import Groups
 from langflash_core.types import Gaussians, Prediction, Views
 
 Progress = Callable[[str, float], None]

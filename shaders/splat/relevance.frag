@@ -1,6 +1,6 @@
 #version 330 core
 // Purpose: cosine of the pixel's feature with up to four phrases, or their relevancy against the best negative.
-// Source: Kerr et al. 2023 (LERF); twin langflash_core/query/relevance.py. The smallest pairwise softmax is
+// Source: Kerr et al. 2023 (LERF); twin langflash_core/language/relevance.py. The smallest pairwise softmax is
 //         the sigmoid against the largest negative.
 
 #include "combine.glsl"

@@ -1,7 +1,7 @@
 #version 330 core
 // Purpose: what every phrase is compared with at a pixel: 1 / |w R|, 0 where F is empty, and the largest cosine of
 //          the negatives; MAX blending goes over groups of COLUMNS.
-// Source: twin langflash_core/query/relevance.py. EMPTY_NORM is set by the program.
+// Source: twin langflash_core/language/relevance.py. EMPTY_NORM is set by the program.
 
 #include "combine.glsl"
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from langflash_core.network.alignment import (
+from langflash_core.network.stereo.alignment import (
     _PRIOR_ERROR,
     _PRIOR_SIGMAS,
     INDEPENDENT,

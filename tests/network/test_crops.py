@@ -2,7 +2,7 @@
 
 import torch
 
-from langflash_core.network.crops import SIDE, crop_atoms, group_box
+from langflash_core.network.semantics.crops import SIDE, crop_atoms, group_box
 
 
 def test_a_box_holds_its_group_with_a_margin_and_stays_square():

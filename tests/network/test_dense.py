@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from langflash_core.network.dense import match_cells
+from langflash_core.network.stereo.dense import match_cells
 
 
 def _random_map(height: int, width: int, seed: int) -> np.ndarray:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from langflash_core.errors import DownloadError
-from langflash_core.network.download import download
+from langflash_core.network.checkpoints.download import download
 
 CONTENT = bytes(range(256)) * 12_000  # three blocks
 

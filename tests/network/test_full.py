@@ -8,12 +8,12 @@ import torch
 
 from langflash_core.geometry.cameras import invert_rigid, rays
 from langflash_core.network import FULL, PointMapNet, build_network
-from langflash_core.network.grouping import Groups
-from langflash_core.network.point_heads import exponential_points
+from langflash_core.network.points.heads import exponential_points
+from langflash_core.network.points.resection import depths_and_confidences, resect
 from langflash_core.network.precision import has_bfloat16
 from langflash_core.network.presets import MaskFilter
-from langflash_core.network.resection import depths_and_confidences, resect
-from langflash_core.network.residual import filtered
+from langflash_core.network.semantics.grouping import Groups
+from langflash_core.network.semantics.residual import filtered
 from langflash_core.types import Views
 from tests.network.sizes import TINY, large
 

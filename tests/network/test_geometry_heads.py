@@ -9,9 +9,9 @@ from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import invert_rigid, rays
 from langflash_core.geometry.quaternions import covariances, quats_to_matrices
-from langflash_core.network.depth import DepthMaps
 from langflash_core.network.gaussians import CHANNELS, assemble_gaussians, footprints
-from langflash_core.network.refiner import Compared, patches, sweep_correlation
+from langflash_core.network.stereo.prior import DepthMaps
+from langflash_core.network.stereo.sweep import Compared, patches, sweep_correlation
 
 K = torch.tensor([[40.0, 0, 16], [0, 40.0, 12], [0, 0, 1]], dtype=torch.float64)
 
@@ -99,7 +99,7 @@ def test_patches_are_what_cross_correlation_compares():
 
 
 def test_refiner_stays_in_its_range_and_is_finite(untrained):
-    from langflash_core.network.encoder import Tokens
+    from langflash_core.network.encoders.shared import Tokens
 
     torch.manual_seed(0)
     images = torch.rand(1, 2, 3, 56, 70)

@@ -10,8 +10,14 @@ from safetensors.torch import save_file
 
 from langflash_core.errors import WeightsError
 from langflash_core.network import PointMapNet, build_network, save_network
-from langflash_core.network.importing import convert, read_checkpoint
-from langflash_core.network.store import assemble_network, install, installed, part_folder, verify_part
+from langflash_core.network.checkpoints.importing import convert, read_checkpoint
+from langflash_core.network.checkpoints.store import (
+    assemble_network,
+    install,
+    installed,
+    part_folder,
+    verify_part,
+)
 from langflash_core.types import Views
 from tests.network import published
 from tests.network.sizes import TINY

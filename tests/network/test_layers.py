@@ -6,13 +6,13 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from langflash_core.network.aggregation import Aggregation, average_atoms
-from langflash_core.network.attention import Attention, rope_2d, rotate
-from langflash_core.network.decoder import TwoStackDecoder, normalised_intrinsics
-from langflash_core.network.dpt import DPT
-from langflash_core.network.encoder import Tokens
-from langflash_core.network.grouping import Groups, SemanticGrouping, group_weights, surviving
+from langflash_core.network.encoders.shared import Tokens
+from langflash_core.network.layers.attention import Attention, rope_2d, rotate
+from langflash_core.network.layers.decoder import TwoStackDecoder, normalised_intrinsics
+from langflash_core.network.layers.dpt import DPT
 from langflash_core.network.presets import MINI
+from langflash_core.network.semantics.aggregation import Aggregation, average_atoms
+from langflash_core.network.semantics.grouping import Groups, SemanticGrouping, group_weights, surviving
 
 GRID = (3, 4)
 

@@ -4,9 +4,9 @@ import torch
 from torch import Tensor
 
 from langflash_core.geometry.cameras import rays
-from langflash_core.network.grouping import Groups
-from langflash_core.network.lifting import lifted_weights
 from langflash_core.network.model import Geometry
+from langflash_core.network.semantics.grouping import Groups
+from langflash_core.network.semantics.lifting import lifted_weights
 from langflash_core.types import Gaussians
 
 SIZE = 96

@@ -7,7 +7,7 @@ from safetensors.torch import save_file
 
 from langflash_core.errors import Cancelled, WeightsError
 from langflash_core.network import MINI, GuidedDepthNet, initial_network, load_network, save_network
-from langflash_core.network.checkpoints import dequantise, quantise, start_from
+from langflash_core.network.checkpoints.files import dequantise, quantise, start_from
 from langflash_core.types import Prediction, Views
 
 

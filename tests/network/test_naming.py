@@ -9,8 +9,8 @@ from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import unproject
 from langflash_core.network import MINI
-from langflash_core.network.encoder import Tokens
-from langflash_core.network.naming import PLACE, PartNamer, describe, places, upright
+from langflash_core.network.encoders.shared import Tokens
+from langflash_core.network.semantics.naming import PLACE, PartNamer, describe, places, upright
 
 SIDE = 64
 KS = torch.tensor([[60.0, 0, SIDE / 2], [0, 60.0, SIDE / 2], [0, 0, 1]])[None]

@@ -8,8 +8,8 @@ from torch import Tensor
 
 from langflash_core.geometry.quaternions import covariances
 from langflash_core.network import PointMapNet, build_network
-from langflash_core.network.importing import convert
-from langflash_core.network.point_heads import activated
+from langflash_core.network.checkpoints.importing import convert
+from langflash_core.network.points.heads import activated
 from langflash_core.network.presets import PointMaps
 from tests.network import published
 from tests.network.sizes import TINY, large

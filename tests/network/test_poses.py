@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from langflash_core.network import matching
-from langflash_core.network.matching import (
+from langflash_core.network.stereo import matching
+from langflash_core.network.stereo.matching import (
     Matches,
     RelativePose,
     match_descriptors,
@@ -14,7 +14,7 @@ from langflash_core.network.matching import (
     refine_pose,
     relative_pose,
 )
-from langflash_core.network.poses import _chain
+from langflash_core.network.stereo.poses import _chain
 
 SIGMA = 1 / 600  # one pixel at a focal length of 600
 

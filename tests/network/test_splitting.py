@@ -7,7 +7,7 @@ import torch
 from torch.nn import functional as F
 
 from langflash_core.network.presets import Splitting
-from langflash_core.network.splitting import cluster, split_groups
+from langflash_core.network.semantics.splitting import cluster, split_groups
 
 RULE = Splitting()
 SIZE = (64, 128)

@@ -5,7 +5,7 @@ import torch
 
 from langflash_core.errors import PromptError
 from langflash_core.geometry.cameras import project, transform
-from langflash_core.query.spaces import language_space
+from langflash_core.language.spaces import language_space
 from langflash_core.scene import bare_scene, describe, load, save
 from langflash_core.scene.checks import check_scene
 from langflash_core.types import Gaussians

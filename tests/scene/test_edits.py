@@ -23,8 +23,8 @@ from langflash_core.edits import (
     toggle_atom,
 )
 from langflash_core.errors import SceneFileError
-from langflash_core.query.relevance import compile_query, relevance_maps
-from langflash_core.query.spaces import LanguageSpace
+from langflash_core.language.relevance import compile_query, relevance_maps
+from langflash_core.language.spaces import LanguageSpace
 from langflash_core.scene import load, save
 from langflash_core.scene.edited import NAMES, edited_scene, first_marks, spoken_scene
 from langflash_core.scene.edits_file import load_history, read_about, save_history, scene_digest

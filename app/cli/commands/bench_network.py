@@ -24,7 +24,7 @@ def run(args: Namespace, out: TextIO) -> None:
         check_output_file(args.output, (".json",))
     import torch
 
-    from langflash_core.evaluation.speed import Plan, measure_network, speed_table
+    from langflash_core.lab.evaluation.speed import Plan, measure_network, speed_table
     from langflash_core.network import PRESETS
     from langflash_core.pipeline import peak_memory_mb
 
@@ -70,7 +70,7 @@ def _network(args: Namespace, device: str):
     import torch
 
     from langflash_core.network import PRESETS, build_network, load_network
-    from langflash_core.network.store import channels_last
+    from langflash_core.network.checkpoints.store import channels_last
 
     if not args.random:
         try:

@@ -11,9 +11,9 @@ from app.cli.files import check_output_file, readable_file
 from app.cli.renderers import open_renderer
 from app.cli.report import write_json
 from langflash_core.errors import ImageError, InputError, WeightsError
-from langflash_core.evaluation.rooms import calibrate, run_eval
-from langflash_core.evaluation.tables import markdown
 from langflash_core.files import make_folder, write_atomically
+from langflash_core.lab.evaluation.rooms import calibrate, run_eval
+from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.network import load_network
 
 

@@ -12,9 +12,9 @@ from app.cli.files import readable_file
 from app.cli.report import ProgressBar, write_json
 from langflash_core.errors import WeightsError
 from langflash_core.network import PRESETS, load_network
-from langflash_core.network.catalogue import CATALOGUE, CLIP, OTHERS, SAM2, published
-from langflash_core.network.download import download
-from langflash_core.network.store import FORMAT, install, part_folder, read_part, verify_part
+from langflash_core.network.checkpoints.catalogue import CATALOGUE, CLIP, OTHERS, SAM2, published
+from langflash_core.network.checkpoints.download import download
+from langflash_core.network.checkpoints.store import FORMAT, install, part_folder, read_part, verify_part
 from langflash_core.resources import asset_path, weights_folder
 
 
@@ -69,7 +69,7 @@ def _import(args: Namespace, out: TextIO) -> None:
 def _get(args: Namespace, out: TextIO) -> None:
     entry = published(args.name)
     if entry is CLIP:
-        from langflash_core.query.clip import fetch_clip
+        from langflash_core.language.clip import fetch_clip
 
         _say_file(args, out, fetch_clip())
         return

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from app.cli import main
-from langflash_core.query.spaces import language_space
+from langflash_core.language.spaces import language_space
 from langflash_core.scene import save
 from langflash_core.types import Gaussians, Scene, Semantics
 

@@ -14,7 +14,7 @@ from PIL import Image
 from app.cli.commands.export import SCENES, SUFFIXES
 from app.window.drops import SCENE_SUFFIXES
 from langflash_core.export import READERS, WRITERS, export, read
-from langflash_core.query.spaces import language_space
+from langflash_core.language.spaces import language_space
 from langflash_core.types import Scene
 from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, stripes
 from tests.export.splats import damaged_files

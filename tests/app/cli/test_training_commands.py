@@ -7,7 +7,7 @@ from PIL import Image
 
 from app.cli.parser import build_parser
 from langflash_core.network import MINI, GuidedDepthNet, save_network
-from tests.rooms.conftest import TINY_PACK
+from tests.lab.rooms.conftest import TINY_PACK
 
 
 @pytest.fixture(scope="module")

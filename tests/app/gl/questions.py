@@ -5,7 +5,7 @@ import math
 import torch
 from torch.nn.functional import normalize
 
-from langflash_core.query.relevance import CompiledQuery, reduce_dictionary
+from langflash_core.language.relevance import CompiledQuery, reduce_dictionary
 from langflash_core.types import Scene
 
 

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from app.gl import SplatRenderer
-from langflash_core.query.relevance import relevance_maps
+from langflash_core.language.relevance import relevance_maps
 from langflash_core.splat import render
 from tests.app.gl.questions import full_relevance, psnr, question
 from tests.splat.scenes import camera, cloud, maps_of, scene_of, splats, turned

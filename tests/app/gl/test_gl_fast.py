@@ -7,7 +7,7 @@ import torch
 
 from app.gl import SplatRenderer
 from app.gl.fast import MAX_PHRASES
-from langflash_core.query.relevance import EMPTY_NORM, CompiledQuery
+from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
 from langflash_core.splat import render
 from langflash_core.types import Camera, Scene, Semantics
 from tests.app.gl.questions import full_relevance, question

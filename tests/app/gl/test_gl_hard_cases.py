@@ -23,7 +23,7 @@ import torch
 from app.gl import SplatRenderer, offscreen_context
 from langflash_core.errors import GraphicsError
 from langflash_core.geometry.harmonics import SH_C0
-from langflash_core.query.relevance import EMPTY_NORM, CompiledQuery
+from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
 from langflash_core.splat import render, view_depths
 from langflash_core.types import Camera, Frame, Gaussians, Scene, Semantics
 from tests.app.gl.questions import full_relevance, question

@@ -291,7 +291,7 @@ def run(
     seconds: float, seed: int, size: tuple[int, int], every: float = 60.0, say=lambda text: None
 ) -> Outcome:
     """Random input for some seconds, a checkpoint `every` so many."""
-    from langflash_core.query.spaces import language_space
+    from langflash_core.language.spaces import language_space
     from langflash_core.scene import save
     from tests.app.window.scenes import PHRASES, room
 

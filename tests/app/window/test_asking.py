@@ -19,9 +19,9 @@ from app.window.prompt_sets import MOST_PROMPTS, PromptSet, read_prompts, write_
 from app.window.state import PALETTE, Mode, Prompt, State
 from app.window.worker import Worker, describe_scene
 from langflash_core.errors import OutputError, PromptError
-from langflash_core.query.algebra import terms
-from langflash_core.query.relevance import compile_query, relevance_maps
-from langflash_core.query.spaces import language_space
+from langflash_core.language.algebra import terms
+from langflash_core.language.relevance import compile_query, relevance_maps
+from langflash_core.language.spaces import language_space
 from langflash_core.splat import render
 from tests.app.window.scenes import CHAIR, PHRASES, room
 from tests.app.window.test_commands import after

@@ -21,7 +21,7 @@ from app.window.poses import Pose
 from app.window.state import SceneInfo, State
 from app.window.worker import describe_scene
 from langflash_core.edits import Mask
-from langflash_core.query.spaces import language_space
+from langflash_core.language.spaces import language_space
 from langflash_core.scene.edited import edited_scene
 from tests.app.window.scenes import PHRASES, room
 

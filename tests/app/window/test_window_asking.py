@@ -8,7 +8,7 @@ import pytest
 
 from app.window.panels.modes import KEYED
 from app.window.state import Mode
-from langflash_core.query.spaces import language_space
+from langflash_core.language.spaces import language_space
 from langflash_core.scene import save
 from tests.app.window import test_window
 from tests.app.window.scenes import PHRASES, room

@@ -9,9 +9,9 @@ from PIL import Image
 from app.window import messages
 from app.window.state import NEGATIVES
 from app.window.worker import Worker
-from langflash_core.query.answers import answer
-from langflash_core.query.relevance import relevance_maps
-from langflash_core.query.spaces import language_space
+from langflash_core.language.answers import answer
+from langflash_core.language.relevance import relevance_maps
+from langflash_core.language.spaces import language_space
 from langflash_core.resources import asset_path
 from langflash_core.scene import load, save
 from langflash_core.splat import render

@@ -1,0 +1,1 @@
+"""The lab: what makes the weights and judges them. The product never imports it."""

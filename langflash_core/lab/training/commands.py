@@ -1,0 +1,301 @@
+"""`langflash train ...`: cache rooms, train stages, export weights. Plain functions; the command
+line only parses arguments. Text embeddings come in as a function, because training does not
+import the query stage."""
+
+import json
+import logging
+import time
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from langflash_core.errors import InputError
+from langflash_core.lab.rooms import HELD_OUT_LIBRARIES, VALIDATION_LIBRARIES, RoomRenderer, load_pack
+from langflash_core.lab.training.batches import RoomSet
+from langflash_core.lab.training.cache import (
+    HELD_OUT_SEED,
+    VALIDATION_SEED,
+    CachePlan,
+    fill_cache,
+    rooms_renderer,
+)
+from langflash_core.lab.training.loop import LoopOptions, load_averaged, train_stage
+from langflash_core.lab.training.naming import NAMING
+from langflash_core.lab.training.parts import PartSet, run_parts
+from langflash_core.lab.training.stages import STAGES, Words, guided
+from langflash_core.lab.training.validation import MEASURES, Validator
+from langflash_core.lab.training.words import PhraseSampler, PhraseTable, build_table
+from langflash_core.network.checkpoints.files import adopt_frozen, initial_network, save_network, start_from
+from langflash_core.network.model import LangFlashNet
+from langflash_core.network.presets import PRESETS
+
+log = logging.getLogger(__name__)
+
+ALL_STAGES = {**STAGES, NAMING.name: NAMING}
+
+Encode = Callable[[Sequence[str]], Tensor]
+SETS = ("train", "validation", "held_out")
+VALIDATION_SCENES = 48
+"""Judged while training, every few minutes; more would cost more time than they tell."""
+
+
+def cache_plan(kind: str, scenes: int, first_seed: int | None = None) -> CachePlan:
+    """The plan of one set: train (tokens, augmented), validation (tokens; furniture that rules drew
+    from other seeds), held_out (pictures only; models by people whose library no training sees).
+
+    Raises:
+        InputError: there is no such set.
+    """
+    if kind == "train":
+        return CachePlan(first_seed or 0, scenes)
+    if kind == "validation":
+        return CachePlan(
+            first_seed or VALIDATION_SEED,
+            scenes,
+            libraries=VALIDATION_LIBRARIES,
+            augment=False,
+            three_view_every=1,
+        )
+    if kind == "held_out":
+        return CachePlan(
+            first_seed or HELD_OUT_SEED,
+            scenes,
+            libraries=HELD_OUT_LIBRARIES,
+            with_tokens=False,
+            augment=False,
+            three_view_every=1,
+        )
+    raise InputError(f"there is no set '{kind}'; choose one of {', '.join(SETS)}")
+
+
+def run_cache(
+    out: Path,
+    pack: Path,
+    start: Path,
+    *,
+    kind: str = "train",
+    scenes: int = 4096,
+    first_seed: int | None = None,
+    part: tuple[int, int] = (0, 1),
+    preset: str = "mini",
+) -> int:
+    """Render and encode one set into `out/<kind>`; returns the number of scenes written.
+
+    Single-threaded: run one process per core with `part` (i, n). Interrupted runs continue.
+
+    Args:
+        pack: furniture (`langflash rooms pack`).
+        start: weights file of the preset, whose encoder is used.
+    """
+    torch.set_num_threads(1)
+    plan = cache_plan(kind, scenes, first_seed)
+    encoder = guided(initial_network(PRESETS[preset], start)).encoder if plan.with_tokens else None
+    furniture = load_pack(pack)
+    began = time.perf_counter()
+    with RoomRenderer(furniture) as renderer:
+        render = rooms_renderer(furniture, renderer, plan.libraries)
+        written = fill_cache(out / kind, plan, render, encoder, part)
+    log.info("%d scenes in %.0f s", written, time.perf_counter() - began)
+    return written
+
+
+def run_train(
+    stages: Sequence[str],
+    folder: Path,
+    run_dir: Path,
+    start: Path,
+    encode: Encode,
+    minutes: Sequence[float],
+    *,
+    preset: str = "mini",
+    options: LoopOptions | None = None,
+    from_scratch: bool = False,
+) -> LangFlashNet:
+    """Train stages one after the other, each for its minutes, on the cached sets in `folder`.
+
+    Earlier stages are read from `run_dir`; a stage found there continues unless
+    `options.resume` is False. Returns the network with every stage trained so far.
+
+    Args:
+        start: weights file of the preset. Its frozen parts are used, and stages without a run of
+            their own begin with its heads, as far as these still fit the network.
+        from_scratch: draw the heads anew instead.
+
+    Raises:
+        InputError: an unknown stage, a stage whose needs have not been trained, or no cache.
+    """
+    if len(stages) != len(minutes):
+        raise InputError(
+            f"{len(stages)} stages need as many minutes, received {len(minutes)}; give one number per stage"
+        )
+    for name in stages:
+        if name not in ALL_STAGES:
+            raise InputError(f"there is no stage '{name}'; choose among {', '.join(ALL_STAGES)}")
+    options = options or LoopOptions(minutes=0)
+    rooms = _open(folder / "train")
+    table = phrase_table(folder, encode)
+    network = initial_network(PRESETS[preset], start, options.seed)
+    done = _load_trained(network, run_dir)
+    if not from_scratch:
+        done |= dict.fromkeys(_begin(network, start, ALL_STAGES.keys() - done.keys()), 0)
+    for name, budget in zip(stages, minutes, strict=True):
+        stage = ALL_STAGES[name]
+        missing = [need for need in stage.needs if need not in done]
+        if missing:
+            raise InputError(
+                f"stage '{name}' reads {', '.join(missing)}; train that first with the same run folder"
+            )
+        seed = options.seed + 1000 * list(ALL_STAGES).index(name) + done.get(name, 0)
+        words = Words(PhraseSampler(table), torch.Generator().manual_seed(seed))
+        own = LoopOptions(**{**options.__dict__, "minutes": budget})
+        learned: RoomSet | PartSet = rooms
+        if stage is NAMING:
+            learned = _parts(folder / "train")
+            if name not in done:
+                namer = guided(network).namer
+                namer.mean, namer.std = learned.statistics()
+        check = _validator(name, folder, table, own)
+        state = train_stage(network, stage, learned, words, run_dir, own, check)
+        done[name] = state.step
+    return network.eval()
+
+
+def _open(folder: Path, limit: int | None = None) -> RoomSet:
+    try:
+        return RoomSet(folder, limit=limit)
+    except ValueError as error:
+        raise InputError(str(error)) from None
+
+
+def _validator(name: str, folder: Path, table: PhraseTable, options: LoopOptions) -> Validator | None:
+    if not (folder / "validation").is_dir():
+        return None
+    measure, views = MEASURES[name]
+    words = Words(PhraseSampler(table), torch.Generator().manual_seed(1))
+    judged = (
+        _parts(folder / "validation")
+        if name == NAMING.name
+        else _open(folder / "validation", VALIDATION_SCENES)
+    )
+    return Validator(judged, words, measure, views, options.device)
+
+
+def _parts(rooms: Path) -> PartSet:
+    try:
+        return PartSet(rooms / "parts")
+    except ValueError as error:
+        raise InputError(str(error)) from None
+
+
+def run_find_parts(
+    folder: Path,
+    start: Path,
+    run_dir: Path | None = None,
+    *,
+    part: tuple[int, int] = (0, 1),
+    preset: str = "mini",
+) -> int:
+    """Find the parts of every cached training and validation room, for the stage `naming`; how many.
+
+    They lie in `parts` beside the shards. Single-threaded, resumable and divisible as `run_cache`;
+    files of an earlier network have to be taken away first.
+
+    Args:
+        start: weights file. run_dir: stages trained there replace its heads.
+
+    Raises:
+        InputError: no cache.
+    """
+    torch.set_num_threads(1)
+    network = initial_network(PRESETS[preset], start)
+    done = _load_trained(network, run_dir) if run_dir is not None else {}
+    _begin(network, start, ALL_STAGES.keys() - done.keys())
+    count = 0
+    for name in ("validation", "train"):
+        if name == "train" or (folder / name).is_dir():
+            rooms = _open(folder / name).folder
+            count += run_parts(guided(network.eval()), rooms, rooms / "parts", part)
+    return count
+
+
+def phrase_table(folder: Path, encode: Encode) -> PhraseTable:
+    """Every phrase of the training and validation rooms; embedded once, kept beside the shards."""
+    labels = _open(folder / "train").labels()
+    extra = _open(folder / "validation").labels() if (folder / "validation").is_dir() else []
+    path = folder / "phrases.pt"
+    known: dict[str, Tensor] = {}
+    if path.exists():
+        saved = torch.load(path, weights_only=True)
+        known = dict(zip(saved["phrases"], saved["embeddings"], strict=True))
+
+    def remembered(phrases: Sequence[str]) -> Tensor:
+        fresh = [phrase for phrase in phrases if phrase not in known]
+        if fresh:
+            known.update(zip(fresh, encode(fresh), strict=True))
+        return torch.stack([known[phrase] for phrase in phrases])
+
+    table = build_table([*labels, *extra], remembered)
+    temporary = path.with_suffix(f".{time.time_ns()}.part")
+    torch.save({"phrases": list(table.phrases), "embeddings": table.embeddings}, temporary)
+    temporary.replace(path)
+    return table
+
+
+def _load_trained(network: LangFlashNet, run_dir: Path) -> dict[str, int]:
+    found = {name: load_averaged(network, run_dir, name) for name in ALL_STAGES}
+    return {name: counts[0] for name, counts in found.items() if counts is not None}
+
+
+def _begin(network: LangFlashNet, start: Path, names: Iterable[str]) -> list[str]:
+    """The stages among `names` whose modules could be filled from `start`."""
+    return [name for name in names if start_from(network, start, ALL_STAGES[name].modules)]
+
+
+def run_adopt(encoder: Path, local: Path, out: Path, *, preset: str = "mini") -> Path:
+    """Make a file to start from out of published weights of the frozen parts (see NOTICE)."""
+    adopt_frozen(PRESETS[preset], encoder, local, out)
+    return out
+
+
+def run_export(
+    run_dir: Path, out: Path, start: Path, *, preset: str = "mini", metadata: dict | None = None
+) -> Path:
+    """Join the averaged weights of every stage in `run_dir` into one weights file; stages that
+    were not trained there keep the heads of `start`.
+
+    The header says how long each stage trained, its last validation, and `metadata` (data,
+    metrics, calibration: `calibration` is what queries read).
+
+    Raises:
+        InputError: no stage has been trained.
+    """
+    network = initial_network(PRESETS[preset], start)
+    trained = {name: load_averaged(network, run_dir, name) for name in ALL_STAGES}
+    _begin(network, start, [name for name, counts in trained.items() if counts is None])
+    report = {
+        name: {
+            "steps": counts[0],
+            "hours": round(counts[1] / 3600, 3),
+            "validation": last_validation(run_dir, name),
+        }
+        for name, counts in trained.items()
+        if counts is not None
+    }
+    if not report:
+        raise InputError(f"{run_dir} holds no trained stage; run `langflash train run` first")
+    details = dict(metadata or {})
+    network.calibration = details.pop("calibration", {})
+    save_network(network, out, {"training": report, **details})
+    return out
+
+
+def last_validation(run_dir: Path, stage: str) -> dict:
+    """The newest validation row of a stage's log; {} if it has none."""
+    path = run_dir / f"{stage}.jsonl"
+    if not path.exists():
+        return {}
+    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
+    kept = [row for row in rows if row["kind"] == "validation"]
+    return {k: v for k, v in kept[-1].items() if k not in ("stage", "kind")} if kept else {}

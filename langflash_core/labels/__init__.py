@@ -1,1 +1,0 @@
-"""Where things end in a photo, by models that this project neither ships nor trains."""

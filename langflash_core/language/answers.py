@@ -1,0 +1,148 @@
+"""From relevance to an answer: is it there, which pixels, where in space, how large.
+
+A phrase is present where its best pixels pass the threshold, not where it is least bad.
+"""
+
+import math
+
+import torch
+from torch import Tensor
+
+from langflash_core.errors import PromptError
+from langflash_core.geometry.cameras import invert_rigid, transform, unproject
+from langflash_core.language.relevance import CompiledQuery
+from langflash_core.types import Camera, Frame, PromptAnswer, QueryResult
+
+COVERED_ALPHA = 0.5  # a pixel shows the scene, rather than the background, from here on
+TOP_FRACTION = 0.001  # of the covered pixels: their mean is the score, so no stray pixel decides
+MIN_AREA = 0.0005  # of all pixels: a smaller mask is noise (154 pixels at 640 x 480)
+BOX_QUANTILES = (0.02, 0.98)  # of the mask's points along each axis: drops edges that bleed in depth
+_PRINCIPAL_GAIN = 0.9  # of the world-axes box's volume, which the principal one must stay below
+_FEW_POINTS = 3  # fewer have no principal axes
+
+
+def answer(
+    relevance: Tensor,
+    frame: Frame,
+    camera: Camera,
+    compiled: CompiledQuery,
+    threshold: float | None = None,
+) -> QueryResult:
+    """Answer P prompts in one view.
+
+    score = mean of the highest 0.1 % of the covered pixels (alpha >= 0.5), at least one;
+    mask = relevance >= threshold at covered pixels; found = score >= threshold and the mask
+    covers at least 0.05 % of the image. The mask of a phrase that is not found is empty.
+
+    Args:
+        relevance: (P, H, W) of `relevance_maps`.
+        frame: rendered by `camera`; alphas and depths are used.
+        threshold: instead of the compiled one; in [0, 1] for relevancy, [-1, 1] for cosine.
+
+    Raises:
+        ValueError: sizes disagree. PromptError: the threshold is out of range.
+    """
+    expected = (len(compiled.texts), *frame.alphas.shape)
+    if tuple(relevance.shape) != expected:
+        raise ValueError(f"relevance: expected {expected}, received {tuple(relevance.shape)}")
+    limit = compiled.threshold if threshold is None else _checked(threshold, compiled.mode)
+    # Without atoms nothing can be there, whatever the threshold.
+    covered = (frame.alphas >= COVERED_ALPHA) & (compiled.factor.shape[0] > 0)  # (H, W)
+    scores = presence_scores(relevance, covered)
+    masks = (relevance >= limit) & covered
+    found = (scores >= limit) & (masks.flatten(1).float().mean(1) >= MIN_AREA)
+    masks = masks & found[:, None, None]
+    points = world_points(frame.depths, camera)  # (H, W, 3)
+    answers = tuple(
+        _one(text, float(score), limit, mask, points[mask], values[mask])
+        for text, score, mask, values in zip(compiled.texts, scores, masks, relevance, strict=True)
+    )
+    return QueryResult(answers, compiled.mode, relevance, masks, frame, camera)
+
+
+def presence_scores(relevance: Tensor, covered: Tensor) -> Tensor:
+    """Scores (P,) of maps (P, H, W): mean of the highest 0.1 % where `covered` (H, W); 0 if nowhere."""
+    inside = relevance[:, covered]  # (P, n)
+    count = inside.shape[1]
+    if count == 0:
+        return relevance.new_zeros(relevance.shape[0])
+    return inside.topk(math.ceil(TOP_FRACTION * count), dim=1).values.mean(1)
+
+
+def world_points(depths: Tensor, camera: Camera) -> Tensor:
+    """World points (H, W, 3) of z-depths (H, W) seen by `camera`."""
+    Ks, viewmat = camera.K.to(depths), camera.viewmat.to(depths)
+    return transform(invert_rigid(viewmat), unproject(depths, Ks).flatten(0, 1)).unflatten(0, depths.shape)
+
+
+def weighted_centroid(points: Tensor, weights: Tensor) -> Tensor:
+    """Mean (3,) of points (n, 3) with weights (n,) >= 0; plain mean where all weights are 0."""
+    total = weights.sum()
+    shares = weights / total if total > 0 else torch.full_like(weights, 1 / len(weights))
+    return shares @ points
+
+
+def oriented_box(points: Tensor) -> dict:
+    """Oriented box of points (n, 3), n >= 1, extents from the 2nd to 98th percentile.
+
+    Gravity is not known. Two sets of axes are tried, the world's (those of view 0, upright
+    where that photo was) and the principal ones of the visible surface. The principal ones win
+    where they save a tenth of the volume; round and square things have none worth the name.
+
+    Returns:
+        {"center": [3], "axes": [3][3] unit rows, right-handed, "size": [3] along them},
+        scene units.
+    """
+    exact = points.double().cpu()
+    candidates = [torch.eye(3, dtype=torch.float64)]
+    if len(exact) >= _FEW_POINTS:
+        candidates.append(principal_axes(exact))
+    boxes = [_extents(exact, axes) for axes in candidates]
+    sizes = torch.stack([high - low for low, high in boxes])  # (1 or 2, 3)
+    # A flat thing has no volume: every side gets a hundredth of the longest one's thickness.
+    volumes = (sizes + 0.01 * sizes.amax(1, keepdim=True)).prod(1)
+    best = 1 if len(volumes) > 1 and volumes[1] < _PRINCIPAL_GAIN * volumes[0] else 0
+    low, high = boxes[best]
+    center = ((low + high) / 2) @ candidates[best]
+    return {"center": center.tolist(), "axes": candidates[best].tolist(), "size": sizes[best].tolist()}
+
+
+def _extents(points: Tensor, axes: Tensor) -> tuple[Tensor, Tensor]:
+    """Low and high (3,) of points (n, 3) along the rows of `axes`."""
+    low, high = (points @ axes.T).quantile(torch.tensor(BOX_QUANTILES, dtype=points.dtype), dim=0)
+    return low, high
+
+
+def principal_axes(points: Tensor) -> Tensor:
+    """Rows (3, 3): orthonormal principal axes of points (n, 3), longest first, determinant 1.
+
+    The 4 % farthest from the median point are left out: squares let a few outliers turn axes.
+    The largest component of the first two axes is positive, so that they do not flip by chance.
+    """
+    distances = (points - points.median(dim=0).values).norm(dim=-1)
+    kept = points[distances <= distances.quantile(BOX_QUANTILES[1] - BOX_QUANTILES[0])]
+    offsets = kept - kept.mean(dim=0)
+    vectors = torch.linalg.eigh(offsets.T @ offsets).eigenvectors.T.flip(0)  # rows, longest first
+    first, second = (axis * axis[axis.abs().argmax()].sign() for axis in vectors[:2])
+    return torch.stack((first, second, torch.linalg.cross(first, second)))
+
+
+def _one(text: str, score: float, limit: float, mask: Tensor, points: Tensor, values: Tensor) -> PromptAnswer:
+    """The answer to one phrase from its final mask (H, W) and its points (n, 3), values (n,)."""
+    if len(points) == 0:
+        return PromptAnswer(text, False, score, limit, 0.0, None, None)
+    x, y, z = weighted_centroid(points, values.clamp_min(0)).tolist()
+    area = float(mask.float().mean())
+    return PromptAnswer(text, True, score, limit, area, (x, y, z), oriented_box(_thinned(points)))
+
+
+def _thinned(points: Tensor, most: int = 20_000) -> Tensor:
+    """Every n-th point, at most about `most`: percentiles need no more."""
+    return points[:: max(1, len(points) // most)]
+
+
+def _checked(threshold: float, mode: str) -> float:
+    low = 0.0 if mode == "relevancy" else -1.0
+    if not low <= threshold <= 1.0:
+        raise PromptError(f"the threshold {threshold} is out of range; {mode} needs {low:g} to 1")
+    return float(threshold)

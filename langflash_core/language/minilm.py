@@ -1,0 +1,196 @@
+"""MiniLM-L6-v2: the embedded text tower. Phrases in, 384 unit numbers out, nothing downloaded.
+
+A BERT encoder in torch's own post-norm transformer layers. Its file keeps the big matrices as
+int8 rows with one float16 scale per row; the word table stays int8 in memory (12 MB) and is
+scaled after lookup. It is a text model: images reach its space only through a network that was
+trained to land there.
+
+Source: Reimers and Gurevych 2019 (Sentence-BERT); Wang et al. 2020 (MiniLM); weights and their
+checks in assets/licences/minilm_l6_v2.md. Twin: `bert_twin`, tests/language/reference.py (NumPy, float64).
+"""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load_file
+from tokenizers import Tokenizer
+from torch import Tensor, nn
+from torch.nn.functional import normalize
+
+from langflash_core.errors import PromptError, WeightsError
+from langflash_core.resources import asset_path
+
+DIMENSION = 384
+MAX_TOKENS = 256  # the model's declared maximum; longer phrases are cut
+_LAYERS, _HEADS, _HIDDEN_MLP, _NORM_EPS = 6, 12, 1536, 1e-12
+_BATCH = 64  # phrases per pass: bounds the attention memory of a long list
+_SPECIAL_TOKENS = 2  # [CLS] and [SEP]
+
+
+class RowInt8Table(nn.Module):
+    """An embedding table kept as int8 rows and one scale per row."""
+
+    rows: Tensor
+    scales: Tensor
+
+    def __init__(self, rows: Tensor, scales: Tensor) -> None:
+        super().__init__()
+        self.register_buffer("rows", rows)  # (T, C) int8
+        self.register_buffer("scales", scales.float())  # (T,)
+
+    def forward(self, ids: Tensor) -> Tensor:
+        """Float rows (..., C) of int64 ids (...)."""
+        return self.rows[ids] * self.scales[ids][..., None]
+
+
+class MiniLM(nn.Module):
+    """The tower: token embeddings, six BERT layers, mean over tokens, unit length."""
+
+    positions: Tensor
+
+    def __init__(self, tensors: dict[str, Tensor], tokenizer: Tokenizer) -> None:
+        super().__init__()
+        prefix = "embeddings."
+        self.words = RowInt8Table(
+            tensors[prefix + "word_embeddings.weight"], tensors[prefix + "word_embeddings.weight.scale"]
+        )
+        # Every token is of type 0, so its type vector is part of the position vector.
+        types = _dense(tensors, prefix + "token_type_embeddings.weight")
+        places = _dense(tensors, prefix + "position_embeddings.weight")[:MAX_TOKENS]
+        self.register_buffer("positions", places + types[0])  # (256, C)
+        with torch.device("meta"):  # no random initialisation: the file's tensors are assigned
+            self.norm = nn.LayerNorm(DIMENSION, eps=_NORM_EPS)
+            self.layers = nn.ModuleList(_layer() for _ in range(_LAYERS))
+        self.load_state_dict(_state(tensors), strict=False, assign=True)
+        self.requires_grad_(False).eval()
+        self.tokenizer = _prepared(tokenizer)
+
+    def encode(self, texts: Sequence[str]) -> Tensor:
+        """Unit embeddings (P, 384) float32 of P phrases; P may be 0.
+
+        Deterministic. A phrase gives the same vector alone or in a list, to 1e-5: padding is
+        masked in attention and left out of the mean. Case and accents are folded.
+
+        Raises:
+            PromptError: a phrase is empty, or holds no word the vocabulary knows.
+        """
+        tokens = [self.tokens(text) for text in texts]
+        embeddings = self.positions.new_zeros(len(tokens), DIMENSION)
+        by_length = sorted(range(len(tokens)), key=lambda i: len(tokens[i]))  # little padding per batch
+        with torch.no_grad():
+            for start in range(0, len(tokens), _BATCH):
+                chosen = by_length[start : start + _BATCH]
+                embeddings[chosen] = self(*_padded([tokens[i] for i in chosen]))
+        return embeddings
+
+    def tokens(self, text: str) -> list[int]:
+        """Token ids, [CLS] first and [SEP] last, at most 256.
+
+        Raises:
+            PromptError: nothing, or nothing known, is between them.
+        """
+        # Command lines can carry undecodable bytes as lone surrogates, which no tokenizer takes.
+        ids = self.tokenizer.encode(text.encode("utf-8", "replace").decode("utf-8")).ids
+        if len(ids) <= _SPECIAL_TOKENS:
+            raise PromptError("a prompt is empty; describe what to look for in a word or a short phrase")
+        unknown = self.tokenizer.token_to_id("[UNK]")
+        if all(token == unknown for token in ids[1:-1]):
+            raise PromptError(f"the prompt {text!r} holds no word the text model knows; use plain words")
+        return ids
+
+    def forward(self, ids: Tensor, mask: Tensor) -> Tensor:
+        """Unit embeddings (B, C) of padded ids (B, T) int64 with mask (B, T), true at real tokens."""
+        hidden = self.norm(self.words(ids) + self.positions[: ids.shape[1]])  # (B, T, C)
+        padding = None if mask.all() else ~mask
+        for layer in self.layers:
+            hidden = layer(hidden, src_key_padding_mask=padding)
+        kept = mask[..., None].to(hidden.dtype)
+        return normalize((hidden * kept).sum(1) / kept.sum(1), dim=-1)
+
+
+@lru_cache(maxsize=1)
+def load_minilm() -> MiniLM:
+    """The shipped tower, read once.
+
+    Raises:
+        WeightsError: its files are missing or damaged.
+    """
+    try:
+        weights = asset_path("weights/minilm_l6_v2_rowint8.safetensors")
+        vocabulary = asset_path("weights/minilm_l6_v2_tokenizer.json")
+    except FileNotFoundError as error:
+        raise WeightsError(str(error)) from error
+    return read_minilm(weights, vocabulary)
+
+
+def read_minilm(weights: Path, vocabulary: Path) -> MiniLM:
+    """The tower of a row-int8 safetensors file and a `tokenizers` JSON file.
+
+    Raises:
+        WeightsError: a file is unreadable or lacks a tensor.
+    """
+    try:
+        tokenizer = Tokenizer.from_buffer(vocabulary.read_bytes())
+        return MiniLM(load_file(weights), tokenizer)
+    except (OSError, SafetensorError, KeyError, ValueError, RuntimeError) as error:
+        raise WeightsError(
+            f"the text model {weights.name} or {vocabulary.name} is damaged ({error}); reinstall LangFlash"
+        ) from error
+
+
+def _layer() -> nn.TransformerEncoderLayer:
+    return nn.TransformerEncoderLayer(
+        DIMENSION,
+        _HEADS,
+        _HIDDEN_MLP,
+        dropout=0.0,
+        activation="gelu",  # the exact one
+        layer_norm_eps=_NORM_EPS,
+        batch_first=True,
+        norm_first=False,
+    )
+
+
+def _prepared(tokenizer: Tokenizer) -> Tokenizer:
+    """Cut at 256 tokens, and no padding: batches are padded by `_padded` alone."""
+    tokenizer.enable_truncation(MAX_TOKENS)
+    tokenizer.no_padding()
+    return tokenizer
+
+
+def _padded(tokens: list[list[int]]) -> tuple[Tensor, Tensor]:
+    """Ids (B, T) filled with 0 and the mask (B, T) of real tokens."""
+    longest = max(len(ids) for ids in tokens)
+    ids = torch.tensor([row + [0] * (longest - len(row)) for row in tokens])
+    lengths = torch.tensor([len(row) for row in tokens])
+    return ids, torch.arange(longest) < lengths[:, None]
+
+
+def _dense(tensors: dict[str, Tensor], key: str) -> Tensor:
+    """A tensor in float32, its int8 rows scaled where it has a `.scale`."""
+    scale = tensors.get(key + ".scale")
+    dense = tensors[key].float()
+    return dense if scale is None else dense * scale.float()[:, None]
+
+
+def _state(tensors: dict[str, Tensor]) -> dict[str, Tensor]:
+    """BERT's names in the file to the names of torch's transformer layers."""
+    state = {f"norm.{end}": _dense(tensors, f"embeddings.LayerNorm.{end}") for end in ("weight", "bias")}
+    names = {
+        "self_attn.out_proj": "attention.output.dense",
+        "norm1": "attention.output.LayerNorm",
+        "linear1": "intermediate.dense",
+        "linear2": "output.dense",
+        "norm2": "output.LayerNorm",
+    }
+    for index in range(_LAYERS):
+        source, target = f"encoder.layer.{index}.", f"layers.{index}."
+        for end in ("weight", "bias"):
+            joined = (f"{source}attention.self.{part}.{end}" for part in ("query", "key", "value"))
+            state[f"{target}self_attn.in_proj_{end}"] = torch.cat([_dense(tensors, key) for key in joined])
+            for ours, theirs in names.items():
+                state[f"{target}{ours}.{end}"] = _dense(tensors, f"{source}{theirs}.{end}")
+    return state

@@ -1,0 +1,257 @@
+"""Open-vocabulary relevance. K atoms, C channels, r = min(K, C), P prompts, M negatives.
+
+Splatting is linear, so the feature at a pixel is F(p) = sum_k W_k(p) d_k = W(p) D and is never
+formed. With the thin factorisation D = R Q, the rows of Q orthonormal,
+
+    F = (W R) Q,   |F| = |W R|,   F . t = (W R) . (Q t),
+
+both exact. A compiled query holds R, Q t and Q n: nothing of it is wider than K.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import torch
+from torch import Tensor
+
+from langflash_core.errors import PromptError, SceneFileError
+from langflash_core.language.algebra import encode_prompts
+from langflash_core.language.spaces import LanguageSpace, encode_cached
+from langflash_core.types import Scene, Semantics
+
+Mode = Literal["relevancy", "cosine"]
+
+# Pixels with |F| below this are empty: just above the smallest normal float16 (6.1e-5), so that
+# half-precision weight maps, too, have a direction wherever relevance is not 0.
+EMPTY_NORM = 1e-4
+_PIXELS_AT_ONCE = 1 << 16  # bounds W R at 33 MB for r = 128
+
+
+@dataclass(frozen=True)
+class CompiledQuery:
+    """P phrases made ready for one dictionary.
+
+    factor: R (K, r). prompts: Q t (P, r). negatives: Q n (M, r), M = 0 in cosine mode.
+    temperature > 0. threshold: from which relevance a phrase counts as present. texts,
+    negative_texts: the phrases.
+    """
+
+    factor: Tensor
+    prompts: Tensor
+    negatives: Tensor
+    temperature: float
+    threshold: float
+    mode: Mode
+    texts: tuple[str, ...]
+    negative_texts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What a space, or the scene's own network, says about scores; fields as LanguageSpace."""
+
+    temperature: float
+    threshold: float
+    cosine_threshold: float
+    negatives: tuple[str, ...]
+
+
+def finite_atoms(dictionary: Tensor) -> Tensor:
+    """(K,) bool: every number of the atom is finite; the others count as atoms of length 0."""
+    return torch.isfinite(dictionary).all(-1)
+
+
+def reduce_dictionary(dictionary: Tensor) -> tuple[Tensor, Tensor]:
+    """Thin factorisation D = R Q of a dictionary (K, C).
+
+    Householder QR of D^T in float64: exact also where rows repeat, vanish, or outnumber the
+    channels. K may be 0. Atoms that are not finite say nothing: they become 0.
+
+    Returns:
+        R (K, r) and Q (r, C) in the dictionary's dtype, r = min(K, C); Q Q^T = 1.
+
+    Raises:
+        ValueError: not a matrix.
+    """
+    if dictionary.dim() != 2:
+        raise ValueError(f"dictionary: expected a (K, C) matrix, received {tuple(dictionary.shape)}")
+    atoms = dictionary.detach().to("cpu", torch.float64)
+    atoms = torch.where(finite_atoms(atoms)[:, None], atoms, 0.0)
+    q, r = torch.linalg.qr(atoms.T, mode="reduced")  # (C, r), (r, K)
+    return r.T.contiguous().to(dictionary), q.T.contiguous().to(dictionary)
+
+
+def calibration_of(scene: Scene | None, space: LanguageSpace) -> Calibration:
+    """The scene's own calibration (`metadata["calibration"]`) over the defaults of its space.
+
+    Raises:
+        SceneFileError: the scene's calibration is not usable.
+    """
+    own = (scene.metadata.get("calibration") if scene is not None else None) or {}
+    try:
+        chosen = Calibration(
+            float(own.get("temperature", space.temperature)),
+            float(own.get("threshold", space.threshold)),
+            float(own.get("cosine_threshold", space.cosine_threshold)),
+            tuple(str(text) for text in own.get("negatives", space.negatives)),
+        )
+    except (TypeError, ValueError, AttributeError) as error:
+        raise SceneFileError(f"the scene's calibration is damaged ({error}); make it again") from error
+    if not (chosen.temperature > 0 and 0 <= chosen.threshold <= 1 and -1 <= chosen.cosine_threshold <= 1):
+        raise SceneFileError(f"the scene's calibration is out of range ({chosen}); make it again")
+    return chosen
+
+
+def compile_query(
+    scene: Scene | Semantics,
+    space: LanguageSpace,
+    prompts: Sequence[str],
+    *,
+    negatives: Sequence[str] | None = None,
+    mode: Mode = "relevancy",
+) -> CompiledQuery:
+    """Encode phrases and bring them into the dictionary's own r dimensions.
+
+    Args:
+        scene: a scene, or its semantics alone (then the space's default calibration holds).
+        space: must be the one the dictionary lives in.
+        prompts: phrases, with the light algebra of `query.algebra`.
+        negatives: instead of the calibrated ones.
+        mode: "relevancy" in (0, 1) or "cosine" in [-1, 1].
+
+    Raises:
+        PromptError: no prompt, an empty prompt, no negative, an unknown mode, another space.
+        WeightsError: the space has no text weights.
+    """
+    semantics = scene.semantics if isinstance(scene, Scene) else scene
+    _check_spoken(semantics, space, prompts, mode)
+    calibration = calibration_of(scene if isinstance(scene, Scene) else None, space)
+    texts = tuple(prompt.strip() for prompt in prompts)
+    against = tuple(calibration.negatives if negatives is None else negatives) if mode == "relevancy" else ()
+    if mode == "relevancy" and not against:
+        raise PromptError("relevancy needs a negative phrase to compare with; name one, or use 'cosine'")
+    factor, basis = reduce_dictionary(_spoken_dictionary(scene))
+    return CompiledQuery(
+        factor=factor,
+        prompts=encode_prompts(space, texts).to(basis) @ basis.T,
+        negatives=encode_cached(space, against).to(basis) @ basis.T,
+        temperature=calibration.temperature,
+        threshold=calibration.threshold if mode == "relevancy" else calibration.cosine_threshold,
+        mode=mode,
+        texts=texts,
+        negative_texts=against,
+    )
+
+
+def cosine_maps(weight_maps: Tensor, factor: Tensor, phrases: Tensor, eps: float = EMPTY_NORM) -> Tensor:
+    """Cosine between F(p) and phrases, in reduced form.
+
+    Args:
+        weight_maps: W (..., K), any dtype; computed in the factor's.
+        factor: R (K, r).
+        phrases: Q t (P, r), of unit t.
+        eps: empty pixels, |F| < eps, give 0.
+
+    Returns:
+        (P, ...) in [-1, 1].
+
+    Raises:
+        ValueError: K or r disagree between arguments.
+
+    Source: own derivation; twins `feature_cosine`, `gram_cosine`, tests/language/reference.py.
+    """
+    return _cosines(weight_maps, factor, phrases, eps)[0].movedim(-1, 0)
+
+
+def relevancy(positives: Tensor, negatives: Tensor, temperature: float) -> Tensor:
+    """Smallest, over the negatives, of softmax(temperature * [pos, neg])_pos.
+
+    Each pair's softmax is sigmoid(temperature * (pos - neg)), which falls as neg rises: the
+    smallest belongs to the largest negative. Finite for any finite logits.
+
+    Args:
+        positives: (P, ...). negatives: (M, ...), M >= 1. temperature: > 0.
+
+    Returns:
+        (P, ...) in (0, 1); below 0.5 a negative fits better.
+
+    Raises:
+        ValueError: there is no negative.
+
+    Source: Kerr et al. 2023 (LERF), equation of section 4.2; twin `softmax_relevancy`.
+    """
+    if negatives.shape[0] == 0:
+        raise ValueError("negatives: expected at least one, received none")
+    return torch.sigmoid(temperature * (positives - negatives.amax(0)))
+
+
+def relevance_maps(weight_maps: Tensor, compiled: CompiledQuery, eps: float = EMPTY_NORM) -> Tensor:
+    """Relevance of every prompt at every pixel.
+
+    Args:
+        weight_maps: (H, W, K), composited w_ik.
+        eps: floor on |F(p)|.
+
+    Returns:
+        (P, H, W), cosine or relevancy as `compiled.mode` says; exactly 0 at empty pixels.
+
+    Raises:
+        ValueError: K disagrees.
+    """
+    pixels = weight_maps.flatten(0, -2)  # (H W, K)
+    maps = torch.cat([_relevance(part, compiled, eps) for part in pixels.split(_PIXELS_AT_ONCE)], -1)
+    return maps.unflatten(-1, weight_maps.shape[:-1])
+
+
+def _relevance(weights: Tensor, compiled: CompiledQuery, eps: float) -> Tensor:
+    """`relevance_maps` of pixels (n, K): (P, n)."""
+    phrases = torch.cat((compiled.prompts, compiled.negatives))
+    cosines, empty = _cosines(weights, compiled.factor, phrases, eps)
+    if compiled.mode == "cosine":
+        return cosines.T
+    positives, negatives = cosines.T.split((compiled.prompts.shape[0], compiled.negatives.shape[0]))
+    return torch.where(empty.T, 0.0, relevancy(positives, negatives, compiled.temperature))
+
+
+def _cosines(weights: Tensor, factor: Tensor, phrases: Tensor, eps: float) -> tuple[Tensor, Tensor]:
+    """Cosines (..., P) of pixels (..., K), 0 where empty, and the empty mask (..., 1)."""
+    if weights.shape[-1] != factor.shape[0]:
+        raise ValueError(f"weight_maps: expected K = {factor.shape[0]}, received {weights.shape[-1]}")
+    if phrases.shape[-1] != factor.shape[1]:
+        raise ValueError(f"phrases: expected r = {factor.shape[1]}, received {phrases.shape[-1]}")
+    features = weights.to(factor) @ factor  # (..., r)
+    norms = features.norm(dim=-1, keepdim=True)
+    empty = norms < eps
+    # Dividing by 1 where empty keeps gradients finite, too; rounding may leave [-1, 1] by an ulp.
+    cosines = (features @ phrases.T) / torch.where(empty, 1.0, norms)
+    return torch.where(empty, 0.0, cosines).clamp(-1, 1), empty
+
+
+def _spoken_dictionary(scene: Scene | Semantics) -> Tensor:
+    """The dictionary (K, C) with a scene's `metadata["silent_atoms"]`, which answer nothing, at 0.
+
+    Raises:
+        SceneFileError: the list names atoms that there are not.
+    """
+    if isinstance(scene, Semantics):
+        return scene.dictionary
+    silent = scene.metadata.get("silent_atoms") or []
+    dictionary = scene.semantics.dictionary
+    if not all(isinstance(k, int) and 0 <= k < len(dictionary) for k in silent):
+        raise SceneFileError(f"the scene's silent atoms are out of range ({silent}); make it again")
+    rows = torch.tensor(silent, dtype=torch.int64, device=dictionary.device)
+    return dictionary.index_fill(0, rows, 0.0) if silent else dictionary
+
+
+def _check_spoken(semantics: Semantics, space: LanguageSpace, prompts: Sequence[str], mode: str) -> None:
+    if mode not in get_args(Mode):
+        raise PromptError(f"the mode '{mode}' is unknown; use 'relevancy' or 'cosine'")
+    if isinstance(prompts, str) or not prompts:
+        raise PromptError("there is no prompt; give a list with at least one word or short phrase")
+    channels = semantics.dictionary.shape[1]
+    if semantics.space != space.name or channels != space.dimension:
+        raise PromptError(
+            f"the scene speaks '{semantics.space}' with {channels} numbers, the text tower "
+            f"'{space.name}' with {space.dimension}; query the scene in its own language space"
+        )

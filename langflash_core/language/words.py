@@ -1,0 +1,93 @@
+"""From a language vector back to words, to Gaussians, and to a query of its own."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery, reduce_dictionary, relevance_maps
+from langflash_core.types import Semantics
+
+_ROWS_AT_ONCE = 1 << 15  # dense weights of so many Gaussians: 17 MB at 128 atoms
+
+
+@dataclass(frozen=True)
+class NearWord:
+    """A word and its cosine with what was asked about."""
+
+    word: str
+    cosine: float
+
+
+def nearest_words(
+    vector: Tensor, words: Sequence[str], embeddings: Tensor, count: int = 5
+) -> tuple[NearWord, ...]:
+    """The words of a vocabulary nearest to a language vector, best first.
+
+    Args:
+        vector: (C,), any length. embeddings: (A, C) of the words, unit rows.
+
+    Returns:
+        At most `count`, each word once whatever its capitals; none for a vector that says nothing.
+
+    Raises:
+        ValueError: words and embeddings differ in number, or C disagrees.
+    """
+    if embeddings.shape != (len(words), vector.shape[-1]):
+        expected = (len(words), vector.shape[-1])
+        raise ValueError(f"embeddings: expected {expected}, received {tuple(embeddings.shape)}")
+    norm = float(vector.norm())
+    if not EMPTY_NORM <= norm < float("inf"):
+        return ()
+    cosines = embeddings @ (vector / norm).to(embeddings)
+    best: dict[str, NearWord] = {}
+    for row in cosines.argsort(descending=True, stable=True).tolist():
+        word = str(words[row]).strip()
+        best.setdefault(word.lower(), NearWord(word, float(cosines[row].clamp(-1, 1))))
+        if len(best) == count:
+            break
+    return tuple(best.values())
+
+
+def feature_at(weights: Tensor, dictionary: Tensor) -> Tensor:
+    """F = W D (C,) of one pixel's weights (K,); atoms that are not finite count as 0."""
+    return weights.to(dictionary) @ torch.where(torch.isfinite(dictionary), dictionary, 0.0)
+
+
+def with_vectors(compiled: CompiledQuery, dictionary: Tensor, vectors: Mapping[int, Tensor]) -> CompiledQuery:
+    """The query with language vectors (C,) instead of some of its phrases, by their place.
+
+    Args:
+        dictionary: (K, C), the one that `compiled` was made for.
+
+    Raises:
+        ValueError: a vector says nothing, or there is no such place.
+    """
+    if not vectors:
+        return compiled
+    _, basis = reduce_dictionary(dictionary)
+    prompts = compiled.prompts.clone()
+    for place, vector in vectors.items():
+        norm = float(vector.norm())
+        if not 0 <= place < len(prompts) or not EMPTY_NORM <= norm < float("inf"):
+            raise ValueError(f"vectors: expected a finite vector for place 0 to {len(prompts) - 1}")
+        prompts[place] = basis @ (vector / norm).to(basis)
+    return replace(compiled, prompts=prompts)
+
+
+def gaussian_relevance(semantics: Semantics, compiled: CompiledQuery) -> Tensor:
+    """Relevance (P, N) of every prompt at every Gaussian, as if a pixel showed it alone.
+
+    `compiled.factor` may come from an edited dictionary of the same K atoms.
+    """
+    ids, values = semantics.weight_ids, semantics.weight_values
+    parts = []
+    for first in range(0, max(len(ids), 1), _ROWS_AT_ONCE):
+        rows = replace(
+            semantics,
+            weight_ids=ids[first : first + _ROWS_AT_ONCE],
+            weight_values=values[first : first + _ROWS_AT_ONCE],
+        )
+        parts.append(relevance_maps(rows.dense_weights()[None], compiled)[:, 0])
+    return torch.cat(parts, -1)

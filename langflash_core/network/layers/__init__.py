@@ -1,0 +1,1 @@
+"""What every network is made of: attention, decoders, dense prediction."""

@@ -1,0 +1,98 @@
+"""Two-stack decoder (views look at each other) and the Siamese decoder of the semantic branch."""
+
+import torch
+from torch import Tensor, nn
+
+from langflash_core.network.encoders.shared import Tokens
+from langflash_core.network.layers.attention import CrossBlock, SelfBlock, rope_2d
+from langflash_core.network.presets import GuidedDepth, Preset
+
+
+def normalised_intrinsics(Ks: Tensor, width: int, height: int) -> Tensor:
+    """K (..., 3, 3) in pixels -> (..., 9): row 0 over width, row 1 over height, row-major."""
+    size = torch.tensor([width, height, 1.0]).to(Ks)
+    return (Ks / size[:, None]).flatten(-2)
+
+
+class TwoStacks(nn.Module):
+    """View 0 through the first stack, every other view through the second.
+
+    Each layer reads the previous layer's tokens of all *other* views; a single view reads
+    itself.
+
+    Source: the paper's decoder, after DUSt3R (Wang et al. 2024) and NoPoSplat (Ye et al. 2025).
+    """
+
+    def __init__(self, preset: Preset, eps: float = 1e-5):
+        super().__init__()
+        dim, heads, depth = preset.decoder_dim, preset.decoder_heads, preset.decoder_depth
+        self.head_dim, self.base, self.patch = dim // heads, preset.rope_base, preset.patch
+        self.embed = nn.Linear(preset.encoder_dim, dim)
+        self.first = nn.ModuleList(CrossBlock(dim, heads, eps) for _ in range(depth))
+        self.other = nn.ModuleList(CrossBlock(dim, heads, eps) for _ in range(depth))
+        self.norm = nn.LayerNorm(dim, eps)
+
+    def layers(self, x: Tensor, grid: tuple[int, int]) -> list[Tensor]:
+        """What every layer gives, the last one normalised, from embedded tokens (B, V, h*w + 1, C);
+        the last token of a view is the one of its intrinsics."""
+        code = rope_2d(grid, self.head_dim, self.base, extra=1).to(x.device)
+        given = []
+        for first, other in zip(self.first, self.other, strict=True):
+            x = self._layer(x, code, first, other)
+            given.append(x)
+        return [*given[:-1], self.norm(x)]
+
+    @staticmethod
+    def _layer(x: Tensor, code: Tensor, first: nn.Module, other: nn.Module) -> Tensor:
+        num_views = x.shape[1]
+        memory_code = code.repeat(1, max(num_views - 1, 1), 1)
+        outputs = []
+        for view in range(num_views):
+            others = [v for v in range(num_views) if v != view] or [view]
+            memory = x[:, others].flatten(1, 2)
+            outputs.append((other if view else first)(x[:, view], memory, code, memory_code))
+        return torch.stack(outputs, 1)
+
+
+class TwoStackDecoder(TwoStacks):
+    """The stacks behind an encoder that knows no intrinsics: their token joins here."""
+
+    def __init__(self, preset: Preset):
+        super().__init__(preset)
+        self.intrinsics = nn.Linear(9, preset.decoder_dim)
+
+    def forward(self, tokens: Tokens, Ks: Tensor) -> tuple[Tensor, Tensor]:
+        """Tokens (B, V, h*w, C) after half of the layers and after the last.
+
+        Args:
+            tokens: of the encoder; the last hook is decoded.
+            Ks: (B, V, 3, 3), pixels of the encoded images.
+        """
+        height, width = (side * self.patch for side in tokens.grid)
+        camera = self.intrinsics(normalised_intrinsics(Ks, width, height))[:, :, None]
+        given = self.layers(torch.cat((self.embed(tokens.hooks[-1]), camera), 2), tokens.grid)
+        middle = given[max(len(given) // 2, 1) - 1]
+        return middle[:, :, :-1], given[-1][:, :, :-1]
+
+
+class SiameseDecoder(nn.Module):
+    """The same self-attention stack for every view: tokens of the semantic branch."""
+
+    def __init__(self, preset: GuidedDepth):
+        super().__init__()
+        dim, heads = preset.decoder_dim, preset.decoder_heads
+        self.head_dim, self.base = dim // heads, preset.rope_base
+        self.embed = nn.Linear(preset.encoder_dim, dim)
+        self.blocks = nn.ModuleList(SelfBlock(dim, heads) for _ in range(preset.semantic_depth))
+        self.norm = nn.LayerNorm(dim)
+
+    def forward(self, tokens: Tokens) -> tuple[Tensor, Tensor]:
+        """Tokens (B, V, h*w, C) after half of the layers and after the last."""
+        x = self.embed(tokens.hooks[-1]).flatten(0, 1)
+        code = rope_2d(tokens.grid, self.head_dim, self.base).to(x.device)
+        middle = x
+        for depth, block in enumerate(self.blocks):
+            x = block(x, code)
+            if depth + 1 == len(self.blocks) // 2:
+                middle = x
+        return tuple(t.unflatten(0, tokens.shape) for t in (middle, self.norm(x)))

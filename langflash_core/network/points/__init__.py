@@ -1,0 +1,1 @@
+"""Point maps: the paper's geometry."""

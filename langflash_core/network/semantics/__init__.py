@@ -1,0 +1,1 @@
+"""Language features, groups, parts and their names."""

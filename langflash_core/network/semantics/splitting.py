@@ -1,0 +1,90 @@
+"""Groups become parts: pixels that look alike to the mask map and to the queries share one atom.
+
+The queries merge neighbours (a chair takes its table along), and a merged group's atom answers to
+neither word. The map that masks are read from tells the two apart: it was trained so that pixels
+of one instance point the same way. So a scene is cut into many parts in the joint space of that
+map and of the queries' answer; parts of one object simply get similar atoms. Against splitting
+each group by its language vectors, mIoU in target views rose, without training: averaged atoms on
+48 validation rooms from .590 to .627 (8 labels) and .181 to .215 (class groups), aggregated atoms
+on 47 held-out rooms from .520 to .546 and .136 to .160; the atoms went from 20 to 38.
+
+Notation: V views, K groups, f channels of the mask map, J parts, X pixels of all views,
+S = f + K channels of the joint space.
+"""
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from langflash_core.network.presets import Splitting
+from langflash_core.network.stereo.prior import resize
+
+_ITERATIONS = 6
+_SEEDS_FROM = 1500  # pixels; enough to seed from, and seeding is the only serial step
+
+
+def split_groups(weights: Tensor, embeddings: Tensor, rule: Splitting, size: tuple[int, int]) -> Tensor:
+    """w_j(x) = softmax_j(sharpness u(x) . c_j), u = (e, agreement sqrt(w)) / norm, over all parts j.
+
+    sqrt(w) is a unit vector, so u . u' adds the Bhattacharyya affinity of the queries' answers at
+    two pixels to the cosine of their embeddings. The c_j are the means of spherical k-means.
+
+    Args:
+        weights: w_k(x), (V, K, h, w), sums to 1 over K; K may be 0.
+        embeddings: e(x), the mask map (V, f, h, w), any norm.
+        size: (H, W) of the answer.
+
+    Returns:
+        (V, J, H, W), sums to 1 over J >= 1; J = 0 where K = 0. Deterministic.
+
+    Source: own; spherical k-means (Dhillon and Modha 2001), seeded as k-means++ (Arthur and
+    Vassilvitskii 2007).
+    """
+    if weights.shape[1] == 0:
+        return weights.new_zeros(len(weights), 0, *size)
+    units = F.normalize(embeddings.float(), dim=1)
+    joint = F.normalize(torch.cat((units, rule.agreement * weights.float().sqrt()), 1), dim=1)
+    coarse = F.avg_pool2d(joint, 2, ceil_mode=True).movedim(1, -1).flatten(0, 2)  # (X, S)
+    centres = cluster(F.normalize(coarse, dim=-1), rule)
+    closeness = torch.einsum("vshw,js->vjhw", joint, rule.sharpness * centres)
+    return resize(closeness.contiguous(), size).softmax(1)  # three times as fast as in einsum's own order
+
+
+def cluster(vectors: Tensor, rule: Splitting) -> Tensor:
+    """Centres (J, S), unit norm, of unit vectors (X, S), the largest first; 1 <= J <= max_parts.
+
+    Centres closer than `max_cosine` to a larger one are left out: simple rooms keep few parts.
+    """
+    centres, counts = _settle(vectors, _seeds(vectors, rule.max_parts))
+    order = counts.argsort(descending=True, stable=True)
+    centres = centres[order[counts[order] > 0]]
+    alike = (centres @ centres.T > rule.max_cosine).tolist()
+    kept: list[int] = []
+    for row in range(len(centres)):
+        if not any(alike[row][other] for other in kept):
+            kept.append(row)
+    return centres[kept]
+
+
+def _seeds(vectors: Tensor, count: int) -> Tensor:
+    """Up to `count` of the vectors, each drawn with the squared distance to those before it."""
+    generator = torch.Generator().manual_seed(0)
+    some = vectors[:: max(1, len(vectors) // _SEEDS_FROM)]
+    distances = torch.full_like(some[:, 0], torch.inf)
+    chosen = [0]
+    while len(chosen) < min(count, len(some)):
+        distances = distances.minimum((some - some[chosen[-1]]).square().sum(1))
+        chance = distances.clamp_min(1e-9).cpu()  # equal pixels still give a seed
+        chosen.append(int(torch.multinomial(chance, 1, generator=generator)))
+    return some[chosen]
+
+
+def _settle(vectors: Tensor, centres: Tensor) -> tuple[Tensor, Tensor]:
+    """Lloyd iterations: unit centres (J, S) and how many vectors each has; empty ones stay put."""
+    counts = torch.zeros(len(centres))
+    for _ in range(_ITERATIONS):
+        nearest = (vectors @ centres.T).argmax(1)
+        counts = torch.bincount(nearest, minlength=len(centres))
+        sums = torch.zeros_like(centres).index_add_(0, nearest, vectors)
+        centres = torch.where(counts[:, None] > 0, F.normalize(sums, dim=-1), centres)
+    return centres, counts

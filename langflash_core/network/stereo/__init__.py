@@ -1,0 +1,1 @@
+"""Depth and poses of guided geometry: the monocular prior, matches, poses, the plane sweep."""

@@ -1,0 +1,189 @@
+"""Poses of V views: pairwise relative poses, chained along the best-connected tree from view 0."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from langflash_core.network.stereo.alignment import NO_CORRECTION, Correction, fit_correction
+from langflash_core.network.stereo.dense import match_cells
+from langflash_core.network.stereo.matching import (
+    Matches,
+    RelativePose,
+    detect,
+    match_descriptors,
+    relative_pose,
+    triangulate,
+)
+
+_MANY_VIEWS = 4  # beyond this, fewer features keep the V (V - 1) / 2 pairs affordable
+_MIN_SHARE = 0.25  # of the matches must agree with a pose
+_MAX_DEPTH_SIGMA = 0.2  # log-depth error beyond which a triangulated match says too little
+_MIN_POINTS = 10  # matches needed to correct a map
+_FEW = 40  # inliers among key points, below which dense matches are asked as well
+_DENSE_SIGMA = 3.0  # pixels at the working size: a third of a cell
+_WORKING_SIDE = 768  # pixels; sigma is one pixel at this size
+
+
+@dataclass(frozen=True)
+class PoseInput:
+    """What pose estimation reads of one view.
+
+    grey: (h, w) uint8, any size, the same crop as the network's image. K: (3, 3) pixels of the
+    network's image of `size` (width, height). depth: (H, W), z of the monocular map. local: unit
+    descriptors (C, h', w') of `LocalFeatures`.
+    """
+
+    grey: np.ndarray
+    K: np.ndarray
+    size: tuple[int, int]
+    depth: np.ndarray
+    local: np.ndarray
+
+
+@dataclass(frozen=True)
+class Poses:
+    """viewmats (V, 4, 4), world = view 0; depth_scales (V,) that bring each view's depth map to
+    view 0's unit; corrections: what matches say of each map beyond its scale, on the log depths
+    before scaling; guessed: views that no match supports."""
+
+    viewmats: np.ndarray
+    depth_scales: np.ndarray
+    corrections: tuple[Correction, ...]
+    guessed: tuple[int, ...]
+
+
+def estimate_poses(views: list[PoseInput], check: Callable[[], None] = lambda: None) -> Poses:
+    """Poses of all views, deterministic.
+
+    A view that matches nothing keeps view 0's pose and is reported in `guessed`. `check` is called
+    before each photo and each pair; what it raises ends the work.
+    """
+    num_views = len(views)
+    limit = 4000 if num_views <= _MANY_VIEWS else 1500
+    features = []
+    for view in views:
+        check()
+        features.append(detect(_working_size(view.grey), limit))
+    pairs: dict[tuple[int, int], RelativePose] = {}
+    agreed: dict[tuple[int, int], Matches] = {}
+    for i in range(num_views):
+        for j in range(i + 1, num_views):
+            check()
+            matches = _key_point_matches(views, features, i, j)
+            pose = _pair_pose(views[i], views[j], matches)
+            if pose is None or pose.num_inliers < _FEW:
+                more = _joined(matches, _dense_matches(views[i], views[j]))
+                better = _pair_pose(views[i], views[j], more)
+                pose, matches = (better, more) if better is not None else (pose, matches)
+            if pose is not None:
+                pairs[i, j], agreed[i, j] = pose, matches.subset(pose.inliers)
+    viewmats, scales, guessed = _chain(num_views, pairs)
+    corrections = [_correction(v, views[v], viewmats, scales[v], agreed) for v in range(num_views)]
+    return Poses(viewmats, scales, tuple(corrections), guessed)
+
+
+def _pair_pose(view_i: PoseInput, view_j: PoseInput, matches: Matches) -> RelativePose | None:
+    """The pose of the matches, if enough of them agree with it."""
+    pose = relative_pose(matches, _depths_at(view_i, matches.x_i), _depths_at(view_j, matches.x_j))
+    return pose if pose is not None and pose.num_inliers >= _MIN_SHARE * len(matches) else None
+
+
+def _working_size(grey: np.ndarray) -> np.ndarray:
+    """Small pictures are enlarged: SIFT needs pixels to find more than a handful of points."""
+    ratio = _WORKING_SIDE / max(grey.shape)
+    if ratio == 1:
+        return grey
+    method = cv2.INTER_CUBIC if ratio > 1 else cv2.INTER_AREA
+    return cv2.resize(grey, None, fx=ratio, fy=ratio, interpolation=method)
+
+
+def _key_point_matches(views: list[PoseInput], features: list, i: int, j: int) -> Matches:
+    pairs = match_descriptors(features[i][1], features[j][1])
+    x_i = _without_camera(features[i][0][pairs[:, 0]], views[i], _WORKING_SIDE)
+    x_j = _without_camera(features[j][0][pairs[:, 1]], views[j], _WORKING_SIDE)
+    return Matches(x_i, x_j, _sigma(views[j], 1.0))
+
+
+def _dense_matches(view_i: PoseInput, view_j: PoseInput) -> Matches:
+    cells_i, cells_j = match_cells(view_i.local, view_j.local)
+    x_i, x_j = (
+        (cells * (np.array(view.size) / view.local.shape[:0:-1]) - view.K[:2, 2]) / view.K.diagonal()[:2]
+        for view, cells in ((view_i, cells_i), (view_j, cells_j))
+    )
+    return Matches(x_i, x_j, _sigma(view_j, _DENSE_SIGMA))
+
+
+def _joined(exact: Matches, dense: Matches) -> Matches:
+    """Both sets, with the tolerance of the coarser."""
+    x_i, x_j = (np.concatenate(both) for both in ((exact.x_i, dense.x_i), (exact.x_j, dense.x_j)))
+    return Matches(x_i, x_j, dense.sigma)
+
+
+def _sigma(view: PoseInput, pixels: float) -> float:
+    """`pixels` at the working size, as normalised coordinates."""
+    return pixels * max(view.size) / _WORKING_SIDE / view.K[0, 0]
+
+
+def _without_camera(pixels: np.ndarray, view: PoseInput, side: int) -> np.ndarray:
+    """Pixels of a picture whose longer side is `side` -> normalised coordinates (n, 2)."""
+    own = pixels * (max(view.size) / side)
+    return (own - view.K[:2, 2]) / view.K.diagonal()[:2]
+
+
+def _depths_at(view: PoseInput, x: np.ndarray) -> np.ndarray:
+    pixels = x * view.K.diagonal()[:2] + view.K[:2, 2]
+    columns, rows = np.clip(pixels.astype(int), 0, np.array(view.size) - 1).T
+    return view.depth[rows, columns].astype(np.float64)
+
+
+def _correction(
+    view: int, own: PoseInput, viewmats: np.ndarray, scale: float, agreed: dict[tuple[int, int], Matches]
+) -> Correction:
+    """What the matches with all other views say of one depth map."""
+    points, targets, sigmas = [], [], []
+    for (i, j), matches in agreed.items():
+        if view not in (i, j):
+            continue
+        mine, theirs = (matches.x_i, matches.x_j) if view == i else (matches.x_j, matches.x_i)
+        relative = viewmats[j if view == i else i] @ np.linalg.inv(viewmats[view])
+        depths = triangulate(mine, theirs, relative[:3, :3], relative[:3, 3])
+        baseline = np.linalg.norm(relative[:3, 3])
+        usable = (depths > 0.05 * baseline) & (depths * matches.sigma < _MAX_DEPTH_SIGMA * baseline)
+        points.append(mine[usable])
+        targets.append(np.log(depths[usable] / scale))
+        sigmas.append(depths[usable] * matches.sigma / baseline)  # one pixel over the parallax
+    if sum(map(len, points)) < _MIN_POINTS:
+        return NO_CORRECTION
+    x = np.concatenate(points)
+    return fit_correction(x, np.log(_depths_at(own, x)), np.concatenate(targets), np.concatenate(sigmas))
+
+
+def _chain(
+    num_views: int, pairs: dict[tuple[int, int], RelativePose]
+) -> tuple[np.ndarray, np.ndarray, tuple[int, ...]]:
+    """Prim's maximum spanning tree on inlier counts; scales and poses multiply along it."""
+    viewmats = np.repeat(np.eye(4)[None], num_views, 0)
+    scales = np.ones(num_views)
+    placed = {0}
+    while True:
+        reachable = [
+            (pose.num_inliers, -i, -j) for (i, j), pose in pairs.items() if (i in placed) != (j in placed)
+        ]
+        if not reachable:
+            break
+        _, i, j = max(reachable)
+        i, j = -i, -j
+        relative = pairs[i, j].matrix()
+        growth = np.exp(pairs[i, j].log_scale)  # view j's depths times this are in view i's unit
+        if i in placed:
+            relative[:3, 3] *= scales[i]
+            viewmats[j], scales[j] = relative @ viewmats[i], scales[i] * growth
+            placed.add(j)
+        else:
+            scales[i] = scales[j] / growth
+            relative[:3, 3] *= scales[i]
+            viewmats[i] = np.linalg.inv(relative) @ viewmats[j]
+            placed.add(i)
+    return viewmats, scales, tuple(v for v in range(num_views) if v not in placed)

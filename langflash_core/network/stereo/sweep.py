@@ -1,0 +1,232 @@
+"""Plane-sweep refinement of monocular depth: what two views say together.
+
+Both views are compared over depth hypotheses around the prior, by features that need no training
+here: descriptors learned on real photos (`local`) and plain patches. A U-Net whose bottom reads
+the encoder's deepest tokens turns the comparison into a correction for every pixel, so that what
+matches at an edge also moves the blank wall beside it.
+
+Sizes: B batch, V views, P hypotheses, G channel groups, h x w the token grid, n = B*V.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from langflash_core.geometry.cameras import invert_rigid, rays
+from langflash_core.network.encoders.shared import Tokens
+from langflash_core.network.layers.dpt import ResidualUnit
+from langflash_core.network.presets import GuidedDepth
+from langflash_core.network.stereo.prior import LOG_ERROR_RANGE, DepthMaps, resize
+
+_TYPICAL_LOG_ERROR = -1.5  # centres the error channel that the network reads
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What a sweep compares: unit vectors of every view as they are, (V, C, h', w'), the same at the
+    size of the depth maps, (V, C, h, w), and in how many equal groups their channels are summed."""
+
+    maps: Tensor
+    own: Tensor
+    groups: int
+
+    @staticmethod
+    def of(maps: Tensor, size: tuple[int, int], groups: int = 1) -> "Compared":
+        """Vectors of any size, for depth maps of `size`; groups must divide C."""
+        return Compared(maps, maps if _size(maps) == size else resize(maps, size), groups)
+
+    def views(self, first: int, count: int) -> "Compared":
+        """The views of one scene out of several."""
+        part = slice(first, first + count)
+        return Compared(self.maps[part], self.own[part], self.groups)
+
+
+def sweep_correlation(
+    compared: Sequence[Compared], log_depths: Tensor, offsets: Tensor, viewmats: Tensor, Ks: Tensor
+) -> tuple[list[Tensor], Tensor]:
+    """Correlation of every view with the others over depth hypotheses.
+
+    Args:
+        compared: vectors to correlate, one answer each.
+        log_depths: (V, h, w) prior; hypothesis j of a pixel is prior * exp(offsets[j]).
+        offsets: (P,). viewmats: (V, 4, 4) of one common length unit. Ks: (V, 3, 3), pixels of
+            the maps of depth.
+
+    Returns:
+        Of each, correlations (V, G, P, h, w), the mean over the other views that see the point,
+        their sum over G is the cosine; and which share of the other views sees it (V, P, h, w).
+
+    Source: plane sweep (Collins 1996) around a prior, as MVSplat does with given poses; groups as
+    in Guo et al. 2019 (group-wise correlation).
+    """
+    num_views, height, width = log_depths.shape
+    directions = rays(Ks, width, height)  # (V, h, w, 3)
+    correlations: list[list[Tensor]] = [[] for _ in compared]
+    visibilities = []
+    for view in range(num_views):
+        depths = (log_depths[view] + offsets[:, None, None]).exp()  # (P, h, w)
+        totals = [depths.new_zeros(c.groups, *depths.shape) for c in compared]
+        count = torch.zeros_like(depths)
+        for other in range(num_views):
+            if other == view:
+                continue
+            relative = viewmats[other] @ invert_rigid(viewmats[view])
+            pos_o = directions[view] @ relative[:3, :3].T * depths[..., None] + relative[:3, 3]
+            ndc, seen = _projected(pos_o, Ks[other])
+            for c, total in zip(compared, totals, strict=True):
+                warped = _sample(c.maps[other], ndc)
+                products = (warped * c.own[view]).unflatten(1, (c.groups, -1)).sum(2)  # (P, G, h, w)
+                total += products.movedim(1, 0) * seen
+            count = count + seen
+        for found, total in zip(correlations, totals, strict=True):
+            found.append(total / count.clamp_min(1))
+        visibilities.append(count / max(num_views - 1, 1))
+    return [torch.stack(found) for found in correlations], torch.stack(visibilities)
+
+
+def _projected(pos_c: Tensor, K: Tensor) -> tuple[Tensor, Tensor]:
+    """Where points (P, h, w, 3) lie in a picture of h x w, as (P, h, w, 2) of -1 to 1, and (P, h, w) 1
+    where they are in view."""
+    height, width = pos_c.shape[1:3]
+    z = pos_c[..., 2]
+    xy = pos_c[..., :2] / z.clamp_min(1e-4)[..., None] * K.diagonal()[:2] + K[:2, 2]
+    ndc = (xy / xy.new_tensor([width, height]) * 2 - 1).clamp(-4, 4)
+    return ndc, ((z > 1e-4) & (ndc.abs() <= 1).all(-1)).to(pos_c.dtype)
+
+
+def _sample(features: Tensor, ndc: Tensor) -> Tensor:
+    """Bilinear features (P, C, h, w) of one map (C, h', w') at (P, h, w, 2)."""
+    batch = features[None].expand(len(ndc), -1, -1, -1)
+    return F.grid_sample(batch, ndc.to(features.dtype), align_corners=False)
+
+
+def patches(images: Tensor, reach: int = 2) -> Tensor:
+    """Grey patches (n, (2 reach + 1)^2, H/2, W/2) of mean 0 and unit norm: their products are
+    normalised cross-correlations, which exposure cannot change. images (n, 3, H, W)."""
+    half = resize(images.mean(1, keepdim=True), (images.shape[-2] // 2, images.shape[-1] // 2))
+    side = 2 * reach + 1
+    columns = F.unfold(half, side, padding=reach).unflatten(2, (half.shape[-2], half.shape[-1]))
+    return F.normalize(columns - columns.mean(1, keepdim=True), dim=1, eps=1e-3)
+
+
+class Regulariser(nn.Module):
+    """A U-Net that works at 2 and 1 times the token grid; the tokens join at the bottom."""
+
+    def __init__(self, inputs: int, token_dim: int, widths: tuple[int, int, int]):
+        super().__init__()
+        a, b, c = widths
+        self.enter = nn.Conv2d(inputs, b, 4, stride=2, padding=1)
+        self.second = ResidualUnit(b)
+        self.down = nn.Conv2d(b, c, 4, stride=2, padding=1)
+        self.tokens = nn.Conv2d(2 * token_dim, c, 1)
+        self.bottom = nn.Sequential(ResidualUnit(c), ResidualUnit(c))
+        self.up_b, self.second_up = nn.Conv2d(c, b, 1), ResidualUnit(b)
+        self.up_a, self.aside, self.first_up = nn.Conv2d(b, a, 1), nn.Conv2d(inputs, a, 1), ResidualUnit(a)
+
+    def forward(self, x: Tensor, shallow: Tensor, deep: Tensor) -> Tensor:
+        """(n, inputs, 4h, 4w) and tokens (n, E, h, w) of two depths -> (n, a, 4h, 4w)."""
+        second = self.second(self.enter(x))
+        bottom = self.bottom(self.down(F.relu(second)) + self.tokens(torch.cat((shallow, deep), 1)))
+        second = self.second_up(second + _double(self.up_b(bottom)))
+        return self.first_up(self.aside(x) + _double(self.up_a(second)))
+
+
+def _double(maps: Tensor) -> Tensor:
+    return F.interpolate(maps, scale_factor=2.0, mode="bilinear", align_corners=False)
+
+
+class DepthRefiner(nn.Module):
+    """Corrects the prior by what the sweep shows.
+
+    Each pass answers with a soft-argmax over the hypotheses, so it can never leave their range, and
+    the next looks around that answer; with no other view (or none that sees a pixel) correlations
+    are 0 and the prior speaks alone.
+    """
+
+    offsets: Tensor  # (P,) log-depth hypotheses around the prior
+
+    def __init__(self, preset: GuidedDepth):
+        super().__init__()
+        planes, widths = preset.sweep_planes, preset.refiner_widths
+        self.match_hook, self.groups = preset.match_hook, preset.sweep_groups
+        self.num_passes = preset.sweep_passes
+        offsets = torch.linspace(-preset.sweep_range, preset.sweep_range, planes)
+        self.register_buffer("offsets", offsets, persistent=False)
+        inputs = (self.groups + 1) * planes + 6  # correlations; how much is seen, depth, error, colour
+        self.regularise = Regulariser(inputs, preset.encoder_dim, widths)
+        self.answer = nn.Conv2d(widths[0], planes + 1, 3, padding=1)
+        self.sharpness = nn.Parameter(torch.tensor([10.0, 5.0]))
+
+    def forward(
+        self, images: Tensor, tokens: Tokens, local: Tensor, prior: DepthMaps, viewmats: Tensor, Ks: Tensor
+    ) -> tuple[DepthMaps, ...]:
+        """Refined maps of the prior's size after each pass; the last are the answer.
+
+        Args:
+            images: (B, V, 3, H, W). local: `LocalFeatures` of them, (n, C, h', w').
+            prior: (B, V, H, W), of the viewmats' length unit.
+            viewmats: (B, V, 4, 4). Ks: (B, V, 3, 3), pixels of the images.
+        """
+        grid, pictures = tokens.grid, images.flatten(0, 1)
+        size = (4 * grid[0], 4 * grid[1])
+        scale = torch.tensor([size[1] / images.shape[-1], size[0] / images.shape[-2], 1.0]).to(Ks)
+        with torch.no_grad():
+            compared = [Compared.of(local, size, self.groups), Compared.of(patches(pictures), size)]
+        read = (resize(pictures, size) - 0.5, tokens.maps(self.match_hook), tokens.maps(-1))
+        passes = []
+        for _ in range(self.num_passes):
+            prior = self._once(compared, read, prior, viewmats, Ks * scale[:, None])
+            passes.append(prior)
+        return tuple(passes)
+
+    def _once(
+        self,
+        compared: list[Compared],
+        read: tuple[Tensor, Tensor, Tensor],
+        prior: DepthMaps,
+        viewmats: Tensor,
+        Ks: Tensor,
+    ) -> DepthMaps:
+        """One pass; read: small pictures, shallow and deep tokens. Ks: pixels of the small pictures."""
+        colours, shallow, deep = read
+        shape = prior.log_depths.shape[:2]
+        start = resize(torch.stack((prior.log_depths, prior.log_errors), 2).flatten(0, 1), _size(colours))
+        with torch.no_grad():
+            (described, plain), seen = self._sweep(compared, start[:, 0].unflatten(0, shape), viewmats, Ks)
+        likely = self.sharpness[0] * described.sum(1) + self.sharpness[1] * plain[:, 0]
+        evidence = (described.flatten(1, 2), plain[:, 0], seen.mean(1, keepdim=True))
+        hidden = self.regularise(torch.cat((*evidence, _centred(start), colours), 1), shallow, deep)
+        raw = self.answer(F.relu(hidden)).float()
+        shift = ((raw[:, :-1] + likely).softmax(1) * self.offsets[:, None, None]).sum(1)
+        change = resize(torch.stack((shift, raw[:, -1]), 1), _size(prior.log_depths)).unflatten(0, shape)
+        return DepthMaps(
+            prior.log_depths + change[:, :, 0],
+            (prior.log_errors + change[:, :, 1]).clamp(*LOG_ERROR_RANGE),
+        )
+
+    def _sweep(
+        self, compared: list[Compared], log_depths: Tensor, viewmats: Tensor, Ks: Tensor
+    ) -> tuple[list[Tensor], Tensor]:
+        """`sweep_correlation` of every scene: (n, G, P, h, w) each, and (n, P, h, w)."""
+        count = log_depths.shape[1]
+        scenes = [
+            sweep_correlation(
+                [c.views(b * count, count) for c in compared], logs, self.offsets, viewmats[b], Ks[b]
+            )
+            for b, logs in enumerate(log_depths)
+        ]
+        volumes, seen = zip(*scenes, strict=True)
+        return [torch.cat(found) for found in zip(*volumes, strict=True)], torch.cat(seen)
+
+
+def _size(maps: Tensor) -> tuple[int, int]:
+    return maps.shape[-2], maps.shape[-1]
+
+
+def _centred(maps: Tensor) -> Tensor:
+    """Log depth about its mean and log error about a typical one, (n, 2, h, w): no unit left."""
+    logs, errors = maps[:, 0], maps[:, 1]
+    return torch.stack((logs - logs.mean((1, 2), keepdim=True), errors - _TYPICAL_LOG_ERROR), 1)

@@ -1,0 +1,56 @@
+"""The loop: rates, resuming, logs, and a loss that is not finite."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+
+from langflash_core.lab.training.loop import LoopOptions, learning_rate, load_averaged, train_stage
+from langflash_core.lab.training.stages import STAGES, Loss
+
+OPTIONS = LoopOptions(minutes=10, max_steps=2, pictures=2, report_s=0.0, validate_s=0.0, save_s=1e9)
+STAGE = STAGES["refine"]  # the smallest
+
+
+def test_the_rate_warms_up_and_falls():
+    assert learning_rate(0, 0.0, 1.0) == pytest.approx(0.01)
+    assert learning_rate(200, 0.0, 1.0) == 1
+    assert learning_rate(200, 0.5, 1.0) == pytest.approx(0.51)
+    assert learning_rate(10_000, 1.0, 1.0) == pytest.approx(0.02)
+
+
+def test_a_run_continues_where_it_stopped(rooms, words, network, tmp_path: Path):
+    first = train_stage(network(), STAGE, rooms, words, tmp_path, OPTIONS, lambda net: {"zero": 0.0})
+    assert first.step == 2
+    again = network()
+    second = train_stage(again, STAGE, rooms, words, tmp_path, replace(OPTIONS, max_steps=3))
+    assert second.step == 3
+    assert second.seconds > first.seconds
+    fresh = network()
+    assert load_averaged(fresh, tmp_path, "refine") == (3, pytest.approx(second.seconds))
+    assert all(torch.equal(fresh.state_dict()[k], v) for k, v in second.ema.items())
+    assert load_averaged(fresh, tmp_path, "depth") is None
+    rows = [json.loads(line) for line in (tmp_path / "refine.jsonl").read_text().splitlines()]
+    assert {row["kind"] for row in rows} == {"train", "validation"}
+    assert all(math.isfinite(row["loss"]) for row in rows if row["kind"] == "train")
+
+
+def test_a_restart_forgets(rooms, words, network, tmp_path: Path):
+    train_stage(network(), STAGE, rooms, words, tmp_path, OPTIONS)
+    state = train_stage(network(), STAGE, rooms, words, tmp_path, replace(OPTIONS, resume=False, max_steps=1))
+    assert state.step == 1
+
+
+def test_a_step_without_a_finite_loss_changes_nothing(rooms, words, network, tmp_path: Path):
+    net = network()
+    kept = {k: v.clone() for k, v in net.state_dict().items()}
+
+    def broken(network, batch, words):
+        return Loss(sum(p.sum() for p in network.refiner.parameters()) * torch.tensor(torch.nan))
+
+    with pytest.raises(RuntimeError, match="no finite loss"):
+        train_stage(net, replace(STAGE, loss=broken), rooms, words, tmp_path, OPTIONS)
+    assert all(torch.equal(v, kept[k]) for k, v in net.state_dict().items())

@@ -1,0 +1,63 @@
+"""Relevance of single Gaussians, against their features formed one by one."""
+
+import numpy as np
+import torch
+from torch.nn.functional import normalize
+
+from langflash_core.language import gaussians
+from langflash_core.language.gaussians import gaussian_relevance, kept
+from langflash_core.language.relevance import compile_query
+from langflash_core.language.spaces import language_space
+from langflash_core.types import Gaussians, Scene, Semantics
+
+
+def mixed_scene(count: int = 200) -> Scene:
+    """Weights over five words, two per Gaussian; the first Gaussian carries nothing."""
+    rng = torch.Generator().manual_seed(0)
+    dictionary = language_space("minilm").encode(["armchair", "lamp", "floor", "plant", "door"])
+    values = torch.rand(count, 2, generator=rng)
+    values = values / values.sum(-1, keepdim=True)
+    values[0] = 0
+    ids = torch.randint(0, 5, (count, 2), generator=rng)
+    shapes = Gaussians(
+        torch.randn(count, 3, generator=rng),
+        normalize(torch.randn(count, 4, generator=rng), dim=-1),
+        torch.ones(count, 3),
+        torch.ones(count),
+        torch.zeros(count, 1, 3),
+    )
+    semantics = Semantics(ids, values, dictionary, "minilm")
+    return Scene(shapes, semantics, torch.eye(4)[None], torch.eye(3)[None], (8, 8))
+
+
+def test_it_is_the_relevancy_of_each_feature(monkeypatch):
+    monkeypatch.setattr(gaussians, "_AT_ONCE", 64)
+    scene, space = mixed_scene(), language_space("minilm")
+    compiled = compile_query(scene, space, ["chair", "floor"])
+    found = gaussian_relevance(scene.semantics, compiled).double().numpy()
+    assert found.shape == (2, 200)
+    dictionary = scene.semantics.dictionary.double().numpy()
+    positives = space.encode(["chair", "floor"]).double().numpy()
+    negatives = space.encode(compiled.negative_texts).double().numpy()
+    for row in range(200):
+        pairs = zip(scene.semantics.weight_ids[row], scene.semantics.weight_values[row], strict=True)
+        feature = sum(float(value) * dictionary[int(k)] for k, value in pairs)
+        norm = np.linalg.norm(feature)
+        for phrase in range(2):
+            if norm == 0:
+                assert found[phrase, row] == 0
+                continue
+            ours, others = positives[phrase] @ feature / norm, negatives @ feature / norm
+            softmax = np.exp(compiled.temperature * ours)
+            least = min(softmax / (softmax + np.exp(compiled.temperature * other)) for other in others)
+            # float32 cosines are good to 1e-6, and relevancy moves by a quarter of temperature times that.
+            assert abs(found[phrase, row] - least) < 1e-5
+
+
+def test_what_is_kept_keeps_its_weights():
+    scene = mixed_scene()
+    rows = scene.semantics.weight_ids[:, 0] == 2
+    part = kept(scene, rows)
+    assert torch.equal(part.gaussians.means, scene.gaussians.means[rows])
+    assert torch.equal(part.semantics.weight_values, scene.semantics.weight_values[rows])
+    assert part.semantics.dictionary is scene.semantics.dictionary and part.num_views == 1
