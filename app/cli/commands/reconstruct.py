@@ -23,7 +23,8 @@ def run(args: Namespace, out: TextIO) -> None:
         readable_file(args.weights, "checkpoint", WeightsError)
     check_output_file(args.output, (".langflash",), inputs=args.photos)
     from langflash_core import pipeline
-    from langflash_core.scene import describe, save
+    from langflash_core.scene.file import save
+    from langflash_core.scene.report import describe
 
     with ProgressBar() as progress:
         scene = pipeline.reconstruct(
@@ -43,7 +44,7 @@ def run(args: Namespace, out: TextIO) -> None:
         progress("writing", 1.0)
         args.output.parent.mkdir(parents=True, exist_ok=True)
         save(scene, args.output)
-    say_warnings(scene.metadata.get("warnings", ()))
+    say_warnings(scene.record.warnings)
     document = {
         "scene": str(args.output),
         **describe(scene),
