@@ -140,7 +140,8 @@ def test_makes_of_a_maker_differ(by_maker: dict[str, list[Model]]) -> None:
     for name, made in by_maker.items():
         sizes = np.array([item.size for item, _, _ in made])
         assert len(made) > 1 and len(np.unique(sizes, axis=0)) == len(made), name
-        assert (np.ptp(sizes, axis=0) / sizes.max(0)).max() > 0.01, name  # a hundredth of it at least
+        # `_finished` alone stretches by up to 8 %: two makes within 0.1 % would be one in a thousand.
+        assert (np.ptp(sizes, axis=0) / sizes.max(0)).max() > 0.001, name
 
 
 def test_every_model_is_asked_for(models: list[Model]) -> None:
