@@ -1,6 +1,8 @@
 """Edits and their exact undoing; the scene they describe; their file."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -181,6 +183,11 @@ def test_a_silent_atom_answers_nothing_and_comes_back(scene):
     assert again.atoms == marks.atoms
     loud = spoken_scene(saved, toggle_atom(again, 2))
     torch.testing.assert_close(relevance(loud, saved), relevance(scene, scene), rtol=0, atol=1e-12)
+
+
+def test_edits_cost_no_torch():
+    program = "import sys, langflash_core.scene.edits; assert 'torch' not in sys.modules"
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=Path(__file__).parents[2])
 
 
 def test_silent_atoms_out_of_range_are_refused(scene):
