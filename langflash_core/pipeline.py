@@ -16,8 +16,8 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import Cancelled, InputError, PromptError, ViewError, WeightsError
-from langflash_core.images import grey_photo, load_views
-from langflash_core.images.views import source_pictures
+from langflash_core.images.decode import grey_photo
+from langflash_core.images.views import load_views, source_pictures
 from langflash_core.language.answers import answer
 from langflash_core.language.clip import load_clip_images
 from langflash_core.language.gaussians import gaussian_relevance, kept
