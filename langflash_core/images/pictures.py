@@ -91,6 +91,11 @@ def _picture(photo: Photo, size: tuple[int, int]) -> Picture:
 
 
 def photo_paths(photos: Sequence[Path | str]) -> list[Path]:
+    """The files of an argument, one or several.
+
+    Raises:
+        InputError: none, or over 32.
+    """
     listed = [photos] if isinstance(photos, str | Path) else list(photos)
     if not listed:
         raise InputError("no photo was given; name one or more photos of a room")

@@ -110,7 +110,8 @@ def _check_same_size(photo: PhotoFacts, first: PhotoFacts) -> None:
     if (photo.width, photo.height) != (first.width, first.height):
         raise InputError(
             f"{photo.name} is {photo.width} x {photo.height} pixels but the first photo is "
-            f"{first.width} x {first.height}; intrinsics need photos of one size, give a field of view instead"
+            f"{first.width} x {first.height}; intrinsics need photos of one size, "
+            "give a field of view instead"
         )
 
 

@@ -10,12 +10,15 @@ from langflash_core.torchvision_fix import ensure_torchvision
 
 @pytest.fixture(scope="module")
 def twins():
-    pytest.importorskip("timm", reason="timm is only the twin of these tests", exc_type=ImportError)
-    ensure_torchvision()
-    import timm
-
+    try:
+        ensure_torchvision()
+    except ImportError:
+        pytest.skip("without torchvision there is no timm, the twin of these tests")
+    timm = pytest.importorskip("timm", reason="timm is the twin of these tests")
     torch.manual_seed(0)
-    theirs = timm.create_model("vit_small_patch14_dinov2", pretrained=False, num_classes=0, dynamic_img_size=True)
+    theirs = timm.create_model(
+        "vit_small_patch14_dinov2", pretrained=False, num_classes=0, dynamic_img_size=True
+    )
     with torch.no_grad():
         for parameter in theirs.parameters():  # fresh blocks add next to nothing, so nothing would show
             parameter.normal_(0, 0.05)

@@ -41,16 +41,11 @@ def tokens_to_maps(tokens: Tensor, grid: tuple[int, int]) -> Tensor:
 class Encoder(nn.Module):
     """A plain ViT, frozen: sides are multiples of the patch, any aspect ratio."""
 
-    mean: Tensor
-    std: Tensor
-
     def __init__(self, preset: GuidedDepth):
         super().__init__()
         self.patch = preset.patch
         self.hook_blocks = preset.hooks
         self.vit = PlainViT(preset)
-        self.register_buffer("mean", torch.tensor(_MEAN)[:, None, None], persistent=False)
-        self.register_buffer("std", torch.tensor(_STD)[:, None, None], persistent=False)
         self.requires_grad_(False).eval()
 
     def train(self, mode: bool = True) -> "Encoder":
@@ -60,7 +55,8 @@ class Encoder(nn.Module):
     @torch.no_grad()
     def forward(self, images: Tensor) -> Tokens:
         """Tokens of images (B, V, 3, H, W) in [0, 1]."""
-        flat = (images.flatten(0, 1) - self.mean) / self.std
+        mean, std = (images.new_tensor(values)[:, None, None] for values in (_MEAN, _STD))
+        flat = (images.flatten(0, 1) - mean) / std
         maps = self.vit(flat, self.hook_blocks)
         batch, num_views, _, height, width = images.shape
         hooks = tuple(m.unflatten(0, (batch, num_views)) for m in maps)
