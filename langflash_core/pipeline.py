@@ -6,16 +6,17 @@ render -> query.relevance_maps -> query.answer
 
 import sys
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 
 import torch
 from torch import Tensor
 
+from langflash_core.ahead import Ahead, begin
 from langflash_core.errors import InputError, PromptError, ViewError, WeightsError
-from langflash_core.images import grey_photo, load_views
-from langflash_core.images.views import source_pictures
+from langflash_core.images.decode import grey_photo
+from langflash_core.images.views import load_views, source_pictures
 from langflash_core.language.answers import answer
 from langflash_core.language.clip import load_clip_images
 from langflash_core.language.gaussians import gaussian_relevance
@@ -24,6 +25,7 @@ from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_network
 from langflash_core.network.build import network_class
 from langflash_core.network.checkpoints.store import part_folder
+from langflash_core.network.checkpoints.stored import Stored
 from langflash_core.network.model import Atoms, Geometry, Lifted, pooled_weights
 from langflash_core.network.precision import has_bfloat16
 from langflash_core.network.semantics.aggregation import averaged_atoms
@@ -43,9 +45,9 @@ STAGES = {"photos": 0.0, "weights": 0.1, "network": 0.2, "assemble": 0.85, "prun
 PRECISIONS = ("auto", "float32", "bfloat16")
 AGGREGATIONS = ("lfa", "average", "crops")
 GROUPINGS = ("queries", "sam2")
-SIZES = (56, 1024)  # pixels: below, the encoder's grid is 4 patches; above, attention's memory runs away
 LARGEST_PICTURE = 8192
 LONGEST_REFINEMENT = 3600  # seconds
+_networks: dict[tuple, LangFlashNet] = {}
 
 
 def reconstruct(
@@ -63,6 +65,7 @@ def reconstruct(
     refine_seconds: float | None = None,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
+    ahead: Ahead | None = None,
 ) -> Scene:
     """Photos of one room to a 3D scene that can be queried, in one forward pass.
 
@@ -86,6 +89,8 @@ def reconstruct(
         device: "auto" takes CUDA where there is one; "cpu"; "cuda".
         progress: called with the stage and the fraction of the whole in [0, 1].
         cancelled: asked between stages, photos and pairs of photos, and before every layer.
+        ahead: of `ahead.begin` with the same arguments, which may have been called before torch was
+            imported; None: begun here.
 
     Returns:
         A scene on the CPU; its record holds seconds per stage, peak memory and warnings.
@@ -101,23 +106,19 @@ def reconstruct(
     device = _device(device)
     if refine_seconds is not None:
         _check_refinement(refine_seconds, photos)
-    area = PRESETS[preset].native_area if size is None else _area(size)
     with run.stage("photos"):
-        files = [Path(photo) for photo in photos]
+        ahead = ahead or begin(
+            photos, preset=preset, weights=weights, size=size, read_weights=False, check=run.check
+        )
         views = load_views(
-            files,
-            fov=fov,
-            intrinsics=intrinsics,
-            area=area,
-            multiple=PRESETS[preset].patch,
-            square=PRESETS[preset].square,
-            check=run.check,
+            photos, fov=fov, intrinsics=intrinsics, check=run.check, pictures=ahead.pictures.result
         )
     with run.stage("weights"):
-        network = _network(preset, weights, device, precision)
+        network = _network(preset, weights, device, precision, ahead.stored)
         atoms = _atoms(network, aggregation, views)
         groups = _groups(network, grouping, device)
     with run.stage("network"):
+        ahead.matched.result()
         prediction = _on_cpu(network.predict(views, run.within("network"), cancelled, atoms, groups))
     with run.stage("assemble"), torch.no_grad():
         scene = assemble(prediction, views, preset=preset)
@@ -341,21 +342,23 @@ def _bfloat16(preset: str, precision: str, device: str) -> bool:
     return can and (precision == "bfloat16" or (precision == "auto" and quick))
 
 
-def _network(preset: str, weights: Path | str | None, device: str, precision: str) -> LangFlashNet:
+def _network(
+    preset: str, weights: Path | str | None, device: str, precision: str, stored: Future[Stored] | None
+) -> LangFlashNet:
     """The network, read once; a checkpoint that changed on disk is read again."""
     path = None if weights is None else Path(weights).resolve()
     changed = path.stat().st_mtime_ns if path is not None and path.is_file() else 0
     folder = part_folder(PRESETS[preset])
     installed = tuple((p.name, p.stat().st_mtime_ns) for p in sorted(folder.glob("*.safetensors")))
-    return _read_network(preset, path, device, _bfloat16(preset, precision, device), (changed, installed))
-
-
-@lru_cache(maxsize=1)
-def _read_network(
-    preset: str, path: Path | None, device: str, bfloat16: bool, changed: tuple
-) -> LangFlashNet:
-    """`changed` is only part of the key."""
-    return load_network(preset, path, device, bfloat16=bfloat16)
+    mixed = _bfloat16(preset, precision, device)
+    key = (preset, path, device, mixed, changed, installed)
+    network = _networks.get(key)
+    if network is None:
+        read = None if stored is None else stored.result()
+        network = load_network(preset, path, device, bfloat16=mixed, stored=read)
+        _networks.clear()  # two are too much memory
+        _networks[key] = network
+    return network
 
 
 def _on_cpu(prediction: Prediction) -> Prediction:
@@ -369,13 +372,6 @@ def _device(name: str) -> str:
     if name == "cuda" and not torch.cuda.is_available():
         raise InputError("there is no CUDA device that torch can use; choose --device cpu or auto")
     return ("cuda" if torch.cuda.is_available() else "cpu") if name == "auto" else name
-
-
-def _area(size: int) -> int:
-    low, high = SIZES
-    if not low <= size <= high:
-        raise InputError(f"the size {size} is out of range; choose {low} to {high} pixels")
-    return int(size) ** 2
 
 
 def _camera(scene: Scene, view: int, camera: Camera | None, size: tuple[int, int] | None) -> Camera:

@@ -80,7 +80,7 @@ def test_installed_package_finds_its_files(installed, tmp_path):
     code = """
 from pathlib import Path
 import langflash_core
-from langflash_core.images import load_views
+from langflash_core.images.views import load_views
 from langflash_core.language.spaces import language_space
 from langflash_core.resources import asset_path, shader_path
 

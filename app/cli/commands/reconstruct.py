@@ -22,6 +22,10 @@ def run(args: Namespace, out: TextIO) -> None:
     if args.weights is not None:
         readable_file(args.weights, "checkpoint", WeightsError)
     check_output_file(args.output, (".langflash",), inputs=args.photos)
+    from langflash_core.ahead import begin
+
+    ahead = begin(args.photos, preset=args.preset, weights=args.weights, size=args.size)
+    ahead.check_photos()
     from langflash_core import pipeline
     from langflash_core.scene.file import save
     from langflash_core.scene.report import describe
@@ -40,6 +44,7 @@ def run(args: Namespace, out: TextIO) -> None:
             grouping=args.grouping,
             refine_seconds=args.refine,
             progress=progress,
+            ahead=ahead,
         )
         progress("writing", 1.0)
         args.output.parent.mkdir(parents=True, exist_ok=True)
