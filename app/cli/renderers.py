@@ -74,7 +74,7 @@ def open_renderer(backend: str | None) -> Iterator[Renderer]:
         renderer = GlRenderer()
     except GraphicsError as problem:
         if backend == "gl":
-            raise
+            raise GraphicsError(f"{problem}, or use --backend torch") from problem
         say_warnings([f"{str(problem).rstrip('.')}; drawing with the slow torch reference instead"])
         yield TorchRenderer()
         return
