@@ -4,9 +4,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
-from app.cli.report import say_warnings
 from langflash_core.errors import GraphicsError
 from langflash_core.types import Camera, Frame, Scene
+
+from .report import say_warnings
 
 
 class Renderer(Protocol):
@@ -38,7 +39,7 @@ class GlRenderer:
     backend = "gl"
 
     def __init__(self) -> None:
-        from app.gl import SplatRenderer, offscreen_context
+        from ..gl import SplatRenderer, offscreen_context
 
         self._context = offscreen_context()
         self._splats = SplatRenderer(self._context)

@@ -14,7 +14,7 @@ from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
 
 from .answers import Answers, in_numbers, temperature_of
 from .layout import ATOMS_A_LAYER, PHRASES_A_LAYER
-from .targets import LayerTarget
+from .targets import NUMPY_TYPES, LayerTarget
 from .weights import Maps
 
 _SOFTWARE = ("llvmpipe", "softpipe", "swr", "software rasterizer", "apple software renderer")
@@ -81,9 +81,10 @@ class HostAnswers(Answers):
 
 def read_maps(maps: Maps) -> np.ndarray:
     """The weight maps of the atoms in view as (Ka, H W) float32."""
-    dtype = {"f2": np.float16, "f4": np.float32}[maps.array.dtype]
     width, height, num_layers = maps.array.size
-    texels = np.frombuffer(maps.array.read(), dtype).reshape(num_layers, height * width, 4)
+    texels = np.frombuffer(maps.array.read(), NUMPY_TYPES[maps.array.dtype]).reshape(
+        num_layers, height * width, 4
+    )
     read = np.empty((len(maps.atoms), height * width), np.float32)
     for place in range(len(read)):
         read[place] = texels[place // ATOMS_A_LAYER, :, place % ATOMS_A_LAYER]

@@ -27,6 +27,7 @@ from .canvas import Canvas, Precision
 from .colours import colour_map, hues
 from .display import MASK_STYLES, Answer, Background, Drawn
 from .host import HostAnswers, draws_in_software
+from .layout import PHRASES_A_LAYER
 from .question import Question
 from .scene import Level, LiveScene, MakeSplats
 from .splats import SplatBuffers
@@ -250,8 +251,8 @@ class SplatRenderer:
         """
         _, answer, _ = self._answered()
         width, height, num_layers = answer.layers.array.size
-        values = read(answer.layers.array).reshape(num_layers, height, width, 4)
-        maps = np.moveaxis(values, -1, 1).reshape(4 * num_layers, height, width)
+        values = read(answer.layers.array).reshape(num_layers, height, width, PHRASES_A_LAYER)
+        maps = np.moveaxis(values, -1, 1).reshape(-1, height, width)
         return torch.from_numpy(maps[: answer.num_phrases].copy())
 
     def labels(self, threshold: float | None = None) -> Tensor:

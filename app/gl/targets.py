@@ -11,7 +11,7 @@ from langflash_core.graphics import bound_framebuffer
 
 _GL_FRAMEBUFFER = 0x8D40
 _GL_COLOR_ATTACHMENT0 = 0x8CE0
-_NUMPY = {"f2": np.float16, "f4": np.float32}
+NUMPY_TYPES = {"f2": np.float16, "f4": np.float32}
 
 PREMULTIPLIED = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
 ADDED = (moderngl.ONE, moderngl.ONE)
@@ -62,7 +62,7 @@ def drawing(
 
 def read(texture: moderngl.Texture | moderngl.TextureArray) -> np.ndarray:
     """Every value of a float texture, flat, as float32."""
-    return np.frombuffer(texture.read(), _NUMPY[texture.dtype]).astype(np.float32)
+    return np.frombuffer(texture.read(), NUMPY_TYPES[texture.dtype]).astype(np.float32)
 
 
 class ColourTarget:
@@ -125,7 +125,7 @@ class LayerTarget:
         read = (
             framebuffer.read((x, y, 1, 1), 4, attachment=layer, dtype=self._dtype) for layer in range(count)
         )
-        return np.stack([np.frombuffer(texel, _NUMPY[self._dtype]) for texel in read])
+        return np.stack([np.frombuffer(texel, NUMPY_TYPES[self._dtype]) for texel in read])
 
     def release(self) -> None:
         for framebuffer in self._framebuffers.values():

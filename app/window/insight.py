@@ -59,7 +59,7 @@ def describe_atoms(request: DescribeAtoms) -> Described:
     import torch
     from torch.nn.functional import normalize
 
-    from app.gl.colours import atom_colours
+    from ..gl.colours import atom_colours
 
     scene = request.scene
     dictionary = scene.semantics.dictionary.double()
