@@ -11,12 +11,10 @@ import torch
 from PIL import Image
 from torch import Tensor
 
-from langflash_core.export.colours import heat, label_colours
+from langflash_core.export.colours import atom_colours, heat, label_colours
 from langflash_core.export.png import label_map, to_8bit
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.types import Frame, QueryResult
-
-from ..gl.colours import atom_colours
 
 LABEL_OPACITY = 0.6
 

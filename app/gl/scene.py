@@ -7,12 +7,13 @@ from itertools import count
 import moderngl
 import numpy as np
 
+from langflash_core.export.colours import atom_colours
 from langflash_core.graphics import Programs
 from langflash_core.language.relevance import finite_atoms
 from langflash_core.scene.thin import thin_with_rows
 from langflash_core.types import Camera, Scene
 
-from .colours import atom_colours, feature_axes
+from .colours import feature_axes
 from .painter import Painter
 from .photos import PhotoDepths
 from .splats import SplatBuffers

@@ -1,5 +1,5 @@
 #version 330 core
-// Purpose: one Gaussian's sparse weights to the dense weights of LAYERS layers, by transform feedback.
+// Purpose: one Gaussian's sparse weights to the 3 * LAYERS dense weights of one pass, by transform feedback.
 // Source: blueprint section 6. gl_VertexID is the Gaussian's row (drawn through the order as index buffer).
 
 uniform sampler2D sparse_weights;  // (atom, weight) texels, ROW_TEXELS a row, m texels a Gaussian
