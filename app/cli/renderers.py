@@ -4,9 +4,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
-from app.cli.report import say_warnings
 from langflash_core.errors import GraphicsError
 from langflash_core.types import Camera, Frame, Scene
+
+from .report import say_warnings
 
 
 class Renderer(Protocol):
@@ -38,7 +39,7 @@ class GlRenderer:
     backend = "gl"
 
     def __init__(self) -> None:
-        from app.gl import SplatRenderer, offscreen_context
+        from ..gl import SplatRenderer, offscreen_context
 
         self._context = offscreen_context()
         self._splats = SplatRenderer(self._context)
@@ -74,7 +75,7 @@ def open_renderer(backend: str | None) -> Iterator[Renderer]:
         renderer = GlRenderer()
     except GraphicsError as problem:
         if backend == "gl":
-            raise
+            raise GraphicsError(f"{problem}, or use --backend torch") from problem
         say_warnings([f"{str(problem).rstrip('.')}; drawing with the slow torch reference instead"])
         yield TorchRenderer()
         return

@@ -8,9 +8,10 @@ from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.scene.consistency import TOLERANCE
 from langflash_core.types import Camera, Scene
 
-from .programs import Programs, set_uniforms
+from .colour import draw_colour
+from .painter import Painter
 from .splats import SplatBuffers
-from .targets import PREMULTIPLIED, ColourTarget, drawing
+from .targets import ColourTarget
 
 SAME = 0.05
 """Relative depth within which a photo shows the very surface: a pixel of 1/200 of the focal length on a floor
@@ -28,13 +29,14 @@ class PhotoDepths:
     own: every photo sees only the Gaussians that it made itself.
     """
 
-    def __init__(self, ctx: moderngl.Context, programs: Programs, scene: Scene, own: bool):
+    def __init__(self, painter: Painter, scene: Scene, own: bool):
         self.cameras = tuple(_small(scene.camera(v)) for v in range(min(scene.num_views, MOST_PHOTOS)))
+        ctx, programs = painter.ctx, painter.programs
         whole = None if own else SplatBuffers(ctx, programs, scene)
         maps = []
         for view, camera in enumerate(self.cameras):
             splats = whole or SplatBuffers(ctx, programs, _own_scene(scene, view))
-            maps.append(_depths(ctx, programs, splats, camera))
+            maps.append(_depths(painter, splats, camera))
             if splats is not whole:
                 splats.release()
         if whole is not None:
@@ -55,7 +57,7 @@ class PhotoDepths:
         matrices = np.tile(np.eye(4), (self.capacity, 1, 1))
         for photo, seen in enumerate(self.cameras):
             pinholes[photo] = _pinhole(seen)
-            matrices[photo] = (_numbers(seen.viewmat) @ back).T  # OpenGL's order
+            matrices[photo] = _numbers(seen.viewmat) @ back
         return {
             "num_photos": len(self.cameras),
             "pinhole": _pinhole(camera),
@@ -92,18 +94,14 @@ def _own_scene(scene: Scene, view: int) -> Scene:
     return scene.rows(scene.view_ids == view)
 
 
-def _depths(ctx: moderngl.Context, programs: Programs, splats: SplatBuffers, camera: Camera) -> np.ndarray:
+def _depths(painter: Painter, splats: SplatBuffers, camera: Camera) -> np.ndarray:
     """z (H, W) float32 of covered pixels, 0 elsewhere."""
-    target = ColourTarget(ctx, (camera.width, camera.height), "f2")
-    target.framebuffer.clear()
+    target = ColourTarget(painter.ctx, (camera.width, camera.height), "f2")
     if splats.num_gaussians:
         splats.sort(camera)
     if len(splats.order):
         splats.project(camera)
-        program = programs.get("quad.vert", "colour.frag", {"COLOUR": 1})
-        set_uniforms(program, image_size=(float(camera.width), float(camera.height)))
-        with drawing(target.framebuffer, PREMULTIPLIED):
-            splats.draw(program)
+    draw_colour(painter.programs, splats, target.framebuffer)
     sums = np.frombuffer(target.depth.read(), np.float32).reshape(camera.height, camera.width, 2)
     target.release()
     alphas = sums[..., 1]

@@ -59,7 +59,7 @@ def describe_atoms(request: DescribeAtoms) -> Described:
     import torch
     from torch.nn.functional import normalize
 
-    from app.gl.display import atom_colours
+    from langflash_core.export.colours import atom_colours
 
     scene = request.scene
     dictionary = scene.semantics.dictionary.double()

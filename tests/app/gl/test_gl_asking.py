@@ -7,7 +7,9 @@ import pytest
 import torch
 
 from app.gl import SplatRenderer
-from app.gl.display import COUNT_COLOURS, feature_axes
+from app.gl.colours import feature_axes
+from app.gl.display import COUNT_COLOURS
+from app.gl.painter import Painter
 from app.gl.photos import SAME, WORST, PhotoDepths
 from langflash_core.splat import render
 from langflash_core.types import Scene
@@ -252,10 +254,12 @@ def test_photo_depths_follow_the_scene_and_leave_it_alone(exact):
 
 
 def test_photo_depths_are_the_references(gl, exact):
-    made = PhotoDepths(gl, exact._programs, stereo(double=False), own=False)
+    painter = Painter(gl)
+    made = PhotoDepths(painter, stereo(double=False), own=False)
     width, height, count = made.texture.size
     drawn = np.frombuffer(made.texture.read(), np.float32).reshape(count, height, width)
     made.release()
+    painter.release()
     for view in range(2):
         frame = render(stereo(), stereo().camera(view), weight_maps=False)
         sure = np.abs(frame.alphas.numpy() - 0.5) > 1e-3
