@@ -6,8 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from app.window.panels.modes import KEYED
-from app.window.state import Mode
+from app.window.scene.panels.modes import KEYED
+from app.window.scene.state import Mode
 from langflash_core.language.spaces import language_space
 from langflash_core.scene import save
 from tests.app.window import test_window

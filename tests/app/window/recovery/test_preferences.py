@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from app.window import preferences
-from app.window.preferences import DEFAULTS, MOST_RECENT, Preferences
+from app.window.recovery import preferences
+from app.window.recovery.preferences import DEFAULTS, MOST_RECENT, Preferences
 
 
 def test_they_come_back_as_they_were_left(folders: Path) -> None:

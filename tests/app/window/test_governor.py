@@ -4,29 +4,40 @@ import math
 
 import pytest
 
-from app.window.pace import FULL_AFTER, LARGE_SCENE, MOVING_SECONDS, SETTLE_AFTER, SIZES, Kind, Pace, Plan
+from app.window.governor import (
+    FULL_AFTER,
+    LARGE_SCENE,
+    MOVING_SECONDS,
+    SETTLE_AFTER,
+    SIZES,
+    Governor,
+    Kind,
+    Plan,
+)
 
 
-def settled(pace: Pace, kind: Kind, seconds_full: float, fixed: float = 0.0) -> tuple[Pace, list[Plan]]:
+def settled(
+    governor: Governor, kind: Kind, seconds_full: float, fixed: float = 0.0
+) -> tuple[Governor, list[Plan]]:
     """Thirty moving pictures on a machine with this cost of a full one, of which `fixed` per Gaussian."""
     plans = []
     for _ in range(30):
-        plan = pace.moving(kind)
+        plan = governor.moving(kind)
         plans.append(plan)
         pixels = (seconds_full - fixed) * plan.scale**2 * (plan.kind.value / kind.value)
-        pace = pace.learn(plan, pixels + fixed * plan.share)
-    return pace, plans
+        governor = governor.learn(plan, pixels + fixed * plan.share)
+    return governor, plans
 
 
 def test_a_fast_machine_draws_everything_in_full() -> None:
-    pace, plans = settled(Pace(), Kind.FAST, 0.004)
+    governor, plans = settled(Governor(), Kind.FAST, 0.004)
     assert plans[-1] == Plan(Kind.MAPS)  # exact while it moves
-    assert pace.resting(Kind.FAST, SETTLE_AFTER) == Plan(Kind.MAPS)
+    assert governor.resting(Kind.FAST, SETTLE_AFTER) == Plan(Kind.MAPS)
 
 
 @pytest.mark.parametrize("kind", [Kind.COLOUR, Kind.FAST])
 def test_a_slow_machine_moves_within_the_budget_and_stays_there(kind) -> None:
-    _, plans = settled(Pace(), kind, 0.4)
+    _, plans = settled(Governor(), kind, 0.4)
     last = plans[-1]
     assert last.kind is kind and last.scale < 1.0 and last.share == 1.0
     assert 0.4 * last.scale**2 <= MOVING_SECONDS
@@ -35,45 +46,45 @@ def test_a_slow_machine_moves_within_the_budget_and_stays_there(kind) -> None:
 
 def test_large_scenes_that_cost_by_the_gaussian_are_thinned() -> None:
     """A second for the Gaussians alone: smaller pictures do not help, fewer Gaussians do."""
-    _, plans = settled(Pace(5 * LARGE_SCENE), Kind.COLOUR, 1.2, fixed=1.0)
+    _, plans = settled(Governor(5 * LARGE_SCENE), Kind.COLOUR, 1.2, fixed=1.0)
     assert plans[-1].share < 1 and 0.2 * plans[-1].scale ** 2 + plans[-1].share <= 1.8 * MOVING_SECONDS
-    _, plans = settled(Pace(LARGE_SCENE - 1), Kind.COLOUR, 1.2, fixed=1.0)
+    _, plans = settled(Governor(LARGE_SCENE - 1), Kind.COLOUR, 1.2, fixed=1.0)
     assert plans[-1].share == 1.0  # small ones never
 
 
 def test_it_climbs_again_when_there_is_time() -> None:
-    pace, _ = settled(Pace(), Kind.COLOUR, 1.0)
-    assert pace.moving(Kind.COLOUR).scale == SIZES[-1][0]
-    _, plans = settled(pace, Kind.COLOUR, 0.01)
+    governor, _ = settled(Governor(), Kind.COLOUR, 1.0)
+    assert governor.moving(Kind.COLOUR).scale == SIZES[-1][0]
+    _, plans = settled(governor, Kind.COLOUR, 0.01)
     assert plans[-1] == Plan(Kind.COLOUR)
 
 
 def test_relevance_moves_in_the_fast_mode_and_rests_exactly() -> None:
-    pace = Pace().learn(Plan(Kind.MAPS), 1.2, moving=False)
-    assert pace.moving(Kind.FAST).kind is Kind.FAST
-    assert pace.resting(Kind.FAST, FULL_AFTER) == Plan(Kind.MAPS)
+    governor = Governor().learn(Plan(Kind.MAPS), 1.2, moving=False)
+    assert governor.moving(Kind.FAST).kind is Kind.FAST
+    assert governor.resting(Kind.FAST, FULL_AFTER) == Plan(Kind.MAPS)
 
 
 def test_atoms_move_as_small_maps_or_give_way_to_colour() -> None:
-    slow = Pace().learn(Plan(Kind.MAPS), 0.5, moving=False)
+    slow = Governor().learn(Plan(Kind.MAPS), 0.5, moving=False)
     assert slow.moving(Kind.MAPS).kind is Kind.MAPS and slow.moving(Kind.MAPS).scale < 0.5
-    slower = Pace().learn(Plan(Kind.MAPS), 8.0, moving=False)
+    slower = Governor().learn(Plan(Kind.MAPS), 8.0, moving=False)
     assert slower.moving(Kind.MAPS).kind is Kind.COLOUR
     assert slower.resting(Kind.MAPS, FULL_AFTER) == Plan(Kind.MAPS)
 
 
 def test_a_slow_picture_settles_small_before_full() -> None:
-    pace = Pace().learn(Plan(Kind.MAPS), 1.2, moving=False)
-    small = pace.resting(Kind.MAPS, SETTLE_AFTER)
+    governor = Governor().learn(Plan(Kind.MAPS), 1.2, moving=False)
+    small = governor.resting(Kind.MAPS, SETTLE_AFTER)
     assert small is not None and small.scale < 1.0 and small.kind is Kind.MAPS
-    assert pace.resting(Kind.MAPS, 0.0) is None
+    assert governor.resting(Kind.MAPS, 0.0) is None
 
 
 def test_what_was_never_drawn_is_expected_to_cost_more_than_colour() -> None:
-    slow = Pace().learn(Plan(Kind.COLOUR), 0.4)
+    slow = Governor().learn(Plan(Kind.COLOUR), 0.4)
     assert slow.moving(Kind.FAST).kind is Kind.FAST  # the first keystroke of a phrase does not freeze
     assert 1.5 * 0.4 * slow.moving(Kind.FAST).scale ** 2 <= MOVING_SECONDS
-    fast = Pace().learn(Plan(Kind.COLOUR), 0.004)
+    fast = Governor().learn(Plan(Kind.COLOUR), 0.004)
     assert fast.moving(Kind.FAST) == Plan(Kind.MAPS)
 
 
@@ -86,11 +97,11 @@ def test_what_a_picture_serves() -> None:
 
 
 def test_rest_ends() -> None:
-    pace = Pace()
-    assert pace.next_rest(0.0) == SETTLE_AFTER
-    assert pace.next_rest(SETTLE_AFTER) == FULL_AFTER - SETTLE_AFTER
-    assert math.isinf(pace.next_rest(FULL_AFTER))
+    governor = Governor()
+    assert governor.next_rest(0.0) == SETTLE_AFTER
+    assert governor.next_rest(SETTLE_AFTER) == FULL_AFTER - SETTLE_AFTER
+    assert math.isinf(governor.next_rest(FULL_AFTER))
 
 
 def test_an_unknown_machine_starts_in_the_middle() -> None:
-    assert Pace().moving(Kind.COLOUR) == Plan(Kind.COLOUR, SIZES[2][0])
+    assert Governor().moving(Kind.COLOUR) == Plan(Kind.COLOUR, SIZES[2][0])

@@ -6,15 +6,17 @@ import subprocess
 import sys
 from pathlib import Path
 
-from app.window import recovery
 from app.window.places import state_folder
 from app.window.poses import Pose, Vector
-from app.window.recovery import Keeper, Kept
+from app.window.recovery import sessions
+from app.window.recovery.keeper import Keeper
+from app.window.recovery.state import Kept
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 DYING = """
 import os, sys, signal
-from app.window.recovery import Keeper, Kept
+from app.window.recovery.keeper import Keeper
+from app.window.recovery.state import Kept
 keeper = Keeper()
 keeper.scene_file.parent.mkdir(parents=True, exist_ok=True)
 keeper.scene_file.write_bytes(b"a scene")
@@ -40,24 +42,24 @@ def test_a_killed_session_is_left_behind(folders: Path) -> None:
     photo = folders / "a photo.png"
     photo.write_bytes(b"pixels")
     die(photo)
-    kept = recovery.left_behind()
+    kept = sessions.left_behind()
     assert kept is not None and kept.file is not None
     assert (kept.photos, kept.fovs, kept.phrases) == ((str(photo),), (61.5,), ("armchair",))
     assert not kept.saved and Path(kept.scene).read_bytes() == b"a scene"
     assert kept.sentence() == "kitchen, 1 photo, 1 phrase"
     photo.unlink()  # what is gone is not offered
-    again = recovery.left_behind()
+    again = sessions.left_behind()
     assert again is not None and again.photos == () and again.fovs == ()
-    recovery.forget(kept.file)
-    assert recovery.left_behind() is None and list(state_folder().iterdir()) == []
+    sessions.forget(kept.file)
+    assert sessions.left_behind() is None and list(state_folder().iterdir()) == []
 
 
 def test_a_session_that_runs_or_ended_well_is_not_offered(folders: Path) -> None:
     keeper = Keeper()
     keeper.keep(Kept(phrases=("door",), pose=Pose(Vector(1.0, 2.0, 3.0))))
-    assert recovery.left_behind() is None
+    assert sessions.left_behind() is None
     keeper.close()
-    assert recovery.left_behind() is None and list(state_folder().iterdir()) == []
+    assert sessions.left_behind() is None and list(state_folder().iterdir()) == []
     keeper.keep(Kept(phrases=("wall",)))  # a late write after the end writes nothing
     assert list(state_folder().iterdir()) == []
 
@@ -66,7 +68,7 @@ def test_the_camera_comes_back_exactly(folders: Path) -> None:
     keeper, kept = Keeper(), Kept(phrases=("door",), pose=Pose(Vector(0.1, 1 / 3, -7.0), fov=61.0))
     keeper.keep(kept)
     file = next(state_folder().glob("*.json"))
-    read = recovery.read(file)
+    read = sessions.read(file)
     keeper.close()
     assert read is not None and read.pose == kept.pose
 
@@ -77,5 +79,5 @@ def test_damage_and_emptiness_are_passed_over_and_removed(folders: Path) -> None
         ("session-1-a.json", b"{"), ("session-2-b.json", b'{"pose": 3}'), ("session-3-c.json", b"[]"),
     ):  # fmt: skip
         (state_folder() / name).write_bytes(content)
-    assert recovery.left_behind() is None
+    assert sessions.left_behind() is None
     assert list(state_folder().iterdir()) == []

@@ -1,7 +1,6 @@
 """Editing commands as pure changes of a frozen state, without a window."""
 
 from dataclasses import replace
-from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +8,15 @@ import pytest
 import torch
 
 from app.window import commands as do
-from app.window import edit_commands as edit
+from app.window.asking import commands as ask
 from app.window.commands import apply
-from app.window.editing import RADIUS_RANGE, Floaters, Offer, Reading, Region, Tool
-from app.window.state import FLIGHT_SECONDS, Mode, State
-from app.window.worker import describe_scene
+from app.window.editing import commands as edit
+from app.window.editing import pointing as point
+from app.window.editing.state import RADIUS_RANGE, Floaters, Reading, Region, Tool
+from app.window.scene import commands as show
+from app.window.scene.state import FLIGHT_SECONDS, Mode
+from app.window.scene.work import describe_scene
+from app.window.state import State
 from langflash_core.edits import Combine, Mask
 from langflash_core.scene.edited import edited_scene
 from tests.app.window.scenes import CHAIR, room
@@ -34,7 +37,7 @@ def info():
 
 @pytest.fixture
 def shown(info) -> State:
-    return after(State(), do.SceneArrived(info))
+    return after(State(), show.SceneArrived(info))
 
 
 def rows(first: int, last: int, count: int = 12_300) -> Mask:
@@ -114,21 +117,21 @@ def test_unsaved_is_what_a_file_would_miss(shown: State) -> None:
     assert state.editing.dirty and not state.editing.unsaved
     state = after(state, edit.Delete())
     assert state.editing.unsaved
-    saved = after(state, do.SceneSaved(Path("s.langflash"), state.editing.marks))
+    saved = after(state, show.SceneSaved(Path("s.langflash"), state.editing.marks))
     assert not saved.editing.dirty
     assert after(saved, edit.Undo()).editing.unsaved
 
 
 def test_a_new_scene_starts_a_new_history_with_the_same_tool(shown: State, info) -> None:
-    state = after(shown, edit.SetTool(Tool.BRUSH), edit.SetRadius(60), found(0, 10), edit.Delete())
-    state = after(state, do.SceneArrived(replace(info, serial=2)))
+    state = after(shown, point.SetTool(Tool.BRUSH), point.SetRadius(60), found(0, 10), edit.Delete())
+    state = after(state, show.SceneArrived(replace(info, serial=2)))
     assert labels(state) == [] and state.editing.tool is Tool.BRUSH and state.editing.radius == 60
     late = after(state, edit.Found(rows(0, 3, 77), "replace", "late"))
     assert labels(late) == []  # of a scene that is gone
 
 
 def test_settings_stay_within_their_ranges(shown: State) -> None:
-    state = after(shown, edit.SetRadius(1e9), edit.SetReach(-3))
+    state = after(shown, point.SetRadius(1e9), point.SetReach(-3))
     assert state.editing.radius == RADIUS_RANGE[1] and state.editing.reach == 1.0
 
 
@@ -148,33 +151,33 @@ def test_floaters_are_previewed_then_deleted(shown: State) -> None:
 
 def test_a_click_is_answered_and_becomes_a_prompt(shown: State) -> None:
     reading = Reading((5.0, 6.0), (0.1, 0.2, 0.9), 0.9)
-    state = after(shown, edit.SetTool(Tool.POINT), edit.Ask((5.0, 6.0)), edit.CardOpened(reading))
-    stale = edit.Named(Reading((1.0, 1.0)), Reading((1.0, 1.0)), (("door", 0.9),), b"x")
+    state = after(shown, point.SetTool(Tool.POINT), point.Ask((5.0, 6.0)), point.CardOpened(reading))
+    stale = point.Named(Reading((1.0, 1.0)), Reading((1.0, 1.0)), (("door", 0.9),), b"x")
     assert after(state, stale) == state
     weighed = replace(reading, atoms=((0, 1.0),))
     vector = np.arange(3, dtype=np.float32).tobytes()
-    state = after(state, edit.Named(reading, weighed, (("armchair", 0.9), ("sofa", 0.7)), vector))
+    state = after(state, point.Named(reading, weighed, (("armchair", 0.9), ("sofa", 0.7)), vector))
     assert state.editing.card is not None and state.editing.card.reading.atoms == ((0, 1.0),)
-    similar = after(state, edit.FindSimilar())
+    similar = after(state, point.FindSimilar())
     prompt = similar.prompts[-1]
     assert (len(similar.prompts), prompt.text, prompt.like) == (1, "like this (armchair)", vector)
     assert similar.mode is Mode.HEAT and similar.active == prompt.key and similar.editing.card is None
-    typed = after(similar, do.EditPrompt(prompt.key, "sofa"))
+    typed = after(similar, ask.EditPrompt(prompt.key, "sofa"))
     assert typed.prompts[0].like == b""
-    again = after(replace(similar, editing=state.editing), edit.FindSimilar())
+    again = after(replace(similar, editing=state.editing), point.FindSimilar())
     assert len(again.prompts) == 2 and again.prompts[0].colour != again.prompts[1].colour
 
 
 def test_what_the_pointer_left_is_forgotten(shown: State) -> None:
-    state = after(shown, edit.Hover((3.0, 4.0)), edit.ReadingTaken(Reading((3.0, 4.0), (0, 0, 1), 1.0)))
+    state = after(shown, point.Hover((3.0, 4.0)), point.ReadingTaken(Reading((3.0, 4.0), (0, 0, 1), 1.0)))
     assert state.editing.hover is not None and state.editing.hover.depth == 1.0
-    moved = after(state, edit.Hover((9.0, 9.0)), edit.ReadingTaken(Reading((3.0, 4.0), (0, 0, 1), 1.0)))
+    moved = after(state, point.Hover((9.0, 9.0)), point.ReadingTaken(Reading((3.0, 4.0), (0, 0, 1), 1.0)))
     assert moved.editing.hover == Reading((9.0, 9.0))
-    assert after(moved, edit.Hover(None)).editing.hover is None
+    assert after(moved, point.Hover(None)).editing.hover is None
 
 
 def test_atoms_are_named_by_the_person_or_by_words(shown: State) -> None:
-    state = after(shown, edit.AtomsNamed((("armchair", "sofa"), ("wall",), ())))
+    state = after(shown, point.AtomsNamed((("armchair", "sofa"), ("wall",), ())))
     assert [state.editing.atom_name(k) for k in range(3)] == ["armchair", "wall", "atom 2"]
     state = after(state, edit.RenameAtom(0, "my chair"), edit.RenameAtom(9, "none"))
     assert state.editing.atom_name(0) == "my chair" and labels(state) == ["Name atom 0 'my chair'"]
@@ -182,16 +185,10 @@ def test_atoms_are_named_by_the_person_or_by_words(shown: State) -> None:
 
 
 def test_framing_the_selection_flies_to_it(shown: State) -> None:
-    state = after(shown, found(0, CHAIRS), edit.FrameSelection(), do.Tick(shown.now + FLIGHT_SECONDS))
+    state = after(shown, found(0, CHAIRS), point.FrameSelection(), do.Tick(shown.now + FLIGHT_SECONDS))
     # Its front is a square of 0.4 around (x, y), at the block's z - 0.2.
     assert state.pose.pivot == pytest.approx((CHAIR[0], CHAIR[1], CHAIR[2] - 0.2), abs=0.01)
     assert state.pose.reach < shown.pose.reach * 2 and state.view is None
-
-
-def test_offers_end(shown: State) -> None:
-    offer = Offer(Path("x.edits"), "room", 3, datetime(2026, 1, 2))
-    state = after(shown, edit.OfferEdits(offer))
-    assert state.editing.offer == offer and after(state, edit.EndOffer()).editing.offer is None
 
 
 def test_commands_without_a_scene_do_nothing() -> None:
@@ -199,12 +196,9 @@ def test_commands_without_a_scene_do_nothing() -> None:
         found(0, 1), edit.SelectAll(), edit.Deselect(), edit.Invert(), edit.Delete(), edit.Hide(),
         edit.Isolate(), edit.ShowAll(), edit.Undo(), edit.Redo(), edit.GoTo(3), edit.FindFloaters(),
         edit.EndFloaters("delete"), edit.RenameAtom(0, "x"), edit.MergeAtoms((0, 1)), edit.ToggleAtom(0),
-        edit.FindSimilar(), edit.FrameSelection(), edit.SelectRegion(Region(((0, 0), (1, 1)))), edit.Grow(),
+        point.FindSimilar(), point.FrameSelection(), edit.SelectRegion(Region(((0, 0), (1, 1)))), edit.Grow(),
     )  # fmt: skip
     assert after(State(), *every) == State()
-
-
-# Regions
 
 
 def test_boxes_and_strokes_are_pixels() -> None:
