@@ -41,11 +41,7 @@ def order(state: State) -> Order | str:
         return "Type a file name."
     if os.path.realpath(target) in _real(scene_file, info.path):
         return "This file is the scene itself; choose another name."
-    written = (
-        target,
-        *(target.with_name(f"{target.stem}_{v}{target.suffix}") for v in range(len(info.views))),
-    )
-    if _real(*written) & _real(*(photo.path for photo in state.photos)):
+    if _real(*_written(target, len(info.views))) & _real(*(photo.path for photo in state.photos)):
         return "This would replace a photo of the tray; choose another name."
     phrases, problem = _phrases(state)
     if problem:
@@ -55,19 +51,31 @@ def order(state: State) -> Order | str:
         words += ["--what", form.what.word]
     if phrases:
         words += ["--prompt", *phrases, *_threshold(state)]
-    camera_file = None
-    if form.what.looks and form.all_views:
-        words.append("--all-views")
-    elif form.what.looks and state.view is not None:
-        words += ["--view", str(state.view)]
-    elif form.what.looks:
-        camera_file = target.with_name(f"{target.stem}.camera.json")
-        words += ["--camera", str(camera_file)]
+    seen_from, camera_file = _seen_from(state, target)
+    words += seen_from
     if form.what.sized:
         words += ["--size", "{}x{}".format(*pixels(form.side, state.pose.aspect))]
     if form.what is What.VIDEO:
         words += ["--seconds", f"{form.seconds:g}"]
     return Order(tuple(words), target, camera_file)
+
+
+def _written(target: Path, num_views: int) -> list[Path]:
+    """What the command may write: one file, or one a view."""
+    return [target, *(target.with_name(f"{target.stem}_{v}{target.suffix}") for v in range(num_views))]
+
+
+def _seen_from(state: State, target: Path) -> tuple[list[str], Path | None]:
+    """The words that say where from it is looked at, and the camera file that they name, if any."""
+    form = state.exporting.form
+    if not form.what.looks:
+        return [], None
+    if form.all_views:
+        return ["--all-views"], None
+    if state.view is not None:
+        return ["--view", str(state.view)], None
+    camera_file = target.with_name(f"{target.stem}.camera.json")
+    return ["--camera", str(camera_file)], camera_file
 
 
 def _real(*files: Path | None) -> set[str]:

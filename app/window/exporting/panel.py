@@ -67,30 +67,36 @@ def _kinds(form: ExportForm, look: Look) -> ExportForm:
 def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
     what = form.what
     if what.looks:
-        imgui.align_text_to_frame_padding()
-        imgui.text("Seen from")
-        imgui.same_line(look.px(110))
+        _label("Seen from", look)
         count = len(state.info.views) if state.info else 0
         options = (("the view on show", False), (f"all {count} photos' views", True))
         form = replace(form, all_views=widgets.choice(options, form.all_views))
     if what.sized:
-        imgui.align_text_to_frame_padding()
-        imgui.text("Longer side")
-        imgui.same_line(look.px(110))
+        _label("Longer side", look)
         form = replace(form, side=widgets.choice([(str(side), side) for side in SIDES], form.side))
         imgui.same_line()
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.MUTED, "px")
     if what is What.VIDEO:
-        imgui.align_text_to_frame_padding()
-        imgui.text("Length")
-        imgui.same_line(look.px(110))
+        _label("Length", look)
         width = imgui.get_content_region_avail().x
         changed, seconds = widgets.slider(
             "##seconds", form.seconds, SECONDS, f"{form.seconds:.0f} s", "", width
         )
         if changed:
             form = replace(form, seconds=float(round(seconds)))
+    return _narrowed(state, form, look)
+
+
+def _label(text: str, look: Look) -> None:
+    imgui.align_text_to_frame_padding()
+    imgui.text(text)
+    imgui.same_line(look.px(110))
+
+
+def _narrowed(state: State, form: ExportForm, look: Look) -> ExportForm:
+    """To what the phrases find, or to what is selected."""
+    what = form.what
     if what.takes_phrases and not what.needs_phrases:
         imgui.begin_disabled(not state.asked)
         changed, only = widgets.checkbox("Only what the phrases find", form.only_found)

@@ -1,6 +1,7 @@
 """The few dialogs."""
 
 import os
+from collections.abc import Callable
 
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
@@ -64,30 +65,12 @@ def draw(state: State, look: Look) -> list[do.Command]:
     if state.dialog is None:
         return []
     title = TITLES[state.dialog]
-    if not imgui.is_popup_open(title):
-        imgui.open_popup(title)
-    middle = imgui.get_main_viewport().get_center()
-    imgui.set_next_window_pos(middle, imgui.Cond_.appearing, ImVec2(0.5, 0.5))
-    room, margin = imgui.get_io().display_size, look.px(24)
-    width = min(look.px(WIDTHS.get(state.dialog, 520.0)), room.x - margin)
-    imgui.set_next_window_size_constraints(ImVec2(width, 0), ImVec2(width, room.y - margin))  # then scrolls
-    imgui.set_next_window_size(ImVec2(width, 0))
+    _place(state.dialog, title, look)
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     opened, kept = imgui.begin_popup_modal(title, True, imgui.WindowFlags_.no_resize)
     issued: list[do.Command] = []
     if opened:
-        bodies = {
-            "save": _save,
-            "open": _open,
-            "help": _help,
-            "leave": _leave,
-            "save prompts": _save_prompts,
-            "load prompts": _load_prompts,
-            "export": export_panel.draw,
-            "settings": recovery_panels.draw_settings,
-            "log": _log,
-        }
-        issued = bodies[state.dialog](state, look)
+        issued = _body(state.dialog)(state, look)
         if not kept:
             issued.append(do.ShowDialog(None))
         if any(isinstance(c, _CLOSING) for c in issued):
@@ -95,6 +78,33 @@ def draw(state: State, look: Look) -> list[do.Command]:
         imgui.end_popup()
     imgui.pop_style_var()
     return issued
+
+
+def _place(dialog: str, title: str, look: Look) -> None:
+    """Open it in the middle, as wide as it wants and no higher than the window."""
+    if not imgui.is_popup_open(title):
+        imgui.open_popup(title)
+    middle = imgui.get_main_viewport().get_center()
+    imgui.set_next_window_pos(middle, imgui.Cond_.appearing, ImVec2(0.5, 0.5))
+    room, margin = imgui.get_io().display_size, look.px(24)
+    width = min(look.px(WIDTHS.get(dialog, 520.0)), room.x - margin)
+    imgui.set_next_window_size_constraints(ImVec2(width, 0), ImVec2(width, room.y - margin))  # then scrolls
+    imgui.set_next_window_size(ImVec2(width, 0))
+
+
+def _body(dialog: str) -> Callable[[State, Look], list[do.Command]]:
+    """What draws the inside of a dialog."""
+    return {
+        "save": _save,
+        "open": _open,
+        "help": _help,
+        "leave": _leave,
+        "save prompts": _save_prompts,
+        "load prompts": _load_prompts,
+        "export": export_panel.draw,
+        "settings": recovery_panels.draw_settings,
+        "log": _log,
+    }[dialog]
 
 
 def _save(state: State, look: Look) -> list[do.Command]:

@@ -29,13 +29,7 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
     place, size = ImVec2(left, top), ImVec2(max(width - left, 1), max(height - bar - top, 1))
     issued = _picture(state, look, place, size)
     with widgets.window("##panel", ImVec2(0, 0), ImVec2(left, height - bar), scrolls=True):
-        issued += export_panel.draw_progress(state, look)
-        issued += tray.draw(state, look)
-        widgets.gap(look.px(6))
-        imgui.separator()
-        widgets.gap(look.px(6))
-        issued += prompts.draw(state, look)
-        issued += history.draw(state, look)
+        issued += _side(state, look)
     with widgets.window("##toolbar", ImVec2(left, 0), ImVec2(size.x, top)):
         imgui.set_cursor_pos_y((top - imgui.get_frame_height()) / 2)
         issued += toolbar.draw(state, look)
@@ -55,6 +49,17 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
     issued += keys.draw(state)
     pixels = io.display_framebuffer_scale
     return issued, (round(size.x * pixels.x), round(size.y * pixels.y))
+
+
+def _side(state: State, look: Look) -> list[do.Command]:
+    """The panel on the left: photos, phrases, edits."""
+    issued = export_panel.draw_progress(state, look)
+    issued += tray.draw(state, look)
+    widgets.gap(look.px(6))
+    imgui.separator()
+    widgets.gap(look.px(6))
+    issued += prompts.draw(state, look)
+    return issued + history.draw(state, look)
 
 
 def _picture(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:

@@ -120,8 +120,20 @@ def _row(state: State, k: int, atoms: tuple[Atom, ...], share: float, look: Look
     issued = _picture(state, k, look)
     imgui.same_line(0, look.px(10))
     imgui.begin_group()
-    atom, side = atoms[k], imgui.get_frame_height()
     start, room = imgui.get_cursor_pos_x(), imgui.get_content_region_avail().x - look.px(6)
+    issued += _name(state, k, atoms[k], room, look)
+    figure = f"{100 * share:.1f} %"
+    _column(start + room - imgui.calc_text_size(figure).x)
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.MUTED, figure)
+    issued += _words(state, k, atoms, start, room, look)
+    imgui.end_group()
+    return issued
+
+
+def _name(state: State, k: int, atom: Atom, room: float, look: Look) -> list[do.Command]:
+    """A field for the name."""
+    issued: list[do.Command] = []
     imgui.set_next_item_width(room - look.px(62))
     with widgets.colours(text=theme.TEXT if atom.on else theme.MUTED):
         changed, name = imgui.input_text_with_hint(
@@ -130,10 +142,15 @@ def _row(state: State, k: int, atoms: tuple[Atom, ...], share: float, look: Look
     if changed or (imgui.is_item_deactivated_after_edit() and name != atom.name):
         issued.append(edit.RenameAtom(k, name))
     widgets.tooltip(f"Atom {k}; type to name it")
-    figure = f"{100 * share:.1f} %"
-    _column(start + room - imgui.calc_text_size(figure).x)
-    imgui.align_text_to_frame_padding()
-    imgui.text_colored(theme.MUTED, figure)
+    return issued
+
+
+def _words(
+    state: State, k: int, atoms: tuple[Atom, ...], start: float, room: float, look: Look
+) -> list[do.Command]:
+    """The nearest words between `start` and `room` beyond it; at their right voice and tick."""
+    issued: list[do.Command] = []
+    atom, side = atoms[k], imgui.get_frame_height()
     words = ", ".join(state.editing.names[k]) if k < len(state.editing.names) else "..."
     merged = sum(other.into == k for other in atoms) - 1
     tail = f"  +{merged} merged" if merged else ""
@@ -151,7 +168,6 @@ def _row(state: State, k: int, atoms: tuple[Atom, ...], share: float, look: Look
     widgets.tooltip("Tick to merge")
     if ticked:
         issued.append(ask.ChooseAtom(k, chosen))
-    imgui.end_group()
     return issued
 
 

@@ -32,8 +32,22 @@ def draw(state: State, look: Look) -> list[do.Command]:
 
 
 def _row(state: State, prompt: Prompt, look: Look, caret: bool) -> list[do.Command]:
-    issued: list[do.Command] = []
     corner = imgui.get_cursor_screen_pos()
+    issued = _phrase(state, prompt, look, caret)
+    issued += _row_buttons(state, prompt, look)
+    if prompt.text.strip() and prompt.visible and state.info is not None:
+        issued += _verdict(prompt, look)
+    shown = state.active_prompt
+    if shown is not None and shown.key == prompt.key and len(state.asked) > 1:
+        end = ImVec2(corner.x - look.px(6), imgui.get_cursor_screen_pos().y - look.px(10))
+        start = ImVec2(end.x - look.px(3), corner.y)
+        imgui.get_window_draw_list().add_rect_filled(start, end, widgets.u32(theme.ACCENT), look.px(2))
+    return issued
+
+
+def _phrase(state: State, prompt: Prompt, look: Look, caret: bool) -> list[do.Command]:
+    """Its colour and its words."""
+    issued: list[do.Command] = []
     changed, colour = imgui.color_edit3("##colour", list(prompt.colour), _SWATCH)
     if changed:
         red, green, blue = colour
@@ -52,6 +66,12 @@ def _row(state: State, prompt: Prompt, look: Look, caret: bool) -> list[do.Comma
         issued.append(ask.SelectPrompt(prompt.key))
     if changed:
         issued.append(ask.EditPrompt(prompt.key, text))
+    return issued
+
+
+def _row_buttons(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
+    """Ask or not, select what it means, remove."""
+    issued: list[do.Command] = []
     imgui.same_line(0, look.px(2))
     eye = fa.ICON_FA_EYE if prompt.visible else fa.ICON_FA_EYE_SLASH
     if widgets.quiet_button(f"{eye}##eye", "Ask, or leave out"):
@@ -65,13 +85,6 @@ def _row(state: State, prompt: Prompt, look: Look, caret: bool) -> list[do.Comma
     imgui.same_line(0, look.px(2))
     if widgets.quiet_button(f"{fa.ICON_FA_XMARK}##remove", "Remove"):
         issued.append(ask.RemovePrompt(prompt.key))
-    if prompt.text.strip() and prompt.visible and state.info is not None:
-        issued += _verdict(prompt, look)
-    shown = state.active_prompt
-    if shown is not None and shown.key == prompt.key and len(state.asked) > 1:
-        end = ImVec2(corner.x - look.px(6), imgui.get_cursor_screen_pos().y - look.px(10))
-        start = ImVec2(end.x - look.px(3), corner.y)
-        imgui.get_window_draw_list().add_rect_filled(start, end, widgets.u32(theme.ACCENT), look.px(2))
     return issued
 
 

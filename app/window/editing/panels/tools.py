@@ -149,6 +149,19 @@ def _selection(state: State, look: Look, room: float) -> list[do.Command]:
         return issued
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
     imgui.same_line(0, look.px(14))
+    issued += _actions()
+    if room < look.px(_LONG):
+        imgui.new_line()
+    else:
+        imgui.same_line(0, look.px(14))
+    issued += _growing(state, look)
+    imgui.pop_style_var()
+    return issued
+
+
+def _actions() -> list[do.Command]:
+    """What is done with a selection, a button each; the line goes on."""
+    issued: list[do.Command] = []
     actions: list[tuple[str, str, do.Command]] = [
         (fa.ICON_FA_CIRCLE_HALF_STROKE, "Select the rest instead  (Ctrl+I)", edit.Invert()),
         (fa.ICON_FA_EYE_SLASH, "Hide", edit.Hide()),
@@ -162,10 +175,13 @@ def _selection(state: State, look: Look, room: float) -> list[do.Command]:
             issued.append(command)
         widgets.tooltip(tip)
         imgui.same_line()
-    if room < look.px(_LONG):
-        imgui.new_line()
-    else:
-        imgui.same_line(0, look.px(14))
+    return issued
+
+
+def _growing(state: State, look: Look) -> list[do.Command]:
+    """Grow the selection, over anything or over what the active phrase means, and how far."""
+    issued: list[do.Command] = []
+    editing = state.editing
     if imgui.button(f"{fa.ICON_FA_MAXIMIZE}  Grow"):
         issued.append(edit.Grow())
     widgets.tooltip(f"Add everything within {editing.reach:.0f} spacings  (G)")
@@ -182,7 +198,6 @@ def _selection(state: State, look: Look, room: float) -> list[do.Command]:
     )
     if changed:
         issued.append(point.SetReach(round(reach)))
-    imgui.pop_style_var()
     return issued
 
 
@@ -212,6 +227,12 @@ def _floaters(state: State, found: Floaters, look: Look, room: float) -> list[do
     if changed:
         issued.append(edit.SetStrictness(strictness))
     imgui.same_line(0, look.px(14))
+    return issued + _end_floaters(count)
+
+
+def _end_floaters(count: int) -> list[do.Command]:
+    """The ways out of the preview of so many."""
+    issued: list[do.Command] = []
     imgui.begin_disabled(count == 0)
     if widgets.primary_button("Delete##floaters"):
         issued.append(edit.EndFloaters("delete"))

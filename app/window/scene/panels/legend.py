@@ -44,10 +44,7 @@ def _body(state: State, look: Look) -> None:
         middle = (prompt.cut + 1) / 2
         _bar(prompt.text, "turbo", (f"{prompt.cut:.2f}", f"{middle:.2f}", "1.00"), look)
     elif mode is Mode.MARGIN:
-        low, high = margin_span(len(state.asked))
-        alone = len(state.asked) == 1
-        title = f"{state.asked[0].text}, over its threshold" if alone else "Best phrase over the second best"
-        _bar(title, "turbo", (f"{low:.2f}", f"{(low + high) / 2:.2f}", f"{high:.2f}"), look)
+        _margin(state, look)
     elif mode in (Mode.LABELS, Mode.MASKS, Mode.ISOLATE, Mode.HIDE, Mode.DIM):
         _prompts(state, look)
     elif mode is Mode.DEPTH:
@@ -64,6 +61,13 @@ def _body(state: State, look: Look) -> None:
         _atoms(state, look)
     else:
         _trust(state, look)
+
+
+def _margin(state: State, look: Look) -> None:
+    low, high = margin_span(len(state.asked))
+    alone = len(state.asked) == 1
+    title = f"{state.asked[0].text}, over its threshold" if alone else "Best phrase over the second best"
+    _bar(title, "turbo", (f"{low:.2f}", f"{(low + high) / 2:.2f}", f"{high:.2f}"), look)
 
 
 def _bar(title: str, colormap: str, numbers: tuple[str, ...], look: Look) -> None:

@@ -195,6 +195,21 @@ def _details(state: State, index: int, photo: Photo, look: Look) -> list[do.Comm
     if imgui.button(f"{fa.ICON_FA_ROTATE_LEFT}  As recorded" if photo.recorded else "Assume again"):
         issued.append(show.SetPhotoFov(index, None))
     imgui.end_disabled()
+    issued += _order(state, index)
+    imgui.same_line()
+    if imgui.button(fa.ICON_FA_TRASH):
+        issued.append(show.RemovePhoto(index))
+        imgui.close_current_popup()
+    widgets.tooltip("Take it out of the tray")
+    for note in photo.notes:
+        _warning(said_here(note))
+    imgui.end_popup()
+    return issued
+
+
+def _order(state: State, index: int) -> list[do.Command]:
+    """Two arrows that take a photo one place earlier or later."""
+    issued: list[do.Command] = []
     for label, place, tip in (
         (fa.ICON_FA_ARROW_LEFT, index - 1, "Earlier; the first photo's camera becomes the world"),
         (fa.ICON_FA_ARROW_RIGHT, index + 1, "Later"),
@@ -205,14 +220,6 @@ def _details(state: State, index: int, photo: Photo, look: Look) -> list[do.Comm
             issued.append(show.MovePhoto(index, place))
         imgui.end_disabled()
         widgets.tooltip(tip)
-    imgui.same_line()
-    if imgui.button(fa.ICON_FA_TRASH):
-        issued.append(show.RemovePhoto(index))
-        imgui.close_current_popup()
-    widgets.tooltip("Take it out of the tray")
-    for note in photo.notes:
-        _warning(said_here(note))
-    imgui.end_popup()
     return issued
 
 
