@@ -16,6 +16,6 @@ def run(paths: Sequence[str | Path] = ()) -> int:
     Raises:
         GraphicsError: no display, or no OpenGL 3.3.
     """
-    from app.window.session import Session  # glfw and ImGui load here, not with the package
+    from .session import Session  # glfw and ImGui load here, not with the package
 
     return Session(paths).run()

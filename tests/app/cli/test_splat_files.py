@@ -12,7 +12,7 @@ import torch
 from PIL import Image
 
 from app.cli.commands.export import SCENES, SUFFIXES
-from app.window.drops import SCENE_SUFFIXES
+from app.window.scene.drops import SCENE_SUFFIXES
 from langflash_core.export import READERS, WRITERS, export, read
 from langflash_core.language.spaces import language_space
 from langflash_core.types import Scene
