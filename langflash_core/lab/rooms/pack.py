@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, UInt8
 from PIL import Image
 
 from langflash_core.errors import InputError
@@ -286,7 +286,7 @@ def _ranges(counts: Int[np.ndarray, " I"]) -> Int[np.ndarray, "I 2"]:
 
 
 def _decode_textures(
-    joined: Int[np.ndarray, " Z"], sizes: Int[np.ndarray, " L"]
+    joined: UInt8[np.ndarray, " Z"], sizes: Int[np.ndarray, " L"]
 ) -> Int[np.ndarray, "L S S 4"]:
     layers = np.zeros((max(len(sizes), 1), TEXTURE_SIZE, TEXTURE_SIZE, 4), dtype=np.uint8)
     starts = np.cumsum(sizes) - sizes
