@@ -60,7 +60,7 @@ class Pack:
     material_ids: Int[np.ndarray, " N"]
     faces: Int[np.ndarray, "F 3"]
     material_table: Float[np.ndarray, "M 2 4"]
-    textures: Int[np.ndarray, "L S S 4"]
+    textures: UInt8[np.ndarray, "L S S 4"]
     heights: Float[np.ndarray, "I R R"]
 
     def select(self, libraries: Iterable[str]) -> tuple[int, ...]:
@@ -287,7 +287,7 @@ def _ranges(counts: Int[np.ndarray, " I"]) -> Int[np.ndarray, "I 2"]:
 
 def _decode_textures(
     joined: UInt8[np.ndarray, " Z"], sizes: Int[np.ndarray, " L"]
-) -> Int[np.ndarray, "L S S 4"]:
+) -> UInt8[np.ndarray, "L S S 4"]:
     layers = np.zeros((max(len(sizes), 1), TEXTURE_SIZE, TEXTURE_SIZE, 4), dtype=np.uint8)
     starts = np.cumsum(sizes) - sizes
     for layer, (start, size) in enumerate(zip(starts, sizes, strict=True)):
