@@ -309,7 +309,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class PromptAnswer:
-    """One phrase answered in one view; the fields of `query --json` (blueprint section 7).
+    """One phrase answered in one view; the fields of `query --json`.
 
     score: the value compared with `threshold` to decide `found`. area: fraction of pixels in
     the mask. centroid, box (center, axes (3, 3) rows, size): scene units, None when not found.

@@ -191,7 +191,7 @@ def _add_export(commands) -> None:
         command,
         "FILE",
         ".png: a picture, or a cut-out with --prompt; .ply, .splat, .langflash: Gaussians; "
-        ".json: COCO masks of --prompt; .csv: their boxes; .npz: a view as numbers; .mp4: a flight",
+        ".json: COCO masks of --prompt; .csv, .glb: their boxes; .npz: a view as numbers; .mp4: a flight",
     )
     command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="keep only what answers one of these")
     command.add_argument(
@@ -201,7 +201,7 @@ def _add_export(commands) -> None:
         "--what",
         choices=("rgb", "heat", "mask", "cutout", "labels", "boxes"),
         help="of a .png: colours, a heat-map, a mask, a cut-out with transparency (default with --prompt), "
-        "or phrase numbers with a legend as .json; boxes: a .json or .csv of places and sizes",
+        "or phrase numbers with a legend as .json; boxes: a .json, .csv or .glb of places and sizes",
     )
     command.add_argument(
         "--all-views", action="store_true", help="from every photo: FILE_0, FILE_1 and so on"

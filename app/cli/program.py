@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from app.cli.parser import build_parser, joined
 from app.cli.report import say_error
 from langflash_core.errors import LangFlashError
+from langflash_core.extras import optional_packages
 
 # Imports make a million objects that stay; looking for garbage among them, as Python would do
 # every 700 of them, is a tenth of the time that torch takes.
@@ -68,10 +69,11 @@ def _run(argv: Sequence[str] | None) -> int:
         # background with that signal ignored, and every child inherits it.
         with contextlib.suppress(ValueError):  # not the main thread
             signal.signal(signal.SIGINT, signal.default_int_handler)
-    command = importlib.import_module(f"app.cli.commands.{args.command.replace('-', '_')}")
-    if not getattr(args, "json", False):
-        return command.run(args, sys.stdout) or 0
-    # stdout carries one document and nothing else, whatever a library prints.
-    document_stream = sys.stdout
-    with contextlib.redirect_stdout(sys.stderr):
-        return command.run(args, document_stream) or 0
+    with optional_packages():
+        command = importlib.import_module(f"app.cli.commands.{args.command.replace('-', '_')}")
+        if not getattr(args, "json", False):
+            return command.run(args, sys.stdout) or 0
+        # stdout carries one document and nothing else, whatever a library prints.
+        document_stream = sys.stdout
+        with contextlib.redirect_stdout(sys.stderr):
+            return command.run(args, document_stream) or 0

@@ -24,7 +24,8 @@ def check_encoder() -> None:
         import imageio_ffmpeg  # noqa: F401
     except ImportError:
         raise InputError(
-            "videos need the package imageio-ffmpeg, which is not installed; pip install 'langflash[video]'"
+            "videos need the package imageio-ffmpeg, which is not installed; "
+            "pip install 'langflash[video]' brings it"
         ) from None
 
 

@@ -56,7 +56,8 @@ class LSegSizes:
 
 @dataclass(frozen=True, kw_only=True)
 class Preset:
-    """What fixes shapes whatever the geometry, and what the paper leaves open (blueprint section 3)."""
+    """What fixes shapes whatever the geometry, and what the paper leaves open: thresholds and weights
+    are this project's choice, to be changed with numbers."""
 
     name: str
     space: str

@@ -1,6 +1,6 @@
 #version 330 core
 // Purpose: one Gaussian's sparse weights to the 3 * LAYERS dense weights of one pass, by transform feedback.
-// Source: blueprint section 6. gl_VertexID is the Gaussian's row (drawn through the order as index buffer).
+// Source: own. gl_VertexID is the Gaussian's row (drawn through the order as index buffer).
 
 uniform sampler2D sparse_weights;  // (atom, weight) texels, ROW_TEXELS a row, m texels a Gaussian
 uniform sampler2D slots;           // (K, 1): place of an atom among the atoms drawn, -1 if it is not

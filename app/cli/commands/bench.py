@@ -101,7 +101,7 @@ def _write(args: Namespace, measured: dict) -> None:
             from app.bench.plot import write_plot
         except ImportError:
             say_warnings(
-                ["the plot is left out, because matplotlib is missing; pip install matplotlib brings it"]
+                ["the plot is left out without matplotlib; pip install 'langflash[bench]' brings it"]
             )
         else:
             write_plot(measured, staging / "bench.png")
