@@ -9,10 +9,11 @@ import sys
 import traceback
 from collections.abc import Sequence
 
-from app.cli.parser import build_parser, joined
-from app.cli.report import say_error
 from langflash_core.errors import LangFlashError
 from langflash_core.extras import optional_packages
+
+from .parser import build_parser, joined
+from .report import say_error
 
 # Imports make a million objects that stay; looking for garbage among them, as Python would do
 # every 700 of them, is a tenth of the time that torch takes.
@@ -70,7 +71,7 @@ def _run(argv: Sequence[str] | None) -> int:
         with contextlib.suppress(ValueError):  # not the main thread
             signal.signal(signal.SIGINT, signal.default_int_handler)
     with optional_packages():
-        command = importlib.import_module(f"app.cli.commands.{args.command.replace('-', '_')}")
+        command = importlib.import_module(f".commands.{args.command.replace('-', '_')}", __package__)
         if not getattr(args, "json", False):
             return command.run(args, sys.stdout) or 0
         # stdout carries one document and nothing else, whatever a library prints.

@@ -7,12 +7,13 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from app.cli import pictures
-from app.cli.commands.query import answer_fields
 from langflash_core.export import glb
 from langflash_core.export.png import heat_over, label_map, to_8bit, write_labels, write_mask
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.types import Frame, QueryResult, Scene
+
+from . import pictures
+from .commands.query import answer_fields
 
 COLUMNS = (
     "view", "prompt", "found", "score", "threshold", "area", "unit",

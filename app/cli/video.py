@@ -5,11 +5,12 @@ from pathlib import Path
 
 import torch
 
-from app.cli.renderers import Renderer
-from app.window.poses import Pose, blend, from_view, median_reach, orbit, to_camera
 from langflash_core.errors import InputError, LangFlashError
 from langflash_core.running import Progress
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
+
+from ..window.poses import Pose, blend, from_view, median_reach, orbit, to_camera
+from .renderers import Renderer
 
 RATE = 30  # pictures a second
 SECONDS = 6.0

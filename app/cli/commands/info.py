@@ -3,8 +3,8 @@
 from argparse import Namespace
 from typing import Any, TextIO
 
-from app.cli.report import write_json
-from app.cli.scenes import open_scene
+from ..report import write_json
+from ..scenes import open_scene
 
 
 def run(args: Namespace, out: TextIO) -> None:

@@ -5,9 +5,10 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TextIO
 
-from app.cli.files import check_output_file, readable_file
-from app.cli.report import ProgressBar, say_warnings, write_json
 from langflash_core.errors import ImageError, WeightsError
+
+from ..files import check_output_file, readable_file
+from ..report import ProgressBar, say_warnings, write_json
 
 
 def run(args: Namespace, out: TextIO) -> None:
