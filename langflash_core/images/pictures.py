@@ -87,7 +87,7 @@ def read_pictures(
 def _picture(photo: Photo, size: tuple[int, int]) -> Picture:
     box = centre_box(photo.width, photo.height, size)
     pixels, source = np.asarray(_scaled(photo, box, size)), _source_jpeg(photo, box, size)
-    return Picture(photo.facts, box, pixels, source, _judged_grey(photo.image))
+    return Picture(photo.facts, box, pixels, source, judged_grey(photo.image))
 
 
 def photo_paths(photos: Sequence[Path | str]) -> list[Path]:
@@ -152,7 +152,8 @@ def _scaled(photo: Photo, box: Box, size: tuple[int, int]) -> Image.Image:
     return photo.image.resize(size, Image.Resampling.LANCZOS, box=inside, reducing_gap=3.0)
 
 
-def _judged_grey(image: Image.Image) -> np.ndarray:
+def judged_grey(image: Image.Image) -> np.ndarray:
+    """The whole photo, (h, w) uint8, at the size where light and sharpness are judged."""
     ratio = min(1.0, JUDGED_SIDE / min(image.size))
     size = max(3, round(image.width * ratio)), max(3, round(image.height * ratio))
     return np.asarray(image.convert("L").resize(size, Image.Resampling.LANCZOS, reducing_gap=3.0))

@@ -163,6 +163,7 @@ def _look_at(photo: "Photo") -> tuple[float | None, tuple[str, ...]]:
     import torch
 
     from langflash_core.images.lens import exif_focal
+    from langflash_core.images.pictures import judged_grey
     from langflash_core.images.triage import photo_notes
 
     focal = exif_focal(photo)
@@ -171,7 +172,7 @@ def _look_at(photo: "Photo") -> tuple[float | None, tuple[str, ...]]:
     small = photo.image.copy()
     small.thumbnail((256, 256))  # about what the network sees
     image = torch.from_numpy(np.array(small, dtype=np.float32)).permute(2, 0, 1) / 255
-    return fov, tuple(photo_notes(photo, image))
+    return fov, tuple(photo_notes(photo, image, judged_grey(photo.image)))
 
 
 @dataclass(frozen=True)
