@@ -1,7 +1,8 @@
 """What can happen, one frozen dataclass each; `apply(state, command)` is the next state, purely.
 
-A command that also needs the outside world (the worker, a file, a clock) is seen once more by
-the session after its pure change. Times come from `state.now`.
+Here those that no feature owns; the others are in the features' own `commands`. A command that also
+needs the outside world (the worker, a file, the picture) is seen once more by its feature's `effects`
+after its pure change. Times come from `state.now`.
 """
 
 from dataclasses import dataclass, field, replace

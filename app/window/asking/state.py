@@ -8,7 +8,6 @@ import numpy as np
 
 NEGATIVES = ("object", "things", "stuff", "texture")
 
-
 # Told apart by people with the common colour-vision deficiencies, on dark ground.
 PALETTE = (
     (0.96, 0.62, 0.16),
@@ -20,7 +19,6 @@ PALETTE = (
     (0.88, 0.36, 0.24),
     (0.70, 0.85, 0.82),
 )
-
 
 MOST_RECENT = 20
 PROMPT_DIALOGS = ("save prompts", "load prompts")

@@ -21,14 +21,11 @@ _DIGITS = (
 )  # fmt: skip
 _MODE_KEYS = tuple(zip(_DIGITS, KEYED, strict=True))
 
-
 # Taken from the event itself: on a slow machine S and the release of Ctrl share a frame.
 EDIT_SHORTCUTS: dict[tuple[str, bool], do.Command] = {  # with Ctrl; the second tells whether with Shift
     ("z", False): edit.Undo(), ("z", True): edit.Redo(), ("y", False): edit.Redo(),
     ("a", False): edit.SelectAll(), ("d", False): edit.Deselect(), ("i", False): edit.Invert(),
 }  # fmt: skip
-
-
 _TOOL_KEYS = (
     (imgui.Key.v, Tool.MOVE), (imgui.Key.x, Tool.POINT), (imgui.Key.r, Tool.BOX),
     (imgui.Key.b, Tool.BRUSH), (imgui.Key.c, Tool.PICK),

@@ -8,13 +8,14 @@ from imgui_bundle import icons_fontawesome_6 as fa
 from .. import commands as do
 from ..kit import theme, widgets
 from ..kit.look import Look
-from ..kit.theme import THEMES
 from ..state import State
 from . import commands as keep
 from . import preferences
-from .preferences import SPEEDS
+from .preferences import SPEEDS, THEMES
 
-_LABELS = 190.0
+_LABELS = 190.0  # design pixels
+_EDITS_OFFER = 470.0  # design pixels wide
+_OFFER = 480.0  # design pixels
 
 
 def draw_settings(state: State, look: Look) -> list[do.Command]:
@@ -54,9 +55,6 @@ def _label(text: str, look: Look) -> None:
     imgui.same_line(look.px(_LABELS))
 
 
-_OFFER = 480.0  # design pixels
-
-
 def draw_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
     """A session that ended badly, offered without standing in the way."""
     kept = state.recovery.session
@@ -81,9 +79,6 @@ def draw_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do
     imgui.pop_style_color()
     imgui.pop_style_var()
     return issued
-
-
-_EDITS_OFFER = 470.0  # design pixels wide
 
 
 def draw_edits_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
