@@ -1,7 +1,7 @@
 """Weights come out of a file at any address; what is computed with them must not depend on it.
 
-Matrix products choose their way by the address of their numbers. Before weights were moved to
-multiples of 64 bytes, the same file with a longer header gave a dictionary that differed by 1.5e-8.
+Matrix products may choose their way by the address of their numbers (MKL promises equal bits for equal
+addresses modulo 64 alone), so weights are moved to where torch itself would have put them.
 """
 
 import os
