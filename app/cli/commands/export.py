@@ -16,7 +16,7 @@ from langflash_core.errors import InputError, PromptError, SceneFileError
 from langflash_core.types import Camera, QueryResult, Scene
 
 SCENES = (".langflash", ".ply", ".splat")
-SUFFIXES = (".png", *SCENES, ".json", ".csv", ".glb", ".mp4", ".npz")
+SUFFIXES = (".png", *SCENES, ".json", ".csv", ".mp4", ".npz", ".glb")
 TABLES = {".json": ".json of masks", ".csv": ".csv of boxes", ".glb": ".glb of boxes"}
 NEED_A_PHRASE = ("heat", "mask", "cutout", "labels", "boxes")
 
