@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import NoReturn
 
 import langflash_core
-from app.cli.values import (
+from langflash_core.errors import InputError
+
+from .values import (
     above_zero,
     atom_count,
     film_seconds,
@@ -22,7 +24,6 @@ from app.cli.values import (
     what,
     whole_count,
 )
-from langflash_core.errors import InputError
 
 # The decisions that `bench` compares: app.bench.modes.AXES, which would bring torch along.
 BENCH_AXES = ("precision", "relevance", "weights", "cut", "dictionary", "resolution", "detail", "sort")

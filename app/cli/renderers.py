@@ -4,10 +4,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
-from app.cli.report import say_warnings
 from langflash_core.errors import GraphicsError, MissingPackageError
 from langflash_core.extras import optional_packages
 from langflash_core.types import Camera, Frame, Scene
+
+from .report import say_warnings
 
 
 class Renderer(Protocol):
@@ -41,7 +42,7 @@ class GlRenderer:
 
     def __init__(self) -> None:
         with optional_packages():
-            from app.gl import SplatRenderer, offscreen_context
+            from ..gl import SplatRenderer, offscreen_context
 
         self._context = offscreen_context()
         self._splats = SplatRenderer(self._context)
@@ -78,7 +79,7 @@ def open_renderer(backend: str | None) -> Iterator[Renderer]:
         renderer = GlRenderer()
     except (GraphicsError, MissingPackageError) as problem:
         if backend == "gl":
-            raise
+            raise GraphicsError(f"{problem}, or use --backend torch") from problem
         say_warnings([f"{str(problem).rstrip('.')}; drawing with the slow torch reference instead"])
         yield TorchRenderer()
         return

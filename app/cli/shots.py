@@ -7,12 +7,13 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from app.cli import pictures
-from app.cli.commands.query import answer_fields
 from langflash_core.export import glb
 from langflash_core.export.png import heat_over, label_map, to_8bit, write_labels, write_mask
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.types import Frame, QueryResult, Scene
+
+from . import pictures
+from .commands.query import answer_fields
 
 COLUMNS = (
     "view", "prompt", "found", "score", "threshold", "area", "unit",
@@ -50,7 +51,7 @@ def box_rows(
     results: Sequence[QueryResult], views: Iterable[int | None], scene: Scene
 ) -> list[dict[str, Any]]:
     """A row per view and phrase; lengths in metres where the scene's scale is known."""
-    metres = scene.metadata.get("metric_scale")
+    metres = scene.record.metric_scale
     return [
         {"view": view, **answer_fields(answer, metres or 1.0), "unit": "m" if metres else "scene"}
         for view, result in zip(views, results, strict=True)

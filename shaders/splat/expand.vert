@@ -16,6 +16,6 @@ void main() {
         vec2 pair = texelFetch(sparse_weights, ivec2(texel % ROW_TEXELS, texel / ROW_TEXELS), 0).rg;
         float slot = texelFetch(slots, ivec2(int(pair.x), 0), 0).r - float(first_slot);
         for (int layer = 0; layer < LAYERS; ++layer)
-            out_weights[layer] += pair.y * vec3(equal(vec3(slot), 3.0 * float(layer) + vec3(0.0, 1.0, 2.0)));
+            out_weights[layer] += pair.y * vec3(equal(vec3(slot), float(ATOMS_A_LAYER * layer) + vec3(0.0, 1.0, 2.0)));
     }
 }

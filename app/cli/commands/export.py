@@ -5,15 +5,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
 
-from app.cli import shots
-from app.cli.cameras import CameraChoice, chosen_camera
-from app.cli.commands.query import spoken
-from app.cli.files import check_output_file, readable_file, staged_folder
-from app.cli.renderers import Renderer, open_renderer
-from app.cli.report import ProgressBar
-from app.cli.scenes import open_scene
 from langflash_core.errors import InputError, PromptError, SceneFileError
 from langflash_core.types import Camera, QueryResult, Scene
+
+from .. import shots
+from ..cameras import CameraChoice, chosen_camera
+from ..files import check_output_file, readable_file, staged_folder
+from ..renderers import Renderer, open_renderer
+from ..report import ProgressBar
+from ..scenes import open_scene
+from .query import spoken
 
 SCENES = (".langflash", ".ply", ".splat")
 SUFFIXES = (".png", *SCENES, ".json", ".csv", ".mp4", ".npz", ".glb")
@@ -35,7 +36,7 @@ def run(args: Namespace, out: TextIO) -> None:
     readable_file(args.scene, "scene", SceneFileError)
     write: Callable[..., str] = _write_scene
     if suffix == ".mp4":
-        from app.cli.video import check_encoder
+        from ..video import check_encoder
 
         check_encoder()
         write = _write_video
@@ -214,7 +215,7 @@ def _write_masks(args: Namespace, scene: Scene, prompts: list[str], choice: Came
 
 
 def _write_video(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
-    from app.cli import video
+    from .. import video
 
     chosen = _selected(args, scene, prompts)
     cameras = video.tour(scene, args.size or scene.view_size, args.seconds or video.SECONDS)

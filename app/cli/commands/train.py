@@ -7,13 +7,14 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any, TextIO
 
-from app.cli.files import check_folder, check_output_file, readable_file
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.lab.training.commands import run_adopt, run_cache, run_export, run_find_parts, run_train
 from langflash_core.lab.training.loop import LoopOptions
 from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS
 from langflash_core.resources import asset_path
+
+from ..files import check_folder, check_output_file, readable_file
 
 
 def run(args: Namespace, out: TextIO) -> None:

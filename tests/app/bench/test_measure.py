@@ -79,12 +79,11 @@ def test_a_cut_at_three_sigma_and_halves_lose_something(rows):
 class _FarOverNear(SplatBuffers):
     def sort(self, camera):
         super().sort(camera)
-        self.order = self.order[::-1].copy()
-        self._order_buffer.write(self.order.tobytes())
+        self.draw_in(self.order[::-1])
 
 
 def test_a_mode_that_is_wrong_shows_it(gl, case):
-    wrong = Mode("sort", "far over near", buffers=_FarOverNear)
+    wrong = Mode("sort", "far over near", splats=_FarOverNear)
     result = measure(gl, case, (DEFAULT, wrong), silent)
     (_, _, right), (_, _, broken) = result.rows
     assert broken.psnr < right.psnr - 20
