@@ -5,23 +5,21 @@ render -> query.relevance_maps -> query.answer
 """
 
 import sys
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import torch
 from torch import Tensor
 
 from langflash_core.ahead import Ahead, begin
-from langflash_core.errors import Cancelled, InputError, PromptError, ViewError, WeightsError
+from langflash_core.errors import InputError, PromptError, ViewError, WeightsError
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.views import load_views, source_pictures
 from langflash_core.language.answers import answer
 from langflash_core.language.clip import load_clip_images
-from langflash_core.language.gaussians import gaussian_relevance, kept
+from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.relevance import Mode, compile_query, relevance_maps
 from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_network
@@ -34,12 +32,12 @@ from langflash_core.network.semantics.crops import crop_atoms
 from langflash_core.network.semantics.grouping import Groups
 from langflash_core.network.semantics.lifting import lifted_weights
 from langflash_core.network.semantics.sam2 import Sam2, sam2_checkpoint
-from langflash_core.scene import assemble, prune
+from langflash_core.running import Progress, Run
+from langflash_core.scene.assemble import assemble
+from langflash_core.scene.prune import prune
 from langflash_core.splat import render as render_reference
 from langflash_core.splat.refine import Budget, refine
-from langflash_core.types import Camera, Frame, Prediction, QueryResult, Scene, Views
-
-Progress = Callable[[str, float], None]
+from langflash_core.types import Camera, Cost, Frame, Prediction, QueryResult, Scene, Views
 
 # Where each stage begins in the whole, from its measured share of the time on two CPU cores.
 STAGES = {"photos": 0.0, "weights": 0.1, "network": 0.2, "assemble": 0.85, "prune": 0.95, "refine": 0.97}
@@ -94,14 +92,14 @@ def reconstruct(
             imported; None: begun here.
 
     Returns:
-        A scene on the CPU; `metadata` holds seconds per stage, peak memory and warnings.
+        A scene on the CPU; its record holds seconds per stage, peak memory and warnings.
 
     Raises:
         ImageError: a photo cannot be used. InputError: an argument cannot.
         WeightsError: the checkpoint is missing or does not fit.
         Cancelled: `cancelled()` became true.
     """
-    run = _Run(progress, cancelled)
+    run = Run(STAGES, progress, cancelled)
     device = _device(device)
     if refine_seconds is not None:
         _check_refinement(refine_seconds, photos)
@@ -127,7 +125,8 @@ def reconstruct(
         placed = [v for v in range(views.num_views) if v not in prediction.unplaced]
         with run.stage("refine"):
             scene = _refined(scene, views.images[placed], refine_seconds, device, run.within("refine"))
-        scene = scene.with_metadata(timings={**scene.metadata["timings"], "fitting": run.timings["refine"]})
+        fitting = {**scene.record.cost.timings, "fitting": run.timings["refine"]}
+        scene = scene.with_record(cost=Cost(fitting))
     run.check()
     run.report("done", 1.0)
     return _with_record(scene, network, run.timings)
@@ -194,7 +193,7 @@ def select(scene: Scene, prompts: Sequence[str], *, threshold: float | None = No
             f"nothing in the scene answers {asked} (best score {highest:.3f}, threshold {limit:.3f}); "
             "lower the threshold"
         )
-    return kept(scene, passing)
+    return scene.rows(passing)
 
 
 def best_pair(
@@ -208,7 +207,7 @@ def best_pair(
     Raises:
         ImageError: a photo cannot be used. Cancelled: `cancelled()` became true.
     """
-    run = _Run(None, cancelled)
+    run = Run(STAGES, None, cancelled)
     greys = []
     for photo in photos:
         run.check()
@@ -216,53 +215,19 @@ def best_pair(
     return choose_pair(greys, run.check)
 
 
-@dataclass
-class _Run:
-    """One reconstruction under way: times its stages, reports them, stops between them."""
-
-    progress: Progress | None
-    cancelled: Callable[[], bool] | None
-    timings: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        self.check()
-        self.report(name, STAGES[name])
-        start = time.perf_counter()
-        yield
-        self.timings[name] = time.perf_counter() - start
-
-    def check(self) -> None:
-        if self.cancelled is not None and self.cancelled():
-            raise Cancelled("the reconstruction was cancelled; nothing was written")
-
-    def report(self, name: str, fraction: float) -> None:
-        if self.progress is not None:
-            self.progress(name, fraction)
-
-    def within(self, name: str) -> Progress:
-        """Progress of a stage's own steps, as a part of the whole."""
-        begins = list(STAGES.values())
-        start = STAGES[name]
-        end = next((begin for begin in begins if begin > start), 1.0)
-        return lambda step, fraction: self.report(step, start + (end - start) * fraction)
-
-
 def _with_record(scene: Scene, network: LangFlashNet, timings: dict[str, float]) -> Scene:
-    """The scene with the cost of its making, and the network's calibration, in its metadata.
+    """The scene with the cost of its making, and the network's calibration, in its record.
 
     `timings` stay disjoint seconds in order (the network's and the scene's own steps are in the
     scene already); `seconds` sums them up for the network and for all.
     """
     before = {name: timings[name] for name in ("photos", "weights")}
-    record = {
-        "timings": {**before, **scene.metadata.get("timings", {})},
-        "seconds": {"network": timings["network"], "total": sum(timings.values())},
-        "peak_memory_mb": peak_memory_mb(),
-    }
-    if network.calibration:
-        record["calibration"] = dict(network.calibration)
-    return scene.with_metadata(**record)
+    cost = Cost(
+        timings={**before, **scene.record.cost.timings},
+        seconds={"network": timings["network"], "total": sum(timings.values())},
+        peak_memory_mb=peak_memory_mb(),
+    )
+    return scene.with_record(cost=cost, calibration=dict(network.calibration))
 
 
 def _check_refinement(seconds: float, photos: Sequence) -> None:
@@ -279,20 +244,20 @@ def _refined(scene: Scene, images: Tensor, seconds: float, device: str, progress
     try:
         result = refine(_moved(scene, device), images.to(device), Budget(seconds), progress)
     except InputError as reason:
-        return scene.with_metadata(warnings=[*scene.metadata["warnings"], f"not refined: {reason}"])
+        return scene.with_record(warnings=(*scene.record.warnings, f"not refined: {reason}"))
     record = {
         "kept": result.kept,
-        "held_out": scene.metadata["photos"][result.view],
+        "held_out": scene.record.photos[result.view],
         "held_out_psnr_db": [round(value, 2) for value in result.held_out],
         "photos_psnr_db": [round(value, 2) for value in result.photos],
         "steps": list(result.steps),
     }
-    warnings = scene.metadata["warnings"]
+    warnings = scene.record.warnings
     if not result.kept:
         before, after = record["held_out_psnr_db"]
         note = f"not refined: {record['held_out']}, held out, came no closer ({before} dB, then {after} dB)"
-        warnings = [*warnings, note]
-    return _moved(result.scene, "cpu").with_metadata(refinement=record, warnings=warnings)
+        warnings = (*warnings, note)
+    return _moved(result.scene, "cpu").with_record(refinement=record, warnings=warnings)
 
 
 def _moved(scene: Scene, device: str) -> Scene:

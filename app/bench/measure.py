@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import moderngl
 import numpy as np
 
+from langflash_core.running import Progress
 from langflash_core.types import Camera, Scene
 
 from .cases import Case
@@ -22,7 +23,6 @@ from .twins import FullQuery, StaleOrder, SwitchedRenderer
 
 ERROR_FRAMES = 2  # the reference takes seconds to minutes a view
 _TIMER_END = 2**32 - 1  # nanoseconds: moderngl reads 32 bits
-Progress = Callable[[str, float], None]
 
 
 @dataclass

@@ -9,8 +9,8 @@ import moderngl
 from app.gl.combine import QueryPasses
 from app.gl.host import draws_in_software
 from app.gl.splats import SplatBuffers
-from langflash_core.scene import thin
 from langflash_core.scene.assemble import renormalised
+from langflash_core.scene.thin import thin
 from langflash_core.types import Scene
 
 from .twins import FullQuery, GramQuery, StaleOrder, ThreeSigma

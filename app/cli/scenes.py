@@ -19,5 +19,5 @@ def open_scene(path: Path) -> Scene:
 
     scene = read(path)
     if scene.semantics.space == NO_LANGUAGE:
-        say_warnings(scene.metadata.get("warnings", ()))
+        say_warnings(scene.record.warnings)
     return scene

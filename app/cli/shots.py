@@ -49,7 +49,7 @@ def box_rows(
     results: Sequence[QueryResult], views: Iterable[int | None], scene: Scene
 ) -> list[dict[str, Any]]:
     """A row per view and phrase; lengths in metres where the scene's scale is known."""
-    metres = scene.metadata.get("metric_scale")
+    metres = scene.record.metric_scale
     return [
         {"view": view, **answer_fields(answer, metres or 1.0), "unit": "m" if metres else "scene"}
         for view, result in zip(views, results, strict=True)

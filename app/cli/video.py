@@ -1,7 +1,6 @@
 """A scene as a film: from photo to photo and back, or around what has no photos."""
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import torch
@@ -9,6 +8,7 @@ import torch
 from app.cli.renderers import Renderer
 from app.window.poses import Pose, blend, from_view, median_reach, orbit, to_camera
 from langflash_core.errors import InputError, LangFlashError
+from langflash_core.running import Progress
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
 
 RATE = 30  # pictures a second
@@ -42,7 +42,7 @@ def write(
     scene: Scene,
     cameras: list[Camera],
     renderer: Renderer,
-    progress: Callable[[str, float], None],
+    progress: Progress,
 ) -> None:
     """Draw every camera into an H.264 file.
 

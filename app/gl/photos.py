@@ -1,7 +1,5 @@
 """What each photo sees: the depths of a scene in the views of its own photos, drawn once per scene."""
 
-from dataclasses import replace
-
 import moderngl
 import numpy as np
 from torch import Tensor
@@ -22,14 +20,6 @@ WORST = TOLERANCE
 MOST_PHOTOS = 32  # matrices of so many fit any driver's uniforms
 LONGEST_SIDE = 320  # pixels of a depth map
 _CAPACITIES = (2, 4, 8, 16, 32)
-
-
-def gaussians_per_view(scene: Scene) -> list[int] | None:
-    """How many Gaussians each photo made, in their order; None where the scene does not say."""
-    counts = scene.metadata.get("gaussians_per_view")
-    if not isinstance(counts, list | tuple) or len(counts) != scene.num_views:
-        return None
-    return list(counts) if sum(counts) == len(scene.gaussians) else None
 
 
 class PhotoDepths:
@@ -97,15 +87,9 @@ def _own_scene(scene: Scene, view: int) -> Scene:
     Raises:
         ValueError: the scene does not say which.
     """
-    counts = gaussians_per_view(scene)
-    if counts is None:
-        raise ValueError("scene: expected gaussians_per_view in its metadata, received none that fits")
-    rows = slice(sum(counts[:view]), sum(counts[: view + 1]))
-    semantics = scene.semantics
-    semantics = replace(
-        semantics, weight_ids=semantics.weight_ids[rows], weight_values=semantics.weight_values[rows]
-    )
-    return replace(scene, gaussians=scene.gaussians.map(lambda v: v[rows]), semantics=semantics)
+    if scene.view_ids is None:
+        raise ValueError("view_ids: expected the photo that made each Gaussian, received none")
+    return scene.rows(scene.view_ids == view)
 
 
 def _depths(ctx: moderngl.Context, programs: Programs, splats: SplatBuffers, camera: Camera) -> np.ndarray:

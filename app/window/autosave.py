@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 from app.window.drops import SCENE_SUFFIX
 from app.window.editing import Offer
 from app.window.places import state_folder
-from langflash_core.edits import History
 from langflash_core.errors import SceneFileError
+from langflash_core.scene.edits import History
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
@@ -30,8 +30,8 @@ def keep(scene: "Scene", history: History, name: str, path: Path | None, token: 
         OutputError: the folder cannot be written.
     """
     from langflash_core.files import make_folder
-    from langflash_core.scene import save
     from langflash_core.scene.edits_file import save_history, scene_digest
+    from langflash_core.scene.file import save
 
     digest = scene_digest(scene)
     edits = _place(digest, token)

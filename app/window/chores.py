@@ -31,7 +31,7 @@ from app.window.edit_messages import (
 )
 from app.window.editing import Reading, strongest
 from app.window.poses import Pose, to_camera
-from langflash_core.edits import Mask
+from langflash_core.scene.edits import Mask
 
 SEEN = 0.05  # of a pixel's colour: a Gaussian that adds less anywhere in a region is not seen there
 MOST_PIXELS = 120_000  # of a region; a larger one is looked at coarser, which takes seconds less
@@ -189,9 +189,10 @@ def _meant(request: FindByPhrase) -> np.ndarray:
     """(N,) bool: Gaussians whose own relevance reaches the threshold."""
     import torch
 
+    from langflash_core.language.gaussians import gaussian_relevance
     from langflash_core.language.relevance import compile_query
     from langflash_core.language.spaces import language_space
-    from langflash_core.language.words import gaussian_relevance, with_vectors
+    from langflash_core.language.words import with_vectors
 
     scene = _spoken(request)
     space = language_space(scene.semantics.space)

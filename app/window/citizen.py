@@ -19,9 +19,9 @@ from app.window.exporter import Exporter, camera_json
 from app.window.preferences import Preferences
 from app.window.recovery import Keeper, Kept
 from app.window.state import SceneInfo, State
-from langflash_core.edits import Marks, Mask
 from langflash_core.errors import LangFlashError
 from langflash_core.files import make_folder, write_atomically
+from langflash_core.scene.edits import Marks, Mask
 
 KEEP_AFTER = 1.0  # seconds without a change before the session is written
 SAVE_AFTER = 0.5  # the same for preferences

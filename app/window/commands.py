@@ -27,7 +27,7 @@ from app.window.state import (
     Stats,
     Toast,
 )
-from langflash_core.edits import Marks
+from langflash_core.scene.edits import Marks
 
 _NOTHING_TO_SAVE = "There is no scene to save; drop photos on the window first."
 

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.window.messages import PairFound
-from langflash_core.edits import Marks
 from langflash_core.errors import LangFlashError
+from langflash_core.scene.edits import Marks
 
 if TYPE_CHECKING:
     from langflash_core.images.decode import Photo
@@ -39,8 +39,8 @@ def keep_copy(scene: "Scene", path: Path, marks: Marks | None = None) -> None:
         OutputError: the folder cannot be written.
     """
     from langflash_core.files import make_folder
-    from langflash_core.scene import save
     from langflash_core.scene.edited import edited_scene
+    from langflash_core.scene.file import save
 
     make_folder(path.parent)
     save(scene if marks is None else edited_scene(scene, marks), path)

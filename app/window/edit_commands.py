@@ -22,8 +22,8 @@ from app.window.editing import (
 )
 from app.window.poses import Vector
 from app.window.state import PALETTE, Flight, Mode, Prompt
-from langflash_core import edits
-from langflash_core.edits import Combine, History, Marks, Mask
+from langflash_core.scene import edits
+from langflash_core.scene.edits import Combine, History, Marks, Mask
 
 if TYPE_CHECKING:
     from app.window.state import State

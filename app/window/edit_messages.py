@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from app.window.editing import Offer, Reading, Region
 from app.window.poses import Pose
-from langflash_core.edits import Combine, History, Marks, Mask
+from langflash_core.scene.edits import Combine, History, Marks, Mask
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from app.window.drops import SCENE_SUFFIX
-from langflash_core.edits import Combine, History, Marks, Mask
+from langflash_core.scene.edits import Combine, History, Marks, Mask
 
 RADIUS_RANGE = (4.0, 160.0)  # design pixels
 PICK_RADIUS = 4.0

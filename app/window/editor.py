@@ -12,8 +12,8 @@ from app.window import edit_commands as edit
 from app.window.editing import Offer, Reading, Tool
 from app.window.state import SceneInfo, State
 from app.window.viewport import Viewport
-from langflash_core.edits import Combine, History, Marks
 from langflash_core.errors import LangFlashError
+from langflash_core.scene.edits import Combine, History, Marks
 
 KEEP_AFTER = 1.0  # seconds after an edit that it is written, so that a burst is written once
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from app.window import ask_messages, edit_messages
 from app.window.state import SceneInfo
-from langflash_core.edits import Marks
+from langflash_core.scene.edits import Marks
 
 if TYPE_CHECKING:
     from torch import Tensor

@@ -11,7 +11,7 @@ from app.window.editing import NO_EDITING, Editing
 from app.window.poses import START, Pose, Vector
 
 if TYPE_CHECKING:
-    from langflash_core.edits import History
+    from langflash_core.scene.edits import History
     from langflash_core.types import Scene
 
 NEGATIVES = ("object", "things", "stuff", "texture")

@@ -16,7 +16,7 @@ from app.window.editing import Point, Reading, strongest
 from app.window.pace import SETTLE_AFTER, Kind, Pace, Plan
 from app.window.poses import START, Pose, to_camera
 from app.window.state import Mode, Prompt, State
-from langflash_core.edits import Marks, Mask
+from langflash_core.scene.edits import Marks, Mask
 
 if TYPE_CHECKING:
     from torch import Tensor

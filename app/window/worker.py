@@ -47,8 +47,8 @@ from app.window.messages import (
     WriteScene,
 )
 from app.window.state import SceneInfo
-from langflash_core.edits import History
 from langflash_core.errors import Cancelled, ImageError, LangFlashError
+from langflash_core.scene.edits import History
 
 log = logging.getLogger(__name__)
 
@@ -274,7 +274,6 @@ def _restored(info: SceneInfo, edits: Path) -> SceneInfo:
 
 def describe_scene(scene, serial: int, name: str, path: Path | None = None) -> SceneInfo:
     """`SceneInfo` of a `Scene`: counts, warnings, and a pose per input view."""
-    from app.gl.photos import gaussians_per_view
     from app.window.poses import from_view, median_reach
     from langflash_core.scene.edited import first_marks
     from langflash_core.types import NO_LANGUAGE
@@ -293,10 +292,10 @@ def describe_scene(scene, serial: int, name: str, path: Path | None = None) -> S
         num_gaussians=len(scene.gaussians),
         num_atoms=scene.semantics.num_atoms,
         space=scene.semantics.space,
-        warnings=(*said, *(str(w) for w in scene.metadata.get("warnings", ()))),
+        warnings=(*said, *scene.record.warnings),
         path=path,
         history=History(first_marks(scene)),
-        own_views=scene.num_views > 1 and gaussians_per_view(scene) is not None,
+        own_views=scene.num_views > 1 and scene.view_ids is not None,
         extent=_extent(means),
     )
 

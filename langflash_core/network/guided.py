@@ -14,7 +14,7 @@ from langflash_core.network.encoders.local import LocalFeatures
 from langflash_core.network.encoders.shared import Encoder, Tokens, tokens_to_maps
 from langflash_core.network.gaussians import GaussianHead, assemble_gaussians
 from langflash_core.network.layers.decoder import SiameseDecoder, TwoStackDecoder
-from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Run, Seen
+from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Seen
 from langflash_core.network.presets import GuidedDepth
 from langflash_core.network.semantics.aggregation import Aggregation
 from langflash_core.network.semantics.features import LanguageHead
@@ -26,6 +26,7 @@ from langflash_core.network.stereo.keypoints import KeyPoints, match_photos, mat
 from langflash_core.network.stereo.poses import PoseInput, Poses, estimate_poses
 from langflash_core.network.stereo.prior import DepthHead, DepthMaps
 from langflash_core.network.stereo.sweep import DepthRefiner
+from langflash_core.running import Run
 from langflash_core.types import Views
 
 

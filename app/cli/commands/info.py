@@ -13,7 +13,7 @@ def run(args: Namespace, out: TextIO) -> None:
     Raises:
         SceneFileError: missing, truncated or foreign.
     """
-    from langflash_core.scene import describe
+    from langflash_core.scene.report import describe
 
     document = {
         "scene": str(args.scene),

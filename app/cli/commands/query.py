@@ -60,7 +60,7 @@ def spoken(prompts: Sequence[str]) -> list[str]:
 
 
 def _answers(scene: Scene, result: QueryResult, files: list[dict[str, str]]) -> dict[str, Any]:
-    metres = scene.metadata.get("metric_scale")
+    metres = scene.record.metric_scale
     return {
         "mode": result.mode,
         "size": [result.camera.width, result.camera.height],

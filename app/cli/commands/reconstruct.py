@@ -27,7 +27,8 @@ def run(args: Namespace, out: TextIO) -> None:
     ahead = begin(args.photos, preset=args.preset, weights=args.weights, size=args.size)
     ahead.check_photos()
     from langflash_core import pipeline
-    from langflash_core.scene import describe, save
+    from langflash_core.scene.file import save
+    from langflash_core.scene.report import describe
 
     with ProgressBar() as progress:
         scene = pipeline.reconstruct(
@@ -48,7 +49,7 @@ def run(args: Namespace, out: TextIO) -> None:
         progress("writing", 1.0)
         args.output.parent.mkdir(parents=True, exist_ok=True)
         save(scene, args.output)
-    say_warnings(scene.metadata.get("warnings", ()))
+    say_warnings(scene.record.warnings)
     document = {
         "scene": str(args.output),
         **describe(scene),

@@ -15,7 +15,7 @@ from app.window.asking import Insight
 from app.window.panels import widgets
 from app.window.panels.look import Look
 from app.window.state import Mode, State
-from langflash_core.edits import Atom
+from langflash_core.scene.edits import Atom
 
 _SIZE = (380.0, 620.0)  # design pixels
 _LEAST = (320.0, 240.0)

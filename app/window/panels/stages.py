@@ -1,7 +1,6 @@
 """What a reconstruction cost, in the stages of the paper's table."""
 
 from collections.abc import Mapping
-from typing import Any
 
 from imgui_bundle import imgui
 
@@ -22,18 +21,17 @@ ROWS = (
 )
 
 
-def table(metadata: Mapping[str, Any]) -> list[tuple[str, float]]:
-    """(row, seconds) of a scene's record, the last one "All"; empty without a record."""
-    timings = metadata.get("timings") or {}
+def table(timings: Mapping[str, float]) -> list[tuple[str, float]]:
+    """(row, seconds) of a scene's stages, the last one "All"; empty where nobody knows."""
     if not timings:
         return []
-    rows = [(name, sum(float(timings.get(part, 0.0)) for part in parts)) for name, parts in ROWS]
-    return [*rows, ("All", sum(map(float, timings.values())))]
+    rows = [(name, sum(timings.get(part, 0.0) for part in parts)) for name, parts in ROWS]
+    return [*rows, ("All", sum(timings.values()))]
 
 
 def draw(state: State, look: Look) -> None:
     """The table, folded away until it is asked for."""
-    rows = [] if state.info is None or state.job is not None else table(state.info.scene.metadata)
+    rows = [] if state.info is None or state.job is not None else table(state.info.scene.record.cost.timings)
     if not rows:
         return
     shape = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
@@ -45,9 +43,9 @@ def draw(state: State, look: Look) -> None:
         _row(name, f"{1000 * seconds:,.0f} ms", theme.MUTED)
     _row("All", f"{1000 * rows[-1][1]:,.0f} ms", theme.TEXT)
     assert state.info is not None
-    peak = state.info.scene.metadata.get("peak_memory_mb")
+    peak = state.info.scene.record.cost.peak_memory_mb
     if peak:
-        _row("Peak memory", f"{int(peak):,} MB", theme.TEXT)
+        _row("Peak memory", f"{peak:,} MB", theme.TEXT)
 
 
 def _row(name: str, figure: str, colour) -> None:

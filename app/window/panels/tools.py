@@ -10,7 +10,7 @@ from app.window.editing import RADIUS_RANGE, REACH_RANGE, STRICTNESS_RANGE, Floa
 from app.window.panels import widgets
 from app.window.panels.look import Look
 from app.window.state import State
-from langflash_core.edits import Combine
+from langflash_core.scene.edits import Combine
 
 _TOOLS = (
     (Tool.MOVE, fa.ICON_FA_ARROWS_UP_DOWN_LEFT_RIGHT, "Move around  (V)"),

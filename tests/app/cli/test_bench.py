@@ -10,7 +10,7 @@ from app.bench.modes import AXES
 from app.cli.parser import BENCH_AXES
 from app.gl import offscreen_context
 from langflash_core.errors import GraphicsError
-from langflash_core.scene import save
+from langflash_core.scene.file import save
 from tests.app.cli.conftest import stripes
 from tests.app.cli.test_bad_input import refused  # noqa: F401
 

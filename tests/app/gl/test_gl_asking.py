@@ -171,7 +171,7 @@ def stereo(double: bool = True) -> Scene:
         base,
         viewmats=poses,
         Ks=base.Ks.expand(2, 3, 3).contiguous(),
-        metadata={"gaussians_per_view": [len(first), len(second)]},
+        view_ids=torch.arange(2).repeat_interleave(len(first)),
     )
 
 
@@ -244,10 +244,10 @@ def test_photo_depths_follow_the_scene_and_leave_it_alone(exact):
     before = exact.frame().rgb
     exact.coverage_texture()
     assert torch.equal(exact.frame().rgb, before) and exact.passes["colour"] == 1
-    bare = dataclasses.replace(scene, metadata={})
+    bare = dataclasses.replace(scene, view_ids=None)
     exact.set_scene(bare)
     exact.draw(SEEN_FROM)
-    with pytest.raises(ValueError, match="gaussians_per_view"):
+    with pytest.raises(ValueError, match="view_ids"):
         exact.agreement_texture()
 
 

@@ -3,8 +3,7 @@
 import pytest
 import torch
 
-from langflash_core.scene import thin
-from langflash_core.scene.thin import thin_with_rows
+from langflash_core.scene.thin import thin, thin_with_rows
 from langflash_core.splat import render
 from tests.app.gl.questions import full_relevance, question
 from tests.splat.scenes import camera, cloud, maps_of

@@ -8,7 +8,7 @@ import torch
 from PIL import Image
 
 from langflash_core.geometry.harmonics import colour_to_sh
-from langflash_core.types import Gaussians, Scene, Semantics
+from langflash_core.types import Gaussians, Record, Scene, Semantics
 
 PHRASES = ("armchair", "wall", "floor")
 COLOURS = ((0.75, 0.15, 0.12), (0.62, 0.66, 0.70), (0.45, 0.33, 0.22))
@@ -54,7 +54,7 @@ def room(dictionary: torch.Tensor, space: str = "minilm") -> Scene:
         K.expand(2, 3, 3).contiguous(),
         VIEW_SIZE,
         photos=(_jpeg((120, 90, 80)), _jpeg((80, 90, 120))),
-        metadata={"preset": "mini", "warnings": ["The photos overlap little; depth may be off."]},
+        record=Record(preset="mini", warnings=("The photos overlap little; depth may be off.",)),
     )
 
 

@@ -10,7 +10,6 @@ import pytest
 import torch
 from PIL import Image
 
-from app.gl.photos import gaussians_per_view
 from app.window import ask_commands as ask
 from app.window import ask_messages, insight, messages
 from app.window import commands as do
@@ -23,6 +22,7 @@ from langflash_core.language.algebra import terms
 from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import language_space
 from langflash_core.splat import render
+from langflash_core.types import Semantics
 from tests.app.window.scenes import CHAIR, PHRASES, room
 from tests.app.window.test_commands import after
 from tests.app.window.test_worker import wait_for
@@ -95,15 +95,6 @@ def test_modes_that_the_scene_cannot_show(info) -> None:
     assert {m for m in Mode if not m.possible(bare)} == {
         Mode.AGREEMENT, Mode.COVERAGE, Mode.WEIGHT, Mode.FEATURES,
     }  # fmt: skip
-
-
-def test_who_made_a_gaussian_is_known_only_where_counts_fit() -> None:
-    scene = room(torch.eye(3))
-    count = len(scene.gaussians)
-    assert gaussians_per_view(scene) is None
-    assert gaussians_per_view(scene.with_metadata(gaussians_per_view=[count, 0])) == [count, 0]
-    for wrong in ([count], [count, 1], "many", None):
-        assert gaussians_per_view(scene.with_metadata(gaussians_per_view=wrong)) is None
 
 
 def test_a_histogram_belongs_to_the_text_it_was_made_for() -> None:
@@ -303,9 +294,8 @@ def test_atoms_without_photos_or_numbers_do_no_harm(scene) -> None:
     )
     found = insight.describe_atoms(ask_messages.DescribeAtoms(1, poor))
     assert found.thumbnails == (None, None, None) and np.isfinite(found.insight.similarity).all()
-    none = replace(poor, semantics=replace(poor.semantics, dictionary=broken[:0]), photos=())
-    none = replace(none, semantics=replace(none.semantics, weight_ids=none.semantics.weight_ids[:, :0]))
-    none = replace(none, semantics=replace(none.semantics, weight_values=none.semantics.weight_values[:, :0]))
+    ids, values = poor.semantics.weight_ids[:, :0], poor.semantics.weight_values[:, :0]
+    none = replace(poor, semantics=Semantics(ids, values, broken[:0], poor.semantics.space), photos=())
     empty = insight.describe_atoms(ask_messages.DescribeAtoms(1, none))
     assert (empty.insight.shares, empty.insight.order, empty.thumbnails) == ((), (), ())
 

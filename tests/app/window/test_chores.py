@@ -14,8 +14,8 @@ from app.window.messages import LoadScene
 from app.window.poses import to_camera
 from app.window.state import NEGATIVES
 from app.window.worker import describe_scene, make_scene
-from langflash_core.edits import Mask, delete, hide, merge_atoms, rename_atom, select
 from langflash_core.language.spaces import language_space
+from langflash_core.scene.edits import Mask, delete, hide, merge_atoms, rename_atom, select
 from langflash_core.splat import render
 from langflash_core.splat.reference import rasterize
 from tests.app.window.scenes import PHRASES, room

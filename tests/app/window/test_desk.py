@@ -21,8 +21,8 @@ from app.window.poses import Pose, Vector
 from app.window.preferences import PANEL_WIDTHS
 from app.window.recovery import Kept
 from app.window.state import Mode, Photo, SceneInfo, State
-from langflash_core.edits import Atom, History, Marks, Mask
-from langflash_core.scene import save
+from langflash_core.scene.edits import Atom, History, Marks, Mask
+from langflash_core.scene.file import save
 from tests.app.window.scenes import room
 
 PATHS = tuple(Path(f"/photos/{name}.jpg") for name in "abc")

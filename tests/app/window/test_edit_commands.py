@@ -14,8 +14,8 @@ from app.window.commands import apply
 from app.window.editing import RADIUS_RANGE, Floaters, Offer, Reading, Region, Tool
 from app.window.state import FLIGHT_SECONDS, Mode, State
 from app.window.worker import describe_scene
-from langflash_core.edits import Combine, Mask
 from langflash_core.scene.edited import edited_scene
+from langflash_core.scene.edits import Combine, Mask
 from tests.app.window.scenes import CHAIR, room
 
 CHAIRS = 2500  # the first rows of the room are its block

@@ -20,9 +20,9 @@ from app.window.editor import _errand
 from app.window.poses import Pose
 from app.window.state import SceneInfo, State
 from app.window.worker import describe_scene
-from langflash_core.edits import Mask
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.edited import edited_scene
+from langflash_core.scene.edits import Mask
 from tests.app.window.scenes import PHRASES, room
 
 MODULES = (commands, edit_commands, ask_commands, desk_commands)

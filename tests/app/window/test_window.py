@@ -21,7 +21,7 @@ from PIL import Image
 from app.window import theme
 from app.window.panels import CANVAS_TOP
 from langflash_core.language.spaces import language_space
-from langflash_core.scene import save
+from langflash_core.scene.file import save
 from tests.app.window.scenes import PHRASES, room
 from tests.app.window.x11 import Client
 

@@ -2,14 +2,16 @@
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from app.window.panels.modes import KEYED
 from app.window.state import Mode
 from langflash_core.language.spaces import language_space
-from langflash_core.scene import save
+from langflash_core.scene.file import save
 from tests.app.window import test_window
 from tests.app.window.scenes import PHRASES, room
 from tests.app.window.test_window import LEFT, PATIENCE, SIZE, Program, change
@@ -27,7 +29,7 @@ def program(display: str, tmp_path_factory) -> Iterator[Program]:
     scene = room(language_space("minilm").encode(list(PHRASES)))
     half = len(scene.gaussians) // 2
     path = tmp_path_factory.mktemp("asking") / "room.langflash"
-    save(scene.with_metadata(gaussians_per_view=[half, len(scene.gaussians) - half]), path)
+    save(replace(scene, view_ids=(torch.arange(len(scene.gaussians)) >= half).long()), path)
     running = Program(display, path)
     running.until(lambda s: s["scene"] == "room.langflash", "the scene")
     running.at_rest()

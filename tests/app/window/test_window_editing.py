@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from langflash_core.scene import load
+from langflash_core.scene.file import load
 from tests.app.window.test_window import (
     CANVAS,
     LEFT,

@@ -13,7 +13,7 @@ from langflash_core.language.answers import answer
 from langflash_core.language.relevance import relevance_maps
 from langflash_core.language.spaces import language_space
 from langflash_core.resources import asset_path
-from langflash_core.scene import load, save
+from langflash_core.scene.file import load, save
 from langflash_core.splat import render
 from tests.app.window.scenes import PHRASES, room
 
