@@ -213,6 +213,7 @@ def judge_photo(judged: Judged, photo: LabelledPhoto, tally: Tally) -> None:
         judge_depth(drawn, photo.metric, tally)
     if photo.labels is not None:
         judge_names(judged, drawn, tally)
+        overlap_fine(judged, drawn, tally)
         ask_photo(judged, drawn, int(photo.id) if photo.id.isdigit() else 0, tally)
 
 
@@ -257,8 +258,8 @@ def judge_names(judged: Judged, drawn: Drawn, tally: Tally) -> None:
 
 
 def ask_photo(judged: Judged, drawn: Drawn, seed: int, tally: Tally) -> None:
-    """As many things that are there as things that are not, asked as anybody asks; the masks of the
-    former, and of every fine name in sight. Pixels without a label count for nothing."""
+    """As many things that are there as things that are not, asked as anybody asks, and the masks of the
+    former, where pixels without a label count for nothing."""
     words, generator = judged.words, torch.Generator().manual_seed(seed)
     labelled = drawn.ids > 0
     shown = torch.bincount(drawn.ids.flatten(), minlength=len(words.asked_of))
@@ -269,7 +270,8 @@ def ask_photo(judged: Judged, drawn: Drawn, seed: int, tally: Tally) -> None:
     present = visible[torch.randperm(len(visible), generator=generator)][: PHRASES // 2].tolist()
     asked = words.rows(words.asked)
     absent = absent_rows(there, words.asked, judged.vectors[asked], len(present), generator)
-    if not present or not absent:
+    present = present[: len(absent)]
+    if not present:
         return
     phrases = [words.asked[row] for row in (*present, *absent)]
     height, width = rows.shape
@@ -281,11 +283,12 @@ def ask_photo(judged: Judged, drawn: Drawn, seed: int, tally: Tally) -> None:
     for place, row in enumerate(present):
         values, truth = found.relevance[place][labelled], rows[labelled] == row
         tally.ious.append(torch.tensor([_iou(values >= limit, truth) for limit in MASK_THRESHOLDS]))
-    _overlap_fine(judged, drawn, labelled, tally)
 
 
-def _overlap_fine(judged: Judged, drawn: Drawn, labelled: Tensor, tally: Tally) -> None:
-    """Masks of the fine names that a photo shows against the truth, pixels added up over photos."""
+def overlap_fine(judged: Judged, drawn: Drawn, tally: Tally) -> None:
+    """Masks of the fine names that a photo shows against the truth, pixels added up over photos; those
+    without a label count for nothing."""
+    labelled = drawn.ids > 0
     rows = judged.words.fine_of[drawn.ids][labelled]
     places = judged.words.rows(judged.words.fine)
     for row in sorted(set(rows[rows >= 0].tolist())):

@@ -14,7 +14,7 @@ from langflash_core.lab.evaluation.words import OTHER, PAPER_LABELS
 from langflash_core.lab.photos import Name, PhotoFolder
 from langflash_core.lab.photos.names import CLASSES37
 from langflash_core.lab.training.photo_names import group_of, photo_label
-from langflash_core.language.vocabulary import groups_of
+from langflash_core.language.vocabulary import EVALUATED, groups_of
 
 _TABLES = frozenset({"table", "desk", "night stand"})
 _TABLE_NAMES = frozenset({"coffee table"})
@@ -115,6 +115,11 @@ def photos_of_names(folder: PhotoFolder, ids: Iterable[str]) -> dict[str, int]:
     return counts
 
 
+def _true_of(text: str) -> frozenset[str]:
+    """Groups of the vocabulary that a word is true of, also of those that no training says."""
+    return groups_of(text) | EVALUATED.get(text, frozenset())
+
+
 def absent_rows(
     there: Sequence[str], asked: Sequence[str], embeddings: Tensor, count: int, generator: torch.Generator
 ) -> list[int]:
@@ -125,13 +130,13 @@ def absent_rows(
     Args:
         there: every name in the photo, however small. embeddings: (len(asked), C), unit rows.
     """
-    groups = {group_of(text) for text in there}.union(*(groups_of(text) for text in there))
+    groups = {group_of(text) for text in there}.union(*(_true_of(text) for text in there))
     shown = [row for row, text in enumerate(asked) if text in there]
     near = (embeddings @ embeddings[shown].T).amax(1) if shown else torch.zeros(len(asked))
     free = [
         row
         for row, text in enumerate(asked)
-        if float(near[row]) <= SYNONYM and group_of(text) not in groups and not groups_of(text) & groups
+        if float(near[row]) <= SYNONYM and group_of(text) not in groups and not _true_of(text) & groups
     ]
     order = torch.randperm(len(free), generator=generator).tolist()
     return [free[i] for i in order[:count]]

@@ -62,15 +62,18 @@ def group_of(name: str) -> str:
     own = [group for group, phrases in OWN.items() if name in phrases]
     if len(own) == 1:
         return own[0]
-    kept = EVALUATED.get(name, frozenset())
+    kept = EVALUATED.get(name) or EVALUATED.get(name.replace(" ", "")) or frozenset()
     return next(iter(kept)) if len(kept) == 1 else name
 
 
 def photo_label(name: Name) -> Label | None:
-    """What a region of this name is called; None: it says nothing of the thing."""
+    """What a region of this name is called; None: it says nothing of the thing, or nothing that may be
+    taught ("pet" is true of several groups)."""
     if name.text in _NAMELESS or name.text.startswith("other "):
         return None
     group = group_of(name.text)
+    if not may_be_taught(group):
+        return None
     text = name.text if may_be_taught(name.text) else group
     broader = name.label
     if (

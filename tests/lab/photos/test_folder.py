@@ -122,7 +122,7 @@ def test_no_folder_and_no_photos(tmp_path: Path):
     with pytest.raises(InputError, match="there is no folder"):
         open_folder(tmp_path / "gone")
     (tmp_path / "images").mkdir()
-    with pytest.raises(InputError, match="holds no .jpg"):
+    with pytest.raises(InputError, match="holds no"):
         open_folder(tmp_path)
     (tmp_path / "images" / "3.jpg").write_bytes(b"text")
     with pytest.raises(ImageError):

@@ -9,8 +9,8 @@ from PIL import Image
 from scipy.io import savemat
 
 from langflash_core.errors import InputError
-from langflash_core.lab.photos import open_folder
 from langflash_core.lab.photos import matlab as matlab_files
+from langflash_core.lab.photos import open_folder
 from langflash_core.lab.photos.layouts import Source, convert
 
 HEIGHT, WIDTH, PHOTOS = 480, 640, 3
@@ -59,7 +59,10 @@ def nyu(request, tmp_path: Path) -> Path:
     else:
         savemat(path, {**arrays, "names": cells(arrays["names"])})
     savemat(tmp_path / "splits.mat", {"trainNdxs": np.array([[3], [1]]), "testNdxs": np.array([[2]])})
-    mapping = {"mapClass": np.array([[2, 1, 3]]), "className": cells(["night stand", "wall", "refridgerator"])}
+    mapping = {
+        "mapClass": np.array([[2, 1, 3]]),
+        "className": cells(["night stand", "wall", "refridgerator"]),
+    }
     savemat(tmp_path / "classMapping40.mat", mapping)
     return path
 
@@ -155,7 +158,11 @@ def test_ade20k(tmp_path: Path):
     for kind in ("images", "annotations"):
         for split in ("training", "validation"):
             (root / kind / split).mkdir(parents=True)
-    rows = ["Idx\tRatio\tTrain\tVal\tName", "1\t0.1576\t11664\t1172\twall", "9\t0.01\t5\t1\twindowpane, window "]
+    rows = [
+        "Idx\tRatio\tTrain\tVal\tName",
+        "1\t0.1576\t11664\t1172\twall",
+        "9\t0.01\t5\t1\twindowpane, window ",
+    ]
     (root / "objectInfo150.txt").write_text("\n".join(rows))
     for split, name in (("training", "ADE_train_00000007"), ("validation", "ADE_val_00000001")):
         Image.fromarray(np.full((40, 50, 3), 99, np.uint8)).save(root / "images" / split / f"{name}.jpg")
