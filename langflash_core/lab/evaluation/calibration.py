@@ -49,7 +49,8 @@ class Asked:
         """
         if not scores:
             raise InputError("nothing could be asked of this set; give scenes that show known things")
-        half = torch.tensor([8 * k // len(scores) % 2 for k in range(len(scores))])
+        blocks = min(8, len(scores))
+        half = torch.tensor([blocks * k // len(scores) % 2 for k in range(len(scores))])
         sizes = torch.tensor([len(s) for s in scores])
         there = torch.tensor([int(t.sum()) for t in truths])
         return Asked(
