@@ -19,8 +19,8 @@ from PIL import Image
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.images import load_views
-from langflash_core.images.views import centre_box
+from langflash_core.images.pictures import centre_box
+from langflash_core.images.views import load_views
 from langflash_core.lab.evaluation.metrics import Presence
 from langflash_core.lab.evaluation.photo_words import (
     PhotoWords,
@@ -227,7 +227,7 @@ def judge_depth(drawn: Drawn, metric: bool, tally: Tally) -> None:
         depth_abs_rel_flat=abs_rel(align_scale(torch.ones_like(truth), truth), truth),
     )
     if metric:
-        metres = drawn.frame.depths * float(drawn.scene.metadata.get("network_unit", math.nan))
+        metres = drawn.frame.depths * (drawn.scene.record.network_unit or math.nan)
         valid = (truth > 0) & (metres > 0)
         tally.note(
             depth_abs_rel_metric=abs_rel(metres, truth),

@@ -19,7 +19,7 @@ from PIL import Image
 from torch import Tensor
 
 from langflash_core.errors import InputError
-from langflash_core.images.views import centre_box
+from langflash_core.images.pictures import centre_box
 from langflash_core.lab.evaluation.labelled import Render, rounded
 from langflash_core.lab.evaluation.metrics import PoseError, pose_error
 from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
