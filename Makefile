@@ -45,6 +45,7 @@ run: $(STAMP)-package $(STAMP)-gl
 
 test: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
 	$(BIN)/pyright
 	$(BIN)/lint-imports
 	$(BIN)/python -m pytest
@@ -78,7 +79,7 @@ $(STAMP)-package: pyproject.toml | $(BIN)/python
 	@echo "Installing LangFlash and what it needs into .venv (the first time takes minutes)"
 	@$(BIN)/python -m pip --version >/dev/null 2>&1 || $(BIN)/python -m ensurepip >/dev/null
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check torch==2.13.0
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[window]'
 	@touch $@
 
 $(STAMP)-dev: $(STAMP)-package

@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import NoReturn
 
 import langflash_core
-from app.cli.values import (
+from langflash_core.errors import InputError
+
+from .values import (
     above_zero,
     atom_count,
     crop,
@@ -24,7 +26,6 @@ from app.cli.values import (
     what,
     whole_count,
 )
-from langflash_core.errors import InputError
 
 # langflash_core.lab.photos.layouts.LAYOUTS, which would bring torch along.
 LAYOUTS = ("nyu", "coco", "ade20k", "sunrgbd", "frames")
@@ -195,7 +196,7 @@ def _add_export(commands) -> None:
         command,
         "FILE",
         ".png: a picture, or a cut-out with --prompt; .ply, .splat, .langflash: Gaussians; "
-        ".json: COCO masks of --prompt; .csv: their boxes; .npz: a view as numbers; .mp4: a flight",
+        ".json: COCO masks of --prompt; .csv, .glb: their boxes; .npz: a view as numbers; .mp4: a flight",
     )
     command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="keep only what answers one of these")
     command.add_argument(
@@ -205,7 +206,7 @@ def _add_export(commands) -> None:
         "--what",
         choices=("rgb", "heat", "mask", "cutout", "labels", "boxes"),
         help="of a .png: colours, a heat-map, a mask, a cut-out with transparency (default with --prompt), "
-        "or phrase numbers with a legend as .json; boxes: a .json or .csv of places and sizes",
+        "or phrase numbers with a legend as .json; boxes: a .json, .csv or .glb of places and sizes",
     )
     command.add_argument(
         "--all-views", action="store_true", help="from every photo: FILE_0, FILE_1 and so on"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from langflash_core.errors import OutputError, SceneFileError
-from langflash_core.export import coco, npz, ply, png, splat
+from langflash_core.export import coco, glb, npz, ply, png, splat
 from langflash_core.scene.file import load, save
 from langflash_core.types import Frame, QueryResult, Scene
 
@@ -28,6 +28,7 @@ WRITERS: dict[str, tuple[Writer, ...]] = {
         Writer(QueryResult, "an answer", png.write_answer),
     ),
     ".npz": (Writer(QueryResult, "an answer", npz.write_npz),),
+    ".glb": (Writer(QueryResult, "an answer", glb.write_answer),),
     ".json": (Writer(QueryResult, "an answer", coco.write_answer),),
     ".ply": (Writer(Scene, "a scene", ply.write_ply),),
     ".splat": (Writer(Scene, "a scene", splat.write_splat),),

@@ -12,7 +12,7 @@ from langflash_core.network.encoders.local import LocalFeatures
 from langflash_core.network.encoders.shared import Encoder, Tokens, tokens_to_maps
 from langflash_core.network.gaussians import GaussianHead, assemble_gaussians
 from langflash_core.network.layers.decoder import SiameseDecoder, TwoStackDecoder
-from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Run, Seen
+from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Seen
 from langflash_core.network.presets import GuidedDepth
 from langflash_core.network.semantics.aggregation import Aggregation
 from langflash_core.network.semantics.features import LanguageHead
@@ -20,9 +20,11 @@ from langflash_core.network.semantics.grouping import ScratchHead, SemanticGroup
 from langflash_core.network.semantics.naming import PartNamer, describe, places
 from langflash_core.network.semantics.splitting import split_groups
 from langflash_core.network.stereo.alignment import Correction
+from langflash_core.network.stereo.keypoints import KeyPoints, match_photos, match_sources
 from langflash_core.network.stereo.poses import PoseInput, Poses, estimate_poses
 from langflash_core.network.stereo.prior import DepthHead, DepthMaps
 from langflash_core.network.stereo.sweep import DepthRefiner
+from langflash_core.running import Run
 from langflash_core.types import Views
 
 
@@ -100,7 +102,7 @@ class GuidedDepthNet(LangFlashNet):
             prior = self.depth_head(levels, tokens)
         with run.stage("poses"):
             local = self.local(images[0])
-            poses = estimate_poses(self._pose_inputs(views, prior, local), run.check)
+            poses = estimate_poses(self._pose_inputs(views, prior, local), _key_points(views, run), run.check)
             viewmats = torch.from_numpy(poses.viewmats).to(images)[None]
         with run.stage("refinement"):
             maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)
@@ -133,7 +135,6 @@ class GuidedDepthNet(LangFlashNet):
     def _pose_inputs(views: Views, prior: DepthMaps, local: Tensor) -> list[PoseInput]:
         return [
             PoseInput(
-                grey=_grey(views, v),
                 K=views.Ks[v].double().numpy(),
                 size=views.size,
                 depth=prior.depths[0, v].cpu().numpy(),
@@ -151,11 +152,9 @@ def _corrected(log_depths: Tensor, K: Tensor, correction: Correction) -> Tensor:
     return log_depths + torch.from_numpy(change).to(log_depths)
 
 
-def _grey(views: Views, view: int) -> np.ndarray:
-    """The largest version of the photo at hand, as (h, w) uint8."""
+def _key_points(views: Views, run: Run) -> KeyPoints:
+    """Of the largest version of the photos at hand."""
     if views.sources:
-        grey = cv2.imdecode(np.frombuffer(views.sources[view], np.uint8), cv2.IMREAD_GRAYSCALE)
-        assert grey is not None, "sources are JPEG bytes that images/ wrote"
-        return grey
-    rgb = (views.images[view].movedim(0, -1).cpu().numpy() * 255).round().astype(np.uint8)
-    return cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
+        return match_sources(views.sources, run.check)
+    photos = (views.images.movedim(1, -1).cpu().numpy() * 255).round().astype(np.uint8)  # (V, H, W, 3)
+    return match_photos([cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY) for rgb in photos], run.check)

@@ -1,13 +1,18 @@
 """`scene.langflash`: one safetensors file, no pickle, whole or refused.
 
 The safetensors header's `__metadata__` holds four strings: `format` ("langflash-scene"),
-`version` ("1"), `scene` (JSON: space, view_size, metadata) and `digest`, the SHA-256 of the JSON
-and of every tensor with its name, type and shape. Tensors: `fields.py`.
+`version` ("2"), `scene` (JSON: space, view_size, metadata) and `digest`, the SHA-256 of the JSON
+and of every tensor with its name, type and shape. Tensors: `fields.py`; `metadata`: `record.py`.
+
+Equal scenes give equal bytes: the header is in one order, and nothing of the run that made the
+scene is in the file. Version 1 said in its metadata how many Gaussians each view made, where
+version 2 has the tensor `view_ids`, and held what the run cost.
 """
 
 import hashlib
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import safetensors.torch
@@ -19,9 +24,10 @@ from langflash_core.errors import SceneFileError
 from langflash_core.files import write_atomically
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.fields import from_fields, to_fields
+from langflash_core.scene.record import counts_per_view, from_json, to_json
 from langflash_core.types import Scene
 
-FORMAT, VERSION = "langflash-scene", 1
+FORMAT, VERSION = "langflash-scene", 2
 _MAX_HEADER = 64 * 2**20
 _REMEDY = "reconstruct the scene again or copy the whole file"
 _FOREIGN = {
@@ -39,14 +45,28 @@ def save(scene: Scene, path: Path | str) -> None:
 
     Raises:
         OutputError: the path cannot be written.
-        ValueError: the scene is not whole (`check_scene`), or its metadata is not plain JSON.
+        ValueError: the scene is not whole (`check_scene`), or its record is not plain JSON.
     """
     check_scene(scene)
     fields = to_fields(scene)
-    described = {"space": scene.semantics.space, "view_size": scene.view_size, "metadata": scene.metadata}
+    described = {
+        "space": scene.semantics.space,
+        "view_size": scene.view_size,
+        "metadata": to_json(scene.record),
+    }
     text = json.dumps(described, allow_nan=False)
     header = {"format": FORMAT, "version": str(VERSION), "scene": text, "digest": _digest(text, fields)}
-    write_atomically(Path(path), safetensors.torch.save(fields, header))
+    write_atomically(Path(path), _in_order(safetensors.torch.save(fields, header)))
+
+
+def _in_order(content: bytes) -> bytes:
+    """The same safetensors file with its strings sorted, which its library writes in any order."""
+    length = struct.unpack("<Q", content[:8])[0]
+    header = json.loads(content[8 : 8 + length])
+    header["__metadata__"] = dict(sorted(header["__metadata__"].items()))
+    head = json.dumps(header, ensure_ascii=False, separators=(",", ":")).encode()
+    head += b" " * (-len(head) % 8)
+    return struct.pack("<Q", len(head)) + head + content[8 + length :]
 
 
 def load(path: Path | str) -> Scene:
@@ -73,11 +93,22 @@ def load(path: Path | str) -> Scene:
             raise ValueError("its content does not match its checksum")
         described = json.loads(text)
         width, height = (int(side) for side in described["view_size"])
-        scene = from_fields(fields, str(described["space"]), (width, height), dict(described["metadata"]))
+        metadata = dict(described["metadata"])
+        record = from_json(metadata)
+        scene = from_fields(fields, str(described["space"]), (width, height), record)
+        if version == "1":
+            scene = replace(scene, view_ids=_view_ids(scene, counts_per_view(metadata)))
         check_scene(scene)
     except (SafetensorError, ValueError, LookupError, TypeError, RuntimeError, ArithmeticError) as error:
         raise SceneFileError(f"{path.name} is damaged ({error}); {_REMEDY}") from error
     return scene
+
+
+def _view_ids(scene: Scene, counts: list[int]) -> Tensor | None:
+    """(N,) of Gaussians in the order of the views that made them; None where the counts do not fit."""
+    if len(counts) != scene.num_views or sum(counts) != len(scene.gaussians):
+        return None
+    return torch.arange(len(counts)).repeat_interleave(torch.tensor(counts))
 
 
 def _read(path: Path) -> tuple[dict[str, str], bytes]:

@@ -17,11 +17,12 @@ def describe(scene: Scene) -> dict:
         total}, bounding_box and core_box {min, max} in scene units (None when empty), metric_scale
         (metres per unit or None), counts, pruning (as `prune` left it, with `psnr_db` and
         `relevance_error` where they were measured), refinement (None, or kept, held_out and the PSNR
-        before and after), timings {stage: seconds, total}, warnings`.
+        before and after), timings {stage: seconds, total} (None where they are not known, as in files),
+        warnings`.
     """
-    known = scene.metadata
+    known = scene.record
     sizes = field_bytes(scene)
-    timings = dict(known.get("timings", {}))
+    timings = known.cost.timings
     kept = scene.semantics.weight_values > 0
     return {
         "gaussians": len(scene.gaussians),
@@ -31,19 +32,19 @@ def describe(scene: Scene) -> dict:
         "sh_degree": round(scene.gaussians.sh.shape[1] ** 0.5) - 1,
         "views": scene.num_views,
         "view_size": list(scene.view_size),
-        "photos": list(known.get("photos", [])),
-        "preset": known.get("preset"),
-        "source": known.get("source"),
+        "photos": list(known.photos),
+        "preset": known.preset,
+        "source": known.source,
         "space": scene.semantics.space,
         "bytes": {**sizes, "total": sum(sizes.values())},
         "bounding_box": _box(scene.gaussians.means, (0.0, 1.0)),
         "core_box": _box(scene.gaussians.means, _CORE),
-        "metric_scale": known.get("metric_scale"),
-        "counts": dict(known.get("counts", {})),
-        "pruning": known.get("pruning"),
-        "refinement": known.get("refinement"),
-        "timings": {**timings, "total": sum(timings.values())},
-        "warnings": list(known.get("warnings", [])),
+        "metric_scale": known.metric_scale,
+        "counts": dict(known.counts),
+        "pruning": dict(known.pruning) or None,
+        "refinement": dict(known.refinement) or None,
+        "timings": {**timings, "total": sum(timings.values())} if timings else None,
+        "warnings": list(known.warnings),
     }
 
 

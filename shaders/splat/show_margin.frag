@@ -6,7 +6,7 @@
 #include "colormaps.glsl"
 
 uniform sampler2D colour;
-uniform sampler2DArray relevance;  // four prompts a layer
+uniform sampler2DArray relevance;  // PHRASES_A_LAYER each
 uniform int num_prompts;
 uniform float threshold;           // of the only prompt
 uniform vec2 span;                 // margins shown as the first and the last colour
@@ -21,7 +21,7 @@ void main() {
     float best = texelFetch(relevance, ivec3(pixel, 0), 0).r;
     float second = threshold;
     for (int prompt = 1; prompt < num_prompts; ++prompt) {
-        float value = texelFetch(relevance, ivec3(pixel, prompt / 4), 0)[prompt % 4];
+        float value = texelFetch(relevance, ivec3(pixel, prompt / PHRASES_A_LAYER), 0)[prompt % PHRASES_A_LAYER];
         second = prompt == 1 ? min(best, value) : max(second, min(best, value));
         best = max(best, value);
     }

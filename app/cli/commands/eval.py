@@ -7,17 +7,18 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TextIO
 
-from app.cli.commands.query import spoken
-from app.cli.files import check_output_file, readable_file
-from app.cli.photos import chosen, opened_folder
-from app.cli.renderers import open_renderer
-from app.cli.report import ProgressBar, say_warnings, write_json
 from langflash_core.errors import ImageError, InputError, WeightsError
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.evaluation.rooms import run_eval
 from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.lab.photos import chosen_ids
 from langflash_core.network import load_network
+
+from ..files import check_output_file, readable_file
+from ..photos import chosen, opened_folder
+from ..renderers import open_renderer
+from ..report import ProgressBar, say_warnings, write_json
+from .query import spoken
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -140,7 +141,7 @@ def _photos(args: Namespace, out: TextIO) -> None:
         )
     photos = [readable_file(path, "photo", ImageError) for path in args.photos]
     check_output_file(args.output, (".png",))
-    from app.cli.sheet import PROMPTS, pair_sheet
+    from ..sheet import PROMPTS, pair_sheet
 
     pairs = list(zip(photos[::2], photos[1::2], strict=True))
     prompts = PROMPTS if args.prompt is None else spoken(args.prompt)

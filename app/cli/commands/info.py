@@ -3,8 +3,8 @@
 from argparse import Namespace
 from typing import Any, TextIO
 
-from app.cli.report import write_json
-from app.cli.scenes import open_scene
+from ..report import write_json
+from ..scenes import open_scene
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -13,7 +13,7 @@ def run(args: Namespace, out: TextIO) -> None:
     Raises:
         SceneFileError: missing, truncated or foreign.
     """
-    from langflash_core.scene import describe
+    from langflash_core.scene.report import describe
 
     document = {
         "scene": str(args.scene),

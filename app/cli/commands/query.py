@@ -5,13 +5,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
-from app.cli.cameras import chosen_camera
-from app.cli.files import check_folder, readable_file, staged_folder
-from app.cli.renderers import open_renderer
-from app.cli.report import ProgressBar, write_json
-from app.cli.scenes import open_scene
 from langflash_core.errors import PromptError, SceneFileError
 from langflash_core.types import PromptAnswer, QueryResult, Scene
+
+from ..cameras import chosen_camera
+from ..files import check_folder, readable_file, staged_folder
+from ..renderers import open_renderer
+from ..report import ProgressBar, write_json
+from ..scenes import open_scene
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -60,7 +61,7 @@ def spoken(prompts: Sequence[str]) -> list[str]:
 
 
 def _answers(scene: Scene, result: QueryResult, files: list[dict[str, str]]) -> dict[str, Any]:
-    metres = scene.metadata.get("metric_scale")
+    metres = scene.record.metric_scale
     return {
         "mode": result.mode,
         "size": [result.camera.width, result.camera.height],

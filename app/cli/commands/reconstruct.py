@@ -5,9 +5,10 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TextIO
 
-from app.cli.files import check_output_file, readable_file
-from app.cli.report import ProgressBar, say_warnings, write_json
 from langflash_core.errors import ImageError, WeightsError
+
+from ..files import check_output_file, readable_file
+from ..report import ProgressBar, say_warnings, write_json
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -22,8 +23,13 @@ def run(args: Namespace, out: TextIO) -> None:
     if args.weights is not None:
         readable_file(args.weights, "checkpoint", WeightsError)
     check_output_file(args.output, (".langflash",), inputs=args.photos)
+    from langflash_core.ahead import begin
+
+    ahead = begin(args.photos, preset=args.preset, weights=args.weights, size=args.size)
+    ahead.check_photos()
     from langflash_core import pipeline
-    from langflash_core.scene import describe, save
+    from langflash_core.scene.file import save
+    from langflash_core.scene.report import describe
 
     with ProgressBar() as progress:
         scene = pipeline.reconstruct(
@@ -39,11 +45,12 @@ def run(args: Namespace, out: TextIO) -> None:
             grouping=args.grouping,
             refine_seconds=args.refine,
             progress=progress,
+            ahead=ahead,
         )
         progress("writing", 1.0)
         args.output.parent.mkdir(parents=True, exist_ok=True)
         save(scene, args.output)
-    say_warnings(scene.metadata.get("warnings", ()))
+    say_warnings(scene.record.warnings)
     document = {
         "scene": str(args.output),
         **describe(scene),

@@ -7,9 +7,6 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any, TextIO
 
-from app.cli.files import check_folder, check_output_file, readable_file
-from app.cli.photos import opened_folder
-from app.cli.report import ProgressBar
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.lab.photos import chosen_ids
 from langflash_core.lab.photos.layouts import Source, convert
@@ -19,6 +16,10 @@ from langflash_core.lab.training.photos import run_photo_cache
 from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS
 from langflash_core.resources import asset_path
+
+from ..files import check_folder, check_output_file, readable_file
+from ..photos import opened_folder
+from ..report import ProgressBar
 
 
 def run(args: Namespace, out: TextIO) -> None:

@@ -12,7 +12,8 @@ from torch import Tensor
 
 from langflash_core.geometry.cameras import intrinsics_from_fov
 from langflash_core.images.lens import ASSUMED_FOV
-from langflash_core.images.views import Box, centre_box, cropped_intrinsics, fitting_size
+from langflash_core.images.pictures import Box, centre_box, fitting_size
+from langflash_core.images.views import cropped_intrinsics
 from langflash_core.lab.photos.folder import LabelledPhoto
 
 SMALLEST_WINDOW = 0.35

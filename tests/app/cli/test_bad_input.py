@@ -273,7 +273,11 @@ def test_from_a_shell(tmp_path):
     """The same through a real process: exit code, one sentence, an empty stdout, no traceback."""
     for words in (["render", "gone.langflash", "-o", "a.png"], ["frobnicate"], []):
         done = subprocess.run(
-            [sys.executable, "-m", "app", *words], capture_output=True, text=True, cwd=tmp_path, timeout=60
+            [sys.executable, "-m", "langflash_core", *words],
+            capture_output=True,
+            text=True,
+            cwd=tmp_path,
+            timeout=60,
         )
         assert done.returncode == 2
         assert done.stdout == ""

@@ -18,10 +18,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.window import theme
-from app.window.panels import CANVAS_TOP
+from app.window.frame.layout import CANVAS_TOP
+from app.window.kit import theme
 from langflash_core.language.spaces import language_space
-from langflash_core.scene import save
+from langflash_core.scene.file import save
 from tests.app.window.scenes import PHRASES, room
 from tests.app.window.x11 import Client
 

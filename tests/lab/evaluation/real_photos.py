@@ -11,7 +11,10 @@ from langflash_core.lab.photos.fitting import fitted
 from langflash_core.lab.photos.folder import LabelledPhoto
 from langflash_core.lab.photos.writing import FolderWriter
 from langflash_core.language.spaces import language_space
-from langflash_core.types import Gaussians, Scene, Semantics
+from langflash_core.network import MINI
+from langflash_core.network.encoders.shared import Tokens
+from langflash_core.network.model import LangFlashNet
+from langflash_core.types import Gaussians, Record, Scene, Semantics
 
 WIDTH, HEIGHT = 112, 84
 NAMES = {1: "wall", 2: "floor", 3: "chair", 4: "desk", 5: "lamp", 6: "garbage bin"}
@@ -80,19 +83,26 @@ def knowing(photos: list[LabelledPhoto], names: dict, *, scale: float = 0.5) -> 
         sh=((torch.cat(colours) - 0.5) / _C0)[:, None],
     )
     semantics = Semantics(torch.cat(atoms)[:, None], torch.ones(count, 1), dictionary, "minilm")
-    metadata = {"network_unit": 1 / scale, "warnings": []}
-    return Scene(gaussians, semantics, torch.stack(viewmats), torch.stack(Ks), size, metadata=metadata)
+    return Scene(
+        gaussians,
+        semantics,
+        torch.stack(viewmats),
+        torch.stack(Ks),
+        size,
+        record=Record(network_unit=1 / scale),
+    )
 
 
-class KnowingNet:
+class KnowingNet(LangFlashNet):
     """Language features that are the names themselves, at half the size of the photo."""
 
     def __init__(self, folder: PhotoFolder):
+        super().__init__(MINI)
         self.folder = folder
         self.id = folder.ids[0]
 
     def encode(self, images, Ks):
-        return None
+        return Tokens((torch.zeros(1, 1, 1, 1),), (1, 1))
 
     def language(self, tokens, images):
         texts = [self.folder.names[id].text for id in sorted(self.folder.names)]
