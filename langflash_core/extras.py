@@ -14,6 +14,7 @@ EXTRAS = {
     "open_clip": "full",
     "torchvision": "full",
     "matplotlib": "bench",
+    "h5py": "photos",
 }
 """Top-level import name -> extra in pyproject.toml."""
 

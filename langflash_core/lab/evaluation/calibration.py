@@ -8,7 +8,7 @@ Sizes: P phrases, M masks, T trial thresholds.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from langflash_core.lab.evaluation.rooms import MASK_THRESHOLDS, asked_rooms
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.language.spaces import language_space
 from langflash_core.network import LangFlashNet
+from langflash_core.running import Progress
 
 BINS = 20
 """Of scores, in the reliability diagram."""
@@ -85,7 +86,7 @@ def photos_asked(
     weights: Path | None = None,
     *,
     preset: str = "mini",
-    progress: Callable[[str, float], None] = lambda stage, fraction: None,
+    progress: Progress = lambda stage, fraction: None,
 ) -> Asked:
     """Phrases in labelled photos, as `run_photos` asks them.
 

@@ -20,6 +20,8 @@ _PHOTOS = (
 _POSED = (
     ("Rotation error, median (degrees)", "pose_rotation_median", "no motion", "true_rotation_median"),
     ("Direction error, median (degrees)", "pose_direction_median", "", ""),
+    ("Rotation error of placed photos, median (degrees)", "rotation_placed_median", "", ""),
+    ("Direction error of placed photos, median (degrees)", "direction_placed_median", "", ""),
     ("Right pose (5 / 15 degrees)", "pose_right_share", "", ""),
     ("Second photo found its place", "placed", "", ""),
     ("Depth AbsRel, each photo's scale aligned", "depth_abs_rel", "one depth", "depth_abs_rel_flat"),
@@ -59,7 +61,7 @@ def photos_markdown(result: dict) -> str:
 def posed_markdown(result: dict) -> str:
     """The tables of a `run_posed` result: all pairs, and by how many numbers they are apart."""
     gaps = result["by_gap"]
-    keys = ("pairs", "true_rotation_median", "pose_rotation_median", "pose_direction_median",
+    keys = ("pairs", "placed", "true_rotation_median", "pose_rotation_median", "pose_direction_median",
             "pose_right_share", "depth_abs_rel", "psnr")  # fmt: skip
     lines = [*_measures(result["measures"], _POSED), ""]
     lines.append("| numbers apart | " + " | ".join(key.replace("_", " ") for key in keys) + " |")

@@ -10,7 +10,7 @@ Sizes: H W pixels as the network saw the photos.
 import math
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -28,6 +28,7 @@ from langflash_core.lab.training.losses import ssim_map
 from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, nan_mean, psnr
 from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.pipeline import reconstruct
+from langflash_core.running import Progress
 from langflash_core.types import Camera, Scene
 
 APART = (6, 12, 18, 24)
@@ -91,7 +92,7 @@ def run_posed(
     *,
     preset: str = "mini",
     size: int | None = None,
-    progress: Callable[[str, float], None] = lambda stage, fraction: None,
+    progress: Progress = lambda stage, fraction: None,
 ) -> dict:
     """Judge a checkpoint on pairs of a posed folder.
 
@@ -142,6 +143,8 @@ def judge_triple(
     predicted = scene.viewmats[1].cpu() if placed else torch.eye(4)
     error = pose_error(predicted, to_second.float())
     tally.poses.append(error if placed else PoseError(error.rotation, LEFT_OUT))
+    if placed:
+        tally.note(rotation_placed=error.rotation, direction_placed=error.direction)
     tally.note(
         seconds=seconds,
         placed=float(placed),
@@ -239,7 +242,7 @@ def _judge_between(
 def summary(tally: Tally) -> dict[str, float | None]:
     """Means, medians and shares, rounded."""
     measures = {name: nan_mean(values) for name, values in tally.numbers.items()}
-    for name in ("depth_abs_rel", "psnr", "true_rotation"):
+    for name in ("depth_abs_rel", "psnr", "true_rotation", "rotation_placed", "direction_placed"):
         if name in tally.numbers:
             measures[f"{name}_median"] = float(torch.tensor(tally.numbers[name]).nanmedian())
     measures |= {

@@ -16,8 +16,7 @@ from PIL import Image
 from langflash_core.errors import InputError
 from langflash_core.lab.photos.matlab import MatFile, open_mat
 from langflash_core.lab.photos.writing import FolderWriter, NameTable
-
-Progress = Callable[[str, float], None]
+from langflash_core.running import Progress
 
 NYU_FRAME = (41, 45, 601, 471)
 """The usual crop of the 640 x 480 pictures, which have a white frame: left, top, right, bottom."""

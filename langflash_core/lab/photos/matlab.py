@@ -12,6 +12,7 @@ from scipy.io import loadmat
 from scipy.io.matlab import MatReadError
 
 from langflash_core.errors import InputError
+from langflash_core.extras import optional_packages
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HEADER = 512
@@ -48,7 +49,7 @@ def open_mat(path: Path) -> MatFile:
     """Open a .mat of any version.
 
     Raises:
-        InputError: missing, damaged, or of version 7.3 without h5py.
+        InputError: missing or damaged. MissingPackageError: of version 7.3, and h5py is not installed.
     """
     try:
         with path.open("rb") as stream:
@@ -92,13 +93,8 @@ class _Hdf5(MatFile):
     """Version 7.3, read piece by piece."""
 
     def __init__(self, path: Path):
-        try:
+        with optional_packages():
             import h5py
-        except ImportError:
-            raise InputError(
-                f"{path} is a MATLAB file of version 7.3, which h5py reads; "
-                "install it with pip install 'langflash[photos]'"
-            ) from None
         self.path = path
         try:
             self._file = h5py.File(path, "r")

@@ -158,7 +158,7 @@ def test_posed_photos_are_judged(run, checkpoint, tmp_path):
     words = ("--weights", checkpoint, "--size", "56", "--backend", "torch", "--apart", "6")
     outcome = run("eval", "posed", tmp_path / "posed", *words)
     assert outcome.code == 0, outcome.err
-    assert "(no motion)" in outcome.out and "| 6 | 1.000 | 0.000 |" in outcome.out
+    assert "(no motion)" in outcome.out and "| 6 | 1.000 | 1.000 | 0.000 |" in outcome.out
     assert "Depth" not in outcome.out
 
 

@@ -42,13 +42,14 @@ def test_the_truth_scores_as_the_truth(folder: PhotoFolder, program):
     result = run_posed(folder, TRIPLES, render)
     measures = result["measures"]
     assert result["pairs"] == 2 and measures["placed"] == 1 and measures["pose_right_share"] == 1
+    assert measures["rotation_placed_median"] == measures["pose_rotation_median"]
     assert measures["pose_rotation_median"] < 1e-2 and measures["pose_direction_median"] < 1e-2
     assert measures["depth_abs_rel"] < 1e-3 and measures["depth_delta1"] == 1
     # 18 cm to the side move things by nine pixels of 112; the scene knows, the first photo does not.
     assert measures["psnr"] > measures["psnr_first_photo"] + 3 and measures["psnr"] > 20
     assert set(result["by_gap"]) == {"6", "12"} and result["by_gap"]["6"]["pairs"] == 1
     table = posed_markdown(result)
-    assert f"| {measures['depth_abs_rel']:.3f} |" in table and "| 12 | 1.000 |" in table
+    assert f"| {measures['depth_abs_rel']:.3f} |" in table and "| 12 | 1.000 | 1.000 |" in table
 
 
 def test_a_turned_camera_is_told(folder: PhotoFolder, program):
@@ -74,6 +75,7 @@ def test_a_photo_without_a_place_counts_as_wrong(folder: PhotoFolder, program):
     measures = run_posed(folder, TRIPLES[:1], render)["measures"]
     assert measures["placed"] == 0 and measures["pose_right_share"] == 0
     assert measures["pose_direction_median"] == posed.LEFT_OUT
+    assert "rotation_placed_median" not in measures
     assert measures["psnr"] is not None  # the first photo's depth tells the scale
 
 

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 from scipy.io import savemat
 
-from langflash_core.errors import InputError
+from langflash_core.errors import InputError, MissingPackageError
 from langflash_core.lab.photos import matlab as matlab_files
 from langflash_core.lab.photos import open_folder
 from langflash_core.lab.photos.layouts import Source, convert
@@ -94,7 +94,7 @@ def test_nyu_without_further_files(nyu: Path, tmp_path: Path):
 def test_version_7_3_needs_h5py(tmp_path: Path, monkeypatch):
     write_hdf5(tmp_path / "new.mat", nyu_arrays())
     monkeypatch.setitem(__import__("sys").modules, "h5py", None)
-    with pytest.raises(InputError, match=r"pip install 'langflash\[photos\]'"):
+    with pytest.raises(MissingPackageError, match=r"pip install 'langflash\[photos\]' brings it"):
         matlab_files.open_mat(tmp_path / "new.mat")
 
 
