@@ -190,7 +190,8 @@ def _add_export(commands) -> None:
     _add_output(
         command,
         "FILE",
-        ".png: a picture, or a cut-out with --prompt; .ply, .splat, .langflash: Gaussians; "
+        ".png: a picture, or a cut-out with --prompt; .langflash, .ply, .compressed.ply, .splat, .spz, .sog, "
+        "meta.json (a SOG in a folder), .glb, .usd, .usda, .usdc, .usdz: Gaussians; "
         ".json: COCO masks of --prompt; .csv: their boxes; .npz: a view as numbers; .mp4: a flight",
     )
     command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="keep only what answers one of these")
@@ -213,7 +214,7 @@ def _add_export(commands) -> None:
 
 def _add_info(commands) -> None:
     command = _command(commands, "info", "what a scene file holds, and what pruning saved")
-    command.add_argument("scene", type=Path, metavar="SCENE", help=".langflash, .ply or .splat")
+    command.add_argument("scene", type=Path, metavar="SCENE", help=".langflash or a splat file")
     _add_json(command)
 
 

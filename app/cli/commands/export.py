@@ -13,10 +13,10 @@ from app.cli.renderers import Renderer, open_renderer
 from app.cli.report import ProgressBar
 from app.cli.scenes import open_scene
 from langflash_core.errors import InputError, PromptError, SceneFileError
+from langflash_core.formats import SCENES_OUT, kind_of
 from langflash_core.types import Camera, QueryResult, Scene
 
-SCENES = (".langflash", ".ply", ".splat")
-SUFFIXES = (".png", *SCENES, ".json", ".csv", ".mp4", ".npz")
+SUFFIXES = (".png", *SCENES_OUT, ".json", ".csv", ".mp4", ".npz")
 TABLES = {".json": ".json of masks", ".csv": ".csv of boxes"}
 NEED_A_PHRASE = ("heat", "mask", "cutout", "labels", "boxes")
 
@@ -29,7 +29,7 @@ def run(args: Namespace, out: TextIO) -> None:
             nothing answers.
     """
     prompts = spoken(args.prompt or [])
-    suffix = check_output_file(args.output, SUFFIXES, inputs=[args.scene]).suffix.lower()
+    suffix = kind_of(check_output_file(args.output, SUFFIXES, inputs=[args.scene]))
     _check_words(args, suffix, prompts)
     choice = chosen_camera(args)
     readable_file(args.scene, "scene", SceneFileError)
@@ -80,7 +80,7 @@ def _check_camera_words(args: Namespace, suffix: str) -> None:
         if set(looked_at) - {"size"}:
             raise InputError(f"--all-views looks from every photo; leave --{looked_at[0]} away")
         looked_at.append("all-views")
-    if suffix in SCENES and looked_at:
+    if suffix in SCENES_OUT and looked_at:
         raise InputError(f"a {suffix} holds the whole scene, not a view of it; leave --{looked_at[0]} away")
     extra = [name for name in looked_at if name != "size"]
     if suffix == ".mp4" and extra:
@@ -89,13 +89,19 @@ def _check_camera_words(args: Namespace, suffix: str) -> None:
 
 def _write_scene(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
     from langflash_core.export import export
+    from langflash_core.export.language import side_car
     from langflash_core.files import make_folder
 
     chosen = _selected(args, scene, prompts)
     make_folder(args.output.parent)
     export(chosen, args.output)
     share = f" of {len(scene.gaussians):,}" if prompts else ""
-    return f"{len(chosen.gaussians):,}{share} Gaussians, {args.output.stat().st_size / 1e6:.1f} MB"
+    beside = f", its language in {side_car(args.output).name}" if _has_side_car(args.output, chosen) else ""
+    return f"{len(chosen.gaussians):,}{share} Gaussians, {args.output.stat().st_size / 1e6:.1f} MB{beside}"
+
+
+def _has_side_car(path: Path, scene: Scene) -> bool:
+    return kind_of(path) == ".ply" and scene.semantics.num_atoms > 0
 
 
 def _selected(args: Namespace, scene: Scene, prompts: list[str]) -> Scene:
