@@ -22,7 +22,7 @@ import torch
 
 from langflash_core.errors import SceneFileError
 from langflash_core.export.language import packed_language, speaks, with_language
-from langflash_core.export.packing import check_some, placed, turned
+from langflash_core.export.packing import check_some, placed, told, turned
 from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, parts, to_scene
 from langflash_core.files import write_atomically
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE, SH_C0
@@ -56,8 +56,7 @@ def read_gltf(path: Path) -> Scene:
         scene, blocks = _gathered(document, path.name)
         block = document.view(blocks[0])[0] if len(blocks) == 1 else b""
     except _DAMAGE as error:
-        said = " ".join(str(error).split())[:100]
-        raise SceneFileError(f"{path.name} is damaged or no glTF ({said}); {_REMEDY}") from error
+        raise SceneFileError(f"{path.name} is damaged or no glTF ({told(error)}); {_REMEDY}") from error
     return with_language(scene, bytes(block), f"the language in {path.name}") if block else scene
 
 

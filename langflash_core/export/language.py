@@ -16,6 +16,7 @@ import safetensors.torch
 import torch
 from safetensors import SafetensorError
 
+from langflash_core.export.packing import told
 from langflash_core.scene.assemble import renormalised
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.fields import to_fields
@@ -81,8 +82,7 @@ def with_language(scene: Scene, block: bytes, name: str) -> Scene:
         check_scene(whole)
         return whole
     except _DAMAGE as error:
-        said = " ".join(str(error).split())[:100]
-        return _warned(scene, f"{name} is damaged ({said}); the Gaussians were read without it.")
+        return _warned(scene, f"{name} is damaged ({told(error)}); the Gaussians were read without it.")
 
 
 def _unpacked(block: bytes) -> tuple[dict[str, torch.Tensor], dict]:

@@ -78,6 +78,14 @@ def morton_order(means: np.ndarray) -> np.ndarray:
     return np.argsort(cells[:, 0] | cells[:, 1] << 1 | cells[:, 2] << 2, kind="stable")
 
 
+def told(error: BaseException) -> str:
+    """What a decoder says, in one short line; some cannot say it in UTF-8."""
+    try:
+        return " ".join(str(error).split())[:100]
+    except UnicodeDecodeError:
+        return "its text is no text"
+
+
 def check_some(gaussians: Gaussians, path: Path) -> None:
     """Raises:
     OutputError: there is nothing to write.
@@ -87,18 +95,22 @@ def check_some(gaussians: Gaussians, path: Path) -> None:
 
 
 def inflated(content: bytes, size: int, name: str, *, wbits: int) -> bytes:
-    """At most `size` bytes of a deflate or gzip stream; fewer where it ends earlier.
+    """At most `size` bytes of a deflate or gzip stream; fewer where it ends, whole, earlier.
 
     Args:
         wbits: as zlib.decompressobj takes it.
 
     Raises:
-        SceneFileError: it is no such stream, or damaged.
+        SceneFileError: it is no such stream, damaged, or cut off.
     """
+    stream = zlib.decompressobj(wbits)
     try:
-        return zlib.decompressobj(wbits).decompress(content, size)
+        plain = stream.decompress(content, size)
     except zlib.error as error:
         raise SceneFileError(f"{name} is damaged: it cannot be unpacked; export or copy it again") from error
+    if len(plain) < size and not stream.eof:
+        raise SceneFileError(f"{name} is cut off: its packed content does not end; export or copy it again")
+    return plain
 
 
 def has_zstd() -> bool:

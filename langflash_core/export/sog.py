@@ -24,7 +24,7 @@ from PIL import Image
 
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export.codebooks import palette, scalar_codebook
-from langflash_core.export.packing import check_some, from_smallest_three, morton_order, smallest_three
+from langflash_core.export.packing import check_some, from_smallest_three, morton_order, smallest_three, told
 from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, to_scene
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.formats import SOG_FOLDER
@@ -61,8 +61,7 @@ def read_sog(path: Path) -> Scene:
     except Image.DecompressionBombError as error:
         raise SceneFileError(f"{path.name} has a picture of too many pixels; {_REMEDY}") from error
     except _DAMAGE as error:
-        said = " ".join(str(error).split())[:100]
-        raise SceneFileError(f"{path.name} is damaged or no SOG ({said}); {_REMEDY}") from error
+        raise SceneFileError(f"{path.name} is damaged or no SOG ({told(error)}); {_REMEDY}") from error
 
 
 def write_sog(scene: Scene, path: Path) -> None:

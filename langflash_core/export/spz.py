@@ -136,7 +136,7 @@ def _unzipped(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
         )
     needed = sum(header.sizes())
     _check_shrinking(needed, len(content), name)
-    after = 1 << 12 if header.flags & _EXTENDED else 0
+    after = 1 << 12 if header.flags & _EXTENDED else 1  # asked for, so that an end that is missing shows
     plain = inflated(content, _HEAD.size + needed + after, name, wbits=31)
     if len(plain) < _HEAD.size + needed:
         raise SceneFileError(

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from langflash_core.errors import OutputError, SceneFileError
-from langflash_core.export.packing import check_some, placed, turned
+from langflash_core.export.packing import check_some, placed, told, turned
 from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, parts, to_scene
 from langflash_core.files import written_atomically
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
@@ -52,8 +52,7 @@ def read_usd(path: Path) -> Scene:
                 some = Rows(*(values[first : first + ROWS_AT_ONCE] for values in rows.all()))
                 gathering.add(_padded(placed(some, place, axes), num_bases))
     except (RuntimeError, ValueError, TypeError, KeyError, pxr.Tf.ErrorException) as error:
-        said = " ".join(str(error).split())[:100]
-        raise SceneFileError(f"{path.name} is damaged or no USD ({said}); {_REMEDY}") from error
+        raise SceneFileError(f"{path.name} is damaged or no USD ({told(error)}); {_REMEDY}") from error
     return to_scene(gathering, path.name, [], logs=False, logits=False)
 
 
