@@ -59,6 +59,7 @@ def build_parser() -> Parser:
         _add_query,
         _add_render,
         _add_export,
+        _add_lift,
         _add_info,
         _add_bench,
         _add_bench_network,
@@ -192,6 +193,7 @@ def _add_export(commands) -> None:
         "FILE",
         ".png: a picture, or a cut-out with --prompt; .langflash, .ply, .compressed.ply, .splat, .spz, .sog, "
         "meta.json (a SOG in a folder), .glb, .usd, .usda, .usdc, .usdz: Gaussians; "
+        "transforms.json, cameras.txt (COLMAP): photos and their poses; "
         ".json: COCO masks of --prompt; .csv: their boxes; .npz: a view as numbers; .mp4: a flight",
     )
     command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="keep only what answers one of these")
@@ -210,6 +212,27 @@ def _add_export(commands) -> None:
     command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of an .mp4 (default: 6)")
     _add_camera(command)
     _add_backend(command)
+
+
+def _add_lift(commands) -> None:
+    command = _command(
+        commands, "lift", "groups and a dictionary for plain splats, so that they answer phrases"
+    )
+    command.add_argument("scene", type=Path, metavar="SCENE", help="a splat file, or a scene to name anew")
+    _add_output(command, "SCENE", "the .langflash, or .ply or .glb with its language, to write")
+    command.add_argument(
+        "--photos",
+        nargs="+",
+        type=Path,
+        metavar="PHOTO",
+        help="of the place, with --poses; else views of itself",
+    )
+    command.add_argument("--poses", type=Path, metavar="PATH", help="transforms.json, or a COLMAP text model")
+    command.add_argument(
+        "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped ones"
+    )
+    _add_backend(command)
+    _add_json(command)
 
 
 def _add_info(commands) -> None:

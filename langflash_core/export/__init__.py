@@ -5,7 +5,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from langflash_core.errors import OutputError, SceneFileError
-from langflash_core.export import coco, compressed_ply, gltf, ksplat, npz, ply, png, sog, splat, spz, usd
+from langflash_core.export import (
+    cameras,
+    coco,
+    compressed_ply,
+    gltf,
+    ksplat,
+    npz,
+    ply,
+    png,
+    sog,
+    splat,
+    spz,
+    usd,
+)
 from langflash_core.formats import COMPRESSED_PLY, SOG_FOLDER, USD, kind_of
 from langflash_core.scene.file import load, save
 from langflash_core.types import Frame, QueryResult, Scene
@@ -37,6 +50,8 @@ WRITERS: dict[str, tuple[Writer, ...]] = {
     ".sog": (Writer(Scene, "a scene", sog.write_sog),),
     SOG_FOLDER: (Writer(Scene, "a scene", sog.write_sog),),
     ".glb": (Writer(Scene, "a scene", gltf.write_glb),),
+    cameras.COLMAP: (Writer(Scene, "a scene", cameras.write_colmap),),
+    cameras.TRANSFORMS: (Writer(Scene, "a scene", cameras.write_transforms),),
     **{suffix: (Writer(Scene, "a scene", usd.write_usd),) for suffix in USD},
 }
 

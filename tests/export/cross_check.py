@@ -178,7 +178,7 @@ def written_by(
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
     parser.add_argument("scene", type=Path)
     parser.add_argument("--splat-transform", type=Path, help="its bin/cli.mjs")
     parser.add_argument("--only", nargs="*", default=[], help="kinds, such as .spz")

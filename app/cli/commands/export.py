@@ -13,10 +13,10 @@ from app.cli.renderers import Renderer, open_renderer
 from app.cli.report import ProgressBar
 from app.cli.scenes import open_scene
 from langflash_core.errors import InputError, PromptError, SceneFileError
-from langflash_core.formats import SCENES_OUT, kind_of
+from langflash_core.formats import CAMERAS_OUT, SCENES_OUT, kind_of
 from langflash_core.types import Camera, QueryResult, Scene
 
-SUFFIXES = (".png", *SCENES_OUT, ".json", ".csv", ".mp4", ".npz")
+SUFFIXES = (".png", *SCENES_OUT, *CAMERAS_OUT, ".json", ".csv", ".mp4", ".npz")
 TABLES = {".json": ".json of masks", ".csv": ".csv of boxes"}
 NEED_A_PHRASE = ("heat", "mask", "cutout", "labels", "boxes")
 
@@ -80,7 +80,7 @@ def _check_camera_words(args: Namespace, suffix: str) -> None:
         if set(looked_at) - {"size"}:
             raise InputError(f"--all-views looks from every photo; leave --{looked_at[0]} away")
         looked_at.append("all-views")
-    if suffix in SCENES_OUT and looked_at:
+    if suffix in (*SCENES_OUT, *CAMERAS_OUT) and looked_at:
         raise InputError(f"a {suffix} holds the whole scene, not a view of it; leave --{looked_at[0]} away")
     extra = [name for name in looked_at if name != "size"]
     if suffix == ".mp4" and extra:
@@ -95,6 +95,8 @@ def _write_scene(args: Namespace, scene: Scene, prompts: list[str], choice: Came
     chosen = _selected(args, scene, prompts)
     make_folder(args.output.parent)
     export(chosen, args.output)
+    if kind_of(args.output) in CAMERAS_OUT:
+        return f"{scene.num_views} photos in images/ and their poses"
     share = f" of {len(scene.gaussians):,}" if prompts else ""
     beside = f", its language in {side_car(args.output).name}" if _has_side_car(args.output, chosen) else ""
     return f"{len(chosen.gaussians):,}{share} Gaussians, {args.output.stat().st_size / 1e6:.1f} MB{beside}"
