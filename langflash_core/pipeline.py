@@ -16,6 +16,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import Cancelled, InputError, PromptError, ViewError, WeightsError
+from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.images import grey_photo, load_views
 from langflash_core.images.views import source_pictures
 from langflash_core.language.answers import answer
@@ -34,6 +35,7 @@ from langflash_core.network.semantics.grouping import Groups
 from langflash_core.network.semantics.lifting import lifted_weights
 from langflash_core.network.semantics.sam2 import Sam2, sam2_checkpoint
 from langflash_core.scene import assemble, prune
+from langflash_core.scene.world import in_world
 from langflash_core.splat import render as render_reference
 from langflash_core.splat.refine import Budget, refine
 from langflash_core.types import Camera, Frame, Prediction, QueryResult, Scene, Views
@@ -63,6 +65,7 @@ def reconstruct(
     aggregation: str | None = None,
     grouping: str | None = None,
     refine_seconds: float | None = None,
+    viewmats: Tensor | None = None,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Scene:
@@ -85,6 +88,8 @@ def reconstruct(
             else clusters of the language features.
         refine_seconds: so long poses and Gaussians are fitted to the photos afterwards, and kept so
             if that brings a view closer that was held out; None: not at all.
+        viewmats: poses (V, 4, 4) of the photos, world to camera, in any world and unit: they are not
+            sought, and the scene is in that world; preset mini. None: the first photo's camera is the world.
         device: "auto" takes CUDA where there is one; "cpu"; "cuda".
         progress: called with the stage and the fraction of the whole in [0, 1].
         cancelled: asked between stages, photos and pairs of photos, and before every layer.
@@ -115,6 +120,7 @@ def reconstruct(
             square=PRESETS[preset].square,
             check=run.check,
         )
+    views = _posed(views, viewmats, preset)
     with run.stage("weights"):
         network = _network(preset, weights, device, precision)
         atoms = _atoms(network, aggregation, views)
@@ -131,6 +137,8 @@ def reconstruct(
             scene = _refined(scene, views.images[placed], refine_seconds, device, run.within("refine"))
         scene = scene.with_metadata(timings={**scene.metadata["timings"], "fitting": run.timings["refine"]})
     run.check()
+    if viewmats is not None:
+        scene = in_world(scene, viewmats[0], scene.metadata["network_unit"])
     run.report("done", 1.0)
     return _with_record(scene, network, run.timings)
 
@@ -197,6 +205,22 @@ def select(scene: Scene, prompts: Sequence[str], *, threshold: float | None = No
             "lower the threshold"
         )
     return kept(scene, passing)
+
+
+def _posed(views: Views, viewmats: Tensor | None, preset: str) -> Views:
+    """The views with the poses that were given, brought to the first camera.
+
+    Raises:
+        InputError: another preset, or not a pose for each photo.
+    """
+    if viewmats is None:
+        return views
+    if preset != "mini":
+        raise InputError(f"the preset '{preset}' seeks poses itself; choose --preset mini for given ones")
+    if tuple(viewmats.shape) != (views.num_views, 4, 4):
+        raise InputError(f"{len(viewmats)} poses were given for {views.num_views} photos; give one each")
+    relative = viewmats.double() @ invert_rigid(viewmats[0].double())
+    return replace(views, viewmats=relative)
 
 
 def best_pair(

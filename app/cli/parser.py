@@ -135,6 +135,13 @@ def _add_reconstruct(commands) -> None:
         help="in pixels of the photos as given, after EXIF orientation",
     )
     command.add_argument(
+        "--poses",
+        type=Path,
+        metavar="PATH",
+        help="a transforms.json or COLMAP text model with the photos' poses and lenses: they are not sought, "
+        "and the scene is in their world and unit",
+    )
+    command.add_argument(
         "--size",
         type=pixel_side,
         metavar="PX",

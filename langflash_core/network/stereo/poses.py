@@ -8,6 +8,7 @@ import numpy as np
 
 from langflash_core.network.stereo.alignment import NO_CORRECTION, Correction, fit_correction
 from langflash_core.network.stereo.dense import match_cells
+from langflash_core.network.stereo.known import agreeing, depth_scales, log_scales
 from langflash_core.network.stereo.matching import (
     Matches,
     RelativePose,
@@ -54,11 +55,19 @@ class Poses:
     guessed: tuple[int, ...]
 
 
-def estimate_poses(views: list[PoseInput], check: Callable[[], None] = lambda: None) -> Poses:
+def estimate_poses(
+    views: list[PoseInput], check: Callable[[], None] = lambda: None, known: np.ndarray | None = None
+) -> Poses:
     """Poses of all views, deterministic.
 
     A view that matches nothing keeps view 0's pose and is reported in `guessed`. `check` is called
     before each photo and each pair; what it raises ends the work.
+
+    Args:
+        known: poses (V, 4, 4) that are given, world = view 0: only depths are fitted, to their unit.
+
+    Raises:
+        InputError: the photos do not fit the poses that are given.
     """
     num_views = len(views)
     limit = 4000 if num_views <= _MANY_VIEWS else 1500
@@ -72,6 +81,9 @@ def estimate_poses(views: list[PoseInput], check: Callable[[], None] = lambda: N
         for j in range(i + 1, num_views):
             check()
             matches = _key_point_matches(views, features, i, j)
+            if known is not None:
+                agreed[i, j] = _agreed(views[i], views[j], matches, known[j] @ np.linalg.inv(known[i]))
+                continue
             pose = _pair_pose(views[i], views[j], matches)
             if pose is None or pose.num_inliers < _FEW:
                 more = _joined(matches, _dense_matches(views[i], views[j]))
@@ -79,9 +91,31 @@ def estimate_poses(views: list[PoseInput], check: Callable[[], None] = lambda: N
                 pose, matches = (better, more) if better is not None else (pose, matches)
             if pose is not None:
                 pairs[i, j], agreed[i, j] = pose, matches.subset(pose.inliers)
-    viewmats, scales, guessed = _chain(num_views, pairs)
+    if known is None:
+        viewmats, scales, guessed = _chain(num_views, pairs)
+    else:
+        viewmats, scales, guessed = known, _known_scales(views, known, agreed), ()
     corrections = [_correction(v, views[v], viewmats, scales[v], agreed) for v in range(num_views)]
     return Poses(viewmats, scales, tuple(corrections), guessed)
+
+
+def _agreed(view_i: PoseInput, view_j: PoseInput, matches: Matches, relative: np.ndarray) -> Matches:
+    """Matches that a known relative pose allows; dense ones as well where few do."""
+    own = agreeing(matches, relative)
+    return own if len(own) >= _FEW else agreeing(_joined(matches, _dense_matches(view_i, view_j)), relative)
+
+
+def _known_scales(
+    views: list[PoseInput], viewmats: np.ndarray, agreed: dict[tuple[int, int], Matches]
+) -> np.ndarray:
+    """Factors (V,) that bring each depth map to the unit of known poses; 1 for a single photo."""
+    said: list[list[np.ndarray]] = [[np.zeros(0)] for _ in views]
+    for (i, j), matches in agreed.items():
+        relative = viewmats[j] @ np.linalg.inv(viewmats[i])
+        depths = _depths_at(views[i], matches.x_i), _depths_at(views[j], matches.x_j)
+        for view, logs in zip((i, j), log_scales(matches, relative, *depths), strict=True):
+            said[view].append(logs)
+    return np.ones(1) if len(views) == 1 else depth_scales([np.concatenate(own) for own in said])
 
 
 def _pair_pose(view_i: PoseInput, view_j: PoseInput, matches: Matches) -> RelativePose | None:
