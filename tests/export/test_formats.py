@@ -475,3 +475,59 @@ def test_usd_that_is_absent_is_said(tmp_path, monkeypatch):
     with pytest.raises(OutputError, match=r"langflash\[usd\]"):
         export(bare_scene(random_gaussians(3), "made"), tmp_path / "b.usd")
     assert not (tmp_path / "b.usd").exists()
+
+
+def test_the_table_in_the_readme_is_what_the_code_does():
+    """A row a format: whether it is read and written, and its axes."""
+    from langflash_core.export import gltf, usd
+
+    lines = (Path(__file__).parents[2] / "README.md").read_text().split("### Splat files")[1].splitlines()
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if line.startswith("| `")]
+    axes = {"`.spz`": spz._STORED_AXES, "`.glb`": gltf._AXES, "`.usd`": usd._AXES["Y"]}
+    read_kinds, written_kinds = set(), set()
+    for kinds, ways, letters, *_ in rows:
+        names = [kind.strip("` ") for kind in kinds.split(",")]
+        read_kinds |= set(names)
+        written_kinds |= {name for name in names if ways == "in, out" or f"out (`{name}`)" in ways}
+        assert letters == axes.get(kinds.split(",")[0], "RDF")
+    assert read_kinds - {".compressed.ply"} == set(SCENES_IN) and written_kinds == set(SCENES_OUT)
+
+
+def stored_position(kind: str, path: Path) -> list[float]:
+    """The position that a file of one Gaussian holds, in its own axes, read as its format says."""
+    content = path.read_bytes()
+    if kind == ".spz":
+        body = gzip.decompress(content)
+        steps = [int.from_bytes(body[16 + 3 * a : 19 + 3 * a], "little", signed=True) for a in range(3)]
+        return [step / 2 ** body[13] for step in steps]
+    if kind == ".sog":
+        with zipfile.ZipFile(path) as archive:
+            lowest = json.loads(archive.read("meta.json"))["means"]["mins"]
+        return [float(np.sign(v) * np.expm1(abs(v))) for v in lowest]
+    if kind == ".glb":
+        return glb_parts(path)[0]["accessors"][0]["min"]
+    if kind == ".usda":
+        return [float(v) for v in content.decode().split("positions = [(")[1].split(")")[0].split(",")]
+    if kind == ".splat":
+        return list(struct.unpack("<3f", content[:12]))
+    return list(struct.unpack("<3f", content.split(b"end_header\n")[1][:12]))  # first numbers of both PLYs
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected"),
+    [
+        (".ply", [1, 2, 3]), (".compressed.ply", [1, 2, 3]), (".splat", [1, 2, 3]), (".sog", [1, 2, 3]),
+        (".spz", [1, -2, -3]), (".glb", [-1, -2, 3]), (".usda", [1, -2, -3]),
+    ],
+)  # fmt: skip
+def test_axes_in_the_files_themselves(tmp_path, kind, expected):
+    """One to the right, two down, three ahead."""
+    if kind == ".usda":
+        pytest.importorskip("pxr")
+    scene = bare_scene(replace(random_gaussians(1), means=torch.tensor([[1.0, 2.0, 3.0]])), "made")
+    path = tmp_path / f"a{kind}"
+    if kind == ".spz":
+        spz.write_spz(scene, path, version=3)
+    else:
+        export(scene, path)
+    assert stored_position(kind, path) == pytest.approx(expected, abs=1e-4)
