@@ -7,11 +7,14 @@
     lf.save(scene, "room.langflash")
     scene = lf.load("room.langflash")  # or .ply, .splat: the suffix says which
 
-The four functions are read in at first use: importing the package alone costs no torch.
+The four functions are read in at first use: importing the package alone costs no torch. It settles
+how torch's threads will wait (`threads.py`), unless the environment says that already.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING
+
+from langflash_core.threads import wait_asleep
 
 if TYPE_CHECKING:
     from langflash_core.export import export as save  # noqa: F401
@@ -20,6 +23,8 @@ if TYPE_CHECKING:
     from langflash_core.pipeline import reconstruct as reconstruct
 
 __version__ = "0.1.0"
+
+wait_asleep()
 
 _HOMES = {
     "reconstruct": ("pipeline", "reconstruct"),

@@ -49,5 +49,9 @@ class GraphicsError(LangFlashError):
     """OpenGL is not available or too old for what was asked."""
 
 
+class MissingPackageError(LangFlashError):
+    """An optional package is not installed; says which extra brings it."""
+
+
 class Cancelled(LangFlashError):
     """The user stopped the work; nothing was written."""

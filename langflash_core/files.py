@@ -1,12 +1,25 @@
-"""Files that are whole or absent: written beside their place, then moved onto it."""
+"""Files that are whole or absent: written beside their place, then moved onto it.
 
+The hidden file beside it is called `.NAME.HOST-PROCESS-RANDOM.part`. A killed process leaves its own
+behind; the next write into the folder from the same computer sweeps it up.
+"""
+
+import hashlib
 import os
+import platform
+import re
 import secrets
+import sys
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from langflash_core.errors import OutputError
+
+# Of a shared folder, only parts of this computer can be judged by their process number.
+_HOST = hashlib.sha256(platform.node().encode()).hexdigest()[:6]
+_PART = re.compile(rf"\..*\.{_HOST}-(\d+)-[0-9a-f]{{12}}\.part", re.DOTALL)
+_STILL_ACTIVE = 259  # what Windows has for the exit code of a process that runs
 
 
 def write_atomically(path: Path, content: bytes | Iterable[bytes]) -> None:
@@ -21,7 +34,7 @@ def write_atomically(path: Path, content: bytes | Iterable[bytes]) -> None:
     if not os.path.isdir(folder):
         state = "is a file" if os.path.exists(folder) else "does not exist"
         raise OutputError(f"cannot write {path}: {folder} {state}; create that folder first")
-    temporary = folder / f".{path.name[:100]}.{secrets.token_hex(6)}.part"
+    temporary = _part(path)
     try:
         with temporary.open("xb") as stream:
             for part in (content,) if isinstance(content, bytes) else content:
@@ -44,7 +57,7 @@ def written_atomically(path: Path) -> Iterator[Path]:
         OutputError: the folder cannot be made or written, or the disk is full.
     """
     make_folder(path.parent)
-    temporary = path.parent / f".{path.name[:100]}.{secrets.token_hex(6)}.part"
+    temporary = _part(path)
     try:
         yield temporary
         os.replace(temporary, path)
@@ -66,6 +79,38 @@ def make_folder(folder: Path) -> None:
     except OSError as error:
         reason = "a file of that name is in the way" if isinstance(error, FileExistsError) else error.strerror
         raise OutputError(f"cannot create the folder {folder}: {reason}; choose another place") from error
+
+
+def _part(path: Path) -> Path:
+    """The hidden file to write to beside `path`, after those of processes that are gone were swept up."""
+    with suppress(OSError):
+        for name in os.listdir(path.parent):
+            found = _PART.fullmatch(name)
+            if found and not _runs(int(found[1])):
+                _remove(path.parent / name)
+    return path.parent / f".{path.name[:100]}.{_HOST}-{os.getpid()}-{secrets.token_hex(6)}.part"
+
+
+def _runs(process: int) -> bool:
+    """Whether a process of this number exists on this computer."""
+    if sys.platform == "win32":  # there, os.kill ends what it is asked about
+        import ctypes
+
+        kernel = ctypes.windll.kernel32
+        handle = kernel.OpenProcess(0x1000, False, process)  # PROCESS_QUERY_LIMITED_INFORMATION
+        if not handle:
+            return False
+        code = ctypes.c_ulong()
+        known = kernel.GetExitCodeProcess(handle, ctypes.byref(code))
+        kernel.CloseHandle(handle)
+        return not known or code.value == _STILL_ACTIVE
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OverflowError, PermissionError):
+        return True
+    return True
 
 
 def _remove(temporary: Path) -> None:

@@ -21,7 +21,8 @@ from torch import Tensor
 from langflash_core.errors import Cancelled, InputError
 from langflash_core.export.cameras import read_posed
 from langflash_core.geometry.cameras import invert_rigid
-from langflash_core.images.views import fitting_size, load_views
+from langflash_core.images.pictures import fitting_size
+from langflash_core.images.views import load_views
 from langflash_core.network import PRESETS, load_network
 from langflash_core.network.posed import posed_semantics
 from langflash_core.scene.assemble import sparse_weights
@@ -221,15 +222,19 @@ def _spoken(
         means = scene.gaussians.means.double().numpy()
         nearest = rows[torch.from_numpy(np.asarray(KDTree(means[seen]).query(means[~seen])[1]))]
         ids[hidden], values[hidden] = ids[nearest], values[nearest]
+    plain = scene.with_record(atom_names={}, silent_atoms=())  # names of atoms that are no more
     lifted = replace(
-        scene,
+        plain,
         semantics=Semantics(ids, values, dictionary, PRESETS[PRESET].space),
         viewmats=torch.stack([camera.viewmat.float() for camera in cameras]),
         Ks=views.Ks.float(),
         view_size=views.size,
         photos=views.sources,
+        view_ids=None,
     )
-    record = {"preset": PRESET, "photos": list(views.names), "lifted": {"seen": int(seen.sum())}}
-    if calibration:
-        record["calibration"] = dict(calibration)
-    return lifted.with_metadata(**record)
+    return lifted.with_record(
+        preset=PRESET,
+        photos=tuple(views.names),
+        calibration=dict(calibration),
+        counts={**scene.record.counts, "seen": int(seen.sum())},
+    )

@@ -5,28 +5,27 @@ render -> query.relevance_maps -> query.answer
 """
 
 import sys
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
 
 import torch
 from torch import Tensor
 
-from langflash_core.errors import Cancelled, InputError, PromptError, ViewError, WeightsError
+from langflash_core.ahead import Ahead, begin
+from langflash_core.errors import InputError, PromptError, ViewError, WeightsError
 from langflash_core.geometry.cameras import invert_rigid
-from langflash_core.images import grey_photo, load_views
-from langflash_core.images.views import source_pictures
+from langflash_core.images.decode import grey_photo
+from langflash_core.images.views import load_views, source_pictures
 from langflash_core.language.answers import answer
 from langflash_core.language.clip import load_clip_images
-from langflash_core.language.gaussians import gaussian_relevance, kept
+from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.relevance import Mode, compile_query, relevance_maps
 from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_network
-from langflash_core.network.build import network_class
 from langflash_core.network.checkpoints.store import part_folder
+from langflash_core.network.checkpoints.stored import Stored
 from langflash_core.network.model import Atoms, Geometry, Lifted, pooled_weights
 from langflash_core.network.precision import has_bfloat16
 from langflash_core.network.semantics.aggregation import averaged_atoms
@@ -34,22 +33,22 @@ from langflash_core.network.semantics.crops import crop_atoms
 from langflash_core.network.semantics.grouping import Groups
 from langflash_core.network.semantics.lifting import lifted_weights
 from langflash_core.network.semantics.sam2 import Sam2, sam2_checkpoint
-from langflash_core.scene import assemble, prune
+from langflash_core.running import Progress, Run
+from langflash_core.scene.assemble import assemble
+from langflash_core.scene.prune import prune
 from langflash_core.scene.world import in_world
 from langflash_core.splat import render as render_reference
 from langflash_core.splat.refine import Budget, refine
-from langflash_core.types import Camera, Frame, Prediction, QueryResult, Scene, Views
-
-Progress = Callable[[str, float], None]
+from langflash_core.types import Camera, Cost, Frame, Prediction, QueryResult, Scene, Views
 
 # Where each stage begins in the whole, from its measured share of the time on two CPU cores.
 STAGES = {"photos": 0.0, "weights": 0.1, "network": 0.2, "assemble": 0.85, "prune": 0.95, "refine": 0.97}
 PRECISIONS = ("auto", "float32", "bfloat16")
 AGGREGATIONS = ("lfa", "average", "crops")
 GROUPINGS = ("queries", "sam2")
-SIZES = (56, 1024)  # pixels: below, the encoder's grid is 4 patches; above, attention's memory runs away
 LARGEST_PICTURE = 8192
 LONGEST_REFINEMENT = 3600  # seconds
+_networks: dict[tuple, LangFlashNet] = {}
 
 
 def reconstruct(
@@ -68,6 +67,7 @@ def reconstruct(
     viewmats: Tensor | None = None,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
+    ahead: Ahead | None = None,
 ) -> Scene:
     """Photos of one room to a 3D scene that can be queried, in one forward pass.
 
@@ -78,8 +78,8 @@ def reconstruct(
             (fx, fy, cx, cy) in pixels of the photos as given, the same for all. Neither: EXIF, else
             an assumption with a warning.
         size: the network sees about size x size pixels per photo, whatever their shape.
-        precision: "float32"; "bfloat16", for presets with a rule for it; "auto" takes it where
-            there is one and the processor is quick at it.
+        precision: "float32"; "bfloat16", in the parts that bear it; "auto" takes bfloat16 where the
+            processor is quick at it.
         aggregation: how a group gets its vector: "lfa" (trained), "average" (of dense features),
             "crops" (CLIP on a cut-out; presets of its space); None: lfa where it has weights,
             else average.
@@ -93,39 +93,35 @@ def reconstruct(
         device: "auto" takes CUDA where there is one; "cpu"; "cuda".
         progress: called with the stage and the fraction of the whole in [0, 1].
         cancelled: asked between stages, photos and pairs of photos, and before every layer.
+        ahead: of `ahead.begin` with the same arguments, which may have been called before torch was
+            imported; None: begun here.
 
     Returns:
-        A scene on the CPU; `metadata` holds seconds per stage, peak memory and warnings.
+        A scene on the CPU; its record holds seconds per stage, peak memory and warnings.
 
     Raises:
         ImageError: a photo cannot be used. InputError: an argument cannot.
         WeightsError: the checkpoint is missing or does not fit.
         Cancelled: `cancelled()` became true.
     """
-    run = _Run(progress, cancelled)
-    if preset not in PRESETS:
-        raise WeightsError(f"there is no preset '{preset}'; choose one of {', '.join(PRESETS)}")
+    run = Run(STAGES, progress, cancelled)
     device = _device(device)
     if refine_seconds is not None:
         _check_refinement(refine_seconds, photos)
-    area = PRESETS[preset].native_area if size is None else _area(size)
     with run.stage("photos"):
-        files = [Path(photo) for photo in photos]
+        ahead = ahead or begin(
+            photos, preset=preset, weights=weights, size=size, read_weights=False, check=run.check
+        )
         views = load_views(
-            files,
-            fov=fov,
-            intrinsics=intrinsics,
-            area=area,
-            multiple=PRESETS[preset].patch,
-            square=PRESETS[preset].square,
-            check=run.check,
+            photos, fov=fov, intrinsics=intrinsics, check=run.check, pictures=ahead.pictures.result
         )
     views = _posed(views, viewmats, preset)
     with run.stage("weights"):
-        network = _network(preset, weights, device, precision)
+        network = _network(preset, weights, device, precision, ahead.stored)
         atoms = _atoms(network, aggregation, views)
         groups = _groups(network, grouping, device)
     with run.stage("network"):
+        ahead.matched.result()
         prediction = _on_cpu(network.predict(views, run.within("network"), cancelled, atoms, groups))
     with run.stage("assemble"), torch.no_grad():
         scene = assemble(prediction, views, preset=preset)
@@ -135,10 +131,11 @@ def reconstruct(
         placed = [v for v in range(views.num_views) if v not in prediction.unplaced]
         with run.stage("refine"):
             scene = _refined(scene, views.images[placed], refine_seconds, device, run.within("refine"))
-        scene = scene.with_metadata(timings={**scene.metadata["timings"], "fitting": run.timings["refine"]})
+        fitting = {**scene.record.cost.timings, "fitting": run.timings["refine"]}
+        scene = scene.with_record(cost=Cost(fitting))
     run.check()
     if viewmats is not None:
-        scene = in_world(scene, viewmats[0], scene.metadata["network_unit"])
+        scene = in_world(scene, viewmats[0], scene.record.network_unit)
     run.report("done", 1.0)
     return _with_record(scene, network, run.timings)
 
@@ -204,7 +201,7 @@ def select(scene: Scene, prompts: Sequence[str], *, threshold: float | None = No
             f"nothing in the scene answers {asked} (best score {highest:.3f}, threshold {limit:.3f}); "
             "lower the threshold"
         )
-    return kept(scene, passing)
+    return scene.rows(passing)
 
 
 def _posed(views: Views, viewmats: Tensor | None, preset: str) -> Views:
@@ -234,7 +231,7 @@ def best_pair(
     Raises:
         ImageError: a photo cannot be used. Cancelled: `cancelled()` became true.
     """
-    run = _Run(None, cancelled)
+    run = Run(STAGES, None, cancelled)
     greys = []
     for photo in photos:
         run.check()
@@ -242,53 +239,19 @@ def best_pair(
     return choose_pair(greys, run.check)
 
 
-@dataclass
-class _Run:
-    """One reconstruction under way: times its stages, reports them, stops between them."""
-
-    progress: Progress | None
-    cancelled: Callable[[], bool] | None
-    timings: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        self.check()
-        self.report(name, STAGES[name])
-        start = time.perf_counter()
-        yield
-        self.timings[name] = time.perf_counter() - start
-
-    def check(self) -> None:
-        if self.cancelled is not None and self.cancelled():
-            raise Cancelled("the reconstruction was cancelled; nothing was written")
-
-    def report(self, name: str, fraction: float) -> None:
-        if self.progress is not None:
-            self.progress(name, fraction)
-
-    def within(self, name: str) -> Progress:
-        """Progress of a stage's own steps, as a part of the whole."""
-        begins = list(STAGES.values())
-        start = STAGES[name]
-        end = next((begin for begin in begins if begin > start), 1.0)
-        return lambda step, fraction: self.report(step, start + (end - start) * fraction)
-
-
 def _with_record(scene: Scene, network: LangFlashNet, timings: dict[str, float]) -> Scene:
-    """The scene with the cost of its making, and the network's calibration, in its metadata.
+    """The scene with the cost of its making, and the network's calibration, in its record.
 
     `timings` stay disjoint seconds in order (the network's and the scene's own steps are in the
     scene already); `seconds` sums them up for the network and for all.
     """
     before = {name: timings[name] for name in ("photos", "weights")}
-    record = {
-        "timings": {**before, **scene.metadata.get("timings", {})},
-        "seconds": {"network": timings["network"], "total": sum(timings.values())},
-        "peak_memory_mb": peak_memory_mb(),
-    }
-    if network.calibration:
-        record["calibration"] = dict(network.calibration)
-    return scene.with_metadata(**record)
+    cost = Cost(
+        timings={**before, **scene.record.cost.timings},
+        seconds={"network": timings["network"], "total": sum(timings.values())},
+        peak_memory_mb=peak_memory_mb(),
+    )
+    return scene.with_record(cost=cost, calibration=dict(network.calibration))
 
 
 def _check_refinement(seconds: float, photos: Sequence) -> None:
@@ -305,20 +268,20 @@ def _refined(scene: Scene, images: Tensor, seconds: float, device: str, progress
     try:
         result = refine(_moved(scene, device), images.to(device), Budget(seconds), progress)
     except InputError as reason:
-        return scene.with_metadata(warnings=[*scene.metadata["warnings"], f"not refined: {reason}"])
+        return scene.with_record(warnings=(*scene.record.warnings, f"not refined: {reason}"))
     record = {
         "kept": result.kept,
-        "held_out": scene.metadata["photos"][result.view],
+        "held_out": scene.record.photos[result.view],
         "held_out_psnr_db": [round(value, 2) for value in result.held_out],
         "photos_psnr_db": [round(value, 2) for value in result.photos],
         "steps": list(result.steps),
     }
-    warnings = scene.metadata["warnings"]
+    warnings = scene.record.warnings
     if not result.kept:
         before, after = record["held_out_psnr_db"]
         note = f"not refined: {record['held_out']}, held out, came no closer ({before} dB, then {after} dB)"
-        warnings = [*warnings, note]
-    return _moved(result.scene, "cpu").with_metadata(refinement=record, warnings=warnings)
+        warnings = (*warnings, note)
+    return _moved(result.scene, "cpu").with_record(refinement=record, warnings=warnings)
 
 
 def _moved(scene: Scene, device: str) -> Scene:
@@ -388,33 +351,30 @@ def _groups(network: LangFlashNet, way: str | None, device: str) -> Lifted | Non
     return lifted
 
 
-def _bfloat16(preset: str, precision: str, device: str) -> bool:
+def _bfloat16(precision: str, device: str) -> bool:
     if precision not in PRECISIONS:
         raise InputError(f"the precision '{precision}' is unknown; choose {', '.join(PRECISIONS)}")
-    can = network_class(PRESETS[preset]).mixes
-    if precision == "bfloat16" and not can:
-        raise InputError(
-            f"the preset '{preset}' computes in float32 only; choose --precision float32 or auto"
-        )
     quick = device != "cpu" or has_bfloat16()
-    return can and (precision == "bfloat16" or (precision == "auto" and quick))
+    return precision == "bfloat16" or (precision == "auto" and quick)
 
 
-def _network(preset: str, weights: Path | str | None, device: str, precision: str) -> LangFlashNet:
+def _network(
+    preset: str, weights: Path | str | None, device: str, precision: str, stored: Future[Stored] | None
+) -> LangFlashNet:
     """The network, read once; a checkpoint that changed on disk is read again."""
     path = None if weights is None else Path(weights).resolve()
     changed = path.stat().st_mtime_ns if path is not None and path.is_file() else 0
     folder = part_folder(PRESETS[preset])
     installed = tuple((p.name, p.stat().st_mtime_ns) for p in sorted(folder.glob("*.safetensors")))
-    return _read_network(preset, path, device, _bfloat16(preset, precision, device), (changed, installed))
-
-
-@lru_cache(maxsize=1)
-def _read_network(
-    preset: str, path: Path | None, device: str, bfloat16: bool, changed: tuple
-) -> LangFlashNet:
-    """`changed` is only part of the key."""
-    return load_network(preset, path, device, bfloat16=bfloat16)
+    mixed = _bfloat16(precision, device)
+    key = (preset, path, device, mixed, changed, installed)
+    network = _networks.get(key)
+    if network is None:
+        read = None if stored is None else stored.result()
+        network = load_network(preset, path, device, bfloat16=mixed, stored=read)
+        _networks.clear()  # two are too much memory
+        _networks[key] = network
+    return network
 
 
 def _on_cpu(prediction: Prediction) -> Prediction:
@@ -428,13 +388,6 @@ def _device(name: str) -> str:
     if name == "cuda" and not torch.cuda.is_available():
         raise InputError("there is no CUDA device that torch can use; choose --device cpu or auto")
     return ("cuda" if torch.cuda.is_available() else "cpu") if name == "auto" else name
-
-
-def _area(size: int) -> int:
-    low, high = SIZES
-    if not low <= size <= high:
-        raise InputError(f"the size {size} is out of range; choose {low} to {high} pixels")
-    return int(size) ** 2
 
 
 def _camera(scene: Scene, view: int, camera: Camera | None, size: tuple[int, int] | None) -> Camera:

@@ -4,8 +4,9 @@ And where the user's own weights live: `LANGFLASH_HOME`, else the platform's cac
 """
 
 import os
-import sys
 from pathlib import Path
+
+import platformdirs
 
 _PACKAGE = Path(__file__).resolve().parent
 _BUNDLED = _PACKAGE / "_bundled"  # hatch puts shaders/ and assets/ here in a wheel
@@ -25,17 +26,12 @@ def asset_path(name: str) -> Path:
 def home_folder() -> Path:
     """The folder of what was downloaded or converted; it may not exist yet.
 
-    The environment variable LANGFLASH_HOME names it; else the platform does: XDG_CACHE_HOME or
-    ~/.cache on Linux, ~/Library/Caches on macOS, LOCALAPPDATA on Windows.
+    The environment variable LANGFLASH_HOME names it; else it is the platform's folder for caches.
     """
     named = os.environ.get("LANGFLASH_HOME")
     if named:
         return Path(named).expanduser()
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "langflash"
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "langflash"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "langflash"
+    return platformdirs.user_cache_path("langflash", appauthor=False)
 
 
 def weights_folder() -> Path:

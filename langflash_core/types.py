@@ -6,18 +6,29 @@ Pixels    `Ks` (V, 3, 3) in pixels; the centre of the top-left pixel is (0.5, 0.
 Rotations quaternions wxyz, unit.
 Values    bare names are activated: scales > 0 (standard deviations, scene units),
           opacities in [0, 1]. Stored forms say so: `log_scales`, `logit_opacities`.
-Colour    the photo's sRGB values in [0, 1], no gamma change; colour = 0.5 + SH, clamped at 0.
+Colour    the photo's sRGB values in [0, 1], no gamma change; colour = 0.5 + SH, clamped at 0;
+          grey is `LUMA` times red, green, blue.
 Lengths   scene units: the mean distance of view 0's points is 1. `metric_scale`, when
           known, is metres per scene unit.
 Sizes     B batch, V views, N Gaussians, K atoms, C channels, S spherical-harmonic bases,
           m weights kept per Gaussian, P prompts, H W pixels.
 Tensors   float32, on one device, unless a docstring says otherwise.
+Checks    constructors refuse shapes that disagree and numbers that name nothing (an atom, a view).
+          Values may be anything, as a network's are: `scene.checks` judges them where files are
+          read and written.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import torch
 from torch import Tensor
+
+from langflash_core.records import Cost as Cost
+from langflash_core.records import Record as Record
+
+LUMA = (0.299, 0.587, 0.114)
+"""Weights of red, green and blue in grey (ITU-R BT.601, as JPEG has them)."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +78,10 @@ class Gaussians:
     """N anisotropic Gaussians in world space.
 
     means (N, 3); quats (N, 4) wxyz unit; scales (N, 3) > 0; opacities (N,) in [0, 1];
-    sh (N, S, 3) spherical-harmonic coefficients, S in {1, 4, 9, 16, 25}.
+    sh (N, S, 3) spherical-harmonic coefficients, S in {1, 4, 9, 16, 25}, 0 where they are not needed.
+
+    Raises:
+        ValueError: a field's shape is another.
     """
 
     means: Tensor
@@ -76,12 +90,22 @@ class Gaussians:
     opacities: Tensor
     sh: Tensor
 
+    def __post_init__(self) -> None:
+        count, bases = len(self.means), self.sh.shape[1] if self.sh.ndim == 3 else 1
+        for name, tail in (("means", (3,)), ("quats", (4,)), ("scales", (3,)), ("opacities", ())):
+            _shape(name, getattr(self, name), (count, *tail))
+        _shape("sh", self.sh, (count, bases, 3))
+
     def __len__(self) -> int:
         return self.means.shape[0]
 
-    def map(self, change) -> "Gaussians":
-        """Apply `change: Tensor -> Tensor` to every field (indexing, casting, moving)."""
+    def map(self, change: Callable[[Tensor], Tensor]) -> "Gaussians":
+        """Apply `change` to every field (casting, moving)."""
         return Gaussians(*(change(v) for v in (self.means, self.quats, self.scales, self.opacities, self.sh)))
+
+    def rows(self, keep: Tensor) -> "Gaussians":
+        """Some of the Gaussians, as `Scene.rows`."""
+        return self.map(lambda values: values[keep.to(values.device)])
 
 
 NO_LANGUAGE = "none"  # the `space` of scenes that come from splat files
@@ -94,12 +118,22 @@ class Semantics:
     weight_ids (N, m) int64 in [0, K); weight_values (N, m) >= 0, rows sum to 1 (or 0 where a
     Gaussian carries nothing); dictionary (K, C), rows of unit norm; space: name of the
     language space the dictionary lives in ("minilm", "clip"; "none" where there is no language).
+
+    Raises:
+        ValueError: a field's shape or type is another, or an id names no atom.
     """
 
     weight_ids: Tensor
     weight_values: Tensor
     dictionary: Tensor
     space: str
+
+    def __post_init__(self) -> None:
+        if self.weight_ids.ndim != 2 or self.dictionary.ndim != 2:
+            found = f"{tuple(self.weight_ids.shape)}, {tuple(self.dictionary.shape)}"
+            raise ValueError(f"weight_ids, dictionary: expected (N, m) and (K, C), received {found}")
+        _shape("weight_values", self.weight_values, tuple(self.weight_ids.shape))
+        _names("weight_ids", self.weight_ids, self.num_atoms)
 
     @property
     def num_atoms(self) -> int:
@@ -111,6 +145,11 @@ class Semantics:
         if self.num_atoms == 0:
             return dense
         return dense.scatter_add(1, self.weight_ids, self.weight_values)
+
+    def rows(self, keep: Tensor) -> "Semantics":
+        """What some of the Gaussians carry, as `Scene.rows`; the dictionary stays whole."""
+        keep = keep.to(self.weight_ids.device)
+        return replace(self, weight_ids=self.weight_ids[keep], weight_values=self.weight_values[keep])
 
 
 @dataclass(frozen=True)
@@ -142,8 +181,11 @@ class Scene:
 
     viewmats (V, 4, 4) and Ks (V, 3, 3) describe the input views at `view_size` (width, height).
     A scene from a splat file has no photos: its one view frames it, and its world is the file's.
-    photos: small JPEG bytes per view. metadata: plain JSON values (preset, timings, counts,
-    warnings, photo names, `metric_scale`).
+    photos: small JPEG bytes per view, or none. view_ids: (N,) int64 in [0, V), the view that each
+    Gaussian was predicted from; None where nobody knows.
+
+    Raises:
+        ValueError: sizes disagree, or a number names no view or no atom.
     """
 
     gaussians: Gaussians
@@ -152,7 +194,27 @@ class Scene:
     Ks: Tensor
     view_size: tuple[int, int]
     photos: tuple[bytes, ...] = ()
-    metadata: dict = field(default_factory=dict)
+    view_ids: Tensor | None = None
+    record: Record = field(default_factory=Record)
+
+    def __post_init__(self) -> None:
+        count, num_views = len(self.gaussians), len(self.viewmats)
+        if len(self.semantics.weight_ids) != count:
+            found = len(self.semantics.weight_ids)
+            raise ValueError(f"weight_ids: expected {count} rows, one per Gaussian, received {found}")
+        _shape("viewmats", self.viewmats, (num_views, 4, 4))
+        _shape("Ks", self.Ks, (num_views, 3, 3))
+        if num_views < 1 or min(self.view_size) < 1:
+            found = f"{num_views} of {self.view_size}"
+            raise ValueError(f"views: expected at least one of at least 1 pixel, received {found}")
+        if len(self.photos) not in (0, num_views):
+            raise ValueError(f"photos: expected {num_views}, one per view, received {len(self.photos)}")
+        if self.view_ids is not None:
+            _shape("view_ids", self.view_ids, (count,))
+            _names("view_ids", self.view_ids, num_views)
+        for name in ("atom_names", "silent_atoms"):
+            atoms = torch.tensor(list(getattr(self.record, name)), dtype=torch.int64)
+            _names(name, atoms, self.semantics.num_atoms)
 
     @property
     def num_views(self) -> int:
@@ -163,8 +225,32 @@ class Scene:
         own = Camera(self.viewmats[view], self.Ks[view], *self.view_size)
         return own if width is None or height is None else own.resized(width, height)
 
-    def with_metadata(self, **changes) -> "Scene":
-        return replace(self, metadata={**self.metadata, **changes})
+    def rows(self, keep: Tensor) -> "Scene":
+        """The scene with some of its Gaussians; dictionary, views, photos and record stay.
+
+        Args:
+            keep: (N,) bool, or row numbers (n,) int64, in whose order they come.
+
+        Raises:
+            ValueError: a mask of another length, or neither of both.
+        """
+        if keep.ndim != 1 or keep.dtype not in (torch.bool, torch.int64):
+            found = f"{keep.dtype} {tuple(keep.shape)}"
+            raise ValueError(f"keep: expected (N,) bool or (n,) int64, received {found}")
+        if keep.dtype == torch.bool:
+            _shape("keep", keep, (len(self.gaussians),))
+        else:
+            _names("keep", keep, len(self.gaussians))
+        return replace(
+            self,
+            gaussians=self.gaussians.rows(keep),
+            semantics=self.semantics.rows(keep),
+            view_ids=None if self.view_ids is None else self.view_ids[keep.to(self.view_ids.device)],
+        )
+
+    def with_record(self, **changes) -> "Scene":
+        """The scene with other values in fields of its record."""
+        return replace(self, record=replace(self.record, **changes))
 
 
 @dataclass(frozen=True)
@@ -184,7 +270,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class PromptAnswer:
-    """One phrase answered in one view; the fields of `query --json` (blueprint section 7).
+    """One phrase answered in one view; the fields of `query --json`.
 
     score: the value compared with `threshold` to decide `found`. area: fraction of pixels in
     the mask. centroid, box (center, axes (3, 3) rows, size): scene units, None when not found.
@@ -213,3 +299,19 @@ class QueryResult:
     masks: Tensor
     frame: Frame
     camera: Camera
+
+
+def _shape(name: str, values: Tensor, expected: tuple[int, ...]) -> None:
+    if tuple(values.shape) != expected:
+        raise ValueError(f"{name}: expected shape {expected}, received {tuple(values.shape)}")
+
+
+def _names(name: str, ids: Tensor, count: int) -> None:
+    """Numbers int64 in [0, count)."""
+    if ids.dtype != torch.int64:
+        raise ValueError(f"{name}: expected int64, received {ids.dtype}")
+    if ids.numel() == 0:
+        return
+    low, high = (int(bound) for bound in ids.aminmax())
+    if low < 0 or high >= count:
+        raise ValueError(f"{name}: expected values in [0, {count}), received {low} to {high}")

@@ -1,11 +1,28 @@
 """What every test shares."""
 
 import os
+import random
+from pathlib import Path
+
+from jaxtyping import install_import_hook
 
 # One thread a process, also in the processes that tests start: the tests' arrays are small, and
 # on a busy machine threads that wait for each other cost up to fifty times what they save.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-import torch
+# The processes that tests start run the checkout that the tests lie in, whatever is installed.
+ROOT = str(Path(__file__).resolve().parent.parent)
+os.environ["PYTHONPATH"] = os.pathsep.join([ROOT, *filter(None, [os.environ.get("PYTHONPATH")])])
+
+# Every signature of the library holds at every call: shapes, their shared sizes, and types. An int
+# passes for a float, as type checkers have it.
+install_import_hook("langflash_core", "beartype.beartype(conf=beartype.BeartypeConf(is_pep484_tower=True))")
+
+import torch  # noqa: E402 - after the threads
 
 torch.set_num_threads(int(os.environ["OMP_NUM_THREADS"]))
+
+
+def pytest_runtest_setup() -> None:
+    """Of a list the checker looks at one item, drawn at random: the same one whenever a test is run again."""
+    random.seed(0)

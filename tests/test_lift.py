@@ -8,7 +8,7 @@ import torch
 
 from langflash_core.errors import Cancelled, InputError
 from langflash_core.lift import cameras_around, lift
-from langflash_core.scene import bare_scene
+from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from langflash_core.splat import rasterize, render
 from langflash_core.splat.backprojection import gathered
@@ -91,7 +91,7 @@ def test_a_plain_wall_gets_its_stripes_back(known_network):
     truth = known_network.semantics.dense_weights().argmax(-1)
     right = (lifted.semantics.dense_weights().argmax(-1) == truth).float().mean()
     assert float(right) > 0.97  # at the borders a pixel shows two stripes
-    assert lifted.metadata["calibration"] == {"threshold": 0.5}
+    assert lifted.record.calibration == {"threshold": 0.5}
     assert steps[-1] == "done" and {"drawing", "network", "carrying back"} < set(steps)
 
 

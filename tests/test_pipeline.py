@@ -65,18 +65,18 @@ def test_photos_become_a_scene(scene):
 
 
 def test_the_scene_records_how_it_was_made(scene):
-    record = scene.metadata
-    assert record["preset"] == "mini"
-    assert record["photos"] == ["books_left.jpg", "books_right.jpg"]
+    record, cost = scene.record, scene.record.cost
+    assert record.preset == "mini"
+    assert record.photos == ("books_left.jpg", "books_right.jpg")
     stages = ["photos", "weights", *GuidedDepthNet.stages, "assembly", "pruning"]
-    assert list(record["timings"]) == stages
-    assert all(seconds > 0 for seconds in record["timings"].values())
+    assert list(cost.timings) == stages
+    assert all(seconds > 0 for seconds in cost.timings.values())
     # The stages are all that is done: between them lie bookkeeping, one copy, and what a busy machine takes.
-    assert sum(record["timings"].values()) == pytest.approx(record["seconds"]["total"], rel=0.2)
-    network = sum(record["timings"][stage] for stage in GuidedDepthNet.stages)
-    assert network == pytest.approx(record["seconds"]["network"], rel=0.2)
-    assert sys.platform == "win32" or 100 < record["peak_memory_mb"] < 100_000
-    assert len(set(record["warnings"])) == len(record["warnings"])
+    assert sum(cost.timings.values()) == pytest.approx(cost.seconds["total"], rel=0.2)
+    network = sum(cost.timings[stage] for stage in GuidedDepthNet.stages)
+    assert network == pytest.approx(cost.seconds["network"], rel=0.2)
+    assert sys.platform == "win32" or 100 < (cost.peak_memory_mb or 0) < 100_000
+    assert len(set(record.warnings)) == len(record.warnings)
 
 
 def test_the_scene_answers(scene):
@@ -228,7 +228,7 @@ def test_bad_queries_are_one_sentence(room):
 
 
 def test_the_scenes_calibration_is_used(room):
-    strict = room.with_metadata(calibration={"threshold": 0.999})
+    strict = room.with_record(calibration={"threshold": 0.999})
     assert lf.query(room, ["couch"]).answers[0].found
     answer = lf.query(strict, ["couch"]).answers[0]
     assert (answer.found, answer.threshold) == (False, 0.999)
@@ -260,14 +260,14 @@ def test_the_package_is_light_and_its_functions_keep_their_names():
 
 def test_a_refinement_is_kept_only_if_it_helps(weights, photos, scene):
     refined = lf.reconstruct(photos, weights=weights, size=SMALL, refine_seconds=2)
-    record = refined.metadata["refinement"]
+    record = refined.record.refinement
     before, after = record["held_out_psnr_db"]
     assert record["held_out"] == "books_right.jpg" and record["steps"][0] >= 1
     assert record["kept"] == (after > before)
-    assert "fitting" in refined.metadata["timings"]
+    assert "fitting" in refined.record.cost.timings
     same = torch.equal(refined.gaussians.opacities, scene.gaussians.opacities)
     assert same != record["kept"]
-    assert any("came no closer" in note for note in refined.metadata["warnings"]) != record["kept"]
+    assert any("came no closer" in note for note in refined.record.warnings) != record["kept"]
 
 
 def test_a_refinement_needs_seconds_and_two_photos(weights, photos):

@@ -1,6 +1,7 @@
 """Scenes and dictionaries out of nothing: a room as a two-view network predicts it, of any size."""
 
 import math
+from dataclasses import replace
 
 import torch
 from torch import Tensor
@@ -106,9 +107,7 @@ def with_atoms(scene: Scene, num_atoms: int, seed: int = 0) -> Scene:
     common = normalize(torch.randn(1, CHANNELS, generator=g), dim=-1)
     atoms = normalize(common + normalize(torch.randn(num_atoms, CHANNELS, generator=g), dim=-1), dim=-1)
     semantics = Semantics(ids, values, atoms, SPACE)
-    return Scene(
-        scene.gaussians, semantics, scene.viewmats, scene.Ks, scene.view_size, scene.photos, scene.metadata
-    )
+    return replace(scene, semantics=semantics)
 
 
 def phrases(scene: Scene, count: int, seed: int = 1) -> CompiledQuery:

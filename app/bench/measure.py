@@ -13,16 +13,21 @@ from dataclasses import dataclass, field, replace
 import moderngl
 import numpy as np
 
+from langflash_core.graphics import Programs
+from langflash_core.language.relevance import CompiledQuery
+from langflash_core.running import Progress
 from langflash_core.types import Camera, Scene
 
+from ..gl import SplatRenderer
+from ..gl.canvas import Canvas
+from ..gl.splats import SplatBuffers
 from .cases import Case
 from .errors import Errors, View, errors_of, true_view
 from .modes import DEFAULT, Mode
-from .twins import FullQuery, StaleOrder, SwitchedRenderer
+from .twins import StaleOrder
 
 ERROR_FRAMES = 2  # the reference takes seconds to minutes a view
 _TIMER_END = 2**32 - 1  # nanoseconds: moderngl reads 32 bits
-Progress = Callable[[str, float], None]
 
 
 @dataclass
@@ -88,14 +93,17 @@ def measure(ctx: moderngl.Context, case: Case, modes: Sequence[Mode], progress: 
 
 
 class _Bench:
-    """The renderers of one case: one a precision and size, its parts switched between modes."""
+    """The renderers of one case: one for each way to upload a scene. Those of a precision and a size share a
+    canvas, so that many fit in memory."""
 
     def __init__(self, ctx: moderngl.Context, case: Case, modes: Sequence[Mode]):
         self.ctx, self.case, self.modes = ctx, case, modes
         # moderngl has no way to give a query back: these two live as long as the context.
         self.timer = ctx.query(time=True)
         self.counter = ctx.query(samples=True)
-        self._renderers: dict[tuple, SwitchedRenderer] = {}
+        self._canvases: dict[tuple, Canvas] = {}
+        self._renderers: dict[tuple, SplatRenderer] = {}
+        self._late: dict[tuple, StaleOrder] = {}
         self._scenes: dict[tuple, Scene] = {_scene_key(mode): mode.scene(case.scene) for mode in modes}
 
     def camera(self, mode: Mode, frame: int) -> Camera:
@@ -105,30 +113,53 @@ class _Bench:
             return camera
         return camera.resized(max(1, camera.width // mode.shrink), max(1, camera.height // mode.shrink))
 
-    def prepared(self, mode: Mode, frame: int) -> SwitchedRenderer:
-        """The mode's renderer as it stands before it sees the frame's camera."""
-        key = (mode.precision, mode.shrink)
+    def prepared(self, mode: Mode, frame: int) -> SplatRenderer:
+        """The mode's renderer as it stands before it sees the frame's camera: nothing counts as drawn."""
+        key = _renderer_key(mode)
         if key not in self._renderers:
-            self._renderers[key] = SwitchedRenderer(self.ctx, mode.precision)
+            self._renderers[key] = self._made(mode, key)
         renderer = self._renderers[key]
-        buffers = renderer.switch(
-            self._scenes[_scene_key(mode)], self.camera(mode, frame), mode.buffers, mode.query
-        )
-        if isinstance(buffers, StaleOrder):
-            buffers.sort_for(self.camera(mode, frame - 1))
-        renderer.ask(self.question(mode))
+        renderer.forget()
+        if key in self._late:
+            self._late[key].sort_for(self.camera(mode, frame - 1))
+        self.ask(renderer, mode)
         if mode.fast:
             renderer.carry()
         self.ctx.finish()
         return renderer
 
-    def question(self, mode: Mode):
-        return self.case.uncompiled if mode.query is FullQuery else self.case.compiled
+    def ask(self, renderer: SplatRenderer, mode: Mode, other: bool = False) -> None:
+        """The case's phrases; `other`: other numbers of equal work."""
+        question = self.question(mode)
+        renderer.ask(replace(question, prompts=-question.prompts) if other else question, mode.answers)
+
+    def question(self, mode: Mode) -> CompiledQuery:
+        return self.case.uncompiled if mode.whole else self.case.compiled
+
+    def _made(self, mode: Mode, key: tuple) -> SplatRenderer:
+        def splats(ctx: moderngl.Context, programs: Programs, scene: Scene) -> SplatBuffers:
+            made = mode.splats(ctx, programs, scene)
+            if isinstance(made, StaleOrder):
+                self._late[key] = made
+            return made
+
+        shared = (mode.precision, mode.shrink)
+        if shared not in self._canvases:
+            self._canvases[shared] = Canvas(self.ctx, mode.precision)
+        renderer = SplatRenderer(self.ctx, mode.precision, splats=splats, canvas=self._canvases[shared])
+        renderer.set_scene(self._scenes[_scene_key(mode)])
+        return renderer
 
     def release(self) -> None:
-        for renderer in self._renderers.values():
-            renderer.release()
+        for owned in (*self._renderers.values(), *self._canvases.values()):
+            owned.release()
         self._renderers.clear()
+        self._canvases.clear()
+        self._late.clear()
+
+
+def _renderer_key(mode: Mode) -> tuple:
+    return mode.precision, mode.shrink, mode.splats, *_scene_key(mode)
 
 
 def _scene_key(mode: Mode) -> tuple:
@@ -179,8 +210,7 @@ def _time_frame(bench: _Bench, mode: Mode, frame: int, into: Times) -> None:
             renderer.heat_texture(0)
 
     def another() -> None:
-        question = bench.question(mode)
-        renderer.ask(replace(question, prompts=-question.prompts))  # other numbers, equal work
+        bench.ask(renderer, mode, other=True)
         renderer.heat_texture(0)
 
     before = time.process_time()
@@ -190,8 +220,8 @@ def _time_frame(bench: _Bench, mode: Mode, frame: int, into: Times) -> None:
     if 0 < elapsed < _TIMER_END:
         into.gpu.append(elapsed / 1e6)
     if not mode.fast:
-        renderer.forget_answers()
-        renderer.ask(bench.question(mode))
+        renderer.forget(answers_only=True)
+        bench.ask(renderer, mode)
         into.answers.append(_milliseconds(bench.ctx, lambda: renderer.heat_texture(0)))
     into.phrases.append(_milliseconds(bench.ctx, another))
 

@@ -6,14 +6,14 @@ from typing import Literal
 
 import moderngl
 
-from app.gl.combine import QueryPasses
-from app.gl.host import draws_in_software
-from app.gl.splats import SplatBuffers
-from langflash_core.scene import thin
 from langflash_core.scene.assemble import renormalised
+from langflash_core.scene.thin import thin
 from langflash_core.types import Scene
 
-from .twins import FullQuery, GramQuery, StaleOrder, ThreeSigma
+from ..gl.answers import MakeAnswers, ShaderAnswers
+from ..gl.host import draws_in_software
+from ..gl.splats import SplatBuffers
+from .twins import FullAnswers, StaleOrder, ThreeSigma, gram_answers
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,8 @@ class Mode:
 
     axis: what is decided. name: how. precision: of the targets. kept: weights per Gaussian, None: all
     that the scene has. share: of the Gaussians, the others widened. fast: relevance from numbers
-    splatted beside the colour. shrink: of the picture's sides. buffers, query: parts of the renderer.
+    splatted beside the colour. shrink: of the picture's sides. splats: what the scene is uploaded to.
+    answers: who answers, None: the renderer's own choice. whole: asked in all C channels of D.
     colours: whether the picture's colours may differ from the default's, not its answers alone.
     """
 
@@ -33,8 +34,9 @@ class Mode:
     share: float = 1.0
     fast: bool = False
     shrink: int = 1
-    buffers: type[SplatBuffers] = SplatBuffers
-    query: type[QueryPasses] | None = None
+    splats: type[SplatBuffers] = SplatBuffers
+    answers: MakeAnswers | None = None
+    whole: bool = False
     colours: bool = False
 
     def scene(self, scene: Scene) -> Scene:
@@ -59,13 +61,13 @@ MODES = (
     Mode("weights", "m = 2", kept=2),
     Mode("weights", "m = 4", kept=4),
     Mode("weights", "m = 8", kept=8),
-    Mode("cut", "3 sigma cut", buffers=ThreeSigma, colours=True),
-    Mode("dictionary", "shader queries", query=QueryPasses),
-    Mode("dictionary", "full D", query=FullQuery),
-    Mode("dictionary", "Gram matrix", query=GramQuery),
+    Mode("cut", "3 sigma cut", splats=ThreeSigma, colours=True),
+    Mode("dictionary", "shader queries", answers=ShaderAnswers),
+    Mode("dictionary", "full D", answers=FullAnswers, whole=True),
+    Mode("dictionary", "Gram matrix", answers=gram_answers),
     Mode("resolution", "half resolution", shrink=2, colours=True),
     Mode("detail", "quarter of Gaussians", share=0.25, colours=True),
-    Mode("sort", "stale sort", buffers=StaleOrder, colours=True),
+    Mode("sort", "stale sort", splats=StaleOrder, colours=True),
 )
 AXES = tuple(dict.fromkeys(mode.axis for mode in MODES[1:]))
 
@@ -77,11 +79,11 @@ def modes_for(ctx: moderngl.Context, scene: Scene, axes: Collection[str] = AXES)
     the reduced D stand beside them.
     """
     stored = scene.semantics.weight_ids.shape[1]
-    same = () if draws_in_software(ctx) else (QueryPasses,)
+    same = () if draws_in_software(ctx) else (ShaderAnswers,)
     return DEFAULT, *(
         mode
         for mode in MODES[1:]
-        if mode.axis in axes and (mode.kept is None or mode.kept < stored) and mode.query not in same
+        if mode.axis in axes and (mode.kept is None or mode.kept < stored) and mode.answers not in same
     )
 
 

@@ -60,24 +60,11 @@ def table(document: dict) -> str:
 
 def _case(result: Result) -> dict:
     case, stages = result.case, result.stages
-    gaussians, semantics = case.scene.gaussians, case.scene.semantics
-    degrees, way = case.path.step()
     width, height = case.size
     base = result.rows[0][1].frames
     return {
         "name": f"{case.name}, {width} x {height}, {_count(case.compiled)}",
-        "scene": {
-            "name": case.name,
-            "gaussians": len(gaussians),
-            "atoms": semantics.num_atoms,
-            "channels": semantics.dictionary.shape[1],
-            "rank": case.compiled.factor.shape[1],
-            "weights_per_gaussian": semantics.weight_ids.shape[1],
-            "weights_above_cut": round(float((semantics.weight_values >= CUT).sum(-1).float().mean()), 3),
-            "sh_bases": gaussians.sh.shape[1],
-            "space": semantics.space,
-            "notes": list(case.notes),
-        },
+        "scene": _scene(case),
         "picture": [width, height],
         "query": {
             "phrases": list(case.compiled.texts),
@@ -85,13 +72,7 @@ def _case(result: Result) -> dict:
             "mode": case.compiled.mode,
             "threshold": case.compiled.threshold,
         },
-        "path": {
-            "kind": case.path.kind,
-            "frames": case.path.num_frames,
-            "degrees_a_frame": _rounded(degrees),
-            "units_a_frame": _rounded(way),
-            "error_frames": list(result.error_frames),
-        },
+        "path": _path(result),
         "default": described_default(case.scene),
         "stages": {
             "colour_ms": _rounded(stages.colour_ms),
@@ -101,6 +82,34 @@ def _case(result: Result) -> dict:
             **_per_splat(case, result),
         },
         "rows": [_row(mode, times, errors, base) for mode, times, errors in result.rows],
+    }
+
+
+def _scene(case: Case) -> dict:
+    gaussians, semantics = case.scene.gaussians, case.scene.semantics
+    return {
+        "name": case.name,
+        "gaussians": len(gaussians),
+        "atoms": semantics.num_atoms,
+        "channels": semantics.dictionary.shape[1],
+        "rank": case.compiled.factor.shape[1],
+        "weights_per_gaussian": semantics.weight_ids.shape[1],
+        "weights_above_cut": round(float((semantics.weight_values >= CUT).sum(-1).float().mean()), 3),
+        "sh_bases": gaussians.sh.shape[1],
+        "space": semantics.space,
+        "notes": list(case.notes),
+    }
+
+
+def _path(result: Result) -> dict:
+    path = result.case.path
+    degrees, way = path.step()
+    return {
+        "kind": path.kind,
+        "frames": path.num_frames,
+        "degrees_a_frame": _rounded(degrees),
+        "units_a_frame": _rounded(way),
+        "error_frames": list(result.error_frames),
     }
 
 

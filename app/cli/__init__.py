@@ -5,6 +5,6 @@ One sentence on stderr and exit code 2 for bad input, 1 for the rest, 130 for Ct
 torch nor OpenGL: `langflash --help` and argument errors answer at once.
 """
 
-from app.cli.program import main
+from .program import main
 
 __all__ = ["main"]

@@ -9,10 +9,11 @@ from typing import Any
 
 import torch
 
-from app.cli.files import readable_file
-from app.cli.values import LARGEST_SIDE
 from langflash_core.errors import ViewError
 from langflash_core.types import Camera, Scene
+
+from .files import readable_file
+from .values import LARGEST_SIDE
 
 # |R R^T - 1| per entry: rotations written by hand carry four or five decimals.
 RIGID_TOLERANCE = 1e-3

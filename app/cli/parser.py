@@ -6,13 +6,17 @@ from pathlib import Path
 from typing import NoReturn
 
 import langflash_core
-from app.cli.values import (
+from langflash_core.errors import InputError
+
+from .values import (
     above_zero,
     atom_count,
+    crop,
     film_seconds,
     intrinsics,
     kept_fraction,
     minutes,
+    numbers,
     open_fov,
     part,
     pixel_side,
@@ -22,8 +26,9 @@ from app.cli.values import (
     what,
     whole_count,
 )
-from langflash_core.errors import InputError
 
+# langflash_core.lab.photos.layouts.LAYOUTS, which would bring torch along.
+LAYOUTS = ("nyu", "coco", "ade20k", "sunrgbd", "frames")
 # The decisions that `bench` compares: app.bench.modes.AXES, which would bring torch along.
 BENCH_AXES = ("precision", "relevance", "weights", "cut", "dictionary", "resolution", "detail", "sort")
 
@@ -118,7 +123,10 @@ def _add_reconstruct(commands) -> None:
         "queries where they have weights, else sam2 where it is installed, else the language features)",
     )
     command.add_argument(
-        "--precision", choices=("auto", "float32", "bfloat16"), default="auto", help="(default: auto)"
+        "--precision",
+        choices=("auto", "float32", "bfloat16"),
+        default="auto",
+        help="auto: bfloat16 where the processor has instructions for it (default: auto)",
     )
     command.add_argument(
         "--refine",
@@ -201,7 +209,8 @@ def _add_export(commands) -> None:
         ".png: a picture, or a cut-out with --prompt; .langflash, .ply, .compressed.ply, .splat, .spz, .sog, "
         "meta.json (a SOG in a folder), .glb, .usd, .usda, .usdc, .usdz: Gaussians; "
         "transforms.json, cameras.txt (COLMAP): photos and their poses; "
-        ".json: COCO masks of --prompt; .csv: their boxes; .npz: a view as numbers; .mp4: a flight",
+        ".json: COCO masks of --prompt; .csv, or .glb with --what boxes: their boxes; "
+        ".npz: a view as numbers; .mp4: a flight",
     )
     command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="keep only what answers one of these")
     command.add_argument(
@@ -211,7 +220,7 @@ def _add_export(commands) -> None:
         "--what",
         choices=("rgb", "heat", "mask", "cutout", "labels", "boxes"),
         help="of a .png: colours, a heat-map, a mask, a cut-out with transparency (default with --prompt), "
-        "or phrase numbers with a legend as .json; boxes: a .json or .csv of places and sizes",
+        "or phrase numbers with a legend as .json; boxes: a .json, .csv or .glb of places and sizes",
     )
     command.add_argument(
         "--all-views", action="store_true", help="from every photo: FILE_0, FILE_1 and so on"
@@ -280,8 +289,25 @@ def _add_train(commands) -> None:
     adopt.add_argument("local", type=Path, metavar="XFEAT", help="XFeat's state dict, .safetensors")
     _add_output(adopt, "FILE", "the .safetensors to write")
     adopt.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
-    cache = _command(actions, "cache", "render and encode one set of rooms; an interrupted run continues")
-    cache.add_argument("pack", type=Path, metavar="PACK", help="made by rooms pack")
+    cache = _command(
+        actions, "cache", "render and encode one set of rooms, or encode photos; an interrupted run continues"
+    )
+    cache.add_argument("pack", type=Path, nargs="?", metavar="PACK", help="made by rooms pack")
+    cache.add_argument(
+        "--photos",
+        type=Path,
+        dest="folder",
+        metavar="FOLDER",
+        help="instead of rooms, a folder of labelled photos as train photos makes it",
+    )
+    _add_description(cache)
+    cache.add_argument(
+        "--copies",
+        type=whole_count,
+        default=1,
+        metavar="N",
+        help="views of each photo (default: 1, as it is)",
+    )
     _add_output(cache, "CACHE", "folder to fill")
     cache.add_argument("--set", choices=("train", "validation", "held_out"), default="train")
     cache.add_argument("--scenes", type=whole_count, default=4096, metavar="N", help="(default: 4096)")
@@ -290,6 +316,7 @@ def _add_train(commands) -> None:
         "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
     )
     _add_start(cache)
+    _add_convert(actions)
     parts = _command(actions, "parts", "find the parts of cached rooms, for the stage naming")
     parts.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
     parts.add_argument(
@@ -321,6 +348,20 @@ def _add_train(commands) -> None:
     _add_output(export, "FILE", "the .safetensors to write")
     export.add_argument("--metadata", type=Path, metavar="JSON", help="an object to add to the model card")
     _add_start(export)
+
+
+def _add_convert(actions) -> None:
+    command = _command(actions, "photos", "a published data set to a folder of labelled photos")
+    command.add_argument("layout", choices=LAYOUTS, metavar="LAYOUT", help=", ".join(LAYOUTS))
+    command.add_argument("source", type=Path, metavar="SOURCE", help="the folder or file as downloaded")
+    _add_output(command, "FOLDER", "folder to fill; photos that are there are kept")
+    command.add_argument(
+        "--splits", type=Path, metavar="FILE", help="nyu: splits.mat, for its training split"
+    )
+    command.add_argument("--classes", type=Path, metavar="FILE", help="nyu: classMapping40.mat")
+    command.add_argument("--images", type=Path, metavar="FOLDER", help="coco: where the photos are")
+    command.add_argument("--camera", type=Path, metavar="FILE", help="frames: K, nine numbers")
+    command.add_argument("--limit", type=whole_count, metavar="N", help="only the first N photos")
 
 
 def _add_bench(commands) -> None:
@@ -391,17 +432,101 @@ def _add_eval(commands) -> None:
     )
     _add_json(rooms)
     calibrate = _command(actions, "calibrate", "presence threshold, as JSON for train export --metadata")
+    _add_photo_sets(calibrate)
+    calibrate.add_argument(
+        "--plot", type=Path, metavar="IMG", help="also write the reliability diagram as .png"
+    )
     for command in (rooms, calibrate):
         command.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
         command.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
         command.add_argument("--weights", type=Path, metavar="PATH", help="(default: the shipped ones)")
         command.add_argument("--limit", type=whole_count, metavar="N", help="only the first N scenes")
-
+    _add_labelled(actions)
+    _add_posed(actions)
     photos = _command(actions, "photos", "a sheet to judge by eye: pairs of photos, new views, heat-maps")
     photos.add_argument("photos", nargs="+", type=Path, metavar="PHOTO", help="first and second in turn")
     _add_output(photos, "IMG", "the .png to write")
     photos.add_argument("--weights", type=Path, metavar="PATH", help="(default: the shipped ones)")
     photos.add_argument("--prompt", nargs="+", metavar="PHRASE", help="(default: ten things of a home)")
+
+
+def _add_labelled(actions) -> None:
+    command = _command(
+        actions, "photos-labelled", "names, presence and depth on single real photos that somebody labelled"
+    )
+    _add_folder(command)
+    _add_choice(command, "photos, taken evenly (default: all)")
+    _add_judging(command)
+
+
+def _add_posed(actions) -> None:
+    command = _command(actions, "posed", "poses, depth and new views on real photos of known poses")
+    _add_folder(command)
+    command.add_argument(
+        "--apart", type=whole_count, nargs="+", metavar="N", help="numbers between two (default: 6 12 18 24)"
+    )
+    command.add_argument("--limit", type=whole_count, metavar="N", help="so many pairs (default: 40)")
+    _add_judging(command)
+
+
+def _add_folder(command: argparse.ArgumentParser) -> None:
+    command.add_argument("folder", type=Path, metavar="FOLDER", help="in the layout that train photos writes")
+    _add_description(command)
+
+
+def _add_description(command: argparse.ArgumentParser) -> None:
+    """What a folder of photos may not say of itself."""
+    command.add_argument(
+        "--crop",
+        type=crop,
+        metavar="LEFT,TOP,RIGHT,BOTTOM",
+        help="part of every photo that counts, in pixels",
+    )
+    command.add_argument(
+        "--intrinsics", type=intrinsics, metavar="FX,FY,CX,CY", help="in pixels of the photos before the crop"
+    )
+    command.add_argument(
+        "--depth-unit", type=above_zero, metavar="METRES", help="a step of the depth maps (16 bits: 0.001)"
+    )
+
+
+def _add_choice(command: argparse.ArgumentParser, limit: str) -> None:
+    """Which photos of a folder."""
+    command.add_argument(
+        "--part",
+        choices=("all", "train", "validation"),
+        default="all",
+        help="runs of numbers that training sees, or those kept from it (default: all)",
+    )
+    command.add_argument("--only", type=numbers, metavar="N-M,...", help="only photos of these numbers")
+    command.add_argument("--limit", type=whole_count, metavar="N", help=f"only N {limit}")
+
+
+def _add_judging(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
+    command.add_argument("--weights", type=Path, metavar="PATH", help="(default: the shipped ones)")
+    command.add_argument(
+        "--size", type=pixel_side, metavar="PX", help="the network sees about PX x PX pixels (default: 224)"
+    )
+    _add_backend(command)
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="also write the tables as .md (default: print them)"
+    )
+    _add_json(command)
+
+
+def _add_photo_sets(command: argparse.ArgumentParser) -> None:
+    """Labelled photos beside rooms."""
+    command.add_argument(
+        "--photos",
+        type=Path,
+        dest="folder",
+        metavar="FOLDER",
+        help="also on the validation part of a folder of labelled photos",
+    )
+    _add_description(command)
+    command.add_argument("--only", type=numbers, metavar="N-M,...", help="only photos of these numbers")
+    _add_backend(command)
 
 
 def _add_start(command: argparse.ArgumentParser) -> None:

@@ -11,8 +11,7 @@ import torch
 from PIL import Image
 from torch import Tensor
 
-from app.gl.display import atom_colours
-from langflash_core.export.colours import heat, label_colours
+from langflash_core.export.colours import atom_colours, heat, label_colours
 from langflash_core.export.png import label_map, to_8bit
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.types import Frame, QueryResult

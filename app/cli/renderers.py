@@ -4,9 +4,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
-from app.cli.report import say_warnings
-from langflash_core.errors import GraphicsError
+from langflash_core.errors import GraphicsError, MissingPackageError
+from langflash_core.extras import optional_packages
 from langflash_core.types import Camera, Frame, Scene
+
+from .report import say_warnings
 
 
 class Renderer(Protocol):
@@ -33,12 +35,14 @@ class GlRenderer:
 
     Raises:
         GraphicsError: there is no OpenGL 3.3 on this machine.
+        MissingPackageError: the packages that speak OpenGL are not installed.
     """
 
     backend = "gl"
 
     def __init__(self) -> None:
-        from app.gl import SplatRenderer, offscreen_context
+        with optional_packages():
+            from ..gl import SplatRenderer, offscreen_context
 
         self._context = offscreen_context()
         self._splats = SplatRenderer(self._context)
@@ -62,19 +66,20 @@ def open_renderer(backend: str | None) -> Iterator[Renderer]:
     """A renderer for the length of a command.
 
     Args:
-        backend: "gl", "torch", or None: gl, and torch with a warning where OpenGL is missing.
+        backend: "gl", "torch", or None: gl, and torch with a warning where OpenGL or what speaks it is
+            missing.
 
     Raises:
-        GraphicsError: "gl" was asked for and is not there.
+        GraphicsError, MissingPackageError: "gl" was asked for and is not there.
     """
     if backend == "torch":
         yield TorchRenderer()
         return
     try:
         renderer = GlRenderer()
-    except GraphicsError as problem:
+    except (GraphicsError, MissingPackageError) as problem:
         if backend == "gl":
-            raise
+            raise GraphicsError(f"{problem}, or use --backend torch") from problem
         say_warnings([f"{str(problem).rstrip('.')}; drawing with the slow torch reference instead"])
         yield TorchRenderer()
         return

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import sys
 import time
 from collections.abc import Iterable
@@ -63,6 +64,7 @@ class ProgressBar:
         done = round(self.WIDTH * min(max(fraction, 0.0), 1.0))
         bar = "#" * done + "." * (self.WIDTH - done)
         line = f"[{bar}] {time.monotonic() - self.start:5.1f} s  {stage}"
+        line = line[: shutil.get_terminal_size().columns - 1]  # a second line could not be wiped
         self.stream.write("\r" + line.ljust(self.drawn))
         self.stream.flush()
         self.drawn = len(line)

@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
-from app.cli.files import readable_file
-from app.cli.report import say_warnings
 from langflash_core.errors import SceneFileError
 from langflash_core.types import NO_LANGUAGE, Scene
+
+from .files import readable_file
+from .report import say_warnings
 
 
 def open_scene(path: Path) -> Scene:
@@ -19,5 +20,5 @@ def open_scene(path: Path) -> Scene:
 
     scene = read(path)
     if scene.semantics.space == NO_LANGUAGE:
-        say_warnings(scene.metadata.get("warnings", ()))
+        say_warnings(scene.record.warnings)
     return scene

@@ -8,13 +8,14 @@ import torch
 from PIL import Image, ImageDraw, ImageFont
 from torch import Tensor
 
-from app.cli.renderers import Renderer
 from langflash_core import pipeline
 from langflash_core.export.colours import heat
 from langflash_core.export.png import heat_over, to_8bit
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.quaternions import matrices_to_quats, quats_to_matrices
 from langflash_core.types import Camera, Scene
+
+from .renderers import Renderer
 
 PROMPTS = (
     "book", "floor", "plant", "flower pot", "table", "picture frame", "monitor", "chair", "door", "toy",

@@ -7,11 +7,13 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from app.cli import pictures
-from app.cli.commands.query import answer_fields
+from langflash_core.export import glb
 from langflash_core.export.png import heat_over, label_map, to_8bit, write_labels, write_mask
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.types import Frame, QueryResult, Scene
+
+from . import pictures
+from .commands.query import answer_fields
 
 COLUMNS = (
     "view", "prompt", "found", "score", "threshold", "area", "unit",
@@ -49,7 +51,7 @@ def box_rows(
     results: Sequence[QueryResult], views: Iterable[int | None], scene: Scene
 ) -> list[dict[str, Any]]:
     """A row per view and phrase; lengths in metres where the scene's scale is known."""
-    metres = scene.metadata.get("metric_scale")
+    metres = scene.record.metric_scale
     return [
         {"view": view, **answer_fields(answer, metres or 1.0), "unit": "m" if metres else "scene"}
         for view, result in zip(views, results, strict=True)
@@ -58,12 +60,14 @@ def box_rows(
 
 
 def write_boxes(path: Path, rows: Sequence[dict[str, Any]]) -> None:
-    """The rows as JSON, or as CSV with a column per number.
+    """The rows as JSON, as CSV with a column per number, or as boxes in glTF.
 
     Raises:
         OutputError: the path cannot be written.
     """
     make_folder(path.parent)
+    if path.suffix.lower() == ".glb":
+        return glb.write_boxes([(_node(row), row["box"]) for row in rows if row["box"]], path)
     if path.suffix.lower() == ".json":
         content = json.dumps(rows, indent=2, ensure_ascii=False, allow_nan=False)
     else:
@@ -73,6 +77,10 @@ def write_boxes(path: Path, rows: Sequence[dict[str, Any]]) -> None:
         table.writerows(_flat(row) for row in rows)
         content = stream.getvalue()
     write_atomically(path, content.encode())
+
+
+def _node(row: dict[str, Any]) -> str:
+    return row["prompt"] if row["view"] is None else f"{row['prompt']} (view {row['view']})"
 
 
 def _flat(row: dict[str, Any]) -> dict[str, Any]:

@@ -104,6 +104,27 @@ def intrinsics(text: str) -> tuple[float, float, float, float]:
     return fx, fy, cx, cy
 
 
+def crop(text: str) -> tuple[int, int, int, int]:
+    """`LEFT,TOP,RIGHT,BOTTOM` in whole pixels."""
+    words = text.split(",")
+    if len(words) != 4:
+        raise ArgumentTypeError(f"expected four numbers LEFT,TOP,RIGHT,BOTTOM, received {text!r}")
+    left, top, right, bottom = (_whole(word, 0, 10**6) for word in words)
+    if left >= right or top >= bottom:
+        raise ArgumentTypeError(f"expected LEFT below RIGHT and TOP below BOTTOM, received {text}")
+    return left, top, right, bottom
+
+
+def numbers(text: str) -> tuple[tuple[int, int], ...]:
+    """`100-200,307`: numbers and ranges of numbers, ends included."""
+    ranges = []
+    for word in text.split(","):
+        low, _, high = word.partition("-")
+        first = _whole(low, 0, 10**12)
+        ranges.append((first, _whole(high or low, first, 10**12)))
+    return tuple(ranges)
+
+
 def what(text: str) -> tuple[str, int | None]:
     """A picture's kind, and for `weights:K` the atom K."""
     kind, colon, atom = text.partition(":")

@@ -1,15 +1,16 @@
 """A scene as a film: from photo to photo and back, or around what has no photos."""
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import torch
 
-from app.cli.renderers import Renderer
-from app.window.poses import Pose, blend, from_view, median_reach, orbit, to_camera
 from langflash_core.errors import InputError, LangFlashError
+from langflash_core.running import Progress
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
+
+from ..window.poses import Pose, blend, from_view, median_reach, orbit, to_camera
+from .renderers import Renderer
 
 RATE = 30  # pictures a second
 SECONDS = 6.0
@@ -24,7 +25,8 @@ def check_encoder() -> None:
         import imageio_ffmpeg  # noqa: F401
     except ImportError:
         raise InputError(
-            "videos need the package imageio-ffmpeg, which is not installed; pip install 'langflash[video]'"
+            "videos need the package imageio-ffmpeg, which is not installed; "
+            "pip install 'langflash[video]' brings it"
         ) from None
 
 
@@ -42,7 +44,7 @@ def write(
     scene: Scene,
     cameras: list[Camera],
     renderer: Renderer,
-    progress: Callable[[str, float], None],
+    progress: Progress,
 ) -> None:
     """Draw every camera into an H.264 file.
 

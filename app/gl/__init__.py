@@ -1,6 +1,7 @@
 """The splat renderer in OpenGL 3.3, in a window or without one."""
 
-from .offscreen import offscreen_context
+from langflash_core.graphics import offscreen_context
+
 from .renderer import SplatRenderer
 
 __all__ = ["SplatRenderer", "offscreen_context"]

@@ -1,7 +1,7 @@
 """Pictures for a screen, RGBA8 and opaque, each drawn once until its inputs change."""
 
-from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass
 
 import moderngl
 import numpy as np
@@ -9,233 +9,270 @@ import numpy as np
 from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.types import Camera
 
-from .combine import Screen
+from .packed import PackedMaps
+from .painter import Painter, Textures, Uniforms
 from .photos import SAME, WORST, PhotoDepths
-from .programs import Programs, set_uniforms
-from .targets import ColourTarget, LayerTarget, drawing
+from .targets import ColourTarget, LayerTarget
+from .weights import Maps
 
-COLOUR_MAPS = ("turbo", "inferno", "grey")
 _HEAT_OPACITY = 0.7
 _LABEL_OPACITY = 0.6
 _TRUST_OPACITY = 0.7
+_COVERED: dict[str, float] = {"COVERED_ALPHA": COVERED_ALPHA}
 MASK_STYLES = ("flat", "isolate", "hide", "dim")
 COUNT_COLOURS = ((0.86, 0.20, 0.55), (0.95, 0.70, 0.20), (0.25, 0.62, 0.55))
 """Coverage: no photo saw it, one, several."""
+Background = tuple[float, float, float]
+Span = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Colour and depth of a picture; `key` names their content."""
+
+    target: ColourTarget
+    camera: Camera
+    background: Background
+    key: int
+
+    @property
+    def colour(self) -> dict[str, moderngl.Texture]:
+        return {"colour": self.target.colour}
+
+    @property
+    def depth(self) -> dict[str, moderngl.Texture]:
+        return {"depth": self.target.depth}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Relevance of P phrases, 4 a layer, over a picture; `key` names question, mode and picture."""
+
+    layers: LayerTarget
+    num_phrases: int
+    key: tuple
+
+    @property
+    def relevance(self) -> dict[str, moderngl.TextureArray]:
+        return {"relevance": self.layers.array}
 
 
 class Display:
     """Owns one texture per kind of picture (and per prompt for heat-maps), of one size."""
 
-    def __init__(
-        self,
-        ctx: moderngl.Context,
-        programs: Programs,
-        screen: Screen,
-        size: tuple[int, int],
-        passes: Counter,
-    ):
-        self._ctx = ctx
-        self._programs = programs
-        self._screen = screen
+    def __init__(self, painter: Painter, size: tuple[int, int], packed: PackedMaps):
+        self._painter = painter
         self._size = size
-        self._passes = passes
+        self._packed = packed
         self._pictures: dict[tuple, tuple[moderngl.Texture, moderngl.Framebuffer]] = {}
-        self._keys: dict[tuple, tuple] = {}
+        self._keys: dict[tuple, Hashable] = {}
         self._label_ids: moderngl.Texture | None = None
 
-    def picture(
-        self, kind: tuple, key: tuple, paint: Callable[[moderngl.Framebuffer], None]
+    # --- of colour and depth --------------------------------------------------------------------
+
+    def rgb(self, drawn: Drawn) -> moderngl.Texture:
+        """The colours over their background."""
+        return self._filled(
+            ("rgb",),
+            (drawn.key, drawn.background),
+            "show_rgb.frag",
+            {**drawn.colour, **drawn.depth},
+            {"background": drawn.background},
+        )
+
+    def depth(self, drawn: Drawn, span: Span, which: int) -> moderngl.Texture:
+        """Depth as a colour of map `which`; `span`: depths of its first and last colour."""
+        return self._filled(
+            ("depth",),
+            (drawn.key, span, which),
+            "show_depth.frag",
+            drawn.depth,
+            {"depth_range": span, "which_map": which},
+        )
+
+    def transmittance(self, drawn: Drawn, which: int) -> moderngl.Texture:
+        """What passes every splat, 0 to 1."""
+        return self._filled(
+            ("transmittance",),
+            (drawn.key, which),
+            "show_transmittance.frag",
+            drawn.depth,
+            {"which_map": which},
+        )
+
+    def trust(self, drawn: Drawn, photos: PhotoDepths, own: bool, which: int) -> moderngl.Texture:
+        """Agreement of the photos' own depths, or else how many photos see each pixel."""
+        limit = {"WORST": WORST} if own else {"SAME": SAME}
+        return self._filled(
+            ("trust", own),
+            (drawn.key,),
+            "show_agreement.frag" if own else "show_coverage.frag",
+            {**drawn.colour, **drawn.depth, "photo_depths": photos.texture},
+            {
+                "count_colours": np.array(COUNT_COLOURS),
+                "which_map": which,
+                "opacity": _TRUST_OPACITY,
+                **photos.uniforms(drawn.camera),
+            },
+            {**_COVERED, "MAX_PHOTOS": photos.capacity, **limit},
+        )
+
+    # --- of answers -----------------------------------------------------------------------------
+
+    def heat(
+        self,
+        drawn: Drawn,
+        answer: Answer,
+        prompt: int,
+        threshold: float,
+        span: Span,
+        which: int,
+        over_rgb: bool,
+    ) -> moderngl.Texture:
+        """One prompt's relevance from `threshold` on; `span`: that of the first and the last colour."""
+        return self._filled(
+            ("heat", prompt),
+            (*answer.key, threshold, span, which, over_rgb),
+            "show_heat.frag",
+            {**drawn.colour, **answer.relevance},
+            {
+                "prompt": prompt,
+                "which_map": which,
+                "threshold": threshold,
+                "span": span,
+                "opacity": _HEAT_OPACITY if over_rgb else 1.0,
+            },
+            _COVERED,
+        )
+
+    def labels(self, drawn: Drawn, answer: Answer, colours: np.ndarray, threshold: float) -> moderngl.Texture:
+        """The best prompt's colour (P, 3) at each pixel; its number, 0 none, 1 + prompt, into `label_ids`."""
+        capacity = _capacity(answer.num_phrases)
+
+        def paint(into: moderngl.Framebuffer) -> None:
+            both = self._painter.ctx.framebuffer([into.color_attachments[0], self.label_ids])
+            self._painter.fill(
+                both,
+                "show_labels.frag",
+                {**drawn.colour, **answer.relevance},
+                {
+                    "num_prompts": answer.num_phrases,
+                    "threshold": threshold,
+                    "opacity": _LABEL_OPACITY,
+                    "label_colours": _padded(colours, capacity),
+                },
+                {**_COVERED, "MAX_PROMPTS": capacity},
+            )
+            both.release()
+
+        return self._picture(("labels",), (*answer.key, threshold, colours.tobytes()), paint)
+
+    def masks(
+        self, drawn: Drawn, answer: Answer, style: str, colours: np.ndarray, thresholds: np.ndarray
+    ) -> moderngl.Texture:
+        """What passes, in one of `MASK_STYLES`; colours (P, 3) and thresholds (P,) of the prompts."""
+        capacity = _capacity(answer.num_phrases)
+        return self._filled(
+            ("masks", style),
+            (*answer.key, drawn.background, colours.tobytes(), thresholds.tobytes()),
+            "show_masks.frag",
+            {**drawn.colour, **drawn.depth, **answer.relevance},
+            {
+                "num_prompts": answer.num_phrases,
+                "style": MASK_STYLES.index(style),
+                "background": drawn.background,
+                "thresholds": _padded(thresholds, capacity),
+                "label_colours": _padded(colours, capacity),
+            },
+            {**_COVERED, "MAX_PROMPTS": capacity},
+        )
+
+    def margin(
+        self, drawn: Drawn, answer: Answer, threshold: float, span: Span, which: int, over_rgb: bool
+    ) -> moderngl.Texture:
+        """The best prompt's relevance less the second best's; of one prompt, less `threshold`."""
+        return self._filled(
+            ("margin",),
+            (*answer.key, threshold, span, which, over_rgb),
+            "show_margin.frag",
+            {**drawn.colour, **answer.relevance},
+            {
+                "num_prompts": answer.num_phrases,
+                "threshold": threshold,
+                "span": span,
+                "which_map": which,
+                "opacity": _TRUST_OPACITY if over_rgb else 1.0,
+            },
+            _COVERED,
+        )
+
+    # --- of weight maps -------------------------------------------------------------------------
+
+    def weight(self, maps: Maps, atom: int, which: int) -> moderngl.Texture:
+        """One atom's weight map, 0 to 1."""
+        places = np.flatnonzero(maps.atoms == atom)
+
+        def paint(into: moderngl.Framebuffer) -> None:
+            into.clear(0.0, 0.0, 0.0, 1.0)
+            if len(places):
+                textures = {"weight_maps": maps.array}
+                self._painter.fill(
+                    into, "show_weight.frag", textures, {"place": int(places[0]), "which_map": which}
+                )
+
+        return self._picture(("weight",), (maps.version, atom, which), paint)
+
+    def atoms(self, maps: Maps, colours: np.ndarray) -> moderngl.Texture:
+        """sum_k W_k c_k for colours (K, 3), on black."""
+        return self._combined(("atoms",), "show_atoms.frag", maps, colours)
+
+    def features(self, maps: Maps, columns: np.ndarray) -> moderngl.Texture:
+        """sum_k W_k c_k / sum_k W_k for columns (K, 4), the last of ones; empty pixels black."""
+        return self._combined(("features",), "show_features.frag", maps, columns)
+
+    def _combined(self, kind: tuple, fragment: str, maps: Maps, columns: np.ndarray) -> moderngl.Texture:
+        def paint(into: moderngl.Framebuffer) -> None:
+            into.clear(0.0, 0.0, 0.0, 1.0)
+            if len(maps.atoms):
+                self._packed.combine(into, fragment, maps, columns[maps.atoms])
+
+        return self._picture(kind, (maps.version,), paint)
+
+    # --- inside ---------------------------------------------------------------------------------
+
+    def _filled(
+        self,
+        kind: tuple,
+        key: tuple,
+        fragment: str,
+        textures: Textures,
+        uniforms: Uniforms,
+        defines: Mapping[str, float] | None = None,
+    ) -> moderngl.Texture:
+        """The picture of `kind` that a fragment shader makes of `textures`."""
+        return self._picture(
+            kind, key, lambda into: self._painter.fill(into, fragment, textures, uniforms, defines)
+        )
+
+    def _picture(
+        self, kind: tuple, key: Hashable, paint: Callable[[moderngl.Framebuffer], None]
     ) -> moderngl.Texture:
         """The texture of `kind`; `paint` draws it where `key` differs from the last time."""
         if kind not in self._pictures:
-            texture = self._ctx.texture(self._size, 4)
-            self._pictures[kind] = texture, self._ctx.framebuffer([texture])
+            texture = self._painter.ctx.texture(self._size, 4)
+            self._pictures[kind] = texture, self._painter.ctx.framebuffer([texture])
         texture, framebuffer = self._pictures[kind]
         if self._keys.get(kind) != key:
             paint(framebuffer)
             self._keys[kind] = key
-            self._passes["show"] += 1
+            self._painter.passes["show"] += 1
         return texture
-
-    def paint_rgb(
-        self, target: moderngl.Framebuffer, colour: ColourTarget, background: tuple[float, float, float]
-    ) -> None:
-        program = self._programs.get("screen.vert", "show_rgb.frag")
-        colour.colour.use(0)
-        colour.depth.use(1)
-        set_uniforms(program, colour=0, depth=1, background=background)
-        with drawing(target):
-            self._screen.draw(program)
-
-    def paint_depth(
-        self, target: moderngl.Framebuffer, colour: ColourTarget, span: tuple[float, float], which: int
-    ) -> None:
-        program = self._programs.get("screen.vert", "show_depth.frag")
-        colour.depth.use(0)
-        set_uniforms(program, depth=0, depth_range=span, which_map=which)
-        with drawing(target):
-            self._screen.draw(program)
-
-    def paint_heat(
-        self,
-        target: moderngl.Framebuffer,
-        colour: ColourTarget,
-        relevance: LayerTarget,
-        *,
-        prompt: int,
-        which: int,
-        threshold: float,
-        span: tuple[float, float],
-        over_rgb: bool,
-    ) -> None:
-        program = self._programs.get("screen.vert", "show_heat.frag", {"COVERED_ALPHA": COVERED_ALPHA})
-        colour.colour.use(0)
-        relevance.array.use(1)
-        set_uniforms(
-            program,
-            colour=0,
-            relevance=1,
-            prompt=prompt,
-            which_map=which,
-            threshold=threshold,
-            span=span,
-            opacity=_HEAT_OPACITY if over_rgb else 1.0,
-        )
-        with drawing(target):
-            self._screen.draw(program)
-
-    def paint_labels(
-        self,
-        into: moderngl.Framebuffer,
-        colour: ColourTarget,
-        relevance: LayerTarget,
-        colours: np.ndarray,
-        threshold: float,
-    ) -> None:
-        """Colours into `into` and label numbers (0 none, 1 + prompt) into `label_ids`."""
-        capacity = max(16, 1 << (len(colours) - 1).bit_length())
-        program = self._programs.get(
-            "screen.vert", "show_labels.frag", {"COVERED_ALPHA": COVERED_ALPHA, "MAX_PROMPTS": capacity}
-        )
-        padded = np.zeros((capacity, 3), np.float32)
-        padded[: len(colours)] = colours
-        colour.colour.use(0)
-        relevance.array.use(1)
-        set_uniforms(
-            program,
-            colour=0,
-            relevance=1,
-            num_prompts=len(colours),
-            threshold=threshold,
-            opacity=_LABEL_OPACITY,
-            label_colours=padded,
-        )
-        target = self._ctx.framebuffer([into.color_attachments[0], self.label_ids])
-        with drawing(target):
-            self._screen.draw(program)
-        target.release()
-
-    def paint_masks(
-        self,
-        into: moderngl.Framebuffer,
-        target: ColourTarget,
-        relevance: LayerTarget,
-        style: str,
-        colours: np.ndarray,
-        thresholds: np.ndarray,
-        background: tuple[float, float, float],
-    ) -> None:
-        """What passes, in one of `MASK_STYLES`; colours (P, 3) and thresholds (P,) of the prompts."""
-        count = len(thresholds)
-        capacity = max(16, 1 << (count - 1).bit_length())
-        defines = {"COVERED_ALPHA": COVERED_ALPHA, "MAX_PROMPTS": capacity}
-        self._paint(
-            into,
-            "show_masks.frag",
-            defines,
-            {"colour": target.colour, "depth": target.depth, "relevance": relevance.array},
-            num_prompts=count,
-            style=MASK_STYLES.index(style),
-            background=background,
-            thresholds=np.pad(thresholds, (0, capacity - count)),
-            label_colours=np.pad(colours, ((0, capacity - count), (0, 0))),
-        )
-
-    def paint_margin(
-        self,
-        into: moderngl.Framebuffer,
-        target: ColourTarget,
-        relevance: LayerTarget,
-        num_prompts: int,
-        threshold: float,
-        span: tuple[float, float],
-        which: int,
-        over_rgb: bool,
-    ) -> None:
-        self._paint(
-            into,
-            "show_margin.frag",
-            {"COVERED_ALPHA": COVERED_ALPHA},
-            {"colour": target.colour, "relevance": relevance.array},
-            num_prompts=num_prompts,
-            threshold=threshold,
-            span=span,
-            which_map=which,
-            opacity=_TRUST_OPACITY if over_rgb else 1.0,
-        )
-
-    def paint_weight(self, into: moderngl.Framebuffer, weights: LayerTarget, place: int, which: int) -> None:
-        self._paint(
-            into, "show_weight.frag", {}, {"weight_maps": weights.array}, place=place, which_map=which
-        )
-
-    def paint_transmittance(self, into: moderngl.Framebuffer, target: ColourTarget, which: int) -> None:
-        self._paint(into, "show_transmittance.frag", {}, {"depth": target.depth}, which_map=which)
-
-    def paint_trust(
-        self,
-        into: moderngl.Framebuffer,
-        target: ColourTarget,
-        photos: PhotoDepths,
-        camera: Camera,
-        own: bool,
-        which: int,
-    ) -> None:
-        """Agreement of the photos' own depths, or else how many photos see each pixel."""
-        defines: dict[str, float] = {"COVERED_ALPHA": COVERED_ALPHA, "MAX_PHOTOS": photos.capacity}
-        name = "show_agreement.frag" if own else "show_coverage.frag"
-        self._paint(
-            into,
-            name,
-            {**defines, **({"WORST": WORST} if own else {"SAME": SAME})},
-            {"colour": target.colour, "depth": target.depth, "photo_depths": photos.texture},
-            count_colours=np.array(COUNT_COLOURS),
-            which_map=which,
-            opacity=_TRUST_OPACITY,
-            **photos.uniforms(camera),
-        )
-
-    def _paint(
-        self,
-        into: moderngl.Framebuffer,
-        fragment: str,
-        defines: dict[str, float],
-        textures: dict[str, moderngl.Texture | moderngl.TextureArray],
-        **uniforms: float | int | tuple | np.ndarray,
-    ) -> None:
-        """Fill `into` by a fragment shader that reads `textures` by their names."""
-        program = self._programs.get("screen.vert", fragment, defines)
-        for unit, texture in enumerate(textures.values()):
-            texture.use(unit)
-        set_uniforms(program, **{name: unit for unit, name in enumerate(textures)}, **uniforms)
-        with drawing(into):
-            self._screen.draw(program)
 
     @property
     def label_ids(self) -> moderngl.Texture:
         """(H, W) float16: 0 for none, 1 + prompt elsewhere; exact up to 2,048 prompts."""
         if self._label_ids is None:
-            self._label_ids = self._ctx.texture(self._size, 1, dtype="f2")
+            self._label_ids = self._painter.ctx.texture(self._size, 1, dtype="f2")
         return self._label_ids
 
     def release(self) -> None:
@@ -249,44 +286,11 @@ class Display:
         self._label_ids = None
 
 
-def atom_colours(dictionary: np.ndarray) -> np.ndarray:
-    """Colours (K, 3) in [0.1, 0.95] from the first three principal axes of the atoms (K, C).
-
-    Made from the whole dictionary, so that an atom has one colour in every view. Each axis'
-    sign makes its largest entry positive. An atom that is not finite counts as one of length 0.
-    """
-    count = dictionary.shape[0]
-    if count == 0:
-        return np.zeros((0, 3), np.float32)
-    dictionary = np.where(np.isfinite(dictionary).all(1, keepdims=True), dictionary, 0.0)
-    centred = dictionary - dictionary.mean(0)
-    left, values, _ = np.linalg.svd(centred, full_matrices=False)
-    scores = np.zeros((count, 3))
-    used = min(3, len(values))
-    scores[:, :used] = left[:, :used] * values[:used]
-    scores *= np.where(scores[np.abs(scores).argmax(0), range(3)] < 0, -1.0, 1.0)
-    low, high = scores.min(0), scores.max(0)
-    flat = high - low < 1e-9  # one atom, or all alike: mid grey on that axis
-    shares = np.where(flat, 0.5, (scores - low) / np.where(flat, 1.0, high - low))
-    return (0.1 + 0.85 * shares).astype(np.float32)
+def _capacity(num_prompts: int) -> int:
+    """Prompts that a program is compiled for: a few sizes only."""
+    return max(16, 1 << (num_prompts - 1).bit_length())
 
 
-def feature_axes(dictionary: np.ndarray, masses: np.ndarray) -> np.ndarray:
-    """Affine colours (K, 4) of atoms (K, C): three principal axes, and ones for `show_features.frag`.
-
-    The axes are of the atoms as often as the scene carries them, masses (K,) >= 0. Two deviations
-    along an axis span its colour; each axis' sign makes its largest entry positive.
-    """
-    finite = np.where(np.isfinite(dictionary).all(1, keepdims=True), dictionary, 0.0)
-    shares = masses / max(masses.sum(), 1e-12)
-    centred = finite - shares @ finite
-    _, values, axes = np.linalg.svd(np.sqrt(shares)[:, None] * centred, full_matrices=False)
-    columns = np.ones((len(finite), 4))
-    columns[:, :3] = 0.5
-    for place in range(min(3, len(values))):
-        if values[place] < 1e-9:  # fewer directions than colours: mid grey
-            continue
-        along = centred @ axes[place]
-        sign = np.sign(along[np.abs(along).argmax()])
-        columns[:, place] += sign * along / (4 * values[place])
-    return columns
+def _padded(values: np.ndarray, capacity: int) -> np.ndarray:
+    """(P, ...) filled up with zeros to (capacity, ...)."""
+    return np.pad(values, ((0, capacity - len(values)), *((0, 0),) * (values.ndim - 1)))

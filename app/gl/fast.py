@@ -14,21 +14,21 @@ import numpy as np
 
 from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
 
-from .combine import PHRASES, Screen
-from .programs import Programs, set_uniforms
+from .answers import temperature_of
+from .layout import ATOMS_A_LAYER, LAYERS_A_PASS, PHRASES_A_LAYER, num_groups, num_layers
+from .painter import Painter
 from .splats import SplatBuffers
-from .targets import ColourTarget, LayerTarget, drawing
+from .targets import ColourTarget, LayerTarget
 
-NUMBERS = 3  # a layer
-MAX_LAYERS = 6  # colour and depth take two of eight attachments
-MAX_PHRASES = NUMBERS * MAX_LAYERS - 1
+MAX_PHRASES = ATOMS_A_LAYER * (LAYERS_A_PASS - 2) - 1
+"""Colour and depth take two attachments, |f| one number of the rest."""
 
 
 def splat_numbers(splats: SplatBuffers, compiled: CompiledQuery, norms: np.ndarray) -> np.ndarray:
     """|f_i| and g_i of every phrase, (N, 3 L) float32, filled up with zeros.
 
     Args:
-        norms: |f_i| (N,), of `splat_norms`.
+        norms: |f_i| (N,).
     """
     factor = compiled.factor.detach().cpu().double().numpy()
     prompts = compiled.prompts.detach().cpu().double().numpy()
@@ -37,58 +37,40 @@ def splat_numbers(splats: SplatBuffers, compiled: CompiledQuery, norms: np.ndarr
     answers = dots[:, : len(prompts)]
     if compiled.mode == "relevancy":
         answers = answers - dots[:, len(prompts) :].max(1, keepdims=True)
-    numbers = np.zeros((len(norms), NUMBERS * num_layers(len(prompts))), np.float32)
+    numbers = np.zeros((len(norms), ATOMS_A_LAYER * num_layers(1 + len(prompts))), np.float32)
     numbers[:, 0] = norms
     numbers[:, 1 : 1 + len(prompts)] = answers
     return numbers
 
 
-def splat_norms(splats: SplatBuffers, factor: np.ndarray) -> np.ndarray:
-    """|f_i| (N,) of Gaussians over a dictionary with factor R (K, r)."""
-    return np.linalg.norm(splats.mixed(factor), axis=1)
-
-
-def num_layers(num_phrases: int) -> int:
-    """Layers that |f| and so many phrases fill."""
-    return -(-(1 + num_phrases) // NUMBERS)
-
-
 class FastPasses:
-    """Owns the layers that the numbers are splatted into, and the relevance made of them."""
+    """Owns the layers that the numbers of so many phrases are splatted into, and the relevance made of them.
 
-    def __init__(
-        self,
-        ctx: moderngl.Context,
-        programs: Programs,
-        screen: Screen,
-        target: ColourTarget,
-        compiled: CompiledQuery,
-        dtype: str,
-    ):
-        self._programs = programs
-        self._screen = screen
-        self._num_phrases = len(compiled.prompts)
-        self._numbers = LayerTarget(ctx, target.colour.size, num_layers(self._num_phrases), dtype)
-        groups = -(-self._num_phrases // PHRASES)
-        self.relevance = LayerTarget(ctx, target.colour.size, groups, "f4")
-        self.framebuffer = self._numbers.layers(
-            0, self._numbers.num_layers, beside=(target.colour, target.depth)
+    `framebuffer` has the layers beside a target's colour and depth; who draws into it says so in `shows`.
+    """
+
+    def __init__(self, painter: Painter, target: ColourTarget, dtype: str, num_phrases: int):
+        size = target.colour.size
+        self.num_phrases = num_phrases
+        self.num_layers = num_layers(1 + num_phrases)
+        self.relevance = LayerTarget(painter.ctx, size, num_groups(num_phrases), "f4")
+        self.shows: tuple[int, int] = (0, 0)  # places and question
+        self._painter = painter
+        self._numbers = LayerTarget(painter.ctx, size, self.num_layers, dtype)
+        self.framebuffer: moderngl.Framebuffer = self._numbers.layers(
+            0, self.num_layers, beside=(target.colour, target.depth)
         )
 
-    def fits(self, compiled: CompiledQuery) -> bool:
-        """Whether the layers serve so many phrases; of another number they are made anew."""
-        return len(compiled.prompts) == self._num_phrases
-
-    def run(self, compiled: CompiledQuery) -> LayerTarget:
-        """Relevance (4 phrases a layer, float32) of what was splatted last."""
-        temperature = float(compiled.temperature) if compiled.mode == "relevancy" else 0.0
-        program = self._programs.get("screen.vert", "fast.frag", {"EMPTY_NORM": EMPTY_NORM})
-        self._numbers.array.use(0)
+    def run(self, compiled: CompiledQuery) -> None:
+        """Make `relevance` (4 phrases a layer, float32) of what was splatted last."""
         for group in range(self.relevance.num_layers):
-            set_uniforms(program, numbers=0, first_phrase=PHRASES * group, temperature=temperature)
-            with drawing(self.relevance.layers(group, 1)):
-                self._screen.draw(program)
-        return self.relevance
+            self._painter.fill(
+                self.relevance.layers(group, 1),
+                "fast.frag",
+                {"numbers": self._numbers.array},
+                {"first_phrase": PHRASES_A_LAYER * group, "temperature": temperature_of(compiled)},
+                {"EMPTY_NORM": EMPTY_NORM},
+            )
 
     def release(self) -> None:
         self.relevance.release()

@@ -4,7 +4,7 @@ A software rasteriser (llvmpipe) runs shaders on the same cores that numpy uses,
 of a phrase with 24 weight maps at 640 x 480 take it some 11 ms, numpy 2 ms on the same machine. So there
 the weight maps are read back once a view, which is a copy within memory, and a phrase is one
 vector-matrix product and a handful of element-wise operations. On a graphics card the shaders of
-combine.py do the same without the maps leaving it.
+answers.py do the same without the maps leaving it.
 """
 
 import moderngl
@@ -12,8 +12,10 @@ import numpy as np
 
 from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
 
-from .combine import PHRASES, QueryPasses
-from .targets import LayerTarget
+from .answers import Answers, in_numbers, temperature_of
+from .layout import ATOMS_A_LAYER, PHRASES_A_LAYER
+from .targets import NUMPY_TYPES, LayerTarget
+from .weights import Maps
 
 _SOFTWARE = ("llvmpipe", "softpipe", "swr", "software rasterizer", "apple software renderer")
 _LARGEST_EXPONENT = np.float32(80)  # exp of it is finite in float32, and 1 / (1 + exp) is 0 to all digits
@@ -25,41 +27,32 @@ def draws_in_software(ctx: moderngl.Context) -> bool:
     return any(known in name for known in _SOFTWARE)
 
 
-class HostQueryPasses(QueryPasses):
-    """Relevance by numpy over weight maps that were read back; float32, atoms' colours as the base class.
+class HostAnswers(Answers):
+    """By numpy over weight maps that were read back; float32.
 
-    Cached steps, as there: the maps (per view), 1 / |F| (per dictionary), the largest negative's cosine
-    (per set of negatives), relevance (per prompts). Pixels lie along the second axis: (n, H W).
+    Steps kept: the maps (per view), 1 / |F| (per dictionary), the largest negative's cosine (per set of
+    negatives), relevance (per prompts). Pixels lie along the second axis: (n, H W).
     """
 
     _maps: np.ndarray  # (Ka, H W)
     _inverse_norms: np.ndarray  # (H W,), 0 where empty
     _worst: np.ndarray  # (H W,), infinite where empty
 
-    def _answer(
-        self,
-        compiled: CompiledQuery,
-        weights: LayerTarget,
-        atoms: np.ndarray,
-        version: int,
-        temperature: float,
-    ) -> None:
-        factor = compiled.factor.detach().cpu().double().numpy()[atoms]
-        prompts = compiled.prompts.detach().cpu().double().numpy()
-        negatives = compiled.negatives.detach().cpu().double().numpy()
-        if self._stale("read", (version,)):
-            self._maps = read_maps(weights, len(atoms))
-        if self._stale("norm", (version, factor.tobytes())):
+    def answer(self, compiled: CompiledQuery, maps: Maps, into: LayerTarget) -> None:
+        factor, prompts, negatives = in_numbers(compiled, maps.atoms)
+        temperature = temperature_of(compiled)
+        dictionary = (maps.version, factor.tobytes())
+        if self.stale("read", maps.version):
+            self._maps = read_maps(maps)
+        if self.stale("norm", dictionary):
             self._inverse_norms = inverse_norms(self._maps, factor)
-            self._forget("scales")
-            self._passes["norm"] += 1
-        if self._stale("scales", (version, negatives.tobytes())):
+            self.painter.passes["norm"] += 1
+        if self.stale("scales", dictionary, negatives.tobytes()):
             self._worst = self._largest(factor @ negatives.T)
-            self._forget("prompts")
-            self._passes["negatives"] += 1
-        if self._stale("prompts", (version, temperature, prompts.tobytes())):
-            self._write(factor @ prompts.T, temperature)
-            self._passes["query"] += 1
+            self.painter.passes["negatives"] += 1
+        if self.stale("prompts", dictionary, negatives.tobytes(), into, temperature, prompts.tobytes()):
+            self._write(factor @ prompts.T, temperature, into)
+            self.painter.passes["query"] += 1
 
     def _largest(self, dots: np.ndarray) -> np.ndarray:
         """Largest cosine of the negatives (Ka, M); of none where M = 0."""
@@ -74,28 +67,28 @@ class HostQueryPasses(QueryPasses):
         cosine *= self._inverse_norms
         return np.clip(cosine, -1, 1, out=cosine)
 
-    def _write(self, dots: np.ndarray, temperature: float) -> None:
-        assert self.relevance is not None
-        width, height, _ = self.relevance.array.size
-        for group in range(self.relevance.num_layers):
-            texels = np.zeros((width * height, PHRASES), np.float32)
-            for place, column in enumerate(dots.T[PHRASES * group : PHRASES * (group + 1)]):
+    def _write(self, dots: np.ndarray, temperature: float, into: LayerTarget) -> None:
+        width, height, _ = into.array.size
+        for group in range(into.num_layers):
+            texels = np.zeros((width * height, PHRASES_A_LAYER), np.float32)
+            for place, column in enumerate(dots.T[PHRASES_A_LAYER * group :][:PHRASES_A_LAYER]):
                 value = self._cosine(column)
                 if temperature > 0:
                     value = relevancy(value, self._worst, temperature)
                 texels[:, place] = value
-            self.relevance.array.write(texels, viewport=(0, 0, group, width, height, 1))
+            into.array.write(texels, viewport=(0, 0, group, width, height, 1))
 
 
-def read_maps(weights: LayerTarget, num_atoms: int) -> np.ndarray:
-    """The first `num_atoms` weight maps, three a layer, as (Ka, H W) float32."""
-    dtype = {"f2": np.float16, "f4": np.float32}[weights.array.dtype]
-    width, height, num_layers = weights.array.size
-    texels = np.frombuffer(weights.array.read(), dtype).reshape(num_layers, height * width, 4)
-    maps = np.empty((num_atoms, height * width), np.float32)
-    for atom in range(num_atoms):
-        maps[atom] = texels[atom // 3, :, atom % 3]
-    return maps
+def read_maps(maps: Maps) -> np.ndarray:
+    """The weight maps of the atoms in view as (Ka, H W) float32."""
+    width, height, num_layers = maps.array.size
+    texels = np.frombuffer(maps.array.read(), NUMPY_TYPES[maps.array.dtype]).reshape(
+        num_layers, height * width, 4
+    )
+    read = np.empty((len(maps.atoms), height * width), np.float32)
+    for place in range(len(read)):
+        read[place] = texels[place // ATOMS_A_LAYER, :, place % ATOMS_A_LAYER]
+    return read
 
 
 def inverse_norms(maps: np.ndarray, factor: np.ndarray) -> np.ndarray:

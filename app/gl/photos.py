@@ -1,7 +1,5 @@
 """What each photo sees: the depths of a scene in the views of its own photos, drawn once per scene."""
 
-from dataclasses import replace
-
 import moderngl
 import numpy as np
 from torch import Tensor
@@ -10,9 +8,10 @@ from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.scene.consistency import TOLERANCE
 from langflash_core.types import Camera, Scene
 
-from .programs import Programs, set_uniforms
+from .colour import draw_colour
+from .painter import Painter
 from .splats import SplatBuffers
-from .targets import PREMULTIPLIED, ColourTarget, drawing
+from .targets import ColourTarget
 
 SAME = 0.05
 """Relative depth within which a photo shows the very surface: a pixel of 1/200 of the focal length on a floor
@@ -24,27 +23,20 @@ LONGEST_SIDE = 320  # pixels of a depth map
 _CAPACITIES = (2, 4, 8, 16, 32)
 
 
-def gaussians_per_view(scene: Scene) -> list[int] | None:
-    """How many Gaussians each photo made, in their order; None where the scene does not say."""
-    counts = scene.metadata.get("gaussians_per_view")
-    if not isinstance(counts, list | tuple) or len(counts) != scene.num_views:
-        return None
-    return list(counts) if sum(counts) == len(scene.gaussians) else None
-
-
 class PhotoDepths:
     """Depth maps of at most `MOST_PHOTOS` photos as layers of one texture.
 
     own: every photo sees only the Gaussians that it made itself.
     """
 
-    def __init__(self, ctx: moderngl.Context, programs: Programs, scene: Scene, own: bool):
+    def __init__(self, painter: Painter, scene: Scene, own: bool):
         self.cameras = tuple(_small(scene.camera(v)) for v in range(min(scene.num_views, MOST_PHOTOS)))
+        ctx, programs = painter.ctx, painter.programs
         whole = None if own else SplatBuffers(ctx, programs, scene)
         maps = []
         for view, camera in enumerate(self.cameras):
             splats = whole or SplatBuffers(ctx, programs, _own_scene(scene, view))
-            maps.append(_depths(ctx, programs, splats, camera))
+            maps.append(_depths(painter, splats, camera))
             if splats is not whole:
                 splats.release()
         if whole is not None:
@@ -65,7 +57,7 @@ class PhotoDepths:
         matrices = np.tile(np.eye(4), (self.capacity, 1, 1))
         for photo, seen in enumerate(self.cameras):
             pinholes[photo] = _pinhole(seen)
-            matrices[photo] = (_numbers(seen.viewmat) @ back).T  # OpenGL's order
+            matrices[photo] = _numbers(seen.viewmat) @ back
         return {
             "num_photos": len(self.cameras),
             "pinhole": _pinhole(camera),
@@ -97,29 +89,19 @@ def _own_scene(scene: Scene, view: int) -> Scene:
     Raises:
         ValueError: the scene does not say which.
     """
-    counts = gaussians_per_view(scene)
-    if counts is None:
-        raise ValueError("scene: expected gaussians_per_view in its metadata, received none that fits")
-    rows = slice(sum(counts[:view]), sum(counts[: view + 1]))
-    semantics = scene.semantics
-    semantics = replace(
-        semantics, weight_ids=semantics.weight_ids[rows], weight_values=semantics.weight_values[rows]
-    )
-    return replace(scene, gaussians=scene.gaussians.map(lambda v: v[rows]), semantics=semantics)
+    if scene.view_ids is None:
+        raise ValueError("view_ids: expected the photo that made each Gaussian, received none")
+    return scene.rows(scene.view_ids == view)
 
 
-def _depths(ctx: moderngl.Context, programs: Programs, splats: SplatBuffers, camera: Camera) -> np.ndarray:
+def _depths(painter: Painter, splats: SplatBuffers, camera: Camera) -> np.ndarray:
     """z (H, W) float32 of covered pixels, 0 elsewhere."""
-    target = ColourTarget(ctx, (camera.width, camera.height), "f2")
-    target.framebuffer.clear()
+    target = ColourTarget(painter.ctx, (camera.width, camera.height), "f2")
     if splats.num_gaussians:
         splats.sort(camera)
     if len(splats.order):
         splats.project(camera)
-        program = programs.get("quad.vert", "colour.frag", {"COLOUR": 1})
-        set_uniforms(program, image_size=(float(camera.width), float(camera.height)))
-        with drawing(target.framebuffer, PREMULTIPLIED):
-            splats.draw(program)
+    draw_colour(painter.programs, splats, target.framebuffer)
     sums = np.frombuffer(target.depth.read(), np.float32).reshape(camera.height, camera.width, 2)
     target.release()
     alphas = sums[..., 1]

@@ -10,10 +10,11 @@ from torch.nn import functional as F
 
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.geometry.quaternions import unit_quats
+from langflash_core.graphics import Programs, set_uniforms
 from langflash_core.splat.projection import ALPHA_MIN, DILATION, NEAR, TAN_MARGIN, drawable_rows
 from langflash_core.types import Camera, Scene
 
-from .programs import Programs, set_uniforms
+from .layout import ATOMS_A_LAYER
 
 _ROW_TEXELS = 4096
 _ROWS_AT_ONCE = 1 << 16  # Gaussians: 12 MB of coefficients of degree 3
@@ -68,12 +69,10 @@ class SplatBuffers:
         self._tints = self._own(self._ctx.buffer(bytes(count)))
         self._order_buffer = self._own(self._ctx.buffer(reserve=4 * count))
         self.places = self._own(self._ctx.buffer(reserve=4 * _PLACE_FLOATS * count))
-        self._sparse = self._upload_weights() if self._num_atoms and self._ids.shape[1] else None
-        self._slots = (
-            self._own(self._ctx.texture((self._num_atoms, 1), 1, dtype="f4")) if self._sparse else None
-        )
-        self._weights: moderngl.Buffer | None = None
-        self._numbers: moderngl.Buffer | None = None
+        self._sparse = self._upload_weights()
+        self._slots = self._own(self._ctx.texture((max(1, self._num_atoms), 1), 1, dtype="f4"))
+        self._weights = self._own(_Growing(self._ctx))
+        self._numbers = self._own(_Growing(self._ctx))
         self._vaos: dict[tuple, moderngl.VertexArray] = {}
 
     def _upload_harmonics(self, sh: np.ndarray, rows: np.ndarray) -> moderngl.Buffer:
@@ -91,7 +90,7 @@ class SplatBuffers:
 
     def _upload_weights(self) -> moderngl.Texture:
         pairs = np.stack((self._ids.astype(np.float32), self._values), -1).reshape(-1, 2)
-        rows = -(-len(pairs) // _ROW_TEXELS)
+        rows = max(1, -(-len(pairs) // _ROW_TEXELS))
         padded = np.zeros((rows * _ROW_TEXELS, 2), np.float32)
         padded[: len(pairs)] = pairs
         texture = self._own(self._ctx.texture((_ROW_TEXELS, rows), 2, padded.tobytes(), dtype="f4"))
@@ -127,11 +126,16 @@ class SplatBuffers:
             rows = np.flatnonzero(self._may_touch(camera, viewmat, z) & self._shown)
         depths = z[rows]
         nearest_first = rows[stable_order(depths)]
-        self.order = nearest_first[::-1].astype(np.uint32)
         if len(rows):
             margin = len(rows) // 50
             near, far = z[nearest_first[margin]], z[nearest_first[len(rows) - 1 - margin]]
             self.depth_range = (float(near), float(far))
+        self.draw_in(nearest_first[::-1])
+
+    def draw_in(self, order: np.ndarray) -> None:
+        """Draw these rows of the Gaussians kept, the first first."""
+        self.order = order.astype(np.uint32)
+        if len(order):
             self._order_buffer.write(self.order.tobytes())
 
     def _may_touch(self, camera: Camera, viewmat: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -176,7 +180,7 @@ class SplatBuffers:
         eye = -viewmat[:3, :3].T @ viewmat[:3, 3]
         set_uniforms(
             program,
-            viewmat=viewmat.T,
+            viewmat=viewmat,
             eye=eye,
             eye_rest=eye - eye.astype(np.float32),
             pinhole=np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2]]),
@@ -190,8 +194,7 @@ class SplatBuffers:
         self._transform(program, content, self.places)
 
     def expand(self, atoms: np.ndarray, first: int, num_layers: int) -> moderngl.Buffer:
-        """Dense weights for atoms[first : first + 3 * num_layers], in draw order, 3 a layer."""
-        assert self._sparse is not None and self._slots is not None, "expand without atoms"
+        """Dense weights of `num_layers` layers of `atoms`, from place `first` on, in draw order."""
         program = self._programs.get(
             "expand.vert",
             defines={"LAYERS": num_layers, "ROW_TEXELS": _ROW_TEXELS},
@@ -205,13 +208,9 @@ class SplatBuffers:
         set_uniforms(
             program, sparse_weights=0, slots=1, weights_per_gaussian=self._ids.shape[1], first_slot=first
         )
-        needed = 4 * 3 * num_layers * self.num_gaussians
-        if self._weights is None:
-            self._weights = self._own(self._ctx.buffer(reserve=needed))
-        elif self._weights.size < needed:
-            self._weights.orphan(needed)
-        self._transform(program, [], self._weights)
-        return self._weights
+        out = self._weights.at_least(4 * ATOMS_A_LAYER * num_layers * self.num_gaussians)
+        self._transform(program, [], out)
+        return out
 
     def mixed(self, table: np.ndarray) -> np.ndarray:
         """sum_j w_ij table[id_ij], (N, n) float32 in the scene's order, of a table (K, n)."""
@@ -221,13 +220,9 @@ class SplatBuffers:
 
     def in_order(self, numbers: np.ndarray) -> moderngl.Buffer:
         """Numbers (N, n) float32 of all Gaussians as those of the chosen ones, in draw order."""
-        data = numbers[self.order].tobytes()
-        if self._numbers is None:
-            self._numbers = self._own(self._ctx.buffer(reserve=numbers.nbytes))
-        elif self._numbers.size < len(data):
-            self._numbers.orphan(numbers.nbytes)
-        self._numbers.write(data)
-        return self._numbers
+        out = self._numbers.at_least(numbers.nbytes)
+        out.write(numbers[self.order].tobytes())
+        return out
 
     def _transform(self, program: moderngl.Program, content: list, out: moderngl.Buffer) -> None:
         key = ("transform", program.glo)
@@ -252,7 +247,7 @@ class SplatBuffers:
             if colour:
                 content = [(self.places, "4f 4f 3f/i", *footprint, "in_colour")]
             if weights is not None:
-                content.append((weights, f"{3 * num_layers}f/i", "in_weights"))
+                content.append((weights, f"{ATOMS_A_LAYER * num_layers}f/i", "in_weights"))
             self._vaos[key] = self._ctx.vertex_array(program, content)
         self._vaos[key].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(self.order))
 
@@ -268,6 +263,27 @@ class SplatBuffers:
             owned.release()
         self._owned.clear()
         self.num_gaussians = 0
+
+
+class _Growing:
+    """A buffer made when first needed, and larger when more is."""
+
+    def __init__(self, ctx: moderngl.Context):
+        self._ctx = ctx
+        self._made: moderngl.Buffer | None = None
+
+    def at_least(self, size: int) -> moderngl.Buffer:
+        """One of `size` bytes or more, always the same object; what it held is lost where it grows."""
+        if self._made is None:
+            self._made = self._ctx.buffer(reserve=size)
+        elif self._made.size < size:
+            self._made.orphan(size)
+        return self._made
+
+    def release(self) -> None:
+        if self._made is not None:
+            self._made.release()
+        self._made = None
 
 
 def stable_order(keys: np.ndarray) -> np.ndarray:

@@ -5,26 +5,19 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import moderngl
+import numpy as np
+
+from langflash_core.graphics import bound_framebuffer
 
 _GL_FRAMEBUFFER = 0x8D40
 _GL_COLOR_ATTACHMENT0 = 0x8CE0
-MAX_LAYERS_AT_ONCE = 8  # colour attachments every OpenGL 3.3 has
+NUMPY_TYPES = {"f2": np.float16, "f4": np.float32}
 
 PREMULTIPLIED = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
 ADDED = (moderngl.ONE, moderngl.ONE)
 SUM = (moderngl.FUNC_ADD, moderngl.FUNC_ADD)
 MAXIMUM = (moderngl.MAX, moderngl.MAX)
 _USUAL = (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA)  # moderngl's default
-
-
-def bound_framebuffer(ctx: moderngl.Context) -> moderngl.Framebuffer:
-    """The framebuffer in use; a context without a screen, or whose last one was released, gets 1 x 1 pixels.
-
-    moderngl binds its last framebuffer again after a clear, released or not: one must stay alive.
-    """
-    if ctx.fbo is None or not hasattr(ctx.fbo.mglo, "use"):
-        (ctx.screen or ctx.simple_framebuffer((1, 1))).use()
-    return ctx.fbo
 
 
 def context_lives(ctx: moderngl.Context) -> bool:
@@ -65,6 +58,11 @@ def drawing(
         ctx.blend_equation = SUM
         ctx.enable_only(moderngl.NOTHING)
         previous.use()
+
+
+def read(texture: moderngl.Texture | moderngl.TextureArray) -> np.ndarray:
+    """Every value of a float texture, flat, as float32."""
+    return np.frombuffer(texture.read(), NUMPY_TYPES[texture.dtype]).astype(np.float32)
 
 
 class ColourTarget:
@@ -121,8 +119,46 @@ class LayerTarget:
         previous.use()
         return framebuffer
 
+    def texel(self, first: int, count: int, x: int, y: int) -> np.ndarray:
+        """(count, 4): one pixel of `count` layers from `first` on."""
+        framebuffer = self.layers(first, count)
+        read = (
+            framebuffer.read((x, y, 1, 1), 4, attachment=layer, dtype=self._dtype) for layer in range(count)
+        )
+        return np.stack([np.frombuffer(texel, NUMPY_TYPES[self._dtype]) for texel in read])
+
     def release(self) -> None:
         for framebuffer in self._framebuffers.values():
             framebuffer.release()
         self._framebuffers.clear()
         self.array.release()
+
+
+class Layers:
+    """A `LayerTarget` of one size that is made when its number of layers is known."""
+
+    def __init__(self, ctx: moderngl.Context, size: tuple[int, int], dtype: str):
+        self._ctx = ctx
+        self._size = size
+        self._dtype = dtype
+        self._made: LayerTarget | None = None
+
+    def exactly(self, count: int) -> LayerTarget:
+        """One of `count` layers; where there is another, it is made anew, empty."""
+        made = self._made
+        return made if made is not None and made.num_layers == count else self._anew(count)
+
+    def at_least(self, count: int) -> LayerTarget:
+        """One of `count` layers or more; where there is a smaller one, it is made anew, empty."""
+        made = self._made
+        return made if made is not None and made.num_layers >= count else self._anew(count)
+
+    def _anew(self, count: int) -> LayerTarget:
+        self.release()
+        self._made = LayerTarget(self._ctx, self._size, count, self._dtype)
+        return self._made
+
+    def release(self) -> None:
+        if self._made is not None:
+            self._made.release()
+        self._made = None

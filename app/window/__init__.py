@@ -1,7 +1,10 @@
 """The window: photos in, a scene to fly through, phrases that light up.
 
-`state` holds what is shown, `commands` what can happen, `worker` what takes long; `panels` turn
-the state into pictures and hands into commands; `session` joins them in one loop.
+A folder a feature (scene, asking, editing, exporting, recovery), a file a role in each: `state` holds
+what is shown, `commands` what can happen, `work` what takes long, on the worker's thread; `effects` alone
+touch the disk, the worker and the picture; panels turn the state into pictures and hands into commands.
+What they share is here: `session` joins it in one loop, `frame` puts the panels in their places, `kit`
+is what panels are made of, `viewport` draws as much as the quality `governor` allows.
 """
 
 from collections.abc import Sequence
@@ -16,6 +19,6 @@ def run(paths: Sequence[str | Path] = ()) -> int:
     Raises:
         GraphicsError: no display, or no OpenGL 3.3.
     """
-    from app.window.session import Session  # glfw and ImGui load here, not with the package
+    from .session import Session  # glfw and ImGui load here, not with the package
 
     return Session(paths).run()

@@ -4,29 +4,18 @@
 """
 
 import os
-import sys
 from pathlib import Path
+
+import platformdirs
 
 
 def config_folder() -> Path:
     """Preferences."""
     own = os.environ.get("LANGFLASH_CONFIG")
-    if own:
-        return Path(own)
-    if sys.platform == "win32":
-        return Path(os.environ.get("APPDATA", Path.home())) / "langflash"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Preferences" / "langflash"
-    return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "langflash"
+    return Path(own) if own else platformdirs.user_config_path("langflash", appauthor=False)
 
 
 def state_folder() -> Path:
     """What a crash must not take, and what may be thrown away."""
     own = os.environ.get("LANGFLASH_STATE")
-    if own:
-        return Path(own)
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", Path.home())) / "langflash"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Application Support" / "langflash"
-    return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state") / "langflash"
+    return Path(own) if own else platformdirs.user_state_path("langflash", appauthor=False)

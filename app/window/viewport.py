@@ -11,19 +11,23 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
-from app.window.asking import margin_span
-from app.window.editing import Point, Reading, strongest
-from app.window.pace import SETTLE_AFTER, Kind, Pace, Plan
-from app.window.poses import START, Pose, to_camera
-from app.window.state import Mode, Prompt, State
-from langflash_core.edits import Marks, Mask
+from langflash_core.scene.edits import Marks, Mask
+
+from .asking.state import Prompt, margin_span
+from .editing.state import Point, Reading, strongest
+from .governor import SETTLE_AFTER, Governor, Kind, Plan
+from .poses import START, Pose, to_camera
+from .scene.state import Mode
+from .state import State
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from app.gl import SplatRenderer
     from langflash_core.language.relevance import CompiledQuery
     from langflash_core.types import Camera, Frame, Scene
+
+    from ..gl import SplatRenderer
+
 
 BACKGROUND = (0.055, 0.06, 0.07)  # the theme's canvas
 COLORMAP = "turbo"
@@ -73,7 +77,7 @@ class Viewport:
         self._answered: tuple | None = None
         self._colouring: tuple | None = None
         self._texture: moderngl.Texture | None = None
-        self.pace = Pace()
+        self.governor = Governor()
         self.picture_seconds = 0.0
         self.picture_size = (0, 0)
 
@@ -104,7 +108,7 @@ class Viewport:
             GraphicsError: the OpenGL here cannot do it.
         """
         if self._renderer is None:
-            from app.gl import SplatRenderer  # loads torch; the worker has by now
+            from ..gl import SplatRenderer  # loads torch; the worker has by now
 
             self._renderer = SplatRenderer(self._ctx)
         renderer = self._renderer
@@ -113,7 +117,7 @@ class Viewport:
         self._serial, self._query, self._keys = serial, None, ()
         self._drawn = self._texture = self._colouring = self._answered = None
         self._marks = (None, None)
-        self.pace = Pace(len(scene.gaussians))
+        self.governor = Governor(len(scene.gaussians))
 
     def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None") -> None:
         """Ask the prompts `keys`, in the order of `query`; None asks nothing."""
@@ -182,12 +186,12 @@ class Viewport:
             self._pose, self._size, self._moved = state.pose, size, state.now
         still = state.now - max(self._moved, touched)
         kind = _kind(state)
-        resting = self.pace.resting(kind, still)
-        wanted = _Drawn(self._serial, state.pose, size, resting or self.pace.moving(kind), self._marked)
+        resting = self.governor.resting(kind, still)
+        wanted = _Drawn(self._serial, state.pose, size, resting or self.governor.moving(kind), self._marked)
         if not self._covers(wanted):
             self._draw(wanted, moving=resting is None)
         self._colour(state)
-        return self.pace.next_rest(still)
+        return self.governor.next_rest(still)
 
     def view(self, state: State) -> View | None:
         """The resting view to score, once per picture and query; None when there is nothing new."""
@@ -232,7 +236,7 @@ class Viewport:
         )
         self._ctx.finish()  # software and hardware alike: the time of the picture, not of the call
         seconds = time.perf_counter() - start
-        self.pace = self.pace.learn(plan, seconds, moving)
+        self.governor = self.governor.learn(plan, seconds, moving)
         self.picture_seconds, self.picture_size = seconds, (width, height)
         self._drawn, self._colouring = wanted, None
 

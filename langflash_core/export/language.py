@@ -3,7 +3,7 @@
 A .ply gets it as a side-car, NAME.language.safetensors; a .glb carries it inside. Viewers read the
 Gaussians and know nothing of it. Tensors: weight_ids and weight_values (N, m), dictionary (K, C),
 viewmats (V, 4, 4), Ks (V, 3, 3), and the photos; the header's JSON says the language space, the size of
-the views, the scene's metadata, and the SHA-256 of the Gaussians' positions: who moves, sorts or
+the views, the scene's record, and the SHA-256 of the Gaussians' positions: who moves, sorts or
 removes some in another program gets the plain splats and a sentence, not words on the wrong things.
 """
 
@@ -20,6 +20,7 @@ from langflash_core.export.packing import told
 from langflash_core.scene.assemble import renormalised
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.fields import to_fields
+from langflash_core.scene.record import from_json, to_json
 from langflash_core.types import Gaussians, Scene, Semantics
 
 SIDE_CAR = ".language.safetensors"
@@ -44,7 +45,7 @@ def packed_language(scene: Scene) -> bytes:
     described = {
         "space": scene.semantics.space,
         "view_size": scene.view_size,
-        "metadata": scene.metadata,
+        "metadata": to_json(scene.record),
         "positions": _fingerprint(scene.gaussians),
     }
     header = {"format": _FORMAT, "version": str(_VERSION), "language": json.dumps(described, allow_nan=False)}
@@ -77,7 +78,8 @@ def with_language(scene: Scene, block: bytes, name: str) -> Scene:
             Ks=fields["Ks"].float(),
             view_size=(width, height),
             photos=photos,
-            metadata=dict(described["metadata"]),
+            view_ids=fields["view_ids"].long() if "view_ids" in fields else None,
+            record=from_json(dict(described["metadata"])),
         )
         check_scene(whole)
         return whole
@@ -104,4 +106,4 @@ def _fingerprint(gaussians: Gaussians) -> str:
 
 
 def _warned(scene: Scene, sentence: str) -> Scene:
-    return scene.with_metadata(warnings=[*scene.metadata.get("warnings", ()), sentence])
+    return scene.with_record(warnings=(*scene.record.warnings, sentence))

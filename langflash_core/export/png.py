@@ -12,10 +12,9 @@ from torch import Tensor
 
 from langflash_core.export.colours import heat, label_colours
 from langflash_core.files import write_atomically
-from langflash_core.types import Frame, QueryResult
+from langflash_core.types import LUMA, Frame, QueryResult
 
 RANGES = {"cosine": (-1.0, 1.0), "relevancy": (0.0, 1.0)}
-_LUMA = (0.299, 0.587, 0.114)
 _GLOW = 0.85  # share of the heat colour where relevance is highest
 _DIM = 0.6  # brightness of the photo where nothing was found
 
@@ -76,7 +75,7 @@ def heat_over(relevance: Tensor, rgb: Tensor, threshold: float, mode: str) -> Te
     neutral = 0.5 * (low + high)  # cosine 0, relevancy 0.5: nothing speaks for the phrase
     neutral = min(neutral, threshold - 0.02 * (high - low))
     view = rgb.float().clamp(0, 1)
-    grey = (view * view.new_tensor(_LUMA)).sum(-1, keepdim=True)
+    grey = (view * view.new_tensor(LUMA)).sum(-1, keepdim=True)
     strength = torch.nan_to_num(relevance.float(), nan=low)
     glow = ((strength - (neutral + threshold) / 2) / (threshold - neutral)).clamp(0, 1)[..., None]
     colours = heat(0.4 + 1.2 * (strength - threshold) / max(high - threshold, 1e-6))
@@ -137,7 +136,7 @@ def write_answer(result: QueryResult, path: Path) -> None:
         np.concatenate((np.zeros((1, 3), np.uint8), label_colours(len(result.answers))))
     )
     view = result.frame.rgb.float().cpu().clamp(0, 1)
-    grey = (view * view.new_tensor(_LUMA)).sum(-1, keepdim=True)
+    grey = (view * view.new_tensor(LUMA)).sum(-1, keepdim=True)
     lit = colours[labels].float() / 255 * (0.45 + 0.55 * grey)
     write_rgb(path, torch.where((labels > 0)[..., None], lit, _DIM * grey.expand_as(view)))
 

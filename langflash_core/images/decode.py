@@ -39,20 +39,31 @@ _UPRIGHT = {
 
 
 @dataclass(frozen=True)
-class Photo:
+class PhotoFacts:
+    """What a photo file says besides its pixels. width, height: pixels, upright. exif: tags by number,
+    the Exif block merged into the main one."""
+
+    name: str
+    width: int
+    height: int
+    exif: dict
+
+
+@dataclass(frozen=True)
+class Photo(PhotoFacts):
     """A decoded photo, upright.
 
     image: RGB, maybe decoded smaller by `reduction` (1, 2, 4 or 8): its point (x, y) is the
-    photo's (x * reduction, y * reduction). width, height: pixels of the photo itself, upright.
-    exif: tags by number, the Exif block merged into the main one.
+    photo's (x * reduction, y * reduction).
     """
 
-    name: str
     image: Image.Image
-    width: int
-    height: int
     reduction: float
-    exif: dict
+
+    @property
+    def facts(self) -> PhotoFacts:
+        """All but the pixels."""
+        return PhotoFacts(self.name, self.width, self.height, self.exif)
 
 
 def read_photo(path: Path, name: str | None = None) -> Photo:
@@ -126,7 +137,7 @@ def _decode(content: bytes, name: str) -> Photo:
         image = image.transpose(turn)
     turned = turn in (_UPRIGHT[5], _UPRIGHT[6], _UPRIGHT[7], _UPRIGHT[8])
     width, height = stored[::-1] if turned else stored
-    return Photo(name, image, width, height, reduction, exif)
+    return Photo(name, width, height, exif, image, reduction)
 
 
 def _register_heif() -> None:

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import intrinsics_from_fov
-from langflash_core.images.decode import Photo
+from langflash_core.images.decode import PhotoFacts
 
 ASSUMED_FOV = 65.0  # degrees on the longer side: a phone's main camera (24-28 mm equivalent)
 PLAUSIBLE_FOV = (5.0, 150.0)  # degrees; EXIF that says otherwise is wrong
@@ -41,7 +41,7 @@ def check_lens(fov: float | None, intrinsics: tuple[float, ...] | None) -> None:
 
 
 def photo_intrinsics(
-    photo: Photo, fov: float | None = None, intrinsics: tuple[float, ...] | None = None
+    photo: PhotoFacts, fov: float | None = None, intrinsics: tuple[float, ...] | None = None
 ) -> tuple[Tensor, bool]:
     """K (3, 3) float32 of the upright photo, and whether it had to be assumed.
 
@@ -70,7 +70,7 @@ def photo_intrinsics(
     return torch.tensor([[focal, 0.0, centre_x], [0.0, focal, centre_y], [0.0, 0.0, 1.0]]), False
 
 
-def exif_focal(photo: Photo) -> float | None:
+def exif_focal(photo: PhotoFacts) -> float | None:
     """Focal length in pixels of the photo, or None where EXIF does not say or cannot be right.
 
     The 35 mm equivalent compares diagonals (CIPA DCG-001-2005, section 2.4). Without it, the
@@ -84,12 +84,12 @@ def exif_focal(photo: Photo) -> float | None:
     return focal if PLAUSIBLE_FOV[0] <= fov <= PLAUSIBLE_FOV[1] else None
 
 
-def _focal_from_35mm(photo: Photo) -> float | None:
+def _focal_from_35mm(photo: PhotoFacts) -> float | None:
     equivalent = _number(photo.exif.get(_FOCAL_35MM))
     return equivalent and equivalent / FILM_DIAGONAL * math.hypot(photo.width, photo.height)
 
 
-def _focal_from_plane(photo: Photo) -> float | None:
+def _focal_from_plane(photo: PhotoFacts) -> float | None:
     focal_mm, density = _number(photo.exif.get(_FOCAL)), _number(photo.exif.get(_PLANE_X))
     unit_mm = _UNIT_MM.get(photo.exif.get(_PLANE_UNIT, 2))
     if focal_mm is None or density is None or unit_mm is None:

@@ -8,17 +8,15 @@ from collections.abc import Sequence
 
 import numpy as np
 import torch
-from PIL import Image
 from torch import Tensor
 from torch.nn.functional import max_pool2d
 
 from langflash_core.geometry.cameras import fov_degrees
-from langflash_core.images.decode import Photo
+from langflash_core.images.decode import PhotoFacts
 
 SMALL_SIDE = 200  # pixels of the short side
 DARK_LIGHTS = 0.22  # a photo whose brightest 10 % stay below this is too dark
 BURNT_SHARE = 0.5  # share of pixels at the top of the range
-JUDGED_SIDE = 360  # pixels of the short side at which light and sharpness are judged
 BLUR_WIDTH = 4.0  # pixels at that size over which even the sharpest edges rise
 EDGE_CONTRAST = 0.12  # an edge weaker than this says nothing about sharpness
 EDGE_BLOCKS = 40  # fewer stretches with an edge: a plain wall, not judged
@@ -28,15 +26,20 @@ FOV_RANGE = (25.0, 110.0)  # degrees of the longer side
 _BLOCK, _WINDOW = 12, 25  # pixels along an edge's rise
 
 
-def photo_notes(photo: Photo, image: Tensor) -> list[str]:
-    """Size, light, and sharpness of one photo. image: (3, H, W) as the network sees it."""
+def photo_notes(photo: PhotoFacts, image: Tensor, grey: np.ndarray) -> list[str]:
+    """Size, light, and sharpness of one photo.
+
+    Args:
+        image: (3, H, W) as the network sees it.
+        grey: (h, w) uint8, the whole photo at the size where light and sharpness are judged.
+    """
     notes = []
     if min(photo.width, photo.height) < SMALL_SIDE:
         notes.append(
             f"{photo.name} is small ({photo.width} x {photo.height} pixels), expect little detail; "
             f"use a photo of at least {SMALL_SIDE} pixels a side"
         )
-    luma = _judged_luma(photo)
+    luma = torch.from_numpy(grey.astype(np.float32)) / 255
     if float(torch.quantile(image.mean(0).flatten(), 0.9)) < DARK_LIGHTS:
         notes.append(f"{photo.name} is very dark; take it again with more light")
     elif float((luma > 250 / 255).float().mean()) > BURNT_SHARE:
@@ -46,7 +49,7 @@ def photo_notes(photo: Photo, image: Tensor) -> list[str]:
     return notes
 
 
-def crop_notes(photo: Photo, box: tuple[float, float, float, float] | None, first: str) -> list[str]:
+def crop_notes(photo: PhotoFacts, box: tuple[float, float, float, float] | None, first: str) -> list[str]:
     """A panorama, or a photo whose shape differs so much from the first that much is cut off;
     box None: all photos are cut to squares, which is no news."""
     aspect = max(photo.width / photo.height, photo.height / photo.width)
@@ -124,12 +127,3 @@ def edge_widths(luma: Tensor) -> Tensor:
     crossing = highest(torch.where(slope_x >= slope_y, slope_x, 0.0)) >= 0.99 * steepest
     edges = (contrast > EDGE_CONTRAST) & crossing
     return contrast[edges] / steepest[edges].clamp_min(1e-6)
-
-
-def _judged_luma(photo: Photo) -> Tensor:
-    """(H, W) of the whole photo, its short side at most 360 pixels."""
-    image = photo.image
-    ratio = min(1.0, JUDGED_SIDE / min(image.size))
-    size = max(3, round(image.width * ratio)), max(3, round(image.height * ratio))
-    grey = image.convert("L").resize(size, Image.Resampling.LANCZOS, reducing_gap=3.0)
-    return torch.from_numpy(np.array(grey, dtype=np.float32)) / 255

@@ -27,6 +27,7 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from langflash_core.errors import PromptError, WeightsError
+from langflash_core.extras import optional_packages
 from langflash_core.files import written_atomically
 from langflash_core.resources import weights_folder
 from langflash_core.torchvision_fix import ensure_torchvision
@@ -81,8 +82,7 @@ class ClipText:
 
 def build_clip() -> ClipText:
     """The tower as open_clip initialises it (random), without its image half."""
-    ensure_torchvision()
-    open_clip = importlib.import_module("open_clip")
+    open_clip = _open_clip()
     config = open_clip.get_model_config(ARCHITECTURE)
     model = open_clip.CLIP(**{**config, "vision_cfg": _TINY_VISION})
     del model.visual
@@ -115,8 +115,7 @@ def load_clip_images(source: str | None = None) -> ClipImages:
         WeightsError: no weights are there, or they lack the image half.
     """
     path = _locate(source or os.environ.get("LANGFLASH_CLIP"))
-    ensure_torchvision()
-    open_clip = importlib.import_module("open_clip")
+    open_clip = _open_clip()
     model = open_clip.CLIP(**open_clip.get_model_config(ARCHITECTURE))
     try:
         model.load_state_dict(_read(path))
@@ -139,6 +138,17 @@ def fetch_clip(tag: str = "openai") -> Path:
     return target
 
 
+def _open_clip() -> Any:
+    """The package.
+
+    Raises:
+        MissingPackageError: it is not installed.
+    """
+    with optional_packages():
+        ensure_torchvision()
+        return importlib.import_module("open_clip")
+
+
 def _remedy() -> str:
     return _REMEDY.format(place=weights_folder() / _FILES[0])
 
@@ -152,8 +162,7 @@ def _locate(source: str | None) -> Path:
         return found[0]
     if Path(source).is_file():
         return Path(source)
-    ensure_torchvision()
-    open_clip = importlib.import_module("open_clip")
+    open_clip = _open_clip()
     config = open_clip.get_pretrained_cfg(ARCHITECTURE, source)
     if not config:
         raise WeightsError(f"CLIP weights '{source}' are neither a file nor a tag of open_clip; {_remedy()}")
@@ -165,8 +174,8 @@ def _locate(source: str | None) -> Path:
 
 def _read(path: Path) -> dict[str, Tensor]:
     """A state dict, never running code from the file."""
-    open_clip = importlib.import_module("open_clip.factory")
+    open_clip = _open_clip()
     try:
-        return open_clip.load_state_dict(str(path), device="cpu", weights_only=True)
+        return open_clip.factory.load_state_dict(str(path), device="cpu", weights_only=True)
     except (OSError, RuntimeError, ValueError, SafetensorError, pickle.UnpicklingError, EOFError) as error:
         raise WeightsError(f"{path} is damaged or is no plain state dict; {_remedy()}") from error

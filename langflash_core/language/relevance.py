@@ -8,9 +8,9 @@ formed. With the thin factorisation D = R Q, the rows of Q orthonormal,
 both exact. A compiled query holds R, Q t and Q n: nothing of it is wider than K.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import torch
 from torch import Tensor
@@ -83,12 +83,12 @@ def reduce_dictionary(dictionary: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def calibration_of(scene: Scene | None, space: LanguageSpace) -> Calibration:
-    """The scene's own calibration (`metadata["calibration"]`) over the defaults of its space.
+    """The scene's own calibration (`Record.calibration`) over the defaults of its space.
 
     Raises:
         SceneFileError: the scene's calibration is not usable.
     """
-    own = (scene.metadata.get("calibration") if scene is not None else None) or {}
+    own: Mapping[str, Any] = scene.record.calibration if scene is not None else {}
     try:
         chosen = Calibration(
             float(own.get("temperature", space.temperature)),
@@ -229,17 +229,10 @@ def _cosines(weights: Tensor, factor: Tensor, phrases: Tensor, eps: float) -> tu
 
 
 def _spoken_dictionary(scene: Scene | Semantics) -> Tensor:
-    """The dictionary (K, C) with a scene's `metadata["silent_atoms"]`, which answer nothing, at 0.
-
-    Raises:
-        SceneFileError: the list names atoms that there are not.
-    """
+    """The dictionary (K, C) with a scene's silent atoms, which answer nothing, at 0."""
     if isinstance(scene, Semantics):
         return scene.dictionary
-    silent = scene.metadata.get("silent_atoms") or []
-    dictionary = scene.semantics.dictionary
-    if not all(isinstance(k, int) and 0 <= k < len(dictionary) for k in silent):
-        raise SceneFileError(f"the scene's silent atoms are out of range ({silent}); make it again")
+    silent, dictionary = scene.record.silent_atoms, scene.semantics.dictionary
     rows = torch.tensor(silent, dtype=torch.int64, device=dictionary.device)
     return dictionary.index_fill(0, rows, 0.0) if silent else dictionary
 

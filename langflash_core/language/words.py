@@ -1,4 +1,4 @@
-"""From a language vector back to words, to Gaussians, and to a query of its own."""
+"""From a language vector back to words, and to a query of its own."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -6,10 +6,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery, reduce_dictionary, relevance_maps
-from langflash_core.types import Semantics
-
-_ROWS_AT_ONCE = 1 << 15  # dense weights of so many Gaussians: 17 MB at 128 atoms
+from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery, reduce_dictionary
 
 
 @dataclass(frozen=True)
@@ -74,20 +71,3 @@ def with_vectors(compiled: CompiledQuery, dictionary: Tensor, vectors: Mapping[i
             raise ValueError(f"vectors: expected a finite vector for place 0 to {len(prompts) - 1}")
         prompts[place] = basis @ (vector / norm).to(basis)
     return replace(compiled, prompts=prompts)
-
-
-def gaussian_relevance(semantics: Semantics, compiled: CompiledQuery) -> Tensor:
-    """Relevance (P, N) of every prompt at every Gaussian, as if a pixel showed it alone.
-
-    `compiled.factor` may come from an edited dictionary of the same K atoms.
-    """
-    ids, values = semantics.weight_ids, semantics.weight_values
-    parts = []
-    for first in range(0, max(len(ids), 1), _ROWS_AT_ONCE):
-        rows = replace(
-            semantics,
-            weight_ids=ids[first : first + _ROWS_AT_ONCE],
-            weight_values=values[first : first + _ROWS_AT_ONCE],
-        )
-        parts.append(relevance_maps(rows.dense_weights()[None], compiled)[:, 0])
-    return torch.cat(parts, -1)

@@ -1,6 +1,8 @@
 """The network with guided depth: depth maps, matches, poses and a plane sweep give the geometry."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 
 import cv2
 import numpy as np
@@ -12,7 +14,7 @@ from langflash_core.network.encoders.local import LocalFeatures
 from langflash_core.network.encoders.shared import Encoder, Tokens, tokens_to_maps
 from langflash_core.network.gaussians import GaussianHead, assemble_gaussians
 from langflash_core.network.layers.decoder import SiameseDecoder, TwoStackDecoder
-from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Run, Seen
+from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Seen
 from langflash_core.network.presets import GuidedDepth
 from langflash_core.network.semantics.aggregation import Aggregation
 from langflash_core.network.semantics.features import LanguageHead
@@ -20,9 +22,11 @@ from langflash_core.network.semantics.grouping import ScratchHead, SemanticGroup
 from langflash_core.network.semantics.naming import PartNamer, describe, places
 from langflash_core.network.semantics.splitting import split_groups
 from langflash_core.network.stereo.alignment import Correction
+from langflash_core.network.stereo.keypoints import KeyPoints, match_photos, match_sources
 from langflash_core.network.stereo.poses import PoseInput, Poses, estimate_poses
 from langflash_core.network.stereo.prior import DepthHead, DepthMaps
 from langflash_core.network.stereo.sweep import DepthRefiner
+from langflash_core.running import Run
 from langflash_core.types import Views
 
 
@@ -41,6 +45,7 @@ class GuidedDepthNet(LangFlashNet):
 
     def __init__(self, preset: GuidedDepth):
         super().__init__(preset)
+        self.mixed = False
         self.encoder = Encoder(preset)
         self.local = LocalFeatures()
         self.decoder = TwoStackDecoder(preset)
@@ -54,14 +59,28 @@ class GuidedDepthNet(LangFlashNet):
         self.aggregation = Aggregation(preset)
         self.namer = PartNamer(preset)
 
+    def use_bfloat16(self) -> "GuidedDepthNet":
+        """Transformers and what names things in it. Depth heads, sweep, local features, poses and Gaussians
+        stay exact: in bfloat16 they would triple the change of the depths for a quarter of a second."""
+        self.mixed = True
+        return self
+
+    @contextmanager
+    def _fast(self, images: Tensor) -> Iterator[None]:
+        with torch.autocast(images.device.type, torch.bfloat16) if self.mixed else nullcontext():
+            yield
+
     def encode(self, images: Tensor, Ks: Tensor) -> Tokens:
         """Four hooks of the frozen encoder; the intrinsics join later."""
-        return self.encoder(images)
+        with self._fast(images):
+            tokens = self.encoder(images)
+        return Tokens(tuple(hook.float() for hook in tokens.hooks), tokens.grid) if self.mixed else tokens
 
     def levels(self, tokens: Tokens, Ks: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Level maps (B*V, C_i, h, w) of the geometry heads: two encoder hooks, two decoder depths."""
-        decoded = self.decoder(tokens, Ks)
-        deep = tuple(tokens_to_maps(t.flatten(0, 1), tokens.grid) for t in decoded)
+        with self._fast(Ks):
+            decoded = self.decoder(tokens, Ks)
+        deep = tuple(tokens_to_maps(self._exact(t).flatten(0, 1), tokens.grid) for t in decoded)
         return tokens.maps(0), tokens.maps(1), deep[0], deep[1]
 
     def monocular_depth(self, tokens: Tokens, Ks: Tensor) -> DepthMaps:
@@ -70,11 +89,19 @@ class GuidedDepthNet(LangFlashNet):
 
     def language(self, tokens: Tokens, images: Tensor) -> Tensor:
         """L(x) from the shared tokens, at four times their grid."""
-        return self.language_head(tokens)
+        with self._fast(images):
+            features = self.language_head(tokens)
+        return self._exact(features)
 
     def semantic_maps(self, tokens: Tokens, images: Tensor) -> tuple[tuple[Tensor, ...], Tensor]:
         """Memories at 1, 2 and 4 times the grid, and the mask map at 8 times."""
-        return self.scratch(tokens, self.siamese(tokens), images)
+        with self._fast(images):
+            memories, finest = self.scratch(tokens, self.siamese(tokens), images)
+        return tuple(map(self._exact, memories)), self._exact(finest)
+
+    def _exact(self, values: Tensor) -> Tensor:
+        """Out of bfloat16 again. Training under autocast of its own goes on as it was."""
+        return values.float() if self.mixed else values
 
     def parts(
         self, tokens: Tokens, images: Tensor, size: tuple[int, int], features: Tensor | None = None
@@ -100,7 +127,8 @@ class GuidedDepthNet(LangFlashNet):
             prior = self.depth_head(levels, tokens)
         with run.stage("poses"):
             local = self.local(images[0])
-            poses = estimate_poses(self._pose_inputs(views, prior, local), run.check, _known(views))
+            inputs = self._pose_inputs(views, prior, local)
+            poses = estimate_poses(inputs, _key_points(views, run), run.check, _known(views))
             viewmats = torch.from_numpy(poses.viewmats).to(images)[None]
         with run.stage("refinement"):
             maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)
@@ -133,7 +161,6 @@ class GuidedDepthNet(LangFlashNet):
     def _pose_inputs(views: Views, prior: DepthMaps, local: Tensor) -> list[PoseInput]:
         return [
             PoseInput(
-                grey=_grey(views, v),
                 K=views.Ks[v].double().numpy(),
                 size=views.size,
                 depth=prior.depths[0, v].cpu().numpy(),
@@ -156,11 +183,9 @@ def _corrected(log_depths: Tensor, K: Tensor, correction: Correction) -> Tensor:
     return log_depths + torch.from_numpy(change).to(log_depths)
 
 
-def _grey(views: Views, view: int) -> np.ndarray:
-    """The largest version of the photo at hand, as (h, w) uint8."""
+def _key_points(views: Views, run: Run) -> KeyPoints:
+    """Of the largest version of the photos at hand."""
     if views.sources:
-        grey = cv2.imdecode(np.frombuffer(views.sources[view], np.uint8), cv2.IMREAD_GRAYSCALE)
-        assert grey is not None, "sources are JPEG bytes that images/ wrote"
-        return grey
-    rgb = (views.images[view].movedim(0, -1).cpu().numpy() * 255).round().astype(np.uint8)
-    return cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
+        return match_sources(views.sources, run.check)
+    photos = (views.images.movedim(1, -1).cpu().numpy() * 255).round().astype(np.uint8)  # (V, H, W, 3)
+    return match_photos([cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY) for rgb in photos], run.check)

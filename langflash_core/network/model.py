@@ -1,23 +1,22 @@
 """A network whatever its geometry: photos in, `Prediction` out. Stages run once, in order, timed."""
 
-import time
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from langflash_core.errors import Cancelled, WeightsError
+from langflash_core.errors import WeightsError
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.presets import Preset
 from langflash_core.network.semantics.aggregation import Aggregation, averaged_atoms
 from langflash_core.network.semantics.grouping import Groups
+from langflash_core.running import Progress, Run, evenly
 from langflash_core.types import Gaussians, Prediction, Views
 
-Progress = Callable[[str, float], None]
 Atoms = Callable[[Tensor, Tensor], Tensor]
 Lifted = Callable[["Geometry", Views], Tensor]
 MEANING_STAGES = ("language features", "grouping", "aggregation")
@@ -58,8 +57,6 @@ class LangFlashNet(nn.Module):
     """Parts that this project takes as they are and never trains."""
     compact: bool
     """Weights are stored as int8 rows; else as they are."""
-    mixes: bool = False
-    """`use_bfloat16` does something."""
     caches_tokens: bool
     """Training may read tokens from disk, because nothing that is trained changes them."""
     grouping: nn.Module
@@ -70,9 +67,9 @@ class LangFlashNet(nn.Module):
         self.preset = preset
         self.calibration: dict = {}
 
+    @abstractmethod
     def use_bfloat16(self) -> "LangFlashNet":
-        """Matrix products in bfloat16 where the network has a rule for it; else nothing changes."""
-        return self
+        """Matrix products in bfloat16 wherever the network's rule allows it."""
 
     def compiled(self, backend: str = "inductor") -> "LangFlashNet":
         """Every part through torch.compile; the first pass of each size then takes minutes."""
@@ -95,7 +92,7 @@ class LangFlashNet(nn.Module):
         """Shared tokens of images (B, V, 3, H, W) in [0, 1]; Ks (B, V, 3, 3) in their pixels."""
 
     @abstractmethod
-    def reconstruct(self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: "Run") -> Geometry:
+    def reconstruct(self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: Run) -> Geometry:
         """The geometry stages of one scene (B = 1)."""
 
     @abstractmethod
@@ -187,12 +184,12 @@ class LangFlashNet(nn.Module):
         shapes = {tuple(views.images.shape) for views in scenes}
         if len(shapes) != 1:
             raise ValueError(f"scenes: expected one shape of (V, 3, H, W), received {sorted(shapes)}")
-        run = Run(self.stages, progress, cancelled)
+        run = Run(evenly(self.stages), progress, cancelled)
         with nullcontext() if cancelled is None else self.stopping(run.check):
             return self._predict(scenes, run, atoms, groups)
 
     def _predict(
-        self, scenes: Sequence[Views], run: "Run", atoms: Atoms | None, groups: Lifted | None
+        self, scenes: Sequence[Views], run: Run, atoms: Atoms | None, groups: Lifted | None
     ) -> list[Prediction]:
         """The stages, timed by `run`; B scenes."""
         device = next(self.parameters()).device
@@ -274,27 +271,3 @@ def _left_out(name: str) -> str:
         f"{name}: too little of it could be matched with the other photos, so it is left out; "
         "take photos that share at least a third of the picture"
     )
-
-
-@dataclass
-class Run:
-    """Times stages, reports them, and stops between them."""
-
-    stages: tuple[str, ...]
-    progress: Progress | None = None
-    cancelled: Callable[[], bool] | None = None
-    timings: dict[str, float] = field(default_factory=dict)
-
-    def check(self) -> None:
-        """Stop here if asked to."""
-        if self.cancelled is not None and self.cancelled():
-            raise Cancelled("the reconstruction was cancelled")
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        self.check()
-        if self.progress is not None:
-            self.progress(name, len(self.timings) / len(self.stages))
-        start = time.perf_counter()
-        yield
-        self.timings[name] = self.timings.get(name, 0.0) + time.perf_counter() - start

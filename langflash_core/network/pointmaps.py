@@ -11,7 +11,7 @@ from langflash_core.network.encoders.lseg import LSeg
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.encoders.vit import RotaryEncoder
 from langflash_core.network.layers.decoder import TwoStacks
-from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Run
+from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet
 from langflash_core.network.points.heads import Levels, ParameterHead, PerView, PointHead, activated
 from langflash_core.network.points.resection import depths_and_confidences, resect
 from langflash_core.network.presets import PointMaps
@@ -19,6 +19,7 @@ from langflash_core.network.semantics.aggregation import Aggregation
 from langflash_core.network.semantics.grouping import group_weights, surviving
 from langflash_core.network.semantics.residual import ResidualGrouping, ScratchPair, filtered
 from langflash_core.network.semantics.splitting import split_groups
+from langflash_core.running import Run
 from langflash_core.types import Views
 
 
@@ -36,7 +37,6 @@ class PointMapNet(LangFlashNet):
 
     frozen = ("encoder", "language_head")
     compact = False
-    mixes = True
     caches_tokens = False
     stages = ("encoder", "point maps", "poses", "Gaussians", *MEANING_STAGES)
 

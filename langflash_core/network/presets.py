@@ -56,7 +56,8 @@ class LSegSizes:
 
 @dataclass(frozen=True, kw_only=True)
 class Preset:
-    """What fixes shapes whatever the geometry, and what the paper leaves open (blueprint section 3)."""
+    """What fixes shapes whatever the geometry, and what the paper leaves open: thresholds and weights
+    are this project's choice, to be changed with numbers."""
 
     name: str
     space: str
@@ -99,8 +100,10 @@ class GuidedDepth(Preset):
     end): shallow tokens carry edges and correspondence, deep ones layout and meaning.
     """
 
-    encoder: str
-    """timm model name."""
+    encoder_depth: int
+    encoder_heads: int
+    trained_grid: int
+    """Side of the grid that the encoder's position codes were trained on."""
     hooks: tuple[int, int, int, int]
     match_hook: int
     """Index into `hooks` of the tokens that correspondence reads (blocks 3-6 match best)."""
@@ -142,9 +145,11 @@ MINI = GuidedDepth(
     name="mini",
     space="minilm",
     language_dim=384,
-    encoder="vit_small_patch14_dinov2",
     patch=14,
     encoder_dim=384,
+    encoder_depth=12,
+    encoder_heads=6,
+    trained_grid=37,
     hooks=(2, 5, 8, 11),
     match_hook=1,
     native_area=224 * 224,

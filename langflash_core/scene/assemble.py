@@ -10,7 +10,7 @@ from torch.nn.functional import normalize
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.scene.consistency import seen_through
-from langflash_core.types import Gaussians, Prediction, Scene, Semantics, Views
+from langflash_core.types import Cost, Gaussians, Prediction, Record, Scene, Semantics, Views
 
 MIN_SCALE = 1e-7  # scene units; below it a covariance is singular in float32
 
@@ -24,12 +24,11 @@ def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: st
     Args:
         prediction: N = V*H*W Gaussians in the order (v h w); may hold non-finite ones.
         views: what it was predicted from. top_m: weights kept per Gaussian, renormalised.
-        preset: recorded in the metadata.
+        preset: recorded.
 
     Returns:
-        Scene whose metadata has `preset`, `photos` (names), `warnings`, `timings` (seconds),
-        `counts`, `gaussians_per_view` (their order is kept), and `network_unit`, the network's
-        length units per scene unit.
+        Scene with `view_ids`, the order of the Gaussians kept, whose record has `preset`, `photos`,
+        `warnings`, `counts`, `network_unit` and, of its cost, `timings`.
 
     Raises:
         InputError: not one usable point in view 0.
@@ -53,20 +52,19 @@ def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: st
         prediction.gaussians.means, prediction.viewmats, views.Ks.to(prediction.viewmats),
         prediction.depths, prediction.confidences,
     )  # fmt: skip
-    per_view = keep.view(num_views, -1).sum(1).tolist()
+    view_ids = torch.arange(num_views, device=keep.device).repeat_interleave(height * width)[keep]
     dense = prediction.weights.permute(0, 2, 3, 1).reshape(num_predicted, num_atoms)[keep]
-    metadata = {
-        "preset": preset,
-        "photos": list(views.names),
-        "warnings": [*views.warnings, *prediction.warnings],
-        "counts": {
+    record = Record(
+        preset=preset,
+        photos=views.names,
+        warnings=(*views.warnings, *prediction.warnings),
+        counts={
             "predicted": num_predicted,
             "unusable": num_predicted - int(usable.sum()),
-            "seen_through": int(usable.sum()) - sum(per_view),
+            "seen_through": int(usable.sum()) - len(view_ids),
         },
-        "gaussians_per_view": per_view,
-        "network_unit": unit,
-    }
+        network_unit=unit,
+    )
     scene = Scene(
         gaussians=_normalised(prediction.gaussians.map(lambda values: values[keep]), unit),
         semantics=_semantics(dense, prediction.dictionary, prediction.space, top_m),
@@ -74,10 +72,11 @@ def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: st
         Ks=views.Ks.to(prediction.viewmats).clone(),
         view_size=views.size,
         photos=views.sources,
-        metadata=metadata,
+        view_ids=view_ids,
+        record=record,
     )
     timings = {**prediction.timings, "assembly": time.perf_counter() - start}
-    return scene.with_metadata(timings=timings)
+    return scene.with_record(cost=Cost(timings))
 
 
 def _placed(prediction: Prediction, views: Views) -> tuple[Prediction, Views]:

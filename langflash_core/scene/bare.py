@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.geometry.cameras import intrinsics_from_fov
-from langflash_core.types import NO_LANGUAGE, Camera, Gaussians, Scene, Semantics
+from langflash_core.types import NO_LANGUAGE, Camera, Gaussians, Record, Scene, Semantics
 
 VIEW_SIZE = (960, 720)  # pixels
 _FOV = 50.0  # degrees of the longer side, from outside
@@ -48,7 +48,7 @@ def bare_scene(gaussians: Gaussians, source: str, warnings: tuple[str, ...] = ()
         viewmats=camera.viewmat[None],
         Ks=camera.K[None],
         view_size=VIEW_SIZE,
-        metadata={"source": source, "warnings": list(warnings)},
+        record=Record(source=source, warnings=warnings),
     )
 
 

@@ -7,11 +7,8 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from langflash_core.edits import Atom, Marks
-from langflash_core.types import Scene, Semantics
-
-NAMES, SILENT = "atom_names", "silent_atoms"
-"""Keys of a scene's metadata: {atom: name a person gave it}; atoms that answer no phrase."""
+from langflash_core.scene.edits import Atom, Marks
+from langflash_core.types import Scene
 
 
 def edited_dictionary(scene: Scene, atoms: Sequence[Atom]) -> Tensor:
@@ -39,35 +36,26 @@ def spoken_scene(scene: Scene, marks: Marks) -> Scene:
     if marks.atoms == atoms_of(scene):
         return scene
     semantics = replace(scene.semantics, dictionary=edited_dictionary(scene, marks.atoms))
-    return replace(scene, semantics=semantics).with_metadata(**{SILENT: []})
+    return replace(scene, semantics=semantics).with_record(silent_atoms=())
 
 
 def edited_scene(scene: Scene, marks: Marks) -> Scene:
-    """The scene to save: without deleted Gaussians, merged atoms as one, names in its metadata.
+    """The scene to save: without deleted Gaussians, merged atoms as one, names in its record.
 
     Hidden Gaussians are kept. Untouched marks give back the scene itself.
     """
     if not marks.deleted and marks.atoms == atoms_of(scene):
         return scene
     kept = torch.from_numpy(~marks.deleted.rows())
-    semantics, changes = _joined(scene, marks.atoms)
-    semantics = replace(
-        semantics, weight_ids=semantics.weight_ids[kept], weight_values=semantics.weight_values[kept]
-    )
-    counts = scene.metadata.get("gaussians_per_view")
-    if counts and sum(counts) == len(kept):
-        changes["gaussians_per_view"] = [int(part.sum()) for part in kept.split(list(counts))]
-    changes["edits"] = {"deleted": scene.metadata.get("edits", {}).get("deleted", 0) + int((~kept).sum())}
-    gaussians = scene.gaussians.map(lambda values: values[kept])
-    return replace(scene, gaussians=gaussians, semantics=semantics).with_metadata(**changes)
+    joined = _joined(scene, marks.atoms)
+    deleted = scene.record.num_deleted + len(marks.deleted)
+    return joined.rows(kept).with_record(num_deleted=deleted)
 
 
 def atoms_of(scene: Scene) -> tuple[Atom, ...]:
     """The atoms as a saved scene names and silences them."""
-    names, silent = scene.metadata.get(NAMES, {}), set(scene.metadata.get(SILENT, ()))
-    return tuple(
-        Atom(k, str(names.get(str(k), "")), k not in silent) for k in range(scene.semantics.num_atoms)
-    )
+    names, silent = scene.record.atom_names, set(scene.record.silent_atoms)
+    return tuple(Atom(k, names.get(k, ""), k not in silent) for k in range(scene.semantics.num_atoms))
 
 
 def first_marks(scene: Scene) -> Marks:
@@ -84,8 +72,8 @@ def _masses(scene: Scene) -> Tensor:
     )
 
 
-def _joined(scene: Scene, atoms: Sequence[Atom]) -> tuple[Semantics, dict]:
-    """Semantics with one row per merged atom, and the metadata of names and silence."""
+def _joined(scene: Scene, atoms: Sequence[Atom]) -> Scene:
+    """The scene with one row per merged atom, their names and silence in its record."""
     semantics = scene.semantics
     heads = sorted({atom.into for atom in atoms})
     places = {head: place for place, head in enumerate(heads)}
@@ -95,8 +83,9 @@ def _joined(scene: Scene, atoms: Sequence[Atom]) -> tuple[Semantics, dict]:
         renumbered = torch.tensor([places[atom.into] for atom in atoms])
         ids = renumbered[ids]
     dictionary = edited_dictionary(scene, speaking)[heads] if heads else semantics.dictionary
-    changes = {
-        NAMES: {str(places[k]): atoms[k].name for k in heads if atoms[k].name},
-        SILENT: [places[k] for k in heads if not atoms[k].on],
-    }
-    return replace(semantics, weight_ids=ids, dictionary=dictionary), changes
+    record = replace(
+        scene.record,
+        atom_names={places[k]: atoms[k].name for k in heads if atoms[k].name},
+        silent_atoms=tuple(places[k] for k in heads if not atoms[k].on),
+    )
+    return replace(scene, semantics=replace(semantics, weight_ids=ids, dictionary=dictionary), record=record)

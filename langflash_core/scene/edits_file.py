@@ -12,9 +12,9 @@ import json
 import zlib
 from pathlib import Path
 
-from langflash_core.edits import MASKS, Atom, Edit, History, Marks
 from langflash_core.errors import SceneFileError
 from langflash_core.files import write_atomically
+from langflash_core.scene.edits import MASKS, Atom, Edit, History, Marks
 from langflash_core.types import Scene
 
 FORMAT, VERSION = "langflash-edits", 1

@@ -11,12 +11,13 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from langflash_core.scene.assemble import renormalised
-from langflash_core.types import Gaussians, Scene, Semantics
+from langflash_core.types import Gaussians, Record, Scene, Semantics
 
 REQUIRED = (
     "means", "quats", "scales", "opacities", "sh",
     "weight_ids", "weight_values", "dictionary", "viewmats", "Ks",
 )  # fmt: skip
+_VIEW_IDS = "view_ids"
 _HALF_MAX, _HALF_MIN = 65504.0, 6e-8
 _PHOTO = "photo_{:03d}"
 _DTYPES = {
@@ -29,37 +30,43 @@ _ID_TYPES = ((2**8, torch.uint8), (2**15, torch.int16), (2**31, torch.int32))
 def to_fields(scene: Scene) -> dict[str, Tensor]:
     """CPU tensors by stable name; see the module's note on precision."""
     gaussians, semantics = scene.gaussians, scene.semantics
-    id_type = next(dtype for limit, dtype in _ID_TYPES if semantics.num_atoms <= limit)
     fields = {
         "means": gaussians.means.float(),
         "quats": gaussians.quats.half(),
         "scales": gaussians.scales.clamp(_HALF_MIN, _HALF_MAX).half(),
         "opacities": gaussians.opacities.half(),
         "sh": gaussians.sh.clamp(-_HALF_MAX, _HALF_MAX).half(),
-        "weight_ids": semantics.weight_ids.to(id_type),
+        "weight_ids": _narrow(semantics.weight_ids, semantics.num_atoms),
         "weight_values": semantics.weight_values.half(),
         "dictionary": semantics.dictionary.float(),
         "viewmats": scene.viewmats.float(),
         "Ks": scene.Ks.float(),
     }
+    if scene.view_ids is not None:
+        fields[_VIEW_IDS] = _narrow(scene.view_ids, scene.num_views)
     for view, photo in enumerate(scene.photos):
         fields[_PHOTO.format(view)] = torch.frombuffer(bytearray(photo), dtype=torch.uint8)
     return {name: values.detach().cpu().contiguous() for name, values in fields.items()}
 
 
-def from_fields(fields: dict[str, Tensor], space: str, view_size: tuple[int, int], metadata: dict) -> Scene:
+def _narrow(ids: Tensor, count: int) -> Tensor:
+    """Numbers below `count` in as few bytes as hold them."""
+    return ids.to(next(dtype for limit, dtype in _ID_TYPES if count <= limit))
+
+
+def from_fields(fields: dict[str, Tensor], space: str, view_size: tuple[int, int], record: Record) -> Scene:
     """The scene of stored tensors; rows that rounding moved off unit norm or sum are put back.
 
     Raises:
         ValueError: a field is missing, unknown, or of another type.
     """
     missing = [name for name in REQUIRED if name not in fields]
-    photos = sorted(name for name in fields if name not in REQUIRED)
+    photos = sorted(name for name in fields if name not in (*REQUIRED, _VIEW_IDS))
     if missing or photos != [_PHOTO.format(view) for view in range(len(photos))]:
         raise ValueError(f"fields: expected {', '.join(REQUIRED)} and photos, received {', '.join(fields)}")
     for name, values in fields.items():
         expected = {_DTYPES[name]} if name in _DTYPES else {torch.uint8}
-        if name == "weight_ids":
+        if name in ("weight_ids", _VIEW_IDS):
             expected = {dtype for _, dtype in _ID_TYPES}
         if values.dtype not in expected:
             raise ValueError(f"{name}: expected {expected.pop()}, received {values.dtype}")
@@ -77,14 +84,17 @@ def from_fields(fields: dict[str, Tensor], space: str, view_size: tuple[int, int
         space=space,
     )
     jpegs = tuple(fields[name].numpy().tobytes() for name in photos)
-    return Scene(gaussians, semantics, fields["viewmats"], fields["Ks"], view_size, jpegs, metadata)
+    view_ids = fields[_VIEW_IDS].long() if _VIEW_IDS in fields else None
+    return Scene(
+        gaussians, semantics, fields["viewmats"], fields["Ks"], view_size, jpegs, view_ids, record
+    )  # fmt: skip
 
 
 def field_bytes(scene: Scene) -> dict[str, int]:
     """Stored bytes by field, photos together."""
     sizes = {name: values.numel() * values.element_size() for name, values in to_fields(scene).items()}
-    photos = sum(size for name, size in sizes.items() if name not in REQUIRED)
-    return {**{name: sizes[name] for name in REQUIRED}, "photos": photos}
+    named = {name: size for name, size in sizes.items() if name in (*REQUIRED, _VIEW_IDS)}
+    return {**named, "photos": sum(sizes.values()) - sum(named.values())}
 
 
 def stored_bytes(scene: Scene) -> int:

@@ -9,7 +9,7 @@ one Gaussian of each other view at most, so a finely seen surface stays finely c
 """
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -40,64 +40,40 @@ def prune(scene: Scene, *, merge_radius: float = 1.0, colour_tolerance: float = 
     """The scene without what no picture of it needs; its order of views is kept.
 
     Args:
-        scene: with `gaussians_per_view` in its metadata, or nothing is merged.
+        scene: with `view_ids`, or nothing is merged.
         merge_radius: in pixel footprints. colour_tolerance: largest difference of a channel.
 
     Returns:
-        Scene with `metadata["pruning"]`: counts and bytes before and after, seconds.
+        Scene with `pruning` in its record: counts and bytes before and after.
 
     Source: the linear compositing of the scene's colours and weights; two coincident layers
     o1, o2 composite to opacity 1 - (1 - o1)(1 - o2).
     """
     start = time.perf_counter()
-    views = _view_ids(scene)
-    bright = scene.gaussians.opacities >= CUT
-    gaussians, ids, values = _rows(scene, bright)
-    views = views[bright]
-    parents = _parents(_sight(gaussians, views, scene), scene, merge_radius, colour_tolerance)
-    gaussians, ids, values = _merged(gaussians, ids, values, parents, scene.semantics.num_atoms)
-    survivors = parents == torch.arange(len(parents), device=parents.device)
-    semantics = _sparser(ids, values, scene.semantics)
-    small = Scene(
-        gaussians, semantics, scene.viewmats, scene.Ks, scene.view_size, scene.photos, scene.metadata
-    )
-    report: dict[str, float] = {
+    bright = scene.rows(scene.gaussians.opacities >= CUT)
+    merged = _merged(bright, _parents(_sight(bright), bright, merge_radius, colour_tolerance))
+    small = _sparser(merged)
+    report = {
         "gaussians_before": len(scene.gaussians),
-        "faint": int((~bright).sum()),
-        "merged": int((~survivors).sum()),
-        "gaussians_after": len(gaussians),
+        "faint": len(scene.gaussians) - len(bright.gaussians),
+        "merged": len(bright.gaussians) - len(merged.gaussians),
+        "gaussians_after": len(small.gaussians),
         "atoms_before": scene.semantics.num_atoms,
-        "atoms_after": semantics.num_atoms,
+        "atoms_after": small.semantics.num_atoms,
         "weights_before": int((scene.semantics.weight_values > 0).sum()),
-        "weights_after": int((semantics.weight_values > 0).sum()),
+        "weights_after": int((small.semantics.weight_values > 0).sum()),
         "bytes_before": stored_bytes(scene),
         "bytes_after": stored_bytes(small),
     }
-    changes: dict = {"pruning": report}
-    if "gaussians_per_view" in scene.metadata:
-        counts = torch.bincount(views[survivors], minlength=scene.num_views)
-        changes["gaussians_per_view"] = counts.tolist()
-    report["seconds"] = time.perf_counter() - start
-    changes["timings"] = {**scene.metadata.get("timings", {}), "pruning": report["seconds"]}
-    return small.with_metadata(**changes)
+    cost = scene.record.cost
+    cost = replace(cost, timings={**cost.timings, "pruning": time.perf_counter() - start})
+    return small.with_record(pruning=report, cost=cost)
 
 
-def _view_ids(scene: Scene) -> Tensor:
-    """(N,) index of the view each Gaussian was predicted from; all 0 where that is unknown."""
-    device = scene.gaussians.means.device
-    counts = scene.metadata.get("gaussians_per_view")
-    if not counts or sum(counts) != len(scene.gaussians) or len(counts) != scene.num_views:
-        return torch.zeros(len(scene.gaussians), dtype=torch.long, device=device)
-    return torch.arange(len(counts), device=device).repeat_interleave(torch.tensor(counts, device=device))
-
-
-def _rows(scene: Scene, keep: Tensor) -> tuple[Gaussians, Tensor, Tensor]:
-    semantics = scene.semantics
-    kept = scene.gaussians.map(lambda values: values[keep])
-    return kept, semantics.weight_ids[keep], semantics.weight_values[keep]
-
-
-def _sight(gaussians: Gaussians, views: Tensor, scene: Scene) -> _Sight:
+def _sight(scene: Scene) -> _Sight:
+    gaussians = scene.gaussians
+    views = torch.zeros_like(gaussians.opacities, dtype=torch.int64)
+    views = views if scene.view_ids is None else scene.view_ids.to(views.device)
     rotations, shifts = scene.viewmats[:, 2, :3], scene.viewmats[:, 2, 3]
     depths = (rotations[views] * gaussians.means).sum(-1) + shifts[views]
     focal = (scene.Ks[:, 0, 0] + scene.Ks[:, 1, 1]) / 2
@@ -174,19 +150,17 @@ def _first_of_each(keys: Tensor, costs: Tensor, num_keys: int) -> Tensor:
     return order[best[best < len(order)]]
 
 
-def _merged(
-    gaussians: Gaussians, ids: Tensor, values: Tensor, parents: Tensor, num_atoms: int
-) -> tuple[Gaussians, Tensor, Tensor]:
+def _merged(scene: Scene, parents: Tensor) -> Scene:
     """Every group becomes one Gaussian in its parent's row.
 
     Places, colours, and weights are opacity-weighted means, the shape is the most opaque
     member's, and the opacity is what the layers composite to.
     """
-    own = torch.arange(len(parents), device=parents.device)
-    children = (parents != own).nonzero().squeeze(1)
-    survivors = parents == own
+    gaussians, semantics = scene.gaussians, scene.semantics
+    survivors = parents == torch.arange(len(parents), device=parents.device)
+    children = (~survivors).nonzero().squeeze(1)
     if len(children) == 0:
-        return gaussians, ids, values
+        return scene
     heads, group = torch.unique(parents[children], return_inverse=True)  # (G,), (c,)
     members = torch.cat((heads, children))
     group = torch.cat((torch.arange(len(heads), device=group.device), group))
@@ -206,20 +180,23 @@ def _merged(
         opacities=gaussians.opacities.index_copy(0, heads, -torch.expm1(through)),
         sh=blended(gaussians.sh),
     )
-    if ids.shape[1]:
-        head_ids, head_values = _blended_weights(
-            ids[members], values[members] * shares[:, None], group, num_atoms
+    if semantics.weight_ids.shape[1]:
+        ids, values = _blended_weights(semantics.rows(members), shares, group)
+        semantics = replace(
+            semantics,
+            weight_ids=semantics.weight_ids.index_copy(0, heads, ids),
+            weight_values=semantics.weight_values.index_copy(0, heads, values),
         )
-        ids, values = ids.index_copy(0, heads, head_ids), values.index_copy(0, heads, head_values)
-    return merged.map(lambda field: field[survivors]), ids[survivors], values[survivors]
+    return replace(scene, gaussians=merged, semantics=semantics).rows(survivors)
 
 
 def _group_sum(values: Tensor, group: Tensor, num_groups: int) -> Tensor:
     return values.new_zeros(num_groups, *values.shape[1:]).index_add(0, group, values)
 
 
-def _blended_weights(ids: Tensor, values: Tensor, group: Tensor, num_atoms: int) -> tuple[Tensor, Tensor]:
-    """Sum of the members' sparse weights per group, again the top m of them."""
+def _blended_weights(members: Semantics, shares: Tensor, group: Tensor) -> tuple[Tensor, Tensor]:
+    """Sum of the members' sparse weights, times their shares, per group; again the top m of them."""
+    ids, values, num_atoms = members.weight_ids, members.weight_values * shares[:, None], members.num_atoms
     num_groups, top_m = int(group.max()) + 1, ids.shape[1]
     parts = []
     for first in range(0, num_groups, _CHUNK):
@@ -232,8 +209,9 @@ def _blended_weights(ids: Tensor, values: Tensor, group: Tensor, num_atoms: int)
     return torch.cat([part.indices for part in parts]), renormalised(top_values)
 
 
-def _sparser(ids: Tensor, values: Tensor, semantics: Semantics) -> Semantics:
+def _sparser(scene: Scene) -> Scene:
     """Weights below 1/255 become 0, empty columns and unused atoms go, ids are renumbered."""
+    semantics, ids, values = scene.semantics, scene.semantics.weight_ids, scene.semantics.weight_values
     values = renormalised(torch.where(values >= CUT, values, 0.0))
     values, order = values.sort(dim=-1, descending=True, stable=True)
     ids = ids.gather(1, order)
@@ -243,4 +221,11 @@ def _sparser(ids: Tensor, values: Tensor, semantics: Semantics) -> Semantics:
     used[ids[values > 0]] = True
     renumbered = (used.cumsum(0) - 1).clamp_min(0)
     ids = torch.where(values > 0, renumbered[ids] if kept_columns else ids, 0)
-    return Semantics(ids, values, semantics.dictionary[used], semantics.space)
+    record = scene.record
+    record = replace(
+        record,
+        atom_names={int(renumbered[k]): name for k, name in record.atom_names.items() if used[k]},
+        silent_atoms=tuple(int(renumbered[k]) for k in record.silent_atoms if used[k]),
+    )
+    sparse = Semantics(ids, values, semantics.dictionary[used], semantics.space)
+    return replace(scene, semantics=sparse, record=record)

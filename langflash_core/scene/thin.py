@@ -1,10 +1,12 @@
 """Fewer, wider Gaussians for a moving camera on a slow machine: levels of detail of a scene."""
 
+from dataclasses import replace
+
 import numpy as np
 import torch
 from torch import Tensor
 
-from langflash_core.types import Gaussians, Scene, Semantics
+from langflash_core.types import Gaussians, Scene
 
 _CELLS = 1 << 10  # a side of the grid that orders Gaussians along a space-filling curve
 
@@ -44,18 +46,9 @@ def thin_with_rows(scene: Scene, share: float) -> tuple[Scene, np.ndarray]:
     rows = np.sort(along[np.diff(ends, prepend=0.0) > 0])
     kept = torch.from_numpy(rows)
     growth = torch.from_numpy(chances[rows] ** -0.5).to(scene.gaussians.scales)
-    gaussians = scene.gaussians.map(lambda v: v[kept])
-    wider = Gaussians(
-        gaussians.means,
-        gaussians.quats,
-        gaussians.scales * growth[:, None],
-        gaussians.opacities,
-        gaussians.sh,
-    )
-    said = scene.semantics
-    semantics = Semantics(said.weight_ids[kept], said.weight_values[kept], said.dictionary, said.space)
-    views = (scene.viewmats, scene.Ks, scene.view_size, scene.photos, scene.metadata)
-    return Scene(wider, semantics, *views), rows
+    thinned = scene.rows(kept)
+    wider = replace(thinned.gaussians, scales=thinned.gaussians.scales * growth[:, None])
+    return replace(thinned, gaussians=wider), rows
 
 
 def covered_areas(gaussians: Gaussians) -> np.ndarray:

@@ -10,7 +10,7 @@ V views, N Gaussians, S spherical-harmonic bases, H W pixels.
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 
@@ -19,6 +19,7 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from langflash_core.errors import InputError
+from langflash_core.running import Progress
 from langflash_core.splat.projection import NEAR, view_colours
 from langflash_core.splat.reference import rasterize
 from langflash_core.types import Camera, Gaussians, Scene
@@ -37,7 +38,6 @@ RATES = {
 }
 _COVERED = 0.5  # alpha from which a pixel counts as shown by the start
 _MIN_COVERED = 0.05  # of the held-out view; less says nothing about it
-Report = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -61,17 +61,17 @@ class Budget:
     steps: int = 2000
 
 
-def refine(scene: Scene, photos: Tensor, budget: Budget, report: Report | None = None) -> Refinement:
+def refine(scene: Scene, photos: Tensor, budget: Budget, report: Progress | None = None) -> Refinement:
     """The scene fitted to its photos, if that brings a held-out view closer to its photo.
 
     Args:
-        scene: with `gaussians_per_view` in its metadata. photos: (V, 3, H, W) in [0, 1], at
+        scene: with `view_ids`. photos: (V, 3, H, W) in [0, 1], at
             `view_size`. budget: half of it for the trial, half for the fit with all photos.
         report: called with what is done and the fraction in [0, 1].
 
     Raises:
         InputError: fewer than two views, or a held-out view that the others hardly cover.
-        ValueError: photos and views disagree.
+        ValueError: photos and views disagree, or nobody knows which view made which Gaussian.
     """
     if scene.num_views < 2:
         raise InputError("a refinement compares photos with each other; give at least two that overlap")
@@ -112,13 +112,13 @@ def _mean_psnr(scene: Scene, photos: Tensor) -> float:
 
 def _without(scene: Scene, view: int) -> Scene:
     """The scene without the Gaussians that came from one view; its camera stays."""
-    counts = torch.tensor(scene.metadata["gaussians_per_view"])
-    keep = torch.repeat_interleave(torch.arange(scene.num_views), counts) != view
-    return replace(scene, gaussians=scene.gaussians.map(lambda values: values[keep]))
+    if scene.view_ids is None:
+        raise ValueError("view_ids: expected the view that made each Gaussian, received none")
+    return scene.rows(scene.view_ids != view)
 
 
 def _fit(
-    scene: Scene, photos: Tensor, views: list[int] | range, budget: Budget, report: Report
+    scene: Scene, photos: Tensor, views: list[int] | range, budget: Budget, report: Progress
 ) -> tuple[Scene, int]:
     """Poses (but the first view's, which is the world), shapes, opacities and colours fitted to some
     photos; steps taken."""
@@ -202,7 +202,7 @@ def _draw(gaussians: Gaussians, camera: Camera) -> tuple[Tensor, Tensor]:
     return pictures[0], alphas[0, ..., 0]
 
 
-def _share(report: Report | None, name: str, start: float) -> Report:
+def _share(report: Progress | None, name: str, start: float) -> Progress:
     """Progress of one half of the whole."""
     if report is None:
         return lambda step, fraction: None

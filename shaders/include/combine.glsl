@@ -1,5 +1,6 @@
 // Purpose: sum_k w_k(p) a_k for COLUMNS columns a at once, w = W / peak out of the packed weight maps.
-// Source: linearity of compositing, blueprint section 1; `pack.frag` wrote the maps, eight atoms a texel.
+// Source: linearity of compositing (ARCHITECTURE.md, "Three ideas"); `pack.frag` wrote the maps, eight atoms a
+//         texel.
 //         LAYERS is a constant, so that the loop unrolls and every uniform has a fixed place.
 // Frames: texel = pixel, row 0 = top of the image.
 

@@ -1,7 +1,7 @@
 #version 330 core
 // Purpose: colour, transmittance and depth of one splat, premultiplied, drawn back to front; in the fast mode also
 //          LAYERS times three numbers that it carries.
-// Source: blueprint section 6. Frames: gl_FragCoord is the pixel centre, y down.
+// Source: ARCHITECTURE.md, "How a splat is drawn". Frames: gl_FragCoord is the pixel centre, y down.
 
 #include "footprint.glsl"
 

@@ -1,6 +1,6 @@
 #version 330 core
 // Purpose: one Gaussian's sparse weights to the 3 * LAYERS dense weights of one pass, by transform feedback.
-// Source: blueprint section 6. gl_VertexID is the Gaussian's row (drawn through the order as index buffer).
+// Source: own. gl_VertexID is the Gaussian's row (drawn through the order as index buffer).
 
 uniform sampler2D sparse_weights;  // (atom, weight) texels, ROW_TEXELS a row, m texels a Gaussian
 uniform sampler2D slots;           // (K, 1): place of an atom among the atoms drawn, -1 if it is not
@@ -16,6 +16,6 @@ void main() {
         vec2 pair = texelFetch(sparse_weights, ivec2(texel % ROW_TEXELS, texel / ROW_TEXELS), 0).rg;
         float slot = texelFetch(slots, ivec2(int(pair.x), 0), 0).r - float(first_slot);
         for (int layer = 0; layer < LAYERS; ++layer)
-            out_weights[layer] += pair.y * vec3(equal(vec3(slot), 3.0 * float(layer) + vec3(0.0, 1.0, 2.0)));
+            out_weights[layer] += pair.y * vec3(equal(vec3(slot), float(ATOMS_A_LAYER * layer) + vec3(0.0, 1.0, 2.0)));
     }
 }

@@ -1,6 +1,7 @@
 #version 330 core
 // Purpose: COLUMNS more components of |F|^2 / peak^2 = |w R|^2, added up by blending; the peak beside them.
-// Source: D = R Q with orthonormal Q, blueprint section 1; R is made triangular, so late columns skip layers.
+// Source: D = R Q with orthonormal Q (ARCHITECTURE.md, "Three ideas"); R is made triangular, so late columns
+//         skip layers.
 // Frames: texel = pixel.
 
 #include "combine.glsl"

@@ -17,7 +17,7 @@ void main() {
     float best = threshold;
     int label = -1;
     for (int prompt = 0; prompt < num_prompts; ++prompt) {
-        float value = texelFetch(relevance, ivec3(pixel, prompt / 4), 0)[prompt % 4];
+        float value = texelFetch(relevance, ivec3(pixel, prompt / PHRASES_A_LAYER), 0)[prompt % PHRASES_A_LAYER];
         bool higher = label < 0 ? value >= best : value > best;
         if (higher && photo.a >= COVERED_ALPHA) {
             best = value;

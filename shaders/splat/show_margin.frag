@@ -4,9 +4,10 @@
 // Frames: texel = pixel.
 
 #include "colormaps.glsl"
+#include "luma.glsl"
 
 uniform sampler2D colour;
-uniform sampler2DArray relevance;  // four prompts a layer
+uniform sampler2DArray relevance;  // PHRASES_A_LAYER each
 uniform int num_prompts;
 uniform float threshold;           // of the only prompt
 uniform vec2 span;                 // margins shown as the first and the last colour
@@ -21,11 +22,11 @@ void main() {
     float best = texelFetch(relevance, ivec3(pixel, 0), 0).r;
     float second = threshold;
     for (int prompt = 1; prompt < num_prompts; ++prompt) {
-        float value = texelFetch(relevance, ivec3(pixel, prompt / 4), 0)[prompt % 4];
+        float value = texelFetch(relevance, ivec3(pixel, prompt / PHRASES_A_LAYER), 0)[prompt % PHRASES_A_LAYER];
         second = prompt == 1 ? min(best, value) : max(second, min(best, value));
         best = max(best, value);
     }
-    float grey = dot(clamp(photo.rgb, 0.0, 1.0), vec3(0.299, 0.587, 0.114));
+    float grey = luma(clamp(photo.rgb, 0.0, 1.0));
     vec3 shade = colour_map(which_map, (best - second - span.x) / (span.y - span.x));
     out_colour = vec4(photo.a >= COVERED_ALPHA ? mix(vec3(grey), shade, opacity) : vec3(0.0), 1.0);
 }

@@ -3,9 +3,11 @@
 //          COVERED_ALPHA, as in the answers, and MAX_PROMPTS are set by the program.
 // Frames: texel = pixel.
 
+#include "luma.glsl"
+
 uniform sampler2D colour;          // premultiplied
 uniform sampler2D depth;           // second channel: sum of T alpha, in full precision
-uniform sampler2DArray relevance;  // four prompts a layer
+uniform sampler2DArray relevance;  // PHRASES_A_LAYER each
 uniform int num_prompts;
 uniform int style;                 // 0 flat colours, 1 only these, 2 without these, 3 the rest dimmed
 uniform vec3 background;
@@ -22,7 +24,7 @@ void main() {
     float best = 0.0;
     int label = -1;
     for (int prompt = 0; prompt < num_prompts; ++prompt) {
-        float value = texelFetch(relevance, ivec3(pixel, prompt / 4), 0)[prompt % 4];
+        float value = texelFetch(relevance, ivec3(pixel, prompt / PHRASES_A_LAYER), 0)[prompt % PHRASES_A_LAYER];
         bool passes = value >= thresholds[prompt] && alpha >= COVERED_ALPHA;
         if (passes && (label < 0 || value > best)) {
             best = value;
@@ -30,7 +32,7 @@ void main() {
         }
     }
     vec3 rgb = clamp(texelFetch(colour, pixel, 0).rgb + (1.0 - alpha) * background, 0.0, 1.0);
-    float grey = dot(rgb, vec3(0.299, 0.587, 0.114));
+    float grey = luma(rgb);
     bool shown = label >= 0;
     if (style == 0) rgb = shown ? label_colours[max(label, 0)] : background;
     if (style == 1) rgb = shown ? rgb : background;

@@ -1,6 +1,6 @@
 #version 330 core
 // Purpose: 3 atoms + alpha per attachment, LAYERS attachments, premultiplied, drawn back to front.
-// Source: blueprint section 6. Frames: gl_FragCoord is the pixel centre, y down.
+// Source: W_k = sum_i T_i a_i w_ik (ARCHITECTURE.md, "Three ideas"). Frames: gl_FragCoord is the pixel centre, y down.
 
 #include "footprint.glsl"
 

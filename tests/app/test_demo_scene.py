@@ -69,7 +69,7 @@ def test_the_demo_room_has_a_floor_below_its_walls_and_no_piano(room):
 
 
 def _langflash(*words: object) -> subprocess.CompletedProcess:
-    command = [sys.executable, "-m", "app", *map(str, words)]
+    command = [sys.executable, "-m", "langflash_core", *map(str, words)]
     return subprocess.run(command, capture_output=True, text=True, timeout=300)
 
 

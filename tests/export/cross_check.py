@@ -26,7 +26,7 @@ from langflash_core.export.packing import turned
 from langflash_core.export.stored import Rows
 from langflash_core.geometry.quaternions import covariances
 from langflash_core.geometry.turning import axes_matrix
-from langflash_core.scene import bare_scene
+from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Gaussians, Scene
 
 _Convert = Callable[[Path, Path], None]

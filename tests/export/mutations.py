@@ -23,7 +23,7 @@ import numpy as np
 
 from langflash_core.errors import SceneFileError
 from langflash_core.export import export, read
-from langflash_core.scene import bare_scene
+from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from tests.export.splats import ksplat_bytes, random_gaussians
 

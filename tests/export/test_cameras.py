@@ -12,7 +12,7 @@ from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export import export
 from langflash_core.export.cameras import read_posed
 from langflash_core.geometry.quaternions import quats_to_matrices
-from langflash_core.scene import bare_scene
+from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Scene
 from tests.export.splats import random_gaussians
 

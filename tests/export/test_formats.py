@@ -19,7 +19,7 @@ from langflash_core.export import READERS, WRITERS, export, read, spz
 from langflash_core.export.packing import morton_order
 from langflash_core.formats import CAMERAS_OUT, DROPPED, SCENES_IN, SCENES_OUT
 from langflash_core.geometry.harmonics import SH_C0, sh_to_colour
-from langflash_core.scene import bare_scene
+from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from langflash_core.types import Gaussians, Scene
 from tests.export.splats import ksplat_bytes, random_gaussians
@@ -192,9 +192,7 @@ def test_an_empty_scene_is_refused_and_nothing_written(tmp_path, kind):
     if kind.startswith(".usd"):
         pytest.importorskip("pxr")
     full = bare_scene(random_gaussians(2), "made")
-    empty = Scene(
-        full.gaussians.map(lambda values: values[:0]), full.semantics, full.viewmats, full.Ks, full.view_size
-    )
+    empty = full.rows(torch.zeros(2, dtype=torch.bool))
     with pytest.raises(OutputError, match="no Gaussians"):
         export(empty, tmp_path / (kind if kind == "meta.json" else f"a{kind}"))
     assert not list(tmp_path.iterdir())

@@ -1,6 +1,5 @@
 """Language beside plain splats: it comes back with them, and not with others."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,6 +7,8 @@ import torch
 
 from langflash_core.export import export, read
 from langflash_core.export.language import side_car
+from langflash_core.records import Record
+from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Scene, Semantics
 from tests.export.splats import random_gaussians
 
@@ -25,9 +26,17 @@ def scene() -> Scene:
     Ks = torch.tensor([[40.0, 0, 20], [0, 40, 15], [0, 0, 1]]).repeat(2, 1, 1)
     viewmats = torch.eye(4).repeat(2, 1, 1)
     viewmats[1, 0, 3] = -0.25
-    metadata = {"photos": ["a.jpg", "b.jpg"], "warnings": [], "calibration": {"threshold": 0.7}}
+    record = Record(photos=("a.jpg", "b.jpg"), calibration={"threshold": 0.7}, atom_names={1: "chair"})
+    view_ids = torch.arange(50) % 2
     return Scene(
-        random_gaussians(50, 1), semantics, viewmats, Ks, (40, 30), (b"jpeg one", b"jpeg two"), metadata
+        random_gaussians(50, 1),
+        semantics,
+        viewmats,
+        Ks,
+        (40, 30),
+        (b"jpeg one", b"jpeg two"),
+        view_ids,
+        record,
     )
 
 
@@ -38,8 +47,9 @@ def same_language(first: Scene, second: Scene) -> bool:
         and torch.equal(first.semantics.dictionary, second.semantics.dictionary)
         and torch.equal(first.viewmats, second.viewmats)
         and torch.equal(first.Ks, second.Ks)
-        and (first.view_size, first.photos, first.metadata, first.semantics.space)
-        == (second.view_size, second.photos, second.metadata, second.semantics.space)
+        and torch.equal(first.view_ids, second.view_ids)
+        and (first.view_size, first.photos, first.record, first.semantics.space)
+        == (second.view_size, second.photos, second.record, second.semantics.space)
     )
 
 
@@ -60,7 +70,7 @@ def test_others_find_plain_splats(tmp_path, scene, suffix):
     if suffix == ".ply":
         side_car(tmp_path / "plain.ply").unlink()
         alone = read(tmp_path / "plain.ply")
-        assert alone.semantics.num_atoms == 0 and alone.metadata["warnings"] == []
+        assert alone.semantics.num_atoms == 0 and alone.record.warnings == ()
     else:
         content = (tmp_path / "plain.glb").read_bytes()
         assert b'"extensionsUsed": ["KHR_gaussian_splatting", "LANGFLASH_language"]' in content
@@ -68,13 +78,7 @@ def test_others_find_plain_splats(tmp_path, scene, suffix):
 
 
 def test_a_scene_without_language_leaves_nothing_beside(tmp_path, scene):
-    plain = replace(
-        scene,
-        semantics=Semantics(
-            torch.zeros(50, 0, dtype=torch.int64), torch.zeros(50, 0), torch.zeros(0, 0), "none"
-        ),
-    )
-    export(plain, tmp_path / "plain.ply")
+    export(bare_scene(scene.gaussians, "made"), tmp_path / "plain.ply")
     assert [file.name for file in tmp_path.iterdir()] == ["plain.ply"]
 
 
@@ -82,7 +86,7 @@ def refused(path: Path) -> str:
     """The warning with which a scene was read without its language."""
     scene = read(path)
     assert scene.semantics.num_atoms == 0 and len(scene.gaussians) > 0
-    (warning,) = scene.metadata["warnings"]
+    (warning,) = scene.record.warnings
     assert "\n" not in warning and "without it" in warning
     return warning
 
@@ -94,9 +98,7 @@ def test_language_of_other_gaussians_stays_out(tmp_path, scene):
     order = torch.randperm(50, generator=torch.Generator().manual_seed(0))
     for name, rows in (("sorted", order), ("fewer", torch.arange(40))):
         gaussians = scene.gaussians.map(lambda values, rows=rows: values[rows])
-        weights = scene.semantics.weight_ids[rows], scene.semantics.weight_values[rows]
-        changed = replace(scene.semantics, weight_ids=weights[0], weight_values=weights[1])
-        export(replace(scene, gaussians=gaussians, semantics=changed), tmp_path / f"{name}.ply")
+        export(bare_scene(gaussians, "made"), tmp_path / f"{name}.ply")
         side_car(tmp_path / f"{name}.ply").write_bytes(beside)
         assert "other Gaussians" in refused(tmp_path / f"{name}.ply")
 

@@ -8,7 +8,7 @@ import trimesh
 from langflash_core.errors import SceneFileError
 from langflash_core.export import export, read
 from langflash_core.files import write_atomically
-from langflash_core.scene import bare_scene
+from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from tests.export.splats import damaged_files, ply_bytes, random_gaussians, stored_columns
 
@@ -33,7 +33,7 @@ def test_a_round_trip_loses_nothing(tmp_path, degree):
     assert torch.allclose(after.scales, before.scales, rtol=2e-6, atol=0)
     # Logits end at 16.1, where 1e-7 of opacity is left; between, sigmoid halves the logit's rounding.
     assert torch.allclose(after.opacities, before.opacities, atol=3e-7)
-    assert scene.semantics.num_atoms == 0 and scene.metadata["warnings"] == []
+    assert scene.semantics.num_atoms == 0 and scene.record.warnings == ()
 
 
 def test_another_reader_finds_what_the_convention_says(tmp_path):
@@ -104,7 +104,7 @@ def test_opacities_that_are_no_logits_are_taken_as_they_are(tmp_path):
     (tmp_path / "a.ply").write_bytes(ply_bytes(columns))
     scene = read(tmp_path / "a.ply")
     assert np.array_equal(scene.gaussians.opacities.numpy(), columns["opacity"])
-    assert len(scene.metadata["warnings"]) == 1 and "opacities" in scene.metadata["warnings"][0]
+    assert len(scene.record.warnings) == 1 and "opacities" in scene.record.warnings[0]
 
 
 def test_scales_that_are_no_logarithms_are_taken_as_they_are(tmp_path):
@@ -114,7 +114,7 @@ def test_scales_that_are_no_logarithms_are_taken_as_they_are(tmp_path):
     (tmp_path / "a.ply").write_bytes(ply_bytes(columns))
     scene = read(tmp_path / "a.ply")
     assert np.allclose(scene.gaussians.scales[:, 0].numpy(), columns["scale_0"])
-    assert len(scene.metadata["warnings"]) == 1 and "scales" in scene.metadata["warnings"][0]
+    assert len(scene.record.warnings) == 1 and "scales" in scene.record.warnings[0]
 
 
 def test_a_scene_in_millimetres_is_not_taken_for_one_with_linear_scales(tmp_path):
@@ -124,7 +124,7 @@ def test_a_scene_in_millimetres_is_not_taken_for_one_with_linear_scales(tmp_path
         columns[f"scale_{axis}"] += 10  # some 150 mm: all logarithms above 0
     assert min(columns[f"scale_{axis}"].min() for axis in range(3)) > 0
     (tmp_path / "a.ply").write_bytes(ply_bytes(columns))
-    assert read(tmp_path / "a.ply").metadata["warnings"] == []
+    assert read(tmp_path / "a.ply").record.warnings == ()
 
 
 def test_own_files_leave_nothing_to_guess(tmp_path):
@@ -135,7 +135,7 @@ def test_own_files_leave_nothing_to_guess(tmp_path):
     after = read(written(tmp_path, made))
     assert torch.allclose(after.gaussians.opacities, made.opacities, atol=3e-7)
     assert torch.allclose(after.gaussians.scales, made.scales, rtol=2e-6)
-    assert after.metadata["warnings"] == []
+    assert after.record.warnings == ()
 
 
 def test_what_is_not_finite_is_left_out_and_counted(tmp_path):
@@ -147,9 +147,9 @@ def test_what_is_not_finite_is_left_out_and_counted(tmp_path):
     scene = read(tmp_path / "a.ply")
     check_scene(scene)
     assert len(scene.gaussians) == 45
-    assert scene.metadata["warnings"] == [
-        "5 of 50 Gaussians have numbers that are not finite; they are left out."
-    ]
+    assert scene.record.warnings == (
+        "5 of 50 Gaussians have numbers that are not finite; they are left out.",
+    )
     assert scene.gaussians.opacities[3] == 1  # row 8, after five others went
 
 

@@ -8,7 +8,7 @@ import torch
 from langflash_core.errors import SceneFileError
 from langflash_core.export import export, read
 from langflash_core.geometry.harmonics import SH_C0
-from langflash_core.scene import bare_scene
+from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from tests.export.splats import ply_bytes, random_gaussians, stored_columns
 
@@ -68,4 +68,4 @@ def test_rows_that_are_not_finite_are_counted(tmp_path):
     bad = struct.pack("<6f8B", float("inf"), 2, 3, 0.1, 0.2, 0.3, 255, 128, 0, 51, 255, 128, 128, 128)
     (tmp_path / "a.splat").write_bytes(3 * good + bad)
     scene = read(tmp_path / "a.splat")
-    assert len(scene.gaussians) == 3 and "1 of 4" in scene.metadata["warnings"][0]
+    assert len(scene.gaussians) == 3 and "1 of 4" in scene.record.warnings[0]

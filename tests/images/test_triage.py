@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageFilter
 
-from langflash_core.images import load_views
+from langflash_core.images.views import load_views
 from langflash_core.resources import asset_path
 from tests.images.pictures import room_picture, saved
 

@@ -8,8 +8,8 @@ import torch
 from PIL import Image
 
 from langflash_core.errors import ImageError, InputError
-from langflash_core.images import load_views
-from langflash_core.images.views import fitting_size
+from langflash_core.images.pictures import fitting_size
+from langflash_core.images.views import load_views
 from tests.images.pictures import exif, room_picture, saved
 
 

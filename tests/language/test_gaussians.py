@@ -5,7 +5,7 @@ import torch
 from torch.nn.functional import normalize
 
 from langflash_core.language import gaussians
-from langflash_core.language.gaussians import gaussian_relevance, kept
+from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.types import Gaussians, Scene, Semantics
@@ -52,12 +52,3 @@ def test_it_is_the_relevancy_of_each_feature(monkeypatch):
             least = min(softmax / (softmax + np.exp(compiled.temperature * other)) for other in others)
             # float32 cosines are good to 1e-6, and relevancy moves by a quarter of temperature times that.
             assert abs(found[phrase, row] - least) < 1e-5
-
-
-def test_what_is_kept_keeps_its_weights():
-    scene = mixed_scene()
-    rows = scene.semantics.weight_ids[:, 0] == 2
-    part = kept(scene, rows)
-    assert torch.equal(part.gaussians.means, scene.gaussians.means[rows])
-    assert torch.equal(part.semantics.weight_values, scene.semantics.weight_values[rows])
-    assert part.semantics.dictionary is scene.semantics.dictionary and part.num_views == 1

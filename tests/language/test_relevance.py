@@ -1,6 +1,5 @@
 import math
 import time
-from dataclasses import replace
 
 import pytest
 import torch
@@ -19,7 +18,7 @@ from langflash_core.language.relevance import (
     relevancy,
 )
 from langflash_core.language.spaces import language_space
-from langflash_core.types import Gaussians, Scene, Semantics
+from langflash_core.types import Gaussians, Record, Scene, Semantics
 from tests.language.reference import feature_cosine, gram_cosine, softmax_relevancy
 
 C = 96  # channels of the algebraic tests: below, at and above it the factorisation differs
@@ -211,11 +210,12 @@ def semantics():
     return Semantics(torch.arange(6)[:, None], torch.ones(6, 1), dictionary, "minilm")
 
 
-def scene_of(semantics, **metadata):
+def scene_of(semantics, **record):
     gaussians = Gaussians(
         torch.zeros(6, 3), torch.zeros(6, 4), torch.ones(6, 3), torch.ones(6), torch.zeros(6, 1, 3)
     )
-    return Scene(gaussians, semantics, torch.eye(4)[None], torch.eye(3)[None], (8, 8), metadata=metadata)
+    eye = torch.eye(4)[None]
+    return Scene(gaussians, semantics, eye, eye[:, :3, :3], (8, 8), record=Record(**record))
 
 
 def test_phrases_find_their_atom(semantics):
@@ -233,7 +233,9 @@ def test_compiled_query_is_reduced(semantics):
     assert query.prompts.shape == (1, 6)
     assert query.negatives.shape == (0, 6)
     assert query.threshold == language_space().cosine_threshold
-    nothing = replace(semantics, dictionary=semantics.dictionary[:0])
+    nothing = Semantics(
+        torch.zeros(6, 0, dtype=torch.int64), torch.zeros(6, 0), semantics.dictionary[:0], "minilm"
+    )
     assert compile_query(nothing, language_space(), ["couch"]).prompts.shape == (1, 0)
 
 

@@ -4,10 +4,9 @@ import pytest
 import torch
 from torch.nn.functional import normalize
 
-from langflash_core.language import words
 from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import LanguageSpace
-from langflash_core.language.words import feature_at, gaussian_relevance, nearest_words, with_vectors
+from langflash_core.language.words import feature_at, nearest_words, with_vectors
 from langflash_core.types import Semantics
 
 WORDS = ("chair", "Sofa", "door", "sofa", "lamp")
@@ -65,11 +64,3 @@ def test_a_vector_as_prompt_equals_the_cosine_of_features(semantics):
     for wrong in ({2: torch.ones(12)}, {0: torch.zeros(12)}):
         with pytest.raises(ValueError, match="vectors"):
             with_vectors(query, semantics.dictionary, wrong)
-
-
-def test_relevance_of_a_gaussian_is_that_of_a_pixel_it_fills(semantics, monkeypatch):
-    query = compile_query(semantics, SPACE, ["chair", "door"], negatives=["thing"])
-    expected = relevance_maps(semantics.dense_weights()[None], query)[:, 0]
-    monkeypatch.setattr(words, "_ROWS_AT_ONCE", 16)
-    torch.testing.assert_close(gaussian_relevance(semantics, query), expected, rtol=0, atol=1e-6)
-    assert gaussian_relevance(semantics, query).shape == (2, 50)

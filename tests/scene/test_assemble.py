@@ -6,11 +6,17 @@ import pytest
 import torch
 
 from langflash_core.errors import InputError
-from langflash_core.scene import assemble
-from langflash_core.scene.assemble import sparse_weights
+from langflash_core.scene.assemble import assemble, sparse_weights
 from langflash_core.scene.checks import check_scene
 from langflash_core.splat.reference import render
+from langflash_core.types import Scene
 from tests.scene.plane import wall_prediction
+
+
+def views_of(scene: Scene) -> list[int]:
+    """How many Gaussians each view made; they lie in the order of the views."""
+    assert scene.view_ids is not None and bool((scene.view_ids.diff() >= 0).all())
+    return scene.view_ids.bincount(minlength=scene.num_views).tolist()
 
 
 def test_the_mean_distance_of_view_0_is_one_and_everything_moved_with_it():
@@ -18,10 +24,11 @@ def test_the_mean_distance_of_view_0_is_one_and_everything_moved_with_it():
     scene = assemble(prediction, views)
     check_scene(scene)
     per_view = views.size[0] * views.size[1]
-    assert scene.metadata["gaussians_per_view"] == [per_view, per_view]
+    assert views_of(scene) == [per_view, per_view]
     # float32 means over some thousand points.
     assert float(scene.gaussians.means[:per_view].norm(dim=-1).mean()) == pytest.approx(1, abs=1e-5)
-    unit = scene.metadata["network_unit"]
+    unit = scene.record.network_unit
+    assert unit is not None
     assert torch.allclose(scene.gaussians.scales * unit, prediction.gaussians.scales)
     assert torch.allclose(scene.viewmats[:, :3, 3] * unit, prediction.viewmats[:, :3, 3])
     assert torch.equal(scene.viewmats[:, :3, :3], prediction.viewmats[:, :3, :3])
@@ -48,14 +55,14 @@ def test_the_unit_of_the_network_does_not_show():
     assert float((first - second).abs().max()) < 1e-3
 
 
-def test_metadata_tells_where_the_scene_came_from():
+def test_the_record_tells_where_the_scene_came_from():
     prediction, views = wall_prediction()
-    metadata = assemble(prediction, views, preset="full").metadata
-    assert metadata["preset"] == "full"
-    assert metadata["photos"] == ["0.jpg", "1.jpg"]
-    assert metadata["warnings"] == ["a note of triage", "a note of the network"]
-    assert list(metadata["timings"]) == ["encoder", "assembly"]
-    assert metadata["counts"] == {"predicted": 2 * 56 * 42, "unusable": 0, "seen_through": 0}
+    record = assemble(prediction, views, preset="full").record
+    assert record.preset == "full"
+    assert record.photos == ("0.jpg", "1.jpg")
+    assert record.warnings == ("a note of triage", "a note of the network")
+    assert list(record.cost.timings) == ["encoder", "assembly"]
+    assert record.counts == {"predicted": 2 * 56 * 42, "unusable": 0, "seen_through": 0}
 
 
 @pytest.mark.parametrize("field", ["means", "quats", "scales", "opacities", "sh"])
@@ -66,8 +73,8 @@ def test_numbers_that_are_not_finite_are_dropped(field, bad):
     spoiled[[3, 800]] = bad
     scene = assemble(replace(prediction, gaussians=replace(prediction.gaussians, **{field: spoiled})), views)
     check_scene(scene)
-    assert scene.metadata["counts"]["unusable"] == 2
-    assert scene.metadata["gaussians_per_view"] == [28 * 28 - 1, 28 * 28 - 1]
+    assert scene.record.counts["unusable"] == 2
+    assert views_of(scene) == [28 * 28 - 1, 28 * 28 - 1]
 
 
 def test_zero_quaternions_and_scales_become_harmless():
@@ -147,10 +154,11 @@ def test_a_view_without_a_place_leaves_no_trace():
     scene = assemble(lost, views)
     check_scene(scene)
     per_view = views.size[0] * views.size[1]
-    assert scene.num_views == 2 and scene.metadata["photos"] == ["0.jpg", "2.jpg"]
+    assert scene.num_views == 2 and scene.record.photos == ("0.jpg", "2.jpg")
     assert scene.photos == (views.sources[0], views.sources[2])
-    assert scene.metadata["gaussians_per_view"] == [per_view, per_view]  # nothing was "seen through"
+    assert views_of(scene) == [per_view, per_view]  # nothing was "seen through"
     assert torch.allclose(scene.viewmats[1, :3, :3], prediction.viewmats[2, :3, :3])
     rows = torch.cat((torch.arange(per_view), torch.arange(2 * per_view, 3 * per_view)))
-    unit = scene.metadata["network_unit"]
+    unit = scene.record.network_unit
+    assert unit is not None
     assert torch.allclose(scene.gaussians.means * unit, prediction.gaussians.means[rows], atol=1e-5)

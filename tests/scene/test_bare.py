@@ -6,8 +6,10 @@ import torch
 from langflash_core.errors import PromptError
 from langflash_core.geometry.cameras import project, transform
 from langflash_core.language.spaces import language_space
-from langflash_core.scene import bare_scene, describe, load, save
+from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
+from langflash_core.scene.file import load, save
+from langflash_core.scene.report import describe
 from langflash_core.types import Gaussians
 
 
@@ -73,7 +75,7 @@ def test_it_is_a_scene_like_others(tmp_path):
     save(scene, tmp_path / "a.langflash")
     again = load(tmp_path / "a.langflash")
     assert torch.equal(again.gaussians.means, scene.gaussians.means)
-    assert again.metadata == scene.metadata
+    assert again.record == scene.record
     described = describe(again)
     assert described["atoms"] == 0 and described["source"] == "a.ply" and described["photos"] == []
 

@@ -1,6 +1,8 @@
 """Edits and their exact undoing; the scene they describe; their file."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,7 +10,11 @@ import numpy as np
 import pytest
 import torch
 
-from langflash_core.edits import (
+from langflash_core.errors import SceneFileError
+from langflash_core.language.relevance import compile_query, relevance_maps
+from langflash_core.language.spaces import LanguageSpace
+from langflash_core.scene.edited import edited_scene, first_marks, spoken_scene
+from langflash_core.scene.edits import (
     History,
     Marks,
     Mask,
@@ -22,12 +28,8 @@ from langflash_core.edits import (
     show_all,
     toggle_atom,
 )
-from langflash_core.errors import SceneFileError
-from langflash_core.language.relevance import compile_query, relevance_maps
-from langflash_core.language.spaces import LanguageSpace
-from langflash_core.scene import load, save
-from langflash_core.scene.edited import NAMES, edited_scene, first_marks, spoken_scene
 from langflash_core.scene.edits_file import load_history, read_about, save_history, scene_digest
+from langflash_core.scene.file import load, save
 from langflash_core.splat import render
 from langflash_core.types import Scene
 from tests.splat.scenes import camera, cloud
@@ -133,9 +135,7 @@ SPACE = LanguageSpace("test", 16, 10.0, 0.5, 0.2, Tower)
 @pytest.fixture
 def scene() -> Scene:
     made = cloud(200, num_atoms=5, size=0.1)
-    return replace(made, semantics=replace(made.semantics, space="test")).with_metadata(
-        gaussians_per_view=[200]
-    )
+    return replace(made, semantics=replace(made.semantics, space="test")).with_record(num_deleted=3)
 
 
 def relevance(scene: Scene, frame_of: Scene) -> torch.Tensor:
@@ -154,7 +154,7 @@ def test_deleted_gaussians_are_left_out(scene):
     rows = np.zeros(200, bool)
     rows[10:60] = True
     smaller = edited_scene(scene, delete(first_marks(scene), Mask.of(rows)))
-    assert len(smaller.gaussians) == 150 and smaller.metadata["gaussians_per_view"] == [150]
+    assert len(smaller.gaussians) == 150 and smaller.record.num_deleted == 53
     assert torch.equal(smaller.gaussians.means, scene.gaussians.means[~torch.from_numpy(rows)])
     everything = edited_scene(scene, delete(first_marks(scene), Mask.full(200)))
     assert len(everything.gaussians) == 0 and everything.semantics.num_atoms == 5
@@ -176,7 +176,7 @@ def test_a_silent_atom_answers_nothing_and_comes_back(scene):
     spoken, saved = spoken_scene(scene, marks), edited_scene(scene, marks)
     expected = relevance(spoken, scene)
     torch.testing.assert_close(relevance(saved, saved), expected, rtol=0, atol=1e-9)
-    assert saved.metadata[NAMES] == {"2": "my chair"} and torch.equal(
+    assert saved.record.atom_names == {2: "my chair"} and torch.equal(
         saved.semantics.dictionary, scene.semantics.dictionary
     )
     again = first_marks(saved)
@@ -185,9 +185,16 @@ def test_a_silent_atom_answers_nothing_and_comes_back(scene):
     torch.testing.assert_close(relevance(loud, saved), relevance(scene, scene), rtol=0, atol=1e-12)
 
 
+def test_edits_cost_no_torch():
+    program = "import sys, langflash_core.scene.edits; assert 'torch' not in sys.modules"
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=Path(__file__).parents[2])
+
+
 def test_silent_atoms_out_of_range_are_refused(scene):
-    with pytest.raises(SceneFileError, match="silent atoms"):
-        compile_query(scene.with_metadata(silent_atoms=[9]), SPACE, ["chair"])
+    with pytest.raises(ValueError, match=r"silent_atoms: expected values in \[0, 5\), received 9 to 9"):
+        scene.with_record(silent_atoms=(9,))
+    with pytest.raises(ValueError, match="atom_names: expected values"):
+        scene.with_record(atom_names={-1: "chair"})
 
 
 def test_an_edited_scene_can_be_saved_and_read(scene, tmp_path: Path):

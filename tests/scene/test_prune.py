@@ -6,9 +6,9 @@ from dataclasses import replace
 import pytest
 import torch
 
-from langflash_core.scene import assemble, prune
+from langflash_core.scene.assemble import assemble
 from langflash_core.scene.checks import check_scene
-from langflash_core.scene.prune import CUT, _parents, _sight, _view_ids
+from langflash_core.scene.prune import CUT, _parents, _sight, prune
 from langflash_core.splat.reference import render
 from langflash_core.types import Scene
 from tests.scene.plane import wall_prediction
@@ -26,13 +26,13 @@ def test_an_overlap_is_merged_and_the_picture_stays():
     scene = wall_scene()
     small = prune(scene)
     check_scene(small)
-    report = small.metadata["pruning"]
+    report = small.record.pruning
     # The second camera sees about nine tenths of what the first sees, and one of its pixels is
     # nearest to one of the first's; a tenth of the matches lose to a neighbour.
     assert report["merged"] > 0.6 * 56 * 42
     assert report["gaussians_after"] == len(small.gaussians) == 2 * 56 * 42 - report["merged"]
-    assert sum(small.metadata["gaussians_per_view"]) == len(small.gaussians)
-    assert small.metadata["gaussians_per_view"][0] == 56 * 42
+    assert small.view_ids is not None and len(small.view_ids) == len(small.gaussians)
+    assert small.view_ids.bincount()[0] == 56 * 42
     for view in (0, 1):
         before, after = render(scene, scene.camera(view)), render(small, small.camera(view))
         # One layer in place of two, sampled at half a pixel's distance: under 1 % of the range.
@@ -53,7 +53,7 @@ def test_exact_copies_merge_into_what_they_composite_to():
     )
     scene = assemble(same, views)
     small = prune(scene)
-    assert small.metadata["pruning"]["merged"] == len(small.gaussians) == half
+    assert small.record.pruning["merged"] == len(small.gaussians) == half
     assert torch.allclose(small.gaussians.opacities, torch.tensor(0.99), atol=1e-5)
     assert torch.allclose(small.gaussians.means, scene.gaussians.means[:half], atol=1e-5)
     # Gaussian falloff: 1 - (1 - o g)^2 is a little wider than (1 - (1 - o)^2) g.
@@ -61,26 +61,25 @@ def test_exact_copies_merge_into_what_they_composite_to():
 
 
 def test_points_of_one_view_other_depths_and_other_colours_stay():
-    assert prune(wall_scene(1)).metadata["pruning"]["merged"] == 0
+    assert prune(wall_scene(1)).record.pruning["merged"] == 0
     scene = wall_scene()
     half = len(scene.gaussians) // 2
     moved = scene.gaussians.means.clone()
     moved[half:, 2] += 0.1  # five footprints behind the wall
     assert (
-        prune(replace(scene, gaussians=replace(scene.gaussians, means=moved))).metadata["pruning"]["merged"]
-        == 0
+        prune(replace(scene, gaussians=replace(scene.gaussians, means=moved))).record.pruning["merged"] == 0
     )
     colours = scene.gaussians.sh.clone()
     colours[half:] += 0.5  # 0.14 in colour, above the tolerance of 0.1
     painted = replace(scene, gaussians=replace(scene.gaussians, sh=colours))
-    assert prune(painted).metadata["pruning"]["merged"] == 0
-    assert prune(painted, colour_tolerance=0.2).metadata["pruning"]["merged"] > 0
+    assert prune(painted).record.pruning["merged"] == 0
+    assert prune(painted, colour_tolerance=0.2).record.pruning["merged"] > 0
 
 
 def test_every_pair_is_a_duplicate_and_no_parent_has_two_children_of_a_view():
     scene = wall_scene(3, noise=0.002)
-    views = _view_ids(scene)
-    sight = _sight(scene.gaussians, views, scene)
+    views, sight = scene.view_ids, _sight(scene)
+    assert views is not None
     parents = _parents(sight, scene, 1.0, 0.1)
     children = (parents != torch.arange(len(parents))).nonzero().squeeze(1)
     assert len(children) > 500
@@ -99,7 +98,7 @@ def test_faint_gaussians_go_and_nothing_changes():
     opacities[::3] = CUT * 0.99
     scene = replace(scene, gaussians=replace(scene.gaussians, opacities=opacities))
     small = prune(scene)
-    assert small.metadata["pruning"]["faint"] == len(opacities[::3])
+    assert small.record.pruning["faint"] == len(opacities[::3])
     camera = scene.camera(0)
     # The rasteriser skips alphas below 1/255, so they were never drawn.
     assert torch.equal(render(scene, camera).rgb, render(small, camera).rgb)
@@ -123,10 +122,26 @@ def test_unused_atoms_go_and_ids_follow():
     assert float((before - after).norm(dim=-1).max()) < 10 / 255
 
 
+def test_names_and_silence_of_atoms_move_with_them():
+    scene = wall_scene(2)
+    spare = torch.zeros(1, scene.semantics.dictionary.shape[1]).index_fill(1, torch.tensor([0]), 1.0)
+    semantics = replace(
+        scene.semantics,
+        dictionary=torch.cat((spare, scene.semantics.dictionary)),
+        weight_ids=scene.semantics.weight_ids + 1,
+    )
+    marked = replace(scene, semantics=semantics).with_record(
+        atom_names={0: "nobody's", 3: "my chair"}, silent_atoms=(0, 4)
+    )
+    small = prune(marked)
+    assert torch.equal(small.semantics.dictionary, scene.semantics.dictionary)
+    assert (small.record.atom_names, small.record.silent_atoms) == ({2: "my chair"}, (3,))
+
+
 def test_pruning_twice_changes_nothing_more():
     once = prune(wall_scene(3))
     twice = prune(once)
-    report = twice.metadata["pruning"]
+    report = twice.record.pruning
     # Means moved by the first merge bring a few more within reach.
     assert report["faint"] == 0 and report["merged"] < 0.05 * len(once.gaussians)
     assert twice.semantics.num_atoms == once.semantics.num_atoms
@@ -134,8 +149,8 @@ def test_pruning_twice_changes_nothing_more():
 
 def test_a_scene_of_unknown_views_or_without_atoms_or_gaussians_is_pruned_too():
     scene = wall_scene()
-    unknown = replace(scene, metadata={})
-    assert prune(unknown).metadata["pruning"]["merged"] == 0
+    unknown = replace(scene, view_ids=None)
+    assert prune(unknown).record.pruning["merged"] == 0
     prediction, views = wall_prediction(width=14, height=14)
     bare = assemble(
         replace(prediction, weights=prediction.weights[:, :0], dictionary=prediction.dictionary[:0]), views

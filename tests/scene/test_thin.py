@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from langflash_core.scene import thin
-from langflash_core.scene.thin import covered_areas, inclusion, z_order
+from langflash_core.scene.thin import covered_areas, inclusion, thin, z_order
 from langflash_core.splat import render
 from tests.app.gl.questions import psnr
 from tests.splat.scenes import camera, cloud

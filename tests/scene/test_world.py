@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from langflash_core.geometry.quaternions import quats_to_matrices
-from langflash_core.scene import bare_scene
+from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.world import in_world
 from langflash_core.splat import render

@@ -67,10 +67,8 @@ def _wall(noise: float = 0.1, placed: Tensor = WRONG) -> tuple[Scene, Tensor]:
     words = Semantics(
         torch.zeros(count, 0, dtype=torch.long), torch.zeros(count, 0), torch.zeros(0, 4), "minilm"
     )
-    per_view = [WIDTH * HEIGHT] * 3
-    scene = Scene(
-        gaussians, words, WRONG, K.repeat(3, 1, 1), (WIDTH, HEIGHT), metadata={"gaussians_per_view": per_view}
-    )
+    view_ids = torch.arange(3).repeat_interleave(WIDTH * HEIGHT)
+    scene = Scene(gaussians, words, WRONG, K.repeat(3, 1, 1), (WIDTH, HEIGHT), view_ids=view_ids)
     return scene, photos
 
 
@@ -128,13 +126,15 @@ def test_the_clock_ends_it():
 
 def test_what_cannot_be_judged_is_said():
     scene, photos = _wall()
-    one = replace(scene, viewmats=scene.viewmats[:1], Ks=scene.Ks[:1])
+    one = replace(scene, viewmats=scene.viewmats[:1], Ks=scene.Ks[:1], view_ids=None)
     with pytest.raises(InputError, match="at least two"):
         refine(one, photos[:1], Budget(1))
     behind = scene.viewmats.clone()
     behind[1, 2, 3] = -50
     with pytest.raises(InputError, match="overlap too little"):
         refine(replace(scene, viewmats=behind), photos, Budget(1))
+    with pytest.raises(ValueError, match="view_ids: expected the view that made each"):
+        refine(replace(scene, view_ids=None), photos, Budget(1))
     with pytest.raises(ValueError, match="photos: expected 3"):
         refine(scene, photos[:2], Budget(1))
 

@@ -3,13 +3,14 @@
 from argparse import Namespace
 from typing import TYPE_CHECKING, TextIO
 
-from app.cli.files import check_folder, readable_file, staged_folder
-from app.cli.report import ProgressBar, say_warnings, write_json
-from app.cli.scenes import open_scene
 from langflash_core.errors import InputError, OutputError, PromptError, SceneFileError
 
+from ..files import check_folder, readable_file, staged_folder
+from ..report import ProgressBar, say_warnings, write_json
+from ..scenes import open_scene
+
 if TYPE_CHECKING:
-    from app.bench import Case
+    from ...bench import Case
 
 FRAMES = 8
 
@@ -21,10 +22,10 @@ def run(args: Namespace, out: TextIO) -> None:
         LangFlashError: the scene, the phrases or the output cannot be used, or OpenGL is missing.
     """
     _check(args)
-    from app.bench import document, measure, table
-    from app.bench.machine import machine
-    from app.bench.modes import AXES, modes_for
-    from app.gl import offscreen_context
+    from ...bench import document, measure, table
+    from ...bench.machine import machine
+    from ...bench.modes import AXES, modes_for
+    from ...gl import offscreen_context
 
     cases = _cases(args)
     context = offscreen_context()
@@ -73,7 +74,7 @@ def _check(args: Namespace) -> None:
 
 
 def _cases(args: Namespace) -> "list[Case]":
-    from app.bench import cases, generated_atoms_case, paper_cases, scene_case, synthetic_case
+    from ...bench import cases, generated_atoms_case, paper_cases, scene_case, synthetic_case
 
     frames = args.frames or FRAMES
     spread = 1.0 if args.spread is None else args.spread
@@ -91,17 +92,17 @@ def _cases(args: Namespace) -> "list[Case]":
 
 def _write(args: Namespace, measured: dict) -> None:
     """bench.json, bench.csv and, where matplotlib is installed, bench.png."""
-    from app.bench import csv_text
+    from ...bench import csv_text
 
     with staged_folder(args.output) as staging:
         with (staging / "bench.json").open("w", encoding="ascii") as stream:
             write_json(measured, stream)
         (staging / "bench.csv").write_text(csv_text(measured), encoding="utf-8")
         try:
-            from app.bench.plot import write_plot
+            from ...bench.plot import write_plot
         except ImportError:
             say_warnings(
-                ["the plot is left out, because matplotlib is missing; pip install matplotlib brings it"]
+                ["the plot is left out without matplotlib; pip install 'langflash[bench]' brings it"]
             )
         else:
             write_plot(measured, staging / "bench.png")

@@ -7,9 +7,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TextIO
 
-from app.cli.files import check_output_file, readable_file
-from app.cli.report import ProgressBar, write_json
 from langflash_core.errors import InputError, WeightsError
+
+from ..files import check_output_file, readable_file
+from ..report import ProgressBar, write_json
 
 
 def run(args: Namespace, out: TextIO) -> None:

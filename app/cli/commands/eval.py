@@ -1,20 +1,24 @@
-"""`langflash eval`: how good a checkpoint is on rooms it has never seen, and how it looks on photos."""
+"""`langflash eval`: how good a checkpoint is on rooms and photos it has never seen, and how it looks."""
 
 import io
 import logging
 import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import TextIO
 
-from app.cli.commands.query import spoken
-from app.cli.files import check_output_file, readable_file
-from app.cli.renderers import open_renderer
-from app.cli.report import write_json
 from langflash_core.errors import ImageError, InputError, WeightsError
 from langflash_core.files import make_folder, write_atomically
-from langflash_core.lab.evaluation.rooms import calibrate, run_eval
+from langflash_core.lab.evaluation.rooms import run_eval
 from langflash_core.lab.evaluation.tables import markdown
+from langflash_core.lab.photos import chosen_ids
 from langflash_core.network import load_network
+
+from ..files import check_output_file, readable_file
+from ..photos import chosen, opened_folder
+from ..renderers import open_renderer
+from ..report import ProgressBar, say_warnings, write_json
+from .query import spoken
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -26,7 +30,13 @@ def run(args: Namespace, out: TextIO) -> None:
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s", stream=sys.stderr)
     if args.weights is not None:
         readable_file(args.weights, "checkpoint", WeightsError)
-    {"rooms": _rooms, "calibrate": _calibrate, "photos": _photos}[args.action](args, out)
+    {
+        "rooms": _rooms,
+        "calibrate": _calibrate,
+        "photos": _photos,
+        "photos-labelled": _photos_labelled,
+        "posed": _posed,
+    }[args.action](args, out)
 
 
 def _check_cache(args: Namespace) -> None:
@@ -39,7 +49,11 @@ def _rooms(args: Namespace, out: TextIO) -> None:
     if args.output is not None:
         check_output_file(args.output, (".md",))
     result = run_eval(args.cache, args.weights, preset=args.preset, limit=args.limit)
-    table = markdown(result)
+    _report(args, result, markdown(result), out)
+
+
+def _report(args: Namespace, result: dict, table: str, out: TextIO) -> None:
+    """The tables to a file where one is named, and the tables or the whole result to `out`."""
     if args.output is not None:
         make_folder(args.output.parent)
         write_atomically(args.output, table.encode())
@@ -49,11 +63,75 @@ def _rooms(args: Namespace, out: TextIO) -> None:
         print(table, end="", file=out)
 
 
+def _photos_labelled(args: Namespace, out: TextIO) -> None:
+    if args.output is not None:
+        check_output_file(args.output, (".md",))
+    folder = opened_folder(args)
+    if not folder.labelled:
+        raise InputError(
+            f"{args.folder} has no names.csv, so nothing in it is labelled; add one, and labels/"
+        )
+    ids = chosen(args, folder)
+    from langflash_core.lab.evaluation.labelled import run_photos
+    from langflash_core.lab.evaluation.photo_tables import photos_markdown
+
+    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+        result, _ = run_photos(
+            folder, ids, renderer, args.weights, preset=args.preset, size=args.size, progress=progress
+        )
+    _report(args, result, photos_markdown(result), out)
+
+
+def _posed(args: Namespace, out: TextIO) -> None:
+    if args.output is not None:
+        check_output_file(args.output, (".md",))
+    folder = opened_folder(args)
+    if folder.poses is None:
+        raise InputError(
+            f"{args.folder} has no poses.txt; add it, or judge single photos with photos-labelled"
+        )
+    from langflash_core.lab.evaluation.photo_tables import posed_markdown
+    from langflash_core.lab.evaluation.posed import APART, PAIRS, chosen_triples, run_posed
+
+    triples = chosen_triples(folder.ids, args.limit or PAIRS, args.apart or APART)
+    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+        result = run_posed(
+            folder, triples, renderer, args.weights, preset=args.preset, size=args.size, progress=progress
+        )
+    _report(args, result, posed_markdown(result), out)
+
+
 def _calibrate(args: Namespace, out: TextIO) -> None:
     _check_cache(args)
+    if args.plot is not None:
+        check_output_file(args.plot, (".png",))
+    from langflash_core.lab.evaluation.calibration import calibration, photos_asked, rooms_asked
+
     network = load_network(args.preset, args.weights)
-    document = {"calibration": calibrate(network, args.cache, limit=args.limit)}
-    write_json(document, out)
+    sets = {"rooms": rooms_asked(network, args.cache, limit=args.limit)}
+    if args.folder is not None:
+        folder = opened_folder(args)
+        ids = chosen_ids(folder.ids, "validation", args.only)
+        with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+            sets["photos"] = photos_asked(
+                folder, ids, renderer, args.weights, preset=args.preset, progress=progress
+            )
+    found = calibration(network, sets)
+    if args.plot is not None:
+        _plot(args.plot, sets, found["threshold"])
+    write_json({"calibration": found}, out)
+
+
+def _plot(path: Path, sets: dict, threshold: float) -> None:
+    try:
+        from langflash_core.lab.evaluation.calibration_plot import calibration_png
+    except ImportError:
+        say_warnings(
+            ["the plot is left out, because matplotlib is missing; pip install matplotlib brings it"]
+        )
+        return
+    make_folder(path.parent)
+    write_atomically(path, calibration_png(sets, threshold))
 
 
 def _photos(args: Namespace, out: TextIO) -> None:
@@ -63,7 +141,7 @@ def _photos(args: Namespace, out: TextIO) -> None:
         )
     photos = [readable_file(path, "photo", ImageError) for path in args.photos]
     check_output_file(args.output, (".png",))
-    from app.cli.sheet import PROMPTS, pair_sheet
+    from ..sheet import PROMPTS, pair_sheet
 
     pairs = list(zip(photos[::2], photos[1::2], strict=True))
     prompts = PROMPTS if args.prompt is None else spoken(args.prompt)

@@ -5,19 +5,20 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
 
-from app.cli import shots
-from app.cli.cameras import CameraChoice, chosen_camera
-from app.cli.commands.query import spoken
-from app.cli.files import check_output_file, readable_file, staged_folder
-from app.cli.renderers import Renderer, open_renderer
-from app.cli.report import ProgressBar
-from app.cli.scenes import open_scene
 from langflash_core.errors import InputError, PromptError, SceneFileError
 from langflash_core.formats import CAMERAS_OUT, SCENES_OUT, kind_of
 from langflash_core.types import Camera, QueryResult, Scene
 
+from .. import shots
+from ..cameras import CameraChoice, chosen_camera
+from ..files import check_output_file, readable_file, staged_folder
+from ..renderers import Renderer, open_renderer
+from ..report import ProgressBar
+from ..scenes import open_scene
+from .query import spoken
+
 SUFFIXES = (".png", *SCENES_OUT, *CAMERAS_OUT, ".json", ".csv", ".mp4", ".npz")
-TABLES = {".json": ".json of masks", ".csv": ".csv of boxes"}
+TABLES = {".json": ".json of masks", ".csv": ".csv of boxes", ".glb": ".glb of boxes"}
 NEED_A_PHRASE = ("heat", "mask", "cutout", "labels", "boxes")
 
 
@@ -35,13 +36,13 @@ def run(args: Namespace, out: TextIO) -> None:
     readable_file(args.scene, "scene", SceneFileError)
     write: Callable[..., str] = _write_scene
     if suffix == ".mp4":
-        from app.cli.video import check_encoder
+        from ..video import check_encoder
 
         check_encoder()
         write = _write_video
     elif suffix == ".json":
         write = _write_boxes if args.what == "boxes" else _write_masks
-    elif suffix == ".csv":
+    elif suffix == ".csv" or (suffix == ".glb" and args.what == "boxes"):
         write = _write_boxes
     elif suffix == ".npz":
         write = _write_numbers
@@ -66,7 +67,7 @@ def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
     if args.what == "rgb" and prompts:
         raise PromptError("--what rgb takes no --prompt; use --what cutout, mask, heat or labels")
     if args.what == "boxes" and suffix not in TABLES:
-        raise InputError(f"--what boxes is a table; name a .json or .csv instead of {args.output.name}")
+        raise InputError(f"--what boxes takes a .json, .csv or .glb; name one instead of {args.output.name}")
     if args.what not in (None, "boxes") and suffix != ".png":
         raise InputError(f"--what {args.what} is a picture; name a .png instead of {args.output.name}")
     if args.seconds is not None and suffix != ".mp4":
@@ -80,7 +81,7 @@ def _check_camera_words(args: Namespace, suffix: str) -> None:
         if set(looked_at) - {"size"}:
             raise InputError(f"--all-views looks from every photo; leave --{looked_at[0]} away")
         looked_at.append("all-views")
-    if suffix in (*SCENES_OUT, *CAMERAS_OUT) and looked_at:
+    if suffix in (*SCENES_OUT, *CAMERAS_OUT) and looked_at and args.what != "boxes":
         raise InputError(f"a {suffix} holds the whole scene, not a view of it; leave --{looked_at[0]} away")
     extra = [name for name in looked_at if name != "size"]
     if suffix == ".mp4" and extra:
@@ -181,7 +182,7 @@ def _told(args: Namespace, prompts: list[str], results: list[QueryResult], camer
 
 
 def _write_boxes(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
-    """Where each phrase is and how large, as JSON or CSV; a row per phrase and view."""
+    """Where each phrase is and how large, as JSON, CSV or glTF; a row or a box per phrase and view."""
     cameras = _shots(args, scene, choice)[0] if args.all_views else [choice.of(scene)]
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
         results = []
@@ -222,7 +223,7 @@ def _write_masks(args: Namespace, scene: Scene, prompts: list[str], choice: Came
 
 
 def _write_video(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
-    from app.cli import video
+    from .. import video
 
     chosen = _selected(args, scene, prompts)
     cameras = video.tour(scene, args.size or scene.view_size, args.seconds or video.SECONDS)

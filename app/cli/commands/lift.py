@@ -4,11 +4,12 @@ import time
 from argparse import Namespace
 from typing import TextIO
 
-from app.cli.files import check_output_file, readable_file
-from app.cli.renderers import open_renderer
-from app.cli.report import ProgressBar, write_json
-from app.cli.scenes import open_scene
 from langflash_core.errors import ImageError, InputError, WeightsError
+
+from ..files import check_output_file, readable_file
+from ..renderers import open_renderer
+from ..report import ProgressBar, write_json
+from ..scenes import open_scene
 
 SUFFIXES = (".langflash", ".ply", ".glb")
 
@@ -47,7 +48,7 @@ def run(args: Namespace, out: TextIO) -> None:
     document = {
         "scene": str(args.output),
         "gaussians": len(lifted.gaussians),
-        "seen": lifted.metadata["lifted"]["seen"],
+        "seen": lifted.record.counts["seen"],
         "atoms": lifted.semantics.num_atoms,
         "views": lifted.num_views,
         "seconds": round(time.perf_counter() - start, 3),

@@ -5,9 +5,10 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TextIO
 
-from app.cli.files import check_output_file, readable_file
-from app.cli.report import ProgressBar, say_warnings, write_json
 from langflash_core.errors import ImageError, InputError, WeightsError
+
+from ..files import check_output_file, readable_file
+from ..report import ProgressBar, say_warnings, write_json
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -24,9 +25,14 @@ def run(args: Namespace, out: TextIO) -> None:
     check_output_file(args.output, (".langflash",), inputs=args.photos)
     if args.poses and (args.fov is not None or args.intrinsics is not None):
         raise InputError("--poses says the lens too; leave --fov and --intrinsics away")
+    from langflash_core.ahead import begin
+
+    ahead = begin(args.photos, preset=args.preset, weights=args.weights, size=args.size)
+    ahead.check_photos()
     from langflash_core import pipeline
     from langflash_core.export.cameras import read_posed
-    from langflash_core.scene import describe, save
+    from langflash_core.scene.file import save
+    from langflash_core.scene.report import describe
 
     lens, viewmats = {"fov": args.fov, "intrinsics": args.intrinsics}, None
     if args.poses:
@@ -46,11 +52,12 @@ def run(args: Namespace, out: TextIO) -> None:
             grouping=args.grouping,
             refine_seconds=args.refine,
             progress=progress,
+            ahead=ahead,
         )
         progress("writing", 1.0)
         args.output.parent.mkdir(parents=True, exist_ok=True)
         save(scene, args.output)
-    say_warnings(scene.metadata.get("warnings", ()))
+    say_warnings(scene.record.warnings)
     document = {
         "scene": str(args.output),
         **describe(scene),

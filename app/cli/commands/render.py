@@ -5,18 +5,19 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from app.cli import pictures
-from app.cli.cameras import chosen_camera
-from app.cli.commands.query import spoken
-from app.cli.files import check_output_file, readable_file
-from app.cli.pictures import write_picture
-from app.cli.renderers import Renderer, open_renderer
-from app.cli.report import ProgressBar, write_json
-from app.cli.scenes import open_scene
 from langflash_core.errors import InputError, PromptError, SceneFileError
 from langflash_core.export.colours import label_colours
 from langflash_core.export.png import heat_over, to_8bit
 from langflash_core.types import Camera, Scene
+
+from .. import pictures
+from ..cameras import chosen_camera
+from ..files import check_output_file, readable_file
+from ..pictures import write_picture
+from ..renderers import Renderer, open_renderer
+from ..report import ProgressBar, write_json
+from ..scenes import open_scene
+from .query import spoken
 
 NEEDS_PROMPT = ("relevance", "labels")
 

@@ -7,13 +7,19 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any, TextIO
 
-from app.cli.files import check_folder, check_output_file, readable_file
 from langflash_core.errors import InputError, WeightsError
+from langflash_core.lab.photos import chosen_ids
+from langflash_core.lab.photos.layouts import Source, convert
 from langflash_core.lab.training.commands import run_adopt, run_cache, run_export, run_find_parts, run_train
 from langflash_core.lab.training.loop import LoopOptions
+from langflash_core.lab.training.photos import run_photo_cache
 from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS
 from langflash_core.resources import asset_path
+
+from ..files import check_folder, check_output_file, readable_file
+from ..photos import opened_folder
+from ..report import ProgressBar
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -23,9 +29,14 @@ def run(args: Namespace, out: TextIO) -> None:
         LangFlashError: the furniture, the encoder, the cache or the output cannot be used.
     """
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s", stream=sys.stderr)
-    {"adopt": _adopt, "cache": _cache, "parts": _parts, "run": _run, "export": _export}[args.action](
-        args, out
-    )
+    {
+        "adopt": _adopt,
+        "cache": _cache,
+        "photos": _convert,
+        "parts": _parts,
+        "run": _run,
+        "export": _export,
+    }[args.action](args, out)
 
 
 def _adopt(args: Namespace, out: TextIO) -> None:
@@ -36,6 +47,11 @@ def _adopt(args: Namespace, out: TextIO) -> None:
 
 
 def _cache(args: Namespace, out: TextIO) -> None:
+    if (args.pack is None) == (args.folder is None):
+        raise InputError("give either a furniture pack or a folder with --photos; not both, not none")
+    if args.folder is not None:
+        _cache_photos(args, out)
+        return
     readable_file(args.pack, "furniture pack", InputError)
     check_folder(args.output)
     count = run_cache(
@@ -49,6 +65,33 @@ def _cache(args: Namespace, out: TextIO) -> None:
         preset=args.preset,
     )
     print(f"{args.output / args.set}: {count} new rooms", file=out)
+
+
+def _cache_photos(args: Namespace, out: TextIO) -> None:
+    if args.set == "held_out":
+        raise InputError("photos have no held-out set; choose --set train or validation")
+    check_folder(args.output)
+    folder = opened_folder(args)
+    ids = chosen_ids(folder.ids, args.set)
+    place = args.output / "photos" / args.set
+    count = run_photo_cache(
+        folder, ids, place, _start(args), copies=args.copies, part=args.part, preset=args.preset
+    )
+    print(f"{place}: {count} new views", file=out)
+
+
+def _convert(args: Namespace, out: TextIO) -> None:
+    further = {
+        role: path
+        for role in ("splits", "classes", "images", "camera")
+        if (path := getattr(args, role)) is not None
+    }
+    if not args.source.exists():
+        raise InputError(f"there is no {args.source}; give what was downloaded, unpacked")
+    check_folder(args.output)
+    with ProgressBar() as progress:
+        count = convert(args.layout, Source(args.source, further, args.limit, progress), args.output)
+    print(f"{args.output}: {count} photos", file=out)
 
 
 def _parts(args: Namespace, out: TextIO) -> None:

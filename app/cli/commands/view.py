@@ -3,8 +3,9 @@
 from argparse import Namespace
 from typing import TextIO
 
-from app.cli.files import readable_file
 from langflash_core.errors import ImageError
+
+from ..files import readable_file
 
 
 def run(args: Namespace, out: TextIO) -> int:
@@ -15,6 +16,6 @@ def run(args: Namespace, out: TextIO) -> int:
     """
     for path in args.paths:
         readable_file(path, "photo or scene", ImageError)
-    from app.window import run as open_window
+    from ...window import run as open_window
 
     return open_window(args.paths)

@@ -8,14 +8,15 @@ from typing import Any, TextIO
 
 from safetensors import SafetensorError, safe_open
 
-from app.cli.files import readable_file
-from app.cli.report import ProgressBar, write_json
 from langflash_core.errors import WeightsError
 from langflash_core.network import PRESETS, load_network
 from langflash_core.network.checkpoints.catalogue import CATALOGUE, CLIP, OTHERS, SAM2, published
 from langflash_core.network.checkpoints.download import download
 from langflash_core.network.checkpoints.store import FORMAT, install, part_folder, read_part, verify_part
 from langflash_core.resources import asset_path, weights_folder
+
+from ..files import readable_file
+from ..report import ProgressBar, write_json
 
 
 def run(args: Namespace, out: TextIO) -> None:

@@ -156,19 +156,11 @@ def run_eval(
     }
 
 
-def calibrate(network: LangFlashNet, data: Path, *, limit: int | None = None) -> dict:
-    """One threshold for "found" and for masks, for the weights' header, from `data/validation`.
+def asked_rooms(network: LangFlashNet, data: Path, *, limit: int | None = None) -> Tally:
+    """Scores, truths and mask overlaps of phrases in `data/validation`, whose furniture no training saw.
 
-    Scores are relevancies at the space's temperature against its negatives; the sets "there" and
-    "not there" are those of `judge_scene`, on rooms of furniture that no training saw. Every second
-    question uses another word of the vocabulary instead of the plain name, because people do. The
-    threshold maximises the lower of precision and recall plus mean IoU of the masks of what is
-    there: one who trusts "found" must be able to trust "not found", and masks decide where the two
-    are level.
-
-    Returns:
-        {"temperature", "threshold", "negatives", "validation": precision, recall, f1, phrases, and
-        the IoU of masks cut at the threshold}.
+    The sets "there" and "not there" are those of `judge_scene`. Every second question uses another word
+    of the vocabulary instead of the plain name, because people do.
     """
     rooms = _rooms(data / "validation", limit)
     groups = sorted({label.group for label in rooms.labels()})
@@ -177,22 +169,7 @@ def calibrate(network: LangFlashNet, data: Path, *, limit: int | None = None) ->
     for record in _records(rooms):
         views = views_of(record, (0, 1))
         ask_phrases(plain, record, network.predict(views), tally, varied=True)
-    scores, truths, ious = torch.cat(tally.scores), torch.cat(tally.truths), torch.stack(tally.mask_ious)
-    trials = [presence(scores, truths, threshold) for threshold in MASK_THRESHOLDS]
-    level = torch.tensor([(t.precision, t.recall) for t in trials]).nan_to_num(0).amin(1)
-    best = int((level + ious.mean(0)).argmax())
-    return {
-        "temperature": plain.temperature,
-        "threshold": MASK_THRESHOLDS[best],
-        "negatives": list(plain.space.negatives),
-        "validation": {
-            "precision": round(trials[best].precision, 3),
-            "recall": round(trials[best].recall, 3),
-            "f1": round(trials[best].f1, 3),
-            "phrases": len(scores),
-            "mask_iou": round(float(ious.mean(0)[best]), 3),
-        },
-    }
+    return tally
 
 
 def _rooms(folder: Path, limit: int | None) -> RoomSet:

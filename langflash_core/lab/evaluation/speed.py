@@ -16,8 +16,9 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.network.model import LangFlashNet, Run, Seen
+from langflash_core.network.model import LangFlashNet, Seen
 from langflash_core.network.semantics.grouping import Groups, group_weights
+from langflash_core.running import Progress, Run, evenly
 from langflash_core.types import Views
 
 STAGES = ("language features", "shared encoder", "grouping", "aggregation", "Gaussian decoder", "all")
@@ -84,9 +85,7 @@ class _Shared:
     seen: Seen
 
 
-def measure_network(
-    network: LangFlashNet, plan: Plan, progress: Callable[[str, float], None] | None = None
-) -> list[Row]:
+def measure_network(network: LangFlashNet, plan: Plan, progress: Progress | None = None) -> list[Row]:
     """Rows of every precision, number of views and number of groups.
 
     What does not depend on the groups is run once for all numbers of them. The network ends in
@@ -94,7 +93,7 @@ def measure_network(
     """
     rows: list[Row] = []
     exact: dict[tuple[int, int], _Pass] = {}
-    precisions = ("float32", "bfloat16") if network.mixes and plan.bfloat16 else ("float32",)
+    precisions = ("float32", "bfloat16") if plan.bfloat16 else ("float32",)
     steps = [(p, v) for p in precisions for v in plan.views]
     for number, (precision, num_views) in enumerate(steps):
         if progress is not None:
@@ -148,7 +147,7 @@ def _share(network: LangFlashNet, side: int, num_views: int) -> _Shared:
     tokens = done.timed("shared encoder", lambda: network.encode(images, Ks), device)
     features = done.timed("language features", lambda: network.language(tokens, images), device)
     groups = done.timed("grouping", lambda: network.group(tokens, images)[-1], device)
-    run = Run(network.stages)
+    run = Run(evenly(network.stages))
     geometry = done.timed(
         "Gaussian decoder", lambda: network.reconstruct(views, images, Ks, tokens, run), device
     )

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from langflash_core.lab.rooms.catalogue import PARAMETRIC, TRAIN_LIBRARIES, UNSEEN, Item
 from langflash_core.lab.rooms.pack import Pack
-from langflash_core.lab.rooms.plan import ODDS, ON_TOP, ROOM_PLANS, Step, hang_height, role
+from langflash_core.lab.rooms.plan import ODDS, ON_TOP, ROOM_PLANS, ROOM_SHARES, Step, hang_height, role
 from langflash_core.lab.rooms.shell import Opening, Shell, Style, Wall, make_shell, random_style
 
 SLACK = 0.01
@@ -96,7 +96,8 @@ def make_room(seed: int, pack: Pack, libraries: tuple[str, ...] = TRAIN_LIBRARIE
     roles: dict[str, list[int]] = {}
     for i in allowed:
         roles.setdefault(role(pack.items[i]), []).append(i)
-    kind = str(rng.choice(list(ROOM_PLANS), p=[0.23, 0.27, 0.17, 0.1, 0.14, 0.09]))
+    kinds, shares = zip(*ROOM_SHARES, strict=True)
+    kind = str(rng.choice(kinds, p=shares))
     site = _Site(rng, pack, roles, make_shell(rng, kind))
     site = replace(site, shell=_cut_openings(site, kind))
     for step in ROOM_PLANS[kind]:
@@ -490,7 +491,9 @@ def _fill_surfaces(site: _Site) -> None:
 def _scatter_odds(site: _Site) -> None:
     """A few things that no rule asks for, each where it may be (`ODDS`)."""
     drawn = {PARAMETRIC, UNSEEN}
-    known = [r for r in ODDS if any(site.pack.items[i].library in drawn for i in site.roles.get(r, ()))]
+    known = [
+        r for r in sorted(ODDS) if any(site.pack.items[i].library in drawn for i in site.roles.get(r, ()))
+    ]
     if not known:
         return
     for _ in range(int(site.rng.integers(0, _MOST_ODDS + 1))):

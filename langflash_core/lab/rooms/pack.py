@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, UInt8
 from PIL import Image
 
 from langflash_core.errors import InputError
@@ -60,7 +60,7 @@ class Pack:
     material_ids: Int[np.ndarray, " N"]
     faces: Int[np.ndarray, "F 3"]
     material_table: Float[np.ndarray, "M 2 4"]
-    textures: Int[np.ndarray, "L S S 4"]
+    textures: UInt8[np.ndarray, "L S S 4"]
     heights: Float[np.ndarray, "I R R"]
 
     def select(self, libraries: Iterable[str]) -> tuple[int, ...]:
@@ -286,8 +286,9 @@ def _ranges(counts: Int[np.ndarray, " I"]) -> Int[np.ndarray, "I 2"]:
 
 
 def _decode_textures(
-    joined: Int[np.ndarray, " Z"], sizes: Int[np.ndarray, " L"]
-) -> Int[np.ndarray, "L S S 4"]:
+    joined: UInt8[np.ndarray, " Z"], sizes: Int[np.ndarray, " L"]
+) -> UInt8[np.ndarray, "T S S 4"]:
+    """T = max(L, 1) square layers: a texture array cannot be empty."""
     layers = np.zeros((max(len(sizes), 1), TEXTURE_SIZE, TEXTURE_SIZE, 4), dtype=np.uint8)
     starts = np.cumsum(sizes) - sizes
     for layer, (start, size) in enumerate(zip(starts, sizes, strict=True)):

@@ -26,6 +26,16 @@ class Step:
     follow: tuple[str, ...] = ()
 
 
+# How often a room is of each kind. The order is the draw's: another one makes other rooms of every seed.
+ROOM_SHARES = (
+    ("bedroom", 0.23),
+    ("living room", 0.27),
+    ("kitchen", 0.17),
+    ("bathroom", 0.1),
+    ("office", 0.14),
+    ("hall", 0.09),
+)
+
 _HANGINGS = Step("hang", ("picture", "picture", "picture", "mirror", "clock", "wall lamp"), 1, 5)
 _CLUTTER = Step(
     "floor",
@@ -252,6 +262,7 @@ ON_TOP: dict[str, tuple[tuple[str, ...], int]] = {
 
 # What no rule above asks for, and where it may be. Only makes of the libraries drawn by rules are
 # scattered so: rooms of the catalogues stay as they are, and figures of different versions compare.
+# They are drawn in the order of the alphabet.
 ODDS: dict[str, str] = {
     "ashtray": "top",
     "barrel": "floor",

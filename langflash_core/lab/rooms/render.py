@@ -5,20 +5,17 @@ it. So colour is smooth, ids are exact, and all three agree on where a pixel is.
 """
 
 import math
-import re
 from dataclasses import dataclass
 
 import moderngl
 import numpy as np
 from jaxtyping import Float, Int
 
-from langflash_core.errors import GraphicsError
+from langflash_core.graphics import Programs, offscreen_context, set_uniforms
 from langflash_core.lab.rooms.layout import Instance, Room
 from langflash_core.lab.rooms.pack import Pack
 from langflash_core.lab.rooms.shell import CEILING, FLOOR, WALL, shell_triangles
-from langflash_core.resources import shader_path
 
-_INCLUDE = re.compile(r'^#include "([\w.]+)"$', re.MULTILINE)
 _LOOKS = ("mesh", "cut", "pattern", "wall", "floor")
 _SHELL_LOOKS = {WALL: "wall", FLOOR: "floor", CEILING: "mesh"}
 _SHADOW_SIZE = 1024
@@ -70,14 +67,13 @@ class RoomRenderer:
 
         Args:
             pack: furniture; must be the one that rooms are laid out with.
-            ctx: a context to draw with; a standalone EGL one is made when None.
+            ctx: a context to draw with; one without a window is made when None.
 
         Raises:
             GraphicsError: OpenGL is not available here.
         """
         self._own = ctx is None
-        self.ctx = _standalone() if ctx is None else ctx
-        self.ctx.gc_mode = None  # pyright: ignore[reportAttributeAccessIssue] - owners release
+        self.ctx = offscreen_context() if ctx is None else ctx
         self.pack = pack
         self._owned: list = []
         self._targets: dict[tuple[int, int], _Targets] = {}
@@ -158,11 +154,12 @@ class RoomRenderer:
         self._vertices = self._keep(ctx.buffer(vertices.astype(np.float32).tobytes()))
         self._faces = self._keep(ctx.buffer(pack.faces.astype(np.uint32).tobytes()))
         self._shell_buffer = self._keep(ctx.buffer(reserve=_MAX_SHELL_VERTICES * 9 * 4, dynamic=True))
-        self._looks = {look: self._keep(_program(ctx, "mesh", look)) for look in _LOOKS}
-        self._shadow = self._keep(_program(ctx, "shadow", "shadow"))
-        self._occlude = self._keep(_program(ctx, "screen", "occlusion"))
-        self._shade = self._keep(_program(ctx, "screen", "shade"))
-        self._finish = self._keep(_program(ctx, "screen", "resolve"))
+        programs = self._keep(Programs(ctx, "rooms"))
+        self._looks = {look: programs.get("mesh.vert", f"{look}.frag") for look in _LOOKS}
+        self._shadow = programs.get("shadow.vert", "shadow.frag")
+        self._occlude, self._shade, self._finish = (
+            programs.get("screen.vert", f"{name}.frag") for name in ("occlusion", "shade", "resolve")
+        )
         names = ("in_position", "in_normal", "in_uv", "in_material")
         self._arrays, self._shell_arrays = {}, {}
         for look, program in self._looks.items():
@@ -240,7 +237,7 @@ class RoomRenderer:
         bounce = np.array(style.floor_colour) ** 2.2 * 0.6 + 0.4
         points, colours = _small_lamps(room)
         portals, normals = _portals(room)
-        _set(
+        set_uniforms(
             shade,
             to_sun=to_sun,
             to_lamp=to_lamp,
@@ -264,15 +261,15 @@ class RoomRenderer:
         self._map_targets[slot].use()
         self._map_targets[slot].clear(depth=1.0)
         self.ctx.enable_only(moderngl.DEPTH_TEST)
-        _set(self._shadow, to_light=to_light)
+        set_uniforms(self._shadow, to_light=to_light)
         for instance in room.instances:
             if instance.item < 0 or instance.group in skip or "ceiling lamp" in instance.names:
                 continue
-            _set(self._shadow, model=instance.model)
+            set_uniforms(self._shadow, model=instance.model)
             first, count = self.pack.face_ranges[instance.item]
             self._shadow_vao.render(moderngl.TRIANGLES, vertices=int(count) * 3, first=int(first) * 3)
         if slot == 0:  # only the sun is outside the walls
-            _set(self._shadow, model=np.eye(4))
+            set_uniforms(self._shadow, model=np.eye(4))
             last = self._shell_ranges[-1]
             self._shadow_shell.render(moderngl.TRIANGLES, vertices=last[1] + last[2])
 
@@ -303,9 +300,9 @@ class RoomRenderer:
     def _draw_instance(self, instance: Instance, number: int) -> None:
         look = self._item_looks[instance.item]
         program = self._looks[look]
-        _set(program, model=instance.model)
+        set_uniforms(program, model=instance.model)
         panes = 1.0 if instance.group in {"window", "door"} else 0.0
-        _set(
+        set_uniforms(
             program,
             instance_id=float(number),
             tint=instance.tint,
@@ -320,8 +317,8 @@ class RoomRenderer:
         for kind, first, count in self._shell_ranges:
             look = _SHELL_LOOKS[kind]
             program = self._looks[look]
-            _set(program, model=np.eye(4))
-            _set(program, instance_id=float(kind), tint=room.style.ceiling_colour, glow=0.0)
+            set_uniforms(program, model=np.eye(4))
+            set_uniforms(program, instance_id=float(kind), tint=room.style.ceiling_colour, glow=0.0)
             self._shell_arrays[look].render(moderngl.TRIANGLES, vertices=count, first=first)
 
     def _lens(self, K: Float[np.ndarray, "3 3"], size: tuple[int, int]) -> tuple[float, float, float, float]:
@@ -332,7 +329,7 @@ class RoomRenderer:
         self.ctx.enable_only(moderngl.NOTHING)
         targets.textures["depth_id"].use(0)
         targets.textures["normal"].use(1)
-        _set(self._occlude, to_camera=viewmat, lens=lens, depth_id=0, normals=1)
+        set_uniforms(self._occlude, to_camera=viewmat, lens=lens, depth_id=0, normals=1)
         self._screens[self._occlude].render(moderngl.TRIANGLES, vertices=3)
 
     def _draw_light(self, targets: _Targets, viewmat: np.ndarray, lens: tuple[float, ...]) -> None:
@@ -342,15 +339,15 @@ class RoomRenderer:
         self._maps[0].use(4)
         self._maps[1].use(5)
         names = ("albedos", "normals", "depth_id", "occlusions", "sun_map", "lamp_map")
-        _set(self._shade, **{name: slot for slot, name in enumerate(names)})
-        _set(self._shade, to_world=np.linalg.inv(viewmat), lens=lens)
+        set_uniforms(self._shade, **{name: slot for slot, name in enumerate(names)})
+        set_uniforms(self._shade, to_world=np.linalg.inv(viewmat), lens=lens)
         self._screens[self._shade].render(moderngl.TRIANGLES, vertices=3)
 
     def _resolve(self, targets: _Targets, size: tuple[int, int]) -> Picture:
         targets.resolve.use()
         targets.textures["radiance"].use(0)
         targets.textures["depth_id"].use(1)
-        _set(self._finish, radiance=0, depth_id=1)
+        set_uniforms(self._finish, radiance=0, depth_id=1)
         self._screens[self._finish].render(moderngl.TRIANGLES, vertices=3)
         colour, centre = (
             np.frombuffer(targets.textures[name].read(), dtype=np.float32).reshape(*size, 4)[::-1]
@@ -359,38 +356,6 @@ class RoomRenderer:
         return Picture(
             colour[..., :3].copy(), centre[..., 0].copy(), np.round(centre[..., 1]).astype(np.int32)
         )
-
-
-def _standalone() -> moderngl.Context:
-    try:
-        return moderngl.create_standalone_context(backend="egl")  # pyright: ignore[reportArgumentType] - its stub is wrong
-    except Exception as error:  # moderngl raises bare Exception
-        raise GraphicsError(
-            "no OpenGL without a screen (EGL) here; install libegl1 and a Mesa driver"
-        ) from error
-
-
-def _program(ctx: moderngl.Context, vertex: str, fragment: str) -> moderngl.Program:
-    return ctx.program(vertex_shader=_source(f"{vertex}.vert"), fragment_shader=_source(f"{fragment}.frag"))
-
-
-def _source(name: str) -> str:
-    """A shader's text with its includes, looked up in `shaders/rooms/`."""
-    text = shader_path(f"rooms/{name}").read_text(encoding="utf-8")
-    return _INCLUDE.sub(lambda m: shader_path(f"rooms/{m[1]}").read_text(encoding="utf-8"), text)
-
-
-def _set(program: moderngl.Program, **values: object) -> None:
-    """Set those uniforms that the compiler kept; matrices are row-major arrays."""
-    for name, value in values.items():
-        uniform = program.get(name, None)
-        if not isinstance(uniform, moderngl.Uniform):
-            continue
-        if isinstance(value, np.ndarray):
-            square = value.shape == (4, 4) and uniform.array_length == 1
-            uniform.write(np.ascontiguousarray(value.T if square else value, dtype=np.float32).tobytes())
-        else:
-            uniform.value = value
 
 
 def _layout(program: moderngl.Program, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -420,10 +385,10 @@ def _frame_uniforms(
     size: tuple[int, int],
 ) -> None:
     """What is the same for all things in one picture."""
-    _set(program, to_camera=viewmat)
+    set_uniforms(program, to_camera=viewmat)
     fine_h, fine_w = 2 * size[0] + 1, 2 * size[1] + 1
     style = room.style
-    _set(
+    set_uniforms(
         program,
         materials=0,
         textures=1,

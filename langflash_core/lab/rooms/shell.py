@@ -73,9 +73,8 @@ class Shell:
         if self.notch is None:
             return True
         x0, z0, x1, z1 = self.notch
-        return (
-            low[0] >= x1 + margin or high[0] <= x0 - margin or low[2] >= z1 + margin or high[2] <= z0 - margin
-        )
+        beside = low[0] >= x1 + margin or high[0] <= x0 - margin
+        return bool(beside or low[2] >= z1 + margin or high[2] <= z0 - margin)
 
 
 @dataclass(frozen=True)

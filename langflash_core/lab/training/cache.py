@@ -25,6 +25,7 @@ from langflash_core.lab.rooms import (
 from langflash_core.lab.training.shards import NOTHING, Label, RoomRecord, quantise_tokens, write_shard
 from langflash_core.network.encoders.shared import Encoder
 from langflash_core.network.precision import mixed
+from langflash_core.types import LUMA
 
 log = logging.getLogger(__name__)
 
@@ -122,7 +123,7 @@ def _finished(record: RoomRecord, plan: CachePlan, encoder: Encoder | None) -> R
 
 def encode_pictures(encoder: Encoder, rgb: Tensor) -> Tensor:
     """Hook tokens (V, L, T, C) float32 of pictures (V, 3, H, W) uint8, in bfloat16 where that is quick."""
-    images = rgb.to(encoder.mean.device).float()[None] / 255
+    images = rgb.to(next(encoder.parameters()).device).float()[None] / 255
     with mixed(images.device):
         hooks = encoder(images).hooks
     return torch.stack([hook[0].float() for hook in hooks], 1).cpu()
@@ -138,7 +139,7 @@ def photometric(rgb: Tensor, seed: int) -> Tensor:
     generator = torch.Generator().manual_seed(seed * 2 + 1)
     grey_draw, gain, contrast, saturation, own = torch.rand(5, generator=generator).tolist()
     images = rgb.float() / 255
-    grey = (images * torch.tensor([0.299, 0.587, 0.114])[:, None, None]).sum(1, keepdim=True)
+    grey = (images * torch.tensor(LUMA)[:, None, None]).sum(1, keepdim=True)
     share = 0.0 if grey_draw < 0.15 else 0.7 + 0.6 * saturation
     images = grey + share * (images - grey)
     mean = images.mean()

@@ -2,7 +2,7 @@
 
 Sizes: N queries, G ground-truth groups of one scene, P pixels of all its views together (one
 group is one instance in every view), C channels. Weights of the terms are `GroupingWeights`,
-`AggregationWeights`: the paper prints only symbols, the values are the blueprint's.
+`AggregationWeights`: the paper prints only symbols, the values are this project's.
 """
 
 from dataclasses import dataclass

@@ -86,7 +86,7 @@ def train_stage(
     path = run_dir / f"{stage.name}.pt"
     if options.resume and path.exists():
         state = _restore(network, stage, optimiser, path)
-    run = _Run(network, stage, rooms, words, options, optimiser, state, run_dir, validate)
+    run = _Training(network, stage, rooms, words, options, optimiser, state, run_dir, validate)
     run.go()
     network.load_state_dict(state.ema, strict=False)
     return state
@@ -107,7 +107,7 @@ def _freeze_all_but(network: LangFlashNet, stage: Stage) -> list[nn.Parameter]:
 
 
 @dataclass
-class _Run:
+class _Training:
     network: LangFlashNet
     stage: Stage
     rooms: RoomSet | PartSet

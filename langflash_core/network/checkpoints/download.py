@@ -8,14 +8,13 @@ import hashlib
 import http.client
 import urllib.error
 import urllib.request
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from langflash_core.errors import DownloadError
 from langflash_core.files import make_folder
+from langflash_core.running import Progress
 
-Progress = Callable[[str, float], None]
 TIMEOUT = 30.0  # seconds without a byte
 _BLOCK = 1 << 20
 

@@ -1,7 +1,6 @@
 """Weights on disk: one safetensors file, matrices as int8 rows, metadata in the header.
 
-A matrix or convolution is stored as int8 with one float16 scale per output row under
-`<key>.scale`; everything else is float16.
+How numbers are stored is said in `stored.py`, which reads them.
 """
 
 import json
@@ -9,20 +8,20 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import overload
 
+import numpy as np
 import torch
-from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor
 
 from langflash_core.errors import WeightsError
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.network.build import build_network, network_class
-from langflash_core.network.checkpoints.store import assemble_network, write_part
+from langflash_core.network.checkpoints.store import assemble_network, finite, write_part
+from langflash_core.network.checkpoints.stored import Stored, dequantised, read_stored, weights_file
 from langflash_core.network.encoders.local import convert
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.presets import PRESETS, GuidedDepth, Preset
-from langflash_core.resources import asset_path
 
 FORMAT = "langflash-weights-1"
 _MIN_QUANTISED = 4096  # numbers; smaller tensors are not worth a scale per row
@@ -34,6 +33,7 @@ def load_network(
     device: str | torch.device = "cpu",
     *,
     bfloat16: bool = False,
+    stored: Stored | None = None,
 ) -> LangFlashNet:
     """The network of a preset with trained weights, in evaluation mode.
 
@@ -41,6 +41,7 @@ def load_network(
         weights: a file written by `save_network` or `weights import`; None takes the embedded one,
             or what has been imported.
         bfloat16: compute in it where the network has a rule for that.
+        stored: what `stored.read_stored` found in the embedded or named file, which is then not read.
 
     Raises:
         WeightsError: the file is missing, damaged, of another preset, or does not fit.
@@ -50,24 +51,19 @@ def load_network(
     if not network_class(PRESETS[preset]).compact:
         named = None if weights is None else Path(weights)
         return assemble_network(PRESETS[preset], named, device, bfloat16=bfloat16)
-    path = _embedded(preset) if weights is None else Path(weights)
-    tensors, metadata = read_weights(path)
-    if metadata.get("preset") != preset:
+    path = weights_file(preset, weights)
+    stored = stored or read_stored(path)
+    if stored.header.get("preset") != preset:
         raise WeightsError(
-            f"{path.name} holds weights of preset '{metadata.get('preset')}', not '{preset}'; "
+            f"{path.name} holds weights of preset '{stored.header.get('preset')}', not '{preset}'; "
             "choose --preset to match"
         )
-    network = build_network(PRESETS[preset])
-    load_strictly(network, tensors, path)
-    network.calibration = metadata.get("calibration", {})
-    return network.eval().to(device)
-
-
-def _embedded(preset: str) -> Path:
-    try:
-        return asset_path(f"weights/{preset}.safetensors")
-    except FileNotFoundError as error:
-        raise WeightsError(f"{error}, or name a checkpoint with --weights") from None
+    with torch.device("meta"):  # no memory and no drawn numbers: it takes over those of the file
+        network = build_network(PRESETS[preset]).eval()
+    load_strictly(network, _tensors(stored.arrays), path, assign=True)
+    assert not any(buffer.is_meta for buffer in network.buffers())
+    network.calibration = stored.header.get("calibration", {})
+    return (network.use_bfloat16() if bfloat16 else network).to(device)
 
 
 @overload
@@ -124,9 +120,18 @@ def start_from(network: LangFlashNet, weights: Path, modules: Sequence[str]) -> 
 
 
 def save_network(network: LangFlashNet, path: Path, metadata: Mapping | None = None) -> None:
-    """Write all weights atomically. `metadata` is plain JSON: data, steps, hours, metrics, calibration."""
+    """Write all weights atomically. `metadata` is plain JSON: data, steps, hours, metrics, calibration.
+
+    An aggregation that has no weights stands by untrained and is not written: who reads the file would
+    take it for trained, and normalise atoms twice where this network does once.
+    """
     if not network.compact:
-        write_part(path, network.state_dict(), network.preset, "trained here", path.name)
+        trained = {
+            key: value
+            for key, value in network.state_dict().items()
+            if network.aggregated or not key.startswith("aggregation.")
+        }
+        write_part(path, trained, network.preset, "trained here", path.name)
         return
     header = {
         "format": FORMAT,
@@ -139,20 +144,13 @@ def save_network(network: LangFlashNet, path: Path, metadata: Mapping | None = N
 
 
 def read_weights(path: Path) -> tuple[dict[str, Tensor], dict]:
-    """Float32 tensors and metadata of a safetensors file ({} for a foreign one)."""
-    try:
-        with safe_open(str(path), framework="pt") as file:
-            tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 (no mapping)
-            header = json.loads((file.metadata() or {}).get("langflash", "{}"))
-    except FileNotFoundError:
-        raise WeightsError(
-            f"there is no weights file {path}; check the path or leave --weights out"
-        ) from None
-    except (SafetensorError, OSError, ValueError) as error:
-        raise WeightsError(
-            f"{path} is not a readable safetensors file ({error}); download or convert it again"
-        ) from None
-    return dequantise(tensors), header
+    """Float32 tensors and metadata of a safetensors file ({} for a foreign one).
+
+    Raises:
+        WeightsError: there is none, or it is no safetensors file.
+    """
+    stored = read_stored(path)
+    return _tensors(stored.arrays), stored.header
 
 
 def quantise(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
@@ -176,18 +174,18 @@ def quantise(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
 
 def dequantise(stored: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """Float32 tensors of `quantise`."""
-    tensors = {}
-    for key, value in stored.items():
-        if value.dtype == torch.int8:
-            scale = stored[f"{key}.scale"].float().reshape(-1, *[1] * (value.ndim - 1))
-            tensors[key] = value.float() * scale
-        elif not key.endswith(".scale"):
-            tensors[key] = value.float()
-    return tensors
+    return _tensors(dequantised({key: value.numpy() for key, value in stored.items()}))
 
 
-def load_strictly(module: torch.nn.Module, tensors: dict[str, Tensor], path: Path) -> None:
-    """Fill a module with exactly its tensors.
+def _tensors(arrays: Mapping[str, np.ndarray]) -> dict[str, Tensor]:
+    """The same memory."""
+    return {key: torch.from_numpy(array) for key, array in arrays.items()}
+
+
+def load_strictly(
+    module: torch.nn.Module, tensors: dict[str, Tensor], path: Path, *, assign: bool = False
+) -> None:
+    """Fill a module with exactly its tensors: copies of them, or `assign` them as they are.
 
     Raises:
         WeightsError: tensors are missing, surplus, misshaped or not finite; lists the first five.
@@ -201,11 +199,11 @@ def load_strictly(module: torch.nn.Module, tensors: dict[str, Tensor], path: Pat
         for k in expected.keys() & found.keys()
         if expected[k] != found[k]
     ]
-    bad = [k for k, v in tensors.items() if not bool(torch.isfinite(v).all())]
+    bad = [k for k, v in tensors.items() if not finite(v)]
     problems += [f"{k} holds NaN or Inf" for k in bad]
     if problems:
         shown = "; ".join(sorted(problems)[:5]) + ("; ..." if len(problems) > 5 else "")
         raise WeightsError(
             f"{path} does not fit this network ({len(problems)} tensors: {shown}); choose another file"
         )
-    module.load_state_dict(tensors)
+    module.load_state_dict(tensors, assign=assign)

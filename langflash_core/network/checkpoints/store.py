@@ -18,6 +18,7 @@ from langflash_core.errors import WeightsError
 from langflash_core.files import written_atomically
 from langflash_core.network.build import build_network
 from langflash_core.network.checkpoints.importing import convert, read_checkpoint
+from langflash_core.network.checkpoints.stored import ALIGNMENT
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.presets import Preset
 from langflash_core.resources import weights_folder
@@ -166,18 +167,28 @@ def _fill(network: LangFlashNet, name: str, path: Path, device: str | torch.devi
         problems = _differences(expected.keys(), keys)
         tensors = {}
         for key in expected.keys() & set(keys):
-            value = file.get_tensor(f"{name}.{key}").to(device, expected[key].dtype)
+            value = on_own_address(file.get_tensor(f"{name}.{key}").to(device, expected[key].dtype))
             if value.shape != expected[key].shape:
                 problems.append(f"{key} is {tuple(value.shape)}, expected {tuple(expected[key].shape)}")
             tensors[key] = value
-    problems += [f"{k} holds NaN or Inf" for k, v in tensors.items() if not _finite(v)]
+    problems += [f"{k} holds NaN or Inf" for k, v in tensors.items() if not finite(v)]
     if problems:
         shown = "; ".join(sorted(problems)[:5]) + ("; ..." if len(problems) > 5 else "")
         raise WeightsError(f"{path} does not fit '{name}' ({len(problems)} tensors: {shown}); {_REMEDY}")
     module.load_state_dict(tensors, assign=True)
 
 
-def _finite(value: Tensor) -> bool:
+def on_own_address(value: Tensor) -> Tensor:
+    """The same numbers where torch would have put them, on a multiple of 64 bytes.
+
+    A tensor of a safetensors file starts at any address, and matrix products may choose their way by it
+    (MKL promises equal bits for equal addresses modulo 64 alone): the last bits would depend on how
+    long the file's header is.
+    """
+    return value if value.data_ptr() % ALIGNMENT == 0 else value.clone()
+
+
+def finite(value: Tensor) -> bool:
     """One sum tells nearly always, and is several times faster than asking every number."""
     return bool(torch.isfinite(value.sum())) or bool(torch.isfinite(value).all())
 

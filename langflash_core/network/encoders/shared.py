@@ -1,13 +1,12 @@
 """The shared image encoder: pictures in, tokens of four blocks out. Run once, read by all heads."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import torch
 from torch import Tensor, nn
 
+from langflash_core.network.encoders.plain import PlainViT
 from langflash_core.network.presets import GuidedDepth
-from langflash_core.torchvision_fix import ensure_torchvision
 
 _MEAN = (0.485, 0.456, 0.406)
 _STD = (0.229, 0.224, 0.225)
@@ -40,23 +39,13 @@ def tokens_to_maps(tokens: Tensor, grid: tuple[int, int]) -> Tensor:
 
 
 class Encoder(nn.Module):
-    """A plain ViT through timm, frozen: sides are multiples of the patch, any aspect ratio."""
-
-    mean: Tensor
-    std: Tensor
+    """A plain ViT, frozen: sides are multiples of the patch, any aspect ratio."""
 
     def __init__(self, preset: GuidedDepth):
         super().__init__()
-        ensure_torchvision()
-        import timm  # heavy, and only importable after the line above
-
         self.patch = preset.patch
-        self.hook_blocks = list(preset.hooks)
-        self.vit: Any = timm.create_model(
-            preset.encoder, pretrained=False, num_classes=0, dynamic_img_size=True
-        )
-        self.register_buffer("mean", torch.tensor(_MEAN)[:, None, None], persistent=False)
-        self.register_buffer("std", torch.tensor(_STD)[:, None, None], persistent=False)
+        self.hook_blocks = preset.hooks
+        self.vit = PlainViT(preset)
         self.requires_grad_(False).eval()
 
     def train(self, mode: bool = True) -> "Encoder":
@@ -66,8 +55,9 @@ class Encoder(nn.Module):
     @torch.no_grad()
     def forward(self, images: Tensor) -> Tokens:
         """Tokens of images (B, V, 3, H, W) in [0, 1]."""
-        flat = (images.flatten(0, 1) - self.mean) / self.std
-        maps = self.vit.get_intermediate_layers(flat, n=self.hook_blocks, norm=True)
+        mean, std = (images.new_tensor(values)[:, None, None] for values in (_MEAN, _STD))
+        flat = (images.flatten(0, 1) - mean) / std
+        maps = self.vit(flat, self.hook_blocks)
         batch, num_views, _, height, width = images.shape
         hooks = tuple(m.unflatten(0, (batch, num_views)) for m in maps)
         return Tokens(hooks, (height // self.patch, width // self.patch))

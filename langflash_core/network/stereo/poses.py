@@ -3,40 +3,29 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from langflash_core.network.stereo.alignment import NO_CORRECTION, Correction, fit_correction
 from langflash_core.network.stereo.dense import match_cells
+from langflash_core.network.stereo.keypoints import WORKING_SIDE, KeyPoints
 from langflash_core.network.stereo.known import agreeing, depth_scales, log_scales
-from langflash_core.network.stereo.matching import (
-    Matches,
-    RelativePose,
-    detect,
-    match_descriptors,
-    relative_pose,
-    triangulate,
-)
+from langflash_core.network.stereo.matching import Matches, RelativePose, relative_pose, triangulate
 
-_MANY_VIEWS = 4  # beyond this, fewer features keep the V (V - 1) / 2 pairs affordable
 _MIN_SHARE = 0.25  # of the matches must agree with a pose
 _MAX_DEPTH_SIGMA = 0.2  # log-depth error beyond which a triangulated match says too little
 _MIN_POINTS = 10  # matches needed to correct a map
 _FEW = 40  # inliers among key points, below which dense matches are asked as well
 _DENSE_SIGMA = 3.0  # pixels at the working size: a third of a cell
-_WORKING_SIDE = 768  # pixels; sigma is one pixel at this size
 
 
 @dataclass(frozen=True)
 class PoseInput:
     """What pose estimation reads of one view.
 
-    grey: (h, w) uint8, any size, the same crop as the network's image. K: (3, 3) pixels of the
-    network's image of `size` (width, height). depth: (H, W), z of the monocular map. local: unit
-    descriptors (C, h', w') of `LocalFeatures`.
+    K: (3, 3) pixels of the network's image of `size` (width, height). depth: (H, W), z of the
+    monocular map. local: unit descriptors (C, h', w') of `LocalFeatures`.
     """
 
-    grey: np.ndarray
     K: np.ndarray
     size: tuple[int, int]
     depth: np.ndarray
@@ -56,31 +45,30 @@ class Poses:
 
 
 def estimate_poses(
-    views: list[PoseInput], check: Callable[[], None] = lambda: None, known: np.ndarray | None = None
+    views: list[PoseInput],
+    points: KeyPoints,
+    check: Callable[[], None] = lambda: None,
+    known: np.ndarray | None = None,
 ) -> Poses:
     """Poses of all views, deterministic.
 
     A view that matches nothing keeps view 0's pose and is reported in `guessed`. `check` is called
-    before each photo and each pair; what it raises ends the work.
+    before each pair; what it raises ends the work.
 
     Args:
+        points: of the same photos, the same crop, in the same order.
         known: poses (V, 4, 4) that are given, world = view 0: only depths are fitted, to their unit.
 
     Raises:
         InputError: the photos do not fit the poses that are given.
     """
     num_views = len(views)
-    limit = 4000 if num_views <= _MANY_VIEWS else 1500
-    features = []
-    for view in views:
-        check()
-        features.append(detect(_working_size(view.grey), limit))
     pairs: dict[tuple[int, int], RelativePose] = {}
     agreed: dict[tuple[int, int], Matches] = {}
     for i in range(num_views):
         for j in range(i + 1, num_views):
             check()
-            matches = _key_point_matches(views, features, i, j)
+            matches = _key_point_matches(views, points, i, j)
             if known is not None:
                 agreed[i, j] = _agreed(views[i], views[j], matches, known[j] @ np.linalg.inv(known[i]))
                 continue
@@ -124,19 +112,10 @@ def _pair_pose(view_i: PoseInput, view_j: PoseInput, matches: Matches) -> Relati
     return pose if pose is not None and pose.num_inliers >= _MIN_SHARE * len(matches) else None
 
 
-def _working_size(grey: np.ndarray) -> np.ndarray:
-    """Small pictures are enlarged: SIFT needs pixels to find more than a handful of points."""
-    ratio = _WORKING_SIDE / max(grey.shape)
-    if ratio == 1:
-        return grey
-    method = cv2.INTER_CUBIC if ratio > 1 else cv2.INTER_AREA
-    return cv2.resize(grey, None, fx=ratio, fy=ratio, interpolation=method)
-
-
-def _key_point_matches(views: list[PoseInput], features: list, i: int, j: int) -> Matches:
-    pairs = match_descriptors(features[i][1], features[j][1])
-    x_i = _without_camera(features[i][0][pairs[:, 0]], views[i], _WORKING_SIDE)
-    x_j = _without_camera(features[j][0][pairs[:, 1]], views[j], _WORKING_SIDE)
+def _key_point_matches(views: list[PoseInput], points: KeyPoints, i: int, j: int) -> Matches:
+    rows = points.pairs[i, j]
+    x_i = _without_camera(points.positions[i][rows[:, 0]], views[i], WORKING_SIDE)
+    x_j = _without_camera(points.positions[j][rows[:, 1]], views[j], WORKING_SIDE)
     return Matches(x_i, x_j, _sigma(views[j], 1.0))
 
 
@@ -157,7 +136,7 @@ def _joined(exact: Matches, dense: Matches) -> Matches:
 
 def _sigma(view: PoseInput, pixels: float) -> float:
     """`pixels` at the working size, as normalised coordinates."""
-    return pixels * max(view.size) / _WORKING_SIDE / view.K[0, 0]
+    return pixels * max(view.size) / WORKING_SIDE / view.K[0, 0]
 
 
 def _without_camera(pixels: np.ndarray, view: PoseInput, side: int) -> np.ndarray:

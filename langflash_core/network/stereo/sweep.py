@@ -153,7 +153,8 @@ class DepthRefiner(nn.Module):
         planes, widths = preset.sweep_planes, preset.refiner_widths
         self.match_hook, self.groups = preset.match_hook, preset.sweep_groups
         self.num_passes = preset.sweep_passes
-        offsets = torch.linspace(-preset.sweep_range, preset.sweep_range, planes)
+        # On a device of its own, because networks that take over a file's tensors are built on none.
+        offsets = torch.linspace(-preset.sweep_range, preset.sweep_range, planes, device="cpu")
         self.register_buffer("offsets", offsets, persistent=False)
         inputs = (self.groups + 1) * planes + 6  # correlations; how much is seen, depth, error, colour
         self.regularise = Regulariser(inputs, preset.encoder_dim, widths)

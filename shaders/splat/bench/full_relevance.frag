@@ -17,8 +17,10 @@ void main() {
     bool empty = norm * square.y < EMPTY_NORM;
     float scale = empty ? 0.0 : 1.0 / norm;
     float largest = -1.0;
-    for (int i = first_negative; i < first_negative + num_negatives; ++i)
-        largest = max(largest, min(scale * texelFetch(sums, ivec3(pixel, 1 + i / 4), 0)[i % 4], 1.0));
+    for (int i = first_negative; i < first_negative + num_negatives; ++i) {
+        float product = texelFetch(sums, ivec3(pixel, 1 + i / PHRASES_A_LAYER), 0)[i % PHRASES_A_LAYER];
+        largest = max(largest, min(scale * product, 1.0));
+    }
     vec4 values = clamp(scale * texelFetch(sums, ivec3(pixel, layer), 0), -1.0, 1.0);
     if (temperature > 0.0) values = 1.0 / (1.0 + exp(clamp(temperature * (largest - values), -80.0, 80.0)));
     out_relevance = empty ? vec4(0.0) : values;

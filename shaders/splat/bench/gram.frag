@@ -8,13 +8,13 @@
 
 uniform sampler2D peaks;
 uniform float with_peak;   // 1 in the first pass, 0 in the others
-uniform int first_atom;    // that of column 0
+uniform int first_column;  // atom of column 0
 
 out vec2 out_square_peak;
 
 float share(ivec2 pixel, int atom) {
-    uint pair = texelFetch(packed_maps, ivec3(pixel, atom / 8), 0)[atom % 4];
-    return float(atom % 8 < 4 ? pair & 65535u : pair >> 16u) / 65535.0;
+    uint pair = texelFetch(packed_maps, ivec3(pixel, atom / ATOMS_A_TEXEL), 0)[atom % 4];
+    return float(atom % ATOMS_A_TEXEL < 4 ? pair & 65535u : pair >> 16u) / 65535.0;
 }
 
 void main() {
@@ -22,6 +22,6 @@ void main() {
     float parts[COLUMNS];
     combine(pixel, parts);
     float square = 0.0;
-    for (int column = 0; column < COLUMNS; ++column) square += parts[column] * share(pixel, first_atom + column);
+    for (int column = 0; column < COLUMNS; ++column) square += parts[column] * share(pixel, first_column + column);
     out_square_peak = vec2(square, with_peak * texelFetch(peaks, pixel, 0).r);
 }

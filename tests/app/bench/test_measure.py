@@ -37,7 +37,7 @@ def test_every_mode_is_measured_on_every_frame(rows):
 
 def test_the_default_is_near_the_reference_and_float32_nearer(rows):
     half, single = rows["default"][1], rows["float32"][1]
-    assert half.psnr >= 50 and half.relevance_mean <= 2e-3  # what issue 4 asks of float16
+    assert half.psnr >= 50 and half.relevance_mean <= 2e-3  # what float16 can hold
     assert single.psnr >= 80 and single.relevance_mean <= 1e-4  # as tests/app/gl
     assert half.relevance_mean <= half.relevance_max
     assert half.mask_iou is not None and half.mask_iou > 0.98
@@ -79,12 +79,11 @@ def test_a_cut_at_three_sigma_and_halves_lose_something(rows):
 class _FarOverNear(SplatBuffers):
     def sort(self, camera):
         super().sort(camera)
-        self.order = self.order[::-1].copy()
-        self._order_buffer.write(self.order.tobytes())
+        self.draw_in(self.order[::-1])
 
 
 def test_a_mode_that_is_wrong_shows_it(gl, case):
-    wrong = Mode("sort", "far over near", buffers=_FarOverNear)
+    wrong = Mode("sort", "far over near", splats=_FarOverNear)
     result = measure(gl, case, (DEFAULT, wrong), silent)
     (_, _, right), (_, _, broken) = result.rows
     assert broken.psnr < right.psnr - 20

@@ -9,8 +9,8 @@ import torch
 
 from app.cli import main
 from langflash_core.language.spaces import language_space
-from langflash_core.scene import save
-from langflash_core.types import Gaussians, Scene, Semantics
+from langflash_core.scene.file import save
+from langflash_core.types import Gaussians, Record, Scene, Semantics
 
 WORDS = ("armchair", "floor lamp", "wooden floor")
 WIDTH, HEIGHT = 56, 42
@@ -64,7 +64,7 @@ def stripes() -> Scene:
         viewmats=torch.stack((torch.eye(4), second)),
         Ks=torch.stack((K, K)),
         view_size=(WIDTH, HEIGHT),
-        metadata={"preset": "mini", "warnings": []},
+        record=Record(preset="mini"),
     )
 
 

@@ -189,7 +189,9 @@ def test_bad_picture(refused, scene_file, tmp_path, words, hint):
 def test_only_png(refused, scene_file, tmp_path, name):
     assert ".png" in refused("render", scene_file, "-o", tmp_path / name)
     if not name.endswith(".ply"):
-        assert ".png, .langflash, .ply, .compressed.ply, .splat" in refused("export", scene_file, "-o", tmp_path / name)
+        assert ".png, .langflash, .ply, .compressed.ply, .splat" in refused(
+            "export", scene_file, "-o", tmp_path / name
+        )
 
 
 def test_export_of_what_is_not_there(refused, scene_file, tmp_path):
@@ -273,7 +275,11 @@ def test_from_a_shell(tmp_path):
     """The same through a real process: exit code, one sentence, an empty stdout, no traceback."""
     for words in (["render", "gone.langflash", "-o", "a.png"], ["frobnicate"], []):
         done = subprocess.run(
-            [sys.executable, "-m", "app", *words], capture_output=True, text=True, cwd=tmp_path, timeout=60
+            [sys.executable, "-m", "langflash_core", *words],
+            capture_output=True,
+            text=True,
+            cwd=tmp_path,
+            timeout=60,
         )
         assert done.returncode == 2
         assert done.stdout == ""

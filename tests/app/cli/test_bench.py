@@ -10,7 +10,7 @@ from app.bench.modes import AXES
 from app.cli.parser import BENCH_AXES
 from app.gl import offscreen_context
 from langflash_core.errors import GraphicsError
-from langflash_core.scene import save
+from langflash_core.scene.file import save
 from tests.app.cli.conftest import stripes
 from tests.app.cli.test_bad_input import refused  # noqa: F401
 
@@ -60,7 +60,7 @@ def test_without_matplotlib_the_rest_is_written(run, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "app.bench.plot", None)
     outcome = run("bench", "--synthetic", 60, *SMALL, "-o", tmp_path)
     assert outcome.code == 0
-    assert "pip install matplotlib" in outcome.err
+    assert "langflash[bench]" in outcome.err
     assert {path.name for path in tmp_path.iterdir()} == {"bench.json", "bench.csv"}
 
 

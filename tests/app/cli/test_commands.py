@@ -178,7 +178,17 @@ def test_info(run, scene_file):
 
 def test_json_is_all_of_stdout(scene_file, tmp_path):
     done = subprocess.run(
-        [sys.executable, "-m", "app", "query", scene_file, "armchair", "-o", tmp_path / "o", "--json"],
+        [
+            sys.executable,
+            "-m",
+            "langflash_core",
+            "query",
+            scene_file,
+            "armchair",
+            "-o",
+            tmp_path / "o",
+            "--json",
+        ],
         capture_output=True,
         text=True,
         timeout=60,
@@ -190,7 +200,7 @@ def test_json_is_all_of_stdout(scene_file, tmp_path):
 @pytest.mark.skipif(sys.platform != "linux", reason="EGL is Linux's")
 def test_without_opengl(scene_file, tmp_path):
     """Hide every EGL driver: gl by default gives way with a warning, gl by choice is an error."""
-    words = [sys.executable, "-m", "app", "render", scene_file, "-o", tmp_path / "a.png"]
+    words = [sys.executable, "-m", "langflash_core", "render", scene_file, "-o", tmp_path / "a.png"]
     hidden = {**os.environ, "__EGL_VENDOR_LIBRARY_FILENAMES": "/dev/null"}
     given_way = subprocess.run(words, capture_output=True, text=True, env=hidden, timeout=60)
     assert given_way.returncode == 0
@@ -226,7 +236,7 @@ def test_interrupted_at_a_terminal(scene_file, tmp_path):
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         child = subprocess.Popen(
-            [sys.executable, "-m", "app", *map(str, words)], stderr=side, start_new_session=True
+            [sys.executable, "-m", "langflash_core", *map(str, words)], stderr=side, start_new_session=True
         )
     finally:
         signal.signal(signal.SIGINT, before)
@@ -250,7 +260,9 @@ def test_help_and_version_answer_at_once():
     """No torch, no OpenGL: 0.3 s are promised; three times that on a machine busy with other tests."""
     for words in (["--help"], ["--version"], ["query", "--size"]):
         start = time.perf_counter()
-        done = subprocess.run([sys.executable, "-m", "app", *words], capture_output=True, timeout=60)
+        done = subprocess.run(
+            [sys.executable, "-m", "langflash_core", *words], capture_output=True, timeout=60
+        )
         assert time.perf_counter() - start < 0.9
         assert done.returncode == (2 if "query" in words else 0)
     code = "import sys, app.cli.parser; sys.exit(bool({'torch', 'numpy', 'moderngl'} & set(sys.modules)))"
@@ -275,7 +287,7 @@ def test_window_needs_a_display(scene_file, tmp_path):
     if sys.platform != "linux":
         pytest.skip("elsewhere there is always a screen")
     hidden = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    words = [sys.executable, "-m", "app", "view"]
+    words = [sys.executable, "-m", "langflash_core", "view"]
     done = subprocess.run([*words, scene_file], capture_output=True, text=True, env=hidden, timeout=60)
     assert done.returncode == 1, done.stderr
     assert done.stderr.startswith("langflash: ") and done.stderr.count("\n") == 1

@@ -7,7 +7,7 @@ import torch
 
 from langflash_core.network import PRESETS
 from langflash_core.resources import asset_path
-from langflash_core.scene import load
+from langflash_core.scene.file import load
 from tests.network import published
 from tests.network.sizes import TINY
 
@@ -45,7 +45,7 @@ def test_imported_checkpoints_make_a_scene(run, checkpoints, tmp_path):
     made = run("reconstruct", *PHOTOS, "--preset", "full", "--size", 64, "-o", scene, "--json").json()
     assert made["preset"] == "full" and made["space"] == "clip" and made["channels"] == 512
     assert made["view_size"] == [64, 64] and made["sh_degree"] == 4
-    assert load(scene).metadata["photos"][0] == "books_left.jpg"
+    assert load(scene).record.photos[0] == "books_left.jpg"
 
 
 def test_what_cannot_be_done_is_one_sentence(run, checkpoints, tmp_path):
@@ -60,7 +60,6 @@ def test_what_cannot_be_done_is_one_sentence(run, checkpoints, tmp_path):
         (("--grouping", "queries"), "grouping has no weights"),
         (("--grouping", "sam2"), "SAM 2 is not at hand"),
         (("--refine", 99999), "out of range"),
-        (("--preset", "mini", "--precision", "bfloat16"), "float32 only"),
         (("--preset", "mini", "--aggregation", "crops"), "crops are embedded by CLIP"),
     ):
         refused = run(*words, *more)

@@ -12,7 +12,7 @@ import torch
 from PIL import Image
 
 from app.cli.commands.export import SUFFIXES
-from app.window.drops import SCENE_SUFFIXES
+from app.window.scene.drops import SCENE_SUFFIXES
 from langflash_core.export import READERS, WRITERS, export, read
 from langflash_core.export.language import side_car
 from langflash_core.language.spaces import language_space
@@ -187,7 +187,7 @@ def test_video(run, scene_file, ply_file, tmp_path, name):
     if name == "turntable":  # moved off the origin, so that it is seen from outside
         gaussians = read(ply_file).gaussians
         gaussians.means[:, 2] -= 1
-        from langflash_core.scene import bare_scene
+        from langflash_core.scene.bare import bare_scene
 
         source = tmp_path / "t.splat"
         export(bare_scene(gaussians, "t"), source)

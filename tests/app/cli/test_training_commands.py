@@ -5,7 +5,10 @@ import pytest
 import torch
 from PIL import Image
 
-from app.cli.parser import build_parser
+from app.cli.parser import LAYOUTS, build_parser
+from langflash_core.lab.photos import layouts
+from langflash_core.lab.photos.writing import FolderWriter
+from langflash_core.lab.training.shards import open_shards
 from langflash_core.network import MINI, GuidedDepthNet, save_network
 from tests.lab.rooms.conftest import TINY_PACK
 
@@ -101,3 +104,87 @@ def test_train_export_of_nothing(run, checkpoint, tmp_path):
 def test_part_and_defaults():
     args = build_parser().parse_args(["train", "cache", "p.npz", "-o", "out", "--part", "1/2"])
     assert args.part == (1, 2) and args.set == "train" and args.first_seed is None
+
+
+@pytest.fixture
+def photos(tmp_path):
+    """Two labelled photos of a wall with a chair on it."""
+    writer = FolderWriter(tmp_path / "photos")
+    for id in ("1", "2"):
+        writer.photo(id, np.full((42, 56, 3), 128, np.uint8))
+        labels = np.ones((42, 56), np.int64)
+        labels[10:30, 10:40] = 2
+        writer.labels(id, labels)
+    writer.finish({1: ("wall", None), 2: ("chair", None)}, "drawn by a test")
+    return tmp_path / "photos"
+
+
+def test_photos_are_cached(run, checkpoint, photos, tmp_path):
+    words = ("--photos", photos, "-o", tmp_path / "cache", "--start", checkpoint, "--copies", "2")
+    outcome = run("train", "cache", *words)
+    assert outcome.code == 0 and "4 new views" in outcome.out, outcome.err
+    assert "0 new views" in run("train", "cache", *words).out
+    (shard,) = (tmp_path / "cache" / "photos" / "train").iterdir()
+    assert open_shards(shard.parent)[0].record(0).labels[0].name == "wall"
+
+
+def test_a_data_set_is_converted(run, tmp_path):
+    (tmp_path / "seq").mkdir()
+    Image.new("RGB", (56, 42)).save(tmp_path / "seq" / "frame-000000.color.png")
+    np.savetxt(tmp_path / "seq" / "frame-000000.pose.txt", np.eye(4))
+    outcome = run("train", "photos", "frames", tmp_path / "seq", "-o", tmp_path / "out")
+    assert outcome.code == 0 and outcome.out == f"{tmp_path / 'out'}: 1 photos\n", outcome.err
+    assert tuple(layouts.LAYOUTS) == LAYOUTS
+
+
+def test_labelled_photos_are_judged(run, checkpoint, photos, tmp_path):
+    table = tmp_path / "new" / "table.md"
+    words = ("--weights", checkpoint, "--limit", "1", "--size", "56", "--backend", "torch", "-o", table)
+    outcome = run("eval", "photos-labelled", photos, *words, "--json")
+    assert outcome.code == 0, outcome.err
+    document = outcome.json()
+    assert document["photos"] == 1 and document["numbers"] == ["2", "2"]
+    assert set(document["labels"]) == {"atoms", "features"}
+    assert "| 37 classes: mIoU |" in table.read_text()
+
+
+def test_posed_photos_are_judged(run, checkpoint, tmp_path):
+    """Three equal photos of nothing: no motion is true, and there is no depth to judge."""
+    writer = FolderWriter(tmp_path / "posed")
+    for id in ("0", "3", "6"):
+        writer.photo(id, np.full((42, 56, 3), 128, np.uint8))
+        writer.pose(id, torch.eye(4, dtype=torch.float64))
+    writer.finish({}, "drawn by a test")
+    words = ("--weights", checkpoint, "--size", "56", "--backend", "torch", "--apart", "6")
+    outcome = run("eval", "posed", tmp_path / "posed", *words)
+    assert outcome.code == 0, outcome.err
+    assert "(no motion)" in outcome.out and "| 6 | 1.000 | 0.000 |" in outcome.out
+    assert "Depth" not in outcome.out
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (["eval", "photos-labelled", "gone"], "there is no folder gone/images"),
+        (["eval", "photos-labelled", "PHOTOS", "--only", "7-9"], "none of the 2 photos is chosen"),
+        (["eval", "photos-labelled", "PHOTOS", "--part", "validation"], "choose another --part or --only"),
+        (["eval", "photos-labelled", "PHOTOS", "--only", "9-7"], "--only"),
+        (["eval", "photos-labelled", "PHOTOS", "--crop", "9,9,3,3"], "--crop"),
+        (["eval", "photos-labelled", "PHOTOS", "--crop", "0,0,99,9"], "does not fit into 1.png"),
+        (["eval", "photos-labelled", "PHOTOS", "-o", "table.txt"], "this command writes .md"),
+        (["eval", "posed", "PHOTOS"], "has no poses.txt"),
+        (["eval", "calibrate", ".", "--plot", "plot.jpg"], "this command writes .png"),
+        (["train", "cache", "-o", "out"], "either a furniture pack or a folder with --photos"),
+        (["train", "cache", "p.npz", "--photos", "PHOTOS", "-o", "out"], "not both"),
+        (["train", "cache", "--photos", "PHOTOS", "-o", "out", "--set", "held_out"], "no held-out set"),
+        (["train", "photos", "nyu", "gone", "-o", "out"], "there is no gone"),
+        (["train", "photos", "voc", "gone", "-o", "out"], "invalid choice"),
+    ],
+)
+def test_bad_photos(run, photos, tmp_path, monkeypatch, words, hint):
+    place = tmp_path / "here"
+    place.mkdir()
+    monkeypatch.chdir(place)
+    outcome = run(*(str(photos) if word == "PHOTOS" else word for word in words))
+    assert outcome.code == 2 and hint in outcome.err and outcome.err.count("\n") == 1
+    assert not list(place.iterdir())

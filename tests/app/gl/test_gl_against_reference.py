@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from app.gl import SplatRenderer
+from app.gl.layout import ATOMS_A_LAYER, ATOMS_A_PASS
 from langflash_core.language.relevance import relevance_maps
 from langflash_core.splat import render
 from tests.app.gl.questions import full_relevance, psnr, question
@@ -67,7 +68,7 @@ def test_weight_maps_and_relevance(gl, precision, num_atoms, kept):
     renderer = SplatRenderer(gl, precision)
     renderer.set_scene(scene)
     renderer.draw(seen)
-    assert renderer.passes["weights"] == math.ceil(num_atoms / 24)
+    assert renderer.passes["weights"] == math.ceil(num_atoms / ATOMS_A_PASS)
     maps = maps_of(renderer.frame(weight_maps=True))
     assert maps is not None and maps.shape == (48, 64, num_atoms)
     if num_atoms:
@@ -86,6 +87,23 @@ def test_weight_maps_and_relevance(gl, precision, num_atoms, kept):
         assert (relevance - twin).abs().max() <= 2e-4
         assert (relevance - twin).abs().mean() <= 2e-5
     renderer.release()
+
+
+def test_the_atoms_a_pass_are_one_number(gl, monkeypatch):
+    """Another number of layers draws the same maps in more passes: nothing else counts them."""
+    scene, seen = cloud(600, 50, 8, dtype=torch.float32), camera()
+    drawn = []
+    for layers, passes in ((8, 3), (3, 6)):
+        monkeypatch.setattr("app.gl.weights.LAYERS_A_PASS", layers)
+        monkeypatch.setattr("app.gl.weights.ATOMS_A_PASS", ATOMS_A_LAYER * layers)
+        renderer = SplatRenderer(gl)
+        renderer.set_scene(scene)
+        renderer.draw(seen)
+        assert renderer.passes["weights"] == passes
+        renderer.ask(question(scene, 5))
+        drawn.append((maps_of(renderer.frame(weight_maps=True)), renderer.relevance()))
+        renderer.release()
+    assert torch.equal(drawn[0][0], drawn[1][0]) and torch.equal(drawn[0][1], drawn[1][1])
 
 
 @pytest.mark.parametrize("num_prompts", [1, 4, 16, 17])

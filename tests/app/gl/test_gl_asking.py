@@ -7,7 +7,9 @@ import pytest
 import torch
 
 from app.gl import SplatRenderer
-from app.gl.display import COUNT_COLOURS, feature_axes
+from app.gl.colours import feature_axes
+from app.gl.display import COUNT_COLOURS
+from app.gl.painter import Painter
 from app.gl.photos import SAME, WORST, PhotoDepths
 from langflash_core.splat import render
 from langflash_core.types import Scene
@@ -171,7 +173,7 @@ def stereo(double: bool = True) -> Scene:
         base,
         viewmats=poses,
         Ks=base.Ks.expand(2, 3, 3).contiguous(),
-        metadata={"gaussians_per_view": [len(first), len(second)]},
+        view_ids=torch.arange(2).repeat_interleave(len(first)),
     )
 
 
@@ -244,18 +246,20 @@ def test_photo_depths_follow_the_scene_and_leave_it_alone(exact):
     before = exact.frame().rgb
     exact.coverage_texture()
     assert torch.equal(exact.frame().rgb, before) and exact.passes["colour"] == 1
-    bare = dataclasses.replace(scene, metadata={})
+    bare = dataclasses.replace(scene, view_ids=None)
     exact.set_scene(bare)
     exact.draw(SEEN_FROM)
-    with pytest.raises(ValueError, match="gaussians_per_view"):
+    with pytest.raises(ValueError, match="view_ids"):
         exact.agreement_texture()
 
 
 def test_photo_depths_are_the_references(gl, exact):
-    made = PhotoDepths(gl, exact._programs, stereo(double=False), own=False)
+    painter = Painter(gl)
+    made = PhotoDepths(painter, stereo(double=False), own=False)
     width, height, count = made.texture.size
     drawn = np.frombuffer(made.texture.read(), np.float32).reshape(count, height, width)
     made.release()
+    painter.release()
     for view in range(2):
         frame = render(stereo(), stereo().camera(view), weight_maps=False)
         sure = np.abs(frame.alphas.numpy() - 0.5) > 1e-3

@@ -21,6 +21,7 @@ import pytest
 import torch
 
 from app.gl import SplatRenderer, offscreen_context
+from app.gl.splats import SplatBuffers
 from langflash_core.errors import GraphicsError
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
@@ -59,6 +60,16 @@ def draw(gl, precision, scene: Scene, seen: Camera, **options) -> Frame:
     frame = renderer.frame(weight_maps=True)
     renderer.release()
     return frame
+
+
+class Watched:
+    """Makes splats for a renderer and keeps the last, so that its order can be looked at."""
+
+    made: SplatBuffers
+
+    def __call__(self, *given) -> SplatBuffers:
+        self.made = SplatBuffers(*given)
+        return self.made
 
 
 def agree(frame: Frame, expected: Frame, precision: str, alpha: float = ALPHA, steps: float = 1) -> None:
@@ -263,15 +274,15 @@ def test_far_floaters_ruin_no_order(gl, precision):
     )
     orders = []
     for gaussians in (near, both):
-        renderer = SplatRenderer(gl, precision)
+        watched = Watched()
+        renderer = SplatRenderer(gl, precision, splats=watched)
         renderer.set_scene(scene_of(gaussians))
         renderer.draw(camera())
-        assert renderer._splats is not None
-        orders.append(renderer._splats.order)
+        orders.append(watched.made.order)
         if gaussians is both:
             # About ten layers a pixel, of which the front ones shrink the errors of those behind.
             agree(renderer.frame(True), render(scene_of(both), camera()), precision, steps=4)
-            assert renderer._splats.depth_range[1] < 10, "the depth picture keeps its contrast, too"
+            assert renderer.depth_range[1] < 10, "the depth picture keeps its contrast, too"
         renderer.release()
     np.testing.assert_array_equal(orders[1][orders[1] >= 9] - 9, orders[0])
 
@@ -300,13 +311,13 @@ def test_equal_depths_stay_equal_in_any_view(gl, precision):
     places = torch.rand(37, 3, generator=g) - 0.5 + torch.tensor([0.0, 0.0, 2.0])
     means = [tuple(row) for row in places.repeat_interleave(3, 0).tolist()]
     gaussians = splats(means, 0.05, 0.9, [RED, GREEN, BLUE] * 37, torch.float32)
-    renderer = SplatRenderer(gl, precision)
+    watched = Watched()
+    renderer = SplatRenderer(gl, precision, splats=watched)
     renderer.set_scene(scene_of(gaussians))
     for yaw in (0.1, 0.2, 0.3):
         seen = camera(pose=turned(yaw, (0.1, 0.0, 0.2)))
         renderer.draw(seen)
-        assert renderer._splats is not None
-        back_to_front = torch.from_numpy(renderer._splats.order.astype(np.int64))
+        back_to_front = torch.from_numpy(watched.made.order.astype(np.int64))
         nearest_first = view_depths(gaussians.map(lambda v: v.double()), seen).argsort(stable=True)
         assert torch.equal(back_to_front.flip(0), nearest_first)
         assert (nearest_first.unflatten(0, (37, 3)) % 3 == torch.arange(3)).all()

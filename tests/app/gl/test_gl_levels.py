@@ -3,8 +3,7 @@
 import pytest
 import torch
 
-from langflash_core.scene import thin
-from langflash_core.scene.thin import thin_with_rows
+from langflash_core.scene.thin import thin, thin_with_rows
 from langflash_core.splat import render
 from tests.app.gl.questions import full_relevance, question
 from tests.splat.scenes import camera, cloud, maps_of
@@ -38,10 +37,24 @@ def test_back_to_all_gaussians(renderer, scene):
     assert torch.equal(renderer.frame().rgb, before.rgb) and torch.equal(renderer.relevance(), relevance)
 
 
+def test_pictures_follow_the_level_and_the_scene(renderer, scene):
+    """The same camera and size: another level, another scene are other pictures."""
+    renderer.set_scene(scene)
+    shown = []
+    for share in (1.0, 0.25, 1.0):
+        renderer.draw(camera(), share=share)
+        shown.append((renderer.rgb_texture.read(), renderer.depth_texture().read()))
+    assert shown[0] == shown[2]
+    assert shown[0][0] != shown[1][0] and shown[0][1] != shown[1][1]
+    renderer.set_scene(cloud(50, 5, dtype=torch.float32))
+    renderer.draw(camera())
+    assert renderer.rgb_texture.read() not in [rgb for rgb, _ in shown]
+
+
 def test_a_level_is_made_once(renderer, scene, monkeypatch):
     made = []
     monkeypatch.setattr(
-        "app.gl.renderer.thin_with_rows", lambda *given: made.append(given) or thin_with_rows(*given)
+        "app.gl.scene.thin_with_rows", lambda *given: made.append(given) or thin_with_rows(*given)
     )
     renderer.set_scene(scene)
     for share in (0.25, 1.0, 0.25, 1.0, 0.25):

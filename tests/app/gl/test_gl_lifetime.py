@@ -8,10 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.cli.renderers import open_renderer
 from app.gl import SplatRenderer, offscreen_context
+from app.gl.canvas import Canvas
 from app.gl.splats import atom_bits, stable_order
 from app.gl.targets import gl_function
 from langflash_core.errors import GraphicsError
+from langflash_core.types import Scene
 from tests.app.gl.questions import question
 from tests.splat.scenes import camera, cloud, maps_of
 
@@ -132,8 +135,70 @@ def test_too_large_an_image_is_one_sentence(renderer):
 def test_without_egl_the_packages_are_named(monkeypatch):
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.setenv("GLCONTEXT_LINUX_LIBEGL", "libnothing.so")
-    with pytest.raises(GraphicsError, match=r"libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri.*--backend torch"):
+    with pytest.raises(GraphicsError, match="libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri"):
         offscreen_context()
+
+
+def test_a_command_that_was_told_to_use_opengl_names_the_other_way(monkeypatch):
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.setenv("GLCONTEXT_LINUX_LIBEGL", "libnothing.so")
+    with pytest.raises(GraphicsError, match="--backend torch"), open_renderer("gl"):
+        pass
+
+
+def test_renderers_share_a_canvas_and_each_has_its_own_picture(gl, queries):
+    """As in the bench: the textures hold the picture drawn last, and no one takes it for another's."""
+    scenes = cloud(200, 5), cloud(150, 3)
+    alone = []
+    for scene in scenes:
+        renderer = SplatRenderer(gl)
+        alone.append(_everything(renderer, scene))
+        renderer.release()
+    canvas = Canvas(gl)
+    sharing = [SplatRenderer(gl, canvas=canvas) for _ in scenes]
+    for renderer, scene in zip(sharing, scenes, strict=True):
+        _everything(renderer, scene)
+    for _ in range(2):
+        assert [_pictures(renderer) for renderer in sharing] == alone
+    for renderer in sharing:
+        renderer.release()
+    canvas.release()
+
+
+def _everything(renderer: SplatRenderer, scene: Scene) -> list[bytes]:
+    renderer.set_scene(scene)
+    renderer.ask(question(scene))
+    renderer.draw(camera())
+    return _pictures(renderer)
+
+
+def _pictures(renderer: SplatRenderer) -> list[bytes]:
+    frame = renderer.frame(weight_maps=True)
+    tensors = (frame.rgb, frame.depths, maps_of(frame), renderer.relevance())
+    textures = (renderer.rgb_texture, renderer.heat_texture(1), renderer.atom_texture())
+    return [*(values.numpy().tobytes() for values in tensors), *(texture.read() for texture in textures)]
+
+
+def test_a_canvas_of_another_precision_is_refused(gl):
+    canvas = Canvas(gl, "float32")
+    with pytest.raises(ValueError, match="canvas: expected float16"):
+        SplatRenderer(gl, canvas=canvas)
+    canvas.release()
+
+
+def test_nothing_is_forgotten_but_what_is_asked_for(gl, queries):
+    renderer = SplatRenderer(gl)
+    before = _everything(renderer, cloud(100, 3))
+    passes = renderer.passes.copy()
+    renderer.forget(answers_only=True)
+    assert _pictures(renderer) == before
+    assert renderer.passes["weights"] == passes["weights"] and renderer.passes["norm"] == passes["norm"] + 1
+    renderer.forget()
+    with pytest.raises(ValueError, match="expected draw"):
+        renderer.frame()
+    renderer.draw(camera())
+    assert _pictures(renderer) == before and renderer.passes["weights"] == passes["weights"] + 1
+    renderer.release()
 
 
 def test_precision_has_two_names(gl):

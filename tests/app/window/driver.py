@@ -10,7 +10,7 @@ The last line has "closed".
 import json
 import sys
 
-from app.window.editing import Editing
+from app.window.editing.state import Editing
 from app.window.session import Session
 from tests.app.window.items import Items
 
@@ -32,7 +32,6 @@ def editing(now: Editing) -> dict:
         "floaters": None
         if preview is None or not preview.scores or history is None
         else len(preview.mask(history.marks.visible)),
-        "offer": None if now.offer is None else now.offer.count,
     }
 
 
@@ -52,6 +51,7 @@ def summary(session: Session) -> dict:
         "toasts": [toast.text for toast in state.toasts],
         "dialog": state.dialog,
         **editing(state.editing),
+        "offer": None if state.recovery.edits is None else state.recovery.edits.count,
         "maps": dict(state.stats.passes).get("weights", 0),
         "picture": list(state.stats.picture_size),
         "splats": sum(n for kind, n in state.stats.passes if kind in ("colour", "weights")),

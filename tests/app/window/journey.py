@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.window import theme
+from app.window.kit import theme
 from langflash_core.resources import asset_path
 from tests.app.window.guarded import environment
 from tests.app.window.sheet import Shot, write_sheet

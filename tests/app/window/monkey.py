@@ -292,7 +292,7 @@ def run(
 ) -> Outcome:
     """Random input for some seconds, a checkpoint `every` so many."""
     from langflash_core.language.spaces import language_space
-    from langflash_core.scene import save
+    from langflash_core.scene.file import save
     from tests.app.window.scenes import PHRASES, room
 
     outcome = Outcome()

@@ -1,14 +1,22 @@
-"""A small room made by hand: three surfaces, three atoms, so that each phrase has one right place."""
+"""A small room made by hand: three surfaces, three atoms, so that each phrase has one right place; and
+states that show it."""
 
 import io
 import math
+from pathlib import Path
 
 import numpy as np
 import torch
 from PIL import Image
 
+from app.window.asking.commands import EditPrompt
+from app.window.commands import Command, apply
+from app.window.poses import Pose, Vector
+from app.window.scene.commands import SceneArrived
+from app.window.scene.state import SceneInfo
+from app.window.state import State
 from langflash_core.geometry.harmonics import colour_to_sh
-from langflash_core.types import Gaussians, Scene, Semantics
+from langflash_core.types import Gaussians, Record, Scene, Semantics
 
 PHRASES = ("armchair", "wall", "floor")
 COLOURS = ((0.75, 0.15, 0.12), (0.62, 0.66, 0.70), (0.45, 0.33, 0.22))
@@ -54,7 +62,7 @@ def room(dictionary: torch.Tensor, space: str = "minilm") -> Scene:
         K.expand(2, 3, 3).contiguous(),
         VIEW_SIZE,
         photos=(_jpeg((120, 90, 80)), _jpeg((80, 90, 120))),
-        metadata={"preset": "mini", "warnings": ["The photos overlap little; depth may be off."]},
+        record=Record(preset="mini", warnings=("The photos overlap little; depth may be off.",)),
     )
 
 
@@ -62,3 +70,27 @@ def _jpeg(colour: tuple[int, int, int]) -> bytes:
     stream = io.BytesIO()
     Image.new("RGB", VIEW_SIZE, colour).save(stream, "JPEG")
     return stream.getvalue()
+
+
+def after(state: State, *commands: Command) -> State:
+    """The state after all of them."""
+    for command in commands:
+        state = apply(state, command)
+    return state
+
+
+def told(state: State) -> str:
+    """The newest message."""
+    return state.toasts[-1].text
+
+
+VIEWS = (Pose(), Pose(Vector(0.3, 0.0, 0.0)))
+
+
+def shown_scene(path: Path | None = Path("/rooms/my room.langflash")) -> State:
+    """A state with a scene of two views and the phrase "door"."""
+    info = SceneInfo(
+        serial=1, name="room", scene=room(torch.eye(3)), views=VIEWS, num_gaussians=3, num_atoms=3,
+        space="minilm", path=path, extent=(Vector(-1.0, -1.0, 0.0), Vector(1.0, 1.0, 2.0)),
+    )  # fmt: skip
+    return after(State(), SceneArrived(info), EditPrompt(0, "door"))

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from app.window import messages
+from app.window.scene import commands as show
+from app.window.scene import work
 from app.window.worker import Worker, _give_back_memory
 from langflash_core.resources import asset_path
 from tests.app.window.test_worker import PATIENCE, wait_for
@@ -29,14 +30,14 @@ def resident_mb() -> float:
 def stages_of(worker: Worker) -> dict[str, float]:
     """When each stage of a whole reconstruction began, seconds from the first one."""
     began: dict[str, float] = {}
-    worker.submit(messages.ReconstructPhotos(PHOTOS))
+    worker.submit(work.ReconstructPhotos(PHOTOS))
     end = time.monotonic() + PATIENCE
     while "done" not in began:
         assert time.monotonic() < end, began
-        for stage in (r.stage for r in worker.poll() if isinstance(r, messages.Progress)):
+        for stage in (r.stage for r in worker.poll() if isinstance(r, show.Progressed)):
             began.setdefault(stage, time.monotonic())
         time.sleep(0.002)
-    wait_for(worker, messages.SceneReady)
+    wait_for(worker, show.SceneArrived)
     return began
 
 
@@ -62,16 +63,16 @@ def cancelled_in(worker: Worker, stage: str, wait: float) -> tuple[float, float,
     gc.collect()
     _give_back_memory()
     before = resident_mb()
-    worker.submit(messages.ReconstructPhotos(PHOTOS))
-    while not any(r.stage == stage for r in worker.poll() if isinstance(r, messages.Progress)):
+    worker.submit(work.ReconstructPhotos(PHOTOS))
+    while not any(r.stage == stage for r in worker.poll() if isinstance(r, show.Progressed)):
         time.sleep(0.002)
     time.sleep(wait)
     start = time.monotonic()
     worker.cancel()
-    wait_for(worker, messages.Stopped)
+    wait_for(worker, show.JobCancelled)
     heard = time.monotonic() - start
-    worker.submit(messages.LoadScene(Path("gone.langflash")))  # its turn comes when the job has ended
-    wait_for(worker, messages.Failed)
+    worker.submit(work.LoadScene(Path("gone.langflash")))  # its turn comes when the job has ended
+    wait_for(worker, show.JobFailed)
     return heard, time.monotonic() - start, resident_mb() - before
 
 

@@ -1,5 +1,6 @@
 """No command takes away what a person did: each can be undone, bit for bit, or changes no edit at all."""
 
+import sys
 import typing
 from dataclasses import fields, is_dataclass, replace
 from datetime import datetime
@@ -11,22 +12,29 @@ import numpy as np
 import pytest
 import torch
 
-from app.window import ask_commands, chores, commands, desk_commands, edit_commands, edit_messages
 from app.window import commands as do
-from app.window import edit_commands as edit
+from app.window.asking import commands as ask
 from app.window.commands import apply
-from app.window.editing import Region
-from app.window.editor import _errand
+from app.window.editing import commands as edit
+from app.window.editing import pointing as point
+from app.window.editing.state import Region
+from app.window.editing.work import ScoreFloaters, request_for
+from app.window.exporting import commands as export
 from app.window.poses import Pose
-from app.window.state import SceneInfo, State
-from app.window.worker import describe_scene
-from langflash_core.edits import Mask
+from app.window.recovery import commands as keep
+from app.window.scene import camera
+from app.window.scene import commands as show
+from app.window.scene.state import SceneInfo
+from app.window.scene.work import describe_scene
+from app.window.state import State
+from langflash_core.language.relevance import CompiledQuery, compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.edited import edited_scene
+from langflash_core.scene.edits import Marks, Mask
 from tests.app.window.scenes import PHRASES, room
 
-MODULES = (commands, edit_commands, ask_commands, desk_commands)
-ARRIVES = do.SceneArrived  # another scene; the edits of the one before are kept on the disk
+MODULES = (do, show, camera, ask, edit, point, export, keep)
+ARRIVES = show.SceneArrived  # another scene; the edits of the one before are kept on the disk
 SAYS_WHICH = {
     "combine": ("replace", "add", "remove"),
     "kind": ("info", "error"),
@@ -51,9 +59,9 @@ def command_classes() -> list[type]:
 @pytest.fixture(scope="module")
 def shown() -> State:
     info = describe_scene(room(language_space("minilm").encode(list(PHRASES))), serial=1, name="room")
-    state = apply(State(), do.SceneArrived(info))
+    state = apply(State(), show.SceneArrived(info))
     for key, phrase in enumerate(PHRASES):
-        state = apply(apply(state, do.AddPrompt()), do.EditPrompt(key, phrase))
+        state = apply(apply(state, ask.AddPrompt()), ask.EditPrompt(key, phrase))
     return state
 
 
@@ -73,7 +81,7 @@ def edited(shown: State) -> State:
 
 
 def arguments(cls: type, chance: np.random.Generator, state: State) -> dict:
-    hints = typing.get_type_hints(cls, {**vars(__import__(cls.__module__, fromlist=["x"])), "State": State})
+    hints = typing.get_type_hints(cls, {**vars(sys.modules[cls.__module__]), "CompiledQuery": CompiledQuery})
     return {f.name: value(f.name, hints[f.name], chance, state) for f in fields(cls)}
 
 
@@ -94,8 +102,13 @@ def value(name: str, hint, chance: np.random.Generator, state: State):
         return tuple(value("", part, chance, state) for part in parts)
     if hint is Mask:
         return Mask.of(chance.random(12_300) < 0.3)
-    if hint is commands.Marks:
+    if hint is Marks:
         return state.editing.marks
+    if hint is CompiledQuery:
+        assert state.info is not None
+        return compile_query(state.info.scene, language_space("minilm"), ["wall"])
+    if hint is do.Command:
+        return show.ClearPhotos()
     if hint is SceneInfo:
         return state.info
     if hint is Pose:
@@ -148,15 +161,11 @@ def answered(state: State, command: do.Command) -> State:
     after = apply(state, command)
     info, marks = after.info, after.editing.marks
     assert info is not None and marks is not None
-    errand = _errand(command, after, info, marks, SIZE)
+    request = request_for(command, after, info, marks, SIZE)
     if isinstance(command, edit.FindFloaters):
-        errand = edit_messages.ScoreFloaters(info.serial, info.scene, marks)
-    found = None if errand is None else chores.run(errand)
-    match found:
-        case edit_messages.SelectionFound(_, mask, combine, what):
-            return apply(after, edit.Found(mask, combine, what))
-        case edit_messages.FloatersScored(_, scores):
-            return apply(after, edit.FloatersFound(scores))
+        request = ScoreFloaters(info.serial, info.scene, marks)
+    for found in () if request is None else request.run(lambda: False):
+        after = apply(after, found)
     return after
 
 
@@ -171,7 +180,7 @@ def random_command(chance: np.random.Generator, state: State) -> do.Command:
         edit.SelectAtom(atom, combine), edit.Grow(), edit.Grow(phrase=True), edit.Invert(), edit.SelectAll(),
         edit.Deselect(), edit.Delete(), edit.Hide(), edit.Isolate(), edit.ShowAll(), edit.FindFloaters(),
         edit.SetStrictness(float(chance.uniform(1, 6))), edit.EndFloaters("select"),
-        edit.EndFloaters("delete"), edit.SetThrough(bool(chance.integers(2))),
+        edit.EndFloaters("delete"), point.SetThrough(bool(chance.integers(2))),
         edit.RenameAtom(atom, f"thing {key}"), edit.ToggleAtom(atom), edit.MergeAtoms((atom, key)),
         edit.Undo(), edit.Redo(), edit.GoTo(int(chance.integers(0, 200))),
     )  # fmt: skip

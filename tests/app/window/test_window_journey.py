@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.window import theme
+from app.window.kit import theme
 from tests.app.window import test_window
 from tests.app.window.journey import PHOTOS, lit, person, walk
 from tests.app.window.test_window import LEFT, PATIENCE, TOP, Program, x_server

@@ -16,16 +16,20 @@ from pathlib import Path
 
 import numpy as np
 
-from app.window import ask_commands as ask
 from app.window import commands as do
-from app.window import desk_commands as desk
-from app.window import edit_commands as edit
 from app.window import poses
-from app.window.editing import Region, Tool
-from app.window.export_form import What
-from app.window.recovery import Kept
+from app.window.asking import commands as ask
+from app.window.editing import commands as edit
+from app.window.editing import pointing as point
+from app.window.editing.state import Region, Tool
+from app.window.exporting import commands as export
+from app.window.exporting.state import What
+from app.window.recovery import commands as keep
+from app.window.recovery.state import Kept
+from app.window.scene import camera
+from app.window.scene import commands as show
+from app.window.scene.state import Mode
 from app.window.session import Session
-from app.window.state import Mode
 from langflash_core.resources import asset_path
 from tests.app.window.sheet import Shot, write_picture, write_sheet
 from tests.app.window.test_window import TOP, x_server
@@ -100,10 +104,10 @@ class Guide:
     def ask(self, *phrases: str) -> None:
         """These phrases instead of the present ones."""
         for key in self.keys:
-            self.tell(do.RemovePrompt(key))
+            self.tell(ask.RemovePrompt(key))
         for phrase in phrases[:-1]:
-            self.tell(do.EditPrompt(self.keys[-1], phrase), do.AddPrompt())
-        self.tell(do.EditPrompt(self.keys[-1], phrases[-1]), do.SelectPrompt(self.keys[0]))
+            self.tell(ask.EditPrompt(self.keys[-1], phrase), ask.AddPrompt())
+        self.tell(ask.EditPrompt(self.keys[-1], phrases[-1]), ask.SelectPrompt(self.keys[0]))
 
     def close(self) -> None:
         self.session.close()
@@ -113,7 +117,7 @@ class Guide:
 def hero(guide: Guide, folder: Path) -> None:
     """The first picture of the README."""
     guide.ask("plant")
-    guide.tell(do.SetMode(Mode.HEAT))
+    guide.tell(camera.SetMode(Mode.HEAT))
     guide.rest()
     write_picture(guide.screen(), folder / "hero.png")
 
@@ -123,7 +127,7 @@ def modes(guide: Guide, folder: Path) -> None:
     guide.ask(*PHRASES)
     shots = []
     for mode, caption in MODES:
-        guide.tell(ask.ShowAtom(atom_of(guide, "plant")) if mode is Mode.WEIGHT else do.SetMode(mode))
+        guide.tell(ask.ShowAtom(atom_of(guide, "plant")) if mode is Mode.WEIGHT else camera.SetMode(mode))
         guide.rest()
         shots.append(Shot(caption, guide.canvas()))
     write_sheet(shots, folder / "tour_modes.png", columns=5, width=260, numbered=False)
@@ -138,20 +142,20 @@ def atom_of(guide: Guide, word: str) -> int:
 
 def asking(guide: Guide, folder: Path) -> None:
     guide.ask("plant", "window", "armchair")
-    guide.tell(do.SetMode(Mode.LABELS))
+    guide.tell(camera.SetMode(Mode.LABELS))
     guide.rest()
     write_picture(guide.screen(), folder / "tour_ask.png")
 
 
 def pointing(guide: Guide, folder: Path) -> None:
     guide.ask("plant")
-    guide.tell(do.SetMode(Mode.RGB), edit.SetTool(Tool.POINT), edit.Ask(PLANT))
+    guide.tell(camera.SetMode(Mode.RGB), point.SetTool(Tool.POINT), point.Ask(PLANT))
     guide.until(
         lambda: bool(guide.session.state.editing.card and guide.session.state.editing.card.words), "words"
     )
     guide.steps(1.0)
     write_picture(guide.screen(), folder / "tour_point.png")
-    guide.tell(edit.CloseCard(), edit.SetTool(Tool.MOVE))
+    guide.tell(point.CloseCard(), point.SetTool(Tool.MOVE))
 
 
 def editing(guide: Guide, folder: Path) -> None:
@@ -159,15 +163,15 @@ def editing(guide: Guide, folder: Path) -> None:
     guide.tell(edit.SelectByPhrase(guide.keys[0]))
     guide.rest()
     guide.tell(
-        edit.Hide(), edit.Undo(), edit.SelectRegion(Region(brush, 40.0), "add"), edit.SetTool(Tool.BRUSH)
+        edit.Hide(), edit.Undo(), edit.SelectRegion(Region(brush, 40.0), "add"), point.SetTool(Tool.BRUSH)
     )
     guide.rest()
     write_picture(guide.screen(), folder / "tour_edit.png")
-    guide.tell(edit.GoTo(0), edit.SetTool(Tool.MOVE))
+    guide.tell(edit.GoTo(0), point.SetTool(Tool.MOVE))
 
 
 def dictionary(guide: Guide, folder: Path) -> None:
-    guide.tell(ask.OpenDictionary(True), do.SetMode(Mode.ATOMS))
+    guide.tell(ask.OpenDictionary(True), camera.SetMode(Mode.ATOMS))
     guide.until(lambda: guide.session.state.asking.insight is not None, "the atoms' description")
     guide.rest()
     write_picture(guide.screen(), folder / "tour_dictionary.png")
@@ -176,16 +180,16 @@ def dictionary(guide: Guide, folder: Path) -> None:
 
 def trust(guide: Guide, folder: Path) -> None:
     aside = poses.orbit(guide.session.state.pose, 0.35, -0.1)
-    guide.tell(do.SetMode(Mode.COVERAGE), do.MoveTo(aside))
+    guide.tell(camera.SetMode(Mode.COVERAGE), camera.MoveTo(aside))
     guide.rest()
     write_picture(guide.screen(), folder / "tour_trust.png")
-    guide.tell(do.JumpTo(0))
+    guide.tell(camera.JumpTo(0))
 
 
 def exporting(guide: Guide, folder: Path) -> None:
-    guide.tell(do.SceneSaved(Path("room.langflash")), do.SetMode(Mode.HEAT), desk.ShowExport())
-    form = replace(guide.session.state.desk.form, what=What.CUTOUT, path="plant.png")
-    guide.tell(desk.EditForm(form))
+    guide.tell(show.SceneSaved(Path("room.langflash")), camera.SetMode(Mode.HEAT), export.ShowExport())
+    form = replace(guide.session.state.exporting.form, what=What.CUTOUT, path="plant.png")
+    guide.tell(export.EditForm(form))
     guide.rest()
     write_picture(guide.screen(), folder / "tour_export.png")
     guide.tell(do.ShowDialog(None))
@@ -195,10 +199,10 @@ def recovery(guide: Guide, folder: Path) -> None:
     kept = Kept(
         tuple(map(str, PHOTOS)), (None, None), "room.langflash", name="living room", phrases=("plant",)
     )
-    guide.tell(desk.OfferSession(kept))
+    guide.tell(keep.OfferSession(kept))
     guide.steps(1.0)
     write_picture(guide.screen(), folder / "tour_recovery.png")
-    guide.tell(desk.EndSessionOffer(False))
+    guide.tell(keep.EndSessionOffer(False))
 
 
 TOUR = (hero, modes, asking, pointing, editing, dictionary, trust, exporting)
@@ -211,7 +215,7 @@ def main() -> int:
         os.environ.update(DISPLAY=display, LANGFLASH_CONFIG=place, LANGFLASH_STATE=place, HOME=place)
         guide = Guide(display)
         recovery(guide, folder)
-        guide.tell(do.OpenPaths(tuple(map(str, PHOTOS))))
+        guide.tell(show.OpenPaths(tuple(map(str, PHOTOS))))
         guide.until(lambda: guide.session.state.info is not None, "the scene")
         for each in wanted:
             each(guide, folder)

@@ -11,6 +11,7 @@ from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.lab.evaluation import rooms
+from langflash_core.lab.evaluation.calibration import calibration, rooms_asked
 from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.lab.training.shards import Label, write_shard
 from langflash_core.language.spaces import language_space
@@ -65,10 +66,11 @@ def test_a_run_measures_everything(cache: Path, weights: Path):
 
 @pytest.mark.slow
 def test_calibration_is_a_threshold_for_queries(cache: Path, weights: Path):
-    found = rooms.calibrate(load_network("mini", weights), cache)
+    network = load_network("mini", weights)
+    found = calibration(network, {"rooms": rooms_asked(network, cache)})
     assert 0 < found["threshold"] < 1
     assert found["temperature"] > 0
-    assert found["validation"]["phrases"] > 0
+    assert found["validation"]["rooms"]["phrases"] > 0
     json.dumps(found, allow_nan=False)
 
 

@@ -1,6 +1,8 @@
 """Rooms by rules: splits, boxes, outline."""
 
+import hashlib
 import itertools
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,9 +11,10 @@ import pytest
 from langflash_core.lab.rooms import HELD_OUT_LIBRARIES, TRAIN_LIBRARIES, Pack, make_room
 from langflash_core.lab.rooms.catalogue import UNSEEN
 from langflash_core.lab.rooms.layout import SLACK
-from langflash_core.lab.rooms.plan import ON_TOP, ROOM_PLANS
+from langflash_core.lab.rooms.plan import ON_TOP, ROOM_PLANS, ROOM_SHARES
 from langflash_core.lab.rooms.shell import CEILING, FLOOR, make_shell, shell_triangles
 
+HELD_OUT_ROOMS = "7bd4a45a1ae0a2c2ac462e3d24d3c19cbb2ad22d432157337c9cf29f6dd4ecd5"
 SOFT = {"bed", "sofa", "armchair", "chair", "bench"}
 
 
@@ -38,6 +41,16 @@ def test_rooms_follow_from_the_seed(pack: Pack) -> None:
     for a, b in zip(first.instances, again.instances, strict=True):
         np.testing.assert_array_equal(a.model, b.model)
     assert first.style == again.style != other.style
+
+
+def test_rooms_of_the_catalogues_are_those_of_every_version(pack: Pack) -> None:
+    """Figures of different versions compare: what is drawn by rules may change, held-out rooms may not."""
+    rooms = [make_room(seed, pack, HELD_OUT_LIBRARIES) for seed in range(40)]
+    said = [
+        (room.kind, [(i.item, i.names[0], (i.model.round(4) + 0.0).tolist()) for i in room.instances])
+        for room in rooms
+    ]
+    assert hashlib.sha256(json.dumps(said).encode()).hexdigest() == HELD_OUT_ROOMS
 
 
 def test_odds_come_from_makes_drawn_by_rules_alone(pack: Pack) -> None:
@@ -70,6 +83,11 @@ def test_boxes_do_not_intersect(pack: Pack, seed: int) -> None:
         if a.group in ON_TOP or b.group in ON_TOP:
             continue  # a small thing may sink into the box of what carries it
         assert np.any(a.low + SLACK >= b.high) or np.any(b.low + SLACK >= a.high), (a.names, b.names)
+
+
+def test_shares_are_of_the_plans() -> None:
+    assert {kind for kind, _ in ROOM_SHARES} == set(ROOM_PLANS) and len(ROOM_SHARES) == len(ROOM_PLANS)
+    assert sum(share for _, share in ROOM_SHARES) == pytest.approx(1.0, abs=1e-12)
 
 
 def test_every_plan_is_drawn(pack: Pack) -> None:

@@ -1,4 +1,4 @@
-"""Makers of more stoves, refrigerators and TV sets (see `makers.common`).
+"""Makers of stoves, refrigerators and TV sets (see `makers.common`).
 
 Metres, y up, front +z.
 """
@@ -20,6 +20,7 @@ from langflash_core.lab.rooms.makers.common import (
     plain,
     spread,
 )
+from langflash_core.lab.rooms.makers.fittings import plain_refrigerator, plain_stove, plain_tv
 from langflash_core.lab.rooms.makers.shapes import (
     BRASS,
     GLASS,
@@ -40,8 +41,10 @@ from langflash_core.lab.rooms.solids import (
 )
 
 
-def stove_more(draw: Draw) -> Design:
-    """Ranges, ovens in tall units, wood stoves, and plates to build in."""
+def stove(draw: Draw) -> Design:
+    """Mostly plain; else ranges, ovens in tall units, wood stoves, and plates to build in."""
+    if draw.chance(0.62):
+        return plain_stove(draw)
     return draw.one_of((_range, _range, _gas_stove, _built_in_oven, _built_in_oven, _wood_stove, _hob, _hob))(
         draw
     )
@@ -184,8 +187,10 @@ def _hob(draw: Draw) -> Design:
     return d
 
 
-def refrigerator_more(draw: Draw) -> Design:
-    """Side by side, round and retro, small, with a screen or a dispenser."""
+def refrigerator(draw: Draw) -> Design:
+    """Mostly plain; else side by side, round and retro, small, with a screen or a dispenser."""
+    if draw.chance(0.67):
+        return plain_refrigerator(draw)
     return draw.one_of(
         (_side_by_side, _side_by_side, _retro_fridge, _retro_fridge, _mini_bar, _glass_fridge)
     )(draw)
@@ -287,8 +292,10 @@ def _glass_fridge(draw: Draw) -> Design:
     return d
 
 
-def tv_more(draw: Draw) -> Design:
-    """Flat on feet, flat on the wall, and old tubes."""
+def tv(draw: Draw) -> Design:
+    """Mostly plain; else flat on feet, flat on the wall, and old tubes."""
+    if draw.chance(0.67):
+        return plain_tv(draw)
     return draw.one_of((_flat_tv, _flat_tv, _flat_tv, _wall_tv, _wall_tv, _tube_tv, _tube_tv))(draw)
 
 

@@ -1,4 +1,4 @@
-"""Makers of more beds (see `makers.common`).
+"""Makers of beds (see `makers.common`).
 
 Metres, y up, front +z.
 """
@@ -19,6 +19,7 @@ from langflash_core.lab.rooms.makers.common import (
     polar,
     spread,
 )
+from langflash_core.lab.rooms.makers.furniture import plain_bed
 from langflash_core.lab.rooms.makers.shapes import (
     BRASS,
     RUBBER,
@@ -68,8 +69,10 @@ def _bedding(
         d.add(shifted(cushion, place), draw.cloth())
 
 
-def bed_more(draw: Draw) -> Design:
-    """Four-poster, iron, upholstered, with drawers, for children, for the day, round."""
+def bed(draw: Draw) -> Design:
+    """Mostly plain; else four-poster, iron, upholstered, with drawers, for children, for the day, round."""
+    if draw.chance(0.69):
+        return plain_bed(draw)
     double = (_four_poster, _iron_bed, _iron_bed, _padded_bed, _padded_bed, _storage_bed, _storage_bed)
     return draw.one_of((*double, _childs_bed, _day_bed, _round_bed))(draw)
 

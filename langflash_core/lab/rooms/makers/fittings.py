@@ -50,7 +50,7 @@ def wall_cabinet(draw: Draw) -> Design:
     return d
 
 
-def refrigerator(draw: Draw) -> Design:
+def plain_refrigerator(draw: Draw) -> Design:
     """From low to tall and double: two compartments, split high or low."""
     d = Design("refrigerator", "refrigerator", ("fridge",))
     width, height, depth = draw.between(0.54, 0.92), draw.between(0.85, 2.0), draw.between(0.58, 0.72)
@@ -68,7 +68,7 @@ def refrigerator(draw: Draw) -> Design:
     return d
 
 
-def stove(draw: Draw) -> Design:
+def plain_stove(draw: Draw) -> Design:
     """An oven under four plates, with a row of knobs and sometimes a back board."""
     d = Design("stove", "stove", ("cooker", "oven"), category="Kitchen")
     width, depth = draw.between(0.5, 0.9), draw.between(0.56, 0.64)
@@ -141,7 +141,7 @@ def sink_unit(draw: Draw) -> Design:
 # ---------------------------------------------------------------------------------- bath and heating
 
 
-def sink(draw: Draw) -> Design:
+def plain_sink(draw: Draw) -> Design:
     """A wash basin on a column, on a cabinet or alone on the wall."""
     d = Design("sink", "sink", ("washbasin",))
     width, depth, top = draw.between(0.42, 0.75), draw.between(0.38, 0.5), draw.between(0.8, 0.9)
@@ -176,7 +176,7 @@ def _basin(d: Design, draw: Draw, width: float, depth: float, top: float) -> Non
     d.tube(tap, 0.014, STEEL)
 
 
-def toilet(draw: Draw) -> Design:
+def plain_toilet(draw: Draw) -> Design:
     """A bowl, its lid closed or up, with or without a cistern."""
     d = Design("toilet", "toilet", ("wc",))
     width, length, seat = draw.between(0.34, 0.4), draw.between(0.42, 0.5), draw.between(0.38, 0.44)
@@ -199,7 +199,7 @@ def toilet(draw: Draw) -> Design:
     return d
 
 
-def bathtub(draw: Draw) -> Design:
+def plain_bathtub(draw: Draw) -> Design:
     """Built in behind panels, or standing free."""
     d = Design("bathtub", "bathtub", ("bath",))
     width, length, height = draw.between(0.68, 0.85), draw.between(1.45, 1.85), draw.between(0.5, 0.62)
@@ -223,7 +223,7 @@ def bathtub(draw: Draw) -> Design:
     return d
 
 
-def shower(draw: Draw) -> Design:
+def plain_shower(draw: Draw) -> Design:
     """A tray behind glass on two or three sides, and a pipe with a head."""
     d = Design("shower", "shower", ("shower cabin",))
     width, depth, height = draw.between(0.75, 1.1), draw.between(0.75, 0.95), draw.between(1.9, 2.15)
@@ -345,7 +345,7 @@ def pendant_lamp(draw: Draw) -> Design:
 # ---------------------------------------------------------------------------------- screens and sound
 
 
-def tv(draw: Draw) -> Design:
+def plain_tv(draw: Draw) -> Design:
     """A wide screen on a foot, off or faintly lit."""
     d = Design("tv", "tv", ("television", "flat screen"))
     width = draw.between(0.65, 1.35)

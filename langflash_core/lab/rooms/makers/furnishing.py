@@ -1,4 +1,4 @@
-"""Makers of more chairs, tables, lamps, shelves, cabinets and bunk beds (see `makers.common`).
+"""Makers of chairs, tables, lamps, shelves, cabinets and bunk beds (see `makers.common`).
 
 Metres, y up, front +z.
 """
@@ -25,6 +25,8 @@ from langflash_core.lab.rooms.makers.common import (
     polar,
     spread,
 )
+from langflash_core.lab.rooms.makers.fittings import floor_lamp, pendant_lamp, table_lamp
+from langflash_core.lab.rooms.makers.furniture import plain_bookcase, plain_chair, plain_cupboard, plain_table
 from langflash_core.lab.rooms.makers.shapes import (
     BULB,
     LEAF,
@@ -128,8 +130,10 @@ def bunk_bed(draw: Draw) -> Design:
     return d
 
 
-def chair_more(draw: Draw) -> Design:
-    """Folding, shell, rocking, ladder-back, bar and bentwood chairs."""
+def chair(draw: Draw) -> Design:
+    """Mostly plain; else folding, shell, rocking, ladder-back, bar and bentwood chairs."""
+    if draw.chance(0.75):
+        return plain_chair(draw)
     styles = (_folding_chair, _shell_chair, _country_chair, _country_chair, _bar_chair, _bentwood_chair)
     return draw.one_of(styles)(draw)
 
@@ -214,12 +218,14 @@ def _bentwood_chair(draw: Draw) -> Design:
     a = np.linspace(0, np.pi, 11)
     for k in (1.0, inner):
         arch = 0.9 * k * r * np.cos(a), seat + k * tall * np.sin(a) ** 0.6, -r * 0.75 - 0.09 * k * np.sin(a)
-        d.tube(np.stack(arch, -1).tolist(), 0.012, look, 6)
+        d.tube(list(zip(*(v.tolist() for v in arch), strict=True)), 0.012, look, 6)
     return d
 
 
-def table_more(draw: Draw) -> Design:
-    """Pedestal, trestle, glass, tulip, console and side tables."""
+def table(draw: Draw) -> Design:
+    """Mostly plain; else pedestal, trestle, glass, tulip, console and side tables."""
+    if draw.chance(0.72):
+        return plain_table(draw)
     style, look, metal = draw.style(6), draw.body(), draw.legs()
     names = ("round table", "side table", "tulip table", "console table", "trestle table", "glass table")
     d = Design(names[style], "table", ("table",))
@@ -266,8 +272,10 @@ def table_more(draw: Draw) -> Design:
     return d
 
 
-def lamp_more(draw: Draw) -> Design:
-    """Desk lamps with arms, tripods, arcs, paper globes, wall lamps, chandeliers and lanterns."""
+def lamp(draw: Draw) -> Design:
+    """Mostly plain; else desk lamps with arms, tripods, arcs, paper globes, wall lamps, chandeliers."""
+    if draw.chance(0.78):
+        return draw.one_of((floor_lamp, table_lamp, pendant_lamp))(draw)
     makers = (_desk_lamp, _tripod_or_arc, _tripod_or_arc, _paper_lamp, _wall_lamp, _chandelier, _lantern)
     d = draw.one_of(makers)(draw, draw.metal() if draw.chance(0.6) else draw.painted())
     d.light, d.tags = True, ("lamp", "light")
@@ -322,7 +330,8 @@ def _paper_lamp(draw: Draw, metal: Look) -> Design:
     )
     d = Design("paper lamp" if foot else "paper pendant lamp", "lamp")
     ribs = r * np.sin(t) * (1 + 0.02 * np.cos(np.arange(25) * np.pi))
-    d.lathe(np.stack([ribs, foot + r * (1 - flat * np.cos(t))], -1).tolist(), _shade_look(draw), 18)
+    heights = foot + r * (1 - flat * np.cos(t))
+    d.lathe(list(zip(ribs.tolist(), heights.tolist(), strict=True)), _shade_look(draw), 18)
     if not foot:
         d.tube(((0, 1.7 * r, 0), (0, 2 * r + draw.between(0.1, 0.4), 0)), 0.005, DARK, 5)
     for a in spread(0, TURN, 4)[1:] if foot else ():
@@ -398,8 +407,10 @@ def _lantern(draw: Draw, metal: Look) -> Design:
     return d
 
 
-def bookcase_more(draw: Draw) -> Design:
-    """Leaning ladders, cubes, boards on the wall and corner shelves, filled or nearly empty."""
+def bookcase(draw: Draw) -> Design:
+    """Mostly plain; else leaning ladders, cubes, boards on the wall, corner shelves; full or nearly empty."""
+    if draw.chance(0.71):
+        return plain_bookcase(draw)
     style, look, frame, fill = draw.style(4), draw.body(), draw.legs(), draw.between(0.2, 1)
     name = ("ladder shelf", "corner shelf", "cube shelf", "wall shelf")[style]
     d = Design(name, "bookcase", ("shelf", "bookcase"), elevation=draw.between(1.1, 1.4) * (style == 3))
@@ -443,8 +454,10 @@ def bookcase_more(draw: Draw) -> Design:
     return d
 
 
-def cabinet_more(draw: Draw) -> Design:
-    """Ribbed sideboards, glass cabinets, buffets with an upper part, filing and shoe cabinets."""
+def cupboard(draw: Draw) -> Design:
+    """Mostly plain; else sideboards, glass cabinets, buffets with an upper part, filing and shoe cabinets."""
+    if draw.chance(0.7):
+        return plain_cupboard(draw)
     makers = (
         _sideboard_or_buffet,
         _sideboard_or_buffet,

@@ -25,7 +25,7 @@ from langflash_core.lab.rooms.solids import Vector, box, rounded, turned
 # ------------------------------------------------------------------------------------------- seating
 
 
-def chair(draw: Draw) -> Design:
+def plain_chair(draw: Draw) -> Design:
     """Dining chairs: four legs or a sled, slats, spindles, panels or a shell for a back."""
     d = Design("chair", "chair", ("dining chair",))
     width, depth, seat = draw.between(0.38, 0.52), draw.between(0.38, 0.52), draw.between(0.42, 0.49)
@@ -101,14 +101,14 @@ def office_chair(draw: Draw) -> Design:
     return d
 
 
-def armchair(draw: Draw) -> Design:
+def plain_armchair(draw: Draw) -> Design:
     """One wide soft seat between arms."""
     d = Design("armchair", "armchair", ("easy chair",))
     _couch(d, draw, 1, draw.between(0.5, 0.66))
     return d
 
 
-def sofa(draw: Draw) -> Design:
+def plain_sofa(draw: Draw) -> Design:
     """Two to four soft seats between arms."""
     d = Design("sofa", "sofa", ("couch",))
     seats = draw.count(2, 4)
@@ -235,7 +235,7 @@ def pouf(draw: Draw) -> Design:
 # -------------------------------------------------------------------------------------------- tables
 
 
-def table(draw: Draw) -> Design:
+def plain_table(draw: Draw) -> Design:
     """Dining tables: long, square or round."""
     d = Design("table", "table", ("dining table",))
     width = draw.between(0.8, 2.0)
@@ -289,7 +289,7 @@ def _table_legs(d: Design, draw: Draw, width: float, depth: float, height: float
                 d.box((width * inset * 0.92, rail, 0.02), centre, look)
 
 
-def desk(draw: Draw) -> Design:
+def plain_desk(draw: Draw) -> Design:
     """A work top on legs, on blocks of drawers or on both, sometimes a shelf above."""
     d = Design("desk", "desk", ("writing desk",))
     width, depth, height = draw.between(0.95, 1.7), draw.between(0.5, 0.8), draw.between(0.71, 0.77)
@@ -329,7 +329,7 @@ def bedside_table(draw: Draw) -> Design:
 # ---------------------------------------------------------------------------------------------- beds
 
 
-def bed(draw: Draw) -> Design:
+def plain_bed(draw: Draw) -> Design:
     """Single or double: frame, mattress, pillows, blanket; head boards of slats, panels or cushions."""
     d = Design("bed", "bed", ("double bed",))
     double = draw.chance(0.6)
@@ -397,7 +397,7 @@ def crib(draw: Draw) -> Design:
 # ------------------------------------------------------------------------------------------- storage
 
 
-def wardrobe(draw: Draw) -> Design:
+def plain_wardrobe(draw: Draw) -> Design:
     """Two to four tall doors, sometimes over drawers, sometimes under a cornice."""
     d = Design("wardrobe", "wardrobe", ("closet",))
     doors = draw.count(2, 4)
@@ -416,7 +416,7 @@ def wardrobe(draw: Draw) -> Design:
     return d
 
 
-def dresser(draw: Draw) -> Design:
+def plain_dresser(draw: Draw) -> Design:
     """Three to five rows of drawers under a top board."""
     d = Design("chest of drawers", "dresser", ("dresser",))
     columns, rows = draw.count(1, 3), draw.count(3, 5)
@@ -430,7 +430,7 @@ def dresser(draw: Draw) -> Design:
     return d
 
 
-def cupboard(draw: Draw) -> Design:
+def plain_cupboard(draw: Draw) -> Design:
     """Sideboards with drawers over their doors, and tall cupboards with two rows of doors."""
     tall = draw.chance(0.45)
     d = Design("cupboard" if tall else "sideboard", "cabinet", ("storage cabinet",))
@@ -449,7 +449,7 @@ def cupboard(draw: Draw) -> Design:
     return d
 
 
-def bookcase(draw: Draw) -> Design:
+def plain_bookcase(draw: Draw) -> Design:
     """Open shelves, more or less full of books and boxes."""
     d = Design("bookcase", "bookcase", ("shelves",))
     columns, rows = draw.count(1, 3), draw.count(2, 6)
@@ -489,7 +489,7 @@ def _books_on(
         x += thick
 
 
-def tv_stand(draw: Draw) -> Design:
+def plain_tv_stand(draw: Draw) -> Design:
     """Low compartments side by side, open or with drawers."""
     d = Design("tv stand", "tv stand", ("tv unit",))
     columns = draw.count(2, 4)

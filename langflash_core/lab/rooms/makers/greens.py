@@ -1,4 +1,4 @@
-"""Makers of more plants (see `makers.common`).
+"""Makers of plants (see `makers.common`).
 
 Metres, y up, front +z.
 """
@@ -28,6 +28,7 @@ from langflash_core.lab.rooms.makers.shapes import (
     put,
     woven,
 )
+from langflash_core.lab.rooms.makers.small import plain_plant
 from langflash_core.lab.rooms.solids import (
     Triangles,
     Vector,
@@ -44,8 +45,10 @@ from langflash_core.lab.rooms.solids import (
 _SOIL = plain((0.14, 0.10, 0.07))
 
 
-def plant_more(draw: Draw) -> Design:
-    """Each a kind that people know by its name."""
+def plant(draw: Draw) -> Design:
+    """Mostly plain; else of kinds that people know by name."""
+    if draw.chance(0.77):
+        return plain_plant(draw)
     large = (_monstera, _cactus, _palm, _ivy, _snake_plant, _fern, _ficus)
     return draw.one_of((*large, _bonsai, _bouquet, _orchid, _succulents))(draw)
 

@@ -18,7 +18,7 @@ from langflash_core.lab.rooms.makers.common import (
     plain,
 )
 from langflash_core.lab.rooms.makers.shapes import boxes
-from langflash_core.lab.rooms.makers.small import cup
+from langflash_core.lab.rooms.makers.small import plain_cup
 from langflash_core.lab.rooms.solids import Triangles, Vector, cylinder, lathe, shifted, turned
 
 _GLASS, _GOLD = plain((0.8, 0.87, 0.87), 0.8, 0.4), plain((0.75, 0.6, 0.25), 0.8)
@@ -174,7 +174,7 @@ def coffee_machine(draw: Draw) -> Design:
         d.tube([(0, y, x) for x, y, _ in _arc(0.12, 0.12, 0.045, 0.05, 0, np.pi)], 0.009, BLACK, 6)
     else:
         d.tube(((0, h * 0.6, 0.056), (0, h * 0.57, 0.056 + 0.14 * (style == 0))), 0.014, BLACK)
-        _put(d, cup(draw).parts if draw.chance(0.6) else (), (0, 0.056, 0.056), draw.between(0, 6))
+        _put(d, plain_cup(draw).parts if draw.chance(0.6) else (), (0, 0.056, 0.056), draw.between(0, 6))
     return d
 
 
@@ -397,7 +397,7 @@ def tray(draw: Draw) -> Design:
         grip = [(s * (w / 2 + y * 0.3), rim + y, x) for x, y, _ in _arc(0, 0, 0.06, 0.04, -QUARTER, QUARTER)]
         d.tube(grip, 0.006, look, 5)
     for k in range(draw.count(-2, 3)):
-        _put(d, cup(draw).parts, ((k - 1) * w * 0.26, 0.01, z * 0.17), draw.between(0, 6))
+        _put(d, plain_cup(draw).parts, ((k - 1) * w * 0.26, 0.01, z * 0.17), draw.between(0, 6))
     _put(d, teapot(draw).parts if draw.chance(0.3) else (), (0, 0.01, -z * 0.14), draw.between(0, 6))
     return d
 

@@ -1,4 +1,4 @@
-"""Makers of more sofas and armchairs (see `makers.common`).
+"""Makers of sofas and armchairs (see `makers.common`).
 
 Metres, y up, front +z.
 """
@@ -19,6 +19,7 @@ from langflash_core.lab.rooms.makers.common import (
     polar,
     spread,
 )
+from langflash_core.lab.rooms.makers.furniture import plain_armchair, plain_sofa
 from langflash_core.lab.rooms.makers.shapes import across, ball, loft, merge, mixed, pad, slab, vivid, woven
 from langflash_core.lab.rooms.solids import (
     Vector,
@@ -31,8 +32,10 @@ from langflash_core.lab.rooms.solids import (
 )
 
 
-def sofa_more(draw: Draw) -> Design:
-    """Corner sofas, chesterfields, chaises, frames with cushions, wicker."""
+def sofa(draw: Draw) -> Design:
+    """Mostly plain; else corner sofas, chesterfields, chaises, frames with cushions, wicker."""
+    if draw.chance(0.69):
+        return plain_sofa(draw)
     many = (_corner_sofa, _corner_sofa, _chesterfield, _chesterfield, _wooden_sofa, _wooden_sofa, _love_seat)
     return draw.one_of((*many, _chaise, _futon, _sectional, _wicker_sofa))(draw)
 
@@ -277,8 +280,10 @@ def _wicker_sofa(draw: Draw) -> Design:
     return d
 
 
-def armchair_more(draw: Draw) -> Design:
-    """Wing chairs, eggs, clubs, recliners, swinging frames, bean bags."""
+def armchair(draw: Draw) -> Design:
+    """Mostly plain; else wing chairs, eggs, clubs, recliners, swinging frames, bean bags."""
+    if draw.chance(0.68):
+        return plain_armchair(draw)
     many = (_wing_chair, _wing_chair, _egg_chair, _club_chair, _club_chair, _recliner, _cantilever, _bean_bag)
     return draw.one_of((*many, _wooden_armchair, _wooden_armchair, _rocking_armchair))(draw)
 

@@ -17,7 +17,7 @@ _FULL_TURN = 6.28  # radians; more digits would make other plants
 # -------------------------------------------------------------------------------------------- plants
 
 
-def plant(draw: Draw) -> Design:
+def plain_plant(draw: Draw) -> Design:
     """A pot with blades, broad leaves, a bush or a little tree, some in bloom."""
     d = Design("plant", "plant", ("potted plant", "houseplant"))
     radius, pot = draw.between(0.06, 0.18), draw.between(0.1, 0.32)
@@ -79,7 +79,7 @@ def _blade(foot: Vector, angle: float, reach: float, high: float, width: float) 
 # ------------------------------------------------------------------------------------------- vessels
 
 
-def vase(draw: Draw) -> Design:
+def plain_vase(draw: Draw) -> Design:
     """Smooth from foot over belly to neck."""
     d = Design("vase", "vase", ("flower vase",))
     height, widest = draw.between(0.14, 0.42), draw.between(0.05, 0.13)
@@ -109,7 +109,7 @@ def bottle(draw: Draw) -> Design:
     return d
 
 
-def cup(draw: Draw) -> Design:
+def plain_cup(draw: Draw) -> Design:
     """Straight or narrow at the foot, most with a handle."""
     d = Design("cup", "cup", ("mug",))
     height, radius = draw.between(0.07, 0.12), draw.between(0.033, 0.05)
@@ -148,7 +148,7 @@ def basket(draw: Draw) -> Design:
     return d
 
 
-def trash_bin(draw: Draw) -> Design:
+def plain_trash_bin(draw: Draw) -> Design:
     """A metal or painted bucket, half of them with a lid."""
     d = Design("trash bin", "trash bin", ("waste basket",))
     radius, height = draw.between(0.11, 0.2), draw.between(0.26, 0.65)
@@ -187,7 +187,7 @@ def crate(draw: Draw) -> Design:
     return d
 
 
-def clock(draw: Draw) -> Design:
+def plain_clock(draw: Draw) -> Design:
     """A round wall clock at any time of day."""
     d = Design("wall clock", "clock", ("clock",), elevation=1.6)
     radius = draw.between(0.11, 0.22)
@@ -204,7 +204,7 @@ def clock(draw: Draw) -> Design:
     return d
 
 
-def toy(draw: Draw) -> Design:
+def plain_toy(draw: Draw) -> Design:
     """A ball, or blocks side by side and on each other."""
     if draw.chance(0.5):
         d = Design("ball", "toy", ("toy ball",))

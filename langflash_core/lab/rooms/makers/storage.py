@@ -1,4 +1,4 @@
-"""Makers of more desks, wardrobes, dressers and TV stands (see `makers.common`).
+"""Makers of desks, wardrobes, dressers and TV stands (see `makers.common`).
 
 Metres, y up, front +z.
 """
@@ -19,6 +19,12 @@ from langflash_core.lab.rooms.makers.common import (
     four_legs,
     plain,
     spread,
+)
+from langflash_core.lab.rooms.makers.furniture import (
+    plain_desk,
+    plain_dresser,
+    plain_tv_stand,
+    plain_wardrobe,
 )
 from langflash_core.lab.rooms.makers.shapes import (
     BRASS,
@@ -45,8 +51,10 @@ from langflash_core.lab.rooms.solids import (
 _SHIRT = ((0.85, 0), (0.85, 0.6), (1, 0.86), (0.9, 0.94), (0.25, 1))
 
 
-def desk_more(draw: Draw) -> Design:
-    """Secretaries, corner desks, hutches, trestles, standing and school desks."""
+def desk(draw: Draw) -> Design:
+    """Mostly plain; else secretaries, corner desks, hutches, trestles, standing and school desks."""
+    if draw.chance(0.71):
+        return plain_desk(draw)
     many = (_secretary, _corner_desk, _hutch_desk, _trestle_desk, _trestle_desk, _standing_desk, _school_desk)
     return draw.one_of(many)(draw)
 
@@ -214,8 +222,10 @@ def _school_desk(draw: Draw) -> Design:
     return d
 
 
-def wardrobe_more(draw: Draw) -> Design:
-    """Sliding mirrors, open rails, country cupboards, corners, smooth fronts."""
+def wardrobe(draw: Draw) -> Design:
+    """Mostly plain; else sliding mirrors, open rails, country cupboards, corners, smooth fronts."""
+    if draw.chance(0.7):
+        return plain_wardrobe(draw)
     many = (
         _sliding_wardrobe,
         _sliding_wardrobe,
@@ -380,8 +390,10 @@ def _modern_wardrobe(draw: Draw) -> Design:
     return d
 
 
-def dresser_more(draw: Draw) -> Design:
-    """Bombé, tall, with a changing top, on legs, in colours, with a mirror."""
+def dresser(draw: Draw) -> Design:
+    """Mostly plain; else bombé, tall, with a changing top, on legs, in colours, with a mirror."""
+    if draw.chance(0.67):
+        return plain_dresser(draw)
     many = (
         _bombe,
         _tallboy,
@@ -537,8 +549,10 @@ def _mirror_dresser(draw: Draw) -> Design:
     return d
 
 
-def tv_stand_more(draw: Draw) -> Design:
-    """Low boards, racks, wall units, glass shelves."""
+def tv_stand(draw: Draw) -> Design:
+    """Mostly plain; else low boards, racks, wall units, glass shelves."""
+    if draw.chance(0.64):
+        return plain_tv_stand(draw)
     return draw.one_of((_low_board, _low_board, _tv_rack, _wall_unit, _glass_stand, _corner_stand))(draw)
 
 

@@ -30,6 +30,7 @@ from langflash_core.lab.rooms.makers.shapes import (
     torus,
     vivid,
 )
+from langflash_core.lab.rooms.makers.small import plain_toy
 from langflash_core.lab.rooms.solids import (
     box,
     cylinder,
@@ -38,8 +39,10 @@ from langflash_core.lab.rooms.solids import (
 )
 
 
-def toy_more(draw: Draw) -> Design:
-    """What children leave on the floor."""
+def toy(draw: Draw) -> Design:
+    """Mostly plain; else what children leave on the floor."""
+    if draw.chance(0.54):
+        return plain_toy(draw)
     rolling = (_toy_car, _toy_train, _rocking_horse, _toy_boat)
     still = (_doll, _dolls_house, _stacking_rings, _toy_robot, _toy_castle, _rubber_duck, _kite)
     return draw.one_of((*rolling, *still))(draw)

@@ -1,4 +1,4 @@
-"""Makers of more vases, clocks, boxes, cups and bins (see `makers.common`).
+"""Makers of vases, clocks, boxes, cups and bins (see `makers.common`).
 
 Metres, y up, front +z.
 """
@@ -41,6 +41,7 @@ from langflash_core.lab.rooms.makers.shapes import (
     torus,
     vivid,
 )
+from langflash_core.lab.rooms.makers.small import crate, plain_clock, plain_cup, plain_trash_bin, plain_vase
 from langflash_core.lab.rooms.solids import (
     Vector,
     box,
@@ -67,8 +68,10 @@ _SEGMENTS = {
 }
 
 
-def vase_more(draw: Draw) -> Design:
-    """Square, with handles, jugs, and with branches."""
+def vase(draw: Draw) -> Design:
+    """Mostly plain; else square, with handles, jugs, and with branches."""
+    if draw.chance(0.71):
+        return plain_vase(draw)
     return draw.one_of((_square_vase, _amphora, _jug, _branch_vase, _branch_vase))(draw)
 
 
@@ -193,8 +196,10 @@ def _branch_vase(draw: Draw) -> Design:
     return d
 
 
-def clock_more(draw: Draw) -> Design:
-    """Alarm, grandfather, mantel, square, cuckoo, digital."""
+def clock(draw: Draw) -> Design:
+    """Mostly plain; else alarm, grandfather, mantel, square, cuckoo, digital."""
+    if draw.chance(0.6):
+        return plain_clock(draw)
     many = (_alarm_clock, _alarm_clock, _grandfather_clock, _mantel_clock, _square_clock, _square_clock)
     return draw.one_of((*many, _cuckoo_clock, _digital_clock))(draw)
 
@@ -357,8 +362,10 @@ def _digital_clock(draw: Draw) -> Design:
     return d
 
 
-def box_more(draw: Draw) -> Design:
-    """Chests, crates, stacks, and boxes for shoes, toys and jewels."""
+def storage_box(draw: Draw) -> Design:
+    """Mostly plain; else chests, crates, stacks, and boxes for shoes, toys and jewels."""
+    if draw.chance(0.64):
+        return crate(draw)
     return draw.one_of(
         (_chest, _chest, _open_crate, _open_crate, _box_stack, _shoe_box, _toy_box, _jewellery_box)
     )(draw)
@@ -517,8 +524,10 @@ def _jewellery_box(draw: Draw) -> Design:
     return d
 
 
-def cup_more(draw: Draw) -> Design:
-    """Glasses for wine, water and beer, and small cups on saucers."""
+def cup(draw: Draw) -> Design:
+    """Mostly plain; else glasses for wine, water and beer, and small cups on saucers."""
+    if draw.chance(0.6):
+        return plain_cup(draw)
     return draw.one_of(
         (_wine_glass, _wine_glass, _tumbler, _beaker, _espresso_cup, _espresso_cup, _beer_mug, _glass_set)
     )(draw)
@@ -661,8 +670,10 @@ def _glass_set(draw: Draw) -> Design:
     return d
 
 
-def trash_bin_more(draw: Draw) -> Design:
-    """With a pedal, of wire, with a swing lid, for sorting, for the office."""
+def trash_bin(draw: Draw) -> Design:
+    """Mostly plain; else with a pedal, of wire, with a swing lid, for sorting, for the office."""
+    if draw.chance(0.64):
+        return plain_trash_bin(draw)
     return draw.one_of(
         (_pedal_bin, _pedal_bin, _wire_bin, _swing_bin, _swing_bin, _sorting_bins, _office_bin)
     )(draw)

@@ -1,4 +1,4 @@
-"""Makers of more sinks, toilets, bathtubs and showers (see `makers.common`).
+"""Makers of sinks, toilets, bathtubs and showers (see `makers.common`).
 
 Metres, y up, front +z.
 """
@@ -24,6 +24,7 @@ from langflash_core.lab.rooms.makers.common import (
     polar,
     spread,
 )
+from langflash_core.lab.rooms.makers.fittings import plain_bathtub, plain_shower, plain_sink, plain_toilet
 from langflash_core.lab.rooms.makers.shapes import (
     BRASS,
     GLASS,
@@ -86,8 +87,10 @@ def _bowl(d: Design, look: Look, size: Vector, foot: Vector, square: bool) -> No
     d.add(cylinder(0.02, 0.006, (foot[0], foot[1] + h * 0.12, foot[2]), segments=10), STEEL)
 
 
-def sink_more(draw: Draw) -> Design:
-    """On a board, on a pedestal, on the wall, double, in a corner, and old ones."""
+def sink(draw: Draw) -> Design:
+    """Mostly plain; else on a board, on a pedestal, on the wall, double, in a corner, and old ones."""
+    if draw.chance(0.64):
+        return plain_sink(draw)
     many = (_bowl_sink, _bowl_sink, _pedestal_sink, _wall_sink, _double_sink, _corner_sink, _old_sink)
     return draw.one_of(many)(draw)
 
@@ -230,8 +233,10 @@ def _old_sink(draw: Draw) -> Design:
     return d
 
 
-def toilet_more(draw: Draw) -> Design:
-    """Hung on a wall box, with a tank, old with a high tank, square; lid open or closed."""
+def toilet(draw: Draw) -> Design:
+    """Mostly plain; else hung on a wall box, with a tank, old with a high tank, square; lid up or down."""
+    if draw.chance(0.64):
+        return plain_toilet(draw)
     return draw.one_of((_hung_toilet, _hung_toilet, _tank_toilet, _tank_toilet, _old_toilet, _square_toilet))(
         draw
     )
@@ -349,8 +354,10 @@ def _square_toilet(draw: Draw) -> Design:
     return d
 
 
-def bathtub_more(draw: Draw) -> Design:
-    """Oval, on claws, in a corner, with an apron or a glass screen."""
+def bathtub(draw: Draw) -> Design:
+    """Mostly plain; else oval, on claws, in a corner, with an apron or a glass screen."""
+    if draw.chance(0.64):
+        return plain_bathtub(draw)
     return draw.one_of((_oval_tub, _oval_tub, _claw_tub, _claw_tub, _corner_tub, _apron_tub, _apron_tub))(
         draw
     )
@@ -488,8 +495,10 @@ def _apron_tub(draw: Draw) -> Design:
     return d
 
 
-def shower_more(draw: Draw) -> Design:
-    """Corner cabins, one pane with a rain head, trays with curtains."""
+def shower(draw: Draw) -> Design:
+    """Mostly plain; else corner cabins, one pane with a rain head, trays with curtains."""
+    if draw.chance(0.6):
+        return plain_shower(draw)
     return draw.one_of((_corner_shower, _corner_shower, _walk_in_shower, _walk_in_shower, _curtain_shower))(
         draw
     )

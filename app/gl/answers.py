@@ -1,0 +1,154 @@
+"""Relevance of phrases, computed from weight maps without touching a splat.
+
+Whoever answers is a class or function of the form `MakeAnswers`: shaders here, numpy in host.py, the ways
+that the bench compares in app/bench/twins.py.
+"""
+
+from collections.abc import Callable, Hashable
+
+import moderngl
+import numpy as np
+
+from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
+
+from .layout import PHRASES_A_LAYER, num_groups
+from .packed import PackedMaps, blocks
+from .painter import Painter
+from .targets import ADDED, MAXIMUM, Layers, LayerTarget
+from .weights import Maps
+
+
+class Answers:
+    """Owns the relevance of one picture size: 4 phrases a layer, float32. Subclasses fill it by `answer`.
+
+    Steps whose inputs are the same as the last time are passed over: `stale` tells.
+    """
+
+    def __init__(self, painter: Painter, size: tuple[int, int], packed: PackedMaps):
+        """packed: shared by all who answer over these maps; its maker releases it."""
+        self.painter = painter
+        self.packed = packed
+        self._relevance = Layers(painter.ctx, size, "f4")
+        self._keys: dict[str, Hashable] = {}
+
+    def run(self, compiled: CompiledQuery, maps: Maps) -> LayerTarget:
+        """Relevance of `compiled` over `maps`; 0 where no atom is in view."""
+        relevance = self._relevance.exactly(num_groups(len(compiled.prompts)))
+        if len(maps.atoms):
+            self.answer(compiled, maps, relevance)
+            return relevance
+        for group in range(relevance.num_layers):
+            relevance.layers(group, 1).clear()
+        self.forget()
+        return relevance
+
+    def answer(self, compiled: CompiledQuery, maps: Maps, into: LayerTarget) -> None:
+        """Fill `into` over maps of at least one atom."""
+        raise NotImplementedError
+
+    def stale(self, step: str, *inputs: Hashable) -> bool:
+        """Whether a step's inputs differ from the last time; they are taken as its new ones."""
+        changed = self._keys.get(step) != inputs
+        self._keys[step] = inputs
+        return changed
+
+    def forget(self) -> None:
+        """Nothing counts as computed."""
+        self._keys.clear()
+
+    def release(self) -> None:
+        self._relevance.release()
+        self.forget()
+
+
+MakeAnswers = Callable[[Painter, tuple[int, int], PackedMaps], Answers]
+AddSquares = Callable[[PackedMaps, Maps, np.ndarray, moderngl.Framebuffer], None]
+
+
+def add_squares(packed: PackedMaps, maps: Maps, factor: np.ndarray, into: moderngl.Framebuffer) -> None:
+    """|w R|^2 and the peak, added to `into`. R = L Q with triangular L: column j needs no atom before j."""
+    triangular = np.asarray(np.linalg.qr(factor.T, mode="r")).T  # (Ka, min(Ka, r))
+    for start, first, block in blocks(triangular, triangular=True):
+        first_pass = {"with_peak": float(start == 0)}
+        packed.combine(into, "norm.frag", maps, block, first, uniforms=first_pass, blend=ADDED)
+
+
+class ShaderAnswers(Answers):
+    """In shaders, from packed maps: the packing is of a view, |F|^2 of a dictionary, its inverse root and the
+    best negative's cosine of a set of negatives, relevance of the prompts. Only what changed is drawn."""
+
+    def __init__(
+        self,
+        painter: Painter,
+        size: tuple[int, int],
+        packed: PackedMaps,
+        add_squares: AddSquares = add_squares,
+    ):
+        super().__init__(painter, size, packed)
+        self._add_squares = add_squares
+        self._squares = painter.ctx.texture(size, 2, dtype="f4")
+        self._scales = painter.ctx.texture(size, 2, dtype="f4")
+        self._squares_target = painter.ctx.framebuffer([self._squares])
+        self._scales_target = painter.ctx.framebuffer([self._scales])
+
+    def answer(self, compiled: CompiledQuery, maps: Maps, into: LayerTarget) -> None:
+        factor, prompts, negatives = in_numbers(compiled, maps.atoms)
+        temperature = temperature_of(compiled)
+        dictionary = (maps.version, factor.tobytes())
+        if self.stale("norm", dictionary):
+            self._squares_target.clear()
+            self._add_squares(self.packed, maps, factor, self._squares_target)
+            self.painter.passes["norm"] += 1
+        if self.stale("scales", dictionary, negatives.tobytes()):
+            self._scale(maps, factor @ negatives.T)
+        if self.stale("prompts", dictionary, negatives.tobytes(), into, temperature, prompts.tobytes()):
+            self._compare(maps, factor @ prompts.T, temperature, into)
+
+    def _scale(self, maps: Maps, dots: np.ndarray) -> None:
+        """1 / |w R| and the largest of the negatives' cosines (Ka, M); of none where M = 0."""
+        self._scales_target.clear(0.0, -1.0)
+        for group in range(num_groups(dots.shape[1])):
+            block = dots[:, PHRASES_A_LAYER * group :][:, :PHRASES_A_LAYER]
+            filler = block[:, :1] if block.shape[1] else np.zeros((len(dots), 1))
+            block = np.concatenate((block, np.repeat(filler, PHRASES_A_LAYER - block.shape[1], 1)), 1)
+            self.packed.combine(
+                self._scales_target,
+                "scale.frag",
+                maps,
+                block,
+                textures={"squares": self._squares},
+                defines={"EMPTY_NORM": EMPTY_NORM},
+                blend=ADDED,
+                equation=MAXIMUM,
+            )
+        self.painter.passes["negatives"] += 1
+
+    def _compare(self, maps: Maps, dots: np.ndarray, temperature: float, into: LayerTarget) -> None:
+        """Relevance of prompts by their products (Ka, P) with the atoms."""
+        for group in range(into.num_layers):
+            self.packed.combine(
+                into.layers(group, 1),
+                "relevance.frag",
+                maps,
+                dots[:, PHRASES_A_LAYER * group :][:, :PHRASES_A_LAYER],
+                textures={"scales": self._scales},
+                uniforms={"temperature": temperature},
+            )
+        self.painter.passes["query"] += 1
+
+    def release(self) -> None:
+        super().release()
+        for owned in (self._squares_target, self._scales_target, self._squares, self._scales):
+            owned.release()
+
+
+def in_numbers(compiled: CompiledQuery, atoms: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Factor (Ka, r) of the atoms, prompts (P, r) and negatives (M, r) in float64."""
+    tensors = (compiled.factor, compiled.prompts, compiled.negatives)
+    factor, prompts, negatives = (values.detach().cpu().double().numpy() for values in tensors)
+    return factor[atoms], prompts, negatives
+
+
+def temperature_of(compiled: CompiledQuery) -> float:
+    """As shaders and numpy take it: 0 is the cosine mode."""
+    return float(compiled.temperature) if compiled.mode == "relevancy" else 0.0

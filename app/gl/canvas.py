@@ -1,0 +1,75 @@
+"""What renderers draw with and on: the programs of a context, and targets of one size at a time."""
+
+from typing import Literal
+
+import moderngl
+
+from langflash_core.errors import GraphicsError
+from langflash_core.graphics import OPENGL
+
+from .painter import Painter
+from .view import ViewTargets
+
+Precision = Literal["float16", "float32"]
+_DTYPES = {"float16": "f2", "float32": "f4"}
+
+
+class Canvas:
+    """Owns both. A renderer has one of its own, or shares one whose maker releases it after the renderers."""
+
+    def __init__(self, ctx: moderngl.Context, precision: Precision = "float16"):
+        """
+        Args:
+            precision: of colour and weight maps; alphas, depth and relevance are always float32.
+
+        Raises:
+            GraphicsError: the context is older than OpenGL 3.3.
+            ValueError: another precision.
+        """
+        if precision not in _DTYPES:
+            raise ValueError(f"precision: expected float16 or float32, received {precision!r}")
+        if ctx.version_code < OPENGL:
+            raise GraphicsError(
+                f"OpenGL {ctx.version_code / 100:.1f} is too old for splatting, 3.3 is needed; "
+                "update the graphics driver"
+            )
+        self.painter = Painter(ctx)
+        self.precision = precision
+        self._view: ViewTargets | None = None
+
+    def view(self, size: tuple[int, int]) -> ViewTargets:
+        """The targets of (width, height) pixels; those of another size are given back.
+
+        Raises:
+            ValueError: the size has no pixels.
+            GraphicsError: it is larger than the driver's textures.
+        """
+        if self._view is None or self._view.size != size:
+            _check(size, self.painter.ctx.info["GL_MAX_TEXTURE_SIZE"])
+            self._drop()
+            self._view = ViewTargets(self.painter, size, _DTYPES[self.precision])
+        return self._view
+
+    def holds(self, view: ViewTargets) -> bool:
+        """Whether these targets are still there to be read."""
+        return self._view is view
+
+    def _drop(self) -> None:
+        if self._view is not None:
+            self._view.release()
+        self._view = None
+
+    def release(self) -> None:
+        """Give everything back; what is drawn next makes it anew."""
+        self._drop()
+        self.painter.release()
+
+
+def _check(size: tuple[int, int], limit: int) -> None:
+    if min(size) < 1:
+        raise ValueError(f"camera: expected at least 1 x 1 pixels, received {size[0]} x {size[1]}")
+    if max(size) > limit:
+        raise GraphicsError(
+            f"an image of {size[0]} x {size[1]} is larger than this driver's {limit} pixels a side; "
+            "choose a smaller size"
+        )

@@ -1,0 +1,34 @@
+"""The splat pass that every picture begins with: colour and depth, in the fast mode numbers beside them."""
+
+import moderngl
+import numpy as np
+
+from langflash_core.graphics import Programs, set_uniforms
+
+from .layout import ATOMS_A_LAYER
+from .splats import SplatBuffers
+from .targets import PREMULTIPLIED, drawing
+
+
+def draw_colour(
+    programs: Programs,
+    splats: SplatBuffers,
+    into: moderngl.Framebuffer,
+    numbers: np.ndarray | None = None,
+) -> None:
+    """Splat the Gaussians, ordered and projected, into a framebuffer whose size the projection was for.
+
+    Args:
+        numbers: (N, 3 L) that the Gaussians carry into L layers behind colour and depth.
+    """
+    defines: dict[str, float] = {"COLOUR": 1}
+    num_layers = 0 if numbers is None else numbers.shape[1] // ATOMS_A_LAYER
+    if num_layers:
+        defines["LAYERS"] = num_layers
+    program = programs.get("quad.vert", "colour.frag", defines)
+    set_uniforms(program, image_size=tuple(float(n) for n in into.size))
+    into.clear()
+    with drawing(into, PREMULTIPLIED):
+        if len(splats.order):
+            carried = None if numbers is None else splats.in_order(numbers)
+            splats.draw(program, carried, num_layers)

@@ -1,0 +1,39 @@
+"""What lives as long as the question: the phrases, who answers them, what Gaussians carry for them."""
+
+from itertools import count
+
+import numpy as np
+
+from langflash_core.language.relevance import CompiledQuery
+
+from .answers import MakeAnswers
+from .fast import MAX_PHRASES, splat_numbers
+from .scene import Level
+
+_names = count(1)
+
+
+class Question:
+    """Phrases compiled for one dictionary. `key` names the question; `answers` makes who answers it."""
+
+    def __init__(self, compiled: CompiledQuery, answers: MakeAnswers):
+        self.compiled = compiled
+        self.answers = answers
+        self.key = next(_names)
+        self._numbers: tuple[Level, np.ndarray] | None = None
+
+    @property
+    def num_phrases(self) -> int:
+        return len(self.compiled.prompts)
+
+    @property
+    def fits_fast(self) -> bool:
+        """Whether the fast mode has numbers enough for the phrases, of a scene that has atoms."""
+        return self.compiled.factor.shape[0] > 0 and self.num_phrases <= MAX_PHRASES
+
+    def numbers(self, level: Level) -> np.ndarray:
+        """What each Gaussian of a level carries in the fast mode (fast.py), (N, 3 L); kept for one level."""
+        if self._numbers is None or self._numbers[0] is not level:
+            factor = self.compiled.factor.detach().cpu().double().numpy()
+            self._numbers = level, splat_numbers(level.splats, self.compiled, level.norms(factor))
+        return self._numbers[1]

@@ -1,0 +1,87 @@
+"""What lives as long as the picture's size: colour, depth, weight maps, relevance, pictures to show."""
+
+from .answers import Answers, MakeAnswers
+from .colour import draw_colour
+from .display import Display
+from .fast import FastPasses
+from .packed import PackedMaps
+from .painter import Painter
+from .question import Question
+from .scene import Level
+from .targets import ColourTarget, LayerTarget
+from .weights import WeightMaps
+
+
+class ViewTargets:
+    """Owns every texture of one picture size. Each knows by key what it shows and is drawn only for another.
+
+    Several renderers may draw into the same: keys are given once, so none takes another's for its own.
+    """
+
+    def __init__(self, painter: Painter, size: tuple[int, int], dtype: str):
+        self.size = size
+        self.colour = ColourTarget(painter.ctx, size, dtype)
+        self.maps = WeightMaps(painter, size, dtype)
+        self.packed = PackedMaps(painter, size)
+        self.display = Display(painter, size, self.packed)
+        self._painter = painter
+        self._dtype = dtype
+        self._shown = 0  # places in `colour`
+        self._answers: dict[MakeAnswers, Answers] = {}
+        self._fast: FastPasses | None = None
+
+    def draw_colour(self, level: Level) -> None:
+        """Colour and depth of the level as it stands, unless they are there."""
+        if self._shown == level.places_key:
+            return
+        draw_colour(self._painter.programs, level.splats, self.colour.framebuffer)
+        self._painter.passes["colour"] += 1
+        self._shown = level.places_key
+
+    def exact(self, question: Question, level: Level) -> LayerTarget:
+        """Relevance from the weight maps, which are drawn unless they are there."""
+        return self.answers(question.answers).run(question.compiled, self.maps.of(level))
+
+    def fast(self, question: Question, level: Level) -> LayerTarget:
+        """Relevance from numbers beside the colour: all three in one splat pass, unless they are there."""
+        passes = self._fast_passes(question.num_phrases)
+        shown = (level.places_key, question.key)
+        if passes.shows != shown:
+            numbers = question.numbers(level)
+            draw_colour(self._painter.programs, level.splats, passes.framebuffer, numbers)
+            self._painter.passes["colour"] += 1
+            self._shown, passes.shows = level.places_key, shown
+            passes.run(question.compiled)
+        return passes.relevance
+
+    def answers(self, make: MakeAnswers) -> Answers:
+        """Who answers so, over these targets; made once."""
+        if make not in self._answers:
+            self._answers[make] = make(self._painter, self.size, self.packed)
+        return self._answers[make]
+
+    def forget_answers(self) -> None:
+        """The next question is answered from the weight maps alone, as the first of a view."""
+        self.packed.forget()
+        for answers in self._answers.values():
+            answers.forget()
+
+    def _fast_passes(self, num_phrases: int) -> FastPasses:
+        if self._fast is None or self._fast.num_phrases != num_phrases:
+            self._release_fast()
+            self._fast = FastPasses(self._painter, self.colour, self._dtype, num_phrases)
+        return self._fast
+
+    def _release_fast(self) -> None:
+        if self._fast is not None:
+            self._fast.release()
+        self._fast = None
+
+    def release(self) -> None:
+        """Give every texture back."""
+        for answers in self._answers.values():
+            answers.release()
+        self._answers.clear()
+        self._release_fast()
+        for owned in (self.display, self.packed, self.maps, self.colour):
+            owned.release()

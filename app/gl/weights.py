@@ -1,0 +1,96 @@
+"""Weight maps W_k(p) of the atoms in view: drawn in passes of `layout.ATOMS_A_PASS`, read back on request."""
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from langflash_core.graphics import set_uniforms
+
+from .layout import ATOMS_A_LAYER, ATOMS_A_PASS, LAYERS_A_PASS, num_layers
+from .painter import Painter
+from .scene import Level
+from .splats import SplatBuffers
+from .targets import PREMULTIPLIED, Layers, LayerTarget, drawing, read
+
+
+@dataclass(frozen=True)
+class Maps:
+    """Weight maps of one view: `atoms` (Ka,) in view, three a layer of `layers`, which is none of
+    theirs where Ka is 0; `version` names their content."""
+
+    layers: LayerTarget
+    atoms: np.ndarray
+    version: int
+
+    @property
+    def array(self) -> moderngl.TextureArray:
+        return self.layers.array
+
+    @property
+    def num_layers(self) -> int:
+        """Layers that hold atoms; the array may have more."""
+        return num_layers(len(self.atoms))
+
+    def read(self, num_atoms: int) -> np.ndarray:
+        """(H, W, K) float32; 0 for atoms out of view."""
+        width, height, _ = self.array.size
+        maps = np.zeros((height, width, num_atoms), np.float32)
+        if len(self.atoms):
+            layers = read(self.array).reshape(-1, height, width, 4)[..., :ATOMS_A_LAYER]
+            flat = np.moveaxis(layers, 0, 2).reshape(height, width, -1)
+            maps[..., self.atoms] = flat[..., : len(self.atoms)]
+        return maps
+
+    def pixel(self, x: int, y: int, num_atoms: int) -> np.ndarray:
+        """(K,) float32 of one pixel; 0 for atoms out of view."""
+        weights = np.zeros(num_atoms, np.float32)
+        for first in range(0, self.num_layers, LAYERS_A_PASS):
+            texels = self.layers.texel(first, min(LAYERS_A_PASS, self.num_layers - first), x, y)
+            atoms = self.atoms[ATOMS_A_LAYER * first :][: ATOMS_A_LAYER * len(texels)]
+            weights[atoms] = texels[:, :ATOMS_A_LAYER].reshape(-1)[: len(atoms)]
+        return weights
+
+
+class WeightMaps:
+    """Owns the layers; draws them once for each order of a level."""
+
+    def __init__(self, painter: Painter, size: tuple[int, int], dtype: str):
+        self._painter = painter
+        self._size = size
+        self._layers = Layers(painter.ctx, size, dtype)
+        self._maps: Maps | None = None
+
+    def shows(self, level: Level) -> bool:
+        """Whether the maps are those of the level as it stands."""
+        return self._maps is not None and self._maps.version == level.order_key
+
+    def of(self, level: Level) -> Maps:
+        """The maps of the level as it stands, drawn unless they are there."""
+        if self._maps is None or self._maps.version != level.order_key:
+            self._maps = self._drawn(level)
+        return self._maps
+
+    def _drawn(self, level: Level) -> Maps:
+        atoms = level.splats.active_atoms()
+        whole_passes = -(-len(atoms) // ATOMS_A_PASS) * LAYERS_A_PASS
+        layers = self._layers.at_least(max(1, whole_passes))
+        for first in range(0, len(atoms), ATOMS_A_PASS):
+            self._draw(level.splats, layers, atoms, first)
+        return Maps(layers, atoms, level.order_key)
+
+    def _draw(self, splats: SplatBuffers, layers: LayerTarget, atoms: np.ndarray, first: int) -> None:
+        """One pass, of the atoms from place `first` on."""
+        count = num_layers(min(ATOMS_A_PASS, len(atoms) - first))
+        expanded = splats.expand(atoms, first, count)
+        program = self._painter.programs.get("quad.vert", "weights.frag", {"LAYERS": count})
+        set_uniforms(program, image_size=tuple(float(n) for n in self._size))
+        target = layers.layers(first // ATOMS_A_LAYER, count)
+        target.clear()
+        with drawing(target, PREMULTIPLIED):
+            splats.draw(program, expanded, count, colour=False)
+        self._painter.passes["weights"] += 1
+
+    def release(self) -> None:
+        self._layers.release()
+        self._maps = None

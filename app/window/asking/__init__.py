@@ -1,0 +1,1 @@
+"""Phrases, their answers, the dictionary."""

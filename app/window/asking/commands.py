@@ -1,0 +1,312 @@
+"""What can happen while asking: phrases, their answers, the dictionary."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..scene.state import Mode
+from ..state import State
+from .prompt_sets import MOST_PROMPTS, PromptSet
+from .state import MOST_RECENT, PALETTE, Histogram, Insight, Prompt
+
+if TYPE_CHECKING:
+    from langflash_core.language.relevance import CompiledQuery
+
+
+def change(state: State, **changes) -> State:
+    """The state with another asking half."""
+    return replace(state, asking=replace(state.asking, **changes))
+
+
+# Phrases
+
+
+@dataclass(frozen=True)
+class AddPrompt:
+    """A new, empty row in a colour of its own."""
+
+    def apply(self, state: State) -> State:
+        used = {p.colour for p in state.prompts}
+        free = [c for c in PALETTE if c not in used] or [PALETTE[len(state.prompts) % len(PALETTE)]]
+        prompt = Prompt(state.next_key, colour=free[0])
+        prompts = (*state.prompts, prompt)
+        return replace(state, prompts=prompts, active=prompt.key, next_key=state.next_key + 1)
+
+
+@dataclass(frozen=True)
+class RemovePrompt:
+    """The last row is emptied, never removed."""
+
+    key: int
+
+    def apply(self, state: State) -> State:
+        prompts = tuple(p for p in state.prompts if p.key != self.key)
+        if not prompts:
+            prompts = (Prompt(state.next_key),)
+            state = replace(state, next_key=state.next_key + 1)
+        active = state.active if any(p.key == state.active for p in prompts) else prompts[0].key
+        return _with_prompts(replace(state, active=active), prompts)
+
+
+@dataclass(frozen=True)
+class EditPrompt:
+    """New text; the old answer no longer holds. The first phrase turns the heat-map on."""
+
+    key: int
+    text: str
+
+    def apply(self, state: State) -> State:
+        after = _change_prompt(state, self.key, text=self.text, score=None, like=b"")
+        first = not state.asked and bool(after.asked)
+        mode = Mode.HEAT if first and state.mode is Mode.RGB else after.mode
+        return replace(after, mode=mode, active=self.key)
+
+
+@dataclass(frozen=True)
+class ColourPrompt:
+    """Another colour, sRGB in [0, 1]."""
+
+    key: int
+    colour: tuple[float, float, float]
+
+    def apply(self, state: State) -> State:
+        return _change_prompt(state, self.key, colour=self.colour)
+
+
+@dataclass(frozen=True)
+class SetThreshold:
+    """None goes back to the calibrated threshold."""
+
+    key: int
+    threshold: float | None
+
+    def apply(self, state: State) -> State:
+        return _change_prompt(state, self.key, threshold=self.threshold)
+
+
+@dataclass(frozen=True)
+class ShowPrompt:
+    """Ask a phrase, or leave it out."""
+
+    key: int
+    visible: bool
+
+    def apply(self, state: State) -> State:
+        return _change_prompt(state, self.key, visible=self.visible)
+
+
+@dataclass(frozen=True)
+class SelectPrompt:
+    """The prompt whose heat-map is on show."""
+
+    key: int
+
+    def apply(self, state: State) -> State:
+        return replace(state, active=self.key)
+
+
+@dataclass(frozen=True)
+class SetNegatives:
+    """What relevancy is measured against; nothing: what the scene's calibration says."""
+
+    negatives: tuple[str, ...]
+
+    def apply(self, state: State) -> State:
+        return replace(state, negatives=self.negatives)
+
+
+@dataclass(frozen=True)
+class Remember:
+    """A phrase was asked: the first of the recent ones."""
+
+    text: str
+
+    def apply(self, state: State) -> State:
+        text = " ".join(self.text.split())
+        if not text:
+            return state
+        others = (t for t in state.asking.recent if t != text)
+        return change(state, recent=(text, *others)[:MOST_RECENT])
+
+
+@dataclass(frozen=True)
+class AskAgain:
+    """A recent phrase, in the first empty row or in a new one."""
+
+    text: str
+
+    def apply(self, state: State) -> State:
+        empty = next((p for p in state.prompts if not p.text.strip()), None)
+        if empty is None and len(state.prompts) >= MOST_PROMPTS:
+            return state
+        prompts, key = state.prompts, state.next_key
+        if empty is None:
+            used = {p.colour for p in prompts}
+            colour = next((c for c in PALETTE if c not in used), PALETTE[len(prompts) % len(PALETTE)])
+            calibrated = prompts[0].calibrated
+            prompts = (*prompts, Prompt(key, self.text, colour, calibrated=calibrated))
+        else:
+            key = empty.key
+            asked = replace(empty, text=self.text, score=None, visible=True)
+            prompts = tuple(asked if p.key == key else p for p in prompts)
+        mode = Mode.HEAT if state.mode is Mode.RGB and not state.asked else state.mode
+        after = replace(state, prompts=prompts, active=key, mode=mode, next_key=state.next_key + 1)
+        return Remember(self.text).apply(after)
+
+
+@dataclass(frozen=True)
+class SavePrompts:
+    """Write the prompts to `path` (the worker does)."""
+
+    path: Path
+
+    def apply(self, state: State) -> State:
+        return replace(change(state, prompts_path=self.path), dialog=None)
+
+
+@dataclass(frozen=True)
+class LoadPrompts:
+    """Read prompts from `path` (the worker does)."""
+
+    path: Path
+
+    def apply(self, state: State) -> State:
+        return replace(state, dialog=None)
+
+
+@dataclass(frozen=True)
+class PromptsRead:
+    """A prompt set takes the place of the present prompts."""
+
+    path: Path
+    chosen: PromptSet
+
+    def apply(self, state: State) -> State:
+        first, calibrated = state.next_key, state.prompts[0].calibrated
+        prompts = tuple(
+            replace(p, key=first + place, calibrated=calibrated)
+            for place, p in enumerate(self.chosen.prompts)
+        )
+        mode = Mode.LABELS if state.mode is Mode.RGB else state.mode
+        state = replace(
+            state,
+            prompts=prompts,
+            active=first,
+            next_key=first + len(prompts),
+            negatives=self.chosen.negatives or state.negatives,
+            mode=mode,
+        )
+        return change(state, prompts_path=self.path)
+
+
+# Answers
+
+
+@dataclass(frozen=True)
+class Answered:
+    """Scores in the view on show: (key, text, score); a prompt edited meanwhile keeps none."""
+
+    scores: tuple[tuple[int, str, float], ...]
+
+    def apply(self, state: State) -> State:
+        current = {p.key: p.text.strip() for p in state.prompts}
+        for key, text, score in self.scores:
+            if current.get(key) == text:
+                state = _change_prompt(state, key, score=score)
+        return state
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """The threshold that the scene and its language space were calibrated to."""
+
+    threshold: float
+
+    def apply(self, state: State) -> State:
+        return _with_prompts(state, tuple(replace(p, calibrated=self.threshold) for p in state.prompts))
+
+
+@dataclass(frozen=True)
+class PhrasesCompiled:
+    """The phrases `keys`, in the order of `query`, are ready to be asked."""
+
+    keys: tuple[int, ...]
+    query: "CompiledQuery" = field(compare=False, repr=False)
+
+    def apply(self, state: State) -> State:
+        state = Calibrated(self.query.threshold).apply(state)
+        return state if state.negatives else change(state, usual=self.query.negative_texts)
+
+
+@dataclass(frozen=True)
+class Binned:
+    """How the pixels of the view on show score."""
+
+    histograms: tuple[Histogram, ...]
+
+    def apply(self, state: State) -> State:
+        return change(state, histograms=self.histograms)
+
+
+# The dictionary
+
+
+@dataclass(frozen=True)
+class OpenDictionary:
+    """Show the atoms, or no longer; the next session begins so too."""
+
+    opened: bool
+
+    def apply(self, state: State) -> State:
+        wanted = replace(state.preferences, dictionary_open=self.opened)
+        return replace(state, preferences=wanted)
+
+
+@dataclass(frozen=True)
+class AtomsDescribed:
+    """The worker has looked the atoms over."""
+
+    insight: Insight
+
+    def apply(self, state: State) -> State:
+        return change(state, insight=self.insight)
+
+
+@dataclass(frozen=True)
+class ShowAtom:
+    """Show one atom's weight map."""
+
+    atom: int
+
+    def apply(self, state: State) -> State:
+        if state.info is None or not 0 <= self.atom < state.info.num_atoms:
+            return state
+        return replace(change(state, atom=self.atom), mode=Mode.WEIGHT)
+
+
+@dataclass(frozen=True)
+class ChooseAtom:
+    """Mark an atom for merging, or no longer; the first marked keeps its name."""
+
+    atom: int
+    chosen: bool
+
+    def apply(self, state: State) -> State:
+        others = tuple(k for k in state.asking.chosen if k != self.atom)
+        return change(state, chosen=(*others, self.atom) if self.chosen else others)
+
+
+@dataclass(frozen=True)
+class ChooseNone:
+    """No atom is marked for merging."""
+
+    def apply(self, state: State) -> State:
+        return change(state, chosen=())
+
+
+def _with_prompts(state: State, prompts: tuple[Prompt, ...]) -> State:
+    return replace(state, prompts=prompts)
+
+
+def _change_prompt(state: State, key: int, **changes) -> State:
+    return _with_prompts(state, tuple(replace(p, **changes) if p.key == key else p for p in state.prompts))

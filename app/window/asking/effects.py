@@ -1,0 +1,72 @@
+"""What asking asks of the world: the worker for compiled phrases and scores, the renderer for the picture."""
+
+from ..commands import Command
+from ..effects import Effects, Hands
+from ..scene.commands import SceneArrived
+from ..state import State
+from ..viewport import Viewport
+from .commands import EditPrompt, LoadPrompts, PhrasesCompiled, SavePrompts, SetNegatives
+from .prompt_sets import PromptSet
+from .work import Answer, DescribeAtoms, Encode, ReadPrompts, WritePrompts
+
+DEBOUNCE_SECONDS = 0.12  # of typing
+
+
+class AskingEffects(Effects):
+    """Asks what is in force a moment after the last keystroke, and each picture at rest for its scores."""
+
+    def __init__(self, hands: Hands, viewport: Viewport) -> None:
+        self._hands = hands
+        self._viewport = viewport
+        self._encode_at = float("inf")
+
+    @property
+    def due(self) -> float:
+        """When the phrases in force are to be compiled."""
+        return self._encode_at
+
+    def tick(self, state: State, now: float) -> None:
+        """Send the phrases in force to the worker."""
+        if now < self._encode_at:
+            return
+        self._encode_at = float("inf")
+        info, asked = state.info, state.asked
+        if info is None or info.num_atoms == 0 or not asked:
+            self._viewport.ask((), None)
+            return
+        keys, texts = tuple(p.key for p in asked), tuple(p.text.strip() for p in asked)
+        likes, marks = tuple(p.like for p in asked), state.editing.marks
+        self._hands.submit(Encode(info.serial, info.scene, keys, texts, state.negatives, likes, marks))
+
+    def follow(self, command: Command, before: State, state: State) -> None:
+        """Prompt sets to the disk and from it; compiled phrases to the renderer."""
+        submit = self._hands.submit
+        match command:
+            case SceneArrived(info):
+                submit(DescribeAtoms(info.serial, info.scene))
+            case SavePrompts(path):
+                submit(WritePrompts(PromptSet(state.prompts, state.negatives), path))
+            case LoadPrompts(path):
+                submit(ReadPrompts(path))
+            case PhrasesCompiled(keys, query):
+                self._viewport.ask(keys, query)
+            case _:
+                pass
+        if _question(before) != _question(state):
+            pause = DEBOUNCE_SECONDS if isinstance(command, EditPrompt | SetNegatives) else 0.0
+            self._encode_at = self._hands.now() + pause
+
+    def after_picture(self, state: State) -> None:
+        """Have the view on show scored, once it rests."""
+        view = self._viewport.view(state)
+        if view is not None:
+            self._hands.submit(
+                Answer(view.serial, view.keys, view.relevance, view.frame, view.camera, view.query)
+            )
+
+
+def _question(state: State) -> tuple:
+    """What an encoding depends on."""
+    serial = state.info.serial if state.info else 0
+    atoms = state.editing.marks.atoms if state.editing.marks else ()
+    return serial, tuple((p.key, p.text.strip(), p.like) for p in state.asked), state.negatives, atoms

@@ -1,0 +1,135 @@
+"""The questions: one row per phrase with its colour, score and threshold; the negatives below."""
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
+
+from ... import commands as do
+from ...editing import commands as edit
+from ...kit import theme, widgets
+from ...kit.look import Look
+from ...state import State
+from .. import commands as ask
+from ..state import Prompt, usable
+from . import entry, scores
+
+_SWATCH = imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label | imgui.ColorEditFlags_.no_tooltip
+
+
+def draw(state: State, look: Look) -> list[do.Command]:
+    """The prompts section."""
+    issued: list[do.Command] = []
+    widgets.heading("Find")
+    caret = state.prompts[-1].key if entry.take_caret(state) else None
+    for prompt in state.prompts:
+        imgui.push_id(prompt.key)
+        issued += _row(state, prompt, look, prompt.key == caret)
+        imgui.pop_id()
+    issued += entry.tools(state, look)
+    issued += scores.draw(state, look)
+    widgets.gap(look.px(2))
+    issued += _negatives(state)
+    return issued
+
+
+def _row(state: State, prompt: Prompt, look: Look, caret: bool) -> list[do.Command]:
+    corner = imgui.get_cursor_screen_pos()
+    issued = _phrase(state, prompt, look, caret)
+    issued += _row_buttons(state, prompt, look)
+    if prompt.text.strip() and prompt.visible and state.info is not None:
+        issued += _verdict(prompt, look)
+    shown = state.active_prompt
+    if shown is not None and shown.key == prompt.key and len(state.asked) > 1:
+        end = ImVec2(corner.x - look.px(6), imgui.get_cursor_screen_pos().y - look.px(10))
+        start = ImVec2(end.x - look.px(3), corner.y)
+        imgui.get_window_draw_list().add_rect_filled(start, end, widgets.u32(theme.ACCENT), look.px(2))
+    return issued
+
+
+def _phrase(state: State, prompt: Prompt, look: Look, caret: bool) -> list[do.Command]:
+    """Its colour and its words."""
+    issued: list[do.Command] = []
+    changed, colour = imgui.color_edit3("##colour", list(prompt.colour), _SWATCH)
+    if changed:
+        red, green, blue = colour
+        issued.append(ask.ColourPrompt(prompt.key, (red, green, blue)))
+    imgui.same_line()
+    imgui.set_next_item_width(imgui.get_content_region_avail().x - 3 * look.px(38))
+    frame = theme.LINE if prompt.like else theme.RAISED  # a chip that stands for a place, not for its words
+    if caret:
+        imgui.set_keyboard_focus_here()
+    with widgets.colours(frame_bg=frame):
+        changed, text = entry.field(state, prompt)
+    issued += entry.remembered(text)
+    if prompt.like:
+        widgets.tooltip("Asks for what the place you clicked says; type to ask for words instead")
+    if imgui.is_item_activated() and state.active != prompt.key:
+        issued.append(ask.SelectPrompt(prompt.key))
+    if changed:
+        issued.append(ask.EditPrompt(prompt.key, text))
+    return issued
+
+
+def _row_buttons(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
+    """Ask or not, select what it means, remove."""
+    issued: list[do.Command] = []
+    imgui.same_line(0, look.px(2))
+    eye = fa.ICON_FA_EYE if prompt.visible else fa.ICON_FA_EYE_SLASH
+    if widgets.quiet_button(f"{eye}##eye", "Ask, or leave out"):
+        issued.append(ask.ShowPrompt(prompt.key, not prompt.visible))
+    imgui.same_line(0, look.px(2))
+    tip = "Select the Gaussians that this phrase means; Shift adds, Ctrl removes"
+    if widgets.quiet_button(f"{fa.ICON_FA_DRAW_POLYGON}##select", tip) and prompt.text.strip():
+        io = imgui.get_io()
+        combine = "add" if io.key_shift else "remove" if io.key_ctrl else state.editing.combine
+        issued.append(edit.SelectByPhrase(prompt.key, combine))
+    imgui.same_line(0, look.px(2))
+    if widgets.quiet_button(f"{fa.ICON_FA_XMARK}##remove", "Remove"):
+        issued.append(ask.RemovePrompt(prompt.key))
+    return issued
+
+
+def _verdict(prompt: Prompt, look: Look) -> list[do.Command]:
+    """Found or not with the score, then the threshold slider."""
+    issued: list[do.Command] = []
+    imgui.indent(look.px(36))
+    if not usable(prompt.text):
+        entry.unfinished_hint()
+        imgui.unindent(look.px(36))
+        return issued
+    imgui.align_text_to_frame_padding()
+    if prompt.score is None:
+        imgui.text_colored(theme.MUTED, "...")
+    elif prompt.found:
+        imgui.text_colored(theme.GOOD, f"{fa.ICON_FA_CHECK} found")
+    else:
+        imgui.text_colored(theme.BAD, f"{fa.ICON_FA_XMARK} not found")
+    if prompt.score is not None:
+        imgui.same_line()
+        imgui.text_colored(theme.MUTED, f"{prompt.score:.2f}")
+    imgui.same_line(look.px(182))
+    width = imgui.get_content_region_avail().x
+    tip = "Found from this score on"
+    changed, cut = widgets.slider("##threshold", prompt.cut, (0.0, 1.0), f"{prompt.cut:.2f}", tip, width)
+    if changed:
+        issued.append(ask.SetThreshold(prompt.key, cut))
+    if prompt.threshold is not None and imgui.button(f"{fa.ICON_FA_ROTATE_LEFT}  Calibrated threshold"):
+        issued.append(ask.SetThreshold(prompt.key, None))
+    imgui.unindent(look.px(36))
+    return issued
+
+
+def _negatives(state: State) -> list[do.Command]:
+    issued: list[do.Command] = []
+    shape = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
+    with widgets.colours(text=theme.MUTED):
+        opened = imgui.tree_node_ex("Compared with", shape)
+    if not opened:
+        return issued
+    widgets.muted("A phrase counts where it fits better than each of these, separated by commas.")
+    imgui.set_next_item_width(-1)
+    changed, text = imgui.input_text("##negatives", ", ".join(state.negatives or state.asking.usual))
+    if changed:
+        issued.append(ask.SetNegatives(tuple(part.strip() for part in text.split(",") if part.strip())))
+    if state.negatives and imgui.button("Back to the usual ones"):
+        issued.append(ask.SetNegatives(()))
+    return issued

@@ -1,0 +1,74 @@
+"""How the pixels of the view score for the active phrase, with its threshold as a line to drag."""
+
+import numpy as np
+from imgui_bundle import ImVec2, imgui, implot
+
+from ... import commands as do
+from ...kit import theme, widgets
+from ...kit.look import Look
+from ...state import State
+from .. import commands as ask
+from ..state import BINS, Prompt
+
+_HEIGHT = 78.0  # design pixels
+_PLOT = implot.Flags_.canvas_only | implot.Flags_.no_frame
+_AXIS = implot.AxisFlags_.no_grid_lines | implot.AxisFlags_.no_tick_marks | implot.AxisFlags_.lock
+_BARE = _AXIS | implot.AxisFlags_.no_tick_labels
+MIDDLES = np.arange(BINS) / BINS + 0.5 / BINS  # the bins' middles
+
+
+def draw(state: State, look: Look) -> list[do.Command]:
+    """The histogram; nothing before an answer."""
+    prompt = state.active_prompt
+    found = None if prompt is None else state.asking.histogram(prompt.key, prompt.text)
+    if prompt is None or found is None:
+        return []
+    widgets.gap(look.px(2))
+    shape = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
+    with widgets.colours(text=theme.MUTED):
+        room = imgui.get_content_region_avail().x - look.px(30)
+        title = widgets.shortened(f"Scores of {prompt.text.strip()}", room)
+        opened = imgui.tree_node_ex(f"{title}###scores", shape | imgui.TreeNodeFlags_.default_open)
+    if not opened:
+        return []
+    return _plot(prompt, np.array(found.counts, float), look)
+
+
+def _plot(prompt: Prompt, counts: np.ndarray, look: Look) -> list[do.Command]:
+    """Bars as high as the logarithm of their pixels, so that small things show beside a large rest."""
+    issued: list[do.Command] = []
+    heights = np.log1p(counts)
+    top = max(float(heights.max()), 1.0) * 1.08
+    implot.push_style_var(implot.StyleVar_.plot_padding, look.vec(2, 2))
+    implot.push_style_color(implot.Col_.plot_bg, theme.CANVAS)
+    implot.push_style_color(implot.Col_.plot_border, theme.CANVAS)
+    if implot.begin_plot("##scores", ImVec2(-1, look.px(_HEIGHT)), _PLOT):
+        implot.setup_axes("", "", _AXIS, _BARE)
+        implot.setup_axes_limits(0.0, 1.0, 0.0, top, imgui.Cond_.always)
+        implot.setup_axis_ticks(implot.ImAxis_.x1, [0.0, 0.25, 0.5, 0.75, 1.0])
+        for passing, alpha in ((prompt.cut > MIDDLES, 0.32), (prompt.cut <= MIDDLES, 0.85)):
+            spec = implot.Spec()
+            spec.fill_color = widgets.rgba(prompt.colour, alpha)
+            spec.line_color = ImVec4Clear
+            if passing.any():
+                implot.plot_bars("##bars", MIDDLES[passing], heights[passing], 0.9 / BINS, spec)
+        moved, cut, *_ = implot.drag_line_x(1, prompt.cut, theme.TEXT, look.px(2))
+        if moved:
+            issued.append(ask.SetThreshold(prompt.key, min(max(cut, 0.0), 1.0)))
+        if implot.is_plot_hovered():
+            _tip(prompt, counts)
+        implot.end_plot()
+    implot.pop_style_color(2)
+    implot.pop_style_var()
+    return issued
+
+
+def _tip(prompt: Prompt, counts: np.ndarray) -> None:
+    passing = counts[prompt.cut <= MIDDLES].sum() / max(counts.sum(), 1.0)
+    imgui.set_tooltip(
+        f"{100 * passing:.1f} % of what is in view scores {prompt.cut:.2f} or more.\n"
+        "Drag the line to move the threshold; heights are logarithmic."
+    )
+
+
+ImVec4Clear = widgets.rgba((0.0, 0.0, 0.0), 0.0)

@@ -1,0 +1,124 @@
+"""What asking adds to the state: phrases, the scores behind an answer, the dictionary."""
+
+import re
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+# Told apart by people with the common colour-vision deficiencies, on dark ground.
+PALETTE = (
+    (0.96, 0.62, 0.16),
+    (0.35, 0.71, 0.98),
+    (0.30, 0.80, 0.55),
+    (0.94, 0.45, 0.62),
+    (0.95, 0.88, 0.35),
+    (0.66, 0.55, 0.95),
+    (0.88, 0.36, 0.24),
+    (0.70, 0.85, 0.82),
+)
+
+MOST_RECENT = 20
+PROMPT_DIALOGS = ("save prompts", "load prompts")
+PROMPTS_SUFFIX = ".prompts.json"
+BINS = 50  # of a histogram of scores, over [0, 1]
+_OPERATOR = re.compile(r"\s+[+-]\s+")  # as langflash_core/language/algebra.py, which loads torch
+
+
+@dataclass(frozen=True)
+class Prompt:
+    """One phrase. `key` never changes; `score` is None until the view on show is answered.
+
+    threshold: the person's own, or None for the calibrated one. calibrated: what None means.
+    like: a language vector as float32 bytes that is asked instead of the words.
+    """
+
+    key: int
+    text: str = ""
+    colour: tuple[float, float, float] = PALETTE[0]
+    threshold: float | None = None
+    calibrated: float = 0.5
+    visible: bool = True
+    score: float | None = None
+    like: bytes = field(default=b"", repr=False)
+
+    @property
+    def found(self) -> bool | None:
+        """Whether the view on show holds it; None until it is answered."""
+        return None if self.score is None else self.score >= self.cut
+
+    @property
+    def cut(self) -> float:
+        """The threshold in force."""
+        return self.calibrated if self.threshold is None else self.threshold
+
+
+FIRST_PROMPT = Prompt(key=0)
+
+
+@dataclass(frozen=True)
+class Insight:
+    """What the worker says about the K atoms of the scene on show.
+
+    shares: of the scene's opacity, sum 1. colours: as in the atoms picture. order: alike atoms side
+    by side. similarity: (K, K) cosines.
+    """
+
+    shares: tuple[float, ...]
+    colours: tuple[tuple[float, float, float], ...]
+    order: tuple[int, ...]
+    similarity: np.ndarray = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True)
+class Histogram:
+    """How many covered pixels of the view on show score how high. counts: (BINS,) over [0, 1]."""
+
+    key: int
+    text: str
+    counts: tuple[int, ...] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Asking:
+    """The asking half of the state.
+
+    recent: phrases asked, the newest first. atom: whose weight map is on show. chosen: atoms to
+    merge. prompts_path: where the last set was. usual: what the scene compares phrases with, by its
+    own calibration, once it has said so.
+    """
+
+    recent: tuple[str, ...] = ()
+    histograms: tuple[Histogram, ...] = ()
+    insight: Insight | None = None
+    atom: int = 0
+    chosen: tuple[int, ...] = ()
+    prompts_path: Path | None = None
+    usual: tuple[str, ...] = ()
+
+    def histogram(self, key: int, text: str) -> Histogram | None:
+        """Of a prompt as it reads now; None until it is answered."""
+        return next((h for h in self.histograms if h.key == key and h.text == text.strip()), None)
+
+    def without_scene(self) -> "Asking":
+        """For another scene: what belongs to the old one goes."""
+        return replace(self, histograms=(), insight=None, atom=0, chosen=(), usual=())
+
+
+NO_ASKING = Asking()
+
+
+def unfinished(text: str) -> bool:
+    """Whether a phrase is still missing beside a + or -, as while one is being typed."""
+    parts = _OPERATOR.split(f" {text} ")
+    return len(parts) > 1 and not all(part.strip() for part in parts)
+
+
+def usable(text: str) -> bool:
+    """Whether a prompt can be asked as it reads."""
+    return bool(text.strip()) and not unfinished(text)
+
+
+def margin_span(num_prompts: int) -> tuple[float, float]:
+    """Margins shown as the first and the last colour: of one prompt it may be negative."""
+    return (-0.5, 0.5) if num_prompts == 1 else (0.0, 0.5)

@@ -1,0 +1,139 @@
+"""The worker's side of asking: phrases compiled and scored, prompt sets, what there is to say about
+atoms. Heavy imports wait until they are needed."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from langflash_core.scene.edits import Marks
+
+from ..commands import Command, Notify, ShowPicture
+from ..requests import Asked, Errand, SceneErrand
+from .commands import Answered, AtomsDescribed, Binned, PhrasesCompiled, PromptsRead
+from .prompt_sets import PromptSet, read_prompts, write_prompts
+from .state import BINS, Histogram, Insight
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from langflash_core.language.relevance import CompiledQuery
+    from langflash_core.types import Camera, Frame, Scene
+
+
+@dataclass(frozen=True)
+class Encode(SceneErrand):
+    """Compile phrases against a scene; milliseconds once the text tower is loaded.
+
+    likes: per phrase a language vector as float32 bytes, asked instead of the text, or none.
+    """
+
+    newest_counts = True
+
+    scene: "Scene" = field(repr=False)
+    keys: tuple[int, ...]
+    texts: tuple[str, ...]
+    negatives: tuple[str, ...]
+    likes: tuple[bytes, ...] = ()
+    marks: Marks | None = None
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.language.relevance import compile_query
+        from langflash_core.language.spaces import language_space
+        from langflash_core.language.words import with_vectors
+        from langflash_core.scene.edited import spoken_scene
+
+        scene = self.scene if self.marks is None else spoken_scene(self.scene, self.marks)
+        space = language_space(scene.semantics.space)
+        query = compile_query(scene, space, list(self.texts), negatives=list(self.negatives) or None)
+        likes = {row: _vector(like) for row, like in enumerate(self.likes) if like}
+        yield PhrasesCompiled(self.keys, with_vectors(query, scene.semantics.dictionary, likes))
+
+
+def _vector(content: bytes) -> "Tensor":
+    import torch
+
+    return torch.from_numpy(np.frombuffer(content, np.float32).copy())
+
+
+@dataclass(frozen=True)
+class Answer(SceneErrand):
+    """Score phrases in one view, and count how its pixels score."""
+
+    newest_counts = True
+
+    keys: tuple[int, ...]
+    relevance: "Tensor"
+    frame: "Frame"
+    camera: "Camera"
+    query: "CompiledQuery"
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.language.answers import answer
+
+        result = answer(self.relevance, self.frame, self.camera, self.query)
+        answers = zip(self.keys, result.answers, strict=True)
+        yield Answered(tuple((key, a.prompt, float(a.score)) for key, a in answers))
+        yield Binned(self.histograms())
+
+    def histograms(self) -> tuple[Histogram, ...]:
+        """How many covered pixels of the view score how high, by phrase."""
+        from langflash_core.language.answers import COVERED_ALPHA
+
+        covered = self.frame.alphas >= COVERED_ALPHA
+        made = []
+        for key, text, relevance in zip(self.keys, self.query.texts, self.relevance, strict=True):
+            counts, _ = np.histogram(relevance[covered].numpy(), BINS, (0.0, 1.0))
+            made.append(Histogram(key, text, tuple(int(n) for n in counts)))
+        return tuple(made)
+
+
+@dataclass(frozen=True)
+class WritePrompts(Errand):
+    """Write a prompt set."""
+
+    saves = True
+
+    chosen: PromptSet
+    path: Path
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        write_prompts(self.chosen, self.path)
+        yield Notify(f"Saved {self.path}", "info")
+
+
+@dataclass(frozen=True)
+class ReadPrompts(Errand):
+    """Read a prompt set."""
+
+    path: Path
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        yield PromptsRead(self.path, read_prompts(self.path))
+
+
+@dataclass(frozen=True)
+class DescribeAtoms(SceneErrand):
+    """Look the atoms over: shares, colours, cosines, and a small picture of each that a photo shows."""
+
+    scene: "Scene" = field(repr=False)
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.export.colours import atom_colours
+        from langflash_core.scene.atoms import atom_pictures, describe_atoms
+
+        report = describe_atoms(self.scene)
+        colours = atom_colours(self.scene.semantics.dictionary.double().numpy())
+        for k, rgb in enumerate(atom_pictures(self.scene)):
+            if rgb is not None:
+                yield ShowPicture(f"atom {k}", rgb)
+        yield AtomsDescribed(
+            Insight(
+                shares=tuple(float(share) for share in report.shares),
+                colours=tuple((float(r), float(g), float(b)) for r, g, b in colours),
+                order=report.order,
+                similarity=report.similarity,
+            )
+        )

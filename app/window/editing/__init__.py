@@ -1,0 +1,1 @@
+"""Selecting, and changing the scene."""

@@ -1,0 +1,303 @@
+"""What can happen while editing. Every change of the scene is an entry of the history."""
+
+from dataclasses import dataclass, replace
+
+from langflash_core.scene import edits
+from langflash_core.scene.edits import Combine, Marks, Mask
+
+from ..scene.state import Mode
+from ..state import State
+from .state import STRICTNESS_RANGE, Floaters, Region
+
+
+def change(state: State, **changes) -> State:
+    """The state with another editing half."""
+    return replace(state, editing=replace(state.editing, **changes))
+
+
+def _edit(state: State, label: str, marks: Marks) -> State:
+    history = state.editing.history
+    return state if history is None else change(state, history=history.edited(label, marks))
+
+
+# Selecting; what must be computed is asked of the worker, and comes back as `Found`
+
+
+@dataclass(frozen=True)
+class SelectRegion:
+    """Find the Gaussians that a region of the picture shows."""
+
+    region: Region
+    combine: Combine = "replace"
+
+    def apply(self, state: State) -> State:
+        return change(state, drag=(), waiting="" if state.info is None else "Selecting")
+
+
+@dataclass(frozen=True)
+class SelectByPhrase:
+    """Find the Gaussians that a prompt means, from its threshold on; a heat-map would cover them."""
+
+    key: int
+    combine: Combine = "replace"
+
+    def apply(self, state: State) -> State:
+        return change(replace(state, mode=Mode.RGB), waiting="Selecting")
+
+
+@dataclass(frozen=True)
+class SelectAtom:
+    """Find the Gaussians that carry an atom more than any other."""
+
+    atom: int
+    combine: Combine = "replace"
+
+    def apply(self, state: State) -> State:
+        return change(state, waiting="Selecting")
+
+
+@dataclass(frozen=True)
+class Grow:
+    """Add what lies around the selection; `phrase`: only what the active prompt means."""
+
+    phrase: bool = False
+
+    def apply(self, state: State) -> State:
+        return change(state, waiting="Growing" if state.editing.num_selected else "")
+
+
+@dataclass(frozen=True)
+class Found:
+    """Gaussians that were looked for. what: how, for the list of edits."""
+
+    mask: Mask
+    combine: Combine
+    what: str
+
+    def apply(self, state: State) -> State:
+        state = change(state, waiting="")
+        marks = state.editing.marks
+        if marks is None or self.mask.count != marks.deleted.count:
+            return state
+        after = edits.select(marks, self.mask, self.combine)
+        changed = len(after.selected ^ marks.selected)
+        count = len(after.selected) if self.combine == "replace" else changed
+        verb = {"replace": "Select", "add": "Add", "remove": "Unselect"}[self.combine]
+        return _edit(state, f"{verb} {count:,} {self.what}", after)
+
+
+@dataclass(frozen=True)
+class StopWaiting:
+    """Nothing is being looked for any more."""
+
+    def apply(self, state: State) -> State:
+        return change(state, waiting="")
+
+
+@dataclass(frozen=True)
+class SelectAll:
+    """Select everything that is shown."""
+
+    def apply(self, state: State) -> State:
+        marks = state.editing.marks
+        return state if marks is None else _edit(state, "Select all", edits.select(marks, marks.visible))
+
+
+@dataclass(frozen=True)
+class Deselect:
+    """Select nothing."""
+
+    def apply(self, state: State) -> State:
+        marks = state.editing.marks
+        if marks is None:
+            return state
+        return _edit(state, "Deselect", edits.select(marks, Mask.none(marks.deleted.count)))
+
+
+@dataclass(frozen=True)
+class Invert:
+    """Select what is shown and not selected."""
+
+    def apply(self, state: State) -> State:
+        marks = state.editing.marks
+        return state if marks is None else _edit(state, "Invert the selection", edits.invert(marks))
+
+
+# Changing the scene
+
+
+@dataclass(frozen=True)
+class Delete:
+    """Take the selection away."""
+
+    def apply(self, state: State) -> State:
+        return _on_selection(state, "Delete", edits.delete)
+
+
+@dataclass(frozen=True)
+class Hide:
+    """Stop showing the selection."""
+
+    def apply(self, state: State) -> State:
+        return _on_selection(state, "Hide", edits.hide)
+
+
+@dataclass(frozen=True)
+class Isolate:
+    """Show the selection alone."""
+
+    def apply(self, state: State) -> State:
+        return _on_selection(state, "Isolate", edits.isolate)
+
+
+@dataclass(frozen=True)
+class ShowAll:
+    """Show what was hidden."""
+
+    def apply(self, state: State) -> State:
+        marks = state.editing.marks
+        return state if marks is None else _edit(state, "Show everything", edits.show_all(marks))
+
+
+@dataclass(frozen=True)
+class RenameAtom:
+    """Give an atom a name; an empty one takes it back."""
+
+    atom: int
+    name: str
+
+    def apply(self, state: State) -> State:
+        marks = state.editing.marks
+        if marks is None or not 0 <= self.atom < len(marks.atoms):
+            return state
+        label = (
+            f"Name atom {self.atom} {self.name.strip()!r}"
+            if self.name.strip()
+            else f"Unname atom {self.atom}"
+        )
+        return _edit(state, label, edits.rename_atom(marks, self.atom, self.name))
+
+
+@dataclass(frozen=True)
+class MergeAtoms:
+    """Make one of several atoms; the first keeps its number."""
+
+    atoms: tuple[int, ...]
+
+    def apply(self, state: State) -> State:
+        marks = state.editing.marks
+        if marks is None or not self.atoms or not all(0 <= k < len(marks.atoms) for k in self.atoms):
+            return state
+        label = "Merge atoms " + ", ".join(map(str, self.atoms))
+        return _edit(state, label, edits.merge_atoms(marks, self.atoms))
+
+
+@dataclass(frozen=True)
+class ToggleAtom:
+    """Let an atom answer phrases, or no longer."""
+
+    atom: int
+
+    def apply(self, state: State) -> State:
+        marks = state.editing.marks
+        if marks is None or not 0 <= self.atom < len(marks.atoms):
+            return state
+        verb = "Silence" if marks.atoms[self.atom].on else "Wake"
+        return _edit(state, f"{verb} atom {self.atom}", edits.toggle_atom(marks, self.atom))
+
+
+@dataclass(frozen=True)
+class Undo:
+    """Take the last edit back."""
+
+    def apply(self, state: State) -> State:
+        return _rewound(state, lambda history: history.undo())
+
+
+@dataclass(frozen=True)
+class Redo:
+    """Make the edit again that was taken back last."""
+
+    def apply(self, state: State) -> State:
+        return _rewound(state, lambda history: history.redo())
+
+
+@dataclass(frozen=True)
+class GoTo:
+    """Undo or redo until `position` edits are done."""
+
+    position: int
+
+    def apply(self, state: State) -> State:
+        return _rewound(state, lambda history: history.moved_to(self.position))
+
+
+# Floaters
+
+
+@dataclass(frozen=True)
+class FindFloaters:
+    """Look for floaters and preview them in red."""
+
+    def apply(self, state: State) -> State:
+        if state.editing.history is None:
+            return state
+        strictness = state.editing.floaters.strictness if state.editing.floaters else Floaters().strictness
+        return change(state, floaters=Floaters(strictness=strictness))
+
+
+@dataclass(frozen=True)
+class FloatersFound:
+    """Scores (N,) of the preview that is open."""
+
+    scores: bytes
+
+    def apply(self, state: State) -> State:
+        marks, preview = state.editing.marks, state.editing.floaters
+        if marks is None or preview is None or len(self.scores) != 4 * marks.deleted.count:
+            return state
+        return change(state, floaters=replace(preview, scores=self.scores))
+
+
+@dataclass(frozen=True)
+class SetStrictness:
+    """How far a Gaussian must stand out to count as a floater."""
+
+    strictness: float
+
+    def apply(self, state: State) -> State:
+        if state.editing.floaters is None:
+            return state
+        strictness = min(max(self.strictness, STRICTNESS_RANGE[0]), STRICTNESS_RANGE[1])
+        return change(state, floaters=replace(state.editing.floaters, strictness=strictness))
+
+
+@dataclass(frozen=True)
+class EndFloaters:
+    """Close the preview: "delete" them, "select" them, or "" leave all as it is."""
+
+    then: str = ""
+
+    def apply(self, state: State) -> State:
+        marks, preview = state.editing.marks, state.editing.floaters
+        if marks is None or preview is None:
+            return state
+        found = preview.mask(marks.visible)
+        state = change(state, floaters=None)
+        if self.then == "delete":
+            return _edit(state, f"Delete {len(found):,} floaters", edits.delete(marks, found))
+        if self.then == "select":
+            return _edit(state, f"Select {len(found):,} floaters", edits.select(marks, found))
+        return state
+
+
+def _on_selection(state: State, verb: str, make) -> State:
+    marks = state.editing.marks
+    if marks is None or not marks.selected:
+        return state
+    return _edit(state, f"{verb} {len(marks.selected):,}", make(marks, marks.selected))
+
+
+def _rewound(state: State, step) -> State:
+    history = state.editing.history
+    return state if history is None else change(state, history=step(history))

@@ -1,0 +1,100 @@
+"""What editing asks of the world: the worker for what must be computed, the picture for what is marked
+in it and what the pointer is on."""
+
+import numpy as np
+
+from ..commands import Command
+from ..effects import Effects, Hands
+from ..scene.commands import SceneArrived
+from ..scene.state import SceneInfo
+from ..state import State
+from ..viewport import Viewport
+from .commands import FindFloaters, StopWaiting
+from .pointing import CardOpened, Named, ReadingTaken
+from .state import Reading, Tool
+from .work import NameAtoms, NamePlace, ScoreFloaters, Weigh, request_for
+
+
+class EditingEffects(Effects):
+    """Marks in the picture, readings from it, requests for what takes long."""
+
+    def __init__(self, hands: Hands, viewport: Viewport) -> None:
+        self._hands = hands
+        self._viewport = viewport
+        self._read: tuple | None = None  # what the last reading under the pointer was of
+
+    # Every picture
+
+    def before_picture(self, state: State) -> None:
+        """Bring deletions, selection and preview into the picture."""
+        marks, preview = state.editing.marks, state.editing.floaters
+        doomed = preview.mask(marks.visible) if marks is not None and preview is not None else None
+        self._viewport.mark(marks, doomed)
+
+    def after_picture(self, state: State) -> None:
+        """Read what is under the pointer, and what a click asked about once the picture rests."""
+        editing, info = state.editing, state.info
+        if info is None:
+            return
+        hover = editing.hover
+        key = None if hover is None else (hover.at, self._viewport.drawn)
+        if hover is not None and key != self._read:
+            found = self._viewport.read(hover.at)
+            if found is not None:
+                reading, weights = found
+                self._hands.perform(ReadingTaken(reading))
+                if weights is None and reading.point is not None and editing.tool is Tool.POINT:
+                    self._weigh(state, info, reading)
+        self._read = key
+        if editing.asked is not None and state.pose == self._viewport.pose:
+            self._ask(state, info)
+
+    def _weigh(self, state: State, info: SceneInfo, reading: Reading) -> None:
+        marks, size = state.editing.marks, self._viewport.size
+        if marks is not None and info.num_atoms and state.pose == self._viewport.pose:
+            self._hands.submit(Weigh(info.serial, info.scene, marks, reading, state.pose, size))
+
+    def _ask(self, state: State, info: SceneInfo) -> None:
+        """Send the place that was clicked on."""
+        assert state.editing.asked is not None and state.editing.marks is not None
+        found = self._viewport.read(state.editing.asked)
+        if found is None:
+            return
+        reading, weights = found
+        self._hands.perform(CardOpened(reading))
+        if reading.point is None or not info.num_atoms:
+            self._hands.perform(Named(reading, reading, (), b""))
+            return
+        extra = tuple(p.text.strip() for p in state.asked if not p.like)
+        content = b"" if weights is None else weights.astype(np.float32).tobytes()
+        scene = (info.serial, info.scene, state.editing.marks)
+        place = (reading, state.pose, self._viewport.size)
+        self._hands.submit(NamePlace(*scene, *place, content, extra))
+
+    # Commands
+
+    def follow(self, command: Command, before: State, state: State) -> None:
+        """What must be computed for a command goes to the worker."""
+        info, marks = state.info, state.editing.marks
+        match command:
+            case SceneArrived():
+                if info is not None and info.num_atoms and marks is not None:
+                    self._hands.submit(NameAtoms(info.serial, info.scene, marks))
+            case FindFloaters() if info is not None and marks is not None:
+                self._hands.submit(ScoreFloaters(info.serial, info.scene, marks))
+            case _ if info is not None and marks is not None:
+                request = request_for(command, state, info, marks, self._viewport.size)
+                if request is not None:
+                    self._hands.submit(request)
+                elif state.editing.waiting and not before.editing.waiting:
+                    self._hands.perform(StopWaiting())
+        if marks != before.editing.marks and state.info is before.info:
+            self._atoms_changed(before, state)
+
+    def _atoms_changed(self, before: State, state: State) -> None:
+        """Merged atoms have other words."""
+        old, new = before.editing.marks, state.editing.marks
+        if old is None or new is None or state.info is None:
+            return
+        if [atom.into for atom in old.atoms] != [atom.into for atom in new.atoms]:
+            self._hands.submit(NameAtoms(state.info.serial, state.info.scene, new))

@@ -1,0 +1,1 @@
+"""Tools, the pointer, the list of edits."""

@@ -1,0 +1,215 @@
+"""At the pointer: the region being drawn, what lies under it, and the answer to "what is this?"."""
+
+import numpy as np
+from imgui_bundle import ImVec2, ImVec4, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
+
+from ... import commands as do
+from ... import poses
+from ...kit import theme, widgets
+from ...kit.look import Look
+from ...state import State
+from .. import commands as edit
+from .. import pointing as point
+from ..state import PICK_RADIUS, Card, Point, Reading, Tool
+
+_CARD = 268.0  # design pixels wide
+_SHOWN_WORDS = 5
+
+
+def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
+    """What belongs to the pointer and to the place that was asked about."""
+    _region(state, look, place, size)
+    editing = state.editing
+    quiet = editing.card is not None or editing.asked is not None
+    if editing.tool is Tool.POINT and not quiet and editing.hover is not None and editing.hover.point:
+        _tooltip(state, editing.hover, look)
+    if editing.card is not None:
+        return _card(state, editing.card, look, place, size)
+    if editing.asked is not None:
+        _pin(_on_screen(editing.asked, place), look)
+    return []
+
+
+def _on_screen(at: Point, place: ImVec2) -> ImVec2:
+    pixels = imgui.get_io().display_framebuffer_scale
+    return ImVec2(place.x + at[0] / pixels.x, place.y + at[1] / pixels.y)
+
+
+def _region(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
+    """The box or stroke under way, or the brush that waits at the pointer."""
+    editing = state.editing
+    if not editing.tool.selects:
+        return
+    io, canvas = imgui.get_io(), imgui.get_foreground_draw_list()
+    canvas.push_clip_rect(place, ImVec2(place.x + size.x, place.y + size.y), True)
+    combine = "add" if io.key_shift else "remove" if io.key_ctrl else editing.combine
+    colour = theme.BAD if combine == "remove" else theme.SELECTED
+    line, fill = widgets.u32(colour), widgets.u32(ImVec4(colour.x, colour.y, colour.z, 0.22))
+    path = [_on_screen(at, place) for at in editing.drag]
+    radius = look.px(editing.radius if editing.tool is Tool.BRUSH else PICK_RADIUS)
+    if editing.tool is Tool.BOX and len(path) > 1:
+        low = ImVec2(min(path[0].x, path[-1].x), min(path[0].y, path[-1].y))
+        high = ImVec2(max(path[0].x, path[-1].x), max(path[0].y, path[-1].y))
+        canvas.add_rect_filled(low, high, fill)
+        canvas.add_rect(low, high, line, 0.0, look.px(1.5))
+    elif editing.tool is Tool.BRUSH and path:
+        if len(path) > 1:
+            canvas.add_polyline([*path], col=fill, thickness=2 * radius, flags=0)
+        canvas.add_circle_filled(path[0], radius, fill)
+        canvas.add_circle_filled(path[-1], radius, fill)
+        canvas.add_circle(path[-1], radius, line, 0, look.px(1.5))
+    elif editing.hover is not None and editing.tool is not Tool.BOX:
+        canvas.add_circle(imgui.get_mouse_pos(), radius, line, 0, look.px(1.5))
+    if editing.hover is not None and combine != "replace":
+        sign = fa.ICON_FA_PLUS if combine == "add" else fa.ICON_FA_MINUS
+        pointer = imgui.get_mouse_pos()
+        canvas.add_text(ImVec2(pointer.x + look.px(10), pointer.y - look.px(22)), line, sign)
+    canvas.pop_clip_rect()
+
+
+def _tooltip(state: State, reading: Reading, look: Look) -> None:
+    """Coordinates, depth, and the groups that the pixel shows."""
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
+    imgui.begin_tooltip()
+    imgui.text_colored(theme.MUTED, _coordinates(reading))
+    if reading.atoms is None:
+        imgui.text_colored(theme.MUTED, "...")
+    for k, share in reading.atoms or ():
+        _bar(share, theme.ACCENT, look)
+        imgui.same_line()
+        imgui.text(f"{100 * share:.0f} %")
+        imgui.same_line(look.px(134))
+        imgui.text(state.editing.atom_name(k))
+        others = state.editing.names[k][1:] if k < len(state.editing.names) else ()
+        if others:
+            imgui.same_line()
+            imgui.text_colored(theme.MUTED, ", ".join(others))
+    imgui.end_tooltip()
+    imgui.pop_style_var()
+
+
+def _coordinates(reading: Reading) -> str:
+    assert reading.point is not None
+    x, y, z = reading.point
+    return f"x {x:.2f}   y {y:.2f}   z {z:.2f}   depth {reading.depth:.2f}"
+
+
+def _bar(share: float, colour: ImVec4, look: Look) -> None:
+    """A horizontal bar, full at 1."""
+    height, width = imgui.get_text_line_height(), look.px(64)
+    corner, canvas = imgui.get_cursor_screen_pos(), imgui.get_window_draw_list()
+    top = corner.y + 0.3 * height
+    bottom = corner.y + 0.75 * height
+    canvas.add_rect_filled(
+        ImVec2(corner.x, top), ImVec2(corner.x + width, bottom), widgets.u32(theme.LINE), 3
+    )
+    filled = corner.x + width * min(max(share, 0.0), 1.0)
+    canvas.add_rect_filled(ImVec2(corner.x, top), ImVec2(filled, bottom), widgets.u32(colour), 3)
+    imgui.dummy(ImVec2(width, height))
+
+
+def _pin(at: ImVec2, look: Look) -> None:
+    canvas = imgui.get_foreground_draw_list()
+    canvas.add_circle_filled(at, look.px(5), widgets.u32(theme.ACCENT))
+    canvas.add_circle(at, look.px(7), widgets.u32(ImVec4(0, 0, 0, 0.7)), 0, look.px(1.5))
+
+
+def _pinned_at(state: State, reading: Reading, place: ImVec2, size: ImVec2) -> ImVec2 | None:
+    """Where the place asked about is on the screen now; None behind the camera or beside the picture."""
+    if reading.point is None:
+        return _on_screen(reading.at, place)
+    width, height = round(size.x), round(size.y)
+    viewmat, K = poses.viewmat(state.pose), poses.intrinsics(state.pose, width, height)
+    x, y, z = viewmat[:3, :3] @ np.array(reading.point) + viewmat[:3, 3]
+    if z <= poses.MIN_REACH:
+        return None
+    at = ImVec2(place.x + K[0, 0] * x / z + K[0, 2], place.y + K[1, 1] * y / z + K[1, 2])
+    inside = place.x <= at.x <= place.x + size.x and place.y <= at.y <= place.y + size.y
+    return at if inside else None
+
+
+def _card(state: State, card: Card, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
+    """The answer, beside its place."""
+    at = _pinned_at(state, card.reading, place, size)
+    if at is not None:
+        _pin(at, look)
+    right = place.x + size.x - look.px(_CARD + 16)
+    corner = ImVec2(right, place.y + look.px(12))
+    if at is not None:
+        x = (
+            at.x + look.px(18)
+            if at.x + look.px(_CARD + 30) < place.x + size.x
+            else at.x - look.px(_CARD + 18)
+        )
+        y = min(max(at.y - look.px(40), place.y + look.px(12)), place.y + size.y - look.px(330))
+        corner = ImVec2(x, max(y, place.y + look.px(12)))
+    imgui.set_next_window_pos(corner)
+    imgui.set_next_window_size(ImVec2(look.px(_CARD), 0))
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
+    with widgets.colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
+        imgui.begin("##card", None, widgets.PLAIN | imgui.WindowFlags_.no_focus_on_appearing)
+        issued = _answer(state, card, look)
+        imgui.end()
+    imgui.pop_style_var()
+    return issued
+
+
+def _answer(state: State, card: Card, look: Look) -> list[do.Command]:
+    issued: list[do.Command] = []
+    title = "..." if card.words is None else card.words[0][0] if card.words else "Nothing is known here"
+    imgui.push_font(None, theme.FONT_SIZE * 1.3)
+    imgui.text_unformatted(title)
+    imgui.pop_font()
+    imgui.same_line(look.px(_CARD - 44))
+    if widgets.quiet_button(f"{fa.ICON_FA_XMARK}##card", "Close  (Esc)"):
+        issued.append(point.CloseCard())
+    for word, cosine in (card.words or ())[:_SHOWN_WORDS]:
+        _bar(cosine, theme.ACCENT, look)
+        imgui.same_line()
+        imgui.text(f"{cosine:.2f}")
+        imgui.same_line(look.px(134))
+        imgui.text_unformatted(word)
+    if card.reading.point is not None:
+        imgui.text_colored(theme.MUTED, _coordinates(card.reading))
+    if card.reading.atoms:
+        issued += _group(state, card.reading.atoms[0][0], look)
+    if card.vector:
+        if widgets.primary_button(
+            f"{fa.ICON_FA_MAGNIFYING_GLASS}  Find similar", ImVec2(look.px(_CARD - 32), 0)
+        ):
+            issued.append(point.FindSimilar())
+        widgets.tooltip("Ask for everything that says the same as this place")
+    return issued
+
+
+def _group(state: State, k: int, look: Look) -> list[do.Command]:
+    """The strongest group of the place: its name, its voice, its Gaussians."""
+    issued: list[do.Command] = []
+    marks = state.editing.marks
+    if marks is None or k >= len(marks.atoms):
+        return issued
+    atom = marks.atoms[k]
+    imgui.separator()
+    imgui.push_id(k)
+    imgui.set_next_item_width(imgui.get_content_region_avail().x - 2 * look.px(42))
+    hint = f"group {k}: {state.editing.atom_name(k)}"
+    entered, name = imgui.input_text_with_hint(
+        "##name", hint, atom.name, imgui.InputTextFlags_.enter_returns_true
+    )
+    widgets.tooltip("Give this group a name of your own, and press Enter")
+    if entered or (imgui.is_item_deactivated_after_edit() and name != atom.name):
+        issued.append(edit.RenameAtom(k, name))
+    imgui.same_line(0, look.px(4))
+    voice = fa.ICON_FA_VOLUME_HIGH if atom.on else fa.ICON_FA_VOLUME_XMARK
+    if imgui.button(f"{voice}##voice", ImVec2(look.px(38), 0)):
+        issued.append(edit.ToggleAtom(k))
+    widgets.tooltip(
+        "This group answers phrases; click to silence it" if atom.on else "Silent; click to let it answer"
+    )
+    imgui.same_line(0, look.px(4))
+    if imgui.button(f"{fa.ICON_FA_DRAW_POLYGON}##group", ImVec2(look.px(38), 0)):
+        issued.append(edit.SelectAtom(k))
+    widgets.tooltip("Select the Gaussians of this group")
+    imgui.pop_id()
+    return issued

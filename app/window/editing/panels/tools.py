@@ -1,0 +1,256 @@
+"""On the picture's left: the tools; beside them what the tool in hand and the selection can do."""
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
+
+from langflash_core.scene.edits import Combine
+
+from ... import commands as do
+from ...kit import theme, widgets
+from ...kit.look import Look
+from ...state import State
+from .. import commands as edit
+from .. import pointing as point
+from ..state import RADIUS_RANGE, REACH_RANGE, STRICTNESS_RANGE, Floaters, Tool
+
+_TOOLS = (
+    (Tool.MOVE, fa.ICON_FA_ARROWS_UP_DOWN_LEFT_RIGHT, "Move around  (V)"),
+    (Tool.POINT, fa.ICON_FA_CIRCLE_QUESTION, "What is this? Click on anything  (X)"),
+    (Tool.BOX, fa.ICON_FA_VECTOR_SQUARE, "Select with a box  (R)\nShift adds, Ctrl removes, Alt orbits"),
+    (Tool.BRUSH, fa.ICON_FA_PAINTBRUSH, "Select with a brush  (B)\n[ and ] change its size"),
+    (Tool.PICK, fa.ICON_FA_ARROW_POINTER, "Select what is under a click  (C)"),
+)
+_COMBINES: tuple[tuple[Combine, str, str], ...] = (
+    ("replace", fa.ICON_FA_SQUARE, "A new selection each time"),
+    ("add", fa.ICON_FA_PLUS, "Add to the selection  (Shift)"),
+    ("remove", fa.ICON_FA_MINUS, "Take from the selection  (Ctrl)"),
+)
+_BUTTON = 36.0  # design pixels of a tool's side
+_MARGIN = 12.0
+_LONG = 610.0  # width of everything a selection can do, in one line
+_BAR = (
+    widgets.PLAIN | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
+)  # a small window over the picture
+
+
+def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
+    """Strip and bars over the picture at `place`."""
+    corner = ImVec2(place.x + look.px(_MARGIN), place.y + look.px(_MARGIN))
+    issued, _ = _panel("##tools", corner, look, lambda: _strip(state, look), tight=True)
+    room = size.x - look.px(_BUTTON + 22 + 2 * _MARGIN)
+    corner = ImVec2(corner.x + look.px(_BUTTON + 22), corner.y)
+    bars = []
+    if state.editing.tool.selects:
+        bars.append(lambda: _options(state, look))
+    if state.editing.num_selected or state.editing.waiting:
+        bars.append(lambda: _selection(state, look, room))
+    if state.editing.floaters is not None:
+        found = state.editing.floaters
+        bars.append(lambda: _floaters(state, found, look, room))
+    hidden = state.editing.marks is not None and bool(state.editing.marks.hidden)
+    if hidden and not state.editing.num_selected:
+        bars.append(lambda: _hidden(state))
+    for number, bar in enumerate(bars):
+        wanted, height = _panel(f"##bar{number}", corner, look, bar)
+        issued += wanted
+        corner = ImVec2(corner.x, corner.y + height + look.px(8))
+    return issued
+
+
+def _panel(
+    name: str, corner: ImVec2, look: Look, body, tight: bool = False
+) -> tuple[list[do.Command], float]:
+    """A rounded window that holds what `body` draws; also its height."""
+    imgui.set_next_window_pos(corner)
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, look.vec(6, 6) if tight else look.vec(10, 7))
+    with widgets.colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
+        imgui.begin(name, None, _BAR)
+        issued, height = body(), imgui.get_window_height()
+        imgui.end()
+    imgui.pop_style_var(2)
+    return issued, height
+
+
+def _strip(state: State, look: Look) -> list[do.Command]:
+    issued: list[do.Command] = []
+    editing = state.editing
+    side = look.vec(_BUTTON, _BUTTON)
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
+    for tool, icon, tip in _TOOLS:
+        if _tool_button(icon, editing.tool is tool, side, tip):
+            issued.append(point.SetTool(tool))
+    imgui.separator()
+    if _tool_button(
+        fa.ICON_FA_WAND_MAGIC_SPARKLES, editing.floaters is not None, side, "Find floaters, with a preview"
+    ):
+        issued.append(edit.FindFloaters() if editing.floaters is None else edit.EndFloaters())
+    imgui.separator()
+    history = editing.history
+    last = history.done[-1].label if history and history.done else ""
+    following = history.undone[-1].label if history and history.undone else ""
+    imgui.begin_disabled(not last)
+    if _tool_button(
+        fa.ICON_FA_ROTATE_LEFT, False, side, f"Undo: {last}  (Ctrl+Z)" if last else "Undo  (Ctrl+Z)"
+    ):
+        issued.append(edit.Undo())
+    imgui.end_disabled()
+    imgui.begin_disabled(not following)
+    tip = f"Redo: {following}  (Ctrl+Shift+Z)" if following else "Redo  (Ctrl+Shift+Z)"
+    if _tool_button(fa.ICON_FA_ROTATE_RIGHT, False, side, tip):
+        issued.append(edit.Redo())
+    imgui.end_disabled()
+    imgui.pop_style_var()
+    return issued
+
+
+def _tool_button(icon: str, chosen: bool, side: ImVec2, tip: str) -> bool:
+    pressed = widgets.primary_button(icon, side) if chosen else imgui.button(icon, side)
+    widgets.tooltip(tip)
+    return pressed
+
+
+def _options(state: State, look: Look) -> list[do.Command]:
+    """How the selecting tool works."""
+    issued: list[do.Command] = []
+    editing = state.editing
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
+    for combine, icon, tip in _COMBINES:
+        chosen = editing.combine == combine
+        if widgets.primary_button(f"{icon}##{combine}") if chosen else imgui.button(f"{icon}##{combine}"):
+            issued.append(point.SetCombine(combine))
+        widgets.tooltip(tip)
+        imgui.same_line()
+    imgui.pop_style_var()
+    imgui.same_line(0, look.px(14))
+    label = f"{fa.ICON_FA_LAYER_GROUP}  Through"
+    if widgets.primary_button(label) if editing.through else imgui.button(label):
+        issued.append(point.SetThrough(not editing.through))
+    widgets.tooltip("Also select what is hidden behind other things")
+    if editing.tool is Tool.BRUSH:
+        imgui.same_line(0, look.px(14))
+        tip = "Radius of the brush, pixels  ([ and ])"
+        text = f"{editing.radius:.0f} px"
+        changed, radius = widgets.slider("##radius", editing.radius, RADIUS_RANGE, text, tip, look.px(150))
+        if changed:
+            issued.append(point.SetRadius(radius))
+    return issued
+
+
+def _selection(state: State, look: Look, room: float) -> list[do.Command]:
+    """How much is selected, and what can be done with it; in two lines where `room` is short."""
+    issued: list[do.Command] = []
+    editing = state.editing
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.SELECTED, fa.ICON_FA_DRAW_POLYGON)
+    imgui.same_line()
+    imgui.text(f"{editing.waiting} ..." if editing.waiting else f"{editing.num_selected:,} selected")
+    if not editing.num_selected:
+        return issued
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
+    imgui.same_line(0, look.px(14))
+    issued += _actions()
+    if room < look.px(_LONG):
+        imgui.new_line()
+    else:
+        imgui.same_line(0, look.px(14))
+    issued += _growing(state, look)
+    imgui.pop_style_var()
+    return issued
+
+
+def _actions() -> list[do.Command]:
+    """What is done with a selection, a button each; the line goes on."""
+    issued: list[do.Command] = []
+    actions: list[tuple[str, str, do.Command]] = [
+        (fa.ICON_FA_CIRCLE_HALF_STROKE, "Select the rest instead  (Ctrl+I)", edit.Invert()),
+        (fa.ICON_FA_EYE_SLASH, "Hide", edit.Hide()),
+        (fa.ICON_FA_CROP_SIMPLE, "Show this alone", edit.Isolate()),
+        (fa.ICON_FA_EXPAND, "Fly to it  (F)", point.FrameSelection()),
+        (fa.ICON_FA_TRASH, "Delete  (Del)", edit.Delete()),
+        (fa.ICON_FA_XMARK, "Select nothing  (Ctrl+D)", edit.Deselect()),
+    ]
+    for icon, tip, command in actions:
+        if imgui.button(icon):
+            issued.append(command)
+        widgets.tooltip(tip)
+        imgui.same_line()
+    return issued
+
+
+def _growing(state: State, look: Look) -> list[do.Command]:
+    """Grow the selection, over anything or over what the active phrase means, and how far."""
+    issued: list[do.Command] = []
+    editing = state.editing
+    if imgui.button(f"{fa.ICON_FA_MAXIMIZE}  Grow"):
+        issued.append(edit.Grow())
+    widgets.tooltip(f"Add everything within {editing.reach:.0f} spacings  (G)")
+    active = state.active_prompt
+    if active is not None:
+        imgui.same_line()
+        if imgui.button(fa.ICON_FA_MAGNIFYING_GLASS_PLUS):
+            issued.append(edit.Grow(phrase=True))
+        widgets.tooltip(f"Grow, only over what is '{active.text.strip()}'")
+    imgui.same_line()
+    tip = "How far growing goes, in distances between neighbours"
+    changed, reach = widgets.slider(
+        "##reach", editing.reach, REACH_RANGE, f"{editing.reach:.0f}", tip, look.px(104)
+    )
+    if changed:
+        issued.append(point.SetReach(round(reach)))
+    return issued
+
+
+def _floaters(state: State, found: Floaters, look: Look, room: float) -> list[do.Command]:
+    """The preview of floaters, in red in the picture."""
+    issued: list[do.Command] = []
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.BAD, fa.ICON_FA_WAND_MAGIC_SPARKLES)
+    imgui.same_line()
+    marks = state.editing.marks
+    if not found.scores or marks is None:
+        imgui.text("Looking for floaters ...")
+        return issued
+    count = len(found.mask(marks.visible))
+    imgui.text(f"{count:,} floaters")
+    imgui.same_line(0, look.px(14))
+    tip = "How far a Gaussian must stand out from its surroundings; right is stricter"
+    text = f"{found.strictness:.1f}"
+    changed, strictness = widgets.slider(
+        "##strict",
+        found.strictness,
+        STRICTNESS_RANGE,
+        text,
+        tip,
+        look.px(170 if room > look.px(_LONG) else 110),
+    )
+    if changed:
+        issued.append(edit.SetStrictness(strictness))
+    imgui.same_line(0, look.px(14))
+    return issued + _end_floaters(count)
+
+
+def _end_floaters(count: int) -> list[do.Command]:
+    """The ways out of the preview of so many."""
+    issued: list[do.Command] = []
+    imgui.begin_disabled(count == 0)
+    if widgets.primary_button("Delete##floaters"):
+        issued.append(edit.EndFloaters("delete"))
+    imgui.same_line()
+    if imgui.button("Select##floaters"):
+        issued.append(edit.EndFloaters("select"))
+    imgui.end_disabled()
+    imgui.same_line()
+    if imgui.button("Cancel##floaters"):
+        issued.append(edit.EndFloaters())
+    widgets.tooltip("Leave all as it is  (Esc)")
+    return issued
+
+
+def _hidden(state: State) -> list[do.Command]:
+    """That something is hidden, and the way back."""
+    assert state.editing.marks is not None
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.MUTED, f"{fa.ICON_FA_EYE_SLASH}  {len(state.editing.marks.hidden):,} hidden")
+    imgui.same_line()
+    return [edit.ShowAll()] if imgui.button("Show all") else []

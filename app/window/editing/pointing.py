@@ -1,0 +1,199 @@
+"""What can happen with the tool in hand, and what is found where it points."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from langflash_core.scene.edits import Combine
+
+from .. import poses
+from ..asking.state import PALETTE, Prompt
+from ..poses import Vector
+from ..scene.state import Flight, Mode
+from ..state import State
+from .commands import change
+from .state import RADIUS_RANGE, REACH_RANGE, Card, Point, Reading, Tool
+
+LIKE_THIS = "like this"
+LIKE_THRESHOLD = 0.97  # relevancy; a look at one spot is sharper than a word, see the README
+
+
+# The tool in hand
+
+
+@dataclass(frozen=True)
+class SetTool:
+    """Take another tool; what the last one was doing ends."""
+
+    tool: Tool
+
+    def apply(self, state: State) -> State:
+        return change(state, tool=self.tool, drag=(), hover=None, asked=None, card=None)
+
+
+@dataclass(frozen=True)
+class SetCombine:
+    """Whether a selection replaces, adds or removes without a modifier key."""
+
+    combine: Combine
+
+    def apply(self, state: State) -> State:
+        return change(state, combine=self.combine)
+
+
+@dataclass(frozen=True)
+class SetRadius:
+    """Another brush, design pixels."""
+
+    radius: float
+
+    def apply(self, state: State) -> State:
+        return change(state, radius=min(max(self.radius, RADIUS_RANGE[0]), RADIUS_RANGE[1]))
+
+
+@dataclass(frozen=True)
+class SetThrough:
+    """Whether regions select what is hidden behind other things, too."""
+
+    through: bool
+
+    def apply(self, state: State) -> State:
+        return change(state, through=self.through)
+
+
+@dataclass(frozen=True)
+class SetReach:
+    """How far growing goes, in spacings of the Gaussians."""
+
+    reach: float
+
+    def apply(self, state: State) -> State:
+        return change(state, reach=min(max(self.reach, REACH_RANGE[0]), REACH_RANGE[1]))
+
+
+@dataclass(frozen=True)
+class Drag:
+    """The region being drawn; an empty one ends it."""
+
+    points: tuple[Point, ...]
+
+    def apply(self, state: State) -> State:
+        return change(state, drag=self.points)
+
+
+# Pointing
+
+
+@dataclass(frozen=True)
+class Hover:
+    """The pointer is at a pixel of the picture's place, framebuffer pixels; None: it left."""
+
+    at: Point | None
+
+    def apply(self, state: State) -> State:
+        hover = None if self.at is None else Reading(self.at)
+        return change(state, hover=hover)
+
+
+@dataclass(frozen=True)
+class ReadingTaken:
+    """What the pixel under the pointer shows."""
+
+    reading: Reading
+
+    def apply(self, state: State) -> State:
+        hover = state.editing.hover
+        if hover is None or hover.at != self.reading.at:
+            return state
+        return change(state, hover=self.reading)
+
+
+@dataclass(frozen=True)
+class Ask:
+    """What is this, at a pixel?"""
+
+    at: Point
+
+    def apply(self, state: State) -> State:
+        return change(state, asked=self.at, card=None)
+
+
+@dataclass(frozen=True)
+class CardOpened:
+    """The place is read; its words follow."""
+
+    reading: Reading
+
+    def apply(self, state: State) -> State:
+        return change(state, asked=None, card=Card(self.reading))
+
+
+@dataclass(frozen=True)
+class Named:
+    """Nearest words (word, cosine) and language vector of the place that was asked about."""
+
+    asked: Reading
+    reading: Reading
+    words: tuple[tuple[str, float], ...]
+    vector: bytes
+
+    def apply(self, state: State) -> State:
+        card = state.editing.card
+        if card is None or card.reading != self.asked:
+            return state
+        return change(state, card=Card(self.reading, self.words, self.vector))
+
+
+@dataclass(frozen=True)
+class CloseCard:
+    """Take the answer away."""
+
+    def apply(self, state: State) -> State:
+        return change(state, card=None, asked=None)
+
+
+@dataclass(frozen=True)
+class AtomsNamed:
+    """The nearest words of every atom."""
+
+    names: tuple[tuple[str, ...], ...]
+
+    def apply(self, state: State) -> State:
+        return change(state, names=self.names)
+
+
+@dataclass(frozen=True)
+class FindSimilar:
+    """Ask for what the card's place says, as a prompt of its own."""
+
+    def apply(self, state: State) -> State:
+        card = state.editing.card
+        if card is None or not card.vector:
+            return state
+        word = card.words[0][0] if card.words else ""
+        text = f"{LIKE_THIS} ({word})" if word else LIKE_THIS
+        empty = next((p for p in state.prompts if not p.text.strip()), None)
+        used = {p.colour for p in state.prompts if p is not empty}
+        free = [c for c in PALETTE if c not in used] or [PALETTE[len(state.prompts) % len(PALETTE)]]
+        prompt = Prompt(state.next_key, text, free[0], LIKE_THRESHOLD, like=card.vector)
+        prompts = (*(p for p in state.prompts if p is not empty), prompt)
+        mode = Mode.HEAT if state.mode is Mode.RGB else state.mode
+        state = replace(state, prompts=prompts, active=prompt.key, next_key=state.next_key + 1, mode=mode)
+        return change(state, card=None)
+
+
+@dataclass(frozen=True)
+class FrameSelection:
+    """Fly to where the selection, or everything where nothing is selected, fills the view."""
+
+    def apply(self, state: State) -> State:
+        marks = state.editing.marks
+        if marks is None or state.info is None:
+            return state
+        rows = (marks.selected or marks.visible).rows()
+        points = state.info.scene.gaussians.means.numpy()[rows]
+        if not len(points):
+            return state
+        low, high = np.quantile(points, (0.02, 0.98), axis=0)
+        pose = poses.framing(state.pose, Vector(*low.tolist()), Vector(*high.tolist()))
+        return replace(state, flight=Flight(state.pose, pose, state.now), view=None)

@@ -1,0 +1,186 @@
+"""What editing adds to the state: the tool in hand, the history, what the pointer found."""
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from langflash_core.scene.edits import Combine, History, Marks, Mask
+
+RADIUS_RANGE = (4.0, 160.0)  # design pixels
+PICK_RADIUS = 4.0
+STRICTNESS_RANGE = (1.0, 6.0)
+REACH_RANGE = (1.0, 12.0)
+TOP_ATOMS = 3
+
+
+class Tool(Enum):
+    """What the left button does on the picture; the value is the name for people."""
+
+    MOVE = "Move"
+    POINT = "What is this?"
+    BOX = "Box"
+    BRUSH = "Brush"
+    PICK = "Pick"
+
+    @property
+    def selects(self) -> bool:
+        return self in (Tool.BOX, Tool.BRUSH, Tool.PICK)
+
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Region:
+    """Pixels of the picture's place: a box between its first and last point, or a brushed line.
+
+    points: x, y in framebuffer pixels. radius: of the brush, None for a box.
+    """
+
+    points: tuple[Point, ...]
+    radius: float | None = None
+
+    def pixels(self, width: int, height: int, scale: float = 1.0) -> np.ndarray:
+        """(height, width) bool: pixels whose centre lies inside, points and radius times `scale`."""
+        path = np.array(self.points, float) * scale
+        inside = np.zeros((height, width), bool)
+        if self.radius is None:
+            (x0, y0), (x1, y1) = path[[0, -1]].min(0), path[[0, -1]].max(0)
+            columns, rows = np.arange(width) + 0.5, np.arange(height) + 0.5
+            inside[np.ix_((rows >= y0) & (rows <= y1), (columns >= x0) & (columns <= x1))] = True
+            return inside
+        for start, end in zip(path, path[1:] if len(path) > 1 else path, strict=False):
+            _stroke(inside, start, end, self.radius * scale)
+        return inside
+
+    @property
+    def what(self) -> str:
+        """For the list of edits."""
+        if self.radius is None:
+            return "in a box"
+        return "with the brush" if len(self.points) > 1 or self.radius > PICK_RADIUS * 4 else "by a click"
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What one pixel of the picture shows. at: framebuffer pixels of the picture's place.
+
+    point: world, scene units; None where nothing is. atoms: (atom, share), most first; None while
+    the weight maps of this view are not drawn.
+    """
+
+    at: Point
+    point: tuple[float, float, float] | None = None
+    depth: float = 0.0
+    atoms: tuple[tuple[int, float], ...] | None = None
+
+
+@dataclass(frozen=True)
+class Card:
+    """The answer to "what is this?". words: (word, cosine), None while they are looked up.
+
+    vector: F(p) as float32 bytes, for "find similar".
+    """
+
+    reading: Reading
+    words: tuple[tuple[str, float], ...] | None = None
+    vector: bytes = field(default=b"", repr=False)
+
+
+@dataclass(frozen=True)
+class Floaters:
+    """The preview of floaters. scores: (N,) float32 bytes in robust deviations, empty while computed."""
+
+    scores: bytes = field(default=b"", repr=False)
+    strictness: float = 2.0
+
+    def mask(self, visible: Mask) -> Mask:
+        """Gaussians at least this strict, of what is shown."""
+        if not self.scores:
+            return Mask.none(visible.count)
+        return Mask.of(np.frombuffer(self.scores, np.float32) >= self.strictness) & visible
+
+
+@dataclass(frozen=True)
+class Editing:
+    """The editing half of the state.
+
+    saved: the marks that the file on disk holds; None when it holds none of these.
+    radius: of the brush, design pixels. reach: of growing, in spacings of the Gaussians.
+    drag: the region being drawn, framebuffer pixels. waiting: what the worker is looking for.
+    hover: what is under the pointer. asked: where a click waits for the picture to rest.
+    names: nearest words of each atom, best first.
+    """
+
+    history: History | None = None
+    saved: Marks | None = None
+    tool: Tool = Tool.MOVE
+    combine: Combine = "replace"
+    radius: float = 24.0
+    through: bool = False
+    reach: float = 3.0
+    drag: tuple[Point, ...] = ()
+    waiting: str = ""
+    hover: Reading | None = None
+    asked: Point | None = None
+    card: Card | None = None
+    names: tuple[tuple[str, ...], ...] = ()
+    floaters: Floaters | None = None
+
+    @property
+    def marks(self) -> Marks | None:
+        return self.history.marks if self.history else None
+
+    @property
+    def num_selected(self) -> int:
+        return len(self.history.marks.selected) if self.history else 0
+
+    @property
+    def dirty(self) -> bool:
+        """Whether anything was marked since the last save, selections included."""
+        return self.marks is not None and self.marks != self.saved
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether a saved file would differ from the one on disk."""
+        if self.marks is None or self.saved is None:
+            return self.marks is not None
+        return (self.marks.deleted, self.marks.atoms) != (self.saved.deleted, self.saved.atoms)
+
+    def atom_name(self, k: int) -> str:
+        """What the person calls an atom, or else its nearest word."""
+        own = self.history.marks.atoms[k].name if self.history else ""
+        words = self.names[k] if k < len(self.names) else ()
+        return own or (words[0] if words else f"atom {k}")
+
+
+NO_EDITING = Editing()
+
+
+def _stroke(inside: np.ndarray, start: np.ndarray, end: np.ndarray, radius: float) -> None:
+    """Set the pixels within `radius` of the line from start to end, x and y."""
+    height, width = inside.shape
+    low = np.floor(np.minimum(start, end) - radius).astype(int).clip(0, (width, height))
+    high = np.ceil(np.maximum(start, end) + radius).astype(int).clip(0, (width, height))
+    x, y = np.meshgrid(np.arange(low[0], high[0]) + 0.5, np.arange(low[1], high[1]) + 0.5)
+    along = end - start
+    length = max(float(along @ along), 1e-12)
+    share = (((x - start[0]) * along[0] + (y - start[1]) * along[1]) / length).clip(0, 1)
+    apart = np.hypot(x - start[0] - share * along[0], y - start[1] - share * along[1])
+    inside[low[1] : high[1], low[0] : high[0]] |= apart <= radius
+
+
+def strongest(weights: np.ndarray) -> tuple[tuple[int, float], ...]:
+    """The atoms that a pixel carries most of, with their shares of all."""
+    total = max(float(weights.sum()), 1e-9)
+    order = np.argsort(-weights, kind="stable")[:TOP_ATOMS]
+    return tuple((int(k), float(weights[k]) / total) for k in order if weights[k] > 0.005 * total)
+
+
+def fresh(editing: Editing, history: History | None, saved: Marks | None) -> Editing:
+    """Editing of a scene that has just come; tool and settings stay in the hand."""
+    return Editing(
+        history=history, saved=saved, tool=editing.tool, combine=editing.combine, radius=editing.radius,
+        through=editing.through, reach=editing.reach,
+    )  # fmt: skip

@@ -1,0 +1,290 @@
+"""The worker's side of editing: what must be computed to select, and the words of places and atoms.
+
+Heavy imports wait until they are needed. No OpenGL, no ImGui.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from langflash_core.scene.edits import Combine, Marks, Mask
+
+from ..commands import Command, Notify
+from ..poses import Pose, to_camera
+from ..requests import Asked, SceneErrand
+from ..scene.state import SceneInfo
+from ..state import State
+from .commands import FloatersFound, Found, Grow, SelectAtom, SelectByPhrase, SelectRegion, StopWaiting
+from .pointing import AtomsNamed, Named, ReadingTaken
+from .state import Reading, Region, strongest
+
+if TYPE_CHECKING:
+    from langflash_core.types import Scene
+
+MOST_PIXELS = 120_000  # of a region; a larger one is looked at coarser, which takes seconds less
+WORDS_ASKED, WORDS_OF_ATOM = 6, 3
+
+
+@dataclass(frozen=True)
+class EditErrand(SceneErrand):
+    """About a scene as its marks show it."""
+
+    scene: "Scene" = field(repr=False)
+    marks: Marks = field(repr=False)
+
+    def spoken(self) -> "Scene":
+        """The scene with its atoms merged and silenced as marked."""
+        from langflash_core.scene.edited import spoken_scene
+
+        return spoken_scene(self.scene, self.marks)
+
+
+# Selections
+
+
+@dataclass(frozen=True)
+class Selection(EditErrand):
+    """Something looks for Gaussians and waits for it."""
+
+    def failed(self, sentence: str) -> Iterable[Command]:
+        return Notify(sentence), StopWaiting()
+
+
+@dataclass(frozen=True)
+class FindInRegion(Selection):
+    """Gaussians that a region shows. size: of the picture's place, pixels."""
+
+    region: Region
+    pose: Pose
+    size: tuple[int, int]
+    through: bool
+    combine: Combine
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.splat.picking import seen_in
+
+        pixels = self.region.pixels(*self.size)
+        scale = min(1.0, (MOST_PIXELS / max(int(pixels.sum()), 1)) ** 0.5)
+        if scale < 1.0:
+            width, height = (max(1, round(side * scale)) for side in self.size)
+            pixels = self.region.pixels(width, height, width / self.size[0])
+        camera = to_camera(self.pose, pixels.shape[1], pixels.shape[0])
+        visible = self.marks.visible.rows()
+        found = seen_in(self.scene.gaussians, visible, camera, pixels, through=self.through)
+        yield Found(Mask.of(found), self.combine, self.region.what)
+
+
+@dataclass(frozen=True)
+class FindByPhrase(Selection):
+    """Gaussians that a phrase, or a language vector `like`, means from `threshold` on."""
+
+    text: str
+    like: bytes
+    negatives: tuple[str, ...]
+    threshold: float
+    combine: Combine
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        yield Found(Mask.of(self.meant()), self.combine, f"by {self.text!r}")
+
+    def meant(self) -> np.ndarray:
+        """(N,) bool: Gaussians whose own relevance reaches the threshold."""
+        import torch
+
+        from langflash_core.language.gaussians import gaussian_relevance
+        from langflash_core.language.relevance import compile_query
+        from langflash_core.language.spaces import language_space
+        from langflash_core.language.words import with_vectors
+
+        scene = self.spoken()
+        space = language_space(scene.semantics.space)
+        query = compile_query(scene, space, [self.text], negatives=list(self.negatives) or None)
+        if self.like:
+            vector = torch.from_numpy(np.frombuffer(self.like, np.float32).copy())
+            query = with_vectors(query, scene.semantics.dictionary, {0: vector})
+        return (gaussian_relevance(scene.semantics, query)[0] >= self.threshold).numpy()
+
+
+@dataclass(frozen=True)
+class FindAtom(Selection):
+    """Gaussians whose strongest atom is the one asked for, or one merged with it."""
+
+    atom: int
+    combine: Combine
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.scene.selection import strongest_atoms
+
+        heads = np.array([atom.into for atom in self.marks.atoms] + [-1])  # the last for "none"
+        found = heads[strongest_atoms(self.scene.semantics)] == heads[self.atom]
+        yield Found(Mask.of(found), self.combine, f"of atom {self.atom}")
+
+
+@dataclass(frozen=True)
+class GrowSelection(Selection):
+    """What lies within `reach` spacings of the selection, a spacing being the median one of what is
+    shown; `within`: of what a phrase means."""
+
+    reach: float
+    within: FindByPhrase | None
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.scene.selection import grow, spacing
+
+        means = self.scene.gaussians.means.numpy()
+        visible = self.marks.visible.rows()
+        allowed = visible & self.within.meant() if self.within else visible
+        distance = self.reach * spacing(means[visible])
+        found = grow(means, self.marks.selected.rows(), allowed, distance)
+        yield Found(Mask.of(found), "add", f"around, {self.within.text!r}" if self.within else "around")
+
+
+@dataclass(frozen=True)
+class ScoreFloaters(EditErrand):
+    """How far every Gaussian stands out."""
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.scene.selection import isolation
+
+        scores = isolation(self.scene.gaussians, self.marks.visible.rows())
+        yield FloatersFound(scores.tobytes())
+
+
+def request_for(
+    command: Command, state: State, info: SceneInfo, marks: Marks, size: tuple[int, int]
+) -> Selection | None:
+    """What the worker must find for a command. size: of the picture's place, pixels."""
+    scene = (info.serial, info.scene, marks)
+    match command:
+        case SelectRegion(region, combine) if min(size) > 0:
+            return FindInRegion(*scene, region, state.pose, size, state.editing.through, combine)
+        case SelectByPhrase(key, combine):
+            return _phrase(state, info, marks, key, combine)
+        case SelectAtom(atom, combine) if 0 <= atom < len(marks.atoms):
+            return FindAtom(*scene, atom, combine)
+        case Grow(phrase) if marks.selected:
+            active = state.active_prompt
+            within = _phrase(state, info, marks, active.key, "add") if phrase and active else None
+            return GrowSelection(*scene, state.editing.reach, within)
+    return None
+
+
+def _phrase(state: State, info: SceneInfo, marks: Marks, key: int, combine: Combine) -> FindByPhrase | None:
+    prompt = next((p for p in state.prompts if p.key == key and p.text.strip()), None)
+    if prompt is None or not info.num_atoms:
+        return None
+    return FindByPhrase(
+        info.serial, info.scene, marks, prompt.text.strip(), prompt.like, state.negatives, prompt.cut, combine
+    )
+
+
+# Places and words
+
+
+@dataclass(frozen=True)
+class Weigh(EditErrand):
+    """The groups of a pixel whose weight maps are not drawn. size: of the picture's place."""
+
+    newest_counts = True
+
+    reading: Reading
+    pose: Pose
+    size: tuple[int, int]
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        yield ReadingTaken(self.weighed(self.weigh()))
+
+    def weigh(self) -> np.ndarray:
+        """Weights (K,) of the pixel, composed exactly; a view is projected once for all its pixels."""
+        from langflash_core.splat.picking import weights_at
+
+        x, y = (min(max(int(at), 0), side - 1) for at, side in zip(self.reading.at, self.size, strict=True))
+        rows, footprints = _projected(self.scene, self.marks.visible, self.pose, self.size)
+        return weights_at(self.scene.semantics, rows, footprints, x, y).numpy()
+
+    def weighed(self, weights: np.ndarray) -> Reading:
+        """The reading with its groups."""
+        return replace(self.reading, atoms=strongest(weights))
+
+
+_views: dict[tuple, tuple] = {}  # the last view that was projected
+
+
+def _projected(scene: "Scene", visible: Mask, pose: Pose, size: tuple[int, int]):
+    """Rows of what is shown, and their footprints in a view."""
+    from langflash_core.splat.picking import projected
+
+    key = (id(scene), visible, pose, size)
+    if key not in _views:
+        _views.clear()
+        _views[key] = scene, *projected(scene.gaussians, visible.rows(), to_camera(pose, *size))
+    return _views[key][1:]
+
+
+@dataclass(frozen=True)
+class NamePlace(Weigh):
+    """The nearest words of F(p) = W D, of the household's and of `extra`, the person's own.
+
+    weights: (K,) of the pixel as float32 bytes; none: not drawn, to be composed.
+    """
+
+    weights: bytes
+    extra: tuple[str, ...]
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        import torch
+
+        from langflash_core.language.words import feature_at, nearest_words
+
+        semantics = self.spoken().semantics
+        weights = np.frombuffer(self.weights, np.float32).copy() if self.weights else self.weigh()
+        vector = feature_at(torch.from_numpy(weights), semantics.dictionary)
+        words, embeddings = _vocabulary(semantics.space, self.extra)
+        near = nearest_words(vector, words, embeddings, WORDS_ASKED)
+        pairs = tuple((each.word, each.cosine) for each in near)
+        content = vector.float().numpy().tobytes() if near else b""
+        yield Named(self.reading, self.weighed(weights), pairs, content)
+
+
+@dataclass(frozen=True)
+class NameAtoms(EditErrand):
+    """The nearest household words of every atom."""
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.language.words import nearest_words
+
+        semantics = self.spoken().semantics
+        words, embeddings = _vocabulary(semantics.space, ())
+        rows = (nearest_words(d, words, embeddings, WORDS_OF_ATOM) for d in semantics.dictionary)
+        yield AtomsNamed(tuple(tuple(each.word for each in row) for row in rows))
+
+
+def household_words() -> tuple[str, ...]:
+    """The names of things in a room that the project knows."""
+    from langflash_core.language.vocabulary import OWN
+
+    return tuple(OWN)
+
+
+@lru_cache(maxsize=4)
+def _household(space: str):
+    from langflash_core.language.spaces import language_space
+
+    return language_space(space).encode(list(household_words()))
+
+
+def _vocabulary(space: str, extra: tuple[str, ...]):
+    """Words and unit embeddings (A, C): the household's, and the person's own."""
+    import torch
+
+    from langflash_core.language.algebra import encode_prompts
+    from langflash_core.language.spaces import language_space
+
+    known = household_words()
+    own = tuple(dict.fromkeys(text for text in extra if text and text not in known))
+    if not own:
+        return known, _household(space)
+    return known + own, torch.cat((_household(space), encode_prompts(language_space(space), own)))

@@ -1,0 +1,1 @@
+"""Files of the scene, by the program of the command line."""

@@ -1,0 +1,123 @@
+"""What can happen to an export: the dialog, and the process that writes."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..commands import Notify
+from ..state import State
+from .state import ExportForm, Running, What
+
+
+def change(state: State, **changes: Any) -> State:
+    """The state with another exporting half."""
+    return replace(state, exporting=replace(state.exporting, **changes))
+
+
+@dataclass(frozen=True)
+class EditForm:
+    """The export dialog as the person left it; a new kind takes its own ending."""
+
+    form: ExportForm
+
+    def apply(self, state: State) -> State:
+        old, form = state.exporting.form, self.form
+        if form.what is not old.what and form.path.lower().endswith(old.what.suffix):
+            form = replace(form, path=form.path[: -len(old.what.suffix)] + form.what.suffix)
+        return change(state, form=form)
+
+
+@dataclass(frozen=True)
+class ShowExport:
+    """Open the export dialog, with a place to write to."""
+
+    def apply(self, state: State) -> State:
+        if state.info is None:
+            text = "There is no scene to export; drop photos on the window first."
+            return Notify(text).apply(state)
+        form = state.exporting.form
+        if not form.path:
+            form = replace(form, path=str(_place(state).with_suffix(What.RGB.suffix)))
+        selected = form.only_selected and state.editing.num_selected > 0
+        state = change(state, form=replace(form, only_selected=selected))
+        return replace(state, dialog="export")
+
+
+@dataclass(frozen=True)
+class Export:
+    """Do what the form says."""
+
+    def apply(self, state: State) -> State:
+        return state
+
+
+@dataclass(frozen=True)
+class ExportBegan:
+    """The command runs."""
+
+    target: Path
+
+    def apply(self, state: State) -> State:
+        return change(replace(state, dialog=None), running=Running(self.target))
+
+
+@dataclass(frozen=True)
+class ExportProgressed:
+    """A stage and the fraction of the whole."""
+
+    stage: str
+    fraction: float
+
+    def apply(self, state: State) -> State:
+        now = state.exporting.running
+        if now is None:
+            return state
+        fraction = min(max(self.fraction, 0.0), 1.0)
+        return change(state, running=replace(now, stage=self.stage, fraction=fraction))
+
+
+@dataclass(frozen=True)
+class CancelExport:
+    """Stop it; nothing is written."""
+
+    def apply(self, state: State) -> State:
+        now = state.exporting.running
+        return state if now is None else change(state, running=replace(now, cancelling=True))
+
+
+@dataclass(frozen=True)
+class ExportEnded:
+    """code: 0 done. said: the command's own words. error: its sentence."""
+
+    code: int
+    said: str
+    error: str
+
+    def apply(self, state: State) -> State:
+        was = state.exporting.running
+        state = change(state, running=None)
+        if was is not None and was.cancelling and self.code != 0:
+            return Notify("The export was stopped; nothing was written.", "info").apply(state)
+        if self.code == 0:
+            return Notify(f"Exported {self.said}", "info").apply(state)
+        return Notify(self.error or f"The export failed (code {self.code}).").apply(state)
+
+
+@dataclass(frozen=True)
+class CopiesAt:
+    """Where the export reads a scene with unsaved edits, and its selection; None: there are none."""
+
+    edited: Path | None
+    selection: Path | None
+
+    def apply(self, state: State) -> State:
+        return change(state, edited=self.edited, selection=self.selection)
+
+
+def _place(state: State) -> Path:
+    """Beside the scene, or beside its first photo, by a name of its own."""
+    assert state.info is not None
+    beside = state.info.path
+    if beside is None:
+        beside = state.photos[0].path if state.photos else Path.home() / "scene"
+    return beside.with_name(f"{beside.stem}_view")

@@ -1,0 +1,111 @@
+"""What exporting asks of the world: the files that the command reads, and the process that writes."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from langflash_core.errors import LangFlashError
+from langflash_core.files import make_folder, write_atomically
+from langflash_core.scene.edits import Marks, Mask
+
+from ..commands import Command, Notify
+from ..effects import Effects, Hands
+from ..recovery.commands import CopyKept
+from ..recovery.keeper import Keeper
+from ..recovery.work import KeepCopy
+from ..scene.commands import SceneArrived
+from ..state import State
+from .commands import CancelExport, CopiesAt, Export, ExportBegan, ExportEnded, ExportProgressed, ShowExport
+from .order import Order, order, pixels, source
+from .process import Exporter, camera_json
+
+
+class ExportingEffects(Effects):
+    """keeper: knows where the copies that an export reads may lie."""
+
+    def __init__(self, hands: Hands, keeper: Keeper) -> None:
+        self._hands = hands
+        self._keeper = keeper
+        self._exporter = Exporter(self._progressed, self._ended)
+        self._waits = False  # for a copy
+        self._ready: set[Path] = set()  # copies that are complete
+
+    def follow(self, command: Command, before: State, state: State) -> None:
+        """The dialog has copies made, its button starts the process."""
+        match command:
+            case SceneArrived():
+                self._ready.clear()
+            case ShowExport() if state.dialog == "export":
+                self._make_copies(state)
+            case CopyKept(path):
+                self._ready.add(path)
+                if self._waits:
+                    self._waits = False
+                    self._hands.dispatch(Export())
+            case Export():
+                self._export(state)
+            case CancelExport():
+                self._exporter.cancel()
+            case _:
+                pass
+
+    def close(self, state: State, crashed: bool) -> None:
+        """End the export under way."""
+        self._exporter.close()
+
+    def _make_copies(self, state: State) -> None:
+        """Write what the scene's own file does not hold: unsaved edits, and the selection."""
+        info, marks = state.info, state.editing.marks
+        self._waits = False
+        if info is None or marks is None:
+            return
+        edited, selection = self._keeper.edited_file, self._keeper.selection_file
+        copies: dict[Path, Marks] = {}
+        if state.editing.unsaved:
+            copies[edited] = marks
+        if marks.selected:
+            rest = Mask.full(marks.selected.count) - marks.selected
+            copies[selection] = replace(marks, deleted=rest)
+        self._ready -= {edited, selection}
+        for path, wanted in copies.items():
+            self._hands.submit(KeepCopy(info.serial, info.scene, path, wanted))
+        there = (path if path in copies else None for path in (edited, selection))
+        self._hands.perform(CopiesAt(*there))
+
+    def _export(self, state: State) -> None:
+        perform = self._hands.perform
+        if self._exporter.running:
+            perform(Notify("An export is under way; wait for it, or stop it."))
+            return
+        wanted = order(state)
+        if isinstance(wanted, str):
+            perform(Notify(wanted))
+            return
+        read = source(state)
+        if state.info is not None and read != state.info.path and read not in self._ready:
+            self._waits = True  # goes on when the copy is complete
+            return
+        try:
+            self._start(wanted, state)
+        except LangFlashError as error:
+            perform(Notify(str(error)))
+        except OSError as error:
+            perform(Notify(f"The export cannot be started: {error.strerror or error}."))
+        else:
+            perform(ExportBegan(wanted.target))
+
+    def _start(self, wanted: Order, state: State) -> None:
+        """Raises:
+        LangFlashError: the folder or the camera file cannot be written.
+        OSError: the process cannot be started.
+        """
+        make_folder(wanted.target.parent)
+        if wanted.camera_file is not None:
+            size = pixels(state.exporting.form.side, state.pose.aspect)
+            write_atomically(wanted.camera_file, camera_json(state.pose, *size))
+        self._exporter.start(wanted.words)
+
+    def _progressed(self, stage: str, fraction: float) -> None:
+        self._hands.dispatch(ExportProgressed(stage, fraction))
+
+    def _ended(self, code: int, said: str, error: str) -> None:
+        self._hands.dispatch(ExportEnded(code, said, error))

@@ -1,0 +1,183 @@
+"""The export dialog, and the export under way."""
+
+import os
+from dataclasses import replace
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
+
+from .. import commands as do
+from ..kit import theme, widgets
+from ..kit.look import Look
+from ..state import State
+from . import commands as export
+from . import order as written
+from .state import SECONDS, ExportForm, What
+
+WIDTH = 620.0  # design pixels
+COLUMNS = 4
+SIDES = (512, 1024, 1600, 2048, 4096)
+HINTS = {
+    What.RGB: "The scene's colours, PNG",
+    What.HEAT: "Where the active phrase fits, over the colours",
+    What.MASK: "White where any phrase is found",
+    What.CUTOUT: "What the phrases find, on transparency (RGBA)",
+    What.LABELS: "Phrase numbers as a palette PNG, and a legend as JSON",
+    What.COCO: "Instance masks as COCO JSON, and the pictures they belong to",
+    What.BOXES_JSON: "Place, axes and size of what each phrase finds",
+    What.BOXES_CSV: "The same as a table",
+    What.BOXES_GLB: "The same as bodies, for Blender and other 3D programs",
+    What.VIDEO: "A round through all views, H.264",
+    What.PLY: "3D Gaussians as other viewers read them",
+    What.SPLAT: "The compact format of web viewers",
+    What.SCENE: "With language and photos, for this program",
+}
+
+
+def draw(state: State, look: Look) -> list[do.Command]:
+    """The dialog's body."""
+    form = state.exporting.form
+    wanted = _kinds(form, look)
+    widgets.muted(HINTS[form.what])
+    widgets.gap(look.px(4))
+    wanted = _options(state, wanted, look)
+    widgets.gap(look.px(4))
+    imgui.text("Where to write it")
+    imgui.set_next_item_width(-1)
+    _, path = imgui.input_text("##file", wanted.path)
+    wanted = replace(wanted, path=path)
+    issued: list[do.Command] = [] if wanted == form else [export.EditForm(wanted)]
+    return issued + _order(state, look)
+
+
+def _kinds(form: ExportForm, look: Look) -> ExportForm:
+    spacing = imgui.get_style().item_spacing.x
+    width = (imgui.get_content_region_avail().x - (COLUMNS - 1) * spacing) / COLUMNS
+    for index, what in enumerate(What):
+        if index % COLUMNS:
+            imgui.same_line()
+        size = ImVec2(width, 0)
+        pressed = (
+            widgets.primary_button(what.label, size) if what is form.what else imgui.button(what.label, size)
+        )
+        if pressed:
+            form = replace(form, what=what)
+    return form
+
+
+def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
+    what = form.what
+    if what.looks:
+        _label("Seen from", look)
+        count = len(state.info.views) if state.info else 0
+        options = (("the view on show", False), (f"all {count} photos' views", True))
+        form = replace(form, all_views=widgets.choice(options, form.all_views))
+    if what.sized:
+        _label("Longer side", look)
+        form = replace(form, side=widgets.choice([(str(side), side) for side in SIDES], form.side))
+        imgui.same_line()
+        imgui.align_text_to_frame_padding()
+        imgui.text_colored(theme.MUTED, "px")
+    if what is What.VIDEO:
+        _label("Length", look)
+        width = imgui.get_content_region_avail().x
+        changed, seconds = widgets.slider(
+            "##seconds", form.seconds, SECONDS, f"{form.seconds:.0f} s", "", width
+        )
+        if changed:
+            form = replace(form, seconds=float(round(seconds)))
+    return _narrowed(state, form, look)
+
+
+def _label(text: str, look: Look) -> None:
+    imgui.align_text_to_frame_padding()
+    imgui.text(text)
+    imgui.same_line(look.px(110))
+
+
+def _narrowed(state: State, form: ExportForm, look: Look) -> ExportForm:
+    """To what the phrases find, or to what is selected."""
+    what = form.what
+    if what.takes_phrases and not what.needs_phrases:
+        imgui.begin_disabled(not state.asked)
+        changed, only = widgets.checkbox("Only what the phrases find", form.only_found)
+        imgui.end_disabled()
+        if changed:
+            form = replace(form, only_found=only)
+    if what.splats:
+        imgui.same_line(0, look.px(26))
+        imgui.begin_disabled(state.exporting.selection is None)
+        changed, only = widgets.checkbox("Only what is selected", form.only_selected)
+        imgui.end_disabled()
+        if changed:
+            form = replace(form, only_selected=only)
+    return form
+
+
+def _order(state: State, look: Look) -> list[do.Command]:
+    """The command that will run, and the button that runs it."""
+    issued: list[do.Command] = []
+    order = written.order(state)
+    busy = state.exporting.running is not None
+    if isinstance(order, str):
+        widgets.muted(order)
+    else:
+        exists = os.path.exists(order.target) and not state.exporting.form.all_views
+        widgets.muted(f"{order.target} will be replaced." if exists else "The same on the command line:")
+        _command_line(order.line, look)
+        issued += _copy(order.line)
+        for remark in written.remarks(state):
+            widgets.muted(remark)
+    widgets.gap(look.px(4))
+    imgui.begin_disabled(isinstance(order, str) or busy)
+    if widgets.primary_button("Export", look.vec(120, 0)):
+        issued.append(export.Export())
+    imgui.end_disabled()
+    imgui.same_line()
+    if imgui.button("Close", look.vec(120, 0)):
+        issued.append(do.ShowDialog(None))
+    if busy:
+        imgui.same_line()
+        imgui.text_colored(theme.MUTED, "one is under way")
+    return issued
+
+
+def _command_line(line: str, look: Look) -> None:
+    padding = look.px(8)
+    width = imgui.get_content_region_avail().x - look.px(44)
+    extent = imgui.calc_text_size(line, False, width - 2 * padding)
+    corner = imgui.get_cursor_screen_pos()
+    end = ImVec2(corner.x + width, corner.y + extent.y + 2 * padding)
+    imgui.get_window_draw_list().add_rect_filled(corner, end, widgets.u32(theme.RAISED), look.px(6))
+    imgui.set_cursor_screen_pos(ImVec2(corner.x + padding, corner.y + padding))
+    imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + width - 2 * padding)
+    imgui.text_unformatted(line)
+    imgui.pop_text_wrap_pos()
+    imgui.set_cursor_screen_pos(corner)
+    imgui.dummy(ImVec2(width, extent.y + 2 * padding))
+
+
+def _copy(line: str) -> list[do.Command]:
+    imgui.same_line()
+    pressed = widgets.quiet_button(f"{fa.ICON_FA_COPY}##line", "Copy the command line")
+    return [do.CopyText(line)] if pressed else []
+
+
+def draw_progress(state: State, look: Look) -> list[do.Command]:
+    """The export under way, for the side panel; nothing without one."""
+    now = state.exporting.running
+    if now is None:
+        return []
+    imgui.text(f"Exporting {now.target.name}")
+    stage = "stopping" if now.cancelling else now.stage
+    with widgets.colours(text=theme.MUTED):
+        widgets.at_right_edge(stage)
+    fraction = now.fraction if now.fraction >= 0 else -0.6 * state.now
+    imgui.progress_bar(fraction, ImVec2(-1, look.px(8)), "")
+    imgui.begin_disabled(now.cancelling)
+    pressed = imgui.button(f"{fa.ICON_FA_STOP}  Stop the export", ImVec2(-1, 0))
+    imgui.end_disabled()
+    widgets.gap(look.px(2))
+    imgui.separator()
+    widgets.gap(look.px(2))
+    return [export.CancelExport()] if pressed else []

@@ -1,0 +1,108 @@
+"""What to write, as the export dialog has it, and the export under way."""
+
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+LARGEST_SIDE = 8192  # pixels, as on the command line
+SECONDS = (1.0, 60.0)
+
+
+class What(Enum):
+    """What to write: the label of the choice, the ending, and the word for `--what`."""
+
+    RGB = ("Picture", ".png", "rgb")
+    HEAT = ("Heat-map", ".png", "heat")
+    MASK = ("Mask", ".png", "mask")
+    CUTOUT = ("Cut-out", ".png", "cutout")
+    LABELS = ("Label map", ".png", "labels")
+    COCO = ("COCO masks", ".json", "")
+    BOXES_JSON = ("Boxes, JSON", ".json", "boxes")
+    BOXES_CSV = ("Boxes, CSV", ".csv", "boxes")
+    BOXES_GLB = ("Boxes, .glb", ".glb", "boxes")
+    VIDEO = ("Turntable", ".mp4", "")
+    PLY = ("Splats, .ply", ".ply", "")
+    SPLAT = ("Splats, .splat", ".splat", "")
+    SCENE = ("Scene", ".langflash", "")
+
+    @property
+    def label(self) -> str:
+        return self.value[0]
+
+    @property
+    def suffix(self) -> str:
+        return self.value[1]
+
+    @property
+    def word(self) -> str:
+        return self.value[2]
+
+    @property
+    def needs_phrases(self) -> bool:
+        """Whether there is nothing to write without a phrase."""
+        return self in (
+            What.HEAT, What.MASK, What.CUTOUT, What.LABELS, What.COCO,
+            What.BOXES_JSON, What.BOXES_CSV, What.BOXES_GLB,
+        )  # fmt: skip
+
+    @property
+    def takes_phrases(self) -> bool:
+        """Whether phrases may narrow it down."""
+        return self is not What.RGB
+
+    @property
+    def looks(self) -> bool:
+        """Whether it is seen from a camera."""
+        return self not in (What.VIDEO, What.PLY, What.SPLAT, What.SCENE)
+
+    @property
+    def splats(self) -> bool:
+        """Whether Gaussians are written, not pictures of them."""
+        return self in (What.PLY, What.SPLAT, What.SCENE)
+
+    @property
+    def sized(self) -> bool:
+        """Whether it has a size in pixels."""
+        return self.looks or self is What.VIDEO
+
+
+@dataclass(frozen=True)
+class ExportForm:
+    """all_views: from every photo instead of the view on show. only_found: just what answers the
+    phrases. only_selected: just the selection, where Gaussians are written. side: the longer one in
+    pixels. path: as typed; an ending is added."""
+
+    what: What = What.RGB
+    all_views: bool = False
+    only_found: bool = False
+    only_selected: bool = False
+    side: int = 1024
+    seconds: float = 6.0
+    path: str = ""
+
+
+@dataclass(frozen=True)
+class Running:
+    """An export under way. fraction: 0 to 1, below 0 while nothing is known."""
+
+    target: Path
+    stage: str = "starting"
+    fraction: float = -1.0
+    cancelling: bool = False
+
+
+NO_FORM = ExportForm()
+
+
+@dataclass(frozen=True)
+class Exporting:
+    """The exporting half of the state. edited, selection: copies that an export reads, of the scene
+    with unsaved edits and of what is selected."""
+
+    form: ExportForm = NO_FORM
+    running: Running | None = None
+    edited: Path | None = None
+    selection: Path | None = None
+
+
+NO_EXPORTING = Exporting()

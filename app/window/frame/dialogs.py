@@ -1,0 +1,209 @@
+"""The few dialogs."""
+
+import os
+from collections.abc import Callable
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
+
+from .. import commands as do
+from ..asking import commands as ask
+from ..exporting import commands as export
+from ..exporting import panel as export_panel
+from ..kit import theme, widgets
+from ..kit.look import Look
+from ..recovery import panels as recovery_panels
+from ..scene import commands as show
+from ..scene.drops import typed_path, typed_scene
+from ..state import State
+
+TITLES = {
+    "save": "Save the scene",
+    "open": "Open",
+    "help": "Mouse and keys",
+    "leave": "Leave?",
+    "save prompts": "Save the phrases",
+    "load prompts": "Load phrases",
+    "export": "Export",
+    "settings": "Preferences",
+    "log": "Log",
+}
+WIDTHS = {  # design pixels; others 520
+    "export": export_panel.WIDTH,
+    "settings": 560.0,
+    "log": 640.0,
+    "help": 600.0,
+}
+HELP = (
+    ("Left drag", "orbit"),
+    ("Middle drag, Shift + left drag", "pan"),
+    ("Wheel", "zoom"),
+    ("Right drag", "look around"),
+    ("W A S D, Q E", "fly, down and up; Shift is faster"),
+    ("H or Home", "back to the first photo's view"),
+    ("Z, F", "show all of the scene, the selection"),
+    ("P, K", "compare with the photo; show the cameras"),
+    ("1 to 5", "colour, heat-map, labels, atoms, depth"),
+    ("6 to 0", "masks, only these, without these, dim, features"),
+    ("Up, Down in a phrase", "recent phrases"),
+    ("V, X", "move; ask what is there"),
+    ("R, B, C", "select with a box, a brush, a click"),
+    ("Shift, Ctrl while selecting", "add, remove;  Alt: orbit"),
+    ("[ and ]", "a smaller, a larger brush"),
+    ("Ctrl + A, D, I", "select all, nothing, the rest"),
+    ("G, Delete", "grow, delete the selection"),
+    ("Ctrl + Z, Ctrl + Shift + Z", "undo, redo"),
+    ("Ctrl + O, Ctrl + S, Ctrl + E", "open, save, export"),
+    ("Ctrl + P, F2", "preferences, log"),
+    ("Esc, Ctrl + Q", "one step back, leave"),
+)
+_CLOSING = do.ShowDialog | show.SaveScene | show.OpenPaths | ask.SavePrompts | ask.LoadPrompts | export.Export
+
+
+def draw(state: State, look: Look) -> list[do.Command]:
+    """The dialog that is open, if any."""
+    if state.dialog is None:
+        return []
+    title = TITLES[state.dialog]
+    _place(state.dialog, title, look)
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
+    opened, kept = imgui.begin_popup_modal(title, True, imgui.WindowFlags_.no_resize)
+    issued: list[do.Command] = []
+    if opened:
+        issued = _body(state.dialog)(state, look)
+        if not kept:
+            issued.append(do.ShowDialog(None))
+        if any(isinstance(c, _CLOSING) for c in issued):
+            imgui.close_current_popup()
+        imgui.end_popup()
+    imgui.pop_style_var()
+    return issued
+
+
+def _place(dialog: str, title: str, look: Look) -> None:
+    """Open it in the middle, as wide as it wants and no higher than the window."""
+    if not imgui.is_popup_open(title):
+        imgui.open_popup(title)
+    middle = imgui.get_main_viewport().get_center()
+    imgui.set_next_window_pos(middle, imgui.Cond_.appearing, ImVec2(0.5, 0.5))
+    room, margin = imgui.get_io().display_size, look.px(24)
+    width = min(look.px(WIDTHS.get(dialog, 520.0)), room.x - margin)
+    imgui.set_next_window_size_constraints(ImVec2(width, 0), ImVec2(width, room.y - margin))  # then scrolls
+    imgui.set_next_window_size(ImVec2(width, 0))
+
+
+def _body(dialog: str) -> Callable[[State, Look], list[do.Command]]:
+    """What draws the inside of a dialog."""
+    return {
+        "save": _save,
+        "open": _open,
+        "help": _help,
+        "leave": _leave,
+        "save prompts": _save_prompts,
+        "load prompts": _load_prompts,
+        "export": export_panel.draw,
+        "settings": recovery_panels.draw_settings,
+        "log": _log,
+    }[dialog]
+
+
+def _save(state: State, look: Look) -> list[do.Command]:
+    issued, confirmed = _path_field(state, "Where to write it")
+    path = typed_scene(state.dialog_path)
+    exists = path is not None and os.path.isfile(path)
+    consequence = f"{path} will be replaced." if exists else f"Writes {path}"
+    widgets.muted("Type a file name." if path is None else consequence)
+    imgui.begin_disabled(path is None)
+    pressed = widgets.primary_button("Replace" if exists else "Save", look.vec(120, 0))
+    imgui.end_disabled()
+    if path is not None and (pressed or confirmed):
+        issued.append(show.SaveScene(path))
+    return issued
+
+
+def _open(state: State, look: Look) -> list[do.Command]:
+    issued, confirmed = _path_field(state, "A scene, a photo, or a folder of photos")
+    text = state.dialog_path.strip()
+    imgui.begin_disabled(not text)
+    pressed = widgets.primary_button("Open", look.vec(120, 0))
+    imgui.end_disabled()
+    if text and (pressed or confirmed):
+        issued.append(show.OpenPaths((str(typed_path(text)),)))
+    return issued
+
+
+def _save_prompts(state: State, look: Look) -> list[do.Command]:
+    issued, confirmed = _path_field(state, "Where to write them")
+    text = state.dialog_path.strip()
+    exists = bool(text) and os.path.isfile(typed_path(text))
+    imgui.begin_disabled(not text)
+    pressed = widgets.primary_button("Replace" if exists else "Save", look.vec(120, 0))
+    imgui.end_disabled()
+    if text and (pressed or confirmed):
+        issued.append(ask.SavePrompts(typed_path(text)))
+    return issued
+
+
+def _load_prompts(state: State, look: Look) -> list[do.Command]:
+    issued, confirmed = _path_field(state, "A set of phrases (.prompts.json); they replace the present ones")
+    text = state.dialog_path.strip()
+    imgui.begin_disabled(not text)
+    pressed = widgets.primary_button("Load", look.vec(120, 0))
+    imgui.end_disabled()
+    if text and (pressed or confirmed):
+        issued.append(ask.LoadPrompts(typed_path(text)))
+    return issued
+
+
+def _path_field(state: State, label: str) -> tuple[list[do.Command], bool]:
+    """A path to edit; the second value tells whether Enter was pressed."""
+    imgui.text(label)
+    imgui.set_next_item_width(-1)
+    if imgui.is_window_appearing():
+        imgui.set_keyboard_focus_here()
+    changed, path = imgui.input_text("##path", state.dialog_path)
+    confirmed = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
+    return ([do.EditDialogPath(path)] if changed else []), confirmed
+
+
+def _help(state: State, look: Look) -> list[do.Command]:
+    for gesture, meaning in HELP:
+        imgui.text(gesture)
+        imgui.same_line(look.px(250))
+        imgui.text_colored(theme.MUTED, meaning)
+    return []
+
+
+def _leave(state: State, look: Look) -> list[do.Command]:
+    imgui.text_wrapped("The scene is not saved.")
+    issued: list[do.Command] = []
+    if widgets.primary_button("Save first", look.vec(120, 0)):
+        issued.append(do.ShowDialog("save"))
+    imgui.same_line()
+    if imgui.button("Leave", look.vec(120, 0)) or imgui.is_key_pressed(imgui.Key.enter):
+        issued.append(do.Leave(sure=True))
+    imgui.same_line()
+    if imgui.button("Stay", look.vec(120, 0)):
+        issued.append(do.ShowDialog(None))
+    return issued
+
+
+def _log(state: State, look: Look) -> list[do.Command]:
+    """What has been said so far, oldest first."""
+    imgui.begin_child("##lines", ImVec2(0, look.px(320)))
+    for line in state.lines:
+        minutes, seconds = divmod(int(line.when), 60)
+        imgui.text_colored(theme.MUTED, f"{minutes:3d}:{seconds:02d}")
+        imgui.same_line()
+        with widgets.colours(text=theme.BAD if line.kind == "error" else theme.TEXT):
+            imgui.push_text_wrap_pos(0.0)
+            imgui.text_unformatted(line.text)
+            imgui.pop_text_wrap_pos()
+    if not state.lines:
+        widgets.muted("Nothing has been said yet.")
+    if imgui.is_window_appearing():
+        imgui.set_scroll_here_y(1.0)
+    imgui.end_child()
+    if imgui.button(f"{fa.ICON_FA_COPY}  Copy all"):
+        return [do.CopyText("\n".join(f"{line.when:.1f} s  {line.text}" for line in state.lines))]
+    return []

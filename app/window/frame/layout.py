@@ -1,0 +1,77 @@
+"""The window's panels in their places: each reads the state and returns the commands that hands issued."""
+
+from imgui_bundle import ImVec2, imgui
+
+from .. import commands as do
+from ..asking.panels import dictionary, prompts
+from ..editing.panels import history, pointing, tools
+from ..exporting import panel as export_panel
+from ..kit import theme, widgets
+from ..kit.look import Look
+from ..recovery import panels as recovery_panels
+from ..scene.panels import legend, tray, views
+from ..state import State
+from . import canvas, dialogs, keys, splitter, status, toasts, toolbar
+
+CANVAS_TOP = 52.0  # design pixels
+_VIEWS = 88.0
+
+
+def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int]]:
+    """Every panel of one frame.
+
+    Returns:
+        What was issued, and the size of the picture's place in framebuffer pixels.
+    """
+    io = imgui.get_io()
+    width, height = io.display_size.x, io.display_size.y
+    left, bar, top = splitter.width(state, look, width), look.px(theme.STATUS_HEIGHT), look.px(CANVAS_TOP)
+    place, size = ImVec2(left, top), ImVec2(max(width - left, 1), max(height - bar - top, 1))
+    issued = _picture(state, look, place, size)
+    with widgets.window("##panel", ImVec2(0, 0), ImVec2(left, height - bar), scrolls=True):
+        issued += _side(state, look)
+    with widgets.window("##toolbar", ImVec2(left, 0), ImVec2(size.x, top)):
+        imgui.set_cursor_pos_y((top - imgui.get_frame_height()) / 2)
+        issued += toolbar.draw(state, look)
+    with widgets.window("##status", ImVec2(0, height - bar), ImVec2(width, bar)):
+        imgui.set_cursor_pos_y((bar - imgui.get_text_line_height()) / 2)
+        status.draw(state, look)
+    issued += splitter.draw(state, look, left, height - bar)
+    legend.draw(state, look, place, size)
+    if state.info is not None:
+        issued += tools.draw(state, look, place, size)
+        issued += pointing.draw(state, look, place, size)
+        issued += dictionary.draw(state, look, place, size)
+    issued += recovery_panels.draw_offer(state, look, place, size)
+    issued += recovery_panels.draw_edits_offer(state, look, place, size)
+    issued += toasts.draw(state, look, ImVec2(width, height - bar))
+    issued += dialogs.draw(state, look)
+    issued += keys.draw(state)
+    pixels = io.display_framebuffer_scale
+    return issued, (round(size.x * pixels.x), round(size.y * pixels.y))
+
+
+def _side(state: State, look: Look) -> list[do.Command]:
+    """The panel on the left: photos, phrases, edits."""
+    issued = export_panel.draw_progress(state, look)
+    issued += tray.draw(state, look)
+    widgets.gap(look.px(6))
+    imgui.separator()
+    widgets.gap(look.px(6))
+    issued += prompts.draw(state, look)
+    return issued + history.draw(state, look)
+
+
+def _picture(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
+    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
+    with widgets.window("##picture", place, size, imgui.WindowFlags_.no_background):
+        imgui.pop_style_var()
+        issued = canvas.draw(state, look)
+    if state.info is not None and state.info.views:
+        corner = ImVec2(place.x, place.y + size.y - look.px(_VIEWS))
+        flags = imgui.WindowFlags_.no_background | imgui.WindowFlags_.always_auto_resize
+        imgui.set_next_window_pos(corner)
+        imgui.begin("##views", None, widgets.PLAIN | flags)
+        issued += views.draw(state, look)
+        imgui.end()
+    return issued

@@ -1,0 +1,50 @@
+"""The bottom line: how fast, how much, on what."""
+
+from collections.abc import Sequence
+from itertools import accumulate
+
+from imgui_bundle import imgui
+
+from ..kit import theme, widgets
+from ..kit.look import Look
+from ..state import State
+
+
+def draw(state: State, look: Look) -> None:
+    """As many figures as fit, the rest on hover; issues nothing."""
+    figures, space = _figures(state), look.px(26)
+    width = imgui.get_content_region_avail().x
+    shown = fitting([imgui.calc_text_size(text).x for text in figures], space, width)
+    with widgets.colours(text=theme.MUTED):
+        for index, text in enumerate(figures[:shown]):
+            if index:
+                imgui.same_line(0, space)
+            imgui.text(text)
+    if shown < len(figures) and imgui.is_window_hovered():
+        imgui.set_tooltip("\n".join(figures[shown:]))
+
+
+def fitting(widths: Sequence[float], space: float, room: float) -> int:
+    """How many of the first fit side by side into `room`."""
+    ends = list(accumulate(width + space for width in widths))
+    return sum(end - space <= room for end in ends)
+
+
+def _figures(state: State) -> list[str]:
+    stats = state.stats
+    figures = [f"frame {1000 * stats.frame_seconds:.1f} ms"]
+    if state.info is not None:
+        width, height = stats.picture_size
+        figures += [
+            f"picture {1000 * stats.picture_seconds:.0f} ms at {width} x {height}",
+            f"{state.info.num_gaussians:,} Gaussians",
+            f"{state.info.num_atoms} atoms",
+        ]
+        hover = state.editing.hover
+        if hover is not None and hover.point is not None:
+            x, y, z = hover.point
+            figures.append(f"x {x:.3f}  y {y:.3f}  z {z:.3f}  depth {hover.depth:.3f}")
+    figures.append(stats.renderer)
+    if stats.passes:
+        figures.append("passes: " + ", ".join(f"{kind} {count}" for kind, count in stats.passes))
+    return figures

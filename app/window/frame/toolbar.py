@@ -1,0 +1,73 @@
+"""Above the picture: what it shows, the field of view, home, all of it, export, the menu."""
+
+from imgui_bundle import icons_fontawesome_6 as fa
+from imgui_bundle import imgui
+
+from .. import commands as do
+from ..asking.panels import dictionary
+from ..exporting import commands as export
+from ..kit import theme, widgets
+from ..kit.look import Look
+from ..poses import FOV_RANGE
+from ..scene import camera
+from ..scene.panels import modes
+from ..state import State
+from . import menu
+
+_FOV = 150.0  # design pixels of the slider; left out where the window is too narrow
+_LABEL = 40.0  # of its name
+_BUTTONS = 5 * 44.0
+
+
+def draw(state: State, look: Look) -> list[do.Command]:
+    """The strip above the picture."""
+    issued: list[do.Command] = []
+    issued += modes.draw(state, look, imgui.get_window_width() - look.px(_BUTTONS + 40))
+    imgui.same_line()
+    used = imgui.get_cursor_pos_x()
+    width = look.px(_LABEL + _FOV + _BUTTONS)
+    roomy = used + width < imgui.get_window_width() - look.px(24)
+    width = width if roomy else look.px(_BUTTONS)
+    imgui.same_line(imgui.get_window_width() - width - look.px(8))
+    issued += _fov(state, look) if roomy else []
+    return issued + dictionary.button(state) + _home(state) + _files(state, look)
+
+
+def _fov(state: State, look: Look) -> list[do.Command]:
+    imgui.begin_disabled(state.info is None)
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.MUTED, "FOV")
+    imgui.same_line()
+    tip = "Field of view over the longer side of the photo"
+    degrees = f"{state.pose.fov:.0f}°"
+    changed, fov = widgets.slider("##fov", state.pose.fov, FOV_RANGE, degrees, tip, look.px(_FOV))
+    imgui.end_disabled()
+    imgui.same_line()
+    return [camera.SetFov(fov)] if changed else []
+
+
+def _home(state: State) -> list[do.Command]:
+    issued: list[do.Command] = []
+    imgui.same_line()
+    imgui.begin_disabled(state.info is None)
+    if imgui.button(fa.ICON_FA_HOUSE):
+        issued.append(camera.Home())
+    widgets.tooltip("Back to the first photo's view  (H)")
+    imgui.end_disabled()
+    return issued
+
+
+def _files(state: State, look: Look) -> list[do.Command]:
+    issued: list[do.Command] = []
+    imgui.same_line()
+    imgui.begin_disabled(state.info is None)
+    if imgui.button(fa.ICON_FA_EXPAND):
+        issued.append(camera.FrameAll())
+    widgets.tooltip("Show all of the scene  (Z)")
+    imgui.same_line()
+    if imgui.button(fa.ICON_FA_FILE_EXPORT):
+        issued.append(export.ShowExport())
+    widgets.tooltip("Export pictures, masks, videos, splats  (Ctrl+E)")
+    imgui.end_disabled()
+    imgui.same_line()
+    return issued + menu.draw(state, look)

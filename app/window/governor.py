@@ -1,0 +1,137 @@
+"""How much to draw, so that a slow machine stays fluent: what the last pictures cost decides.
+
+While the camera moves, a picture should take `MOVING_SECONDS`: one that takes longer sends the next
+ones down a ladder of smaller pictures, for large scenes also of fewer Gaussians; ones that take less
+than half send them up again, a rung at a time. Colour, colour with the fast mode's relevance, and
+exact maps are paced apart, because they cost so differently. At rest the picture settles: at once at
+full size where that is quick, else smaller first and full after a longer pause, so that neither the
+next drag nor the next keystroke is met by a frozen window.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+from enum import Enum
+
+MOVING_SECONDS = 0.060
+QUICK_SECONDS = 0.15  # a full picture this quick is drawn as soon as the hands rest
+SETTLE_AFTER = 0.12  # seconds since the last motion, key or pointer event
+FULL_AFTER = 0.70
+LARGE_SCENE = 200_000  # Gaussians, from which drawing fewer of them pays
+_RUNG_FACTOR = 1.8  # about what a rung saves
+
+
+class Kind(Enum):
+    """What a picture holds; the value is its expected cost over colour alone, until measured."""
+
+    COLOUR = 1.0
+    FAST = 1.5
+    MAPS = 4.0
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One picture to draw: its kind, the scale of the panel's sides, the share of the Gaussians."""
+
+    kind: Kind
+    scale: float = 1.0
+    share: float = 1.0
+
+    def covers(self, other: "Plan") -> bool:
+        """Whether a picture of this plan has all that `other` asks for."""
+        enough = self.kind is other.kind or self.kind is Kind.MAPS or other.kind is Kind.COLOUR
+        return enough and self.scale >= other.scale and self.share >= other.share
+
+
+SIZES = ((1.0, 1.0), (0.75, 1.0), (0.5, 1.0), (0.35, 1.0), (0.25, 1.0))
+"""(scale, share) from dear to cheap; few, so that textures and levels are reused."""
+SIZES_OF_LARGE_SCENES = (
+    (1.0, 1.0),
+    (0.75, 1.0),
+    (0.5, 1.0),
+    (0.5, 0.25),
+    (0.35, 0.25),
+    (0.35, 0.0625),
+    (0.25, 0.0625),
+)
+_START = 2  # rung of an unknown machine
+
+
+@dataclass(frozen=True)
+class Governor:
+    """For one scene. full_seconds: what a full picture of a kind cost last, smoothed; rungs: where
+    on the ladder a kind moves."""
+
+    num_gaussians: int = 0
+    full_seconds: dict[Kind, float] = field(default_factory=dict)
+    rungs: dict[Kind, int] = field(default_factory=dict)
+
+    @property
+    def ladder(self) -> tuple[tuple[float, float], ...]:
+        """(scale, share) from dear to cheap."""
+        return SIZES if self.num_gaussians < LARGE_SCENE else SIZES_OF_LARGE_SCENES
+
+    def learn(self, plan: Plan, seconds: float, moving: bool = True) -> "Governor":
+        """Account for a picture just drawn, while the camera moved or at rest."""
+        full = self.full_seconds
+        if plan.share == 1:  # cost goes with the pixels, nearly
+            estimate = seconds / plan.scale**2
+            full = {**full, plan.kind: 0.5 * (full.get(plan.kind, estimate) + estimate)}
+        if not moving or (plan.scale, plan.share) not in self.ladder:
+            return replace(self, full_seconds=full)
+        rung = self.ladder.index((plan.scale, plan.share))
+        return replace(self, full_seconds=full, rungs={**self.rungs, plan.kind: self._next(rung, seconds)})
+
+    def _next(self, rung: int, seconds: float) -> int:
+        over = math.log(max(seconds, 1e-6) / MOVING_SECONDS) / math.log(_RUNG_FACTOR)
+        if over > 0:
+            return min(rung + math.ceil(over), len(self.ladder) - 1)
+        return max(rung - 1, 0) if over < -1.2 else rung
+
+    def moving(self, wanted: Kind) -> Plan:
+        """What to draw while the camera moves.
+
+        Exact maps where even a full picture of them is quick. Else, for relevance (`Kind.FAST`), the
+        fast mode, and for atoms (`Kind.MAPS`) smaller maps, or colour where these take too long.
+        """
+        if wanted is not Kind.COLOUR and self._expected(Kind.MAPS, MOVING_SECONDS) <= MOVING_SECONDS:
+            return Plan(Kind.MAPS)
+        if wanted is Kind.MAPS:
+            smallest = min(scale for scale, _ in SIZES)
+            if self._expected(Kind.MAPS, 1.0) * smallest**2 > MOVING_SECONDS:
+                wanted = Kind.COLOUR
+        return Plan(wanted, *self.ladder[self.rungs.get(wanted, self._first_rung(wanted))])
+
+    def _first_rung(self, kind: Kind) -> int:
+        """By the cost of another kind, or in the middle."""
+        expected = self._expected(kind, math.inf)
+        if expected == math.inf:
+            return _START
+        fits = (i for i, (scale, _) in enumerate(self.ladder) if expected * scale**2 <= MOVING_SECONDS)
+        return next(fits, len(self.ladder) - 1)
+
+    def resting(self, wanted: Kind, still: float) -> Plan | None:
+        """What to draw `still` seconds after the last event; None while more may come."""
+        if still < SETTLE_AFTER:
+            return None
+        kind = Kind.COLOUR if wanted is Kind.COLOUR else Kind.MAPS
+        if still >= FULL_AFTER:
+            return Plan(kind)
+        full = self._expected(kind, math.inf)
+        scales = [scale for scale, _ in SIZES]
+        if full == math.inf:
+            return Plan(kind, scales[_START])
+        return Plan(kind, next((s for s in scales if full * s * s <= QUICK_SECONDS), scales[-1]))
+
+    def _expected(self, kind: Kind, unknown: float) -> float:
+        """Seconds of a full picture, measured or scaled from another kind's; `unknown` before any."""
+        if kind in self.full_seconds:
+            return self.full_seconds[kind]
+        known = [seconds * kind.value / other.value for other, seconds in self.full_seconds.items()]
+        return max(known) if known else unknown
+
+    def next_rest(self, still: float) -> float:
+        """Seconds until `resting` may answer otherwise; infinity when it never will."""
+        for moment in (SETTLE_AFTER, FULL_AFTER):
+            if still < moment:
+                return moment - still
+        return math.inf

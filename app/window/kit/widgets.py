@@ -1,0 +1,149 @@
+"""Small pieces that several panels share."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TypeVar
+
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from . import theme
+
+PLAIN = (
+    imgui.WindowFlags_.no_decoration
+    | imgui.WindowFlags_.no_move
+    | imgui.WindowFlags_.no_saved_settings
+    | imgui.WindowFlags_.no_nav
+)
+_Value = TypeVar("_Value")
+
+
+@contextmanager
+def window(name: str, pos: ImVec2, size: ImVec2, flags: int = 0, scrolls: bool = False) -> Iterator[None]:
+    """A fixed window without decoration; with a scroll bar when it `scrolls`."""
+    plain = PLAIN & ~imgui.WindowFlags_.no_scrollbar if scrolls else PLAIN
+    imgui.set_next_window_pos(pos)
+    imgui.set_next_window_size(size)
+    imgui.begin(name, None, plain | imgui.WindowFlags_.no_bring_to_front_on_focus | flags)
+    try:
+        yield
+    finally:
+        imgui.end()
+
+
+@contextmanager
+def colours(**changes: ImVec4) -> Iterator[None]:
+    """Style colours by their name in `imgui.Col_`, for a few widgets."""
+    for name, colour in changes.items():
+        imgui.push_style_color(getattr(imgui.Col_, name), colour)
+    try:
+        yield
+    finally:
+        imgui.pop_style_color(len(changes))
+
+
+def heading(text: str) -> None:
+    """A section's title."""
+    imgui.push_font(None, theme.FONT_SIZE * theme.HEADING)
+    imgui.text_colored(theme.TEXT, text)
+    imgui.pop_font()
+
+
+def muted(text: str) -> None:
+    """Secondary text, wrapped."""
+    with colours(text=theme.MUTED):
+        imgui.text_wrapped(text)
+
+
+def primary_button(label: str, size: ImVec2 | None = None) -> bool:
+    """The one button a section is about."""
+    accent = theme.ACCENT
+    lighter = ImVec4(min(accent.x * 1.06, 1), accent.y * 1.08, accent.z * 1.3, 1)
+    with colours(button=accent, button_hovered=lighter, button_active=accent, text=theme.ON_ACCENT):
+        return imgui.button(label, size or ImVec2(0, 0))
+
+
+def choice(options: Sequence[tuple[str, _Value]], chosen: _Value) -> _Value:
+    """One of several values, a button each in a row; returns the one that now holds."""
+    for index, (label, value) in enumerate(options):
+        if index:
+            imgui.same_line(0, 0.5 * imgui.get_style().item_spacing.x)
+        if primary_button(label) if value == chosen else imgui.button(label):
+            chosen = value
+    return chosen
+
+
+def checkbox(label: str, on: bool) -> tuple[bool, bool]:
+    """A box with an edge, so that it is seen while empty."""
+    imgui.push_style_var(imgui.StyleVar_.frame_border_size, 1.0)
+    with colours(border=theme.PRESSED):
+        changed = imgui.checkbox(label, on)
+    imgui.pop_style_var()
+    return changed
+
+
+def quiet_button(label: str, tip: str = "") -> bool:
+    """An icon without a frame; `tip` explains it on hover."""
+    clear = ImVec4(0, 0, 0, 0)
+    with colours(button=clear, text=theme.MUTED):
+        pressed = imgui.button(label)
+    if tip:
+        tooltip(tip)
+    return pressed
+
+
+def slider(
+    name: str, value: float, limits: tuple[float, float], text: str, tip: str, width: float
+) -> tuple[bool, float]:
+    """A slider whose value stands beside it, where the knob cannot cover it; `width` of both."""
+    room = imgui.calc_text_size("0.00").x + imgui.get_style().item_inner_spacing.x
+    imgui.set_next_item_width(width - room)
+    changed, moved = imgui.slider_float(name, value, *limits, "", imgui.SliderFlags_.always_clamp)
+    tooltip(tip)
+    imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.MUTED, text)
+    return changed, moved
+
+
+def tooltip(text: str) -> None:
+    """Explain the last item when the pointer rests on it."""
+    if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled):
+        imgui.set_tooltip(text)
+
+
+def shortened(text: str, width: float) -> str:
+    """The text, cut with an ellipsis where it is wider than `width` interface pixels."""
+    if imgui.calc_text_size(text).x <= width:
+        return text
+    kept = len(text)
+    while kept > 1 and imgui.calc_text_size(text[:kept].rstrip() + "...").x > width:
+        kept -= 1
+    return text[:kept].rstrip() + "..."
+
+
+def sentence(text: str) -> str:
+    """`text` with a full stop and a capital, unless it begins with the name of a file."""
+    named = any(mark in text.partition(" ")[0].rstrip(".") for mark in "./\\")
+    return (text if named else text[:1].upper() + text[1:]).rstrip(".") + "."
+
+
+def rgba(colour: tuple[float, float, float], alpha: float = 1.0) -> ImVec4:
+    """An ImGui colour of an RGB triple."""
+    return ImVec4(*colour, alpha)
+
+
+def u32(colour: ImVec4) -> int:
+    """A draw-list colour."""
+    return imgui.color_convert_float4_to_u32(colour)
+
+
+def gap(height: float) -> None:
+    """Vertical space, interface pixels."""
+    imgui.dummy(ImVec2(0, height))
+
+
+def at_right_edge(text: str) -> None:
+    """Text on the last item's line, flush right."""
+    edge = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x
+    imgui.same_line(edge - imgui.calc_text_size(text).x)
+    imgui.text(text)

@@ -1,0 +1,174 @@
+"""Preferences, and what of an earlier session is offered again."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ..asking.state import PALETTE, Prompt
+from ..poses import Pose
+from ..scene.state import Mode, Photo
+from ..state import State
+from .preferences import PANEL_WIDTHS, SCALES, SPEEDS, Preferences
+from .state import Kept, Offer
+
+
+def change(state: State, **changes: Any) -> State:
+    """The state with another recovery half."""
+    return replace(state, recovery=replace(state.recovery, **changes))
+
+
+# Preferences
+
+
+@dataclass(frozen=True)
+class Prefer:
+    """Other preferences; what is out of range is brought back into it."""
+
+    preferences: Preferences
+
+    def apply(self, state: State) -> State:
+        wanted = self.preferences
+        return replace(
+            state,
+            preferences=replace(
+                wanted,
+                scale=_within(wanted.scale, SCALES),
+                speed=_within(wanted.speed, SPEEDS),
+                panel_width=_within(wanted.panel_width, PANEL_WIDTHS),
+            ),
+        )
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A file was opened or saved: it is the newest of the recent ones."""
+
+    path: Path
+
+    def apply(self, state: State) -> State:
+        return replace(state, preferences=state.preferences.opened(self.path))
+
+
+@dataclass(frozen=True)
+class ForgetRecent:
+    """Empty the list of recent files."""
+
+    def apply(self, state: State) -> State:
+        return replace(state, preferences=replace(state.preferences, recent=()))
+
+
+# A session that ended badly
+
+
+@dataclass(frozen=True)
+class CopyAt:
+    """Where the scene on show is kept until somebody saves it."""
+
+    path: Path
+
+    def apply(self, state: State) -> State:
+        return change(state, copy=self.path)
+
+
+@dataclass(frozen=True)
+class OfferSession:
+    """It can be had back."""
+
+    kept: Kept
+
+    def apply(self, state: State) -> State:
+        return change(state, session=self.kept)
+
+
+@dataclass(frozen=True)
+class EndSessionOffer:
+    """Take the offer, or turn it down for good."""
+
+    restore: bool
+
+    def apply(self, state: State) -> State:
+        kept = state.recovery.session
+        state = change(state, session=None)
+        if kept is None or not self.restore:
+            return state
+        photos = tuple(Photo(Path(path), fov=fov) for path, fov in zip(kept.photos, kept.fovs, strict=True))
+        return restored_phrases(replace(state, photos=photos), kept)
+
+
+def restored_phrases(state: State, kept: Kept) -> State:
+    """The phrases of a kept session in rows of their own."""
+    rows = []
+    for text in kept.phrases:
+        colour = PALETTE[len(rows) % len(PALETTE)]
+        rows.append(Prompt(state.next_key + len(rows), text, colour))
+    if not rows:
+        return state
+    return replace(state, prompts=tuple(rows), active=rows[0].key, next_key=state.next_key + len(rows))
+
+
+@dataclass(frozen=True)
+class StandAgain:
+    """The camera and the mode of a kept session, once its scene is there. name: what it was called;
+    saved: whether its file is the person's own."""
+
+    pose: Pose | None
+    mode: str
+    name: str
+    saved: bool
+
+    def apply(self, state: State) -> State:
+        if state.info is None:
+            return state
+        info = state.info if self.saved else replace(state.info, name=self.name, path=None)
+        mode = Mode[self.mode] if self.mode in Mode.__members__ else state.mode
+        pose = self.pose or state.pose
+        view = state.view if pose == state.pose else None
+        return replace(state, info=info, mode=mode, pose=pose, view=view)
+
+
+@dataclass(frozen=True)
+class CopyKept:
+    """A copy of the scene on show is complete at `path`."""
+
+    path: Path
+
+    def apply(self, state: State) -> State:
+        return state
+
+
+# Edits of an earlier session
+
+
+@dataclass(frozen=True)
+class EditsKept:
+    """Where the edits lie until they are saved; None: nowhere."""
+
+    file: Path | None
+
+    def apply(self, state: State) -> State:
+        return change(state, kept=self.file)
+
+
+@dataclass(frozen=True)
+class OfferEdits:
+    """Edits were found that nobody saved."""
+
+    offer: Offer
+
+    def apply(self, state: State) -> State:
+        return change(state, edits=self.offer)
+
+
+@dataclass(frozen=True)
+class EndOffer:
+    """Restore the edits, or `forget` them for good; otherwise they are offered again next time."""
+
+    restore: bool = False
+    forget: bool = False
+
+    def apply(self, state: State) -> State:
+        return change(state, edits=None)
+
+
+def _within(value: float, limits: tuple[float, float]) -> float:
+    return min(max(value, limits[0]), limits[1])

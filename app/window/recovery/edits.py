@@ -1,0 +1,85 @@
+"""Edits that are not saved yet, kept where a crash cannot take them, and offered again.
+
+One pair of files a scene and session in the folder of the program's state: the scene as it was
+opened, and the history of its edits. Both are written whole. The eight newest are kept. `token`
+names the session.
+"""
+
+from contextlib import suppress
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from langflash_core.errors import SceneFileError
+from langflash_core.scene.edits import History
+
+from ..places import state_folder
+from ..scene.drops import SCENE_SUFFIX
+from .state import Offer
+
+if TYPE_CHECKING:
+    from langflash_core.types import Scene
+
+
+MOST_KEPT = 8
+SUFFIX = ".edits"
+
+
+def keep(scene: "Scene", history: History, name: str, path: Path | None, token: str) -> Path:
+    """Write edits, and their scene where it is not there yet; returns the file of edits.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    from langflash_core.files import make_folder
+    from langflash_core.scene.edits_file import save_history, scene_digest
+    from langflash_core.scene.file import save
+
+    digest = scene_digest(scene)
+    edits = _place(digest, token)
+    make_folder(edits.parent)
+    if not edits.with_suffix(SCENE_SUFFIX).is_file():
+        save(scene, edits.with_suffix(SCENE_SUFFIX))
+    about = {"name": name, "path": None if path is None else str(path)}
+    save_history(history, digest, about, edits)
+    for old in _newest_first()[MOST_KEPT:]:
+        forget_file(old)
+    return edits
+
+
+def forget(scene: "Scene", token: str) -> None:
+    """Remove the edits that a session kept of a scene; nothing there is fine."""
+    from langflash_core.scene.edits_file import scene_digest
+
+    forget_file(_place(scene_digest(scene), token))
+
+
+def forget_file(edits: Path) -> None:
+    """Remove a file of edits with its scene; nothing there is fine."""
+    for file in (edits, edits.with_suffix(SCENE_SUFFIX)):
+        with suppress(OSError):
+            file.unlink(missing_ok=True)
+
+
+def find(scene: "Scene | None" = None, path: Path | None = None) -> Offer | None:
+    """Edits kept of this scene, by its content or its path; without a scene the newest of all."""
+    from langflash_core.scene.edits_file import read_about, scene_digest
+
+    wanted = None if scene is None else scene_digest(scene)
+    for edits in _newest_first():
+        with suppress(SceneFileError):  # a damaged file is passed over
+            digest, about, count = read_about(edits)
+            ours = path is not None and about.get("path") == str(path)
+            if count and edits.with_suffix(SCENE_SUFFIX).is_file() and (wanted in (None, digest) or ours):
+                when = datetime.fromtimestamp(edits.stat().st_mtime)
+                return Offer(edits, str(about.get("name", "")), count, when)
+    return None
+
+
+def _place(digest: str, token: str) -> Path:
+    return state_folder() / f"{digest[:20]}-{token}{SUFFIX}"
+
+
+def _newest_first() -> list[Path]:
+    found = [file for file in state_folder().glob(f"*{SUFFIX}") if file.is_file()]
+    return sorted(found, key=lambda file: file.stat().st_mtime, reverse=True)

@@ -1,0 +1,111 @@
+"""Preferences, and the offers to go on with what an earlier session left."""
+
+from dataclasses import replace
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
+
+from .. import commands as do
+from ..kit import theme, widgets
+from ..kit.look import Look
+from ..state import State
+from . import commands as keep
+from . import preferences
+from .preferences import SPEEDS, THEMES
+
+_LABELS = 190.0  # design pixels
+_EDITS_OFFER = 470.0  # design pixels wide
+_OFFER = 480.0  # design pixels
+
+
+def draw_settings(state: State, look: Look) -> list[do.Command]:
+    """The preferences; each takes effect at once."""
+    old = state.preferences
+    new = old
+    _label("Theme", look)
+    new = replace(new, theme=widgets.choice([(name.capitalize(), name) for name in THEMES], old.theme))
+    _label("Size of the interface", look)
+    sizes = [(f"{scale:.0%}", scale) for scale in (0.75, 1.0, 1.25, 1.5, 2.0)]
+    new = replace(new, scale=widgets.choice(sizes, old.scale))
+    _label("Speed of flying", look)
+    width = imgui.get_content_region_avail().x
+    changed, speed = widgets.slider("##speed", old.speed, SPEEDS, f"{old.speed:.1f}", "", width)
+    if changed:
+        new = replace(new, speed=speed)
+    for text, name in (
+        ("Touch pad: two fingers turn, with Ctrl they zoom, with Shift they slide", "touch_pad"),
+        ("Show the photos' cameras in the scene", "photos_in_space"),
+        ("Reconstruct as soon as photos are dropped", "start_at_once"),
+    ):
+        changed, value = widgets.checkbox(text, getattr(old, name))
+        if changed:
+            new = replace(new, **{name: value})
+    widgets.gap(look.px(4))
+    widgets.muted(f"Kept in {preferences.file()}")
+    issued: list[do.Command] = [] if new == old else [keep.Prefer(new)]
+    if imgui.button(f"{fa.ICON_FA_ROTATE_LEFT}  Defaults"):
+        kept = replace(preferences.DEFAULTS, recent=old.recent, window=old.window)
+        issued.append(keep.Prefer(kept))
+    return issued
+
+
+def _label(text: str, look: Look) -> None:
+    imgui.align_text_to_frame_padding()
+    imgui.text(text)
+    imgui.same_line(look.px(_LABELS))
+
+
+def draw_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
+    """A session that ended badly, offered without standing in the way."""
+    kept = state.recovery.session
+    if kept is None or state.job is not None or state.info is not None:
+        return []
+    issued: list[do.Command] = []
+    middle = ImVec2(place.x + size.x / 2, place.y + look.px(16))
+    imgui.set_next_window_pos(middle, 0, ImVec2(0.5, 0))
+    imgui.set_next_window_size(ImVec2(min(look.px(_OFFER), size.x - look.px(24)), 0))
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
+    imgui.push_style_color(imgui.Col_.window_bg, theme.POPUP)
+    imgui.begin("##session", None, widgets.PLAIN | imgui.WindowFlags_.no_focus_on_appearing)
+    imgui.text_wrapped("LangFlash did not end well last time. It had open:")
+    widgets.muted(kept.sentence())
+    widgets.gap(look.px(2))
+    if widgets.primary_button("Go on with it", look.vec(140, 0)):
+        issued.append(keep.EndSessionOffer(restore=True))
+    imgui.same_line()
+    if imgui.button("Forget it", look.vec(120, 0)):
+        issued.append(keep.EndSessionOffer(restore=False))
+    imgui.end()
+    imgui.pop_style_color()
+    imgui.pop_style_var()
+    return issued
+
+
+def draw_edits_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
+    """Edits that nobody saved, offered without standing in the way."""
+    offer = state.recovery.edits
+    if offer is None or state.job is not None:
+        return []
+    issued: list[do.Command] = []
+    corner = ImVec2(place.x + size.x / 2, place.y + size.y - look.px(14))
+    imgui.set_next_window_pos(corner, 0, ImVec2(0.5, 1))
+    imgui.set_next_window_size(ImVec2(look.px(_EDITS_OFFER), 0))
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
+    with widgets.colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
+        imgui.begin("##offer", None, widgets.PLAIN | imgui.WindowFlags_.no_focus_on_appearing)
+        edits, were = ("1 edit", "was") if offer.count == 1 else (f"{offer.count} edits", "were")
+        imgui.text_colored(theme.ACCENT, fa.ICON_FA_CLOCK_ROTATE_LEFT)
+        imgui.same_line()
+        imgui.text_wrapped(f"{edits} of {offer.name} {were} not saved ({offer.when:%d %B, %H:%M}).")
+        if widgets.primary_button("Restore", look.vec(120, 0)):
+            issued.append(keep.EndOffer(restore=True))
+        imgui.same_line()
+        if imgui.button("Later", look.vec(120, 0)):
+            issued.append(keep.EndOffer())
+        widgets.tooltip("They are offered again next time")
+        imgui.same_line()
+        if imgui.button("Forget them", look.vec(120, 0)):
+            issued.append(keep.EndOffer(forget=True))
+        imgui.end()
+    imgui.pop_style_var()
+    return issued

@@ -1,0 +1,116 @@
+"""What the program remembers from one day to the next: one small JSON file, written whole.
+
+A file that is damaged, foreign or from another version never stops the start: what cannot be
+used falls back to its default, and one sentence says so.
+"""
+
+import json
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from langflash_core.errors import OutputError
+from langflash_core.files import make_folder, write_atomically
+
+from ..places import config_folder
+
+MOST_RECENT = 10
+THEMES = ("dark", "light")
+SCALES = (0.75, 2.0)
+SPEEDS = (0.2, 5.0)
+PANEL_WIDTHS = (300.0, 560.0)  # design pixels
+_PLACES = 20_000  # pixels; beyond this a window position is no position
+
+
+@dataclass(frozen=True)
+class Preferences:
+    """theme: of THEMES. scale: of the interface, on top of the monitor's. speed: of flying, a
+    factor. touch_pad: two fingers turn, with Ctrl they zoom. photos_in_space: the cameras' frusta
+    are drawn. start_at_once: dropped photos are reconstructed without asking. panel_width: design
+    pixels. window: x, y, width, height in screen pixels, or none. dictionary: the same of the
+    dictionary's window inside it, design pixels, and whether it is open. recent: newest first."""
+
+    theme: str = "dark"
+    scale: float = 1.0
+    speed: float = 1.0
+    touch_pad: bool = False
+    photos_in_space: bool = False
+    start_at_once: bool = True
+    panel_width: float = 348.0
+    window: tuple[int, ...] = ()
+    maximised: bool = False
+    dictionary: tuple[int, ...] = ()
+    dictionary_open: bool = False
+    recent: tuple[str, ...] = ()
+
+    def opened(self, path: Path) -> "Preferences":
+        """With `path` as the newest of the recent files."""
+        others = [other for other in self.recent if other != str(path)]
+        return replace(self, recent=(str(path), *others)[:MOST_RECENT])
+
+
+DEFAULTS = Preferences()
+
+
+def file() -> Path:
+    """Where they live."""
+    return config_folder() / "preferences.json"
+
+
+def load(path: Path | None = None) -> tuple[Preferences, str]:
+    """The preferences, and a sentence when some of them could not be used."""
+    path = path or file()
+    try:
+        content = json.loads(path.read_bytes())
+    except FileNotFoundError:
+        return DEFAULTS, ""
+    except (OSError, ValueError, RecursionError):
+        return DEFAULTS, f"The preferences could not be read, so the defaults are used; see {path}."
+    if not isinstance(content, dict):
+        return DEFAULTS, f"The preferences hold something else, so the defaults are used; see {path}."
+    known = {field.name for field in fields(Preferences)}
+    good: dict[str, Any] = {name: _fitting(name, value) for name, value in content.items() if name in known}
+    lost = sorted(name for name, value in good.items() if value is None)
+    kept = {name: value for name, value in good.items() if value is not None}
+    sentence = f"Some preferences could not be used ({', '.join(lost)}); their defaults are." if lost else ""
+    return Preferences(**kept), sentence
+
+
+def save(preferences: Preferences, path: Path | None = None) -> None:
+    """Write them, whole.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    path = path or file()
+    make_folder(path.parent)
+    write_atomically(path, json.dumps(asdict(preferences), indent=2).encode())
+
+
+def try_to_save(preferences: Preferences) -> str:
+    """Save; a sentence where that failed."""
+    try:
+        save(preferences)
+    except OutputError as error:
+        return f"The preferences are not kept: {error}."
+    return ""
+
+
+def _fitting(name: str, value: Any) -> Any:
+    """The value as its field's type and in its range, or None."""
+    default = getattr(DEFAULTS, name)
+    if isinstance(default, bool):
+        return value if isinstance(value, bool) else None
+    if name == "theme":
+        return value if value in THEMES else None
+    if isinstance(default, float):
+        low, high = {"scale": SCALES, "speed": SPEEDS, "panel_width": PANEL_WIDTHS}[name]
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        return float(value) if number and low <= value <= high else None
+    if not isinstance(value, list):
+        return None
+    if name == "recent":
+        return tuple(value[:MOST_RECENT]) if all(isinstance(each, str) for each in value) else None
+    whole = all(isinstance(each, int) and not isinstance(each, bool) for each in value)
+    sides = whole and len(value) == 4 and min(value[2:]) >= 200 and max(map(abs, value)) <= _PLACES
+    return tuple(value) if sides or value == [] else None

@@ -1,0 +1,121 @@
+"""The session as it stands, on disk while the program runs, so that a crash does not take it.
+
+One JSON file per running window and a lock beside it that the system opens when the process dies,
+however it dies. A file whose lock is free belongs to nobody: it is offered again.
+"""
+
+import json
+import os
+import sys
+from contextlib import suppress
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import BinaryIO
+
+from langflash_core.errors import OutputError
+
+from ..places import state_folder
+from ..poses import Pose, Rotation, Vector
+from ..scene.drops import SCENE_SUFFIX
+from .state import Kept
+
+PREFIX = "session-"
+EDITED, SELECTION = f".edited{SCENE_SUFFIX}", f".selection{SCENE_SUFFIX}"
+CONTENTS = (".json", SCENE_SUFFIX, EDITED, SELECTION)
+
+
+def left_behind() -> Kept | None:
+    """The newest session that ended badly and holds something; older and empty ones are removed."""
+    found: list[tuple[float, Kept]] = []
+    with suppress(OSError):
+        for path in state_folder().glob(f"{PREFIX}*.json"):
+            if not _abandoned(path.with_suffix(".lock")):
+                continue
+            kept = read(path)
+            if kept is None or kept.empty:
+                forget(path)
+            else:
+                found.append((path.stat().st_mtime, kept))
+    found.sort(key=lambda each: each[0], reverse=True)
+    for _, old in found[1:]:
+        if old.file is not None:
+            forget(old.file)
+    return found[0][1] if found else None
+
+
+def read(path: Path) -> Kept | None:
+    """A kept session without what has gone since; None where the file is damaged."""
+    try:
+        content = json.loads(path.read_bytes())
+        pose = content.pop("pose")
+        placed = None
+        if pose is not None:
+            centre, rotation = Vector(*map(float, pose["centre"])), Rotation(*map(float, pose["rotation"]))
+            rest = {name: float(pose[name]) for name in ("reach", "fov", "aspect")}
+            shift = (float(pose["shift"][0]), float(pose["shift"][1]))
+            placed = Pose(centre, rotation, shift=shift, **rest)
+        lists = {name: tuple(content.pop(name)) for name in ("photos", "fovs", "phrases")}
+        kept = Kept(pose=placed, file=path, **lists, **content)
+        there = [os.path.isfile(photo) for photo in kept.photos]
+        photos = tuple(photo for photo, here in zip(kept.photos, there, strict=True) if here)
+        fovs = tuple(fov for fov, here in zip(kept.fovs, there, strict=True) if here)
+        edits = kept.edits if kept.edits and os.path.isfile(kept.edits) else ""
+        scene = kept.scene if edits or (kept.scene and os.path.isfile(kept.scene)) else ""
+    except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError):
+        return None
+    return replace(kept, photos=photos, fovs=fovs, scene=scene, edits=edits)
+
+
+def forget(path: Path) -> None:
+    """Remove a kept session with its scene and its lock."""
+    for suffix in (*CONTENTS, ".lock"):
+        with suppress(OSError):
+            path.with_suffix(suffix).unlink(missing_ok=True)
+
+
+def fields(kept: Kept) -> dict:
+    """What its file holds."""
+    content = asdict(replace(kept, file=None))
+    del content["file"]
+    return content
+
+
+def locked(path: Path) -> BinaryIO:
+    """A lock file, held until it is closed or the process ends."""
+    try:
+        stream = path.open("wb")
+        stream.write(b"\0")
+        stream.flush()
+        _lock(stream)
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+    return stream
+
+
+def _abandoned(path: Path) -> bool:
+    """Whether nobody holds the lock."""
+    try:
+        with path.open("r+b") as stream:
+            _lock(stream)
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+    return True
+
+
+def _lock(stream: BinaryIO) -> None:
+    """Without waiting.
+
+    Raises:
+        OSError: another process holds it.
+    """
+    if sys.platform == "win32":
+        import msvcrt
+
+        stream.seek(0)
+        msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl
+
+        fcntl.flock(stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,0 +1,73 @@
+"""What is kept for the next time: a session that ended badly, edits that nobody saved."""
+
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from ..poses import Pose
+from ..scene.drops import SCENE_SUFFIX
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What a session holds. scene: its file, or the copy kept of one that was never saved, then
+    `saved` is false. edits: the file of those that nobody saved. phrases: texts. file: where this
+    was read from."""
+
+    photos: tuple[str, ...] = ()
+    fovs: tuple[float | None, ...] = ()
+    scene: str = ""
+    edits: str = ""
+    saved: bool = True
+    name: str = ""
+    phrases: tuple[str, ...] = ()
+    mode: str = "RGB"
+    pose: Pose | None = None
+    file: Path | None = None
+
+    @property
+    def empty(self) -> bool:
+        """Whether nothing would be lost."""
+        return not (self.photos or self.scene or any(self.phrases))
+
+    def sentence(self) -> str:
+        """What it holds, for people."""
+        parts = [self.name or Path(self.scene).name] if self.scene else []
+        if self.photos:
+            parts.append(f"{len(self.photos)} photo{'s' * (len(self.photos) > 1)}")
+        phrases = [phrase for phrase in self.phrases if phrase.strip()]
+        if phrases:
+            parts.append(f"{len(phrases)} phrase{'s' * (len(phrases) > 1)}")
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True)
+class Offer:
+    """Edits of an earlier session that were not saved. edits: the file. when: written."""
+
+    edits: Path
+    name: str
+    count: int
+    when: datetime
+
+    @property
+    def scene(self) -> Path:
+        """The scene as it was before them, kept beside them."""
+        return self.edits.with_suffix(SCENE_SUFFIX)
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """The recovery half of the state.
+
+    session: one that ended badly, offered again. edits: those of an earlier session that nobody
+    saved. copy: where a scene that nobody saved is kept. kept: the file that holds unsaved edits.
+    """
+
+    session: Kept | None = None
+    edits: Offer | None = None
+    copy: Path | None = None
+    kept: Path | None = None
+
+
+NO_RECOVERY = Recovery()

@@ -1,0 +1,87 @@
+"""The worker's side of recovery: scenes and edits written where a crash cannot take them.
+
+Heavy imports wait until they are needed.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from langflash_core.files import make_folder
+from langflash_core.scene.edits import History, Marks
+
+from ..commands import Command
+from ..requests import Asked, Errand, SceneErrand
+from . import edits
+from .commands import CopyKept, EditsKept, OfferEdits
+
+if TYPE_CHECKING:
+    from langflash_core.types import Scene
+
+
+@dataclass(frozen=True)
+class KeepCopy(SceneErrand):
+    """Write a scene that nobody saved where a crash cannot take it; with `marks` as they edit it."""
+
+    scene: "Scene" = field(repr=False)
+    path: Path
+    marks: Marks | None = None
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.scene.edited import edited_scene
+        from langflash_core.scene.file import save
+
+        make_folder(self.path.parent)
+        save(self.scene if self.marks is None else edited_scene(self.scene, self.marks), self.path)
+        yield CopyKept(self.path)
+
+
+@dataclass(frozen=True)
+class KeepEdits(SceneErrand):
+    """Write the edits where a crash cannot take them; `token` names the session."""
+
+    scene: "Scene" = field(repr=False)
+    history: History = field(repr=False)
+    name: str
+    path: Path | None
+    token: str
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        yield EditsKept(edits.keep(self.scene, self.history, self.name, self.path, self.token))
+
+
+@dataclass(frozen=True)
+class ForgetEdits(Errand):
+    """Remove what a session kept of a scene."""
+
+    scene: "Scene" = field(repr=False)
+    token: str
+
+    def run(self, stopping: Asked) -> Iterable[Command]:
+        edits.forget(self.scene, self.token)
+        return ()
+
+
+@dataclass(frozen=True)
+class ForgetFile(Errand):
+    """Remove a file of kept edits."""
+
+    edits: Path
+
+    def run(self, stopping: Asked) -> Iterable[Command]:
+        edits.forget_file(self.edits)
+        return ()
+
+
+@dataclass(frozen=True)
+class LookForEdits(SceneErrand):
+    """Edits that an earlier session kept: of a scene, or the newest of all."""
+
+    scene: "Scene | None" = field(default=None, repr=False)
+    path: Path | None = None
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        offer = edits.find(self.scene, self.path)
+        if offer is not None:
+            yield OfferEdits(offer)

@@ -1,0 +1,91 @@
+"""What can happen to the picture: its mode, the pose it is seen from, the photo beside it."""
+
+from dataclasses import dataclass, replace
+
+from .. import poses
+from ..poses import Pose
+from ..state import State
+from .state import Flight, Mode
+
+
+@dataclass(frozen=True)
+class SetMode:
+    """What the picture shows."""
+
+    mode: Mode
+
+    def apply(self, state: State) -> State:
+        return replace(state, mode=self.mode)
+
+
+@dataclass(frozen=True)
+class JumpTo:
+    """Fly to input view `view`; `Home` is view 0."""
+
+    view: int
+
+    def apply(self, state: State) -> State:
+        if state.info is None or not 0 <= self.view < len(state.info.views):
+            return state
+        flight = Flight(state.pose, state.info.views[self.view], state.now)
+        return replace(state, flight=flight, view=self.view)
+
+
+@dataclass(frozen=True)
+class FlyTo:
+    """Fly to a pose that is no photo's."""
+
+    pose: Pose
+
+    def apply(self, state: State) -> State:
+        return replace(state, flight=Flight(state.pose, self.pose, state.now), view=None)
+
+
+@dataclass(frozen=True)
+class Home:
+    """Fly back to the first photo's view."""
+
+    def apply(self, state: State) -> State:
+        return JumpTo(0).apply(state)
+
+
+@dataclass(frozen=True)
+class MoveTo:
+    """Stand at `pose`: a step of an orbit, pan, zoom or fly. Ends a flight."""
+
+    pose: Pose
+
+    def apply(self, state: State) -> State:
+        return replace(state, pose=self.pose, flight=None, view=None)
+
+
+@dataclass(frozen=True)
+class SetFov:
+    """Another field of view, degrees."""
+
+    degrees: float
+
+    def apply(self, state: State) -> State:
+        return MoveTo(poses.with_fov(state.pose, self.degrees)).apply(state)
+
+
+@dataclass(frozen=True)
+class FrameAll:
+    """Fly back until the whole scene is in view, looking the same way."""
+
+    def apply(self, state: State) -> State:
+        info = state.info
+        if info is None or info.extent is None:
+            return state
+        return FlyTo(poses.framing(state.pose, *info.extent)).apply(state)
+
+
+@dataclass(frozen=True)
+class Compare:
+    """The photo of the view on show from `place` (0 to 1) on to the right; None: no photo."""
+
+    place: float | None
+
+    def apply(self, state: State) -> State:
+        place = None if self.place is None else min(max(self.place, 0.0), 1.0)
+        return replace(state, compare=place)

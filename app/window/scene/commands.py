@@ -1,0 +1,285 @@
+"""What can happen to the tray and to the scene: photos, files, the jobs that make scenes."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from langflash_core.scene.edits import Marks
+
+from .. import poses
+from ..commands import NOTHING_TO_SAVE, Notify
+from ..editing.state import fresh
+from ..state import State
+from .drops import MAX_PHOTOS
+from .state import Job, Photo, SceneInfo
+
+# Photos
+
+
+@dataclass(frozen=True)
+class AddPhotos:
+    """Append photos to the tray, each once, up to what the network takes."""
+
+    paths: tuple[Path, ...]
+
+    def apply(self, state: State) -> State:
+        known = {p.path for p in state.photos}
+        fresh = tuple(Photo(p) for p in dict.fromkeys(self.paths) if p not in known)
+        photos = (*state.photos, *fresh)
+        after = replace(state, photos=photos[:MAX_PHOTOS])
+        if len(photos) > MAX_PHOTOS:
+            left = len(photos) - MAX_PHOTOS
+            text = f"{left} photos were left out: at most {MAX_PHOTOS} make one scene; clear the tray first."
+            after = Notify(text).apply(after)
+        return after
+
+
+@dataclass(frozen=True)
+class RemovePhoto:
+    """Take a photo out of the tray."""
+
+    index: int
+
+    def apply(self, state: State) -> State:
+        return replace(state, photos=state.photos[: self.index] + state.photos[self.index + 1 :])
+
+
+@dataclass(frozen=True)
+class ClearPhotos:
+    """Empty the tray; the scene stays."""
+
+    def apply(self, state: State) -> State:
+        return replace(state, photos=())
+
+
+@dataclass(frozen=True)
+class PhotoFailed:
+    """A photo could not be read for its thumbnail."""
+
+    path: Path
+    problem: str
+
+    def apply(self, state: State) -> State:
+        photos = (replace(p, problem=self.problem) if p.path == self.path else p for p in state.photos)
+        return replace(state, photos=tuple(photos))
+
+
+@dataclass(frozen=True)
+class PhotoRead:
+    """What a photo's file says: field of view of the longer side in degrees, if any, and triage."""
+
+    path: Path
+    recorded: float | None
+    notes: tuple[str, ...]
+
+    def apply(self, state: State) -> State:
+        return _change_photo(state, self.path, recorded=self.recorded, notes=self.notes)
+
+
+@dataclass(frozen=True)
+class SetPhotoFov:
+    """The person's own field of view, degrees; None goes back to the photo's record."""
+
+    index: int
+    fov: float | None
+
+    def apply(self, state: State) -> State:
+        if not 0 <= self.index < len(state.photos):
+            return state
+        fov = None if self.fov is None else min(max(self.fov, poses.FOV_RANGE[0]), poses.FOV_RANGE[1])
+        return _change_photo(state, state.photos[self.index].path, fov=fov)
+
+
+@dataclass(frozen=True)
+class MovePhoto:
+    """Take the photo at `index` to `place`; the first one's camera becomes the world."""
+
+    index: int
+    place: int
+
+    def apply(self, state: State) -> State:
+        photos = list(state.photos)
+        if not 0 <= self.index < len(photos):
+            return state
+        photo = photos.pop(self.index)
+        photos.insert(min(max(self.place, 0), len(photos)), photo)
+        return replace(state, photos=tuple(photos))
+
+
+@dataclass(frozen=True)
+class ChoosePair:
+    """Look for the two photos that make the best scene."""
+
+    def apply(self, state: State) -> State:
+        if len(state.photos) < 3:
+            text = "Choosing needs three photos or more; drop some on the window."
+            return Notify(text).apply(state)
+        return replace(state, choosing=True)
+
+
+@dataclass(frozen=True)
+class PairChosen:
+    """The best pair of `paths`, or none; the others leave the tray."""
+
+    paths: tuple[Path, ...]
+    pair: tuple[int, int] | None
+
+    def apply(self, state: State) -> State:
+        state = replace(state, choosing=False)
+        if tuple(photo.path for photo in state.photos) != self.paths:
+            return state  # the tray has changed meanwhile: the answer is about other photos
+        if self.pair is None:
+            text = "No two of these photos match; take photos that share at least a third of the picture."
+            return Notify(text).apply(state)
+        chosen = tuple(state.photos[index] for index in self.pair)
+        names = " and ".join(photo.path.name for photo in chosen)
+        return Notify(f"Kept {names}.", "info").apply(replace(state, photos=chosen))
+
+
+@dataclass(frozen=True)
+class ChoosingFailed:
+    """The search for a pair ended without an answer."""
+
+    sentence: str
+
+    def apply(self, state: State) -> State:
+        return Notify(self.sentence).apply(replace(state, choosing=False))
+
+
+# Scenes
+
+
+@dataclass(frozen=True)
+class Reconstruct:
+    """Make a scene of the photos in the tray; replaces a job under way."""
+
+    def apply(self, state: State) -> State:
+        if not state.photos:
+            return Notify("There is no photo to reconstruct; drop two photos on the window.").apply(state)
+        return replace(state, job=Job("Reconstructing", "starting", started=state.now))
+
+
+@dataclass(frozen=True)
+class OpenScene:
+    """Read a scene file; replaces a job under way. edits: kept by an earlier session."""
+
+    path: Path
+    edits: Path | None = None
+
+    def apply(self, state: State) -> State:
+        title = "Restoring" if self.edits else f"Opening {self.path.name}"
+        return replace(state, job=Job(title, "reading", started=state.now))
+
+
+@dataclass(frozen=True)
+class SaveScene:
+    """Write the scene on show to `path`."""
+
+    path: Path
+
+    def apply(self, state: State) -> State:
+        if state.info is None:
+            return Notify(NOTHING_TO_SAVE).apply(state)
+        return replace(state, dialog=None)
+
+
+@dataclass(frozen=True)
+class OpenPaths:
+    """Paths that behave like a drop (the open dialog, the command line)."""
+
+    paths: tuple[str, ...]
+
+    def apply(self, state: State) -> State:
+        return replace(state, dialog=None)
+
+
+@dataclass(frozen=True)
+class SceneArrived:
+    """A scene is ready: show it from its first view, ask every prompt again."""
+
+    info: SceneInfo
+
+    def apply(self, state: State) -> State:
+        prompts = tuple(replace(p, score=None) for p in state.prompts)
+        history = self.info.history
+        saved = None if history is None else history.moved_to(0).marks
+        return replace(
+            state,
+            editing=fresh(state.editing, history, saved),
+            recovery=replace(state.recovery, edits=None, kept=None),
+            asking=state.asking.without_scene(),
+            info=self.info,
+            prompts=prompts,
+            job=None,
+            flight=None,
+            pose=self.info.views[0] if self.info.views else poses.START,
+            view=0 if self.info.views else None,
+        )
+
+
+@dataclass(frozen=True)
+class SceneSaved:
+    """The scene on show, edited up to `marks`, now lives at `path`."""
+
+    path: Path
+    marks: Marks | None = None
+
+    def apply(self, state: State) -> State:
+        info = None if state.info is None else replace(state.info, path=self.path, name=self.path.name)
+        saved = self.marks or state.editing.saved
+        state = replace(state, info=info, editing=replace(state.editing, saved=saved))
+        return Notify(f"Saved {self.path}", "info").apply(state)
+
+
+# The job under way
+
+
+@dataclass(frozen=True)
+class CancelJob:
+    """Ask the job to stop; it ends after its present stage."""
+
+    def apply(self, state: State) -> State:
+        return state if state.job is None else replace(state, job=replace(state.job, cancelling=True))
+
+
+@dataclass(frozen=True)
+class Progressed:
+    """A stage of the job, 0 to 1; a new stage files the last one with its seconds."""
+
+    stage: str
+    fraction: float
+
+    def apply(self, state: State) -> State:
+        job = state.job
+        if job is None:
+            return state
+        fraction = min(max(self.fraction, 0.0), 1.0)
+        if self.stage == job.stage:
+            return replace(state, job=replace(job, fraction=fraction))
+        done = (*job.done, (job.stage, state.now - job.started))
+        return replace(
+            state, job=replace(job, stage=self.stage, fraction=fraction, started=state.now, done=done)
+        )
+
+
+@dataclass(frozen=True)
+class JobFailed:
+    """The job ended without a scene; a sentence with a remedy."""
+
+    sentence: str
+
+    def apply(self, state: State) -> State:
+        return Notify(self.sentence).apply(replace(state, job=None))
+
+
+@dataclass(frozen=True)
+class JobCancelled:
+    """The job ended because the person stopped it."""
+
+    def apply(self, state: State) -> State:
+        return Notify("Stopped.", "info").apply(replace(state, job=None))
+
+
+def _change_photo(state: State, path: Path, **changes: Any) -> State:
+    photos = (replace(photo, **changes) if photo.path == path else photo for photo in state.photos)
+    return replace(state, photos=tuple(photos))

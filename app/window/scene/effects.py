@@ -1,0 +1,87 @@
+"""What the scene asks of the world: paths from the disk, the worker's jobs, the scene in the renderer."""
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+
+from langflash_core.errors import LangFlashError
+
+from ..commands import Command, Notify
+from ..effects import Effects, Hands
+from ..kit.textures import Thumbnails
+from ..state import State
+from ..viewport import Viewport
+from .commands import (
+    AddPhotos,
+    CancelJob,
+    ChoosePair,
+    OpenPaths,
+    OpenScene,
+    Reconstruct,
+    SaveScene,
+    SceneArrived,
+)
+from .drops import sort_drop
+from .state import SceneInfo
+from .work import FindPair, LoadScene, MakeThumbnails, ReconstructPhotos, WriteScene
+
+COLORMAPS = ("turbo", "inferno")  # of colour-bars
+
+
+class SceneEffects(Effects):
+    """entitle: gives the window a title."""
+
+    def __init__(
+        self, hands: Hands, viewport: Viewport, thumbnails: Thumbnails, entitle: Callable[[str], None]
+    ) -> None:
+        self._hands = hands
+        self._viewport = viewport
+        self._thumbnails = thumbnails
+        self._entitle = entitle
+
+    def follow(self, command: Command, before: State, state: State) -> None:
+        """Jobs and errands of the worker; a scene that has come goes to the renderer."""
+        submit = self._hands.submit
+        match command:
+            case OpenPaths(paths):
+                self._open(paths, state)
+            case AddPhotos(paths):
+                submit(MakeThumbnails(paths))
+            case Reconstruct() if state.photos:
+                photos = state.photos
+                submit(ReconstructPhotos(tuple(p.path for p in photos), tuple(p.fov for p in photos)))
+            case OpenScene(path, edits):
+                submit(LoadScene(path, edits))
+            case SaveScene(path) if state.info is not None:
+                submit(WriteScene(state.info.scene, path, state.editing.marks))
+            case CancelJob():
+                self._hands.cancel()
+            case ChoosePair() if state.choosing and not before.choosing:
+                submit(FindPair(tuple(photo.path for photo in state.photos)))
+            case SceneArrived(info):
+                self._show(info)
+            case _:
+                pass
+
+    def _open(self, paths: Sequence[str], state: State) -> None:
+        perform = self._hands.perform
+        drop = sort_drop(paths)
+        for sentence in drop.rejected:
+            perform(Notify(sentence))
+        if drop.photos:
+            perform(AddPhotos(drop.photos))
+            if state.preferences.start_at_once:
+                perform(Reconstruct())
+        elif drop.scenes:
+            perform(OpenScene(drop.scenes[0]))
+
+    def _show(self, info: SceneInfo) -> None:
+        try:
+            self._viewport.set_scene(info.serial, info.scene)
+        except LangFlashError as error:
+            self._hands.perform(Notify(str(error)))
+        for index, photo in enumerate(info.scene.photos):
+            with suppress(OSError):  # a scene whose small photos are damaged still shows; buttons get numbers
+                self._thumbnails.put_encoded(f"view {index}", photo)
+        for colormap in COLORMAPS:
+            self._thumbnails.put(f"bar {colormap}", self._viewport.colour_bar(colormap))
+        self._entitle(f"{info.name} - LangFlash")

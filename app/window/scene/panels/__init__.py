@@ -1,0 +1,1 @@
+"""The tray, the modes, the views."""

@@ -1,0 +1,155 @@
+"""Over the picture: the cameras of the photos as frusta with the photos on them, and the photo of
+the view on show to compare with."""
+
+import numpy as np
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
+
+from ... import commands as do
+from ... import poses
+from ...kit import theme, widgets
+from ...kit.look import Look
+from ...poses import Pose
+from ...state import State
+from .. import camera
+
+FRUSTUM = 0.10  # length of a frustum in distances to the pivot of its view
+NEAREST = 0.02  # scene units in front of the camera from which a frustum is drawn
+_HANDLE = 13.0  # design pixels
+
+
+def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Command]:
+    """Frusta and comparison on the picture at `corner` of `size`; call it inside the picture's window,
+    before the picture takes the pointer."""
+    if state.info is None:
+        return []
+    if comparing(state):
+        return _compare(state, look, corner, size)
+    if state.preferences.photos_in_space and state.flight is None:
+        return _frusta(state, look, corner, size)
+    return []
+
+
+def comparing(state: State) -> bool:
+    """Whether the photo of the view on show lies over a part of the picture."""
+    return state.compare is not None and state.view is not None and state.flight is None
+
+
+# Frusta
+
+
+def _frusta(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Command]:
+    assert state.info is not None
+    issued: list[do.Command] = []
+    canvas = imgui.get_window_draw_list()
+    shown = [
+        (float(pos_c[:, 2].mean()), view, points)
+        for view, pose in enumerate(state.info.views)
+        if (projected := project(frustum(pose), state.pose, size)) is not None and state.view != view
+        for pos_c, points in [projected]
+    ]
+    for _, view, points in sorted(shown, key=lambda each: -each[0]):  # far ones first
+        tip, *base = [ImVec2(corner.x + float(x), corner.y + float(y)) for x, y in points]
+        centre = ImVec2(sum(p.x for p in base) / 4, sum(p.y for p in base) / 4)
+        half = [max(abs(p.x - centre.x) for p in base), max(abs(p.y - centre.y) for p in base)]
+        over = _over(state, view, centre, half, size)
+        colour = widgets.u32(theme.DARK.ACCENT if over else theme.DARK.TEXT)
+        for point in base:
+            canvas.add_line(tip, point, colour, look.px(1.2))
+        a, b, c, d = base
+        picture = look.thumbnails.get(f"view {view}")
+        if picture is not None:
+            tint = imgui.IM_COL32(255, 255, 255, 225)
+            corners = (ImVec2(0, 0), ImVec2(1, 0), ImVec2(1, 1), ImVec2(0, 1))
+            canvas.add_image_quad(picture[0], a, b, c, d, *corners, col=tint)
+        canvas.add_quad(a, b, c, d, colour, look.px(2.2 if over else 1.2))
+        if over:
+            imgui.set_tooltip(f"Stand where photo {view} was taken")
+            if imgui.is_mouse_clicked(0):
+                issued.append(camera.JumpTo(view))
+    return issued
+
+
+def _over(state: State, view: int, centre: ImVec2, half: list[float], size: ImVec2) -> bool:
+    """Whether the pointer is on a frustum's photo, with nothing else in front."""
+    if max(half) > size.x or not imgui.is_window_hovered() or imgui.is_any_item_active():
+        return False
+    pointer = imgui.get_mouse_pos()
+    return abs(pointer.x - centre.x) <= half[0] and abs(pointer.y - centre.y) <= half[1]
+
+
+def frustum(pose: Pose) -> np.ndarray:
+    """(5, 3) world: the camera's centre and the corners of its picture, clockwise from the upper left."""
+    width, height = (1.0, 1.0 / pose.aspect)
+    K = poses.intrinsics(pose, 1000, round(1000 * height))
+    K = K / 1000
+    K[2, 2] = 1.0
+    pixels = np.array([[0, 0, 1], [width, 0, 1], [width, height, 1], [0, height, 1]])
+    rays = pixels @ np.linalg.inv(K).T
+    corners = rays * FRUSTUM * pose.reach
+    return np.concatenate((np.zeros((1, 3)), corners)) @ pose.axes.T + np.array(pose.centre)
+
+
+def project(points: np.ndarray, pose: Pose, size: ImVec2) -> tuple[np.ndarray, np.ndarray] | None:
+    """Camera coordinates (n, 3) and pixels (n, 2) of world points; None where one is not in front."""
+    matrix = poses.viewmat(pose)
+    pos_c = points @ matrix[:3, :3].T + matrix[:3, 3]
+    if pos_c[:, 2].min() < NEAREST:
+        return None
+    K = poses.intrinsics(pose, max(round(size.x), 1), max(round(size.y), 1))
+    pos_px = pos_c @ K.T
+    return pos_c, pos_px[:, :2] / pos_px[:, 2:]
+
+
+# Comparison
+
+
+def photo_box(pose: Pose, size: tuple[float, float]) -> tuple[float, float, float, float]:
+    """(left, top, right, bottom) of the photo in a picture of `size`, from its upper left corner."""
+    width = min(size[0], size[1] * pose.aspect)
+    height = width / pose.aspect
+    left, top = (size[0] - width) / 2, (size[1] - height) / 2
+    return left, top, left + width, top + height
+
+
+def _compare(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Command]:
+    """The photo to the right of a line that can be dragged."""
+    place, picture = state.compare, look.thumbnails.get(f"view {state.view}")
+    if place is None or picture is None:
+        return []
+    left, top, right, bottom = photo_box(state.pose, (size.x, size.y))
+    x = left + place * (right - left)
+    canvas = imgui.get_window_draw_list()
+    low, high = ImVec2(corner.x + x, corner.y + top), ImVec2(corner.x + right, corner.y + bottom)
+    canvas.add_image(picture[0], low, high, ImVec2(place, 0), ImVec2(1, 1))
+    canvas.add_line(low, ImVec2(low.x, high.y), widgets.u32(theme.DARK.ACCENT), look.px(2))
+    middle, radius = ImVec2(low.x, (low.y + high.y) / 2), look.px(_HANDLE)
+    canvas.add_circle_filled(middle, radius, widgets.u32(theme.DARK.ACCENT))
+    icon, ink = fa.ICON_FA_LEFT_RIGHT, widgets.u32(theme.DARK.ON_ACCENT)
+    extent = imgui.calc_text_size(icon)
+    canvas.add_text(ImVec2(middle.x - extent.x / 2, middle.y - extent.y / 2), ink, icon)
+    _caption(look, ImVec2(low.x - look.px(10), low.y + look.px(10)), "scene", 1.0)
+    _caption(look, ImVec2(low.x + look.px(10), low.y + look.px(10)), "photo", 0.0)
+    before = imgui.get_cursor_screen_pos()
+    imgui.set_cursor_screen_pos(ImVec2(low.x - radius, low.y))
+    imgui.set_next_item_allow_overlap()
+    imgui.invisible_button("compare", ImVec2(2 * radius, max(high.y - low.y, 1)))
+    if imgui.is_item_hovered() or imgui.is_item_active():
+        imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)
+    dragged = imgui.is_item_active()
+    imgui.set_cursor_screen_pos(before)
+    if not dragged:
+        return []
+    wanted = (imgui.get_mouse_pos().x - corner.x - left) / max(right - left, 1)
+    return [camera.Compare(min(max(wanted, 0.0), 1.0))]
+
+
+def _caption(look: Look, at: ImVec2, text: str, anchor: float) -> None:
+    """A word on a dark ground; `anchor` 0 starts at `at`, 1 ends there."""
+    canvas, extent = imgui.get_window_draw_list(), imgui.calc_text_size(text)
+    width, height = extent.x + look.px(14), extent.y + look.px(6)
+    corner = ImVec2(at.x - anchor * width, at.y)
+    end = ImVec2(corner.x + width, corner.y + height)
+    canvas.add_rect_filled(corner, end, imgui.IM_COL32(14, 16, 20, 190), look.px(5))
+    place = ImVec2(corner.x + look.px(7), corner.y + look.px(3))
+    canvas.add_text(place, widgets.u32(theme.DARK.TEXT), text)

@@ -1,0 +1,53 @@
+"""What a reconstruction cost, in the stages of the paper's table."""
+
+from collections.abc import Mapping
+
+from imgui_bundle import imgui
+
+from ...kit import theme, widgets
+from ...kit.look import Look
+from ...state import State
+
+# The paper's rows, from this program's own stages. Depth, poses and their refinement take the place
+# of the paper's point maps, which its Gaussian decoder predicts.
+ROWS = (
+    ("Language features", ("language features",)),
+    ("Encoder", ("encoder",)),
+    ("Grouping", ("grouping",)),
+    ("Aggregation", ("aggregation",)),
+    ("Gaussian decoder", ("depth", "poses", "refinement", "Gaussians")),
+    ("Reading and tidying up", ("photos", "weights", "assembly", "pruning")),
+)
+
+
+def table(timings: Mapping[str, float]) -> list[tuple[str, float]]:
+    """(row, seconds) of a scene's stages, the last one "All"; empty where nobody knows."""
+    if not timings:
+        return []
+    rows = [(name, sum(timings.get(part, 0.0) for part in parts)) for name, parts in ROWS]
+    return [*rows, ("All", sum(timings.values()))]
+
+
+def draw(state: State, look: Look) -> None:
+    """The table, folded away until it is asked for."""
+    rows = [] if state.info is None or state.job is not None else table(state.info.scene.record.cost.timings)
+    if not rows:
+        return
+    shape = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
+    with widgets.colours(text=theme.MUTED):
+        opened = imgui.tree_node_ex(f"Made in {rows[-1][1]:.1f} s###cost", shape)
+    if not opened:
+        return
+    for name, seconds in rows[:-1]:
+        _row(name, f"{1000 * seconds:,.0f} ms", theme.MUTED)
+    _row("All", f"{1000 * rows[-1][1]:,.0f} ms", theme.TEXT)
+    assert state.info is not None
+    peak = state.info.scene.record.cost.peak_memory_mb
+    if peak:
+        _row("Peak memory", f"{peak:,} MB", theme.TEXT)
+
+
+def _row(name: str, figure: str, colour) -> None:
+    imgui.text_colored(colour, name)
+    with widgets.colours(text=colour):
+        widgets.at_right_edge(figure)

@@ -1,0 +1,281 @@
+"""The tray: photos with their lenses and notes, the reconstruct button, a job's progress and, at its
+end, what each stage cost."""
+
+from collections.abc import Iterable
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
+
+from ... import commands as do
+from ...kit import theme, widgets
+from ...kit.look import Look
+from ...poses import FOV_RANGE
+from ...state import State
+from .. import commands as show
+from ..state import Job, Photo
+from . import stages
+
+COLUMNS = 3
+NOTABLE_SECONDS = 0.05  # of a finished stage; a shorter one is only a heading of others
+ASSUMED_FOV = 65.0  # degrees, as the core assumes where neither file nor person says
+HOW_TO_TELL = "click a photo to tell it"
+_DRAGGED = "photo"  # what a card is called while it is dragged
+
+
+def draw(state: State, look: Look) -> list[do.Command]:
+    """The photos section."""
+    issued: list[do.Command] = []
+    widgets.heading("Photos")
+    if state.photos:
+        issued += _tray(state, look)
+    else:
+        _hint(look)
+    if state.job is not None:
+        issued += _progress(state.job, state.now, look)
+    elif state.photos:
+        issued += _buttons(state, look)
+    for sentence in _sentences(state):
+        _warning(sentence)
+    stages.draw(state, look)
+    return issued
+
+
+def _sentences(state: State) -> list[str]:
+    """Each once: what the tray says of a photo, the scene made of it says again."""
+    said = [photo.problem for photo in state.photos if photo.problem]
+    said += [note for photo in state.photos for note in photo.notes]
+    said += state.info.warnings if state.info else ()
+    return sentences(said)
+
+
+def sentences(said: Iterable[str]) -> list[str]:
+    """Warnings as sentences, each once."""
+    return list(dict.fromkeys(said_here(each) for each in said))
+
+
+def said_here(text: str) -> str:
+    """A warning as a sentence; what the core says of its command line in the window's words."""
+    return widgets.sentence(text.replace("on the command line, --fov tells it", HOW_TO_TELL))
+
+
+def _hint(look: Look) -> None:
+    """The place to drop on."""
+    width, height = imgui.get_content_region_avail().x, look.px(104)
+    corner = imgui.get_cursor_screen_pos()
+    canvas = imgui.get_window_draw_list()
+    end = ImVec2(corner.x + width, corner.y + height)
+    canvas.add_rect_filled(corner, end, widgets.u32(theme.CANVAS), look.px(8))
+    canvas.add_rect(corner, end, widgets.u32(theme.LINE), look.px(8), look.px(1.5))
+    lines = ((fa.ICON_FA_IMAGES, theme.ACCENT), ("Drop two or more photos of a room", theme.TEXT))
+    lines = (*lines, ("or a folder, a scene, or a .ply of splats", theme.MUTED))
+    step = height / (len(lines) + 1)
+    for row, (text, colour) in enumerate(lines, start=1):
+        size = imgui.calc_text_size(text)
+        at = ImVec2(corner.x + (width - size.x) / 2, corner.y + row * step - size.y / 2)
+        canvas.add_text(at, widgets.u32(colour), text)
+    imgui.dummy(ImVec2(width, height))
+
+
+def _tray(state: State, look: Look) -> list[do.Command]:
+    issued: list[do.Command] = []
+    spacing = imgui.get_style().item_spacing.x
+    width = (imgui.get_content_region_avail().x - (COLUMNS - 1) * spacing) / COLUMNS
+    size = ImVec2(width, width * 0.75)
+    for index, photo in enumerate(state.photos):
+        if index % COLUMNS:
+            imgui.same_line()
+        imgui.push_id(str(photo.path))
+        removed = _card(look, photo, size, state.job is None)
+        if state.job is None:
+            issued += _drag(index)
+            if removed:
+                issued.append(show.RemovePhoto(index))
+            elif imgui.is_item_deactivated() and imgui.is_item_hovered() and not _slipped():
+                imgui.open_popup("lens")
+        issued += _details(state, index, photo, look)
+        imgui.pop_id()
+    return issued
+
+
+def _slipped() -> bool:
+    way = imgui.get_mouse_drag_delta(0)
+    return bool(way.x or way.y)
+
+
+def _drag(index: int) -> list[do.Command]:
+    """Cards are put in order by dragging one onto the place of another."""
+    issued: list[do.Command] = []
+    if imgui.begin_drag_drop_source(imgui.DragDropFlags_.source_no_preview_tooltip):
+        imgui.set_drag_drop_payload_py_id(_DRAGGED, index)
+        imgui.end_drag_drop_source()
+    if imgui.begin_drag_drop_target():
+        payload = imgui.accept_drag_drop_payload_py_id(_DRAGGED)
+        if payload is not None and payload.data_id != index:
+            issued.append(show.MovePhoto(payload.data_id, index))
+        imgui.end_drag_drop_target()
+    return issued
+
+
+def _card(look: Look, photo: Photo, size: ImVec2, open_for_change: bool) -> bool:
+    """One thumbnail, cropped to the card; returns whether its cross was pressed."""
+    corner = imgui.get_cursor_screen_pos()
+    end = ImVec2(corner.x + size.x, corner.y + size.y)
+    canvas = imgui.get_window_draw_list()
+    imgui.invisible_button("card", size)
+    hovered = imgui.is_item_hovered()
+    if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip):
+        imgui.set_tooltip(f"{photo.path.name}\nClick for its lens, drag to put it elsewhere")
+    picture = look.thumbnails.get(str(photo.path))
+    canvas.add_rect_filled(corner, end, widgets.u32(theme.RAISED), look.px(6))
+    if picture is not None:
+        low, high = _crop(picture[1], size.x / size.y)
+        canvas.add_image_rounded(picture[0], corner, end, low, high, 0xFFFFFFFF, look.px(6))
+    else:
+        icon = fa.ICON_FA_TRIANGLE_EXCLAMATION if photo.problem else fa.ICON_FA_IMAGE
+        extent = imgui.calc_text_size(icon)
+        middle = ImVec2((corner.x + end.x - extent.x) / 2, (corner.y + end.y - extent.y) / 2)
+        canvas.add_text(middle, widgets.u32(theme.BAD if photo.problem else theme.MUTED), icon)
+    if picture is not None:
+        _badge(look, ImVec2(corner.x + look.px(4), end.y - look.px(4)), f"{_fov(photo):.0f}°")
+    if photo.notes:
+        place = ImVec2(corner.x + look.px(4), corner.y + look.px(22))
+        _badge(look, place, fa.ICON_FA_TRIANGLE_EXCLAMATION, theme.DARK.ACCENT)
+    if hovered:
+        canvas.add_rect(corner, end, widgets.u32(theme.ACCENT), look.px(6), look.px(1.5))
+    return open_for_change and hovered and _cross(look, ImVec2(end.x, corner.y))
+
+
+def _badge(look: Look, lower_left: ImVec2, text: str, colour=theme.DARK.TEXT) -> None:
+    """A few letters on a dark ground over a picture."""
+    canvas, extent = imgui.get_window_draw_list(), imgui.calc_text_size(text)
+    factor = 0.82
+    size = ImVec2(extent.x * factor + look.px(8), extent.y * factor + look.px(2))
+    corner = ImVec2(lower_left.x, lower_left.y - size.y)
+    end = ImVec2(corner.x + size.x, lower_left.y)
+    canvas.add_rect_filled(corner, end, imgui.IM_COL32(14, 16, 20, 190), look.px(4))
+    at = ImVec2(corner.x + look.px(4), corner.y + look.px(1))
+    canvas.add_text(imgui.get_font(), imgui.get_font_size() * factor, at, widgets.u32(colour), text)
+
+
+def _cross(look: Look, upper_right: ImVec2) -> bool:
+    canvas, side = imgui.get_window_draw_list(), look.px(22)
+    place = ImVec2(upper_right.x - side - look.px(3), upper_right.y + look.px(3))
+    pointer = imgui.get_mouse_pos()
+    over = place.x <= pointer.x <= place.x + side and place.y <= pointer.y <= place.y + side
+    ground = theme.DARK.BAD if over else theme.DARK.CANVAS
+    canvas.add_rect_filled(place, ImVec2(place.x + side, place.y + side), widgets.u32(ground), look.px(11))
+    extent = imgui.calc_text_size(fa.ICON_FA_XMARK)
+    at = ImVec2(place.x + (side - extent.x) / 2, place.y + (side - extent.y) / 2)
+    canvas.add_text(at, widgets.u32(theme.DARK.TEXT), fa.ICON_FA_XMARK)
+    return over and imgui.is_mouse_clicked(0)
+
+
+def _fov(photo: Photo) -> float:
+    """Degrees in force."""
+    return photo.fov or photo.recorded or ASSUMED_FOV
+
+
+def _details(state: State, index: int, photo: Photo, look: Look) -> list[do.Command]:
+    """A card's own panel: its lens, its place, what the triage has to say."""
+    issued: list[do.Command] = []
+    imgui.set_next_window_size(ImVec2(look.px(330), 0))
+    if not imgui.begin_popup("lens"):
+        return issued
+    widgets.heading(photo.path.name)
+    if photo.fov is not None:
+        source = "your own"
+    else:
+        source = "from the file" if photo.recorded else "assumed: the file does not say"
+    widgets.muted(f"Field of view of the longer side, {source}")
+    width = imgui.get_content_region_avail().x
+    changed, fov = widgets.slider("##fov", _fov(photo), FOV_RANGE, f"{_fov(photo):.0f}°", "", width)
+    if changed:
+        issued.append(show.SetPhotoFov(index, fov))
+    imgui.begin_disabled(photo.fov is None)
+    if imgui.button(f"{fa.ICON_FA_ROTATE_LEFT}  As recorded" if photo.recorded else "Assume again"):
+        issued.append(show.SetPhotoFov(index, None))
+    imgui.end_disabled()
+    issued += _order(state, index)
+    imgui.same_line()
+    if imgui.button(fa.ICON_FA_TRASH):
+        issued.append(show.RemovePhoto(index))
+        imgui.close_current_popup()
+    widgets.tooltip("Take it out of the tray")
+    for note in photo.notes:
+        _warning(said_here(note))
+    imgui.end_popup()
+    return issued
+
+
+def _order(state: State, index: int) -> list[do.Command]:
+    """Two arrows that take a photo one place earlier or later."""
+    issued: list[do.Command] = []
+    for label, place, tip in (
+        (fa.ICON_FA_ARROW_LEFT, index - 1, "Earlier; the first photo's camera becomes the world"),
+        (fa.ICON_FA_ARROW_RIGHT, index + 1, "Later"),
+    ):
+        imgui.same_line()
+        imgui.begin_disabled(not 0 <= place < len(state.photos))
+        if imgui.button(label):
+            issued.append(show.MovePhoto(index, place))
+        imgui.end_disabled()
+        widgets.tooltip(tip)
+    return issued
+
+
+def _crop(aspect: float, target: float) -> tuple[ImVec2, ImVec2]:
+    """Texture corners that fill a card of aspect `target` with the middle of a picture."""
+    if aspect > target:
+        margin = (1 - target / aspect) / 2
+        return ImVec2(margin, 0), ImVec2(1 - margin, 1)
+    margin = (1 - aspect / target) / 2
+    return ImVec2(0, margin), ImVec2(1, 1 - margin)
+
+
+def _buttons(state: State, look: Look) -> list[do.Command]:
+    issued: list[do.Command] = []
+    few = len(state.photos) < 3
+    side, gap = imgui.get_frame_height() + look.px(6), imgui.get_style().item_spacing.x
+    others = side + gap if few else 2 * (side + gap)
+    width = imgui.get_content_region_avail().x - others
+    imgui.begin_disabled(state.choosing)
+    if widgets.primary_button(f"{fa.ICON_FA_CUBES}  Reconstruct", ImVec2(width, 0)):
+        issued.append(show.Reconstruct())
+    if not few:
+        imgui.same_line()
+        icon = fa.ICON_FA_HOURGLASS_HALF if state.choosing else fa.ICON_FA_WAND_MAGIC_SPARKLES
+        if imgui.button(f"{icon}##pair", ImVec2(side, 0)):
+            issued.append(show.ChoosePair())
+        widgets.tooltip("Keep only the two photos that make the best scene together")
+    imgui.same_line()
+    if imgui.button(f"{fa.ICON_FA_TRASH}##clear", ImVec2(side, 0)):
+        issued.append(show.ClearPhotos())
+    widgets.tooltip("Clear the tray; the scene stays")
+    imgui.end_disabled()
+    return issued
+
+
+def _progress(job: Job, now: float, look: Look) -> list[do.Command]:
+    """The stage under way with its bar, the finished ones with their seconds, and cancel."""
+    imgui.text(job.title)
+    for stage, seconds in job.done:
+        if seconds < NOTABLE_SECONDS:
+            continue
+        with widgets.colours(text=theme.MUTED):
+            imgui.text(f"{fa.ICON_FA_CHECK}  {stage}")
+            widgets.at_right_edge(f"{seconds:.1f} s")
+    stage = "stopping" if job.cancelling else job.stage
+    imgui.text(stage)
+    widgets.at_right_edge(f"{now - job.started:.1f} s")
+    imgui.progress_bar(job.fraction, ImVec2(-1, look.px(8)), "")
+    imgui.begin_disabled(job.cancelling)
+    pressed = imgui.button(f"{fa.ICON_FA_STOP}  Cancel", ImVec2(-1, 0))
+    imgui.end_disabled()
+    return [show.CancelJob()] if pressed else []
+
+
+def _warning(sentence: str) -> None:
+    with widgets.colours(text=theme.ACCENT):
+        imgui.text(fa.ICON_FA_TRIANGLE_EXCLAMATION)
+    imgui.same_line()
+    widgets.muted(sentence)

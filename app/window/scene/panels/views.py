@@ -1,0 +1,68 @@
+"""The scene's own photos as buttons in the picture's corner."""
+
+from dataclasses import replace
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
+
+from ... import commands as do
+from ...kit import theme, widgets
+from ...kit.look import Look
+from ...recovery import commands as keep
+from ...state import State
+from .. import camera
+from . import in_space
+
+_VIEW = 54.0  # of a photo to jump to
+
+
+def draw(state: State, look: Look) -> list[do.Command]:
+    """Buttons with the scene's own photos, to jump to their views."""
+    issued: list[do.Command] = []
+    if state.info is None:
+        return issued
+    height = look.px(_VIEW)
+    for view in range(len(state.info.views)):
+        if view:
+            imgui.same_line()
+        chosen = state.view == view
+        ring = theme.ACCENT if chosen else theme.RAISED
+        picture = look.thumbnails.get(f"view {view}")
+        imgui.push_id(view)
+        with widgets.colours(button=ring, button_hovered=theme.ACCENT, button_active=theme.ACCENT):
+            if picture is None:
+                pressed = imgui.button(str(view), ImVec2(height, height))
+            else:
+                imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(3, 3))
+                pressed = imgui.image_button("view", picture[0], ImVec2(round(height * picture[1]), height))
+                imgui.pop_style_var()
+        widgets.tooltip(f"Stand where photo {view} was taken")
+        if pressed:
+            issued.append(camera.JumpTo(view))
+        imgui.pop_id()
+    imgui.same_line(0, look.px(12))
+    return issued + _in_space(state, look)
+
+
+def _in_space(state: State, look: Look) -> list[do.Command]:
+    """Two switches beside the photos: compare with the photo, and the cameras in the scene."""
+    issued: list[do.Command] = []
+    size, wanted = look.vec(34, (_VIEW + 6 - 4) / 2), state.preferences  # together as high as a photo
+    imgui.begin_group()
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(4, 4))
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
+    imgui.begin_disabled(state.view is None)
+    if _switch(fa.ICON_FA_LEFT_RIGHT, in_space.comparing(state), size):
+        issued.append(camera.Compare(None if in_space.comparing(state) else 0.5))
+    imgui.end_disabled()
+    widgets.tooltip("Compare with the photo, at a photo's own view  (P)")
+    if _switch(fa.ICON_FA_CAMERA, wanted.photos_in_space, size):
+        issued.append(keep.Prefer(replace(wanted, photos_in_space=not wanted.photos_in_space)))
+    widgets.tooltip("Show the photos' cameras in the scene  (K)")
+    imgui.pop_style_var(2)
+    imgui.end_group()
+    return issued
+
+
+def _switch(icon: str, on: bool, size: ImVec2) -> bool:
+    return widgets.primary_button(icon, size) if on else imgui.button(icon, size)

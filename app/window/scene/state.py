@@ -1,0 +1,113 @@
+"""The photos in the tray, the scene made of them, and what of it the picture shows."""
+
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from langflash_core.scene.edits import History
+
+from ..poses import Pose, Vector
+
+if TYPE_CHECKING:
+    from langflash_core.types import Scene
+
+
+FLIGHT_SECONDS = 0.7
+
+
+class Mode(Enum):
+    """What the picture shows; the value is the label on its button."""
+
+    RGB = "RGB"
+    HEAT = "Heat-map"
+    LABELS = "Labels"
+    ATOMS = "Atoms"
+    DEPTH = "Depth"
+    MASKS = "Masks"
+    ISOLATE = "Only these"
+    HIDE = "Without these"
+    DIM = "Dim the rest"
+    FEATURES = "Features"
+    WEIGHT = "One atom"
+    TRANSMITTANCE = "Transmittance"
+    COVERAGE = "Coverage"
+    AGREEMENT = "Agreement"
+    MARGIN = "Margin"
+
+    @property
+    def answers(self) -> bool:
+        """Whether it shows relevance."""
+        return self in _ANSWERING
+
+    @property
+    def of_atoms(self) -> bool:
+        """Whether it shows weight maps whatever is asked."""
+        return self in (Mode.ATOMS, Mode.FEATURES, Mode.WEIGHT)
+
+    def possible(self, info: "SceneInfo | None") -> bool:
+        """Whether a scene has what it shows."""
+        if info is None or (self in (Mode.WEIGHT, Mode.FEATURES) and info.num_atoms == 0):
+            return False
+        return bool(info.views) if self is Mode.COVERAGE else self is not Mode.AGREEMENT or info.own_views
+
+
+_ANSWERING = (Mode.HEAT, Mode.LABELS, Mode.MASKS, Mode.ISOLATE, Mode.HIDE, Mode.DIM, Mode.MARGIN)
+
+
+@dataclass(frozen=True)
+class Photo:
+    """A photo in the tray; `problem` is a sentence when it could not be shown.
+
+    fov: the person's own, degrees of the longer side. recorded: what the file says. notes: triage.
+    """
+
+    path: Path
+    problem: str = ""
+    fov: float | None = None
+    recorded: float | None = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Job:
+    """Work under way. done: finished stages with their seconds; started: when `stage` began."""
+
+    title: str
+    stage: str = ""
+    fraction: float = 0.0
+    started: float = 0.0
+    done: tuple[tuple[str, float], ...] = ()
+    cancelling: bool = False
+
+
+@dataclass(frozen=True)
+class SceneInfo:
+    """The scene on show. `scene` is the immutable snapshot; `views` are poses of its photos.
+
+    history: edits that came with it, none of them or those of an earlier session.
+    own_views: whether it says which photo made which Gaussian, so that photos can be compared.
+    extent: corners (low, high) of the box around nearly all of it, world axes, scene units.
+    """
+
+    serial: int
+    name: str
+    scene: "Scene" = field(compare=False, repr=False)
+    views: tuple[Pose, ...]
+    num_gaussians: int
+    num_atoms: int
+    space: str
+    warnings: tuple[str, ...] = ()
+    path: Path | None = None
+    history: "History | None" = field(default=None, compare=False, repr=False)
+    own_views: bool = False
+    extent: tuple[Vector, Vector] | None = None
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A smooth transition between poses, `FLIGHT_SECONDS` long."""
+
+    start: Pose
+    end: Pose
+    began: float

@@ -1,0 +1,190 @@
+"""The worker's side of the scene: making, reading and writing it, and looking at photos.
+
+Heavy imports wait until they are needed: the window makes these requests before torch is loaded.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from langflash_core.errors import ImageError, LangFlashError
+from langflash_core.scene.edits import History, Marks
+
+from ..commands import Command, ShowPicture
+from ..poses import Vector, from_view, median_reach
+from ..requests import Asked, Errand, Job
+from .commands import ChoosingFailed, PairChosen, PhotoFailed, PhotoRead, SceneArrived, SceneSaved
+from .state import SceneInfo
+
+if TYPE_CHECKING:
+    from langflash_core.images.decode import Photo
+    from langflash_core.types import Scene
+
+THUMBNAIL_SIDE = 320  # pixels of the longer side
+
+
+# Jobs
+
+
+@dataclass(frozen=True)
+class ReconstructPhotos(Job):
+    """Make a scene of photos. fovs: degrees of the longer side, one per photo; None: its record."""
+
+    paths: tuple[Path, ...]
+    fovs: tuple[float | None, ...] = ()
+
+    def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> SceneArrived:
+        from langflash_core.pipeline import reconstruct
+
+        scene = reconstruct(self.paths, fov=self.fovs or None, progress=progress, cancelled=cancelled)
+        name = " + ".join(path.stem for path in self.paths[:3]) + (" ..." if len(self.paths) > 3 else "")
+        return SceneArrived(describe_scene(scene, serial, name))
+
+
+@dataclass(frozen=True)
+class LoadScene(Job):
+    """Read a scene file; or, with `edits`, the scene and the history that an earlier session kept."""
+
+    path: Path
+    edits: Path | None = None
+
+    def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> SceneArrived:
+        from langflash_core.export import read
+
+        scene = read(self.path)
+        if self.edits is not None:
+            return SceneArrived(_restored(describe_scene(scene, serial, ""), self.edits))
+        return SceneArrived(describe_scene(scene, serial, self.path.name, self.path))
+
+
+def _restored(info: SceneInfo, edits: Path) -> SceneInfo:
+    """The scene with the edits of an earlier session, its name and its place.
+
+    Raises:
+        SceneFileError: the edits cannot be read.
+    """
+    from langflash_core.scene.edits_file import load_history, read_about
+
+    assert info.history is not None
+    history = load_history(edits, info.scene, info.history.marks)
+    about = read_about(edits)[1]
+    path = Path(about["path"]) if about.get("path") else None
+    return replace(info, name=str(about.get("name", "")), path=path, history=history)
+
+
+def describe_scene(scene: "Scene", serial: int, name: str, path: Path | None = None) -> SceneInfo:
+    """`SceneInfo` of a `Scene`: counts, warnings, and a pose per input view."""
+    from langflash_core.scene.edited import first_marks
+    from langflash_core.types import NO_LANGUAGE
+
+    mute = scene.semantics.space == NO_LANGUAGE
+    said = ("This splat file holds no language: phrases find nothing in it.",) if mute else ()
+    means = scene.gaussians.means.double().numpy()
+    views = []
+    for viewmat, K in zip(scene.viewmats.double().numpy(), scene.Ks.double().numpy(), strict=True):
+        views.append(from_view(viewmat, K, scene.view_size, median_reach(means, viewmat, K, scene.view_size)))
+    return SceneInfo(
+        serial=serial,
+        name=name,
+        scene=scene,
+        views=tuple(views),
+        num_gaussians=len(scene.gaussians),
+        num_atoms=scene.semantics.num_atoms,
+        space=scene.semantics.space,
+        warnings=(*said, *scene.record.warnings),
+        path=path,
+        history=History(first_marks(scene)),
+        own_views=scene.num_views > 1 and scene.view_ids is not None,
+        extent=_extent(means),
+    )
+
+
+def _extent(means: np.ndarray) -> tuple[Vector, Vector] | None:
+    """Corners of the box around the middle 98 % of the means (N, 3) along each axis."""
+    if not len(means):
+        return None
+    low, high = np.percentile(means, (1, 99), axis=0)
+    return Vector(*low.tolist()), Vector(*high.tolist())
+
+
+# Errands
+
+
+@dataclass(frozen=True)
+class WriteScene(Errand):
+    """Write a scene file of the scene as edited."""
+
+    saves = True
+
+    scene: "Scene" = field(repr=False)
+    path: Path
+    marks: Marks | None = None
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.export import export
+        from langflash_core.scene.edited import edited_scene
+
+        export(self.scene if self.marks is None else edited_scene(self.scene, self.marks), self.path)
+        yield SceneSaved(self.path, self.marks)
+
+
+@dataclass(frozen=True)
+class MakeThumbnails(Errand):
+    """Decode photos small, and say what their files do."""
+
+    paths: tuple[Path, ...]
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        for path in self.paths:
+            yield from _thumbnail(path)
+
+
+def _thumbnail(path: Path) -> Iterator[Command]:
+    """A small upright picture of a photo and what its file says; of an unreadable one its problem."""
+    from langflash_core.images.decode import read_photo
+
+    try:
+        photo = read_photo(path)
+    except ImageError as error:
+        yield PhotoFailed(path, str(error))
+        return
+    small = photo.image.copy()
+    small.thumbnail((THUMBNAIL_SIDE, THUMBNAIL_SIDE))
+    yield ShowPicture(str(path), np.asarray(small.convert("RGB")))
+    yield PhotoRead(path, *_look_at(photo))
+
+
+def _look_at(photo: "Photo") -> tuple[float | None, tuple[str, ...]]:
+    """The recorded field of view of the longer side in degrees, if any, and the triage notes."""
+    import torch
+
+    from langflash_core.images.lens import exif_focal
+    from langflash_core.images.pictures import judged_grey
+    from langflash_core.images.triage import photo_notes
+
+    focal = exif_focal(photo)
+    side = max(photo.width, photo.height)
+    fov = None if focal is None else 2 * math.degrees(math.atan(side / (2 * focal)))
+    small = photo.image.copy()
+    small.thumbnail((256, 256))  # about what the network sees
+    image = torch.from_numpy(np.array(small, dtype=np.float32)).permute(2, 0, 1) / 255
+    return fov, tuple(photo_notes(photo, image, judged_grey(photo.image)))
+
+
+@dataclass(frozen=True)
+class FindPair(Errand):
+    """The two photos that make the best scene."""
+
+    paths: tuple[Path, ...]
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.pipeline import best_pair
+
+        try:
+            yield PairChosen(self.paths, best_pair(self.paths, cancelled=stopping))
+        except LangFlashError as error:
+            yield ChoosingFailed(str(error))

@@ -1,0 +1,77 @@
+"""Boxes of phrases as binary glTF, for Blender, game engines and web viewers.
+
+glTF has +x to the left, +y up and +z forward; scenes have +x to the right and +y down. One half turn
+about z leads from one to the other, as for the splats (`gltf.py`), so that both lie together.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from langflash_core.errors import PromptError
+from langflash_core.export.colours import label_colours
+from langflash_core.files import write_atomically
+from langflash_core.types import QueryResult
+
+_TO_GLTF = np.diag([-1.0, -1.0, 1.0, 1.0])
+_OPACITY = 0.35  # what stands in the box stays visible
+_THINNEST = 1e-3  # of the longest side: a flat thing still gets a body
+
+
+def write_answer(result: QueryResult, path: Path) -> None:
+    """The boxes of what was found, in scene units.
+
+    Raises:
+        OutputError: the path cannot be written.
+        PromptError: nothing was found.
+    """
+    write_boxes([(a.prompt, a.box) for a in result.answers if a.box is not None], path)
+
+
+def write_boxes(boxes: Sequence[tuple[str, dict[str, Any]]], path: Path) -> None:
+    """Translucent boxes, a node and a colour each, called what they are called here.
+
+    Args:
+        boxes: name, and box with `center` (3,), `axes` (3, 3) rows and `size` (3,), in the unit that
+            the file is to have; glTF's own is the metre.
+
+    Raises:
+        OutputError: the path cannot be written.
+        PromptError: there are none.
+    """
+    if not boxes:
+        raise PromptError("nothing was found, so there is no box to write; lower the threshold")
+    import trimesh  # late: half a second that no other format needs
+    from trimesh.visual.material import PBRMaterial
+    from trimesh.visual.texture import TextureVisuals
+
+    scene = trimesh.Scene(base_frame="langflash")
+    for (name, box), colour in zip(boxes, label_colours(len(boxes)), strict=True):
+        size = np.asarray(box["size"], float)
+        body = trimesh.creation.box(np.maximum(size, _THINNEST * max(size.max(), _THINNEST)))
+        material = PBRMaterial(
+            name=name,
+            baseColorFactor=[*colour, round(255 * _OPACITY)],
+            metallicFactor=0.0,
+            roughnessFactor=1.0,
+            alphaMode="BLEND",
+            doubleSided=True,
+        )
+        body.visual = TextureVisuals(material=material)
+        scene.add_geometry(body, node_name=name, geom_name=name, transform=_TO_GLTF @ _pose(box))
+    content = scene.export(file_type="glb")
+    assert isinstance(content, bytes)
+    write_atomically(path, content)
+
+
+def _pose(box: dict[str, Any]) -> Float[np.ndarray, "4 4"]:
+    """From a box around the origin to where it stands; without mirroring."""
+    pose = np.eye(4)
+    pose[:3, :3] = np.asarray(box["axes"], float).T
+    if np.linalg.det(pose[:3, :3]) < 0:
+        pose[:3, 2] *= -1
+    pose[:3, 3] = box["center"]
+    return pose

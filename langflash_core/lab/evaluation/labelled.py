@@ -1,0 +1,374 @@
+"""`langflash eval photos-labelled`: the whole program on single real photos that somebody labelled.
+
+Each photo is reconstructed, its scene drawn from the photo's own camera, and asked as anybody would ask
+it. Names are judged on the drawn atoms and, beside them, on the language features of the photo alone; the
+depth is the drawn one. Maps of the truth take the nearest value at the size drawn.
+
+Sizes: H W drawn pixels, K atoms, C channels, P phrases, L fine names.
+"""
+
+import math
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import torch
+from PIL import Image
+from torch import Tensor
+from torch.nn import functional as F
+
+from langflash_core.images import load_views
+from langflash_core.images.views import centre_box
+from langflash_core.lab.evaluation.metrics import Presence
+from langflash_core.lab.evaluation.photo_words import (
+    PhotoWords,
+    absent_rows,
+    paper_row,
+    photos_of_names,
+)
+from langflash_core.lab.evaluation.rooms import MASK_THRESHOLDS, MIN_SHARE, PHRASES, language_maps
+from langflash_core.lab.evaluation.words import PAPER_LABELS
+from langflash_core.lab.photos import LabelledPhoto, Name, PhotoFolder
+from langflash_core.lab.photos.fitting import seen_through
+from langflash_core.lab.training.measures import (
+    abs_rel,
+    accuracy,
+    align_scale,
+    class_ious,
+    confusion,
+    delta1,
+    mean_iou,
+    nan_mean,
+)
+from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.relevance import compile_query, relevance_maps
+from langflash_core.language.spaces import LanguageSpace, language_space
+from langflash_core.network import PRESETS, LangFlashNet, load_network
+from langflash_core.pipeline import query, reconstruct
+from langflash_core.types import Camera, Frame, Scene, Views
+
+DRAWN = 1
+"""Scenes are drawn at so many times the size of the network's photo."""
+METHODS = ("atoms", "features")
+"""Where names are read from: the drawn atoms, the features of the photo before there is a scene."""
+Render = Callable[[Scene, Camera], Frame]
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What every photo is judged with. network: a second copy, for the features alone; vectors: of
+    `words.phrases`, unit rows (P, C)."""
+
+    network: LangFlashNet
+    space: LanguageSpace
+    names: dict[int, Name]
+    words: PhotoWords
+    vectors: Tensor
+    weights: Path | None
+    preset: str
+    size: int | None
+    render: Render
+
+
+@dataclass
+class Tally:
+    """What a run collects. numbers: per photo, by name; counts: confusion by (method, label set), the
+    last column for pixels without an answer; presence: found against truth; scores, truths: of every
+    phrase asked; ious: of the masks of present phrases at each of `MASK_THRESHOLDS`, one row each;
+    overlaps: per fine name the pixels of mask and truth together, of either, and photos."""
+
+    numbers: dict[str, list[float]] = field(default_factory=dict)
+    counts: dict[tuple[str, str], Tensor] = field(default_factory=dict)
+    presence: Presence = field(default_factory=Presence)
+    scores: list[Tensor] = field(default_factory=list)
+    truths: list[Tensor] = field(default_factory=list)
+    ious: list[Tensor] = field(default_factory=list)
+    overlaps: dict[str, tuple[int, int, int]] = field(default_factory=dict)
+
+    def note(self, **values: float) -> None:
+        for name, value in values.items():
+            self.numbers.setdefault(name, []).append(float(value))
+
+    def count(self, method: str, labels: str, found: Tensor, truth: Tensor, classes: int) -> None:
+        """Add pixels: rows `found` (-1: no answer) against `truth` (-1: not judged), both flat."""
+        answered = torch.where(found < 0, classes, found)
+        table = confusion(answered, truth, classes + 1)
+        self.counts[method, labels] = self.counts.get((method, labels), 0) + table
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """One photo as the program shows it: relevancy maps (P, H, W) of `words.judged`, from `threshold` on
+    present; the frame and its scene; the truth's ids and depths (H, W) under the same pixels; the photo
+    as the network saw it."""
+
+    scene: Scene
+    frame: Frame
+    maps: Tensor
+    threshold: float
+    ids: Tensor
+    depths: Tensor
+    views: Views
+
+
+def run_photos(
+    folder: PhotoFolder,
+    ids: Sequence[str],
+    render: Render,
+    weights: Path | None = None,
+    *,
+    preset: str = "mini",
+    size: int | None = None,
+    progress: Progress = lambda stage, fraction: None,
+) -> tuple[dict, Tally]:
+    """Judge a checkpoint on photos of a labelled folder.
+
+    Args:
+        ids: of the photos judged; how often a name occurs is counted in the whole folder.
+        render: draws a scene with weight maps. size: as `reconstruct` has it.
+
+    Returns:
+        Plain JSON ("measures", "labels", "class_ious", "paper_ious", "names") and what it was made from.
+
+    Raises:
+        InputError: the folder has no labels, or a map cannot be used. WeightsError: of the checkpoint.
+    """
+    judged = judged_by(folder, render, weights, preset=preset, size=size, progress=progress)
+    tally = Tally()
+    for done, id in enumerate(ids):
+        progress(f"photo {id}, {done + 1} of {len(ids)}", 0.1 + 0.9 * done / len(ids))
+        judge_photo(judged, folder.photo(id), tally)
+    result = {
+        "weights": str(weights) if weights else preset,
+        "folder": folder.root.name,
+        "photos": len(ids),
+        "numbers": [ids[0], ids[-1]],
+        **summary(tally, judged.words),
+    }
+    return result, tally
+
+
+def judged_by(
+    folder: PhotoFolder,
+    render: Render,
+    weights: Path | None = None,
+    *,
+    preset: str = "mini",
+    size: int | None = None,
+    progress: Progress = lambda stage, fraction: None,
+) -> Judged:
+    """The words of a folder and a checkpoint, ready to judge photos."""
+    progress("names of the folder", 0.0)
+    words = PhotoWords.of(folder.names, photos_of_names(folder, folder.ids))
+    space = language_space(PRESETS[preset].space)
+    network = load_network(preset, weights)
+    return Judged(
+        network, space, folder.names, words, space.encode(words.phrases), weights, preset, size, render
+    )
+
+
+def draw_photo(judged: Judged, photo: LabelledPhoto) -> tuple[Drawn, float]:
+    """A photo through the whole program, and the seconds that the reconstruction took."""
+    preset = PRESETS[judged.preset]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"{photo.id}.png"
+        Image.fromarray(photo.image).save(path, "PNG", compress_level=1)
+        start = time.perf_counter()
+        scene = reconstruct(
+            [path],
+            preset=judged.preset,
+            weights=judged.weights,
+            intrinsics=photo.intrinsics,
+            size=judged.size,
+        )
+        seconds = time.perf_counter() - start
+        area = preset.native_area if judged.size is None else judged.size**2
+        views = load_views(
+            [path], intrinsics=photo.intrinsics, area=area, multiple=preset.patch, square=preset.square
+        )
+    width, height = scene.view_size[0] * DRAWN, scene.view_size[1] * DRAWN
+    frame = judged.render(scene, scene.camera(0, width, height))
+    assert frame.weight_maps is not None
+    compiled = compile_query(scene, judged.space, judged.words.judged)
+    maps = relevance_maps(frame.weight_maps, compiled)
+    box = centre_box(photo.image.shape[1], photo.image.shape[0], scene.view_size)
+    ids = torch.zeros(height, width, dtype=torch.int64)
+    depths = torch.zeros(height, width)
+    if photo.labels is not None:
+        ids = seen_through(photo.labels, box, (width, height))
+    if photo.depths is not None:
+        depths = seen_through(photo.depths, box, (width, height))
+    return Drawn(scene, frame, maps, compiled.threshold, ids, depths, views), seconds
+
+
+@torch.no_grad()
+def judge_photo(judged: Judged, photo: LabelledPhoto, tally: Tally) -> None:
+    """Everything about one photo; adds to `tally`."""
+    drawn, seconds = draw_photo(judged, photo)
+    tally.note(seconds=seconds, covered=float((drawn.frame.alphas >= COVERED_ALPHA).float().mean()))
+    if photo.depths is not None:
+        judge_depth(drawn, photo.metric, tally)
+    if photo.labels is not None:
+        judge_names(judged, drawn, tally)
+        overlap_fine(judged, drawn, tally)
+        ask_photo(judged, drawn, int(photo.id) if photo.id.isdigit() else 0, tally)
+
+
+def judge_depth(drawn: Drawn, metric: bool, tally: Tally) -> None:
+    """The drawn depth with its scale aligned, a wall instead of it, and lengths as they were guessed."""
+    truth = torch.where(drawn.frame.alphas >= COVERED_ALPHA, drawn.depths, 0.0)
+    aligned = align_scale(drawn.frame.depths, truth)
+    tally.note(
+        depth_abs_rel=abs_rel(aligned, truth),
+        depth_delta1=delta1(aligned, truth),
+        depth_abs_rel_flat=abs_rel(align_scale(torch.ones_like(truth), truth), truth),
+    )
+    if metric:
+        metres = drawn.frame.depths * float(drawn.scene.metadata.get("network_unit", math.nan))
+        valid = (truth > 0) & (metres > 0)
+        tally.note(
+            depth_abs_rel_metric=abs_rel(metres, truth),
+            depth_scale=float((truth[valid] / metres[valid]).median()) if bool(valid.any()) else math.nan,
+        )
+
+
+def judge_names(judged: Judged, drawn: Drawn, tally: Tally) -> None:
+    """37 classes, the paper's labels and fine names, by argmax over each list, of both methods."""
+    words = judged.words
+    empty = (drawn.maps == 0).all(0)
+    features = language_maps(judged.network, drawn.views)[0][0, 0].float()  # (C, h, w)
+    alone = torch.einsum("pc,chw->phw", judged.vectors[: len(drawn.maps)], features)
+    size = (drawn.ids.shape[0], drawn.ids.shape[1])  # interpolating features first would give the same
+    alone = F.interpolate(alone[None], size=size, mode="bilinear", align_corners=False)[0]
+    for method, maps in zip(METHODS, (drawn.maps, alone), strict=True):
+        unanswered = empty if method == "atoms" else torch.zeros_like(empty)
+        best = maps[words.rows(words.classes)].argmax(0).masked_fill(unanswered, -1).flatten()
+        truth = words.classes_of[drawn.ids].flatten()
+        tally.count(method, "classes", best, truth, len(words.classes))
+        for name, published in (("paper", False), ("published", True)):
+            table = words.published if published else words.papers
+            rows = torch.tensor([*(paper_row(c, published=published) for c in words.classes), -1])
+            tally.count(method, name, rows[best], table[drawn.ids].flatten(), len(PAPER_LABELS))
+        if words.fine:
+            fine = maps[words.rows(words.fine)].argmax(0).masked_fill(unanswered, -1).flatten()
+            tally.count(method, "fine", fine, words.fine_of[drawn.ids].flatten(), len(words.fine))
+
+
+def ask_photo(judged: Judged, drawn: Drawn, seed: int, tally: Tally) -> None:
+    """As many things that are there as things that are not, asked as anybody asks, and the masks of the
+    former, where pixels without a label count for nothing."""
+    words, generator = judged.words, torch.Generator().manual_seed(seed)
+    labelled = drawn.ids > 0
+    shown = torch.bincount(drawn.ids.flatten(), minlength=len(words.asked_of))
+    there = sorted({name.text for id, name in judged.names.items() if int(shown[id]) > 0})
+    rows = words.asked_of[drawn.ids]
+    shares = torch.bincount(rows[rows >= 0], minlength=len(words.asked)) / rows.numel()
+    visible = torch.nonzero(shares >= MIN_SHARE).flatten()
+    present = visible[torch.randperm(len(visible), generator=generator)][: PHRASES // 2].tolist()
+    asked = words.rows(words.asked)
+    absent = absent_rows(there, words.asked, judged.vectors[asked], len(present), generator)
+    present = present[: len(absent)]
+    if not present:
+        return
+    phrases = [words.asked[row] for row in (*present, *absent)]
+    height, width = rows.shape
+    found = query(drawn.scene, phrases, size=(width, height), render=lambda scene, camera: drawn.frame)
+    truths = torch.arange(len(phrases)) < len(present)
+    tally.presence += _counts([answer.found for answer in found.answers], truths.tolist())
+    tally.scores.append(torch.tensor([answer.score for answer in found.answers]))
+    tally.truths.append(truths)
+    for place, row in enumerate(present):
+        values, truth = found.relevance[place][labelled], rows[labelled] == row
+        tally.ious.append(torch.tensor([_iou(values >= limit, truth) for limit in MASK_THRESHOLDS]))
+
+
+def overlap_fine(judged: Judged, drawn: Drawn, tally: Tally) -> None:
+    """Masks of the fine names that a photo shows against the truth, pixels added up over photos; those
+    without a label count for nothing."""
+    labelled = drawn.ids > 0
+    rows = judged.words.fine_of[drawn.ids][labelled]
+    places = judged.words.rows(judged.words.fine)
+    for row in sorted(set(rows[rows >= 0].tolist())):
+        found, truth = drawn.maps[places[row]][labelled] >= drawn.threshold, rows == row
+        name = judged.words.fine[row]
+        both, either, photos = tally.overlaps.get(name, (0, 0, 0))
+        tally.overlaps[name] = (
+            both + int((found & truth).sum()),
+            either + int((found | truth).sum()),
+            photos + 1,
+        )
+
+
+def _counts(found: Sequence[bool], there: Sequence[bool]) -> Presence:
+    pairs = list(zip(found, there, strict=True))
+    return Presence(
+        hits=pairs.count((True, True)),
+        false_alarms=pairs.count((True, False)),
+        misses=pairs.count((False, True)),
+        rejections=pairs.count((False, False)),
+    )
+
+
+def _iou(found: Tensor, truth: Tensor) -> float:
+    union = float((found | truth).sum())
+    return float((found & truth).sum()) / union if union else 0.0
+
+
+def summary(tally: Tally, words: PhotoWords) -> dict:
+    """Means, medians and tables of a run, rounded; plain JSON."""
+    measures = {name: nan_mean(values) for name, values in tally.numbers.items()}
+    if "depth_abs_rel" in tally.numbers:
+        measures["depth_abs_rel_median"] = float(torch.tensor(tally.numbers["depth_abs_rel"]).nanmedian())
+    if "depth_scale" in tally.numbers:
+        measures["depth_scale"] = float(torch.tensor(tally.numbers["depth_scale"]).nanmedian())
+    if tally.scores:
+        measures |= {
+            "presence_precision": tally.presence.precision,
+            "presence_recall": tally.presence.recall,
+            "presence_f1": tally.presence.f1,
+            "presence_phrases": float(sum(len(s) for s in tally.scores)),
+        }
+    labels: dict[str, dict[str, float]] = {}
+    for (method, kind), counts in tally.counts.items():
+        row = labels.setdefault(method, {})
+        row[f"{kind}_accuracy"] = accuracy(counts)
+        row[f"{kind}_miou"] = mean_iou(counts, range(len(counts) - 1))
+    return {
+        "measures": rounded(dict(sorted(measures.items()))),
+        "labels": {method: rounded(row) for method, row in labels.items()},
+        "class_ious": _ious(tally, "classes", words.classes),
+        "paper_ious": _ious(tally, "paper", PAPER_LABELS),
+        "names": _fine_report(tally, words),
+    }
+
+
+def _ious(tally: Tally, kind: str, names: Sequence[str]) -> dict[str, dict[str, float | None]]:
+    """Per method: IoU of every label of a list that occurs."""
+    return {
+        method: rounded(dict(zip(names, class_ious(tally.counts[method, kind])[:-1].tolist(), strict=True)))
+        for method in METHODS
+        if (method, kind) in tally.counts
+    }
+
+
+def _fine_report(tally: Tally, words: PhotoWords) -> list[dict]:
+    """Fine names in sight, best first: photos judged, IoU by argmax over all fine names, and that of the
+    mask of whoever asks for the name."""
+    if ("atoms", "fine") not in tally.counts:
+        return []
+    ious = class_ious(tally.counts["atoms", "fine"])[:-1].tolist()
+    rows = []
+    for name, iou in zip(words.fine, ious, strict=True):
+        both, either, photos = tally.overlaps.get(name, (0, 0, 0))
+        if photos:
+            asked = both / either if either else math.nan
+            rows.append({"name": name, "photos": photos, **rounded({"iou": iou, "asked_iou": asked})})
+    return sorted(rows, key=lambda row: -(row["iou"] or 0))
+
+
+def rounded(values: dict[str, float]) -> dict[str, float | None]:
+    """Four digits; what could not be measured is null, because JSON has no NaN."""
+    return {k: None if math.isnan(v) else round(v, 4) for k, v in values.items()}

@@ -1,0 +1,251 @@
+"""`langflash eval posed`: pairs of real photos whose poses somebody measured.
+
+Two photos some numbers apart make a scene; a third from between them, which the network does not see, is
+drawn from its true place. Lengths of a scene are brought to metres by the first photo's depth, or by the
+distance between the cameras where there are no depth maps.
+
+Sizes: H W pixels as the network saw the photos.
+"""
+
+import math
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import torch
+from PIL import Image
+from torch import Tensor
+
+from langflash_core.errors import InputError
+from langflash_core.images.views import centre_box
+from langflash_core.lab.evaluation.labelled import Render, rounded
+from langflash_core.lab.evaluation.metrics import PoseError, pose_error
+from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
+from langflash_core.lab.photos.fitting import FittedPhoto, fitted
+from langflash_core.lab.training.losses import ssim_map
+from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, nan_mean, psnr
+from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.pipeline import reconstruct
+from langflash_core.types import Camera, Scene
+
+APART = (6, 12, 18, 24)
+"""Numbers between the photos of a pair, in turn."""
+PAIRS = 40
+LEFT_OUT = 180.0
+"""Degrees of direction for a photo that the program left out: it has no place, so it is wrong."""
+
+
+@dataclass(frozen=True)
+class Triple:
+    """Ids of the first photo, of one from between, and of the second; how many numbers apart."""
+
+    first: str
+    between: str
+    second: str
+    apart: int
+
+
+@dataclass
+class Tally:
+    """Numbers per pair, by name, and the error of each pose."""
+
+    numbers: dict[str, list[float]] = field(default_factory=dict)
+    poses: list[PoseError] = field(default_factory=list)
+
+    def note(self, **values: float) -> None:
+        for name, value in values.items():
+            self.numbers.setdefault(name, []).append(float(value))
+
+
+def chosen_triples(ids: Sequence[str], count: int = PAIRS, apart: Sequence[int] = APART) -> list[Triple]:
+    """About `count` pairs, starting evenly over the folder, with a photo half-way between.
+
+    Raises:
+        InputError: no two photos are so far apart with one between.
+    """
+    by_number = {int(id): id for id in ids if id.isdigit()}
+    found = []
+    for gap in apart:
+        every = [
+            Triple(id, by_number[number + gap // 2], by_number[number + gap], gap)
+            for number, id in sorted(by_number.items())
+            if number + gap in by_number and number + gap // 2 in by_number
+        ]
+        wanted = min(len(every), -(-count // len(apart)))
+        found += [every[(2 * k + 1) * len(every) // (2 * wanted)] for k in range(wanted)]
+    if not found:
+        numbers = ", ".join(str(gap) for gap in apart)
+        raise InputError(
+            f"no two photos are {numbers} numbers apart with one half-way between; choose another --apart"
+        )
+    return sorted(found, key=lambda triple: (int(triple.first), triple.apart))[:count]
+
+
+def run_posed(
+    folder: PhotoFolder,
+    triples: Sequence[Triple],
+    render: Render,
+    weights: Path | None = None,
+    *,
+    preset: str = "mini",
+    size: int | None = None,
+    progress: Callable[[str, float], None] = lambda stage, fraction: None,
+) -> dict:
+    """Judge a checkpoint on pairs of a posed folder.
+
+    Args:
+        render: draws a scene. size: as `reconstruct` has it.
+
+    Returns:
+        Plain JSON: "measures" over all pairs, "by_gap" the medians and means for each distance in number.
+
+    Raises:
+        InputError: the folder lacks a pose. WeightsError: the checkpoint does not fit.
+    """
+    tallies: dict[int, Tally] = {}
+    for done, triple in enumerate(triples):
+        progress(f"pair {triple.first} and {triple.second}", done / len(triples))
+        tally = tallies.setdefault(triple.apart, Tally())
+        judge_triple(folder, triple, render, tally, weights=weights, preset=preset, size=size)
+    whole = Tally()
+    for tally in tallies.values():
+        whole.poses += tally.poses
+        for name, values in tally.numbers.items():
+            whole.numbers.setdefault(name, []).extend(values)
+    return {
+        "weights": str(weights) if weights else preset,
+        "folder": folder.root.name,
+        "pairs": len(triples),
+        "measures": summary(whole),
+        "by_gap": {str(gap): summary(tally) for gap, tally in sorted(tallies.items())},
+    }
+
+
+@torch.no_grad()
+def judge_triple(
+    folder: PhotoFolder,
+    triple: Triple,
+    render: Render,
+    tally: Tally,
+    *,
+    weights: Path | None = None,
+    preset: str = "mini",
+    size: int | None = None,
+) -> None:
+    """Pose, depth and the photo from between of one pair; adds to `tally`."""
+    first, between, second = (folder.photo(id) for id in (triple.first, triple.between, triple.second))
+    to_second, to_between = relative(first, second), relative(first, between)
+    scene, seconds = _scene_of(first, second, weights, preset, size)
+    placed = scene.num_views == 2
+    predicted = scene.viewmats[1].cpu() if placed else torch.eye(4)
+    error = pose_error(predicted, to_second.float())
+    tally.poses.append(error if placed else PoseError(error.rotation, LEFT_OUT))
+    tally.note(
+        seconds=seconds,
+        placed=float(placed),
+        true_rotation=pose_error(torch.eye(4), to_second.float()).rotation,
+    )
+    truths = [_seen(photo, scene) for photo in (first, second)[: scene.num_views]]
+    scale = _judge_depth(scene, truths, render, tally)
+    if math.isnan(scale) and placed:
+        scale = float(to_second[:3, 3].norm() / predicted[:3, 3].norm().clamp_min(1e-9))
+    if not math.isnan(scale):
+        _judge_between(scene, _seen(between, scene), to_between, scale, truths[0], render, tally)
+
+
+def relative(first: LabelledPhoto, other: LabelledPhoto) -> Tensor:
+    """World-to-camera matrix (4, 4) float64 of a photo, world = the first one's camera.
+
+    Raises:
+        InputError: one of them has no pose.
+    """
+    for photo in (first, other):
+        if photo.pose is None:
+            raise InputError(
+                f"photo {photo.id} has no line in poses.txt; add it, or take the photo out of the folder"
+            )
+    assert first.pose is not None and other.pose is not None
+    return torch.linalg.inv(other.pose.double()) @ first.pose.double()
+
+
+def _scene_of(
+    first: LabelledPhoto, second: LabelledPhoto, weights: Path | None, preset: str, size: int | None
+) -> tuple[Scene, float]:
+    """The pair through the whole program, and the seconds that took."""
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [Path(folder) / f"{photo.id}.png" for photo in (first, second)]
+        for path, photo in zip(paths, (first, second), strict=True):
+            Image.fromarray(photo.image).save(path, "PNG", compress_level=1)
+        start = time.perf_counter()
+        scene = reconstruct(paths, preset=preset, weights=weights, intrinsics=first.intrinsics, size=size)
+        return scene, time.perf_counter() - start
+
+
+def _seen(photo: LabelledPhoto, scene: Scene) -> FittedPhoto:
+    """A photo as the scene's photos were cut."""
+    height, width = photo.image.shape[:2]
+    return fitted(photo, scene.view_size, centre_box(width, height, scene.view_size))
+
+
+def _judge_depth(scene: Scene, truths: Sequence[FittedPhoto], render: Render, tally: Tally) -> float:
+    """Drawn depth of every photo, each with its own scale; returns metres per scene unit by the first
+    (NaN: not known)."""
+    scale = math.nan
+    for view, truth in enumerate(truths):
+        frame = render(scene, scene.camera(view))
+        depths = torch.where(frame.alphas >= COVERED_ALPHA, truth.depths, 0.0)
+        valid = (depths > 0) & (frame.depths > 0)
+        if not bool(valid.any()):
+            continue
+        if view == 0:
+            scale = float((depths[valid] / frame.depths[valid]).median())
+        aligned = align_scale(frame.depths, depths)
+        tally.note(
+            depth_abs_rel=abs_rel(aligned, depths),
+            depth_delta1=delta1(aligned, depths),
+            depth_abs_rel_flat=abs_rel(align_scale(torch.ones_like(depths), depths), depths),
+        )
+    return scale
+
+
+def _judge_between(
+    scene: Scene,
+    photo: FittedPhoto,
+    viewmat: Tensor,
+    scale: float,
+    first: FittedPhoto,
+    render: Render,
+    tally: Tally,
+) -> None:
+    """The scene from where the photo between was taken; pixels that the scene covers, and all of them."""
+    moved = viewmat.float().clone()
+    moved[:3, 3] /= scale
+    frame = render(scene, Camera(moved, photo.K, *scene.view_size))
+    truth, start = (p.rgb.permute(1, 2, 0).float() / 255 for p in (photo, first))
+    shown = frame.alphas >= COVERED_ALPHA
+    tally.note(covered=float(shown.float().mean()), psnr_whole_picture=psnr(frame.rgb, truth))
+    if bool(shown.any()):
+        flat = truth[shown].mean(0).expand_as(truth)
+        tally.note(
+            psnr=psnr(frame.rgb[shown], truth[shown]),
+            ssim=float(ssim_map(frame.rgb.clamp(0, 1), truth)[shown].mean()),
+            psnr_first_photo=psnr(start[shown], truth[shown]),
+            psnr_mean_colour=psnr(flat[shown], truth[shown]),
+        )
+
+
+def summary(tally: Tally) -> dict[str, float | None]:
+    """Means, medians and shares, rounded."""
+    measures = {name: nan_mean(values) for name, values in tally.numbers.items()}
+    for name in ("depth_abs_rel", "psnr", "true_rotation"):
+        if name in tally.numbers:
+            measures[f"{name}_median"] = float(torch.tensor(tally.numbers[name]).nanmedian())
+    measures |= {
+        "pose_rotation_median": float(torch.tensor([e.rotation for e in tally.poses]).nanmedian()),
+        "pose_direction_median": float(torch.tensor([e.direction for e in tally.poses]).nanmedian()),
+        "pose_right_share": nan_mean(float(error.right()) for error in tally.poses),
+        "pairs": float(len(tally.poses)),
+    }
+    return rounded(dict(sorted(measures.items())))

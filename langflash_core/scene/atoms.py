@@ -1,0 +1,121 @@
+"""What there is to say about the atoms of a scene: how much each carries, which are alike, and where
+the photos show it."""
+
+import io
+from dataclasses import dataclass, field
+
+import numpy as np
+import torch
+from PIL import Image
+from torch.nn.functional import normalize
+
+from langflash_core.types import Scene
+
+CELL = 4  # pixels of a photo as the network saw it, along a side
+PICTURE_SIDE = 96
+NEAR_ENOUGH = 1.05  # of the nearest depth in a cell: what lies behind is hidden
+
+
+@dataclass(frozen=True)
+class AtomsReport:
+    """shares: (K,) of the scene's opacity, sum 1. order: (K,) rows, alike atoms side by side.
+    similarity: (K, K) cosines."""
+
+    shares: np.ndarray = field(repr=False)
+    order: tuple[int, ...]
+    similarity: np.ndarray = field(repr=False)
+
+
+def describe_atoms(scene: Scene) -> AtomsReport:
+    """Shares, order and cosines; atoms that are not finite count as 0."""
+    dictionary = scene.semantics.dictionary.double()
+    dictionary = torch.where(torch.isfinite(dictionary).all(-1, keepdim=True), dictionary, 0.0)
+    unit = normalize(dictionary, dim=-1)
+    masses = _carried(scene)
+    similarity = (unit @ unit.T).numpy()
+    return AtomsReport(masses / max(masses.sum(), 1e-12), alike_order(similarity), similarity)
+
+
+def alike_order(similarity: np.ndarray) -> tuple[int, ...]:
+    """An order (K,) of rows in which alike ones are near: each next to its likest among the rest.
+
+    Starts at the row least like all others.
+    """
+    count = len(similarity)
+    left = set(range(count))
+    order: list[int] = []
+    while left:
+        rest = sorted(left)
+        scores = similarity[order[-1], rest] if order else -similarity[rest].sum(1)
+        order.append(rest[int(np.argmax(scores))])
+        left.remove(order[-1])
+    return tuple(order)
+
+
+def _carried(scene: Scene) -> np.ndarray:
+    """(K,) opacity with which the Gaussians carry each atom."""
+    shares = (scene.semantics.weight_values * scene.gaussians.opacities[:, None]).double().numpy()
+    ids, finite = scene.semantics.weight_ids.numpy(), np.nan_to_num(shares, posinf=0)
+    return np.bincount(ids.ravel(), finite.ravel(), minlength=scene.semantics.num_atoms)
+
+
+def atom_pictures(scene: Scene) -> tuple[np.ndarray | None, ...]:
+    """For each atom the part of a photo that carries it most, (side, side, 3) uint8; None where none does."""
+    maps = [_cells(scene, view) for view in range(len(scene.photos))]
+    photos = [_decoded(photo) for photo in scene.photos]
+    made: list[np.ndarray | None] = []
+    for k in range(scene.semantics.num_atoms):
+        totals = [cells[k].sum() for cells in maps]
+        view = int(np.argmax(totals)) if totals else 0
+        photo = photos[view] if totals and totals[view] > 0 else None
+        made.append(None if photo is None else _crop(photo, maps[view][k]))
+    return tuple(made)
+
+
+def _cells(scene: Scene, view: int) -> np.ndarray:
+    """(K, h, w): how much of each atom the cells of a photo show, of what is not hidden there."""
+    camera = scene.camera(view)
+    viewmat, K = camera.viewmat.double().numpy(), camera.K.double().numpy()
+    pos_c = scene.gaussians.means.double().numpy() @ viewmat[:3, :3].T + viewmat[:3, 3]
+    z = pos_c[:, 2]
+    width, height = -(-camera.width // CELL), -(-camera.height // CELL)
+    with np.errstate(all="ignore"):
+        x = (pos_c[:, 0] / z * K[0, 0] + K[0, 2]) / CELL
+        y = (pos_c[:, 1] / z * K[1, 1] + K[1, 2]) / CELL
+        inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    rows = np.flatnonzero(inside)
+    cells = y[rows].astype(int) * width + x[rows].astype(int)
+    nearest = np.full(width * height, np.inf)
+    np.minimum.at(nearest, cells, z[rows])
+    seen = z[rows] <= NEAR_ENOUGH * nearest[cells]
+    rows, cells = rows[seen], cells[seen]
+    semantics = scene.semantics
+    ids = semantics.weight_ids.numpy()[rows]
+    shares = (semantics.weight_values * scene.gaussians.opacities[:, None]).double().numpy()[rows]
+    flat = (ids * (width * height) + cells[:, None]).ravel()
+    maps = np.bincount(flat, np.nan_to_num(shares).ravel(), minlength=semantics.num_atoms * width * height)
+    return maps.reshape(semantics.num_atoms, height, width)
+
+
+def _crop(photo: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """The square of a photo (H, W, 3) around the densest place of an atom's cells (h, w)."""
+    height, width = cells.shape
+    padded = np.pad(cells, 2)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (5, 5)).sum((-1, -2))
+    row, column = np.unravel_index(windows.argmax(), windows.shape)
+    dense = int((cells > 0.5 * cells.max()).sum())
+    side = float(np.clip(1.3 * np.sqrt(dense), 6, min(height, width)))
+    top = float(np.clip(row + 0.5 - side / 2, 0, height - side))
+    left = float(np.clip(column + 0.5 - side / 2, 0, width - side))
+    down, right = photo.shape[0] / height, photo.shape[1] / width
+    box = (left * right, top * down, (left + side) * right, (top + side) * down)
+    size = (PICTURE_SIDE, PICTURE_SIDE)
+    return np.asarray(Image.fromarray(photo).resize(size, Image.Resampling.BILINEAR, box))
+
+
+def _decoded(photo: bytes) -> np.ndarray | None:
+    try:
+        with Image.open(io.BytesIO(photo)) as opened:
+            return np.asarray(opened.convert("RGB"))
+    except OSError:  # a scene whose small photos are damaged still has its words
+        return None

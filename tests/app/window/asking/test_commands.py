@@ -1,0 +1,168 @@
+"""Asking without a window: phrases, their answers, the dictionary."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import torch
+
+from app.window.asking import commands as ask
+from app.window.asking.prompt_sets import MOST_PROMPTS
+from app.window.asking.state import BINS, MOST_RECENT, Histogram, margin_span, unfinished, usable
+from app.window.scene import camera
+from app.window.scene import commands as show
+from app.window.scene.state import Mode
+from app.window.scene.work import describe_scene
+from app.window.state import State
+from langflash_core.errors import PromptError
+from langflash_core.language.algebra import terms
+from tests.app.window.scenes import after, room
+
+
+@pytest.fixture(scope="module")
+def info():
+    return describe_scene(room(torch.eye(3)), serial=1, name="room")
+
+
+def asked(*texts: str) -> State:
+    state = after(State(), ask.EditPrompt(0, texts[0]))
+    for text in texts[1:]:
+        state = after(state, ask.AddPrompt())
+        state = after(state, ask.EditPrompt(state.active, text))
+    return state
+
+
+def test_recent_phrases_are_kept_once_newest_first_and_bounded() -> None:
+    state = after(State(), ask.Remember("door"), ask.Remember(" red  door "), ask.Remember("door"))
+    assert state.asking.recent == ("door", "red door")
+    state = after(state, ask.Remember("   "), *(ask.Remember(str(n)) for n in range(MOST_RECENT + 5)))
+    assert len(state.asking.recent) == MOST_RECENT and state.asking.recent[0] == str(MOST_RECENT + 4)
+
+
+def test_a_recent_phrase_takes_an_empty_row_or_a_new_one() -> None:
+    state = after(State(), ask.Calibrated(0.7), ask.AskAgain("sofa"))
+    assert [p.text for p in state.prompts] == ["sofa"] and state.mode is Mode.HEAT
+    state = after(state, camera.SetMode(Mode.DEPTH), ask.AskAgain("rug"))
+    assert [p.text for p in state.prompts] == ["sofa", "rug"]
+    assert state.active == state.prompts[1].key and state.mode is Mode.DEPTH
+    assert state.prompts[1].colour != state.prompts[0].colour and state.prompts[1].cut == 0.7
+    assert state.asking.recent == ("rug", "sofa")
+    full = asked(*(str(n) for n in range(MOST_PROMPTS)))
+    assert after(full, ask.AskAgain("one more")) == full
+
+
+@pytest.mark.parametrize("text", ["chair -", "+ chair", "chair - ", "- ", "-", " sofa +  "])
+def test_an_unfinished_sum_is_not_asked(text: str) -> None:
+    assert unfinished(text) and not usable(text)
+    assert asked(text).asked == ()
+    with pytest.raises(PromptError):  # the library refuses what the window holds back
+        terms(text)
+
+
+@pytest.mark.parametrize("text", ["chair - armchair", "t-shirt", "C++ book", "sofa + cushion", "-5"])
+def test_a_whole_phrase_is_asked(text: str) -> None:
+    assert usable(text) and len(asked(text).asked) == 1
+    assert terms(text)
+
+
+def test_what_each_mode_needs() -> None:
+    for mode in Mode:
+        silent, spoken = (replace(state, mode=mode) for state in (State(), asked("door")))
+        assert silent.wants_maps == mode.of_atoms
+        assert spoken.wants_maps  # to be answered
+        answered = replace(spoken, prompts=tuple(replace(p, score=0.9) for p in spoken.prompts))
+        assert answered.wants_maps == (mode.of_atoms or mode.answers)
+    assert not any(mode.of_atoms and mode.answers for mode in Mode)
+
+
+def test_modes_that_the_scene_cannot_show(info) -> None:
+    assert not any(mode.possible(None) for mode in Mode)
+    assert not info.own_views and {m for m in Mode if not m.possible(info)} == {Mode.AGREEMENT}
+    assert Mode.AGREEMENT.possible(replace(info, own_views=True))
+    bare = replace(info, views=(), num_atoms=0)
+    assert {m for m in Mode if not m.possible(bare)} == {
+        Mode.AGREEMENT, Mode.COVERAGE, Mode.WEIGHT, Mode.FEATURES,
+    }  # fmt: skip
+
+
+def test_a_histogram_belongs_to_the_text_it_was_made_for() -> None:
+    state = asked("door")
+    made = Histogram(0, "door", (1,) * BINS)
+    state = after(state, ask.Binned((made,)))
+    assert state.asking.histogram(0, " door ") == made
+    assert state.asking.histogram(0, "doors") is None and state.asking.histogram(1, "door") is None
+
+
+def test_another_scene_forgets_the_old_ones_atoms_but_no_phrases(info) -> None:
+    state = after(State(), show.SceneArrived(info), ask.ShowAtom(2), ask.ChooseAtom(1, True))
+    state = after(state, ask.Remember("door"), ask.Binned((Histogram(0, "door", (0,) * BINS),)))
+    state = after(state, show.SceneArrived(replace(info, serial=2)))
+    assert (state.asking.atom, state.asking.chosen, state.asking.histograms) == (0, (), ())
+    assert state.asking.recent == ("door",)
+
+
+def test_atoms_are_shown_and_chosen(info) -> None:
+    state = after(State(), show.SceneArrived(info))
+    assert after(state, ask.ShowAtom(3)) == state and after(State(), ask.ShowAtom(0)) == State()
+    state = after(state, ask.ShowAtom(2), ask.OpenDictionary(True))
+    assert (state.mode, state.asking.atom, state.preferences.dictionary_open) == (Mode.WEIGHT, 2, True)
+    state = after(state, ask.ChooseAtom(2, True), ask.ChooseAtom(0, True), ask.ChooseAtom(2, True))
+    assert state.asking.chosen == (0, 2)
+    assert after(state, ask.ChooseAtom(0, False)).asking.chosen == (2,)
+    assert after(state, ask.ChooseNone()).asking.chosen == ()
+
+
+def test_one_phrase_may_have_a_negative_margin() -> None:
+    assert margin_span(1) == (-0.5, 0.5) and margin_span(2)[0] == margin_span(8)[0] == 0
+
+
+def test_the_first_phrase_turns_the_heat_map_on_and_only_the_first() -> None:
+    state = after(State(), ask.EditPrompt(0, "d"))
+    assert state.mode is Mode.HEAT
+    state = after(state, camera.SetMode(Mode.RGB), ask.EditPrompt(0, "do"))
+    assert state.mode is Mode.RGB
+    assert after(State(), ask.EditPrompt(0, "  ")).mode is Mode.RGB
+
+
+def test_prompts_are_edited_by_key() -> None:
+    state = after(State(), ask.EditPrompt(0, "door"), ask.AddPrompt())
+    second = state.prompts[1]
+    assert second.colour != state.prompts[0].colour and state.active == second.key
+    state = after(state, ask.EditPrompt(second.key, "floor"), ask.ShowPrompt(second.key, False))
+    assert [p.text for p in state.asked] == ["door"]
+    assert state.active_prompt == state.prompts[0]
+    state = after(state, ask.RemovePrompt(0), ask.RemovePrompt(second.key))
+    assert len(state.prompts) == 1 and state.prompts[0].text == "" and state.active_prompt is None
+
+
+def test_found_follows_the_threshold_in_force() -> None:
+    state = after(State(), ask.EditPrompt(0, "door"))
+    assert state.prompts[0].found is None
+    state = after(state, ask.Calibrated(0.8), ask.Answered(((0, "door", 0.7), (99, "x", 0.9))))
+    assert state.prompts[0].found is False
+    assert after(state, ask.SetThreshold(0, 0.6)).prompts[0].found is True
+    back = after(state, ask.SetThreshold(0, 0.6), ask.SetThreshold(0, None))
+    assert back.prompts[0].cut == 0.8
+    edited = after(state, ask.EditPrompt(0, "doors"))
+    assert edited.prompts[0].score is None
+    assert after(edited, ask.Answered(((0, "door", 0.7),))).prompts[0].score is None  # of the old text
+
+
+def test_negatives_and_what_needs_weight_maps() -> None:
+    state = after(State(), ask.SetNegatives(("thing",)))
+    assert state.negatives == ("thing",) and State().negatives == ()
+    assert not after(State(), camera.SetMode(Mode.HEAT)).wants_maps
+    assert after(State(), camera.SetMode(Mode.ATOMS)).wants_maps
+    asked = after(State(), ask.EditPrompt(0, "door"))
+    assert asked.wants_maps and after(asked, camera.SetMode(Mode.DEPTH)).wants_maps  # it has no score yet
+    answered = after(asked, ask.Answered(((0, "door", 0.9),)), camera.SetMode(Mode.DEPTH))
+    assert answered.prompts[0].score == 0.9 and not answered.wants_maps
+
+
+def test_without_own_negatives_the_scene_says_what_phrases_are_compared_with() -> None:
+    query: Any = SimpleNamespace(threshold=0.7, negative_texts=("wall",))
+    state = ask.PhrasesCompiled((), query).apply(State())
+    assert (state.negatives, state.asking.usual) == ((), ("wall",))
+    own = ask.PhrasesCompiled((), query).apply(replace(State(), negatives=("thing",)))
+    assert own.asking.usual != ("wall",)

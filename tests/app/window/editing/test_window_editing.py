@@ -1,0 +1,164 @@
+"""Editing as a person does it: real clicks, drags and keys on a real window."""
+
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from langflash_core.scene.file import load
+from tests.app.window.test_window import (
+    CANVAS,
+    LEFT,
+    MIDDLE,
+    PATIENCE,
+    SIZE,
+    TOP,
+    Program,
+    display,
+    pytestmark,
+    scene_file,
+)
+
+__all__ = ["display", "pytestmark", "scene_file"]  # fixtures and the mark of the window's tests
+
+ACROSS, DOWN = SIZE[0] - LEFT, CANVAS[0].stop - TOP
+CHAIR = (LEFT + ACROSS * 3 // 10, TOP + DOWN * 6 // 10)  # as in test_the_scene_is_drawn
+WALL = (LEFT + ACROSS * 8 // 10, TOP + DOWN * 3 // 10)  # below the bars
+
+
+@pytest.fixture
+def state_folder(tmp_path: Path, monkeypatch) -> Path:
+    monkeypatch.setenv("LANGFLASH_STATE", str(tmp_path / "state"))
+    return tmp_path / "state"
+
+
+@pytest.fixture
+def program(display: str, scene_file: Path, state_folder: Path) -> Iterator[Program]:
+    running = Program(display, scene_file)
+    running.until(lambda s: s["scene"] == "room.langflash", "the scene")
+    running.at_rest()
+    yield running
+    running.leave()
+
+
+def press(program: Program, key: str, tool: str) -> None:
+    """Take a tool; on a busy machine the key may come before the window has the keyboard."""
+    for _ in range(5):
+        program.xdotool("mousemove", *map(str, MIDDLE), "key", key)
+        with program._changed:
+            if program._changed.wait_for(lambda: program._lines[-1]["tool"] == tool, PATIENCE / 5):
+                return
+    raise AssertionError(f"the tool stays {program.state['tool']}")
+
+
+def move(program: Program, at: tuple[int, int]) -> None:
+    program.xdotool("mousemove", *map(str, at))
+
+
+def drag_with(program: Program, key: str) -> None:
+    """Drag by 30 x 30 pixels with a modifier held; the pauses let a busy machine see it held."""
+    drag = ("mousedown", "1", "mousemove_relative", "30", "30", "sleep", "0.3", "mouseup", "1")
+    program.xdotool("keydown", key, *drag, "sleep", "0.3", "keyup", key)
+
+
+def test_brush_delete_undo_save(program: Program, tmp_path: Path) -> None:
+    plain = program.picture()
+    press(program, "b", "BRUSH")
+    move(program, CHAIR)
+    program.xdotool("mousedown", "1", "mousemove_relative", "12", "8", "mouseup", "1")
+    state = program.until(lambda s: s["selected"] > 0 and not s["waiting"], "a selection")
+    count = state["selected"]
+    assert state["edits"] == [f"Select {count:,} with the brush"] and 50 < count < 2500
+    move(program, WALL)
+    program.at_rest()
+    blue = program.picture()
+    x, y = CHAIR[0] - LEFT, CHAIR[1] - TOP
+    assert blue[y, x, 2] > blue[y, x, 0] and plain[y, x, 0] > 2 * plain[y, x, 2]
+    program.xdotool("key", "Delete")
+    program.until(lambda s: s["deleted"] == count and s["selected"] == 0, "the deletion")
+    program.at_rest()
+    # Where the red block was, the grey wall or the brown floor behind it shows.
+    hole = program.picture()[y, x]
+    assert hole[0] < 2 * max(hole[1], 1)
+    program.xdotool("key", "ctrl+z")
+    program.until(lambda s: s["deleted"] == 0 and s["selected"] == count and s["undone"] == 1, "undo")
+    program.xdotool("key", "ctrl+z")
+    program.until(lambda s: s["selected"] == 0 and s["edits"] == [], "undo of the selection")
+    program.at_rest()
+    around = (slice(y - 30, y + 30), slice(x - 60, x + 200))  # without the tools on the left
+    assert np.array_equal(program.picture()[around], plain[around])
+    program.xdotool("key", "ctrl+y", "key", "ctrl+shift+z")
+    state = program.until(lambda s: s["deleted"] == count, "redo")
+    assert state["unsaved"]
+    program.xdotool("key", "ctrl+s")
+    program.until(lambda s: s["dialog"] == "save", "the dialog")
+    program.at_rest()
+    program.xdotool("key", "ctrl+a")
+    program.xdotool("type", "--delay", "20", str(tmp_path / "edited"))
+    program.xdotool("key", "Return")
+    state = program.until(lambda s: s["scene"] == "edited.langflash" and not s["unsaved"], "the saved scene")
+    assert any("edited.langflash" in toast for toast in state["toasts"])
+    assert len(load(tmp_path / "edited.langflash").gaussians) == 12_300 - count
+    assert state["gl_errors"] == []
+
+
+def test_what_is_this_and_find_similar(program: Program) -> None:
+    press(program, "x", "POINT")
+    move(program, CHAIR)
+    state = program.until(lambda s: s["shares"] is not None, "the groups under the pointer")
+    # The front of the block stands at z = 0.65; a few percent of what is behind, at up to 1.3, shine through.
+    assert abs(state["hover"][2] - 0.65) < 0.05 and state["shares"]["0"] > 0.9
+    program.xdotool("click", "1")
+    state = program.until(lambda s: s["words"], "the words")
+    assert state["words"][0] == "armchair"
+    move(program, WALL)
+    program.xdotool("click", "1")
+    program.until(lambda s: s["words"] and s["words"][0] == "wall", "the wall")
+    program.xdotool("key", "Escape")
+    program.until(lambda s: s["words"] is None and not s["closed"], "the closed card")
+    program.xdotool("key", "Escape")
+    state = program.until(lambda s: s["tool"] == "MOVE", "the tool put away")
+    assert not state["closed"] and state["gl_errors"] == []
+
+
+def test_a_box_with_shift_adds_and_with_ctrl_removes(program: Program) -> None:
+    press(program, "r", "BOX")
+    move(program, CHAIR)
+    program.xdotool("mousedown", "1", "mousemove_relative", "30", "30", "mouseup", "1")
+    first = program.until(lambda s: s["selected"] > 0 and not s["waiting"], "a selection")["selected"]
+    move(program, WALL)
+    drag_with(program, "shift")
+    more = program.until(lambda s: s["selected"] > first and not s["waiting"], "more")["selected"]
+    move(program, CHAIR)
+    drag_with(program, "ctrl")
+    state = program.until(lambda s: s["selected"] == more - first, "less")
+    assert [label.split()[0] for label in state["edits"]] == ["Select", "Add", "Unselect"]
+    assert state["pose"] == [0, 0, 0, 1, 0, 0, 0]  # the camera stood still all the while
+
+
+def test_a_crash_loses_no_edit(display: str, scene_file: Path, state_folder: Path) -> None:
+    running = Program(display, scene_file)
+    running.until(lambda s: s["scene"] == "room.langflash", "the scene")
+    running.at_rest()
+    running.xdotool("mousemove", *map(str, MIDDLE), "key", "ctrl+a")
+    running.until(lambda s: s["selected"] == 12_300, "everything selected")
+    running.xdotool("key", "Delete")
+    running.until(lambda s: s["deleted"] == 12_300, "everything deleted")
+    end = PATIENCE
+    while not list(state_folder.glob("*.edits")) and end > 0:
+        running.at_rest()
+        end -= 1
+    os.kill(running._process.pid, signal.SIGKILL)
+    running.leave()
+    again = Program(display, scene_file)
+    again.until(lambda s: s["offer"] == 2, "the offer")
+    again.at_rest()
+    again.click("Restore")
+    state = again.until(lambda s: s["deleted"] == 12_300 and s["job"] is None, "the restored edits")
+    assert state["edits"] == ["Select all", "Delete 12,300"] and state["scene"] == "room.langflash"
+    again.xdotool("mousemove", *map(str, MIDDLE), "key", "ctrl+z")
+    again.until(lambda s: s["deleted"] == 0, "undo over the crash")
+    again.leave()

@@ -1,0 +1,141 @@
+"""The worker's side of editing on a room whose answers are known."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from app.window.editing import commands as edit
+from app.window.editing import work
+from app.window.editing.state import Reading, Region
+from app.window.poses import to_camera
+from app.window.requests import SceneErrand
+from app.window.scene.work import describe_scene
+from langflash_core.language.spaces import language_space
+from langflash_core.scene.edits import Mask, hide, merge_atoms, select
+from langflash_core.splat import render
+from langflash_core.splat.picking import SEEN
+from langflash_core.splat.reference import rasterize
+from tests.app.window.scenes import PHRASES, room
+
+SIZE = (224, 168)
+CHAIRS = 2500
+MIDDLE_OF_CHAIR = (70.0, 110.0)  # pixels of view 0
+
+
+@pytest.fixture(scope="module")
+def info():
+    return describe_scene(room(language_space("minilm").encode(list(PHRASES))), serial=3, name="room")
+
+
+def scene_of(info, marks=None):
+    return info.serial, info.scene, marks or info.history.marks
+
+
+def result(request: SceneErrand) -> Any:
+    """The command that a request comes to."""
+    (command,) = request.run(lambda: False)
+    return command
+
+
+def find(info, region: Region, through: bool = False, marks=None) -> np.ndarray:
+    request = work.FindInRegion(*scene_of(info, marks), region, info.views[0], SIZE, through, "replace")
+    return result(request).mask.rows()
+
+
+def test_a_brush_selects_what_it_shows(info) -> None:
+    region = Region((MIDDLE_OF_CHAIR,), radius=9.0)
+    found = find(info, region)
+    # The float64 reference with one feature for each Gaussian that might matter, the rest black.
+    gaussians = info.scene.gaussians.map(lambda v: v.double())
+    camera = to_camera(info.views[0], *SIZE)
+    candidates = np.flatnonzero(find(info, region, through=True))
+    features = torch.zeros(len(gaussians), len(candidates), dtype=torch.float64)
+    features[candidates, np.arange(len(candidates))] = 1.0
+    maps, _ = rasterize(gaussians, features, camera)
+    most = maps[torch.from_numpy(region.pixels(*SIZE))].amax(0).numpy()
+    expected = np.zeros(len(found), bool)
+    expected[candidates[most >= SEEN]] = True
+    assert (found == expected).all()
+    assert found[:CHAIRS].sum() > 50 and not found[CHAIRS:].any()
+    assert len(candidates) - found.sum() > 0  # the floor or wall behind is found only through
+
+
+def test_what_is_hidden_neither_covers_nor_is_found(info) -> None:
+    chairs = Mask.of(np.arange(12_300) < CHAIRS)
+    marks = hide(info.history.marks, chairs)
+    behind = find(info, Region((MIDDLE_OF_CHAIR,), radius=9.0), marks=marks)
+    assert behind[CHAIRS:].any() and not behind[:CHAIRS].any()
+
+
+def test_a_large_box_is_looked_at_coarser(info, monkeypatch) -> None:
+    box = Region(((40.0, 90.0), (100.0, 140.0)))
+    fine = find(info, box)
+    monkeypatch.setattr(work, "MOST_PIXELS", 1000)
+    coarse = find(info, box)
+    # A third of the resolution moves the box's rim by up to a pixel of three.
+    assert (fine & coarse).sum() > 0.9 * (fine | coarse).sum()
+
+
+def by_phrase(info, text: str, like: bytes = b"", threshold: float = 0.8) -> work.FindByPhrase:
+    return work.FindByPhrase(*scene_of(info), text, like, (), threshold, "replace")
+
+
+def test_a_phrase_selects_its_gaussians_and_a_place_those_like_it(info) -> None:
+    chair = result(by_phrase(info, "armchair"))
+    assert isinstance(chair, edit.Found) and chair.what == "by 'armchair'"
+    assert (chair.mask.rows() == (np.arange(12_300) < CHAIRS)).all()
+    like = info.scene.semantics.dictionary[1].numpy().tobytes()
+    wall = result(by_phrase(info, "like this", like, 0.97))
+    assert isinstance(wall, edit.Found)
+    assert (wall.mask.rows() == (info.scene.semantics.weight_ids[:, 0].numpy() == 1)).all()
+
+
+def test_an_atom_selects_itself_and_what_it_was_merged_with(info) -> None:
+    marks = merge_atoms(info.history.marks, (0, 2))
+    alone = result(work.FindAtom(*scene_of(info), 0, "add")).mask
+    both = result(work.FindAtom(*scene_of(info, marks), 2, "add")).mask
+    assert len(alone) == CHAIRS and len(both) == CHAIRS + 4900
+
+
+def test_growing_stays_within_a_phrase(info) -> None:
+    start = Mask.of(np.arange(12_300) == 1225)  # a middle one of the block
+    marks = select(info.history.marks, start)
+    free = result(work.GrowSelection(*scene_of(info, marks), 12.0, None)).mask
+    within = work.GrowSelection(*scene_of(info, marks), 12.0, by_phrase(info, "wall"))
+    assert len(free) > 20 and free.rows()[1225]
+    assert result(within).mask == start
+
+
+def test_a_place_is_composed_as_the_weight_maps_hold_it(info) -> None:
+    reading = Reading((100.4, 120.2), (0.0, 0.0, 1.0), 1.0)
+    request = work.Weigh(*scene_of(info), reading, info.views[0], SIZE)
+    maps = render(info.scene, to_camera(info.views[0], *SIZE)).weight_maps
+    assert maps is not None
+    np.testing.assert_allclose(request.weigh(), maps[120, 100].numpy(), atol=1e-6)  # float32 out
+    hidden = hide(info.history.marks, Mask.full(12_300))
+    assert not work.Weigh(*scene_of(info, hidden), reading, info.views[0], SIZE).weigh().any()
+
+
+def test_a_place_has_words_also_the_persons_own(info) -> None:
+    reading = Reading(MIDDLE_OF_CHAIR, (0.0, 0.0, 0.65), 0.65)
+    place = (reading, info.views[0], SIZE)
+    named = result(work.NamePlace(*scene_of(info), *place, b"", ("red armchair", "armchair")))
+    words = dict(named.words)
+    assert named.words[0][0] == "armchair" and named.words[0][1] > 0.99
+    assert "red armchair" in words and named.reading.atoms is not None and named.reading.atoms[0][1] > 0.95
+    vector = np.frombuffer(named.vector, np.float32)
+    assert vector @ info.scene.semantics.dictionary[0].numpy() > 0.9
+    drawn = np.array([0.0, 0.7, 0.0], np.float32).tobytes()
+    assert result(work.NamePlace(*scene_of(info), *place, drawn, ())).words[0][0] == "wall"
+
+
+def test_atoms_are_named(info) -> None:
+    names = result(work.NameAtoms(*scene_of(info))).names
+    assert [row[0] for row in names] == list(PHRASES)
+
+
+def test_floaters_are_scored_for_every_row(info) -> None:
+    floaters = result(work.ScoreFloaters(*scene_of(info)))
+    assert isinstance(floaters, edit.FloatersFound) and len(floaters.scores) == 4 * 12_300

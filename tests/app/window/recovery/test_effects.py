@@ -1,0 +1,165 @@
+"""What lasts, followed without a window: files of this version and of the one before."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from app.window.commands import Command, Notify, OfScene, Tick, apply
+from app.window.editing import commands as edit
+from app.window.effects import Hands
+from app.window.places import state_folder
+from app.window.recovery import commands as keep
+from app.window.recovery import edits, sessions, work
+from app.window.recovery.effects import KEEP_AFTER, RecoveryEffects
+from app.window.recovery.keeper import Keeper
+from app.window.recovery.preferences import DEFAULTS
+from app.window.requests import Errand, Job, SceneErrand
+from app.window.scene import commands as show
+from app.window.scene import work as scene_work
+from app.window.scene.work import describe_scene
+from app.window.state import State
+from langflash_core.scene.edits import Mask, delete
+from langflash_core.scene.file import save
+from tests.app.window.scenes import room
+
+
+@dataclass
+class Desk:
+    """A session without its window: performs commands, and runs requests when told to."""
+
+    state: State = field(default_factory=State)
+    asked: list[Job | Errand] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.keeper = Keeper()
+        hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: self.state.now)
+        self.effects = RecoveryEffects(hands, self.keeper)
+
+    def perform(self, command: Command) -> None:
+        if isinstance(command, OfScene):
+            if not command.holds(self.state):
+                return
+            command = command.command
+        before = self.state
+        self.state = apply(before, command)
+        self.effects.follow(command, before, self.state)
+
+    def work(self) -> None:
+        """Everything that was asked of the worker."""
+        while self.asked:
+            request = self.asked.pop(0)
+            if isinstance(request, Job):
+                self.perform(request.run(7, lambda *_: None, lambda: False))
+                continue
+            for command in request.run(lambda: False):
+                about = isinstance(request, SceneErrand)
+                self.perform(OfScene(request.serial, command) if about else command)
+
+    def pass_time(self, seconds: float) -> None:
+        self.perform(Tick(self.state.now + seconds))
+        self.effects.tick(self.state, self.state.now)
+
+
+@pytest.fixture
+def desk(folders: Path) -> Iterator[Desk]:
+    desk = Desk()
+    yield desk
+    desk.effects.close(desk.state, crashed=False)
+
+
+@pytest.fixture(scope="module")
+def info():
+    return describe_scene(room(torch.eye(3)), serial=1, name="room")
+
+
+def some(count: int = 12_300) -> Mask:
+    return Mask.of(np.arange(count) < 5)
+
+
+def test_an_unsaved_scene_gets_a_copy_and_its_edits_are_written_once_they_rest(desk: Desk, info) -> None:
+    desk.perform(show.SceneArrived(info))
+    assert {type(each) for each in desk.asked} == {work.LookForEdits, work.KeepCopy}
+    desk.work()
+    assert desk.keeper.scene_file.is_file() and desk.state.recovery.copy == desk.keeper.scene_file
+    desk.perform(edit.Found(some(), "replace", "here"))
+    desk.perform(edit.Delete())
+    desk.pass_time(0.5 * KEEP_AFTER)
+    assert desk.asked == []
+    desk.pass_time(0.6 * KEEP_AFTER)
+    desk.work()
+    kept = desk.state.recovery.kept
+    assert kept is not None and desk.keeper.own(kept) and edits.find(info.scene) is not None
+    desk.perform(show.SceneSaved(Path("/rooms/a.langflash"), desk.state.editing.marks))
+    desk.work()
+    assert desk.state.recovery.kept is None and edits.find(info.scene) is None
+    assert desk.state.preferences.recent == ("/rooms/a.langflash",)
+
+
+def test_the_edits_of_the_scene_before_are_kept_when_another_comes(desk: Desk, info) -> None:
+    desk.perform(show.SceneArrived(info))
+    desk.perform(edit.Found(some(), "replace", "here"))
+    desk.perform(edit.Delete())
+    desk.perform(show.SceneArrived(replace(info, serial=2, name="other")))
+    assert "edits of room are kept" in desk.state.toasts[-1].text
+    desk.work()
+    assert desk.state.recovery.kept is None  # the answer was about the scene that is gone
+    offer = edits.find(info.scene)
+    assert offer is not None and (offer.name, offer.count) == ("room", 2)
+
+
+BEFORE = {
+    "photos": [], "fovs": [], "scene": "", "edits": "", "saved": False, "name": "kitchen",
+    "phrases": ["armchair"], "mode": "DEPTH",
+    "pose": {"centre": [0.1, 0.2, -0.3], "rotation": [1.0, 0.0, 0.0, 0.0], "reach": 1.5, "fov": 60.0,
+             "aspect": 1.25, "shift": [0.0, 0.0]},
+}  # fmt: skip
+"""As the version before wrote a session."""
+
+
+def test_a_session_of_the_version_before_is_restored_with_its_edits(desk: Desk, info) -> None:
+    scene = state_folder() / "session-1-00000000.langflash"
+    scene.parent.mkdir(parents=True)
+    save(info.scene, scene)
+    assert info.history is not None
+    history = info.history.edited("Delete 5", delete(info.history.marks, some()))
+    file = edits.keep(info.scene, history, "kitchen", None, "deadbeef")
+    session = state_folder() / "session-1-00000000.json"
+    session.write_text(json.dumps({**BEFORE, "scene": str(scene), "edits": str(file)}))
+    desk.effects.begin(DEFAULTS, "", empty=True)
+    assert desk.state.recovery.session is not None and desk.asked == []  # it holds its edits
+    desk.perform(keep.EndSessionOffer(restore=True))
+    desk.perform(scene_work.LoadScene(file.with_suffix(".langflash"), file).run(3, print, lambda: False))
+    state = desk.state
+    assert state.editing.history == history and state.info is not None
+    assert (state.info.name, state.info.path, state.mode.name) == ("kitchen", None, "DEPTH")
+    assert tuple(state.pose.centre) == (0.1, 0.2, -0.3) and [p.text for p in state.prompts] == ["armchair"]
+    desk.work()
+    assert not file.exists()  # this window keeps them under its own name
+    again = edits.find(info.scene)
+    assert again is not None and desk.keeper.own(again.edits)
+    desk.effects.close(desk.state, crashed=True)
+    left = sessions.left_behind()
+    assert left is None  # this process lives and holds its lock
+    assert not session.exists() and not scene.exists()
+
+
+def test_without_a_session_the_newest_edits_are_looked_for(desk: Desk) -> None:
+    desk.effects.begin(DEFAULTS, "Something was lost.", empty=True)
+    assert [type(each) for each in desk.asked] == [work.LookForEdits]
+    assert desk.state.toasts[-1].text == "Something was lost."
+    other = Desk()
+    other.effects.begin(DEFAULTS, "", empty=False)
+    assert other.asked == []
+    other.effects.close(other.state, crashed=False)
+
+
+def test_what_holds_for_one_scene_is_nothing_for_another(info) -> None:
+    shown = apply(State(), show.SceneArrived(info))
+    word = Notify("a word")
+    assert apply(shown, OfScene(1, word)).toasts and not apply(shown, OfScene(2, word)).toasts
+    assert apply(State(), OfScene(0, word)).toasts and not apply(State(), OfScene(1, word)).toasts

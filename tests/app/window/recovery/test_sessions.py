@@ -1,0 +1,83 @@
+"""A session outlives the process that dies, and only that."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from app.window.places import state_folder
+from app.window.poses import Pose, Vector
+from app.window.recovery import sessions
+from app.window.recovery.keeper import Keeper
+from app.window.recovery.state import Kept
+
+ROOT = Path(__file__).parents[4]
+DYING = """
+import os, sys, signal
+from app.window.recovery.keeper import Keeper
+from app.window.recovery.state import Kept
+keeper = Keeper()
+keeper.scene_file.parent.mkdir(parents=True, exist_ok=True)
+keeper.scene_file.write_bytes(b"a scene")
+keeper.keep(Kept(photos=(sys.argv[1],), fovs=(61.5,), scene=str(keeper.scene_file), saved=False,
+                 name="kitchen", phrases=("armchair",)))
+print("kept", flush=True)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def die(photo: Path) -> None:
+    """A process that keeps a session and is killed."""
+    done = subprocess.run(
+        [sys.executable, "-c", DYING, str(photo)],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == -signal.SIGKILL and done.stdout == "kept\n", done.stderr
+
+
+def test_a_killed_session_is_left_behind(folders: Path) -> None:
+    photo = folders / "a photo.png"
+    photo.write_bytes(b"pixels")
+    die(photo)
+    kept = sessions.left_behind()
+    assert kept is not None and kept.file is not None
+    assert (kept.photos, kept.fovs, kept.phrases) == ((str(photo),), (61.5,), ("armchair",))
+    assert not kept.saved and Path(kept.scene).read_bytes() == b"a scene"
+    assert kept.sentence() == "kitchen, 1 photo, 1 phrase"
+    photo.unlink()  # what is gone is not offered
+    again = sessions.left_behind()
+    assert again is not None and again.photos == () and again.fovs == ()
+    sessions.forget(kept.file)
+    assert sessions.left_behind() is None and list(state_folder().iterdir()) == []
+
+
+def test_a_session_that_runs_or_ended_well_is_not_offered(folders: Path) -> None:
+    keeper = Keeper()
+    keeper.keep(Kept(phrases=("door",), pose=Pose(Vector(1.0, 2.0, 3.0))))
+    assert sessions.left_behind() is None
+    keeper.close()
+    assert sessions.left_behind() is None and list(state_folder().iterdir()) == []
+    keeper.keep(Kept(phrases=("wall",)))  # a late write after the end writes nothing
+    assert list(state_folder().iterdir()) == []
+
+
+def test_the_camera_comes_back_exactly(folders: Path) -> None:
+    keeper, kept = Keeper(), Kept(phrases=("door",), pose=Pose(Vector(0.1, 1 / 3, -7.0), fov=61.0))
+    keeper.keep(kept)
+    file = next(state_folder().glob("*.json"))
+    read = sessions.read(file)
+    keeper.close()
+    assert read is not None and read.pose == kept.pose
+
+
+def test_damage_and_emptiness_are_passed_over_and_removed(folders: Path) -> None:
+    state_folder().mkdir(parents=True)
+    for name, content in (
+        ("session-1-a.json", b"{"), ("session-2-b.json", b'{"pose": 3}'), ("session-3-c.json", b"[]"),
+    ):  # fmt: skip
+        (state_folder() / name).write_bytes(content)
+    assert sessions.left_behind() is None
+    assert list(state_folder().iterdir()) == []

@@ -1,0 +1,114 @@
+"""The tray, the jobs, the camera: what their commands do, without a window."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+
+from app.window import commands as do
+from app.window.poses import Pose
+from app.window.scene import camera
+from app.window.scene import commands as show
+from app.window.scene.drops import MAX_PHOTOS
+from app.window.scene.state import FLIGHT_SECONDS
+from app.window.scene.work import describe_scene
+from app.window.state import State
+from tests.app.window.scenes import after, room, told
+from tests.app.window.scenes import shown_scene as scene
+
+PATHS = tuple(Path(f"/photos/{name}.jpg") for name in "abc")
+
+
+@pytest.fixture(scope="module")
+def info():
+    return describe_scene(room(torch.eye(3)), serial=1, name="room")
+
+
+@pytest.fixture
+def shown(info) -> State:
+    return after(State(), show.SceneArrived(info))
+
+
+def test_photos_are_added_once_and_bounded() -> None:
+    paths = tuple(Path(f"{i}.jpg") for i in range(MAX_PHOTOS + 3))
+    state = after(State(), show.AddPhotos(paths[:2]), show.AddPhotos(paths[1:3]))
+    assert [p.path.name for p in state.photos] == ["0.jpg", "1.jpg", "2.jpg"]
+    state = after(state, show.AddPhotos(paths))
+    assert len(state.photos) == MAX_PHOTOS
+    assert "3 photos were left out" in state.toasts[0].text
+    state = after(state, show.RemovePhoto(0))
+    assert state.photos[0].path.name == "1.jpg"
+    assert after(state, show.ClearPhotos()).photos == ()
+
+
+def test_reconstruct_needs_photos() -> None:
+    state = after(State(), show.Reconstruct())
+    assert state.job is None and "no photo" in state.toasts[0].text
+    state = after(State(), show.AddPhotos((Path("a.jpg"),)), show.Reconstruct())
+    assert state.job is not None
+
+
+def test_photos_take_a_lens_notes_and_another_place() -> None:
+    state = after(State(), show.AddPhotos(PATHS), show.PhotoRead(PATHS[1], 50.0, ("it is dark",)))
+    state = after(state, show.SetPhotoFov(0, 500.0), show.MovePhoto(2, 0), show.MovePhoto(9, 0))
+    assert [photo.path.stem for photo in state.photos] == ["c", "a", "b"]
+    fov = state.photos[1].fov
+    assert fov is not None and 0 < fov < 180  # within what a lens can have
+    assert (state.photos[2].recorded, state.photos[2].notes) == (50.0, ("it is dark",))
+    state = after(state, show.SetPhotoFov(1, None))
+    assert state.photos[1].fov is None
+
+
+def test_the_best_pair_keeps_two_and_is_dropped_when_the_tray_has_changed() -> None:
+    two = after(State(), show.AddPhotos(PATHS[:2]), show.ChoosePair())
+    assert not two.choosing and "three photos" in told(two)
+    state = after(State(), show.AddPhotos(PATHS), show.ChoosePair())
+    assert state.choosing
+    chosen = after(state, show.PairChosen(PATHS, (0, 2)))
+    assert [photo.path for photo in chosen.photos] == [PATHS[0], PATHS[2]] and not chosen.choosing
+    changed = after(state, show.RemovePhoto(0), show.PairChosen(PATHS, (0, 2)))
+    assert len(changed.photos) == 2 and changed.toasts == ()
+    assert "No two of these photos match" in told(after(state, show.PairChosen(PATHS, None)))
+    assert told(after(state, show.ChoosingFailed("It is damaged."))) == "It is damaged."
+
+
+def test_progress_files_finished_stages_with_their_seconds() -> None:
+    state = after(State(now=1.0), show.AddPhotos((Path("a.jpg"),)), show.Reconstruct())
+    state = after(state, do.Tick(2.0), show.Progressed("encoder", 0.0), show.Progressed("encoder", 0.5))
+    state = after(state, do.Tick(5.0), show.Progressed("grouping", 7.0))
+    assert state.job is not None
+    assert state.job.done == (("starting", 1.0), ("encoder", 3.0))
+    assert (state.job.stage, state.job.fraction) == ("grouping", 1.0)
+    assert after(State(), show.Progressed("late", 0.5)).job is None
+    assert after(state, show.CancelJob()).job.cancelling  # type: ignore[union-attr]
+    assert after(state, show.JobCancelled()).job is None
+    failed = after(state, show.JobFailed("The photos are too dark; use a lamp."))
+    assert failed.job is None and failed.toasts[-1].text.startswith("The photos are too dark")
+
+
+def test_a_scene_is_shown_from_its_first_view(shown: State, info) -> None:
+    assert shown.pose == info.views[0] and shown.view == 0
+    assert info.num_gaussians == 12_300 and info.num_atoms == 3
+    # The block fills the middle of view 0; its front is at z = 0.65.
+    assert info.views[0].reach == pytest.approx(0.65, abs=1e-4)
+    assert info.warnings == ("The photos overlap little; depth may be off.",)
+
+
+def test_jumping_flies_and_arrives_exactly(shown: State, info) -> None:
+    flying = after(replace(shown, now=10.0), camera.JumpTo(1), do.Tick(10.0 + FLIGHT_SECONDS / 2))
+    assert flying.flight is not None and flying.pose not in info.views
+    arrived = after(flying, do.Tick(10.01 + FLIGHT_SECONDS))
+    assert arrived.flight is None and arrived.pose == info.views[1] and arrived.view == 1
+    assert after(shown, camera.JumpTo(7)) == shown
+    moved = after(flying, camera.MoveTo(Pose()))
+    assert moved.flight is None and moved.view is None and moved.pose == Pose()
+    assert after(arrived, camera.Home(), do.Tick(99.0)).pose == info.views[0]
+
+
+def test_all_of_the_scene_is_framed_and_a_photo_compared() -> None:
+    assert after(State(), camera.FrameAll()) == State()
+    framed = after(scene(), camera.FrameAll())
+    assert framed.flight is not None and framed.flight.end.centre.z < 0  # stands back
+    assert after(scene(), camera.Compare(1.5)).compare == 1.0
+    assert after(scene(), camera.Compare(None)).compare is None

@@ -1,0 +1,107 @@
+"""How much is drawn, from what it costs."""
+
+import math
+
+import pytest
+
+from app.window.governor import (
+    FULL_AFTER,
+    LARGE_SCENE,
+    MOVING_SECONDS,
+    SETTLE_AFTER,
+    SIZES,
+    Governor,
+    Kind,
+    Plan,
+)
+
+
+def settled(
+    governor: Governor, kind: Kind, seconds_full: float, fixed: float = 0.0
+) -> tuple[Governor, list[Plan]]:
+    """Thirty moving pictures on a machine with this cost of a full one, of which `fixed` per Gaussian."""
+    plans = []
+    for _ in range(30):
+        plan = governor.moving(kind)
+        plans.append(plan)
+        pixels = (seconds_full - fixed) * plan.scale**2 * (plan.kind.value / kind.value)
+        governor = governor.learn(plan, pixels + fixed * plan.share)
+    return governor, plans
+
+
+def test_a_fast_machine_draws_everything_in_full() -> None:
+    governor, plans = settled(Governor(), Kind.FAST, 0.004)
+    assert plans[-1] == Plan(Kind.MAPS)  # exact while it moves
+    assert governor.resting(Kind.FAST, SETTLE_AFTER) == Plan(Kind.MAPS)
+
+
+@pytest.mark.parametrize("kind", [Kind.COLOUR, Kind.FAST])
+def test_a_slow_machine_moves_within_the_budget_and_stays_there(kind) -> None:
+    _, plans = settled(Governor(), kind, 0.4)
+    last = plans[-1]
+    assert last.kind is kind and last.scale < 1.0 and last.share == 1.0
+    assert 0.4 * last.scale**2 <= MOVING_SECONDS
+    assert len(set(plans[5:])) == 1  # no flicker between two sizes
+
+
+def test_large_scenes_that_cost_by_the_gaussian_are_thinned() -> None:
+    """A second for the Gaussians alone: smaller pictures do not help, fewer Gaussians do."""
+    _, plans = settled(Governor(5 * LARGE_SCENE), Kind.COLOUR, 1.2, fixed=1.0)
+    assert plans[-1].share < 1 and 0.2 * plans[-1].scale ** 2 + plans[-1].share <= 1.8 * MOVING_SECONDS
+    _, plans = settled(Governor(LARGE_SCENE - 1), Kind.COLOUR, 1.2, fixed=1.0)
+    assert plans[-1].share == 1.0  # small ones never
+
+
+def test_it_climbs_again_when_there_is_time() -> None:
+    governor, _ = settled(Governor(), Kind.COLOUR, 1.0)
+    assert governor.moving(Kind.COLOUR).scale == SIZES[-1][0]
+    _, plans = settled(governor, Kind.COLOUR, 0.01)
+    assert plans[-1] == Plan(Kind.COLOUR)
+
+
+def test_relevance_moves_in_the_fast_mode_and_rests_exactly() -> None:
+    governor = Governor().learn(Plan(Kind.MAPS), 1.2, moving=False)
+    assert governor.moving(Kind.FAST).kind is Kind.FAST
+    assert governor.resting(Kind.FAST, FULL_AFTER) == Plan(Kind.MAPS)
+
+
+def test_atoms_move_as_small_maps_or_give_way_to_colour() -> None:
+    slow = Governor().learn(Plan(Kind.MAPS), 0.5, moving=False)
+    assert slow.moving(Kind.MAPS).kind is Kind.MAPS and slow.moving(Kind.MAPS).scale < 0.5
+    slower = Governor().learn(Plan(Kind.MAPS), 8.0, moving=False)
+    assert slower.moving(Kind.MAPS).kind is Kind.COLOUR
+    assert slower.resting(Kind.MAPS, FULL_AFTER) == Plan(Kind.MAPS)
+
+
+def test_a_slow_picture_settles_small_before_full() -> None:
+    governor = Governor().learn(Plan(Kind.MAPS), 1.2, moving=False)
+    small = governor.resting(Kind.MAPS, SETTLE_AFTER)
+    assert small is not None and small.scale < 1.0 and small.kind is Kind.MAPS
+    assert governor.resting(Kind.MAPS, 0.0) is None
+
+
+def test_what_was_never_drawn_is_expected_to_cost_more_than_colour() -> None:
+    slow = Governor().learn(Plan(Kind.COLOUR), 0.4)
+    assert slow.moving(Kind.FAST).kind is Kind.FAST  # the first keystroke of a phrase does not freeze
+    assert 1.5 * 0.4 * slow.moving(Kind.FAST).scale ** 2 <= MOVING_SECONDS
+    fast = Governor().learn(Plan(Kind.COLOUR), 0.004)
+    assert fast.moving(Kind.FAST) == Plan(Kind.MAPS)
+
+
+def test_what_a_picture_serves() -> None:
+    assert Plan(Kind.MAPS).covers(Plan(Kind.FAST, 0.5, 0.25))
+    assert Plan(Kind.FAST, 0.5).covers(Plan(Kind.COLOUR, 0.5))
+    assert not Plan(Kind.FAST).covers(Plan(Kind.MAPS))
+    assert not Plan(Kind.COLOUR, 1.0, 0.25).covers(Plan(Kind.COLOUR))
+    assert not Plan(Kind.MAPS, 0.5).covers(Plan(Kind.COLOUR))
+
+
+def test_rest_ends() -> None:
+    governor = Governor()
+    assert governor.next_rest(0.0) == SETTLE_AFTER
+    assert governor.next_rest(SETTLE_AFTER) == FULL_AFTER - SETTLE_AFTER
+    assert math.isinf(governor.next_rest(FULL_AFTER))
+
+
+def test_an_unknown_machine_starts_in_the_middle() -> None:
+    assert Governor().moving(Kind.COLOUR) == Plan(Kind.COLOUR, SIZES[2][0])

@@ -1,0 +1,44 @@
+"""Work under way: what is told, what is timed, where it stops."""
+
+import pytest
+
+from langflash_core.errors import Cancelled
+from langflash_core.running import Run, evenly
+
+BEGINS = {"read": 0.0, "think": 0.2, "write": 0.8, "check": 0.8}
+
+
+def test_stages_are_told_in_their_place_and_timed():
+    told: list[tuple[str, float]] = []
+    run = Run(BEGINS, lambda *what: told.append(what))
+    for name in BEGINS:
+        with run.stage(name):
+            pass
+    assert told == list(BEGINS.items()) and list(run.timings) == list(BEGINS)
+    before = run.timings["think"]
+    with run.stage("think"):
+        pass
+    assert run.timings["think"] > before >= 0 and len(run.timings) == 4
+
+
+def test_steps_of_a_stage_are_a_part_of_the_whole():
+    told: list[tuple[str, float]] = []
+    run = Run(BEGINS, lambda *what: told.append(what))
+    for name in ("think", "write"):
+        run.within(name)("step", 0.5)
+    assert told == [("step", pytest.approx(0.5)), ("step", pytest.approx(0.9))]
+    Run(BEGINS).within("think")("nobody listens", 0.5)
+
+
+def test_a_run_stops_before_the_next_stage():
+    stopped = False
+    run = Run(evenly(("one", "two")), None, lambda: stopped)
+    with run.stage("one"):
+        stopped = True
+    with pytest.raises(Cancelled, match="nothing was written"), run.stage("two"):
+        raise AssertionError("the stage began")
+    assert list(run.timings) == ["one"]
+
+
+def test_stages_that_take_equally_long():
+    assert evenly(("a", "b", "c", "d")) == {"a": 0.0, "b": 0.25, "c": 0.5, "d": 0.75}
