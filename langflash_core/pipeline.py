@@ -15,6 +15,7 @@ from torch import Tensor
 
 from langflash_core.ahead import Ahead, begin
 from langflash_core.errors import InputError, PromptError, ViewError, WeightsError
+from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.views import load_views, source_pictures
 from langflash_core.language.answers import answer
@@ -35,6 +36,7 @@ from langflash_core.network.semantics.sam2 import Sam2, sam2_checkpoint
 from langflash_core.running import Progress, Run
 from langflash_core.scene.assemble import assemble
 from langflash_core.scene.prune import prune
+from langflash_core.scene.world import in_world
 from langflash_core.splat import render as render_reference
 from langflash_core.splat.refine import Budget, refine
 from langflash_core.types import Camera, Cost, Frame, Prediction, QueryResult, Scene, Views
@@ -62,6 +64,7 @@ def reconstruct(
     aggregation: str | None = None,
     grouping: str | None = None,
     refine_seconds: float | None = None,
+    viewmats: Tensor | None = None,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
     ahead: Ahead | None = None,
@@ -85,6 +88,8 @@ def reconstruct(
             else clusters of the language features.
         refine_seconds: so long poses and Gaussians are fitted to the photos afterwards, and kept so
             if that brings a view closer that was held out; None: not at all.
+        viewmats: poses (V, 4, 4) of the photos, world to camera, in any world and unit: they are not
+            sought, and the scene is in that world; preset mini. None: the first photo's camera is the world.
         device: "auto" takes CUDA where there is one; "cpu"; "cuda".
         progress: called with the stage and the fraction of the whole in [0, 1].
         cancelled: asked between stages, photos and pairs of photos, and before every layer.
@@ -110,6 +115,7 @@ def reconstruct(
         views = load_views(
             photos, fov=fov, intrinsics=intrinsics, check=run.check, pictures=ahead.pictures.result
         )
+    views = _posed(views, viewmats, preset)
     with run.stage("weights"):
         network = _network(preset, weights, device, precision, ahead.stored)
         atoms = _atoms(network, aggregation, views)
@@ -128,6 +134,8 @@ def reconstruct(
         fitting = {**scene.record.cost.timings, "fitting": run.timings["refine"]}
         scene = scene.with_record(cost=Cost(fitting))
     run.check()
+    if viewmats is not None:
+        scene = in_world(scene, viewmats[0], scene.record.network_unit)
     run.report("done", 1.0)
     return _with_record(scene, network, run.timings)
 
@@ -194,6 +202,22 @@ def select(scene: Scene, prompts: Sequence[str], *, threshold: float | None = No
             "lower the threshold"
         )
     return scene.rows(passing)
+
+
+def _posed(views: Views, viewmats: Tensor | None, preset: str) -> Views:
+    """The views with the poses that were given, brought to the first camera.
+
+    Raises:
+        InputError: another preset, or not a pose for each photo.
+    """
+    if viewmats is None:
+        return views
+    if preset != "mini":
+        raise InputError(f"the preset '{preset}' seeks poses itself; choose --preset mini for given ones")
+    if tuple(viewmats.shape) != (views.num_views, 4, 4):
+        raise InputError(f"{len(viewmats)} poses were given for {views.num_views} photos; give one each")
+    relative = viewmats.double() @ invert_rigid(viewmats[0].double())
+    return replace(views, viewmats=relative)
 
 
 def best_pair(

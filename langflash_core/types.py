@@ -52,7 +52,8 @@ class Views:
 
     images: (V, 3, H, W) in [0, 1]. Ks: (V, 3, 3) pixels of these images, after crop and
     resize. names: file names for people. sources: the photos as small JPEG bytes, the same
-    crop. warnings: triage, one sentence each.
+    crop. warnings: triage, one sentence each. viewmats: (V, 4, 4), world = view 0, in any unit, where
+    poses are given instead of sought.
     """
 
     images: Tensor
@@ -60,6 +61,7 @@ class Views:
     names: tuple[str, ...]
     sources: tuple[bytes, ...] = ()
     warnings: tuple[str, ...] = ()
+    viewmats: Tensor | None = None
 
     @property
     def num_views(self) -> int:

@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from langflash_core.errors import InputError, OutputError, SceneFileError
+from langflash_core.formats import kind_of
 
 
 def readable_file(path: Path, what: str, error: type[InputError]) -> Path:
@@ -73,7 +74,7 @@ def check_output_file(path: Path, suffixes: tuple[str, ...] = (), inputs: Iterab
         raise OutputError(f"cannot write {path}: it is a folder; give a file name")
     if any(path.exists() and other.exists() and path.samefile(other) for other in inputs):
         raise OutputError(f"{path} is also an input; choose another -o")
-    if suffixes and path.suffix.lower() not in suffixes:
+    if suffixes and kind_of(path) not in suffixes:
         raise OutputError(f"cannot write {path.name}: this command writes {', '.join(suffixes)}; rename -o")
     check_folder(path.parent)
     return path

@@ -64,6 +64,7 @@ def build_parser() -> Parser:
         _add_query,
         _add_render,
         _add_export,
+        _add_lift,
         _add_info,
         _add_bench,
         _add_bench_network,
@@ -142,6 +143,13 @@ def _add_reconstruct(commands) -> None:
         help="in pixels of the photos as given, after EXIF orientation",
     )
     command.add_argument(
+        "--poses",
+        type=Path,
+        metavar="PATH",
+        help="a transforms.json or COLMAP text model with the photos' poses and lenses: they are not sought, "
+        "and the scene is in their world and unit",
+    )
+    command.add_argument(
         "--size",
         type=pixel_side,
         metavar="PX",
@@ -198,8 +206,11 @@ def _add_export(commands) -> None:
     _add_output(
         command,
         "FILE",
-        ".png: a picture, or a cut-out with --prompt; .ply, .splat, .langflash: Gaussians; "
-        ".json: COCO masks of --prompt; .csv, .glb: their boxes; .npz: a view as numbers; .mp4: a flight",
+        ".png: a picture, or a cut-out with --prompt; .langflash, .ply, .compressed.ply, .splat, .spz, .sog, "
+        "meta.json (a SOG in a folder), .glb, .usd, .usda, .usdc, .usdz: Gaussians; "
+        "transforms.json, cameras.txt (COLMAP): photos and their poses; "
+        ".json: COCO masks of --prompt; .csv, or .glb with --what boxes: their boxes; "
+        ".npz: a view as numbers; .mp4: a flight",
     )
     command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="keep only what answers one of these")
     command.add_argument(
@@ -219,9 +230,30 @@ def _add_export(commands) -> None:
     _add_backend(command)
 
 
+def _add_lift(commands) -> None:
+    command = _command(
+        commands, "lift", "groups and a dictionary for plain splats, so that they answer phrases"
+    )
+    command.add_argument("scene", type=Path, metavar="SCENE", help="a splat file, or a scene to name anew")
+    _add_output(command, "SCENE", "the .langflash, or .ply or .glb with its language, to write")
+    command.add_argument(
+        "--photos",
+        nargs="+",
+        type=Path,
+        metavar="PHOTO",
+        help="of the place, with --poses; else views of itself",
+    )
+    command.add_argument("--poses", type=Path, metavar="PATH", help="transforms.json, or a COLMAP text model")
+    command.add_argument(
+        "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped ones"
+    )
+    _add_backend(command)
+    _add_json(command)
+
+
 def _add_info(commands) -> None:
     command = _command(commands, "info", "what a scene file holds, and what pruning saved")
-    command.add_argument("scene", type=Path, metavar="SCENE", help=".langflash, .ply or .splat")
+    command.add_argument("scene", type=Path, metavar="SCENE", help=".langflash or a splat file")
     _add_json(command)
 
 

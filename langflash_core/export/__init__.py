@@ -1,11 +1,26 @@
-"""Scenes and answers out: one table from a file's suffix to what writes (or reads) it."""
+"""Scenes and answers out: one table from what a file's name ends in to what writes (or reads) it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from langflash_core.errors import OutputError, SceneFileError
-from langflash_core.export import coco, glb, npz, ply, png, splat
+from langflash_core.export import (
+    cameras,
+    coco,
+    compressed_ply,
+    glb,
+    gltf,
+    ksplat,
+    npz,
+    ply,
+    png,
+    sog,
+    splat,
+    spz,
+    usd,
+)
+from langflash_core.formats import COMPRESSED_PLY, SOG_FOLDER, USD, kind_of
 from langflash_core.scene.file import load, save
 from langflash_core.types import Frame, QueryResult, Scene
 
@@ -28,15 +43,40 @@ WRITERS: dict[str, tuple[Writer, ...]] = {
         Writer(QueryResult, "an answer", png.write_answer),
     ),
     ".npz": (Writer(QueryResult, "an answer", npz.write_npz),),
-    ".glb": (Writer(QueryResult, "an answer", glb.write_answer),),
     ".json": (Writer(QueryResult, "an answer", coco.write_answer),),
     ".ply": (Writer(Scene, "a scene", ply.write_ply),),
+    COMPRESSED_PLY: (Writer(Scene, "a scene", compressed_ply.write_compressed_ply),),
     ".splat": (Writer(Scene, "a scene", splat.write_splat),),
+    ".spz": (Writer(Scene, "a scene", spz.write_spz),),
+    ".sog": (Writer(Scene, "a scene", sog.write_sog),),
+    SOG_FOLDER: (Writer(Scene, "a scene", sog.write_sog),),
+    ".glb": (
+        Writer(Scene, "a scene", gltf.write_glb),
+        Writer(QueryResult, "an answer", glb.write_answer),
+    ),
+    cameras.COLMAP: (Writer(Scene, "a scene", cameras.write_colmap),),
+    cameras.TRANSFORMS: (Writer(Scene, "a scene", cameras.write_transforms),),
+    **{suffix: (Writer(Scene, "a scene", usd.write_usd),) for suffix in USD},
 }
+
+
+def _read_any_ply(path: Path) -> Scene:
+    """A .ply by what its header declares, whatever stands before the suffix."""
+    packed = compressed_ply.is_compressed(path)
+    return compressed_ply.read_compressed_ply(path) if packed else ply.read_ply(path)
+
+
 READERS: dict[str, Callable[[Path], Scene]] = {
     ".langflash": load,
-    ".ply": ply.read_ply,
+    ".ply": _read_any_ply,
     ".splat": splat.read_splat,
+    ".spz": spz.read_spz,
+    ".sog": sog.read_sog,
+    SOG_FOLDER: sog.read_sog,
+    ".ksplat": ksplat.read_ksplat,
+    ".glb": gltf.read_gltf,
+    ".gltf": gltf.read_gltf,
+    **dict.fromkeys(USD, usd.read_usd),
 }
 
 
@@ -47,7 +87,7 @@ def export(subject: Scene | Frame | QueryResult, path: Path | str) -> None:
         OutputError: unknown suffix, a suffix that cannot hold this subject, or an unwritable path.
     """
     path = Path(path)
-    suffix = path.suffix.lower()
+    suffix = kind_of(path)
     writers = WRITERS.get(suffix)
     if writers is None:
         known = ", ".join(sorted(WRITERS))
@@ -71,7 +111,7 @@ def read(path: Path | str) -> Scene:
         SceneFileError: unknown suffix, or what the reader finds wrong.
     """
     path = Path(path)
-    reader = READERS.get(path.suffix.lower())
+    reader = READERS.get(kind_of(path), READERS.get(path.suffix.lower()))
     if reader is None:
         known = ", ".join(sorted(READERS))
         raise SceneFileError(f"{path.name} is not a scene this program reads; name a file ending in {known}")

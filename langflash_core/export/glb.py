@@ -1,7 +1,7 @@
 """Boxes of phrases as binary glTF, for Blender, game engines and web viewers.
 
-glTF has +y up and +z towards the viewer; scenes have +y down and +z forward. One half turn about x
-leads from one to the other.
+glTF has +x to the left, +y up and +z forward; scenes have +x to the right and +y down. One half turn
+about z leads from one to the other, as for the splats (`gltf.py`), so that both lie together.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from langflash_core.export.colours import label_colours
 from langflash_core.files import write_atomically
 from langflash_core.types import QueryResult
 
-_TO_GLTF = np.diag([1.0, -1.0, -1.0, 1.0])
+_TO_GLTF = np.diag([-1.0, -1.0, 1.0, 1.0])
 _OPACITY = 0.35  # what stands in the box stays visible
 _THINNEST = 1e-3  # of the longest side: a flat thing still gets a body
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.lib.recfunctions import structured_to_unstructured
 
 from langflash_core.errors import SceneFileError
+from langflash_core.export.language import packed_language, side_car, speaks, with_language
 from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, logit, parts, to_scene
 from langflash_core.files import write_atomically
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
@@ -61,7 +62,7 @@ class _Layout:
 
 
 def read_ply(path: Path) -> Scene:
-    """A scene without language from a 3DGS .ply.
+    """A scene from a 3DGS .ply, with the language of the side-car that `write_ply` put beside it.
 
     Raises:
         SceneFileError: missing, no such PLY, cut off, or without a usable Gaussian.
@@ -82,16 +83,20 @@ def read_ply(path: Path) -> Scene:
         warnings.append("All opacities lie between 0 and 1, so they are taken as they are, not as logits.")
     if not logs:
         warnings.append("The scales are no logarithms (they would fill the scene); taken as lengths.")
-    return to_scene(gathering, path.name, warnings, logs=logs, logits=logits)
+    scene = to_scene(gathering, path.name, warnings, logs=logs, logits=logits)
+    beside = side_car(path)
+    return with_language(scene, beside.read_bytes(), beside.name) if beside.is_file() else scene
 
 
 def write_ply(scene: Scene, path: Path) -> None:
-    """The Gaussians of a scene, as viewers of 3D Gaussian Splatting read them.
+    """The Gaussians of a scene, as viewers of 3D Gaussian Splatting read them; its language beside it.
 
     Raises:
         OutputError: the path cannot be written.
     """
     write_atomically(path, _encoded(scene.gaussians))
+    if speaks(scene):
+        write_atomically(side_car(path), packed_language(scene))
 
 
 def _encoded(gaussians: Gaussians) -> Iterator[bytes]:
@@ -115,10 +120,32 @@ def _encoded(gaussians: Gaussians) -> Iterator[bytes]:
 
 
 def _read_layout(stream: BinaryIO, name: str) -> _Layout:
-    """Read a header.
+    """Where the Gaussians are.
 
     Raises:
         SceneFileError: it is no PLY, or no binary one with Gaussians in it.
+    """
+    order, elements, body, own = read_elements(stream, name)
+    before = 0
+    for index, (element, count, fields) in enumerate(elements):
+        if element == "vertex":
+            row = _row(fields, order, name)
+            after = [bytes_of(count, fields, order) for _, count, fields in elements[index:]]
+            start = body + before
+            end = None if None in after else start + sum(size or 0 for size in after)
+            return _Layout(count, row, start, end, own)
+        size = bytes_of(count, fields, order)
+        if size is None:
+            raise SceneFileError(f"{name} has lists ({element}) before its points; {_REMEDY}")
+        before += size
+    raise SceneFileError(f"{name} has no points (element vertex), so no Gaussians; {_REMEDY}")
+
+
+def read_elements(stream: BinaryIO, name: str) -> tuple[str, list["_Element"], int, bool]:
+    """A header: byte order, elements, the byte where they begin, and whether this program wrote it.
+
+    Raises:
+        SceneFileError: it is no binary PLY.
     """
     head = stream.read(_MAX_HEADER)
     if not head:
@@ -130,20 +157,7 @@ def _read_layout(stream: BinaryIO, name: str) -> _Layout:
         state = "cut off inside its header" if len(head) < _MAX_HEADER else "damaged: its header does not end"
         raise SceneFileError(f"{name} is {state}; {_REMEDY}")
     lines = [line.split() for line in head[: ended.start()].decode("latin-1").splitlines()]
-    order, elements = _elements(lines, name)
-    before = 0
-    for index, (element, count, fields) in enumerate(elements):
-        if element == "vertex":
-            row = _row(fields, order, name)
-            after = [_bytes_of(count, fields, order) for _, count, fields in elements[index:]]
-            start = ended.end() + before
-            end = None if None in after else start + sum(size or 0 for size in after)
-            return _Layout(count, row, start, end, _OWN.encode() in head[: ended.start()])
-        size = _bytes_of(count, fields, order)
-        if size is None:
-            raise SceneFileError(f"{name} has lists ({element}) before its points; {_REMEDY}")
-        before += size
-    raise SceneFileError(f"{name} has no points (element vertex), so no Gaussians; {_REMEDY}")
+    return *_elements(lines, name), ended.end(), _OWN.encode() in head[: ended.start()]
 
 
 _Element = tuple[str, int, list[tuple[str, str]]]
@@ -180,8 +194,6 @@ def _row(fields: list[tuple[str, str]], order: str, name: str) -> np.dtype:
     num_rest = sum(field.startswith("f_rest_") for field in names)
     if lists:
         raise SceneFileError(f"{name} has a list ({lists[0]}) among the points' numbers; {_REMEDY}")
-    if "packed_position" in names:
-        raise SceneFileError(f"{name} is a compressed PLY; save it uncompressed, for example in SuperSplat")
     if missing:
         kind = "a mesh or point cloud" if "opacity" in missing else "incomplete"
         raise SceneFileError(f"{name} is {kind}: its points have no {', '.join(missing[:3])}; {_REMEDY}")
@@ -192,7 +204,7 @@ def _row(fields: list[tuple[str, str]], order: str, name: str) -> np.dtype:
     return np.dtype([(field, order + kind) for kind, field in fields])
 
 
-def _bytes_of(count: int, fields: list[tuple[str, str]], order: str) -> int | None:
+def bytes_of(count: int, fields: list[tuple[str, str]], order: str) -> int | None:
     """Bytes of an element, None where lists make it unknown."""
     if any(kind == "list" for kind, _ in fields):
         return None if count else 0

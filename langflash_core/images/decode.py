@@ -89,7 +89,8 @@ def read_photo(path: Path, name: str | None = None) -> Photo:
     except MemoryError as error:
         raise ImageError(f"{name} does not fit into memory; scale it down first") from error
     except _DAMAGE as error:
-        raise ImageError(f"{name} is damaged or incomplete ({error}); copy or export it again") from error
+        said = " ".join(str(error).split())  # what decoders say may have line breaks
+        raise ImageError(f"{name} is damaged or incomplete ({said}); copy or export it again") from error
 
 
 def grey_photo(path: Path) -> np.ndarray:

@@ -127,7 +127,8 @@ class GuidedDepthNet(LangFlashNet):
             prior = self.depth_head(levels, tokens)
         with run.stage("poses"):
             local = self.local(images[0])
-            poses = estimate_poses(self._pose_inputs(views, prior, local), _key_points(views, run), run.check)
+            inputs = self._pose_inputs(views, prior, local)
+            poses = estimate_poses(inputs, _key_points(views, run), run.check, _known(views))
             viewmats = torch.from_numpy(poses.viewmats).to(images)[None]
         with run.stage("refinement"):
             maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)
@@ -167,6 +168,11 @@ class GuidedDepthNet(LangFlashNet):
             )
             for v in range(views.num_views)
         ]
+
+
+def _known(views: Views) -> np.ndarray | None:
+    """Poses that were given, float64, world = view 0."""
+    return None if views.viewmats is None else views.viewmats.double().cpu().numpy()
 
 
 def _corrected(log_depths: Tensor, K: Tensor, correction: Correction) -> Tensor:

@@ -103,6 +103,7 @@ def _placed(prediction: Prediction, views: Views) -> tuple[Prediction, Views]:
             images=views.images[keep],
             Ks=views.Ks[keep],
             names=tuple(views.names[v] for v in keep),
+            viewmats=None if views.viewmats is None else views.viewmats[keep],
             sources=tuple(views.sources[v] for v in keep) if views.sources else (),
         ),
     )

@@ -1,5 +1,7 @@
 """Small random splats, and a PLY writer of the tests' own that can also write what is wrong."""
 
+import struct
+
 import numpy as np
 import torch
 from torch.nn.functional import normalize
@@ -114,3 +116,46 @@ def damaged_files() -> dict[str, tuple[bytes, str]]:
             "uncompressed",
         ),
     }
+
+
+def ksplat_bytes(gaussians: Gaussians, level: int) -> bytes:
+    """A .ksplat of one section: full buckets of 256 and partial ones, after GaussianSplats3D's layout."""
+    means, sh = gaussians.means.numpy(), gaussians.sh.numpy()
+    count, degree = len(means), int(sh.shape[1] ** 0.5) - 1
+    # Buckets that the section's order gives; each as wide as the whole scene, so all positions fit.
+    side, capacity, steps = 5.0 * 4, 256, 32767
+    full, sizes = count // capacity, [100, count % capacity - 100]
+    buckets = np.split(np.arange(count), [capacity * (i + 1) for i in range(full)] + [capacity * full + 100])
+    centres = np.stack([means[bucket].mean(0) for bucket in buckets]).astype("<f4")
+    own = np.concatenate([np.full(len(bucket), index) for index, bucket in enumerate(buckets)])
+    number = ("<f4", "<f2", "<f2")[level]
+    rest = np.concatenate(
+        [
+            sh[:, each**2 : (each + 1) ** 2].transpose(0, 2, 1).reshape(count, -1)
+            for each in range(1, degree + 1)
+        ]
+        or [np.zeros((count, 0), np.float32)],
+        1,
+    )
+    if level == 2:
+        rest = np.round((rest.clip(-1.5, 1.5) + 1.5) / 3 * 255).astype("u1")
+    places = means.astype("<f4")
+    if level:
+        places = np.round((means - centres[own]) / (side / 2) * steps + steps).clip(0, 65535).astype("<u2")
+    colours = np.concatenate((0.5 + 0.28209479177387814 * sh[:, 0], gaussians.opacities.numpy()[:, None]), 1)
+    columns = (
+        places,
+        gaussians.scales.numpy().astype(number),
+        gaussians.quats.numpy().astype(number),
+        np.round(colours.clip(0, 1) * 255).astype("u1"),
+        rest if level == 2 else rest.astype(number),
+    )
+    rows = [np.ascontiguousarray(column).view("u1").reshape(count, -1) for column in columns]
+    body = np.array(sizes, "<u4").tobytes() + centres.tobytes() if level else b""
+    body += np.concatenate(rows, 1).tobytes()
+    main = struct.pack("<BBxxIIIIH14xff", 0, 1, 1, 1, count, count, level, 0, 0)
+    section = struct.pack(
+        "<IIIIfHxxI4xIIH", count, count, capacity, len(buckets) if level else 0, side,
+        12 if level else 0, 0, full if level else 0, len(sizes) if level else 0, degree,
+    )  # fmt: skip
+    return main.ljust(4096, b"\0") + section.ljust(1024, b"\0") + body

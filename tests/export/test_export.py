@@ -159,12 +159,12 @@ def test_places_and_suffixes_that_cannot_be(tmp_path, result):
         (lambda: export(result, blocker / "a.npz"), "is a file"),
         (lambda: export(result, tmp_path / "nowhere" / "a.png"), "does not exist"),
         (lambda: export(result.frame, tmp_path), "suffix"),
-        (lambda: export(result, tmp_path / "a.xyz"), r"use \.json, \.langflash, \.npz, \.ply, \.png"),
-        (lambda: export(result, tmp_path / "a.langflash"), r"holds a scene; use \.json, \.npz, \.png"),
+        (lambda: export(result, tmp_path / "a.xyz"), r"use \.compressed\.ply, \.glb, \.json, "),
+        (lambda: export(result, tmp_path / "a.langflash"), r"holds a scene; use \.glb, \.json, \.npz, \.png"),
     ):
         with pytest.raises(OutputError, match=words) as caught:
             attempt()
         assert "\n" not in str(caught.value) and ";" in str(caught.value)
     assert os.listdir(tmp_path) == ["file"] and blocker.read_bytes() == b"in the way"
-    with pytest.raises(SceneFileError, match=r"ending in \.langflash"):
+    with pytest.raises(SceneFileError, match=r"name a file ending in"):
         read(tmp_path / "scene.obj")

@@ -32,7 +32,7 @@ def test_a_box_stands_where_it_was_found(tmp_path):
     scene = written(tmp_path, [("armchair", CHAIR)])
     pose, name = scene.graph["armchair"]
     there = trimesh.transform_points(scene.geometry[name].vertices, pose)
-    expected = corners(CHAIR) * [1, -1, -1]  # y up, z towards the viewer
+    expected = corners(CHAIR) * [-1, -1, 1]  # x to the left, y up
     distances = np.linalg.norm(there[:, None] - expected[None], axis=2)
     assert distances.min(0).max() < 1e-5 and distances.min(1).max() < 1e-5
     assert scene.geometry[name].volume == pytest.approx(0.6 * 1.0 * 0.4, rel=1e-5)

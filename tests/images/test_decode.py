@@ -162,6 +162,16 @@ def test_a_folder_and_a_missing_file(tmp_path):
         read_photo(tmp_path / "nowhere.jpg")
 
 
+def test_what_a_decoder_says_over_several_lines_becomes_one(tmp_path, monkeypatch):
+    def broken(_, __):
+        raise RuntimeError("Invalid input:\n  no 'pitm' box\n")
+
+    monkeypatch.setattr("langflash_core.images.decode._decode", broken)
+    (tmp_path / "a.heic").write_bytes(b"heic")
+    with pytest.raises(ImageError, match=r"\(Invalid input: no 'pitm' box\); copy"):
+        read_photo(tmp_path / "a.heic")
+
+
 @pytest.mark.parametrize("kind", ["JPEG", "PNG", "WEBP", "TIFF", "HEIF"])
 def test_damage_anywhere_gives_pixels_or_an_image_error(tmp_path, kind):
     """Random flips and cuts: decoders may repair or refuse, nothing else may come out."""

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TextIO
 
 from langflash_core.errors import InputError, PromptError, SceneFileError
+from langflash_core.formats import CAMERAS_OUT, SCENES_OUT, kind_of
 from langflash_core.types import Camera, QueryResult, Scene
 
 from .. import shots
@@ -16,8 +17,7 @@ from ..report import ProgressBar
 from ..scenes import open_scene
 from .query import spoken
 
-SCENES = (".langflash", ".ply", ".splat")
-SUFFIXES = (".png", *SCENES, ".json", ".csv", ".mp4", ".npz", ".glb")
+SUFFIXES = (".png", *SCENES_OUT, *CAMERAS_OUT, ".json", ".csv", ".mp4", ".npz")
 TABLES = {".json": ".json of masks", ".csv": ".csv of boxes", ".glb": ".glb of boxes"}
 NEED_A_PHRASE = ("heat", "mask", "cutout", "labels", "boxes")
 
@@ -30,7 +30,7 @@ def run(args: Namespace, out: TextIO) -> None:
             nothing answers.
     """
     prompts = spoken(args.prompt or [])
-    suffix = check_output_file(args.output, SUFFIXES, inputs=[args.scene]).suffix.lower()
+    suffix = kind_of(check_output_file(args.output, SUFFIXES, inputs=[args.scene]))
     _check_words(args, suffix, prompts)
     choice = chosen_camera(args)
     readable_file(args.scene, "scene", SceneFileError)
@@ -42,7 +42,7 @@ def run(args: Namespace, out: TextIO) -> None:
         write = _write_video
     elif suffix == ".json":
         write = _write_boxes if args.what == "boxes" else _write_masks
-    elif suffix in (".csv", ".glb"):
+    elif suffix == ".csv" or (suffix == ".glb" and args.what == "boxes"):
         write = _write_boxes
     elif suffix == ".npz":
         write = _write_numbers
@@ -59,7 +59,7 @@ def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
     """
     if args.threshold is not None and not prompts:
         raise PromptError('--threshold needs a phrase; add --prompt "armchair"')
-    if not prompts and (suffix in TABLES or args.what in NEED_A_PHRASE):
+    if not prompts and (suffix in (".json", ".csv") or args.what in NEED_A_PHRASE):
         what = f"--what {args.what}" if args.what in NEED_A_PHRASE else f"a {TABLES.get(suffix)}"
         raise PromptError(f'{what} needs a phrase; add --prompt "armchair"')
     if args.what == "heat" and len(prompts) > 1:
@@ -81,7 +81,7 @@ def _check_camera_words(args: Namespace, suffix: str) -> None:
         if set(looked_at) - {"size"}:
             raise InputError(f"--all-views looks from every photo; leave --{looked_at[0]} away")
         looked_at.append("all-views")
-    if suffix in SCENES and looked_at:
+    if suffix in (*SCENES_OUT, *CAMERAS_OUT) and looked_at and args.what != "boxes":
         raise InputError(f"a {suffix} holds the whole scene, not a view of it; leave --{looked_at[0]} away")
     extra = [name for name in looked_at if name != "size"]
     if suffix == ".mp4" and extra:
@@ -90,13 +90,21 @@ def _check_camera_words(args: Namespace, suffix: str) -> None:
 
 def _write_scene(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
     from langflash_core.export import export
+    from langflash_core.export.language import side_car
     from langflash_core.files import make_folder
 
     chosen = _selected(args, scene, prompts)
     make_folder(args.output.parent)
     export(chosen, args.output)
+    if kind_of(args.output) in CAMERAS_OUT:
+        return f"{scene.num_views} photos in images/ and their poses"
     share = f" of {len(scene.gaussians):,}" if prompts else ""
-    return f"{len(chosen.gaussians):,}{share} Gaussians, {args.output.stat().st_size / 1e6:.1f} MB"
+    beside = f", its language in {side_car(args.output).name}" if _has_side_car(args.output, chosen) else ""
+    return f"{len(chosen.gaussians):,}{share} Gaussians, {args.output.stat().st_size / 1e6:.1f} MB{beside}"
+
+
+def _has_side_car(path: Path, scene: Scene) -> bool:
+    return kind_of(path) == ".ply" and scene.semantics.num_atoms > 0
 
 
 def _selected(args: Namespace, scene: Scene, prompts: list[str]) -> Scene:

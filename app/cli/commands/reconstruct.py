@@ -5,7 +5,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TextIO
 
-from langflash_core.errors import ImageError, WeightsError
+from langflash_core.errors import ImageError, InputError, WeightsError
 
 from ..files import check_output_file, readable_file
 from ..report import ProgressBar, say_warnings, write_json
@@ -23,21 +23,28 @@ def run(args: Namespace, out: TextIO) -> None:
     if args.weights is not None:
         readable_file(args.weights, "checkpoint", WeightsError)
     check_output_file(args.output, (".langflash",), inputs=args.photos)
+    if args.poses and (args.fov is not None or args.intrinsics is not None):
+        raise InputError("--poses says the lens too; leave --fov and --intrinsics away")
     from langflash_core.ahead import begin
 
     ahead = begin(args.photos, preset=args.preset, weights=args.weights, size=args.size)
     ahead.check_photos()
     from langflash_core import pipeline
+    from langflash_core.export.cameras import read_posed
     from langflash_core.scene.file import save
     from langflash_core.scene.report import describe
 
+    lens, viewmats = {"fov": args.fov, "intrinsics": args.intrinsics}, None
+    if args.poses:
+        posed = read_posed(args.poses).of(args.photos)
+        lens, viewmats = posed.lens(), posed.viewmats
     with ProgressBar() as progress:
         scene = pipeline.reconstruct(
             args.photos,
+            **lens,
+            viewmats=viewmats,
             preset=args.preset,
             weights=args.weights,
-            fov=args.fov,
-            intrinsics=args.intrinsics,
             size=args.size,
             device=args.device,
             precision=args.precision,

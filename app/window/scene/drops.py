@@ -8,11 +8,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from langflash_core.formats import DROPPED
+
 PHOTO_SUFFIXES = frozenset(
     {".jpg", ".jpeg", ".png", ".webp", ".heic", ".heif", ".tif", ".tiff", ".bmp", ".avif"}
 )
 SCENE_SUFFIX = ".langflash"
-SCENE_SUFFIXES = frozenset({SCENE_SUFFIX, ".ply", ".splat"})  # those of langflash_core.export.READERS
+SCENE_SUFFIXES = frozenset(DROPPED)
 MAX_PHOTOS = 8  # what the network was shaped for
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from langflash_core.network.stereo.alignment import NO_CORRECTION, Correction, fit_correction
 from langflash_core.network.stereo.dense import match_cells
 from langflash_core.network.stereo.keypoints import WORKING_SIDE, KeyPoints
+from langflash_core.network.stereo.known import agreeing, depth_scales, log_scales
 from langflash_core.network.stereo.matching import Matches, RelativePose, relative_pose, triangulate
 
 _MIN_SHARE = 0.25  # of the matches must agree with a pose
@@ -44,7 +45,10 @@ class Poses:
 
 
 def estimate_poses(
-    views: list[PoseInput], points: KeyPoints, check: Callable[[], None] = lambda: None
+    views: list[PoseInput],
+    points: KeyPoints,
+    check: Callable[[], None] = lambda: None,
+    known: np.ndarray | None = None,
 ) -> Poses:
     """Poses of all views, deterministic.
 
@@ -53,6 +57,10 @@ def estimate_poses(
 
     Args:
         points: of the same photos, the same crop, in the same order.
+        known: poses (V, 4, 4) that are given, world = view 0: only depths are fitted, to their unit.
+
+    Raises:
+        InputError: the photos do not fit the poses that are given.
     """
     num_views = len(views)
     pairs: dict[tuple[int, int], RelativePose] = {}
@@ -61,6 +69,9 @@ def estimate_poses(
         for j in range(i + 1, num_views):
             check()
             matches = _key_point_matches(views, points, i, j)
+            if known is not None:
+                agreed[i, j] = _agreed(views[i], views[j], matches, known[j] @ np.linalg.inv(known[i]))
+                continue
             pose = _pair_pose(views[i], views[j], matches)
             if pose is None or pose.num_inliers < _FEW:
                 more = _joined(matches, _dense_matches(views[i], views[j]))
@@ -68,9 +79,31 @@ def estimate_poses(
                 pose, matches = (better, more) if better is not None else (pose, matches)
             if pose is not None:
                 pairs[i, j], agreed[i, j] = pose, matches.subset(pose.inliers)
-    viewmats, scales, guessed = _chain(num_views, pairs)
+    if known is None:
+        viewmats, scales, guessed = _chain(num_views, pairs)
+    else:
+        viewmats, scales, guessed = known, _known_scales(views, known, agreed), ()
     corrections = [_correction(v, views[v], viewmats, scales[v], agreed) for v in range(num_views)]
     return Poses(viewmats, scales, tuple(corrections), guessed)
+
+
+def _agreed(view_i: PoseInput, view_j: PoseInput, matches: Matches, relative: np.ndarray) -> Matches:
+    """Matches that a known relative pose allows; dense ones as well where few do."""
+    own = agreeing(matches, relative)
+    return own if len(own) >= _FEW else agreeing(_joined(matches, _dense_matches(view_i, view_j)), relative)
+
+
+def _known_scales(
+    views: list[PoseInput], viewmats: np.ndarray, agreed: dict[tuple[int, int], Matches]
+) -> np.ndarray:
+    """Factors (V,) that bring each depth map to the unit of known poses; 1 for a single photo."""
+    said: list[list[np.ndarray]] = [[np.zeros(0)] for _ in views]
+    for (i, j), matches in agreed.items():
+        relative = viewmats[j] @ np.linalg.inv(viewmats[i])
+        depths = _depths_at(views[i], matches.x_i), _depths_at(views[j], matches.x_j)
+        for view, logs in zip((i, j), log_scales(matches, relative, *depths), strict=True):
+            said[view].append(logs)
+    return np.ones(1) if len(views) == 1 else depth_scales([np.concatenate(own) for own in said])
 
 
 def _pair_pose(view_i: PoseInput, view_j: PoseInput, matches: Matches) -> RelativePose | None:

@@ -189,7 +189,9 @@ def test_bad_picture(refused, scene_file, tmp_path, words, hint):
 def test_only_png(refused, scene_file, tmp_path, name):
     assert ".png" in refused("render", scene_file, "-o", tmp_path / name)
     if not name.endswith(".ply"):
-        assert ".png, .langflash, .ply, .splat" in refused("export", scene_file, "-o", tmp_path / name)
+        assert ".png, .langflash, .ply, .compressed.ply, .splat" in refused(
+            "export", scene_file, "-o", tmp_path / name
+        )
 
 
 def test_export_of_what_is_not_there(refused, scene_file, tmp_path):

@@ -30,11 +30,11 @@ def test_three_files_say_the_same(run, scene_file, tmp_path):
     bodies = trimesh.load_scene(exported(run, scene_file, tmp_path / "a.glb"))
     assert list(bodies.geometry) == ["armchair (view 0)"]
     (corners,) = bodies.bounds[None]
-    np.testing.assert_allclose(corners.mean(0), np.array(box["center"]) * [1, -1, -1], atol=1e-5)
+    np.testing.assert_allclose(corners.mean(0), np.array(box["center"]) * [-1, -1, 1], atol=1e-5)
 
 
-def test_a_suffix_alone_means_boxes(run, scene_file, tmp_path):
-    words = ("--prompt", "armchair", "--all-views", "--backend", "torch")
+def test_every_photo_has_its_boxes(run, scene_file, tmp_path):
+    words = ("--what", "boxes", "--prompt", "armchair", "--all-views", "--backend", "torch")
     outcome = run("export", scene_file, *words, "-o", tmp_path / "a.glb")
     assert outcome.code == 0, outcome
     views = json.loads(run("info", scene_file, "--json").out)["views"]
@@ -44,8 +44,8 @@ def test_a_suffix_alone_means_boxes(run, scene_file, tmp_path):
 @pytest.mark.parametrize(
     ("name", "words", "hint"),
     [
-        ("a.glb", (), "--prompt"),
-        ("a.glb", ("--prompt", "submarine", "--backend", "torch"), "lower the threshold"),
+        ("a.glb", ("--what", "boxes"), "--prompt"),
+        ("a.glb", ("--what", "boxes", "--prompt", "submarine", "--backend", "torch"), "lower the threshold"),
         ("a.png", ("--what", "boxes", "--prompt", "armchair"), ".json, .csv or .glb"),
     ],
 )

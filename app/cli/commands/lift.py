@@ -1,0 +1,60 @@
+"""`langflash lift`: plain splats that answer phrases afterwards."""
+
+import time
+from argparse import Namespace
+from typing import TextIO
+
+from langflash_core.errors import ImageError, InputError, WeightsError
+
+from ..files import check_output_file, readable_file
+from ..renderers import open_renderer
+from ..report import ProgressBar, write_json
+from ..scenes import open_scene
+
+SUFFIXES = (".langflash", ".ply", ".glb")
+
+
+def run(args: Namespace, out: TextIO) -> None:
+    """Draw views of the scene, or take photos with poses, and carry back what the network sees in them.
+
+    Raises:
+        LangFlashError: the scene, a photo, the poses, the weights or the output cannot be used.
+    """
+    start = time.perf_counter()
+    if args.photos and not args.poses:
+        raise InputError("photos need --poses, a transforms.json or a COLMAP text model in the scene's world")
+    for photo in args.photos or ():
+        readable_file(photo, "photo", ImageError)
+    if args.weights is not None:
+        readable_file(args.weights, "checkpoint", WeightsError)
+    check_output_file(args.output, SUFFIXES, inputs=[args.scene, *(args.photos or ())])
+    scene = open_scene(args.scene)
+    from langflash_core.export import export
+    from langflash_core.files import make_folder
+    from langflash_core.lift import lift, posed_views
+
+    views, viewmats = posed_views(args.poses, args.photos or ()) if args.poses else (None, None)
+    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+        lifted = lift(
+            scene,
+            views,
+            viewmats,
+            render=lambda scene, camera: renderer(scene, camera, weight_maps=False),
+            weights=args.weights,
+            progress=progress,
+        )
+        make_folder(args.output.parent)
+        export(lifted, args.output)
+    document = {
+        "scene": str(args.output),
+        "gaussians": len(lifted.gaussians),
+        "seen": lifted.record.counts["seen"],
+        "atoms": lifted.semantics.num_atoms,
+        "views": lifted.num_views,
+        "seconds": round(time.perf_counter() - start, 3),
+    }
+    if args.json:
+        write_json(document, out)
+    else:
+        told = f"{len(lifted.gaussians):,} Gaussians in {lifted.semantics.num_atoms} groups"
+        print(f"{args.output}: {told} from {lifted.num_views} views, {document['seconds']:.1f} s", file=out)

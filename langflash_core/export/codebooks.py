@@ -1,0 +1,56 @@
+"""Few values that stand for many: scalar codebooks and palettes of vectors, by k-means.
+
+The result is the same in every run: starts are spread over the sorted data, and the steps are Lloyd's.
+Source: Lloyd, "Least squares quantization in PCM", 1982.
+"""
+
+import numpy as np
+import torch
+
+_SCALAR_STEPS, _VECTOR_STEPS = 24, 5
+_PAIRS_AT_ONCE = 1 << 26  # distances: 256 MB
+
+
+def scalar_codebook(values: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """At most `size` sorted values, float32, and for each of `values` (any shape) the nearest's index.
+
+    Half of them start at even ranks, half at even values, so that neither dense nor rare ones suffer.
+    """
+    ordered = np.sort(values.astype(np.float64), axis=None)
+    distinct = np.unique(ordered)
+    if len(distinct) <= size:
+        book = distinct
+    else:
+        sums = np.concatenate(([0.0], np.cumsum(ordered)))
+        ranks = ordered[np.linspace(0, len(ordered) - 1, size - size // 2).astype(int)]
+        book = np.unique(np.concatenate((ranks, np.linspace(ordered[0], ordered[-1], size // 2))))
+        for _ in range(_SCALAR_STEPS):
+            ends = np.searchsorted(ordered, (book[1:] + book[:-1]) / 2)
+            starts, ends = np.concatenate(([0], ends)), np.concatenate((ends, [len(ordered)]))
+            filled = ends > starts
+            book = book[filled]
+            book = (sums[ends[filled]] - sums[starts[filled]]) / (ends - starts)[filled]
+    places = np.searchsorted((book[1:] + book[:-1]) / 2, values.astype(np.float64))
+    return book.astype(np.float32), places
+
+
+def palette(vectors: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """At most `size` vectors (k, d) float32, and for each of `vectors` (n, d) the nearest's index (n,)."""
+    distinct, places = np.unique(vectors.astype(np.float32), axis=0, return_inverse=True)
+    if len(distinct) <= size:
+        return distinct, places.reshape(-1)
+    points = torch.from_numpy(np.ascontiguousarray(vectors, np.float32))
+    centres = torch.from_numpy(distinct[np.linspace(0, len(distinct) - 1, size).astype(int)])
+    for _ in range(_VECTOR_STEPS):
+        nearest = _nearest(points, centres)
+        sums = torch.zeros_like(centres).index_add_(0, nearest, points)
+        counts = torch.bincount(nearest, minlength=len(centres))
+        centres = torch.where(counts[:, None] > 0, sums / counts.clamp_min(1)[:, None], centres)
+    return centres.numpy(), _nearest(points, centres).numpy()
+
+
+def _nearest(points: torch.Tensor, centres: torch.Tensor) -> torch.Tensor:
+    """The nearest centre (n,) of points (n, d): |c|^2 - 2 p c is smallest where |p - c|^2 is."""
+    norms = (centres**2).sum(1)
+    step = max(1, _PAIRS_AT_ONCE // len(centres))
+    return torch.cat([(norms - 2 * part @ centres.T).argmin(1) for part in points.split(step)])

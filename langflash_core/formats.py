@@ -1,0 +1,23 @@
+"""Which scene files there are, by name alone: light enough for the command line and the window to ask.
+
+A name ends in a suffix, or in `.compressed.ply`, or is a whole one:
+`meta.json` is a SOG in a folder, `cameras.txt` COLMAP's model in one.
+"""
+
+from pathlib import Path
+
+COMPRESSED_PLY = ".compressed.ply"
+SOG_FOLDER = "meta.json"
+USD = (".usd", ".usda", ".usdc", ".usdz")
+SCENES_IN = (".langflash", ".ply", ".splat", ".spz", ".sog", SOG_FOLDER, ".ksplat", ".glb", ".gltf", *USD)
+SCENES_OUT = (".langflash", ".ply", COMPRESSED_PLY, ".splat", ".spz", ".sog", SOG_FOLDER, ".glb", *USD)
+CAMERAS_OUT = ("cameras.txt", "transforms.json")  # and the photos, in images/ beside
+DROPPED = tuple(kind for kind in SCENES_IN if kind.startswith("."))  # a meta.json may be anything
+
+
+def kind_of(path: Path) -> str:
+    """What the name of a file says it is: its suffix in lower case, or one of the longer names above."""
+    name = path.name.lower()
+    if name in (SOG_FOLDER, *CAMERAS_OUT):
+        return name
+    return COMPRESSED_PLY if name.endswith(COMPRESSED_PLY) else path.suffix.lower()

@@ -1,0 +1,240 @@
+"""Language for plain splats: views of them through the network, what it sees carried back to the Gaussians.
+
+    views (of the scene itself, or photos with poses) -> network: w_k(x) per view and one dictionary
+    -> w_ik = sum c_ip w_k(p) / sum c_ip, with c_ip what Gaussian i adds to pixel p (`splat.backprojection`)
+
+Nothing is trained. What no view shows takes the weights of the nearest Gaussian that one does.
+"""
+
+import io
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from PIL import Image
+from scipy.spatial import KDTree
+from torch import Tensor
+
+from langflash_core.errors import Cancelled, InputError
+from langflash_core.export.cameras import read_posed
+from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.images.pictures import fitting_size
+from langflash_core.images.views import load_views
+from langflash_core.network import PRESETS, load_network
+from langflash_core.network.posed import posed_semantics
+from langflash_core.scene.assemble import sparse_weights
+from langflash_core.scene.bare import framing_camera
+from langflash_core.splat import render as render_reference
+from langflash_core.splat.backprojection import gathered
+from langflash_core.types import Camera, Frame, Scene, Semantics, Views
+
+PRESET = "mini"
+VIEWS = 8  # what the network was shaped for
+_CLOSER = 0.85  # of the framing camera's distance: things fill more of each view
+_ELEVATIONS = (15.0, 35.0)  # degrees above the horizon, in turn
+_GREY = 0.5  # behind what a view shows, as behind transparent photos
+_COVERED = 0.5  # alpha from which a pixel speaks of the scene
+_SEEN = 1e-3  # sum of c_ip below which a Gaussian counts as not seen
+_TOP = 8  # weights kept per Gaussian
+_QUALITY = 88
+Progress = Callable[[str, float], None]
+Renderer = Callable[[Scene, Camera], Frame]
+
+
+def lift(
+    scene: Scene,
+    photos: Views | None = None,
+    viewmats: Tensor | None = None,
+    *,
+    render: Renderer | None = None,
+    weights: Path | None = None,
+    progress: Progress = lambda _, __: None,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> Scene:
+    """A plain scene with groups, a dictionary, and the views that they were seen in.
+
+    Args:
+        scene: any; what language it has is replaced.
+        photos, viewmats: V views and their poses (V, 4, 4) in the scene's world; None: views of the
+            scene itself, around its middle.
+        render: draws colour and depth; None: the reference in torch. weights: a checkpoint of `mini`.
+        progress: called with the step and its place in [0, 1]. cancelled: asked between steps and views.
+
+    Raises:
+        InputError: the photos show nothing of the scene, or the network sees nothing in the views.
+        WeightsError: the checkpoint is missing or does not fit. Cancelled: `cancelled()` became true.
+    """
+    draw = render or render_reference
+    if photos is None or viewmats is None:
+        cameras = cameras_around(scene)
+    else:
+        cameras = [Camera(v, K, *photos.size) for v, K in zip(viewmats, photos.Ks, strict=True)]
+    frames = []
+    for index, camera in enumerate(cameras):
+        _check(cancelled)
+        progress("drawing", 0.3 * index / len(cameras))
+        frames.append(draw(scene, camera))
+    _check_shown(frames)
+    views = photos if photos is not None else own_views(frames, cameras)
+    _check(cancelled)
+    progress("network", 0.3)
+    network = load_network(PRESET, weights, "cpu")
+    depths = torch.stack([frame.depths.float() for frame in frames])
+    world = torch.stack([camera.viewmat for camera in cameras])
+    unit = float(depths[0][depths[0] > 0].mean())
+    relative = world @ invert_rigid(world[0])
+    relative = torch.cat((relative[:, :, :3], relative[:, :, 3:]), -1).clone()
+    relative[:, :3, 3] /= unit
+    maps, dictionary = posed_semantics(network, views, relative, depths / unit)
+    if not len(dictionary):
+        raise InputError("the network finds no part in these views; give photos that show more of the scene")
+    sums, totals = _carried_back(scene, cameras, maps, frames, progress, cancelled)
+    progress("done", 1.0)
+    return _spoken(scene, views, cameras, sums, totals, dictionary, network.calibration)
+
+
+def posed_views(poses: Path, photos: Sequence[Path]) -> tuple[Views, Tensor]:
+    """Photos as the network sees them, and their poses (V, 4, 4) in their own world.
+
+    Args:
+        poses: a transforms.json, or a COLMAP text model. photos: those to take; none: all, at most 8,
+            evenly chosen.
+
+    Raises:
+        SceneFileError: the poses cannot be used. ImageError: a photo cannot.
+    """
+    posed = read_posed(poses).of(photos)
+    step = 1 if photos else -(-len(posed.paths) // VIEWS)
+    posed = posed.of(posed.paths[::step])
+    preset = PRESETS[PRESET]
+    views = load_views(posed.paths, area=preset.native_area, multiple=preset.patch, **posed.lens())
+    return views, posed.viewmats.float()
+
+
+def cameras_around(scene: Scene, count: int = VIEWS) -> list[Camera]:
+    """Cameras around what `framing_camera` frames, looking at its middle from two heights; +y is down."""
+    framing = framing_camera(scene.gaussians)
+    means = scene.gaussians.means[scene.gaussians.opacities >= 0.1]
+    means = means if len(means) else scene.gaussians.means
+    step = max(1, len(means) // 100_000)
+    pose = invert_rigid(framing.viewmat.double())
+    eye, forward = pose[:3, 3], pose[:3, 2]
+    ahead = float((means[::step].double().median(0).values - eye) @ forward)
+    middle, distance = eye + ahead * forward, _CLOSER * ahead
+    size = fitting_size(framing.width, framing.height, PRESETS[PRESET].native_area, PRESETS[PRESET].patch)
+    cameras = []
+    for index in range(count):
+        azimuth = 2 * math.pi * index / count
+        elevation = math.radians(_ELEVATIONS[index % len(_ELEVATIONS)])
+        away = torch.tensor(
+            [
+                math.sin(azimuth) * math.cos(elevation),
+                -math.sin(elevation),
+                -math.cos(azimuth) * math.cos(elevation),
+            ],
+            dtype=torch.float64,
+        )
+        cameras.append(_looking(middle + distance * away, middle, framing, size))
+    return cameras
+
+
+def _looking(eye: Tensor, at: Tensor, like: Camera, size: tuple[int, int]) -> Camera:
+    """A camera at `eye` that looks `at` a point, upright, with the lens of another."""
+    forward = torch.nn.functional.normalize(at - eye, dim=0)
+    down = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64)
+    right = torch.nn.functional.normalize(torch.linalg.cross(down, forward), dim=0)
+    rotation = torch.stack((right, torch.linalg.cross(forward, right), forward))
+    viewmat = torch.eye(4, dtype=torch.float64)
+    viewmat[:3, :3], viewmat[:3, 3] = rotation, -rotation @ eye
+    return Camera(viewmat.float(), like.K, like.width, like.height).resized(*size)
+
+
+def own_views(frames: Sequence[Frame], cameras: Sequence[Camera]) -> Views:
+    """Drawn views as photos, over grey."""
+    images = []
+    for frame in frames:
+        grey = frame.rgb + (1 - frame.alphas[..., None]) * _GREY
+        images.append(grey.clamp(0, 1).permute(2, 0, 1).float())
+    names = tuple(f"view {index}" for index in range(len(frames)))
+    Ks = torch.stack([camera.K.float() for camera in cameras])
+    return Views(torch.stack(images), Ks, names, tuple(_jpeg(image) for image in images))
+
+
+def _jpeg(image: Tensor) -> bytes:
+    stream = io.BytesIO()
+    pixels = (image.permute(1, 2, 0).numpy() * 255).round().astype(np.uint8)
+    Image.fromarray(pixels).save(stream, "JPEG", quality=_QUALITY)
+    return stream.getvalue()
+
+
+def _check(cancelled: Callable[[], bool]) -> None:
+    if cancelled():
+        raise Cancelled("the lifting was cancelled; nothing was written")
+
+
+def _check_shown(frames: Sequence[Frame]) -> None:
+    """Raises:
+    InputError: the first view, or most of them, show nothing.
+    """
+    shown = [float((frame.alphas >= _COVERED).float().mean()) for frame in frames]
+    if not shown[0] or sum(share > 0.02 for share in shown) * 2 <= len(shown):
+        raise InputError(
+            "the views show almost nothing of the scene; check that the poses are in its world and its unit"
+        )
+
+
+def _carried_back(
+    scene: Scene,
+    cameras: Sequence[Camera],
+    maps: Tensor,
+    frames: Sequence[Frame],
+    progress: Progress,
+    cancelled,
+) -> tuple[Tensor, Tensor]:
+    """Sums (N, K) and totals (N,) over all views."""
+    sums = torch.zeros(len(scene.gaussians), maps.shape[1])
+    totals = torch.zeros(len(scene.gaussians))
+    for index, (camera, values, frame) in enumerate(zip(cameras, maps, frames, strict=True)):
+        _check(cancelled)
+        progress("carrying back", 0.6 + 0.4 * index / len(cameras))
+        trust = (frame.alphas >= _COVERED).float()
+        own, count = gathered(scene.gaussians, camera, values.permute(1, 2, 0), trust)
+        sums += own
+        totals += count
+    return sums, totals
+
+
+def _spoken(
+    scene: Scene, views: Views, cameras: Sequence[Camera], sums: Tensor, totals: Tensor, dictionary: Tensor,
+    calibration: dict,
+) -> Scene:  # fmt: skip
+    """The scene with its language."""
+    seen = totals >= _SEEN
+    if not bool(seen.any()):
+        raise InputError("no view shows a Gaussian of the scene; check the poses")
+    ids, values = sparse_weights(sums / totals.clamp_min(1e-12)[:, None], _TOP)
+    hidden = (~seen).nonzero()[:, 0]
+    if len(hidden):
+        rows = seen.nonzero()[:, 0]
+        means = scene.gaussians.means.double().numpy()
+        nearest = rows[torch.from_numpy(np.asarray(KDTree(means[seen]).query(means[~seen])[1]))]
+        ids[hidden], values[hidden] = ids[nearest], values[nearest]
+    plain = scene.with_record(atom_names={}, silent_atoms=())  # names of atoms that are no more
+    lifted = replace(
+        plain,
+        semantics=Semantics(ids, values, dictionary, PRESETS[PRESET].space),
+        viewmats=torch.stack([camera.viewmat.float() for camera in cameras]),
+        Ks=views.Ks.float(),
+        view_size=views.size,
+        photos=views.sources,
+        view_ids=None,
+    )
+    return lifted.with_record(
+        preset=PRESET,
+        photos=tuple(views.names),
+        calibration=dict(calibration),
+        counts={**scene.record.counts, "seen": int(seen.sum())},
+    )

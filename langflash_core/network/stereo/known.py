@@ -1,0 +1,61 @@
+"""Photos whose poses are given: matches say how large each depth map is in the poses' own unit."""
+
+import numpy as np
+
+from langflash_core.errors import InputError
+from langflash_core.network.stereo.matching import Matches, triangulate
+
+_TOLERANCE = 3.0  # standard deviations of a match from its epipolar line
+_LEAST_PARALLAX = 2.0  # standard deviations of a match that its depth must move it by
+_FEWEST = 12  # matches that say a map's scale
+
+
+def agreeing(matches: Matches, relative: np.ndarray) -> Matches:
+    """Those matches that a pose allows: on each other's epipolar lines, and in front of both cameras.
+
+    Args:
+        relative: (4, 4), pos_j = R pos_i + t.
+    """
+    rotation, shift = relative[:3, :3], relative[:3, 3]
+    cross = np.array([[0, -shift[2], shift[1]], [shift[2], 0, -shift[0]], [-shift[1], shift[0], 0]])
+    essential = cross @ rotation
+    x_i, x_j = (np.c_[x, np.ones(len(x))] for x in (matches.x_i, matches.x_j))
+    lines_j, lines_i = x_i @ essential.T, x_j @ essential
+    slopes = (lines_j[:, :2] ** 2).sum(1) + (lines_i[:, :2] ** 2).sum(1)
+    distances = np.abs((x_j * lines_j).sum(1)) / np.sqrt(np.maximum(slopes, 1e-24))  # Sampson's
+    depths = triangulate(matches.x_i, matches.x_j, rotation, shift)
+    ahead = (depths > 0) & ((x_i * depths[:, None]) @ rotation[2] + shift[2] > 0)
+    return matches.subset((distances < _TOLERANCE * matches.sigma) & ahead)
+
+
+def log_scales(
+    matches: Matches, relative: np.ndarray, depths_i: np.ndarray, depths_j: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """What the matches of a pair say each map has to be multiplied by, as logarithms.
+
+    Args:
+        depths_i, depths_j: (n,) of the two maps at the matches.
+    """
+    rotation, shift = relative[:3, :3], relative[:3, 3]
+    true_i = triangulate(matches.x_i, matches.x_j, rotation, shift)
+    points = np.c_[matches.x_i, np.ones(len(true_i))] * true_i[:, None]
+    true_j = points @ rotation[2] + shift[2]
+    parallax = np.linalg.norm(shift) / np.maximum(np.minimum(true_i, true_j), 1e-12)
+    sure = (true_i > 0) & (true_j > 0) & (parallax > _LEAST_PARALLAX * matches.sigma)
+    return np.log(true_i[sure] / depths_i[sure]), np.log(true_j[sure] / depths_j[sure])
+
+
+def depth_scales(said: list[np.ndarray]) -> np.ndarray:
+    """Factors (V,) from the logarithms that the matches of each view say; of all, where few do.
+
+    Raises:
+        InputError: no view has matches enough.
+    """
+    everything = np.concatenate(said) if said else np.zeros(0)
+    if len(everything) < _FEWEST:
+        raise InputError(
+            "the photos do not fit the poses: too little of them matches where the poses say it must; "
+            "check that poses and photos belong together, or leave --poses away"
+        )
+    common = np.median(everything)
+    return np.exp([np.median(own) if len(own) >= _FEWEST else common for own in said])

@@ -1,0 +1,162 @@
+"""Damaged splat files by the thousand: every reader gives a whole scene or one sentence, and little memory.
+
+    python -m tests.export.mutations [--count 10000] [--seed 0]
+
+Bytes are flipped, overwritten with extreme numbers, cut, doubled or mixed with those of another file; a
+packed payload is damaged inside its wrapping too, where checksums would otherwise hide its readers.
+"""
+
+import argparse
+import gzip
+import io
+import json
+import struct
+import sys
+import tempfile
+import tracemalloc
+import zipfile
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from langflash_core.errors import SceneFileError
+from langflash_core.export import export, read
+from langflash_core.scene.bare import bare_scene
+from langflash_core.scene.checks import check_scene
+from tests.export.splats import ksplat_bytes, random_gaussians
+
+EXTREMES = [0, 1, 0xFF, 0x7F, 0xFFFFFFFF, 0x7FFFFFFF, 0x80000000, 1 << 24, 0xFFFF]
+MOST_MEMORY = 64 * 2**20  # bytes that reading one of these files of some 10 kB may take
+
+
+def whole_files(folder: Path, count: int = 60) -> dict[str, bytes]:
+    """A small whole file of every kind, by name; those that need a package which is absent are left out."""
+    scene = bare_scene(random_gaussians(count, 2), "made")
+    files = {}
+    for name in ("a.ply", "a.compressed.ply", "a.splat", "a.spz", "a.sog", "a.glb", "a.usda", "a.langflash"):
+        try:
+            export(scene, folder / name)
+        except SceneFileError:
+            continue
+        files[name] = (folder / name).read_bytes()
+    from langflash_core.export import spz
+
+    spz.write_spz(scene, folder / "three.spz", version=3)
+    files["three.spz"] = (folder / "three.spz").read_bytes()
+    for level in (0, 2):
+        files[f"level{level}.ksplat"] = ksplat_bytes(random_gaussians(700, 1), level)
+    return files
+
+
+def mutated(content: bytes, other: bytes, rng: np.random.Generator) -> bytes:
+    """One to four damages."""
+    damaged = bytearray(content)
+    for _ in range(rng.integers(1, 5)):
+        size = max(1, len(damaged))
+        # Headers decide most, so half of the damage goes there.
+        place = int(rng.integers(0, min(size, 400) if rng.random() < 0.5 else size))
+        kind = rng.integers(0, 6)
+        if kind == 0:
+            damaged[place : place + 1] = bytes([rng.integers(0, 256)])
+        elif kind == 1:
+            damaged[place : place + 4] = struct.pack("<I", EXTREMES[rng.integers(0, len(EXTREMES))])
+        elif kind == 2:
+            damaged = damaged[:place]
+        elif kind == 3:
+            damaged[place:place] = damaged[place : place + int(rng.integers(1, 200))]
+        elif kind == 4:
+            damaged[place : place + int(rng.integers(1, 300))] = b""
+        else:
+            damaged[place : place + 64] = other[place : place + 64]
+    return bytes(damaged)
+
+
+def damaged_inside(name: str, content: bytes, other: bytes, rng: np.random.Generator) -> bytes:
+    """Damage below the wrapping of a packed file; others as `mutated`."""
+    if name == "three.spz":
+        return gzip.compress(mutated(gzip.decompress(content), other, rng), 1)
+    if not name.endswith(".sog"):
+        return mutated(content, other, rng)
+    packed = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(packed, "w") as new:
+        victim = old.namelist()[rng.integers(0, len(old.namelist()))]
+        for entry in old.namelist():
+            inner = old.read(entry)
+            if entry == "meta.json" and rng.random() < 0.5:
+                inner = json.dumps(lied(json.loads(inner), rng)).encode()
+            new.writestr(entry, mutated(inner, other, rng) if entry == victim else inner)
+    return packed.getvalue()
+
+
+def lied(meta: dict, rng: np.random.Generator) -> dict:
+    """One value of a document replaced by one that it should not have."""
+    wrong = [None, -1, 10**12, 1.5, "x", [], {}, [1e308] * 3, ["../meta.json"]]
+    path, here = [], meta
+    while isinstance(here, dict) and here:
+        key = list(here)[rng.integers(0, len(here))]
+        path.append(key)
+        here = here[key]
+    inner = meta
+    for key in path[:-1]:
+        inner = inner[key]
+    inner[path[-1]] = wrong[rng.integers(0, len(wrong))]
+    return meta
+
+
+def damages(files: dict[str, bytes], count: int, seed: int) -> Iterator[tuple[str, bytes]]:
+    rng = np.random.default_rng(seed)
+    names = list(files)
+    for index in range(count):
+        name, other = names[index % len(names)], files[names[rng.integers(0, len(names))]]
+        change = damaged_inside if rng.random() < 0.4 else lambda _, *rest: mutated(*rest)
+        yield name, change(name, files[name], other, rng)
+
+
+def outcome(path: Path) -> str:
+    """ "read" or "refused".
+
+    Raises:
+        AssertionError: the scene is not whole, or the sentence is none. Whatever a reader lets through.
+    """
+    try:
+        scene = read(path)
+    except SceneFileError as error:
+        sentence = str(error)
+        assert "\n" not in sentence and "; " in sentence and len(sentence) < 400, sentence
+        return "refused"
+    check_scene(scene)
+    return "read"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
+    parser.add_argument("--count", type=int, default=10_000)
+    parser.add_argument("--seed", type=int, default=0)
+    args = parser.parse_args()
+    found: Counter = Counter()
+    tracemalloc.start()
+    most = 0
+    with tempfile.TemporaryDirectory() as folder:
+        files = whole_files(Path(folder))
+        for index, (name, content) in enumerate(damages(files, args.count, args.seed)):
+            path = Path(folder) / f"x{name}"
+            path.write_bytes(content)
+            tracemalloc.reset_peak()
+            try:
+                found[f"{name} {outcome(path)}"] += 1
+            except Exception as error:
+                found["CRASH"] += 1
+                kept = Path(tempfile.gettempdir()) / f"crash{index}-{name}"
+                kept.write_bytes(content)
+                sys.stdout.write(f"{kept}: {type(error).__name__}: {error}\n")
+            most = max(most, tracemalloc.get_traced_memory()[1])
+    for key in sorted(found):
+        sys.stdout.write(f"{key:32} {found[key]}\n")
+    sys.stdout.write(f"{args.count} files, {found['CRASH']} crashes, at most {most / 1e6:.0f} MB\n")
+    return 1 if found["CRASH"] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

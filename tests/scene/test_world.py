@@ -1,0 +1,37 @@
+"""Scenes in a given frame and unit: the same pictures from the same cameras."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from langflash_core.geometry.quaternions import quats_to_matrices
+from langflash_core.scene.bare import bare_scene
+from langflash_core.scene.checks import check_scene
+from langflash_core.scene.world import in_world
+from langflash_core.splat import render
+from tests.export.splats import random_gaussians
+
+
+@pytest.mark.parametrize("degree", [0, 2])
+def test_moving_a_scene_does_not_change_what_its_cameras_see(degree):
+    gaussians = random_gaussians(60, degree)
+    means = gaussians.means + torch.tensor([0.0, 0, 4])
+    gaussians = replace(gaussians, means=means, scales=gaussians.scales.clamp(0.05, 0.5))
+    second = torch.eye(4)
+    second[0, 3] = -0.3
+    K = torch.tensor([[30.0, 0, 16], [0, 30, 12], [0, 0, 1]])
+    scene = replace(
+        bare_scene(gaussians, "made"),
+        viewmats=torch.stack((torch.eye(4), second)), Ks=K.repeat(2, 1, 1), view_size=(32, 24),
+    )  # fmt: skip
+    viewmat = torch.eye(4, dtype=torch.float64)
+    viewmat[:3, :3] = quats_to_matrices(torch.tensor([0.8, 0.3, -0.4, 0.3], dtype=torch.float64))
+    viewmat[:3, 3] = torch.tensor([2.0, -1, 5], dtype=torch.float64)
+    moved = in_world(scene, viewmat, 2.5)
+    check_scene(moved)
+    assert torch.allclose(moved.viewmats[0].double(), viewmat, atol=1e-6)
+    for view in range(2):
+        before, after = render(scene, scene.camera(view)), render(moved, moved.camera(view))
+        assert torch.allclose(before.rgb, after.rgb, atol=1e-3)
+        assert torch.allclose(before.depths * 2.5, after.depths, rtol=1e-3, atol=1e-3)

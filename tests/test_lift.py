@@ -1,0 +1,128 @@
+"""Language for plain splats: what views say of pixels comes to the Gaussians that show them."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+import torch
+
+from langflash_core.errors import Cancelled, InputError
+from langflash_core.lift import cameras_around, lift
+from langflash_core.scene.bare import bare_scene
+from langflash_core.scene.checks import check_scene
+from langflash_core.splat import rasterize, render
+from langflash_core.splat.backprojection import gathered
+from langflash_core.types import Camera, Gaussians, Scene
+from tests.app.cli.conftest import stripes
+from tests.export.splats import random_gaussians
+
+
+def small_camera() -> Camera:
+    K = torch.tensor([[30.0, 0, 16], [0, 30.0, 12], [0, 0, 1]])
+    viewmat = torch.eye(4)
+    viewmat[2, 3] = 5
+    return Camera(viewmat, K, 32, 24)
+
+
+def test_gathering_is_the_transpose_of_splatting():
+    """Twin: the gradient of sum_p m(p) (sum_i c_ip w_i)(p) by w_i is sum_p c_ip m(p)."""
+    gaussians, camera = random_gaussians(80), small_camera()
+    gaussians = replace(gaussians, scales=gaussians.scales.clamp(0.02, 0.5))
+    rng = torch.Generator().manual_seed(0)
+    values = torch.rand(24, 32, 3, generator=rng)
+    trust = (torch.rand(24, 32, generator=rng) > 0.3).float()
+    features = torch.zeros(80, 3, dtype=torch.float64, requires_grad=True)
+    doubled = gaussians.map(lambda v: v.double())
+    maps, _ = rasterize(doubled, features, camera)
+    (maps * (values * trust[..., None])).sum().backward()
+    sums, totals = gathered(gaussians, camera, values, trust)
+    assert features.grad is not None
+    assert torch.allclose(sums.double(), features.grad, atol=1e-4)
+    ones, _ = gathered(gaussians, camera, torch.ones(24, 32, 1), trust)
+    assert torch.allclose(ones[:, 0], totals)
+    assert float(totals.max()) > 1  # some Gaussian is seen by more than a pixel's worth
+
+
+def test_shares_stay_shares():
+    gaussians, camera = random_gaussians(80), small_camera()
+    values = torch.rand(24, 32, 4).softmax(-1)
+    sums, totals = gathered(gaussians, camera, values)
+    seen = totals > 1e-4
+    shares = sums[seen] / totals[seen, None]
+    assert bool(seen.any()) and bool((shares >= 0).all())
+    assert torch.allclose(shares.sum(-1), torch.ones(len(shares)), atol=1e-4)
+
+
+def test_values_of_another_size_are_refused():
+    with pytest.raises(ValueError, match="values: expected"):
+        gathered(random_gaussians(3), small_camera(), torch.zeros(24, 31, 2))
+    with pytest.raises(ValueError, match="trust: expected"):
+        gathered(random_gaussians(3), small_camera(), torch.zeros(24, 32, 2), torch.zeros(3, 3))
+
+
+@pytest.fixture
+def known_network(monkeypatch) -> Scene:
+    """A network that sees, in every view, what a wall with three stripes truly shows there."""
+    whole = stripes()
+
+    named = SimpleNamespace(calibration={"threshold": 0.5})
+
+    def seen(network, views, viewmats, depths):
+        assert torch.allclose(viewmats[0], torch.eye(4), atol=1e-5)  # the world of the first view
+        assert views.images.shape[0] == len(viewmats) == len(depths)
+        frames = [render(whole, camera) for camera in cameras]
+        maps = torch.stack([f.weight_maps for f in frames if f.weight_maps is not None]).permute(0, 3, 1, 2)
+        return maps, whole.semantics.dictionary
+
+    cameras = cameras_around(whole, 4)
+    monkeypatch.setattr("langflash_core.lift.load_network", lambda *_, **__: named)
+    monkeypatch.setattr("langflash_core.lift.posed_semantics", seen)
+    monkeypatch.setattr("langflash_core.lift.cameras_around", lambda scene: cameras)
+    return whole
+
+
+def test_a_plain_wall_gets_its_stripes_back(known_network):
+    plain = bare_scene(known_network.gaussians, "wall.ply")
+    steps = []
+    lifted = lift(plain, progress=lambda name, _: steps.append(name))
+    check_scene(lifted)
+    assert lifted.num_views == 4 == len(lifted.photos) and lifted.semantics.space == "minilm"
+    assert torch.equal(lifted.semantics.dictionary, known_network.semantics.dictionary)
+    truth = known_network.semantics.dense_weights().argmax(-1)
+    right = (lifted.semantics.dense_weights().argmax(-1) == truth).float().mean()
+    assert float(right) > 0.97  # at the borders a pixel shows two stripes
+    assert lifted.record.calibration == {"threshold": 0.5}
+    assert steps[-1] == "done" and {"drawing", "network", "carrying back"} < set(steps)
+
+
+def test_what_no_view_shows_takes_the_nearest(known_network):
+    """A second wall hidden far behind: each of its Gaussians speaks as the front one before it."""
+    front = known_network.gaussians
+    behind = replace(front, means=front.means + torch.tensor([0.0, 0, 0.05]))
+    both = Gaussians(
+        *(torch.cat(pair) for pair in zip(vars(front).values(), vars(behind).values(), strict=True))
+    )
+    both = replace(both, opacities=torch.cat((torch.full((len(front),), 0.99), behind.opacities)))
+    lifted = lift(bare_scene(both, "walls.ply"))
+    assert bool((lifted.semantics.weight_values.sum(-1) > 0.99).all())
+
+
+def test_views_that_show_nothing_are_refused(known_network):
+    gaussians = replace(known_network.gaussians, opacities=torch.full((len(known_network.gaussians),), 1e-3))
+    with pytest.raises(InputError, match="almost nothing"):
+        lift(bare_scene(gaussians, "mist.ply"))
+
+
+def test_lifting_stops_when_asked(known_network):
+    with pytest.raises(Cancelled):
+        lift(bare_scene(known_network.gaussians, "wall.ply"), cancelled=lambda: True)
+
+
+def test_cameras_look_at_the_middle_upright():
+    whole = stripes()
+    cameras = cameras_around(bare_scene(whole.gaussians, "wall.ply"))
+    assert len(cameras) == 8
+    for camera in cameras:
+        centre = camera.viewmat[:3, :3] @ whole.gaussians.means.mean(0) + camera.viewmat[:3, 3]
+        assert float(centre[2]) > 0 and float(centre[:2].abs().max()) < 0.2 * float(centre[2])
+        assert float(camera.viewmat[1, 1]) > 0  # +y of the world is down in the picture
