@@ -28,8 +28,8 @@ from .scene.commands import JobCancelled, JobFailed, Progressed
 
 log = logging.getLogger(__name__)
 
-AHEAD = ("torch._dynamo", "torchvision", "timm", "langflash_core.pipeline")
-"""What a reconstruction imports, some seconds of it, in the order in which one needs the next."""
+AHEAD = ("langflash_core.pipeline",)
+"""What a reconstruction imports, in the order in which one needs the next."""
 IDLE = 0.5  # seconds without a request until the next of them is imported
 SAVING_SECONDS = 60.0  # that `stop` waits at the most for what a person asked to be saved
 

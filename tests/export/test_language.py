@@ -47,6 +47,8 @@ def same_language(first: Scene, second: Scene) -> bool:
         and torch.equal(first.semantics.dictionary, second.semantics.dictionary)
         and torch.equal(first.viewmats, second.viewmats)
         and torch.equal(first.Ks, second.Ks)
+        and first.view_ids is not None
+        and second.view_ids is not None
         and torch.equal(first.view_ids, second.view_ids)
         and (first.view_size, first.photos, first.record, first.semantics.space)
         == (second.view_size, second.photos, second.record, second.semantics.space)
