@@ -1,5 +1,6 @@
 # make run    set up what is missing, then open the window on the demo photos
 # make test   set up what is missing, then every check and every test
+# make test-machines   every test three times, as three other processors and orders would run it
 #
 # Set-up is a virtual environment in .venv, this package in it, and (Debian, Ubuntu) the system's
 # OpenGL libraries where they are missing. Finished steps leave a stamp in .venv and are not
@@ -26,9 +27,9 @@ APT := install() { \
 	echo "Installing $$*"; \
 	$$add "$$@" >/dev/null 2>&1 || { $$get update >/dev/null && $$add "$$@" >/dev/null; }; }
 
-.PHONY: help run test
+.PHONY: help run test test-machines
 help:
-	@sed -n '1,2s/^# //p' Makefile
+	@sed -n '1,3s/^# //p' Makefile
 
 run: $(STAMP)-package $(STAMP)-gl
 	@if $(BIN)/python -c 'import glfw, sys; sys.exit(not glfw.init())' 2>/dev/null; then \
@@ -49,6 +50,16 @@ test: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window
 	$(BIN)/pyright
 	$(BIN)/lint-imports
 	$(BIN)/python -m pytest
+
+# Results must not hang on the processor's vector units (ATEN_CPU_CAPABILITY: what torch uses of them,
+# all that is there where it is unset), on the number of threads, or on which test ran before. Three
+# passes cover three settings, one and two threads, and two shuffled orders; SEED repeats an order.
+SEED ?= 1
+SHUFFLED = --random-order --random-order-seed
+test-machines: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window
+	env -u ATEN_CPU_CAPABILITY OMP_NUM_THREADS=2 $(BIN)/python -m pytest
+	ATEN_CPU_CAPABILITY=avx2 OMP_NUM_THREADS=1 $(BIN)/python -m pytest $(SHUFFLED)=$(SEED)
+	ATEN_CPU_CAPABILITY=default OMP_NUM_THREADS=2 $(BIN)/python -m pytest $(SHUFFLED)=$$(($(SEED) + 1))
 
 # The newest Python from 3.11 that can make a virtual environment.
 $(BIN)/python:

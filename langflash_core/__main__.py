@@ -17,9 +17,14 @@ _BESIDE = Path(__file__).resolve().parent.parent
 
 def main() -> int:
     """Run `langflash` with the words of `sys.argv`; the exit code."""
-    if not (_BESIDE / NAME).is_dir():
-        _read_in(_BESIDE / "app")
+    find_program()
     return importlib.import_module(f"{NAME}.cli").main()
+
+
+def find_program() -> None:
+    """From now on `NAME` can be imported, from a wheel or from a checkout."""
+    if NAME not in sys.modules and not (_BESIDE / NAME).is_dir():
+        _read_in(_BESIDE / "app")
 
 
 def _read_in(folder: Path) -> None:

@@ -70,10 +70,16 @@ def begin(
     if read_weights and matches:
         path = weights_file(preset, None if weights is None else Path(weights))
         read_header(path)
-        stored = pool.submit(read_stored, path)
+        stored = pool.submit(_stored, pictures, path)
     matched = pool.submit(_match, pictures, check) if matches else _nothing()
     pool.shutdown(wait=False)
     return Ahead(pictures, matched, stored)
+
+
+def _stored(pictures: Future[list[Picture]], path: Path) -> Stored:
+    """After the photos, so that an error about one of them need not wait for the end of this."""
+    pictures.result()
+    return read_stored(path)
 
 
 def _match(pictures: Future[list[Picture]], check: Callable[[], None]) -> None:

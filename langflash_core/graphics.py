@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from langflash_core.errors import GraphicsError
+from langflash_core.extras import optional_packages
 from langflash_core.resources import shader_path
 
 if TYPE_CHECKING:
@@ -32,11 +33,10 @@ def offscreen_context() -> "moderngl.Context":
 
     Raises:
         GraphicsError: no OpenGL 3.3; the sentence names what brings it.
+        MissingPackageError: moderngl is not installed.
     """
-    try:
+    with optional_packages():
         import moderngl
-    except ImportError as error:
-        raise GraphicsError("drawing with OpenGL needs moderngl; pip install moderngl") from error
     settings: dict[str, Any] = {"backend": "egl"} if sys.platform.startswith("linux") else {}
     try:
         context = moderngl.create_context(require=OPENGL, standalone=True, **settings)

@@ -23,7 +23,6 @@ from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.relevance import Mode, compile_query, relevance_maps
 from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_network
-from langflash_core.network.build import network_class
 from langflash_core.network.checkpoints.store import part_folder
 from langflash_core.network.checkpoints.stored import Stored
 from langflash_core.network.model import Atoms, Geometry, Lifted, pooled_weights
@@ -76,8 +75,8 @@ def reconstruct(
             (fx, fy, cx, cy) in pixels of the photos as given, the same for all. Neither: EXIF, else
             an assumption with a warning.
         size: the network sees about size x size pixels per photo, whatever their shape.
-        precision: "float32"; "bfloat16", for presets with a rule for it; "auto" takes it where
-            there is one and the processor is quick at it.
+        precision: "float32"; "bfloat16", in the parts that bear it; "auto" takes bfloat16 where the
+            processor is quick at it.
         aggregation: how a group gets its vector: "lfa" (trained), "average" (of dense features),
             "crops" (CLIP on a cut-out; presets of its space); None: lfa where it has weights,
             else average.
@@ -101,8 +100,6 @@ def reconstruct(
         Cancelled: `cancelled()` became true.
     """
     run = Run(STAGES, progress, cancelled)
-    if preset not in PRESETS:
-        raise WeightsError(f"there is no preset '{preset}'; choose one of {', '.join(PRESETS)}")
     device = _device(device)
     if refine_seconds is not None:
         _check_refinement(refine_seconds, photos)
@@ -330,16 +327,11 @@ def _groups(network: LangFlashNet, way: str | None, device: str) -> Lifted | Non
     return lifted
 
 
-def _bfloat16(preset: str, precision: str, device: str) -> bool:
+def _bfloat16(precision: str, device: str) -> bool:
     if precision not in PRECISIONS:
         raise InputError(f"the precision '{precision}' is unknown; choose {', '.join(PRECISIONS)}")
-    can = network_class(PRESETS[preset]).mixes
-    if precision == "bfloat16" and not can:
-        raise InputError(
-            f"the preset '{preset}' computes in float32 only; choose --precision float32 or auto"
-        )
     quick = device != "cpu" or has_bfloat16()
-    return can and (precision == "bfloat16" or (precision == "auto" and quick))
+    return precision == "bfloat16" or (precision == "auto" and quick)
 
 
 def _network(
@@ -350,7 +342,7 @@ def _network(
     changed = path.stat().st_mtime_ns if path is not None and path.is_file() else 0
     folder = part_folder(PRESETS[preset])
     installed = tuple((p.name, p.stat().st_mtime_ns) for p in sorted(folder.glob("*.safetensors")))
-    mixed = _bfloat16(preset, precision, device)
+    mixed = _bfloat16(precision, device)
     key = (preset, path, device, mixed, changed, installed)
     network = _networks.get(key)
     if network is None:

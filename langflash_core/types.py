@@ -18,12 +18,14 @@ Checks    constructors refuse shapes that disagree and numbers that name nothing
           read and written.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import torch
 from torch import Tensor
+
+from langflash_core.records import Cost as Cost
+from langflash_core.records import Record as Record
 
 LUMA = (0.299, 0.587, 0.114)
 """Weights of red, green and blue in grey (ITU-R BT.601, as JPEG has them)."""
@@ -172,49 +174,6 @@ class Prediction:
 
 
 @dataclass(frozen=True)
-class Cost:
-    """What it took to make a scene. It differs from run to run, so scene files do not hold it.
-
-    timings: seconds per stage, disjoint, in order. seconds: "network" and "total", from start to
-    end. peak_memory_mb: the most that the process held, None where it cannot be asked.
-    """
-
-    timings: Mapping[str, float] = field(default_factory=dict)
-    seconds: Mapping[str, float] = field(default_factory=dict)
-    peak_memory_mb: int | None = None
-
-
-@dataclass(frozen=True)
-class Record:
-    """What is known of a scene besides its tensors. Mappings hold plain JSON values; empty: unknown.
-
-    preset: of the network. source: the splat file it came from. photos: names, one per view.
-    warnings: a sentence each. metric_scale: metres per scene unit. network_unit: the network's
-    length units per scene unit. counts: Gaussians predicted and left out. pruning: as `prune` left
-    it. refinement: what a fit to the photos brought. calibration: what the network's checkpoint
-    says about scores, instead of its language space. atom_names: a person's own, by atom.
-    silent_atoms: those that answer no phrase. num_deleted: Gaussians that edits took away.
-    others: what a file says under keys that this version does not know.
-    """
-
-    preset: str | None = None
-    source: str | None = None
-    photos: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
-    metric_scale: float | None = None
-    network_unit: float | None = None
-    counts: Mapping[str, int] = field(default_factory=dict)
-    pruning: Mapping[str, int] = field(default_factory=dict)
-    refinement: Mapping[str, Any] = field(default_factory=dict)
-    calibration: Mapping[str, Any] = field(default_factory=dict)
-    atom_names: Mapping[int, str] = field(default_factory=dict)
-    silent_atoms: tuple[int, ...] = ()
-    num_deleted: int = 0
-    cost: Cost = Cost()
-    others: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
 class Scene:
     """A finished scene: what is saved, splatted, queried, and exported.
 
@@ -234,7 +193,7 @@ class Scene:
     view_size: tuple[int, int]
     photos: tuple[bytes, ...] = ()
     view_ids: Tensor | None = None
-    record: Record = Record()
+    record: Record = field(default_factory=Record)
 
     def __post_init__(self) -> None:
         count, num_views = len(self.gaussians), len(self.viewmats)

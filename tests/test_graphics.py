@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from langflash_core.errors import GraphicsError
+from langflash_core.errors import GraphicsError, MissingPackageError
 from langflash_core.graphics import Programs, offscreen_context, set_uniforms, shader_source
 from langflash_core.resources import shader_path
 
@@ -106,5 +106,5 @@ def test_a_context_is_made_the_platforms_way(monkeypatch, platform, asked):
 
 def test_without_moderngl_it_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "moderngl", None)
-    with pytest.raises(GraphicsError, match="pip install moderngl"):
+    with pytest.raises(MissingPackageError, match="langflash\\[gl\\]"):
         offscreen_context()

@@ -246,6 +246,23 @@ def test_checkout_beside_another_app(checkout, tmp_path):
     assert listed
 
 
+@pytest.mark.parametrize("place", ["installed", "checkout"])
+def test_the_window_finds_the_command_line(place, request, tmp_path):
+    """It runs exports in a process of their own."""
+    code = """
+import threading
+from langflash_core.__main__ import find_program
+find_program()
+from langflash_app.window.exporting.process import Exporter
+said, done = [], threading.Event()
+exporter = Exporter(lambda *_: None, lambda *words: (said.extend(words), done.set()))
+exporter.start(("--version",))
+print(done.wait(60), *said)
+"""
+    said = request.getfixturevalue(place).python("-c", code, cwd=tmp_path)
+    assert said.strip() == f"True 0 langflash {langflash_core.__version__}"
+
+
 def test_every_module_of_the_program_can_be_imported(installed, tmp_path):
     code = """
 import importlib, pkgutil, app, langflash_app

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from langflash_core.errors import InputError, OutputError
+from langflash_core.errors import InputError, OutputError, SceneFileError
 
 
 def readable_file(path: Path, what: str, error: type[InputError]) -> Path:
@@ -25,6 +25,20 @@ def readable_file(path: Path, what: str, error: type[InputError]) -> Path:
     except (OSError, ValueError) as problem:  # ValueError: a NUL character in the path
         reason = getattr(problem, "strerror", None) or problem
         raise error(f"the {what} {path} cannot be read: {reason}") from None
+    return path
+
+
+def checked_scene(path: Path) -> Path:
+    """`path`, when it opens and, if it is one of our own files, is whole by its header; without torch.
+
+    Raises:
+        SceneFileError: missing, truncated, foreign, or of a newer version.
+    """
+    readable_file(path, "scene", SceneFileError)
+    if path.suffix.lower() == ".langflash":
+        from langflash_core.scene.container import check_container
+
+        check_container(path)
     return path
 
 

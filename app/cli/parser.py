@@ -122,7 +122,10 @@ def _add_reconstruct(commands) -> None:
         "queries where they have weights, else sam2 where it is installed, else the language features)",
     )
     command.add_argument(
-        "--precision", choices=("auto", "float32", "bfloat16"), default="auto", help="(default: auto)"
+        "--precision",
+        choices=("auto", "float32", "bfloat16"),
+        default="auto",
+        help="auto: bfloat16 where the processor has instructions for it (default: auto)",
     )
     command.add_argument(
         "--refine",

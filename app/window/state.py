@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from .asking.state import FIRST_PROMPT, NEGATIVES, NO_ASKING, Asking, Prompt, usable
+from .asking.state import FIRST_PROMPT, NO_ASKING, Asking, Prompt, usable
 from .editing.state import NO_EDITING, Editing
 from .exporting.state import NO_EXPORTING, Exporting
 from .poses import START, Pose
@@ -54,7 +54,8 @@ class State:
 
     now: seconds of the session's clock, set at the start of a frame. choosing: the best pair is being
     looked for. view: of the photo stood at, if any. compare: where the photo begins, 0 to 1 across the
-    picture; None: not compared. lines: the log, oldest first.
+    picture; None: not compared. negatives: the person's own; none: those of the scene. lines: the log,
+    oldest first.
     """
 
     now: float = 0.0
@@ -63,7 +64,7 @@ class State:
     info: SceneInfo | None = None
     prompts: tuple[Prompt, ...] = (FIRST_PROMPT,)
     active: int = 0
-    negatives: tuple[str, ...] = NEGATIVES
+    negatives: tuple[str, ...] = ()
     mode: Mode = Mode.RGB
     pose: Pose = START
     flight: Flight | None = None

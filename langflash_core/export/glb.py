@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from langflash_core.errors import PromptError
 from langflash_core.export.colours import label_colours
 from langflash_core.files import write_atomically
 from langflash_core.types import QueryResult
@@ -25,6 +26,7 @@ def write_answer(result: QueryResult, path: Path) -> None:
 
     Raises:
         OutputError: the path cannot be written.
+        PromptError: nothing was found.
     """
     write_boxes([(a.prompt, a.box) for a in result.answers if a.box is not None], path)
 
@@ -38,7 +40,10 @@ def write_boxes(boxes: Sequence[tuple[str, dict[str, Any]]], path: Path) -> None
 
     Raises:
         OutputError: the path cannot be written.
+        PromptError: there are none.
     """
+    if not boxes:
+        raise PromptError("nothing was found, so there is no box to write; lower the threshold")
     import trimesh  # late: half a second that no other format needs
     from trimesh.visual.material import PBRMaterial
     from trimesh.visual.texture import TextureVisuals

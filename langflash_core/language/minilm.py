@@ -172,7 +172,7 @@ def _padded(tokens: list[list[int]]) -> tuple[Tensor, Tensor]:
 def _dense(tensors: dict[str, Tensor], key: str) -> Tensor:
     """A tensor in float32, its int8 rows scaled where it has a `.scale`."""
     scale = tensors.get(key + ".scale")
-    dense = tensors[key].float()
+    dense = tensors[key].to(torch.float32, copy=True)  # not where the file happened to lie
     return dense if scale is None else dense * scale.float()[:, None]
 
 

@@ -1,6 +1,8 @@
 """The network with guided depth: depth maps, matches, poses and a plane sweep give the geometry."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 
 import cv2
 import numpy as np
@@ -43,6 +45,7 @@ class GuidedDepthNet(LangFlashNet):
 
     def __init__(self, preset: GuidedDepth):
         super().__init__(preset)
+        self.mixed = False
         self.encoder = Encoder(preset)
         self.local = LocalFeatures()
         self.decoder = TwoStackDecoder(preset)
@@ -56,14 +59,28 @@ class GuidedDepthNet(LangFlashNet):
         self.aggregation = Aggregation(preset)
         self.namer = PartNamer(preset)
 
+    def use_bfloat16(self) -> "GuidedDepthNet":
+        """Transformers and what names things in it. Depth heads, sweep, local features, poses and Gaussians
+        stay exact: in bfloat16 they would triple the change of the depths for a quarter of a second."""
+        self.mixed = True
+        return self
+
+    @contextmanager
+    def _fast(self, images: Tensor) -> Iterator[None]:
+        with torch.autocast(images.device.type, torch.bfloat16) if self.mixed else nullcontext():
+            yield
+
     def encode(self, images: Tensor, Ks: Tensor) -> Tokens:
         """Four hooks of the frozen encoder; the intrinsics join later."""
-        return self.encoder(images)
+        with self._fast(images):
+            tokens = self.encoder(images)
+        return Tokens(tuple(hook.float() for hook in tokens.hooks), tokens.grid) if self.mixed else tokens
 
     def levels(self, tokens: Tokens, Ks: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Level maps (B*V, C_i, h, w) of the geometry heads: two encoder hooks, two decoder depths."""
-        decoded = self.decoder(tokens, Ks)
-        deep = tuple(tokens_to_maps(t.flatten(0, 1), tokens.grid) for t in decoded)
+        with self._fast(Ks):
+            decoded = self.decoder(tokens, Ks)
+        deep = tuple(tokens_to_maps(self._exact(t).flatten(0, 1), tokens.grid) for t in decoded)
         return tokens.maps(0), tokens.maps(1), deep[0], deep[1]
 
     def monocular_depth(self, tokens: Tokens, Ks: Tensor) -> DepthMaps:
@@ -72,11 +89,19 @@ class GuidedDepthNet(LangFlashNet):
 
     def language(self, tokens: Tokens, images: Tensor) -> Tensor:
         """L(x) from the shared tokens, at four times their grid."""
-        return self.language_head(tokens)
+        with self._fast(images):
+            features = self.language_head(tokens)
+        return self._exact(features)
 
     def semantic_maps(self, tokens: Tokens, images: Tensor) -> tuple[tuple[Tensor, ...], Tensor]:
         """Memories at 1, 2 and 4 times the grid, and the mask map at 8 times."""
-        return self.scratch(tokens, self.siamese(tokens), images)
+        with self._fast(images):
+            memories, finest = self.scratch(tokens, self.siamese(tokens), images)
+        return tuple(map(self._exact, memories)), self._exact(finest)
+
+    def _exact(self, values: Tensor) -> Tensor:
+        """Out of bfloat16 again. Training under autocast of its own goes on as it was."""
+        return values.float() if self.mixed else values
 
     def parts(
         self, tokens: Tokens, images: Tensor, size: tuple[int, int], features: Tensor | None = None

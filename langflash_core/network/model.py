@@ -57,8 +57,6 @@ class LangFlashNet(nn.Module):
     """Parts that this project takes as they are and never trains."""
     compact: bool
     """Weights are stored as int8 rows; else as they are."""
-    mixes: bool = False
-    """`use_bfloat16` does something."""
     caches_tokens: bool
     """Training may read tokens from disk, because nothing that is trained changes them."""
     grouping: nn.Module
@@ -69,9 +67,9 @@ class LangFlashNet(nn.Module):
         self.preset = preset
         self.calibration: dict = {}
 
+    @abstractmethod
     def use_bfloat16(self) -> "LangFlashNet":
-        """Matrix products in bfloat16 where the network has a rule for it; else nothing changes."""
-        return self
+        """Matrix products in bfloat16 wherever the network's rule allows it."""
 
     def compiled(self, backend: str = "inductor") -> "LangFlashNet":
         """Every part through torch.compile; the first pass of each size then takes minutes."""

@@ -37,7 +37,6 @@ class PointMapNet(LangFlashNet):
 
     frozen = ("encoder", "language_head")
     compact = False
-    mixes = True
     caches_tokens = False
     stages = ("encoder", "point maps", "poses", "Gaussians", *MEANING_STAGES)
 

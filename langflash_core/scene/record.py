@@ -5,7 +5,7 @@ from run to run, and equal photos are to give equal files. Keys that this versio
 read into `Record.others` and written back as they are.
 """
 
-from langflash_core.types import Cost, Record
+from langflash_core.records import Cost, Record
 
 _COST = ("timings", "seconds", "peak_memory_mb")
 _VERSION_1 = "gaussians_per_view"  # a tensor since

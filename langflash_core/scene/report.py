@@ -1,14 +1,23 @@
-"""What `langflash info` says about a scene: plain JSON values."""
+"""What `langflash info` says about a scene: plain JSON values. A scene file is described without torch."""
 
-from torch import Tensor
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from langflash_core.scene.fields import field_bytes
-from langflash_core.types import Scene
+import numpy as np
+
+from langflash_core.records import Record
+from langflash_core.scene.container import damaged, read_container
+from langflash_core.scene.record import from_json
+
+if TYPE_CHECKING:
+    from langflash_core.types import Scene
 
 _CORE = (0.01, 0.99)  # the middle 98 % along each axis: stray points do not stretch the box
+_PHOTO = "photo_"
 
 
-def describe(scene: Scene) -> dict:
+def describe(scene: "Scene") -> dict:
     """Counts, bytes, timings, warnings, and extent.
 
     Returns:
@@ -20,25 +29,46 @@ def describe(scene: Scene) -> dict:
         before and after), timings {stage: seconds, total} (None where they are not known, as in files),
         warnings`.
     """
-    known = scene.record
-    sizes = field_bytes(scene)
-    timings = known.cost.timings
-    kept = scene.semantics.weight_values > 0
+    from langflash_core.scene.fields import to_fields  # torch
+
+    arrays = {name: values.numpy() for name, values in to_fields(scene).items()}
+    return _document(arrays, scene.semantics.space, scene.view_size, scene.record)
+
+
+def describe_file(path: Path) -> dict:
+    """`describe` of the scene in a file.
+
+    Raises:
+        SceneFileError: as `container.read_container`.
+    """
+    found = read_container(path)
+    try:
+        return _document(found.arrays, found.space, found.view_size, from_json(found.metadata))
+    except (ValueError, LookupError, TypeError, ArithmeticError) as error:
+        raise damaged(path, error) from error
+
+
+def _document(
+    arrays: Mapping[str, np.ndarray], space: str, view_size: tuple[int, int], known: Record
+) -> dict:
+    sizes = {name: values.nbytes for name, values in arrays.items() if not name.startswith(_PHOTO)}
+    sizes["photos"] = sum(values.nbytes for name, values in arrays.items() if name.startswith(_PHOTO))
+    timings, means = known.cost.timings, arrays["means"]
     return {
-        "gaussians": len(scene.gaussians),
-        "atoms": scene.semantics.num_atoms,
-        "channels": scene.semantics.dictionary.shape[1],
-        "weights_per_gaussian": float(kept.sum()) / max(1, len(scene.gaussians)),
-        "sh_degree": round(scene.gaussians.sh.shape[1] ** 0.5) - 1,
-        "views": scene.num_views,
-        "view_size": list(scene.view_size),
+        "gaussians": len(means),
+        "atoms": len(arrays["dictionary"]),
+        "channels": arrays["dictionary"].shape[1],
+        "weights_per_gaussian": float((arrays["weight_values"] > 0).sum()) / max(1, len(means)),
+        "sh_degree": round(arrays["sh"].shape[1] ** 0.5) - 1,
+        "views": len(arrays["viewmats"]),
+        "view_size": list(view_size),
         "photos": list(known.photos),
         "preset": known.preset,
         "source": known.source,
-        "space": scene.semantics.space,
+        "space": space,
         "bytes": {**sizes, "total": sum(sizes.values())},
-        "bounding_box": _box(scene.gaussians.means, (0.0, 1.0)),
-        "core_box": _box(scene.gaussians.means, _CORE),
+        "bounding_box": _box(means, (0.0, 1.0)),
+        "core_box": _box(means, _CORE),
         "metric_scale": known.metric_scale,
         "counts": dict(known.counts),
         "pruning": dict(known.pruning) or None,
@@ -48,10 +78,10 @@ def describe(scene: Scene) -> dict:
     }
 
 
-def _box(means: Tensor, quantiles: tuple[float, float]) -> dict | None:
-    """Corners between two quantiles per axis, by rank (torch.quantile stops at 16 million)."""
+def _box(means: np.ndarray, quantiles: tuple[float, float]) -> dict | None:
+    """Corners between two quantiles per axis, by rank."""
     if len(means) == 0:
         return None
-    ordered = means.sort(dim=0).values
+    ordered = np.sort(means, axis=0)
     low, high = (ordered[round(q * (len(means) - 1))].tolist() for q in quantiles)
     return {"min": low, "max": high}

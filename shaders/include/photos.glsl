@@ -1,6 +1,6 @@
 // Purpose: where the surface of a pixel lies in every photo, and what depth that photo has there.
 // Frames: camera axes are OpenCV's; `pinhole` of the picture's pixels, `pinholes` of the photos' depth maps.
-//         MAX_PHOTOS and COVERED_ALPHA are set by the program.
+//         MAX_PHOTOS and COVERED_ALPHA are set by the program; luma.glsl is included before.
 
 uniform sampler2D colour;
 uniform sampler2D depth;                 // of the picture: sum of T alpha z, sum of T alpha
@@ -30,5 +30,5 @@ float depth_ratio(vec3 pos_c, int photo) {
 }
 
 vec3 grey_photo(ivec2 pixel) {
-    return vec3(dot(clamp(texelFetch(colour, pixel, 0).rgb, 0.0, 1.0), vec3(0.299, 0.587, 0.114)));
+    return vec3(luma(clamp(texelFetch(colour, pixel, 0).rgb, 0.0, 1.0)));
 }

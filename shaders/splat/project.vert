@@ -5,6 +5,7 @@
 
 #include "footprint.glsl"
 #include "harmonics.glsl"
+#include "luma.glsl"
 
 in vec4 in_mean;   // xyz world, w opacity
 in vec4 in_quat;   // wxyz, unit
@@ -40,7 +41,7 @@ void main() {
     out_colour = min(sh_colour(normalize(from_eye)), HALF_MAX);
     int tint = int(255.0 * in_tint + 0.5);
     if (tint > 0) {
-        float grey = dot(min(out_colour, 1.0), vec3(0.299, 0.587, 0.114));
+        float grey = luma(min(out_colour, 1.0));
         out_colour = mix(out_colour, tint_colours[tint - 1] * (0.35 + 0.75 * grey), TINTED);
     }
 }

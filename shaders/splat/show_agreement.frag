@@ -5,6 +5,7 @@
 // Frames: see photos.glsl; here every photo's depth is of its own Gaussians alone.
 
 #include "colormaps.glsl"
+#include "luma.glsl"
 #include "photos.glsl"
 
 uniform int which_map;

@@ -2,6 +2,7 @@
 // Purpose: how many photos saw what a pixel shows: none, one, several. SAME is set by the program.
 // Frames: see photos.glsl.
 
+#include "luma.glsl"
 #include "photos.glsl"
 
 uniform vec3 count_colours[3];

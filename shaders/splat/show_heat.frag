@@ -3,6 +3,7 @@
 //          COVERED_ALPHA, as in the answers, is set by the program.
 
 #include "colormaps.glsl"
+#include "luma.glsl"
 
 uniform sampler2D colour;
 uniform sampler2DArray relevance;  // PHRASES_A_LAYER each
@@ -20,7 +21,7 @@ void main() {
     vec4 photo = texelFetch(colour, pixel, 0);
     vec3 rgb = clamp(photo.rgb, 0.0, 1.0);
     vec3 heat = colour_map(which_map, (value - span.x) / max(span.y - span.x, 1e-6));
-    float grey = dot(rgb, vec3(0.299, 0.587, 0.114));
+    float grey = luma(rgb);
     vec3 under = mix(rgb, vec3(0.5 * grey), opacity < 1.0 ? 0.6 : 1.0);
     vec3 over = mix(rgb, heat, opacity);
     bool shown = value >= threshold && photo.a >= COVERED_ALPHA;

@@ -4,6 +4,7 @@
 // Frames: texel = pixel.
 
 #include "colormaps.glsl"
+#include "luma.glsl"
 
 uniform sampler2D colour;
 uniform sampler2DArray relevance;  // PHRASES_A_LAYER each
@@ -25,7 +26,7 @@ void main() {
         second = prompt == 1 ? min(best, value) : max(second, min(best, value));
         best = max(best, value);
     }
-    float grey = dot(clamp(photo.rgb, 0.0, 1.0), vec3(0.299, 0.587, 0.114));
+    float grey = luma(clamp(photo.rgb, 0.0, 1.0));
     vec3 shade = colour_map(which_map, (best - second - span.x) / (span.y - span.x));
     out_colour = vec4(photo.a >= COVERED_ALPHA ? mix(vec3(grey), shade, opacity) : vec3(0.0), 1.0);
 }

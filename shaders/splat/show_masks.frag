@@ -3,6 +3,8 @@
 //          COVERED_ALPHA, as in the answers, and MAX_PROMPTS are set by the program.
 // Frames: texel = pixel.
 
+#include "luma.glsl"
+
 uniform sampler2D colour;          // premultiplied
 uniform sampler2D depth;           // second channel: sum of T alpha, in full precision
 uniform sampler2DArray relevance;  // PHRASES_A_LAYER each
@@ -30,7 +32,7 @@ void main() {
         }
     }
     vec3 rgb = clamp(texelFetch(colour, pixel, 0).rgb + (1.0 - alpha) * background, 0.0, 1.0);
-    float grey = dot(rgb, vec3(0.299, 0.587, 0.114));
+    float grey = luma(rgb);
     bool shown = label >= 0;
     if (style == 0) rgb = shown ? label_colours[max(label, 0)] : background;
     if (style == 1) rgb = shown ? rgb : background;

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from langflash_core.errors import OutputError
+from langflash_core.errors import OutputError, PromptError
 from langflash_core.export.glb import write_boxes
 
 TURN = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]])  # rows are axes
@@ -58,6 +58,12 @@ def test_names_and_colours(tmp_path):
     colours = [material["pbrMetallicRoughness"]["baseColorFactor"] for material in document["materials"]]
     assert len({tuple(colour) for colour in colours}) == 3
     assert all(material["alphaMode"] == "BLEND" for material in document["materials"])
+
+
+def test_nothing_found_writes_nothing(tmp_path):
+    with pytest.raises(PromptError, match="threshold"):
+        write_boxes([], tmp_path / "boxes.glb")
+    assert not list(tmp_path.iterdir())
 
 
 def test_unwritable(tmp_path):

@@ -17,7 +17,7 @@ from ..scenes import open_scene
 from .query import spoken
 
 SCENES = (".langflash", ".ply", ".splat")
-SUFFIXES = (".png", *SCENES, ".json", ".csv", ".glb", ".mp4", ".npz")
+SUFFIXES = (".png", *SCENES, ".json", ".csv", ".mp4", ".npz", ".glb")
 TABLES = {".json": ".json of masks", ".csv": ".csv of boxes", ".glb": ".glb of boxes"}
 NEED_A_PHRASE = ("heat", "mask", "cutout", "labels", "boxes")
 

@@ -1,10 +1,13 @@
 """`langflash info`: what a scene file holds."""
 
 from argparse import Namespace
+from pathlib import Path
 from typing import Any, TextIO
 
+from langflash_core.errors import SceneFileError
+
+from ..files import readable_file
 from ..report import write_json
-from ..scenes import open_scene
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -13,17 +16,27 @@ def run(args: Namespace, out: TextIO) -> None:
     Raises:
         SceneFileError: missing, truncated or foreign.
     """
-    from langflash_core.scene.report import describe
-
     document = {
         "scene": str(args.scene),
-        **describe(open_scene(args.scene)),
+        **_described(args.scene),
         "file_bytes": args.scene.stat().st_size,
     }
     if args.json:
         write_json(document, out)
     else:
         print("\n".join(_lines(document)), file=out)
+
+
+def _described(path: Path) -> dict[str, Any]:
+    """Our own files without torch; those of other programs as the scene they become."""
+    from langflash_core.scene.report import describe, describe_file
+
+    readable_file(path, "scene", SceneFileError)
+    if path.suffix.lower() == ".langflash":
+        return describe_file(path)
+    from ..scenes import open_scene
+
+    return describe(open_scene(path))
 
 
 def _lines(fields: dict[str, Any], indent: str = "") -> list[str]:

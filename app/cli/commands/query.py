@@ -3,16 +3,15 @@
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
-from langflash_core.errors import PromptError, SceneFileError
-from langflash_core.types import PromptAnswer, QueryResult, Scene
+from langflash_core.errors import PromptError
 
-from ..cameras import chosen_camera
-from ..files import check_folder, readable_file, staged_folder
-from ..renderers import open_renderer
+from ..files import check_folder, checked_scene, staged_folder
 from ..report import ProgressBar, write_json
-from ..scenes import open_scene
+
+if TYPE_CHECKING:
+    from langflash_core.types import PromptAnswer, QueryResult, Scene
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -23,12 +22,16 @@ def run(args: Namespace, out: TextIO) -> None:
     """
     prompts = spoken(args.prompts)
     negatives = None if args.negatives is None else spoken(args.negatives)
-    choice = chosen_camera(args)
-    readable_file(args.scene, "scene", SceneFileError)
+    checked_scene(args.scene)
     check_folder(args.output)
     from langflash_core import pipeline
     from langflash_core.export.answers import write_answers
 
+    from ..cameras import chosen_camera
+    from ..renderers import open_renderer
+    from ..scenes import open_scene
+
+    choice = chosen_camera(args)
     scene = open_scene(args.scene)
     camera = choice.of(scene)
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
@@ -60,7 +63,7 @@ def spoken(prompts: Sequence[str]) -> list[str]:
     return phrases
 
 
-def _answers(scene: Scene, result: QueryResult, files: list[dict[str, str]]) -> dict[str, Any]:
+def _answers(scene: "Scene", result: "QueryResult", files: list[dict[str, str]]) -> dict[str, Any]:
     metres = scene.record.metric_scale
     return {
         "mode": result.mode,
@@ -73,7 +76,7 @@ def _answers(scene: Scene, result: QueryResult, files: list[dict[str, str]]) -> 
     }
 
 
-def answer_fields(answer: PromptAnswer, scale: float) -> dict[str, Any]:
+def answer_fields(answer: "PromptAnswer", scale: float) -> dict[str, Any]:
     """The JSON of one answer; positions and sizes multiplied by `scale` (metres per scene unit)."""
     box = answer.box and {
         "center": [scale * value for value in answer.box["center"]],

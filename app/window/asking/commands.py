@@ -107,7 +107,7 @@ class SelectPrompt:
 
 @dataclass(frozen=True)
 class SetNegatives:
-    """What relevancy is measured against."""
+    """What relevancy is measured against; nothing: what the scene's calibration says."""
 
     negatives: tuple[str, ...]
 
@@ -234,7 +234,8 @@ class PhrasesCompiled:
     query: "CompiledQuery" = field(compare=False, repr=False)
 
     def apply(self, state: State) -> State:
-        return Calibrated(self.query.threshold).apply(state)
+        state = Calibrated(self.query.threshold).apply(state)
+        return state if state.negatives else change(state, usual=self.query.negative_texts)
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-NEGATIVES = ("object", "things", "stuff", "texture")
-
 # Told apart by people with the common colour-vision deficiencies, on dark ground.
 PALETTE = (
     (0.96, 0.62, 0.16),
@@ -86,7 +84,8 @@ class Asking:
     """The asking half of the state.
 
     recent: phrases asked, the newest first. atom: whose weight map is on show. chosen: atoms to
-    merge. prompts_path: where the last set was.
+    merge. prompts_path: where the last set was. usual: what the scene compares phrases with, by its
+    own calibration, once it has said so.
     """
 
     recent: tuple[str, ...] = ()
@@ -95,6 +94,7 @@ class Asking:
     atom: int = 0
     chosen: tuple[int, ...] = ()
     prompts_path: Path | None = None
+    usual: tuple[str, ...] = ()
 
     def histogram(self, key: int, text: str) -> Histogram | None:
         """Of a prompt as it reads now; None until it is answered."""
@@ -102,7 +102,7 @@ class Asking:
 
     def without_scene(self) -> "Asking":
         """For another scene: what belongs to the old one goes."""
-        return replace(self, histograms=(), insight=None, atom=0, chosen=())
+        return replace(self, histograms=(), insight=None, atom=0, chosen=(), usual=())
 
 
 NO_ASKING = Asking()

@@ -8,7 +8,6 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..asking.state import NEGATIVES
 from ..scene.drops import typed_path
 from ..state import State
 from .state import ExportForm, What
@@ -145,6 +144,6 @@ def remarks(state: State) -> list[str]:
         return notes
     if form.what is not What.HEAT and len({prompt.threshold for prompt in state.asked}) > 1:
         notes.append("The thresholds differ, so the calibrated one is used for all.")
-    if state.negatives != NEGATIVES:
+    if state.negatives:
         notes.append("Phrases are compared with the usual ones, not with your own.")
     return notes

@@ -26,6 +26,7 @@ HINTS = {
     What.COCO: "Instance masks as COCO JSON, and the pictures they belong to",
     What.BOXES_JSON: "Place, axes and size of what each phrase finds",
     What.BOXES_CSV: "The same as a table",
+    What.BOXES_GLB: "The same as bodies, for Blender and other 3D programs",
     What.VIDEO: "A round through all views, H.264",
     What.PLY: "3D Gaussians as other viewers read them",
     What.SPLAT: "The compact format of web viewers",

@@ -13,7 +13,7 @@ from pathlib import Path
 from ..poses import Pose, intrinsics, viewmat
 
 _LAST_LINES = 20
-_PROGRAM = __name__.partition(".window.")[0]  # the package whose command line it is
+_PROGRAM = "langflash_core"  # its __main__ finds the command line, installed or not
 
 
 class Exporter:

@@ -19,6 +19,7 @@ class What(Enum):
     COCO = ("COCO masks", ".json", "")
     BOXES_JSON = ("Boxes, JSON", ".json", "boxes")
     BOXES_CSV = ("Boxes, CSV", ".csv", "boxes")
+    BOXES_GLB = ("Boxes, .glb", ".glb", "boxes")
     VIDEO = ("Turntable", ".mp4", "")
     PLY = ("Splats, .ply", ".ply", "")
     SPLAT = ("Splats, .splat", ".splat", "")
@@ -40,7 +41,8 @@ class What(Enum):
     def needs_phrases(self) -> bool:
         """Whether there is nothing to write without a phrase."""
         return self in (
-            What.HEAT, What.MASK, What.CUTOUT, What.LABELS, What.COCO, What.BOXES_JSON, What.BOXES_CSV
+            What.HEAT, What.MASK, What.CUTOUT, What.LABELS, What.COCO,
+            What.BOXES_JSON, What.BOXES_CSV, What.BOXES_GLB,
         )  # fmt: skip
 
     @property

@@ -93,7 +93,7 @@ def measure_network(network: LangFlashNet, plan: Plan, progress: Progress | None
     """
     rows: list[Row] = []
     exact: dict[tuple[int, int], _Pass] = {}
-    precisions = ("float32", "bfloat16") if network.mixes and plan.bfloat16 else ("float32",)
+    precisions = ("float32", "bfloat16") if plan.bfloat16 else ("float32",)
     steps = [(p, v) for p in precisions for v in plan.views]
     for number, (precision, num_views) in enumerate(steps):
         if progress is not None:

@@ -287,7 +287,8 @@ def _ranges(counts: Int[np.ndarray, " I"]) -> Int[np.ndarray, "I 2"]:
 
 def _decode_textures(
     joined: UInt8[np.ndarray, " Z"], sizes: Int[np.ndarray, " L"]
-) -> UInt8[np.ndarray, "L S S 4"]:
+) -> UInt8[np.ndarray, "T S S 4"]:
+    """T = max(L, 1) square layers: a texture array cannot be empty."""
     layers = np.zeros((max(len(sizes), 1), TEXTURE_SIZE, TEXTURE_SIZE, 4), dtype=np.uint8)
     starts = np.cumsum(sizes) - sizes
     for layer, (start, size) in enumerate(zip(starts, sizes, strict=True)):

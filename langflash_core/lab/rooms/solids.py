@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-Triangles = Float[np.ndarray, "F 3 3"]
+Triangles = Float[np.ndarray, "_F 3 3"]  # the underscore: every piece of a thing has its own F
 Vector = tuple[float, float, float]
 
 

@@ -120,9 +120,18 @@ def start_from(network: LangFlashNet, weights: Path, modules: Sequence[str]) -> 
 
 
 def save_network(network: LangFlashNet, path: Path, metadata: Mapping | None = None) -> None:
-    """Write all weights atomically. `metadata` is plain JSON: data, steps, hours, metrics, calibration."""
+    """Write all weights atomically. `metadata` is plain JSON: data, steps, hours, metrics, calibration.
+
+    An aggregation that has no weights stands by untrained and is not written: who reads the file would
+    take it for trained, and normalise atoms twice where this network does once.
+    """
     if not network.compact:
-        write_part(path, network.state_dict(), network.preset, "trained here", path.name)
+        trained = {
+            key: value
+            for key, value in network.state_dict().items()
+            if network.aggregated or not key.startswith("aggregation.")
+        }
+        write_part(path, trained, network.preset, "trained here", path.name)
         return
     header = {
         "format": FORMAT,

@@ -181,8 +181,9 @@ def _fill(network: LangFlashNet, name: str, path: Path, device: str | torch.devi
 def on_own_address(value: Tensor) -> Tensor:
     """The same numbers where torch would have put them, on a multiple of 64 bytes.
 
-    A tensor of a safetensors file starts at any address, and matrix products choose their way by it:
-    the last bits would depend on how long the file's header is.
+    A tensor of a safetensors file starts at any address, and matrix products may choose their way by it
+    (MKL promises equal bits for equal addresses modulo 64 alone): the last bits would depend on how
+    long the file's header is.
     """
     return value if value.data_ptr() % ALIGNMENT == 0 else value.clone()
 

@@ -21,8 +21,8 @@ from langflash_core.resources import asset_path
 
 SCALE = ".scale"
 ALIGNMENT = 64
-"""Bytes. Matrix products choose their way by the address of their numbers: what lies elsewhere than
-torch itself would have put it gives other last bits. Every array starts on a multiple of this."""
+"""Bytes. Matrix products may choose their way by the address of their numbers; every array starts on a
+multiple of this, where torch itself would have put it, so that the last bits do not depend on the file."""
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,6 @@ def test_what_cannot_be_done_is_one_sentence(run, checkpoints, tmp_path):
         (("--grouping", "queries"), "grouping has no weights"),
         (("--grouping", "sam2"), "SAM 2 is not at hand"),
         (("--refine", 99999), "out of range"),
-        (("--preset", "mini", "--precision", "bfloat16"), "float32 only"),
         (("--preset", "mini", "--aggregation", "crops"), "crops are embedded by CLIP"),
     ):
         refused = run(*words, *more)

@@ -134,10 +134,14 @@ class Program:
 
     def box(self, label: str, place: int = 0) -> list[int]:
         """Left, top, right, bottom of an item by the end of its label; `place` counts equal ones."""
-        items = self.state["items"]
-        found = [box for name, boxes in items.items() if name.endswith(label) for box in boxes]
-        assert len(found) > place, f"no item {label!r} among {sorted(items)}"
-        return found[place]
+        end = time.monotonic() + PATIENCE
+        while True:  # on a busy machine the news comes before the frame that shows it
+            items = self.state["items"]
+            found = [box for name, boxes in items.items() if name.endswith(label) for box in boxes]
+            if len(found) > place:
+                return found[place]
+            assert time.monotonic() < end, f"no item {label!r} among {sorted(items)}"
+            time.sleep(0.05)
 
     def item(self, label: str, place: int = 0) -> tuple[int, int]:
         """The middle of an item."""

@@ -7,7 +7,6 @@ import pytest
 from PIL import Image
 
 from app.window.asking import commands as ask
-from app.window.asking.state import NEGATIVES
 from app.window.asking.work import Answer, Encode
 from app.window.commands import OfScene, ShowPicture
 from app.window.scene import commands as show
@@ -54,7 +53,7 @@ def test_a_scene_is_loaded_and_phrases_are_scored(worker: Worker, scene_file: Pa
     info = wait_for(worker, show.SceneArrived)[-1].info
     assert (info.num_atoms, len(info.views), info.path) == (3, 2, scene_file)
     texts = ("armchair", "elephant")
-    worker.submit(Encode(info.serial, info.scene, (4, 9), texts, NEGATIVES))
+    worker.submit(Encode(info.serial, info.scene, (4, 9), texts, ()))
     compiled = wait_for(worker, ask.PhrasesCompiled)[-1]
     assert compiled.keys == (4, 9)
     camera = info.scene.camera(0, 112, 84)
@@ -95,7 +94,7 @@ def test_only_the_newest_prompts_are_encoded(worker: Worker, scene_file: Path) -
     scene = load(scene_file)
     typed = "an armchair by the window"
     for end in range(1, len(typed) + 1):
-        worker.submit(Encode(1, scene, (0,), (typed[:end],), NEGATIVES))
+        worker.submit(Encode(1, scene, (0,), (typed[:end],), ()))
     results = wait_for(worker, ask.PhrasesCompiled)
     while results[-1].query.texts != (typed,):
         results += wait_for(worker, ask.PhrasesCompiled)

@@ -9,7 +9,7 @@ from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State
 from .. import commands as ask
-from ..state import NEGATIVES, Prompt, usable
+from ..state import Prompt, usable
 from . import entry, scores
 
 _SWATCH = imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label | imgui.ColorEditFlags_.no_tooltip
@@ -127,9 +127,9 @@ def _negatives(state: State) -> list[do.Command]:
         return issued
     widgets.muted("A phrase counts where it fits better than each of these, separated by commas.")
     imgui.set_next_item_width(-1)
-    changed, text = imgui.input_text("##negatives", ", ".join(state.negatives))
+    changed, text = imgui.input_text("##negatives", ", ".join(state.negatives or state.asking.usual))
     if changed:
         issued.append(ask.SetNegatives(tuple(part.strip() for part in text.split(",") if part.strip())))
-    if state.negatives != NEGATIVES and imgui.button("Back to the usual ones"):
-        issued.append(ask.SetNegatives(NEGATIVES))
+    if state.negatives and imgui.button("Back to the usual ones"):
+        issued.append(ask.SetNegatives(()))
     return issued

@@ -218,7 +218,7 @@ def _bentwood_chair(draw: Draw) -> Design:
     a = np.linspace(0, np.pi, 11)
     for k in (1.0, inner):
         arch = 0.9 * k * r * np.cos(a), seat + k * tall * np.sin(a) ** 0.6, -r * 0.75 - 0.09 * k * np.sin(a)
-        d.tube(np.stack(arch, -1).tolist(), 0.012, look, 6)
+        d.tube(list(zip(*(v.tolist() for v in arch), strict=True)), 0.012, look, 6)
     return d
 
 
@@ -330,7 +330,8 @@ def _paper_lamp(draw: Draw, metal: Look) -> Design:
     )
     d = Design("paper lamp" if foot else "paper pendant lamp", "lamp")
     ribs = r * np.sin(t) * (1 + 0.02 * np.cos(np.arange(25) * np.pi))
-    d.lathe(np.stack([ribs, foot + r * (1 - flat * np.cos(t))], -1).tolist(), _shade_look(draw), 18)
+    heights = foot + r * (1 - flat * np.cos(t))
+    d.lathe(list(zip(ribs.tolist(), heights.tolist(), strict=True)), _shade_look(draw), 18)
     if not foot:
         d.tube(((0, 1.7 * r, 0), (0, 2 * r + draw.between(0.1, 0.4), 0)), 0.005, DARK, 5)
     for a in spread(0, TURN, 4)[1:] if foot else ():

@@ -63,7 +63,8 @@ def _outline(width: float, height: float, corner: float) -> list[tuple[float, fl
     turn = np.arange(16) // 4 * QUARTER + np.arange(16) % 4 * QUARTER / 3
     signs = np.repeat([[1, 1], [-1, 1], [-1, -1], [1, -1]], 4, 0)
     shift = signs * [width / 2 - corner, height / 2 - corner]
-    return (shift + corner * np.stack([np.cos(turn), np.sin(turn)], 1)).tolist()
+    corners = shift + corner * np.stack([np.cos(turn), np.sin(turn)], 1)
+    return [(x, y) for x, y in corners.tolist()]
 
 
 def _slab(d: Design, look: Look, size: Vector, corner: float, at: Vector = (0, 0, 0)) -> None:

@@ -1,13 +1,15 @@
 """Asking without a window: phrases, their answers, the dictionary."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 import torch
 
 from app.window.asking import commands as ask
 from app.window.asking.prompt_sets import MOST_PROMPTS
-from app.window.asking.state import BINS, MOST_RECENT, NEGATIVES, Histogram, margin_span, unfinished, usable
+from app.window.asking.state import BINS, MOST_RECENT, Histogram, margin_span, unfinished, usable
 from app.window.scene import camera
 from app.window.scene import commands as show
 from app.window.scene.state import Mode
@@ -149,10 +151,18 @@ def test_found_follows_the_threshold_in_force() -> None:
 
 def test_negatives_and_what_needs_weight_maps() -> None:
     state = after(State(), ask.SetNegatives(("thing",)))
-    assert state.negatives == ("thing",) and State().negatives == NEGATIVES
+    assert state.negatives == ("thing",) and State().negatives == ()
     assert not after(State(), camera.SetMode(Mode.HEAT)).wants_maps
     assert after(State(), camera.SetMode(Mode.ATOMS)).wants_maps
     asked = after(State(), ask.EditPrompt(0, "door"))
     assert asked.wants_maps and after(asked, camera.SetMode(Mode.DEPTH)).wants_maps  # it has no score yet
     answered = after(asked, ask.Answered(((0, "door", 0.9),)), camera.SetMode(Mode.DEPTH))
     assert answered.prompts[0].score == 0.9 and not answered.wants_maps
+
+
+def test_without_own_negatives_the_scene_says_what_phrases_are_compared_with() -> None:
+    query: Any = SimpleNamespace(threshold=0.7, negative_texts=("wall",))
+    state = ask.PhrasesCompiled((), query).apply(State())
+    assert (state.negatives, state.asking.usual) == ((), ("wall",))
+    own = ask.PhrasesCompiled((), query).apply(replace(State(), negatives=("thing",)))
+    assert own.asking.usual != ("wall",)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 
-from app.window.asking.state import NEGATIVES
 from app.window.editing import commands as edit
 from app.window.editing import work
 from app.window.editing.state import Reading, Region
@@ -80,7 +79,7 @@ def test_a_large_box_is_looked_at_coarser(info, monkeypatch) -> None:
 
 
 def by_phrase(info, text: str, like: bytes = b"", threshold: float = 0.8) -> work.FindByPhrase:
-    return work.FindByPhrase(*scene_of(info), text, like, NEGATIVES, threshold, "replace")
+    return work.FindByPhrase(*scene_of(info), text, like, (), threshold, "replace")
 
 
 def test_a_phrase_selects_its_gaussians_and_a_place_those_like_it(info) -> None:

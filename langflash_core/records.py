@@ -1,0 +1,48 @@
+"""What is known of a scene besides its tensors. Imports no torch: `langflash info` reads it without."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What it took to make a scene. It differs from run to run, so scene files do not hold it.
+
+    timings: seconds per stage, disjoint, in order. seconds: "network" and "total", from start to
+    end. peak_memory_mb: the most that the process held, None where it cannot be asked.
+    """
+
+    timings: Mapping[str, float] = field(default_factory=dict)
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    peak_memory_mb: int | None = None
+
+
+@dataclass(frozen=True)
+class Record:
+    """What is known of a scene besides its tensors. Mappings hold plain JSON values; empty: unknown.
+
+    preset: of the network. source: the splat file it came from. photos: names, one per view.
+    warnings: a sentence each. metric_scale: metres per scene unit. network_unit: the network's
+    length units per scene unit. counts: Gaussians predicted and left out. pruning: as `prune` left
+    it. refinement: what a fit to the photos brought. calibration: what the network's checkpoint
+    says about scores, instead of its language space. atom_names: a person's own, by atom.
+    silent_atoms: those that answer no phrase. num_deleted: Gaussians that edits took away.
+    others: what a file says under keys that this version does not know.
+    """
+
+    preset: str | None = None
+    source: str | None = None
+    photos: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    metric_scale: float | None = None
+    network_unit: float | None = None
+    counts: Mapping[str, int] = field(default_factory=dict)
+    pruning: Mapping[str, int] = field(default_factory=dict)
+    refinement: Mapping[str, Any] = field(default_factory=dict)
+    calibration: Mapping[str, Any] = field(default_factory=dict)
+    atom_names: Mapping[int, str] = field(default_factory=dict)
+    silent_atoms: tuple[int, ...] = ()
+    num_deleted: int = 0
+    cost: Cost = Cost()
+    others: Mapping[str, Any] = field(default_factory=dict)

@@ -1,0 +1,148 @@
+"""A scene file as named arrays and strings, found whole or refused. Imports no torch, so that what is
+wrong with a file is told at once. The format is described in `file.py`.
+"""
+
+import hashlib
+import json
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import safetensors.numpy
+from safetensors import SafetensorError
+
+from langflash_core.errors import SceneFileError
+
+FORMAT, VERSION = "langflash-scene", 2
+_MAX_HEADER = 64 * 2**20
+_REMEDY = "reconstruct the scene again or copy the whole file"
+_FOREIGN = {
+    b"\xff\xd8\xff": "a JPEG photo",
+    b"\x89PNG": "a PNG picture",
+    b"ply": "a PLY file",
+    b"PK\x03\x04": "a zip archive or PyTorch checkpoint",
+    b"\x1f\x8b": "a gzip archive",
+    b"glTF": "a glTF file",
+}
+
+
+@dataclass(frozen=True)
+class Container:
+    """version: of the format. space, view_size, metadata: as the header has them. arrays: the tensors."""
+
+    version: int
+    space: str
+    view_size: tuple[int, int]
+    metadata: dict
+    arrays: dict[str, np.ndarray]
+
+
+def read_container(path: Path) -> Container:
+    """What a scene file holds, its checksum found right.
+
+    Raises:
+        SceneFileError: missing, truncated, damaged, foreign, or of a newer version; says what was
+            expected and what was found.
+    """
+    header, content = _read(path)
+    version = _version(path, header)
+    try:
+        arrays, text = safetensors.numpy.load(content), header["scene"]
+        if digest(text, arrays) != header["digest"]:
+            raise ValueError("its content does not match its checksum")
+        described = json.loads(text)
+        width, height = (int(side) for side in described["view_size"])
+        return Container(
+            version, str(described["space"]), (width, height), dict(described["metadata"]), arrays
+        )
+    except (SafetensorError, ValueError, LookupError, TypeError, RuntimeError, ArithmeticError) as error:
+        raise damaged(path, error) from error
+
+
+def check_container(path: Path) -> None:
+    """Read no more than tells a whole scene file of a known version from everything else.
+
+    Raises:
+        SceneFileError: as `read_container`, but for what only the checksum shows.
+    """
+    _version(path, _read(path)[0])
+
+
+def damaged(path: Path, reason: object) -> SceneFileError:
+    """The error that says so."""
+    return SceneFileError(f"{path.name} is damaged ({reason}); {_REMEDY}")
+
+
+def digest(text: str, arrays: Mapping[str, np.ndarray]) -> str:
+    """SHA-256 of the header's JSON and of every array with its name, type (as torch spells it) and shape."""
+    total = hashlib.sha256(text.encode())
+    for name in sorted(arrays):
+        values = arrays[name]
+        total.update(f"{name} torch.{values.dtype} {tuple(values.shape)}\n".encode())
+        total.update(values.tobytes())
+    return total.hexdigest()
+
+
+def _read(path: Path) -> tuple[dict[str, str], bytes]:
+    """The `__metadata__` strings and the whole file, after its size was found right."""
+    if path.is_dir():
+        raise SceneFileError(f"{path} is a folder; name a scene file (.langflash)")
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(8)
+            length = struct.unpack("<Q", start)[0] if len(start) == 8 else 0
+            head = stream.read(length) if 2 <= length <= _MAX_HEADER else b""
+            header = _parse_header(path, start + head[:8], head)
+            _check_size(path, 8 + length, header, path.stat().st_size)
+            return header["__metadata__"], start + head + stream.read()
+    except FileNotFoundError as error:
+        remedy = "check the path, or make it with: langflash reconstruct"
+        raise SceneFileError(f"scene {path} does not exist; {remedy}") from error
+    except OSError as error:
+        raise SceneFileError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
+
+
+def _parse_header(path: Path, first: bytes, head: bytes) -> dict:
+    if not first:
+        raise SceneFileError(f"{path.name} is an empty file; {_REMEDY}")
+    if f'"format":"{FORMAT}"'.encode() in head and not head.rstrip().endswith(b"}"):
+        raise SceneFileError(f"{path.name} is cut off inside its header; {_REMEDY}")
+    try:
+        header = json.loads(head)
+        strings = header["__metadata__"]
+        known = strings["format"] == FORMAT and all(isinstance(text, str) for text in strings.values())
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        known, header = False, {}
+    if known:
+        return header
+    found = next((kind for mark, kind in _FOREIGN.items() if first.startswith(mark)), "something else")
+    found = "another safetensors file" if first[8:10] == b'{"' and found == "something else" else found
+    raise SceneFileError(
+        f"{path.name} is not a LangFlash scene: expected a {FORMAT} file, found {found}; "
+        "name a file made by langflash reconstruct"
+    )
+
+
+def _check_size(path: Path, body_start: int, header: dict, found: int) -> None:
+    try:
+        ends = [int(entry["data_offsets"][1]) for name, entry in header.items() if name != "__metadata__"]
+        expected = body_start + max(ends, default=0)
+    except (ValueError, LookupError, TypeError) as error:
+        raise SceneFileError(f"{path.name} is damaged: its header lists no tensors; {_REMEDY}") from error
+    if found != expected:
+        kind = "cut off" if found < expected else "damaged"
+        raise SceneFileError(f"{path.name} is {kind}: expected {expected} bytes, found {found}; {_REMEDY}")
+
+
+def _version(path: Path, header: dict[str, str]) -> int:
+    version = header.get("version", "")
+    if not version.isdecimal() or int(version) < 1:
+        raise SceneFileError(f"{path.name} is damaged: its version reads {version!r}; {_REMEDY}")
+    if int(version) > VERSION:
+        raise SceneFileError(
+            f"{path.name} is a scene of format {version}, this program reads format {VERSION}; "
+            "update LangFlash"
+        )
+    return int(version)

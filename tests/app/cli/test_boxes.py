@@ -1,0 +1,53 @@
+"""`langflash export --what boxes`: the same places and sizes as JSON, as a table and as bodies."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+import trimesh
+
+from tests.app.cli.test_bad_input import refused  # noqa: F401
+
+ASKED = ("--what", "boxes", "--prompt", "armchair", "submarine", "--backend", "torch")
+
+
+def exported(run, scene_file, path, *words):
+    outcome = run("export", scene_file, *ASKED, *words, "-o", path)
+    assert outcome.code == 0, outcome
+    return path
+
+
+def test_three_files_say_the_same(run, scene_file, tmp_path):
+    rows = json.loads(exported(run, scene_file, tmp_path / "a.json").read_text())
+    assert [(row["prompt"], row["found"]) for row in rows] == [("armchair", True), ("submarine", False)]
+    box = rows[0]["box"]
+    with exported(run, scene_file, tmp_path / "a.csv").open(newline="") as stream:
+        table = list(csv.DictReader(stream))
+    assert [float(table[0][f"center_{axis}"]) for axis in "xyz"] == box["center"]
+    assert [float(table[0][f"size_{axis}"]) for axis in "xyz"] == box["size"]
+    assert table[1]["center_x"] == ""
+    bodies = trimesh.load_scene(exported(run, scene_file, tmp_path / "a.glb"))
+    assert list(bodies.geometry) == ["armchair (view 0)"]
+    (corners,) = bodies.bounds[None]
+    np.testing.assert_allclose(corners.mean(0), np.array(box["center"]) * [1, -1, -1], atol=1e-5)
+
+
+def test_a_suffix_alone_means_boxes(run, scene_file, tmp_path):
+    words = ("--prompt", "armchair", "--all-views", "--backend", "torch")
+    outcome = run("export", scene_file, *words, "-o", tmp_path / "a.glb")
+    assert outcome.code == 0, outcome
+    views = json.loads(run("info", scene_file, "--json").out)["views"]
+    assert len(trimesh.load_scene(tmp_path / "a.glb").geometry) == views
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "hint"),
+    [
+        ("a.glb", (), "--prompt"),
+        ("a.glb", ("--prompt", "submarine", "--backend", "torch"), "lower the threshold"),
+        ("a.png", ("--what", "boxes", "--prompt", "armchair"), ".json, .csv or .glb"),
+    ],
+)
+def test_what_cannot_be(refused, scene_file, tmp_path, name, words, hint):  # noqa: F811
+    assert hint in refused("export", scene_file, *words, "-o", tmp_path / name)
