@@ -47,7 +47,6 @@ from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import LanguageSpace, language_space
 from langflash_core.network import PRESETS, LangFlashNet, load_network
 from langflash_core.pipeline import query, reconstruct
-from langflash_core.running import Progress
 from langflash_core.types import Camera, Frame, Scene, Views
 
 DRAWN = 1
@@ -55,6 +54,7 @@ DRAWN = 1
 METHODS = ("atoms", "features")
 """Where names are read from: the drawn atoms, the features of the photo before there is a scene."""
 Render = Callable[[Scene, Camera], Frame]
+Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -227,8 +227,7 @@ def judge_depth(drawn: Drawn, metric: bool, tally: Tally) -> None:
         depth_abs_rel_flat=abs_rel(align_scale(torch.ones_like(truth), truth), truth),
     )
     if metric:
-        unit = drawn.scene.record.network_unit
-        metres = drawn.frame.depths * (math.nan if unit is None else unit)
+        metres = drawn.frame.depths * (drawn.scene.record.network_unit or math.nan)
         valid = (truth > 0) & (metres > 0)
         tally.note(
             depth_abs_rel_metric=abs_rel(metres, truth),

@@ -1,5 +1,7 @@
 """rooms, train, eval, weights: words in, files out; what they compute is tested where it lives."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -8,9 +10,10 @@ from PIL import Image
 from app.cli.parser import LAYOUTS, build_parser
 from langflash_core.lab.photos import layouts
 from langflash_core.lab.photos.writing import FolderWriter
-from langflash_core.lab.training.shards import open_shards
+from langflash_core.lab.training.shards import Label, open_shards, write_shard
 from langflash_core.network import MINI, GuidedDepthNet, save_network
 from tests.lab.rooms.conftest import TINY_PACK
+from tests.lab.training.conftest import toy_record
 
 
 @pytest.fixture(scope="module")
@@ -188,3 +191,26 @@ def test_bad_photos(run, photos, tmp_path, monkeypatch, words, hint):
     outcome = run(*(str(photos) if word == "PHOTOS" else word for word in words))
     assert outcome.code == 2 and hint in outcome.err and outcome.err.count("\n") == 1
     assert not list(place.iterdir())
+
+
+def test_rooms_and_photos_are_calibrated_together(run, checkpoint, tmp_path):
+    """Sixteen photos of a wall, every second with a toilet; the fourth and the eleventh are validation."""
+    writer = FolderWriter(tmp_path / "photos")
+    for number in range(0, 32, 2):
+        id = str(number)
+        writer.photo(id, np.random.default_rng(number).integers(0, 255, (42, 56, 3), dtype=np.uint8))
+        labels = np.ones((42, 56), np.int64)
+        labels[10:30, 10:40] = 1 + number // 2 % 2
+        writer.labels(id, labels)
+    writer.finish({1: ("wall", None), 2: ("toilet", None)}, "drawn by a test")
+    rooms = [replace(toy_record(seed), tokens=None, token_scales=None) for seed in (0, 1)]
+    rooms[1] = replace(rooms[1], labels=tuple(Label(g, g) for g in ("lamp", "rug", "bed", "bath")))
+    write_shard(tmp_path / "cache" / "validation" / "a.safetensors", rooms)
+    plot = tmp_path / "new" / "diagram.png"
+    words = ("--weights", checkpoint, "--photos", tmp_path / "photos", "--backend", "torch", "--plot", plot)
+    outcome = run("eval", "calibrate", tmp_path / "cache", *words)
+    assert outcome.code == 0, outcome.err
+    found = outcome.json()["calibration"]
+    assert 0 < found["threshold"] < 1 and set(found["validation"]) == {"rooms", "photos"}
+    assert found["validation"]["photos"]["phrases"] == 2  # one photo shows both names, so nothing is absent
+    assert np.asarray(Image.open(plot)).std() > 10

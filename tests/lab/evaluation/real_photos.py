@@ -11,9 +11,8 @@ from langflash_core.lab.photos.fitting import fitted
 from langflash_core.lab.photos.folder import LabelledPhoto
 from langflash_core.lab.photos.writing import FolderWriter
 from langflash_core.language.spaces import language_space
-from langflash_core.network import MINI
+from langflash_core.network import LangFlashNet
 from langflash_core.network.encoders.shared import Tokens
-from langflash_core.network.model import LangFlashNet
 from langflash_core.types import Gaussians, Record, Scene, Semantics
 
 WIDTH, HEIGHT = 112, 84
@@ -83,26 +82,20 @@ def knowing(photos: list[LabelledPhoto], names: dict, *, scale: float = 0.5) -> 
         sh=((torch.cat(colours) - 0.5) / _C0)[:, None],
     )
     semantics = Semantics(torch.cat(atoms)[:, None], torch.ones(count, 1), dictionary, "minilm")
-    return Scene(
-        gaussians,
-        semantics,
-        torch.stack(viewmats),
-        torch.stack(Ks),
-        size,
-        record=Record(network_unit=1 / scale),
-    )
+    record = Record(network_unit=1 / scale)
+    return Scene(gaussians, semantics, torch.stack(viewmats), torch.stack(Ks), size, record=record)
 
 
 class KnowingNet(LangFlashNet):
     """Language features that are the names themselves, at half the size of the photo."""
 
     def __init__(self, folder: PhotoFolder):
-        super().__init__(MINI)
+        torch.nn.Module.__init__(self)  # no preset: it only knows names
         self.folder = folder
         self.id = folder.ids[0]
 
     def encode(self, images, Ks):
-        return Tokens((torch.zeros(1, 1, 1, 1),), (1, 1))
+        return Tokens((), (1, 1))
 
     def language(self, tokens, images):
         texts = [self.folder.names[id].text for id in sorted(self.folder.names)]
