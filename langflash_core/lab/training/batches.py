@@ -21,7 +21,8 @@ PATCH = 14
 class SceneBatch:
     """images (B, V, 3, H, W) in [0, 1]; depths (B, V, H, W) metres, 0 = nothing; instances
     (B, V, H, W) int64, 255 = nothing; viewmats (B, V, 4, 4), world = view 0; Ks (B, V, 3, 3)
-    pixels; tokens of the frozen encoder, or None; labels per scene; seeds (B)."""
+    pixels; tokens of the frozen encoder, or None; labels per scene; seeds (B); partly: what no instance
+    claims is something that nobody has named, not nothing."""
 
     images: Tensor
     depths: Tensor
@@ -31,6 +32,7 @@ class SceneBatch:
     tokens: Tokens | None
     labels: tuple[tuple[Label, ...], ...]
     seeds: tuple[int, ...]
+    partly: bool = False
 
     @property
     def size(self) -> tuple[int, int]:
@@ -86,13 +88,14 @@ def _tokens(records: Sequence[RoomRecord]) -> Tokens | None:
 class RoomSet:
     """All scenes of a folder of shards; draws random batches or walks through them in order."""
 
-    def __init__(self, folder: Path, *, limit: int | None = None):
-        """limit: use only the first so many scenes.
+    def __init__(self, folder: Path, *, limit: int | None = None, partly: bool = False, tokens: bool = True):
+        """limit: use only the first so many scenes. partly: they are labelled in part, as photos are.
+        tokens: read the cached ones, too, where there are any.
 
         Raises:
             ValueError: the folder holds no shard.
         """
-        self.folder = folder
+        self.folder, self.partly, self.tokens = folder, partly, tokens
         self.shards = open_shards(folder)
         self.entries = [(shard, i) for shard in self.shards for i in range(len(shard))][:limit]
         self._by_shape: dict[tuple[int, int, int], list[int]] = {}
@@ -110,9 +113,7 @@ class RoomSet:
             for name, group, words in shard.scenes[i]["labels"]
         ]
 
-    def draw(
-        self, count: int, views: int, generator: torch.Generator, *, with_tokens: bool = True
-    ) -> SceneBatch:
+    def draw(self, count: int, views: int, generator: torch.Generator) -> SceneBatch:
         """`count` random scenes of one random shape, `views` random views of each in random order.
 
         Scenes with fewer views than asked for give all they have; shapes are drawn in proportion
@@ -128,13 +129,14 @@ class RoomSet:
         for row in picked:
             shard, index = self.entries[rows[row]]
             order = torch.randperm(shape[0], generator=generator)[: min(views, shape[0])].tolist()
-            records.append(shard.record(index, views=order, with_tokens=with_tokens))
-        return collate(records)
+            records.append(shard.record(index, views=order, with_tokens=self.tokens))
+        return replace(collate(records), partly=self.partly)
 
-    def walk(self, count: int, *, views: int | None = None, with_tokens: bool = True):
+    def walk(self, count: int, *, views: int | None = None):
         """All scenes in order, `count` at a time, never mixing shapes; the first `views` views."""
         for (available, _, _), rows in self._by_shape.items():
             order = list(range(min(views or available, available)))
             for start in range(0, len(rows), count):
                 entries = [self.entries[row] for row in rows[start : start + count]]
-                yield collate([s.record(i, views=order, with_tokens=with_tokens) for s, i in entries])
+                records = [s.record(i, views=order, with_tokens=self.tokens) for s, i in entries]
+                yield replace(collate(records), partly=self.partly)

@@ -1,6 +1,8 @@
-"""`langflash train ...`: cache rooms, train stages, export weights. Plain functions; the command
-line only parses arguments. Text embeddings come in as a function, because training does not
-import the query stage."""
+"""`langflash train ...`: cache rooms, train stages on rooms and photos, export weights.
+
+Plain functions; the command line only parses arguments. Text embeddings come in as a function, because
+training does not import the query stage.
+"""
 
 import json
 import logging
@@ -21,10 +23,11 @@ from langflash_core.lab.training.cache import (
     fill_cache,
     rooms_renderer,
 )
-from langflash_core.lab.training.loop import LoopOptions, load_averaged, train_stage
+from langflash_core.lab.training.loop import LoopOptions, Validate, load_averaged, train_stage
+from langflash_core.lab.training.mixing import MixedSet
 from langflash_core.lab.training.naming import NAMING
 from langflash_core.lab.training.parts import PartSet, run_parts
-from langflash_core.lab.training.stages import STAGES, Words, guided
+from langflash_core.lab.training.stages import STAGES, Stage, Words, guided
 from langflash_core.lab.training.validation import MEASURES, Validator
 from langflash_core.lab.training.words import PhraseSampler, PhraseTable, build_table
 from langflash_core.network.checkpoints.files import adopt_frozen, initial_network, save_network, start_from
@@ -134,7 +137,7 @@ def run_train(
         if name not in ALL_STAGES:
             raise InputError(f"there is no stage '{name}'; choose among {', '.join(ALL_STAGES)}")
     options = options or LoopOptions(minutes=0)
-    rooms = _open(folder / "train")
+    _open(folder / "train")
     table = phrase_table(folder, encode)
     network = initial_network(PRESETS[preset], start, options.seed)
     done = _load_trained(network, run_dir)
@@ -150,41 +153,68 @@ def run_train(
         seed = options.seed + 1000 * list(ALL_STAGES).index(name) + done.get(name, 0)
         words = Words(PhraseSampler(table), torch.Generator().manual_seed(seed))
         own = LoopOptions(**{**options.__dict__, "minutes": budget})
-        learned: RoomSet | PartSet = rooms
-        if stage is NAMING:
-            learned = _parts(folder / "train")
-            if name not in done:
-                namer = guided(network).namer
-                namer.mean, namer.std = learned.statistics()
+        learned = _learned(stage, folder)
+        if isinstance(learned, PartSet) and name not in done:
+            namer = guided(network).namer
+            namer.mean, namer.std = learned.statistics()
         check = _validator(name, folder, table, own)
         state = train_stage(network, stage, learned, words, run_dir, own, check)
         done[name] = state.step
     return network.eval()
 
 
-def _open(folder: Path, limit: int | None = None) -> RoomSet:
+def _open(folder: Path, limit: int | None = None, *, photos: bool = False) -> RoomSet:
     try:
-        return RoomSet(folder, limit=limit)
+        return RoomSet(folder, limit=limit, partly=photos)
     except ValueError as error:
         raise InputError(str(error)) from None
 
 
-def _validator(name: str, folder: Path, table: PhraseTable, options: LoopOptions) -> Validator | None:
+def _photos(folder: Path, part: str) -> Path | None:
+    """Where `train cache --photos` puts a part; None if nothing is there."""
+    place = folder / "photos" / part
+    return place if place.is_dir() else None
+
+
+def _learned(stage: Stage, folder: Path) -> RoomSet | MixedSet | PartSet:
+    """What a stage learns from: rooms, and photos where some are cached and the stage can use them."""
+    if stage.name == NAMING.name:
+        return _parts(folder, "train")
+    rooms, photos = _open(folder / "train"), _photos(folder, "train")
+    if stage.photos == 0 or photos is None:
+        return rooms
+    return MixedSet(rooms, _open(photos, photos=True), stage.photos)
+
+
+def _validator(name: str, folder: Path, table: PhraseTable, options: LoopOptions) -> Validate | None:
+    """The stage's measure on validation rooms and, under names that begin with "photos_", on photos."""
     if not (folder / "validation").is_dir():
         return None
     measure, views = MEASURES[name]
-    words = Words(PhraseSampler(table), torch.Generator().manual_seed(1))
-    judged = (
-        _parts(folder / "validation")
-        if name == NAMING.name
-        else _open(folder / "validation", VALIDATION_SCENES)
-    )
-    return Validator(judged, words, measure, views, options.device)
+
+    def judge(judged: RoomSet | PartSet) -> Validator:
+        words = Words(PhraseSampler(table), torch.Generator().manual_seed(1))
+        return Validator(judged, words, measure, views, options.device)
+
+    if name == NAMING.name:
+        return judge(_parts(folder, "validation"))
+    rooms = judge(_open(folder / "validation", VALIDATION_SCENES))
+    place = _photos(folder, "validation")
+    if ALL_STAGES[name].photos == 0 or place is None:
+        return rooms
+    photos = judge(_open(place, photos=True))
+    return lambda network: {
+        **rooms(network),
+        **{f"photos_{key}": value for key, value in photos(network).items()},
+    }
 
 
-def _parts(rooms: Path) -> PartSet:
+def _parts(folder: Path, part: str) -> PartSet:
+    """The parts of rooms, and of photos where there are any."""
+    photos = _photos(folder, part)
+    folders = [folder / part / "parts", *([photos / "parts"] if photos is not None else [])]
     try:
-        return PartSet(rooms / "parts")
+        return PartSet(*folders)
     except ValueError as error:
         raise InputError(str(error)) from None
 
@@ -197,7 +227,8 @@ def run_find_parts(
     part: tuple[int, int] = (0, 1),
     preset: str = "mini",
 ) -> int:
-    """Find the parts of every cached training and validation room, for the stage `naming`; how many.
+    """Find the parts of every cached training and validation room and photo, for the stage `naming`; how
+    many.
 
     They lie in `parts` beside the shards. Single-threaded, resumable and divisible as `run_cache`;
     files of an earlier network have to be taken away first.
@@ -214,16 +245,22 @@ def run_find_parts(
     _begin(network, start, ALL_STAGES.keys() - done.keys())
     count = 0
     for name in ("validation", "train"):
-        if name == "train" or (folder / name).is_dir():
-            rooms = _open(folder / name).folder
-            count += run_parts(guided(network.eval()), rooms, rooms / "parts", part)
+        places = [folder / name] if name == "train" or (folder / name).is_dir() else []
+        photos = _photos(folder, name)
+        for place in [*places, *([photos] if photos is not None else [])]:
+            found = _open(place).folder
+            count += run_parts(guided(network.eval()), found, found / "parts", part)
     return count
 
 
 def phrase_table(folder: Path, encode: Encode) -> PhraseTable:
-    """Every phrase of the training and validation rooms; embedded once, kept beside the shards."""
+    """Every phrase of the training and validation rooms and photos; embedded once, kept beside the
+    shards."""
     labels = _open(folder / "train").labels()
-    extra = _open(folder / "validation").labels() if (folder / "validation").is_dir() else []
+    others = [folder / "validation", _photos(folder, "train"), _photos(folder, "validation")]
+    extra = [
+        label for place in others if place is not None and place.is_dir() for label in _open(place).labels()
+    ]
     path = folder / "phrases.pt"
     known: dict[str, Tensor] = {}
     if path.exists():

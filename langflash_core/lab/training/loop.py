@@ -17,6 +17,7 @@ import torch
 from torch import Tensor, nn
 
 from langflash_core.lab.training.batches import RoomSet
+from langflash_core.lab.training.mixing import MixedSet, loss_of
 from langflash_core.lab.training.parts import PartSet
 from langflash_core.lab.training.stages import Stage, Words, modules_of
 from langflash_core.network.model import LangFlashNet
@@ -68,7 +69,7 @@ def stage_parameters(network: LangFlashNet, stage: Stage) -> dict[str, Tensor]:
 def train_stage(
     network: LangFlashNet,
     stage: Stage,
-    rooms: RoomSet | PartSet,
+    rooms: RoomSet | MixedSet | PartSet,
     words: Words,
     run_dir: Path,
     options: LoopOptions,
@@ -110,7 +111,7 @@ def _freeze_all_but(network: LangFlashNet, stage: Stage) -> list[nn.Parameter]:
 class _Training:
     network: LangFlashNet
     stage: Stage
-    rooms: RoomSet | PartSet
+    rooms: RoomSet | MixedSet | PartSet
     words: Words
     options: LoopOptions
     optimiser: torch.optim.Optimizer
@@ -165,7 +166,7 @@ class _Training:
         count = max(1, (options.pictures or stage.pictures) // views)
         batch = self.rooms.draw(count, views, generator).to(options.device)
         with mixed(options.device):
-            loss = stage.loss(self.network, batch, self.words)
+            loss = loss_of(stage.loss, self.network, batch, self.words)
         self.optimiser.zero_grad(set_to_none=True)
         if not bool(torch.isfinite(loss.total)):
             self._skip(batch.seeds)

@@ -1,4 +1,4 @@
-"""Parts of rendered rooms as the namer reads them, on disk: found once, drawn many times.
+"""Parts of rendered rooms and labelled photos as the namer reads them, on disk: found once, drawn many times.
 
 Of every room twice: the parts that the frozen grouping finds, each called what most of it shows, and
 the true masks. The namer is small and the parts take seconds a room, so it learns from this table.
@@ -90,7 +90,7 @@ def run_parts(network: GuidedDepthNet, rooms: Path, out: Path, part: tuple[int, 
         found = [
             room
             for i in range(len(shard))
-            for room in parts_of(network, collate([shard.record(i, views=(0, 1))]))
+            for room in parts_of(network, collate([shard.record(i, views=range(min(2, shard.views)))]))
         ]
         if found:
             _write(path, joined(found))
@@ -167,15 +167,18 @@ def _write(path: Path, batch: PartBatch) -> None:
 
 
 class PartSet:
-    """All parts of a folder. What is drawn are rooms, once cut as the network cuts and once by true masks."""
+    """All parts of some folders. What is drawn are rooms and photos, once cut as the network cuts and once
+    by true masks."""
 
-    def __init__(self, folder: Path):
+    def __init__(self, *folders: Path):
         """Raises:
-        ValueError: the folder holds no part file.
+        ValueError: the first folder holds no part file.
         """
-        paths = sorted(folder.glob("*.safetensors"))
-        if not paths:
-            raise ValueError(f"folder: expected parts in {folder}, found none; run `langflash train parts`")
+        paths = [path for folder in folders for path in sorted(folder.glob("*.safetensors"))]
+        if not any(path.parent == folders[0] for path in paths):
+            raise ValueError(
+                f"folder: expected parts in {folders[0]}, found none; run `langflash train parts`"
+            )
         self.rooms = [room for path in paths for room in _read(path).rooms()]
 
     def __len__(self) -> int:

@@ -84,7 +84,8 @@ StageLoss = Callable[[LangFlashNet, Any, Words], Loss]
 @dataclass(frozen=True)
 class Stage:
     """modules: attributes of the network that learn; needs: stages whose modules are read frozen;
-    views: how many views a scene gives, with their chances; learning_rate: AdamW's peak."""
+    views: how many views a scene gives, with their chances; learning_rate: AdamW's peak; photos: share
+    of the pictures that come from labelled photos, where some are cached."""
 
     name: str
     modules: tuple[str, ...]
@@ -93,6 +94,7 @@ class Stage:
     pictures: int
     learning_rate: float
     loss: StageLoss
+    photos: float = 0.0
 
 
 def depth_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
@@ -291,7 +293,8 @@ def nearest(ids: Tensor, size: tuple[int, int]) -> Tensor:
 
 
 def grouping_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
-    """L_SG after every scale of the decoder, on every second pixel of the mask map.
+    """L_SG after every scale of the decoder, on every second pixel of the mask map; of photos that are
+    labelled in part, on the pixels that are.
 
     Without a dense teacher its term is `instance_contrast` on the map that masks are read from.
     """
@@ -307,7 +310,10 @@ def grouping_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Lo
     losses, quality = [], []
     for answer in answers:
         flat = answer.mask_logits.transpose(1, 2).flatten(2)  # (B, N, V*h*w)
-        for logits, existence, truth in zip(flat, answer.existence_logits, masks, strict=True):
+        for logits, existence, truth, own in zip(flat, answer.existence_logits, masks, ids, strict=True):
+            if batch.partly:
+                seen = (own != NOTHING).flatten()
+                logits, truth = logits[:, seen], truth[:, seen]
             loss, chosen = grouping_loss(logits, existence, truth, GroupingWeights())
             losses.append(loss)
             if answer is answers[-1] and len(chosen.queries):
@@ -466,7 +472,7 @@ def _views(batch: SceneBatch, chosen) -> SceneBatch:
     )
     return SceneBatch(
         batch.images[:, keep], batch.depths[:, keep], batch.instances[:, keep],
-        batch.viewmats[:, keep], batch.Ks[:, keep], tokens, batch.labels, batch.seeds,
+        batch.viewmats[:, keep], batch.Ks[:, keep], tokens, batch.labels, batch.seeds, batch.partly,
     )  # fmt: skip
 
 
@@ -484,18 +490,36 @@ def one_scene(batch: SceneBatch, index: int) -> SceneBatch:
     )
     return SceneBatch(
         batch.images[one], batch.depths[one], batch.instances[one], batch.viewmats[one], batch.Ks[one],
-        tokens, batch.labels[one], batch.seeds[one],
+        tokens, batch.labels[one], batch.seeds[one], batch.partly,
     )  # fmt: skip
 
 
 STAGES = {
     stage.name: stage
     for stage in (
-        Stage("depth", ("decoder", "depth_head"), (), {1: 0.2, 2: 0.65, 3: 0.15}, 8, 5e-4, depth_stage),
+        Stage(
+            "depth",
+            ("decoder", "depth_head"),
+            (),
+            {1: 0.2, 2: 0.65, 3: 0.15},
+            8,
+            5e-4,
+            depth_stage,
+            photos=0.6,
+        ),
         Stage("refine", ("refiner",), ("depth",), {2: 0.8, 3: 0.2}, 8, 1e-3, refine_stage),
         Stage("gaussians", ("gaussian_head",), ("depth", "refine"), {3: 1.0}, 6, 5e-4, gaussians_stage),
         Stage("language", ("language_head",), (), {1: 1.0}, 12, 1e-3, language_stage),
-        Stage("grouping", ("siamese", "scratch", "grouping"), (), {2: 0.8, 3: 0.2}, 8, 5e-4, grouping_stage),
+        Stage(
+            "grouping",
+            ("siamese", "scratch", "grouping"),
+            (),
+            {2: 0.8, 3: 0.2},
+            8,
+            5e-4,
+            grouping_stage,
+            photos=0.5,
+        ),
         Stage(
             "aggregation",
             ("aggregation",),
@@ -504,6 +528,7 @@ STAGES = {
             8,
             3e-4,
             aggregation_stage,
+            photos=0.5,
         ),
     )
 }
