@@ -6,6 +6,7 @@ is read in from its own place, under the wheel's name. Inside, the program impor
 names and does not know what it is called.
 """
 
+import gc
 import importlib
 import importlib.util
 import sys
@@ -18,7 +19,9 @@ _BESIDE = Path(__file__).resolve().parent.parent
 def main() -> int:
     """Run `langflash` with the words of `sys.argv`; the exit code."""
     find_program()
-    return importlib.import_module(f"{NAME}.cli").main()
+    code = importlib.import_module(f"{NAME}.cli").main()
+    gc.freeze()  # else Python looks for garbage once more on its way out, among a million objects: half a second
+    return code
 
 
 def find_program() -> None:

@@ -135,7 +135,9 @@ def reconstruct(
         scene = scene.with_record(cost=Cost(fitting))
     run.check()
     if viewmats is not None:
-        scene = in_world(scene, viewmats[0], scene.record.network_unit)
+        unit = scene.record.network_unit
+        assert unit is not None, "`assemble` records it"
+        scene = in_world(scene, viewmats[0], unit)
     run.report("done", 1.0)
     return _with_record(scene, network, run.timings)
 

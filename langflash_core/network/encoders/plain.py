@@ -9,6 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from langflash_core.network.layers.draws import drawn
 from langflash_core.network.presets import GuidedDepth
 
 _NORM_EPS = 1e-6
@@ -30,7 +31,7 @@ class PlainViT(nn.Module):
         dim, heads = preset.encoder_dim, preset.encoder_heads
         self.trained_grid = preset.trained_grid
         self.cls_token = nn.Parameter(torch.zeros(1, 1, dim))
-        self.pos_embed = nn.Parameter(torch.randn(1, preset.trained_grid**2 + 1, dim) * 0.02)
+        self.pos_embed = nn.Parameter(drawn(1, preset.trained_grid**2 + 1, dim, std=0.02))
         self.patch_embed = _Patches(dim, preset.patch)
         self.blocks = nn.ModuleList(_Block(dim, heads) for _ in range(preset.encoder_depth))
         self.norm = nn.LayerNorm(dim, _NORM_EPS)

@@ -13,6 +13,7 @@ from torch.nn import functional as F
 from langflash_core.network.encoders.shared import Tokens, tokens_to_maps
 from langflash_core.network.layers.attention import MLP, QueryBlock
 from langflash_core.network.layers.dpt import DPT
+from langflash_core.network.layers.draws import drawn
 from langflash_core.network.presets import Preset
 from langflash_core.network.stereo.prior import resize
 
@@ -63,8 +64,8 @@ class SemanticGrouping(nn.Module):
     def __init__(self, preset: Preset):
         super().__init__()
         dim, f = preset.grouping_dim, preset.dpt_feature
-        self.patterns = nn.Parameter(torch.randn(preset.num_queries, dim))
-        self.positions = nn.Parameter(torch.randn(preset.num_queries, dim))
+        self.patterns = nn.Parameter(drawn(preset.num_queries, dim))
+        self.positions = nn.Parameter(drawn(preset.num_queries, dim))
         self.memories = nn.ModuleList(nn.Conv2d(f, dim, 1) for _ in range(3))
         self.layers = nn.ModuleList(
             QueryBlock(dim, preset.grouping_heads) for _ in range(preset.grouping_layers)

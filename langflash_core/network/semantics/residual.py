@@ -15,6 +15,7 @@ from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.encoders.vit import centred
 from langflash_core.network.layers.attention import MLP, QueryBlock
 from langflash_core.network.layers.dpt import DPT, double
+from langflash_core.network.layers.draws import drawn
 from langflash_core.network.presets import MaskFilter, PointMaps
 from langflash_core.network.semantics.grouping import Groups, sinusoid
 
@@ -66,8 +67,8 @@ class ResidualGrouping(nn.Module):
         dim, depth = preset.grouping_dim, preset.grouping_layers
         if dim != preset.dpt_feature:
             raise ValueError(f"grouping_dim: expected the dpt_feature, {preset.dpt_feature}, received {dim}")
-        self.patterns = nn.Parameter(torch.randn(preset.num_queries, dim))
-        self.positions = nn.Parameter(torch.randn(preset.num_queries, dim))
+        self.patterns = nn.Parameter(drawn(preset.num_queries, dim))
+        self.positions = nn.Parameter(drawn(preset.num_queries, dim))
         self.layers = nn.ModuleList(QueryBlock(dim, preset.grouping_heads, bias=False) for _ in range(depth))
         self.scores = nn.ModuleList(MLP(dim, dim, 1) for _ in range(depth))
         self.mask_mlp = MLP(dim, dim, preset.dpt_feature)
