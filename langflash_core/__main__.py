@@ -20,7 +20,7 @@ def main() -> int:
     """Run `langflash` with the words of `sys.argv`; the exit code."""
     find_program()
     code = importlib.import_module(f"{NAME}.cli").main()
-    gc.freeze()  # else Python looks for garbage once more on its way out, among a million objects: half a second
+    gc.freeze()  # else Python looks for garbage on its way out, half a second among a million objects
     return code
 
 
