@@ -78,8 +78,8 @@ def reconstruct(
             (fx, fy, cx, cy) in pixels of the photos as given, the same for all. Neither: EXIF, else
             an assumption with a warning.
         size: the network sees about size x size pixels per photo, whatever their shape.
-        precision: "float32"; "bfloat16", in the parts that bear it; "auto" takes bfloat16 where the
-            processor is quick at it.
+        precision: "float32"; "bfloat16", in the parts that bear it; "auto" takes bfloat16 on graphics
+            cards and, for `full`, on processors that are quick at it.
         aggregation: how a group gets its vector: "lfa" (trained), "average" (of dense features),
             "crops" (CLIP on a cut-out; presets of its space); None: lfa where it has weights,
             else average.
@@ -353,11 +353,12 @@ def _groups(network: LangFlashNet, way: str | None, device: str) -> Lifted | Non
     return lifted
 
 
-def _bfloat16(precision: str, device: str) -> bool:
+def _bfloat16(preset: str, precision: str, device: str) -> bool:
     if precision not in PRECISIONS:
         raise InputError(f"the precision '{precision}' is unknown; choose {', '.join(PRECISIONS)}")
-    quick = device != "cpu" or has_bfloat16()
-    return precision == "bfloat16" or (precision == "auto" and quick)
+    if precision != "auto":
+        return precision == "bfloat16"
+    return device != "cpu" or (network_class(PRESETS[preset]).bfloat16_on_cpu and has_bfloat16())
 
 
 def _network(
@@ -368,7 +369,7 @@ def _network(
     changed = path.stat().st_mtime_ns if path is not None and path.is_file() else 0
     folder = part_folder(PRESETS[preset])
     installed = tuple((p.name, p.stat().st_mtime_ns) for p in sorted(folder.glob("*.safetensors")))
-    mixed = _bfloat16(precision, device)
+    mixed = _bfloat16(preset, precision, device)
     key = (preset, path, device, mixed, changed, installed)
     network = _networks.get(key)
     if network is None:

@@ -126,7 +126,8 @@ def _add_reconstruct(commands) -> None:
         "--precision",
         choices=("auto", "float32", "bfloat16"),
         default="auto",
-        help="auto: bfloat16 where the processor has instructions for it (default: auto)",
+        help="auto: bfloat16 on graphics cards and, for full, on processors with instructions for it "
+        "(default: auto)",
     )
     command.add_argument(
         "--refine",

@@ -57,6 +57,8 @@ class LangFlashNet(nn.Module):
     """Parts that this project takes as they are and never trains."""
     compact: bool
     """Weights are stored as int8 rows; else as they are."""
+    bfloat16_on_cpu: bool = True
+    """A processor with instructions for bfloat16 takes it by itself: what it saves is worth what it changes."""
     caches_tokens: bool
     """Training may read tokens from disk, because nothing that is trained changes them."""
     grouping: nn.Module
