@@ -24,6 +24,7 @@ from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.relevance import Mode, compile_query, relevance_maps
 from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_network
+from langflash_core.network.build import network_class
 from langflash_core.network.checkpoints.store import part_folder
 from langflash_core.network.checkpoints.stored import Stored
 from langflash_core.network.model import Atoms, Geometry, Lifted, pooled_weights

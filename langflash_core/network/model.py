@@ -58,7 +58,7 @@ class LangFlashNet(nn.Module):
     compact: bool
     """Weights are stored as int8 rows; else as they are."""
     bfloat16_on_cpu: bool = True
-    """A processor with instructions for bfloat16 takes it by itself: what it saves is worth what it changes."""
+    """A processor with instructions for bfloat16 takes it by itself: the time is worth the change."""
     caches_tokens: bool
     """Training may read tokens from disk, because nothing that is trained changes them."""
     grouping: nn.Module
