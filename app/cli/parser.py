@@ -290,6 +290,26 @@ def _add_train(commands) -> None:
     adopt.add_argument("local", type=Path, metavar="XFEAT", help="XFeat's state dict, .safetensors")
     _add_output(adopt, "FILE", "the .safetensors to write")
     adopt.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
+    _add_cache(actions)
+    _add_convert(actions)
+    parts = _command(actions, "parts", "find the parts of cached rooms, for the stage naming")
+    parts.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
+    parts.add_argument(
+        "--run", type=Path, metavar="RUN", help="folder of train run whose stages are used (default: none)"
+    )
+    parts.add_argument(
+        "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
+    )
+    _add_start(parts)
+    _add_stages(actions)
+    export = _command(actions, "export", "all stages of a run to one checkpoint")
+    export.add_argument("run", type=Path, metavar="RUN")
+    _add_output(export, "FILE", "the .safetensors to write")
+    export.add_argument("--metadata", type=Path, metavar="JSON", help="an object to add to the model card")
+    _add_start(export)
+
+
+def _add_cache(actions) -> None:
     cache = _command(
         actions, "cache", "render and encode one set of rooms, or encode photos; an interrupted run continues"
     )
@@ -317,16 +337,9 @@ def _add_train(commands) -> None:
         "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
     )
     _add_start(cache)
-    _add_convert(actions)
-    parts = _command(actions, "parts", "find the parts of cached rooms, for the stage naming")
-    parts.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
-    parts.add_argument(
-        "--run", type=Path, metavar="RUN", help="folder of train run whose stages are used (default: none)"
-    )
-    parts.add_argument(
-        "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
-    )
-    _add_start(parts)
+
+
+def _add_stages(actions) -> None:
     run = _command(actions, "run", "train stages, one after the other; continues where a run stopped")
     run.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
     _add_output(run, "RUN", "folder of checkpoints and logs")
@@ -344,11 +357,6 @@ def _add_train(commands) -> None:
         "--from-scratch", action="store_true", help="draw the heads anew instead of going on with --start's"
     )
     _add_start(run)
-    export = _command(actions, "export", "all stages of a run to one checkpoint")
-    export.add_argument("run", type=Path, metavar="RUN")
-    _add_output(export, "FILE", "the .safetensors to write")
-    export.add_argument("--metadata", type=Path, metavar="JSON", help="an object to add to the model card")
-    _add_start(export)
 
 
 def _add_convert(actions) -> None:
