@@ -36,7 +36,7 @@ pytestmark = [
     pytest.mark.skipif(
         not (shutil.which("Xvfb") and shutil.which("xdotool")), reason="needs Xvfb and xdotool"
     ),
-    # One window tells a story, as a person would live it: drawn, asked, moved, saved. Shuffled orders keep it.
+    # One window tells a story, as a person would live it: drawn, asked, moved. Shuffled orders keep it.
     pytest.mark.random_order(disabled=True),
 ]
 
