@@ -121,8 +121,8 @@ def reconstruct(
         network = _network(preset, weights, device, precision, ahead.stored)
         atoms = _atoms(network, aggregation, views)
         groups = _groups(network, grouping, device)
+        ahead.matched.result()  # key points are found beside the weights
     with run.stage("network"):
-        ahead.matched.result()
         prediction = _on_cpu(network.predict(views, run.within("network"), cancelled, atoms, groups))
     with run.stage("assemble"), torch.no_grad():
         scene = assemble(prediction, views, preset=preset)
