@@ -123,7 +123,7 @@ def _finished(record: RoomRecord, plan: CachePlan, encoder: Encoder | None) -> R
 
 def encode_pictures(encoder: Encoder, rgb: Tensor) -> Tensor:
     """Hook tokens (V, L, T, C) float32 of pictures (V, 3, H, W) uint8, in bfloat16 where that is quick."""
-    images = rgb.to(encoder.mean.device).float()[None] / 255
+    images = rgb.to(encoder.vit.cls_token.device).float()[None] / 255
     with mixed(images.device):
         hooks = encoder(images).hooks
     return torch.stack([hook[0].float() for hook in hooks], 1).cpu()
