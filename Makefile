@@ -1,5 +1,6 @@
 # make run    set up what is missing, then open the window on the demo photos
 # make test   set up what is missing, then every check and every test
+# make setup  the set-up alone
 # make test-machines   every test three times, as three other processors and orders would run it
 #
 # Set-up is a virtual environment in .venv, this package in it, and (Debian, Ubuntu) the system's
@@ -27,9 +28,11 @@ APT := install() { \
 	echo "Installing $$*"; \
 	$$add "$$@" >/dev/null 2>&1 || { $$get update >/dev/null && $$add "$$@" >/dev/null; }; }
 
-.PHONY: help run test test-machines
+.PHONY: help setup run test test-machines
 help:
-	@sed -n '1,3s/^# //p' Makefile
+	@sed -n '1,4s/^# //p' Makefile
+
+setup: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window
 
 run: $(STAMP)-package $(STAMP)-gl
 	@if $(BIN)/python -c 'import glfw, sys; sys.exit(not glfw.init())' 2>/dev/null; then \

@@ -59,8 +59,10 @@ def _body(state: State, look: Look) -> None:
         widgets.muted("The three main axes of the language features, as red, green and blue.")
     elif mode is Mode.ATOMS:
         _atoms(state, look)
-    else:
+    elif mode in (Mode.COVERAGE, Mode.AGREEMENT):
         _trust(state, look)
+    else:
+        widgets.muted(mode.value)
 
 
 def _margin(state: State, look: Look) -> None:
