@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from langflash_core.errors import SceneFileError
+from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export import export, read
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
@@ -38,7 +38,7 @@ def whole_files(folder: Path, count: int = 60) -> dict[str, bytes]:
     for name in ("a.ply", "a.compressed.ply", "a.splat", "a.spz", "a.sog", "a.glb", "a.usda", "a.langflash"):
         try:
             export(scene, folder / name)
-        except SceneFileError:
+        except OutputError:
             continue
         files[name] = (folder / name).read_bytes()
     from langflash_core.export import spz
