@@ -17,7 +17,8 @@ def context():
 
 @pytest.fixture
 def gl(context):
-    """The context, free of errors before and after each test."""
+    """The context, free of errors before and after each test; current, whoever else drew in between."""
+    context.__enter__()
     assert context.error == "GL_NO_ERROR"
     yield context
     assert context.error == "GL_NO_ERROR"
