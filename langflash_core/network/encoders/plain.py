@@ -23,7 +23,7 @@ class PlainViT(nn.Module):
     position codes are resized bicubically, smoothed where the grid is smaller than the trained one.
 
     Source: Dosovitskiy et al. 2021; Touvron et al. 2021 (layer scale); Oquab et al. 2023 (DINOv2).
-    Twin: timm's vit_small_patch14_dinov2, tests/network/test_vit.py.
+    Twin: timm's vit_small_patch14_dinov2, tests/network/test_plain.py.
     """
 
     def __init__(self, preset: GuidedDepth):
