@@ -28,7 +28,7 @@ from langflash_core.network.build import network_class
 from langflash_core.network.checkpoints.store import part_folder
 from langflash_core.network.checkpoints.stored import Stored
 from langflash_core.network.model import Atoms, Geometry, Lifted, pooled_weights
-from langflash_core.network.precision import has_bfloat16
+from langflash_core.network.precision import bfloat16_fails, has_bfloat16
 from langflash_core.network.semantics.aggregation import averaged_atoms
 from langflash_core.network.semantics.crops import crop_atoms
 from langflash_core.network.semantics.grouping import Groups
@@ -357,6 +357,11 @@ def _groups(network: LangFlashNet, way: str | None, device: str) -> Lifted | Non
 def _bfloat16(preset: str, precision: str, device: str) -> bool:
     if precision not in PRECISIONS:
         raise InputError(f"the precision '{precision}' is unknown; choose {', '.join(PRECISIONS)}")
+    if precision == "bfloat16" and device == "cpu" and bfloat16_fails():
+        raise InputError(
+            "ATEN_CPU_CAPABILITY hides what this processor needs for bfloat16; take it out of the environment, "
+            "or choose --precision float32"
+        )
     if precision != "auto":
         return precision == "bfloat16"
     return device != "cpu" or (network_class(PRESETS[preset]).bfloat16_on_cpu and has_bfloat16())

@@ -16,6 +16,13 @@ def mixed(device: str | torch.device) -> torch.autocast:
 
 
 def has_bfloat16() -> bool:
-    """Whether this processor has instructions for bfloat16."""
+    """Whether this processor has instructions for bfloat16 that torch can use."""
     known = torch.cpu.get_capabilities()
-    return any(bool(known.get(name)) for name in _INSTRUCTIONS)
+    return any(bool(known.get(name)) for name in _INSTRUCTIONS) and not bfloat16_fails()
+
+
+def bfloat16_fails() -> bool:
+    """Whether attention in bfloat16 stops with an error: the processor has AMX, which torch 2.13 asks for
+    there, but ATEN_CPU_CAPABILITY told torch to leave out the vector units that go with it."""
+    hidden = torch.backends.cpu.get_cpu_capability() in ("DEFAULT", "AVX2")
+    return hidden and bool(torch.cpu.get_capabilities().get("amx_bf16"))

@@ -6,6 +6,8 @@ import pytest
 import torch
 from torch.nn import functional as F
 
+from langflash_core import reconstruct
+from langflash_core.errors import InputError
 from langflash_core.images.views import load_views
 from langflash_core.network import load_network, precision
 from langflash_core.resources import asset_path
@@ -22,12 +24,27 @@ from langflash_core.resources import asset_path
 )
 def test_products_on_a_processor(monkeypatch, known, kind):
     monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: known)
+    monkeypatch.setattr(torch.backends.cpu, "get_cpu_capability", lambda: "AVX512")
     a = torch.ones(4, 4)
     with precision.mixed("cpu"):
         assert (a @ a).dtype is kind
     assert (a @ a).dtype is torch.float32
 
 
+@pytest.mark.parametrize("told", ["AVX2", "DEFAULT"])
+def test_a_processor_whose_units_are_hidden_keeps_float32_and_says_why(monkeypatch, told):
+    """With AMX and without AVX-512 torch's attention in bfloat16 stops with an error of its own."""
+    monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: {"amx_bf16": True})
+    monkeypatch.setattr(torch.backends.cpu, "get_cpu_capability", lambda: told)
+    a = torch.ones(4, 4)
+    with precision.mixed("cpu"):
+        assert (a @ a).dtype is torch.float32
+    photos = [asset_path(f"photos/living_room_{side}.png") for side in ("left", "right")]
+    with pytest.raises(InputError, match="ATEN_CPU_CAPABILITY.*--precision float32"):
+        reconstruct(photos, precision="bfloat16", device="cpu")
+
+
+@pytest.mark.skipif(precision.bfloat16_fails(), reason="ATEN_CPU_CAPABILITY hides what bfloat16 needs here")
 def test_mini_in_bfloat16_stays_near_and_its_poses_stay_where_they_are():
     photos = [asset_path(f"photos/living_room_{side}.png") for side in ("left", "right")]
     views = load_views(photos, fov=65)
