@@ -359,8 +359,8 @@ def _bfloat16(preset: str, precision: str, device: str) -> bool:
         raise InputError(f"the precision '{precision}' is unknown; choose {', '.join(PRECISIONS)}")
     if precision == "bfloat16" and device == "cpu" and bfloat16_fails():
         raise InputError(
-            "ATEN_CPU_CAPABILITY hides what this processor needs for bfloat16; take it out of the environment, "
-            "or choose --precision float32"
+            "ATEN_CPU_CAPABILITY hides what this processor needs for bfloat16; "
+            "take it out of the environment, or choose --precision float32"
         )
     if precision != "auto":
         return precision == "bfloat16"

@@ -40,7 +40,7 @@ def test_a_processor_whose_units_are_hidden_keeps_float32_and_says_why(monkeypat
     with precision.mixed("cpu"):
         assert (a @ a).dtype is torch.float32
     photos = [asset_path(f"photos/living_room_{side}.png") for side in ("left", "right")]
-    with pytest.raises(InputError, match="ATEN_CPU_CAPABILITY.*--precision float32"):
+    with pytest.raises(InputError, match=r"ATEN_CPU_CAPABILITY.*--precision float32"):
         reconstruct(photos, precision="bfloat16", device="cpu")
 
 
