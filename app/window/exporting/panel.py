@@ -29,7 +29,10 @@ HINTS = {
     What.BOXES_GLB: "The same as bodies, for Blender and other 3D programs",
     What.VIDEO: "A round through all views, H.264",
     What.PLY: "3D Gaussians as other viewers read them",
-    What.SPLAT: "The compact format of web viewers",
+    What.SPZ: "Compressed, for phones and the web",
+    What.SOG: "Compressed as pictures, for SuperSplat and PlayCanvas",
+    What.SPLAT: "The compact format of older web viewers",
+    What.GLB: "3D Gaussians in glTF, with what they mean",
     What.SCENE: "With language and photos, for this program",
 }
 

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
+from langflash_core.formats import SCENES_OUT
+
 LARGEST_SIDE = 8192  # pixels, as on the command line
 SECONDS = (1.0, 60.0)
 
@@ -22,7 +24,10 @@ class What(Enum):
     BOXES_GLB = ("Boxes, .glb", ".glb", "boxes")
     VIDEO = ("Turntable", ".mp4", "")
     PLY = ("Splats, .ply", ".ply", "")
+    SPZ = ("Splats, .spz", ".spz", "")
+    SOG = ("Splats, .sog", ".sog", "")
     SPLAT = ("Splats, .splat", ".splat", "")
+    GLB = ("Splats, .glb", ".glb", "")
     SCENE = ("Scene", ".langflash", "")
 
     @property
@@ -53,12 +58,12 @@ class What(Enum):
     @property
     def looks(self) -> bool:
         """Whether it is seen from a camera."""
-        return self not in (What.VIDEO, What.PLY, What.SPLAT, What.SCENE)
+        return self is not What.VIDEO and not self.splats
 
     @property
     def splats(self) -> bool:
         """Whether Gaussians are written, not pictures of them."""
-        return self in (What.PLY, What.SPLAT, What.SCENE)
+        return not self.word and self.suffix in SCENES_OUT
 
     @property
     def sized(self) -> bool:
