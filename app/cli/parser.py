@@ -301,6 +301,7 @@ def _add_train(commands) -> None:
         "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
     )
     _add_start(parts)
+    _add_late(actions)
     _add_stages(actions)
     export = _command(actions, "export", "all stages of a run to one checkpoint")
     export.add_argument("run", type=Path, metavar="RUN")
@@ -347,16 +348,41 @@ def _add_stages(actions) -> None:
         "--stages", nargs="+", required=True, metavar="STAGE", help="such as depth refine gaussians"
     )
     run.add_argument("--minutes", nargs="+", required=True, type=minutes, metavar="M", help="one per stage")
-    run.add_argument("--max-steps", type=whole_count, metavar="N", help="stop each stage earlier")
-    run.add_argument("--device", choices=("cpu", "cuda"), default="cpu")
-    run.add_argument("--seed", type=seed, default=0, metavar="N")
-    run.add_argument(
-        "--restart", action="store_true", help="forget what the run folder holds of these stages"
-    )
+    _add_loop(run)
     run.add_argument(
         "--from-scratch", action="store_true", help="draw the heads anew instead of going on with --start's"
     )
     _add_start(run)
+
+
+def _add_late(actions) -> None:
+    late = _command(
+        actions, "late", "train the late half of the encoder, names and depth on labelled photos and rooms"
+    )
+    late.add_argument("cache", type=Path, metavar="CACHE", help="rooms, made by train cache")
+    late.add_argument(
+        "--photos",
+        type=Path,
+        dest="folder",
+        metavar="FOLDER",
+        required=True,
+        help="labelled photos, as train photos makes them; every seventh run of numbers is kept to validate",
+    )
+    _add_description(late)
+    _add_output(late, "RUN", "folder of checkpoints and logs")
+    late.add_argument("--minutes", required=True, type=minutes, metavar="M", help="of training")
+    _add_loop(late)
+    _add_start(late)
+
+
+def _add_loop(command: argparse.ArgumentParser) -> None:
+    """What every training loop can be told."""
+    command.add_argument("--max-steps", type=whole_count, metavar="N", help="stop each stage earlier")
+    command.add_argument("--device", choices=("cpu", "cuda"), default="cpu")
+    command.add_argument("--seed", type=seed, default=0, metavar="N")
+    command.add_argument(
+        "--restart", action="store_true", help="forget what the run folder holds of these stages"
+    )
 
 
 def _add_convert(actions) -> None:

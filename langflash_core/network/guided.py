@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -10,8 +11,9 @@ import torch
 from torch import Tensor
 
 from langflash_core.geometry.cameras import rays
+from langflash_core.network.encoders.late import LateHalf
 from langflash_core.network.encoders.local import LocalFeatures
-from langflash_core.network.encoders.shared import Encoder, Tokens, tokens_to_maps
+from langflash_core.network.encoders.shared import Encoder, Tokens, tokens_to_maps, unflattened
 from langflash_core.network.gaussians import GaussianHead, assemble_gaussians
 from langflash_core.network.layers.decoder import SiameseDecoder, TwoStackDecoder
 from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Seen
@@ -48,6 +50,7 @@ class GuidedDepthNet(LangFlashNet):
         super().__init__(preset)
         self.mixed = False
         self.encoder = Encoder(preset)
+        self.late = LateHalf(preset)
         self.local = LocalFeatures()
         self.decoder = TwoStackDecoder(preset)
         self.depth_head = DepthHead(preset)
@@ -72,10 +75,12 @@ class GuidedDepthNet(LangFlashNet):
             yield
 
     def encode(self, images: Tensor, Ks: Tensor) -> Tokens:
-        """Four hooks of the frozen encoder; the intrinsics join later."""
+        """Four hooks of the frozen encoder and two of the half that real photos taught; the intrinsics
+        join later."""
         with self._fast(images):
-            tokens = self.encoder(images)
-        return Tokens(tuple(hook.float() for hook in tokens.hooks), tokens.grid) if self.mixed else tokens
+            tokens, early = self.encoder(images)
+            named = tuple(unflattened(t, images) for t in self.late(early, self.encoder.vit))
+        return replace(tokens, named=named).each(self._exact)
 
     def levels(self, tokens: Tokens, Ks: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Level maps (B*V, C_i, h, w) of the geometry heads: two encoder hooks, two decoder depths."""
@@ -107,12 +112,14 @@ class GuidedDepthNet(LangFlashNet):
     def parts(
         self, tokens: Tokens, images: Tensor, size: tuple[int, int], features: Tensor | None = None
     ) -> Tensor:
-        """The surviving groups, cut into parts."""
+        """The surviving groups, cut into parts, also by what their pixels are called."""
+        if features is None:
+            features = self.language(tokens, images)
         memories, finest = self.semantic_maps(tokens, images)
         groups = self.grouping(memories, finest, tokens.shape[1])[-1]
         survivors = surviving(groups, self.preset.tau_exist)
         whole = group_weights(groups, survivors, (finest.shape[-2], finest.shape[-1]))
-        return split_groups(whole, finest, self.preset.splitting, size)
+        return split_groups(whole, finest, self.preset.splitting, size, features[0].float())
 
     def named(self, atoms: Tensor, weights: Tensor, seen: Seen) -> Tensor:
         """Atoms corrected by deep tokens, places and each other."""
@@ -151,7 +158,7 @@ class GuidedDepthNet(LangFlashNet):
         maps = DepthMaps(scaled.log_depths[0], scaled.log_errors[0])
         if len(keep) < 2:
             return maps
-        chosen = Tokens(tuple(h[:, keep] for h in tokens.hooks), tokens.grid)
+        chosen = tokens.views(keep)
         part = DepthMaps(scaled.log_depths[:, keep], scaled.log_errors[:, keep])
         refined = self.refiner(images[:, keep], chosen, local[keep], part, viewmats[:, keep], Ks[:, keep])[-1]
         log_depths, log_errors = maps.log_depths.clone(), maps.log_errors.clone()

@@ -11,13 +11,15 @@ from dataclasses import dataclass
 class Splitting:
     """How finely a scene is cut into parts, and how softly.
 
-    max_parts: K never exceeds it. max_cosine: parts closer than this are one. agreement: what the
-    queries' answer counts for beside the mask map. sharpness: of the softmax over the parts.
+    max_parts: K never exceeds it. max_cosine: parts closer than this are one. agreement, meaning:
+    what the queries' answer and the language features count for beside the mask map. sharpness: of
+    the softmax over the parts.
     """
 
     max_parts: int = 48
-    max_cosine: float = 0.85
+    max_cosine: float = 0.92
     agreement: float = 0.6
+    meaning: float = 1.0
     sharpness: float = 15.0
 
 
@@ -105,6 +107,8 @@ class GuidedDepth(Preset):
     trained_grid: int
     """Side of the grid that the encoder's position codes were trained on."""
     hooks: tuple[int, int, int, int]
+    late_rank: int
+    """Of what the matrices of the late half that reads names differ from the encoder's by."""
     match_hook: int
     """Index into `hooks` of the tokens that correspondence reads (blocks 3-6 match best)."""
     language_feature: int
@@ -151,6 +155,7 @@ MINI = GuidedDepth(
     encoder_heads=6,
     trained_grid=37,
     hooks=(2, 5, 8, 11),
+    late_rank=88,
     match_hook=1,
     native_area=224 * 224,
     decoder_dim=256,

@@ -20,7 +20,8 @@ GRID = (3, 4)
 def _tokens(num_views: int) -> Tokens:
     torch.manual_seed(num_views)
     n = GRID[0] * GRID[1]
-    return Tokens(tuple(torch.randn(1, num_views, n, MINI.encoder_dim) for _ in range(4)), GRID)
+    hooks = [torch.randn(1, num_views, n, MINI.encoder_dim) for _ in range(6)]
+    return Tokens(tuple(hooks[:4]), GRID, tuple(hooks[4:]))
 
 
 def _intrinsics(num_views: int) -> torch.Tensor:
@@ -66,11 +67,11 @@ def test_decoder_treats_other_views_alike_and_reads_them():
     """Exchanging views 1 and 2 exchanges their tokens and leaves view 0 alone."""
     decoder = TwoStackDecoder(MINI).eval()
     tokens = _tokens(3)
-    swapped = Tokens(tuple(h[:, [0, 2, 1]] for h in tokens.hooks), GRID)
+    swapped = tokens.views([0, 2, 1])
     _, plain = decoder(tokens, _intrinsics(3))
     _, exchanged = decoder(swapped, _intrinsics(3))
     assert torch.allclose(plain[:, [0, 2, 1]], exchanged, atol=1e-5)  # sums run in another order
-    alone = Tokens(tuple(h[:, :1] for h in tokens.hooks), GRID)
+    alone = tokens.views([0])
     assert not torch.allclose(decoder(alone, _intrinsics(1))[1][:, 0], plain[:, 0], atol=1e-3)
 
 

@@ -101,13 +101,13 @@ def test_unknown_depths_say_nothing(bad):
 
 
 def test_looks_are_means_of_the_parts_own_patches():
-    tokens = Tokens(tuple(torch.randn(1, 2, 16, 384) for _ in range(4)), (4, 4))
+    tokens = Tokens((), (4, 4), tuple(torch.randn(1, 2, 16, 384) for _ in range(2)))
     weights = torch.zeros(2, 2, 8, 8)
     weights[0, 0, :2, :2] = 1  # one patch
     weights[:, 1] = 1
     looks = describe(weights, tokens)
-    first = torch.cat((tokens.hooks[2][0, 0, 0], tokens.hooks[3][0, 0, 0]))
-    every = torch.cat((tokens.hooks[2][0].mean((0, 1)), tokens.hooks[3][0].mean((0, 1))))
+    first = torch.cat([hook[0, 0, 0] for hook in tokens.named])
+    every = torch.cat([hook[0].mean((0, 1)) for hook in tokens.named])
     torch.testing.assert_close(looks[0], first, atol=1e-4, rtol=1e-4)  # eps 1e-6 of a weight of 1/1
     torch.testing.assert_close(looks[1], every, atol=1e-4, rtol=1e-4)
 

@@ -7,6 +7,7 @@ import torch
 from torch.nn import functional as F
 
 from langflash_core.network.presets import Splitting
+from langflash_core.network.semantics import splitting
 from langflash_core.network.semantics.splitting import cluster, split_groups
 
 RULE = Splitting()
@@ -82,3 +83,29 @@ def test_clusters_are_the_best_of_their_kind():
     for index, centre in enumerate(centres):
         assert F.cosine_similarity(vectors[nearest == index].mean(0), centre, dim=0) > 1 - 1e-5
     assert torch.equal(cluster(vectors, replace(RULE, max_parts=3)), centres)
+
+
+def test_what_is_called_differently_is_cut_apart():
+    """One group of one look, whose halves point to different words; without features it stays whole."""
+    features = torch.zeros(1, 384, 4, 8)
+    features[:, 0, :, :4], features[:, 7, :, 4:] = 1, 1
+    parts = split_groups(_one_group(), _embeddings(0), RULE, SIZE, features)
+    assert split_groups(_one_group(), _embeddings(0), RULE, SIZE).shape[1] == 1
+    assert parts.shape[1] == 2
+    left, right = parts[0, :, :, : SIZE[1] // 4], parts[0, :, :, -SIZE[1] // 4 :]
+    assert left.mean((1, 2)).argmax() != right.mean((1, 2)).argmax()
+
+
+def test_few_directions_keep_the_cosines_of_a_scene():
+    """Features of a scene are mixtures of few words: 20 of them, and noise of a tenth."""
+    generator = torch.Generator().manual_seed(3)
+    words = torch.nn.functional.normalize(torch.randn(20, 384, generator=generator), dim=1)
+    mixed = torch.rand(2, 6, 8, 20, generator=generator) ** 4 @ words
+    noise = 0.1 * mixed.norm(dim=-1, keepdim=True) / 384**0.5
+    mixed = mixed + noise * torch.randn(mixed.shape, generator=generator)
+    maps = torch.nn.functional.normalize(mixed, dim=-1).movedim(-1, 1)
+    small = splitting._condensed(maps)
+    assert small.shape == (2, 32, 6, 8)
+    flat, thin = (m.movedim(1, -1).flatten(0, 2) for m in (maps, small))
+    # What is lost is noise, a tenth of a vector: at most .1^2 of a cosine, and room for twice that.
+    assert float((flat @ flat.T - thin @ thin.T).abs().max()) < 0.02

@@ -10,7 +10,14 @@ from typing import Any, TextIO
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.lab.photos import chosen_ids
 from langflash_core.lab.photos.layouts import Source, convert
-from langflash_core.lab.training.commands import run_adopt, run_cache, run_export, run_find_parts, run_train
+from langflash_core.lab.training.commands import (
+    run_adopt,
+    run_cache,
+    run_export,
+    run_find_parts,
+    run_late,
+    run_train,
+)
 from langflash_core.lab.training.loop import LoopOptions
 from langflash_core.lab.training.photos import run_photo_cache
 from langflash_core.language.spaces import language_space
@@ -34,6 +41,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "cache": _cache,
         "photos": _convert,
         "parts": _parts,
+        "late": _late,
         "run": _run,
         "export": _export,
     }[args.action](args, out)
@@ -103,6 +111,35 @@ def _parts(args: Namespace, out: TextIO) -> None:
     print(f"{args.cache}: {count} new parts", file=out)
 
 
+def _late(args: Namespace, out: TextIO) -> None:
+    if not args.cache.is_dir():
+        raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
+    check_folder(args.output)
+    folder = opened_folder(args)
+    if not folder.labelled:
+        raise InputError(f"{args.folder} has no names.csv, so its photos name nothing; give labelled ones")
+    learned = chosen_ids(folder.ids, "train")
+    kept = [id for id in folder.ids if id not in learned]
+    state = run_late(
+        args.cache,
+        folder,
+        learned,
+        kept[::2],  # the other half is for the threshold
+        args.output,
+        _start(args),
+        language_space(PRESETS[args.preset].space).encode,
+        _options(args, args.minutes),
+        preset=args.preset,
+    )
+    print(f"{args.output}: trained the late half, {state.step} steps", file=out)
+
+
+def _options(args: Namespace, minutes: float) -> LoopOptions:
+    return LoopOptions(
+        minutes=minutes, device=args.device, seed=args.seed, max_steps=args.max_steps, resume=not args.restart
+    )
+
+
 def _run(args: Namespace, out: TextIO) -> None:
     if not args.cache.is_dir():
         raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
@@ -116,9 +153,7 @@ def _run(args: Namespace, out: TextIO) -> None:
         space.encode,
         args.minutes,
         preset=args.preset,
-        options=LoopOptions(
-            minutes=0, device=args.device, seed=args.seed, max_steps=args.max_steps, resume=not args.restart
-        ),
+        options=_options(args, 0),
         from_scratch=args.from_scratch,
     )
     print(f"{args.output}: trained {', '.join(args.stages)}", file=out)

@@ -15,6 +15,8 @@ from langflash_core.lab.training.shards import Label, RoomRecord, dequantise_tok
 from langflash_core.network.encoders.shared import Tokens
 
 PATCH = 14
+HOOKS = 4
+"""Of the frozen encoder; the late half's follow in a record."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class SceneBatch:
     def to(self, device: str | torch.device) -> "SceneBatch":
         tokens = self.tokens
         if tokens is not None:
-            tokens = Tokens(tuple(hook.to(device) for hook in tokens.hooks), tokens.grid)
+            tokens = tokens.each(lambda hook: hook.to(device))
         return replace(
             self,
             images=self.images.to(device),
@@ -81,8 +83,8 @@ def _tokens(records: Sequence[RoomRecord]) -> Tokens | None:
     height, width = records[0].rgb.shape[-2:]
     steps = torch.stack([r.tokens for r in records if r.tokens is not None])
     scales = torch.stack([r.token_scales for r in records if r.token_scales is not None])
-    tokens = dequantise_tokens(steps, scales)  # (B, V, L, T, C)
-    return Tokens(tuple(tokens.unbind(2)), (height // PATCH, width // PATCH))
+    hooks = dequantise_tokens(steps, scales).unbind(2)  # (B, V, T, C) each
+    return Tokens(hooks[:HOOKS], (height // PATCH, width // PATCH), hooks[HOOKS:])
 
 
 class RoomSet:

@@ -125,7 +125,7 @@ def encode_pictures(encoder: Encoder, rgb: Tensor) -> Tensor:
     """Hook tokens (V, L, T, C) float32 of pictures (V, 3, H, W) uint8, in bfloat16 where that is quick."""
     images = rgb.to(next(encoder.parameters()).device).float()[None] / 255
     with mixed(images.device):
-        hooks = encoder(images).hooks
+        hooks = encoder(images)[0].hooks
     return torch.stack([hook[0].float() for hook in hooks], 1).cpu()
 
 

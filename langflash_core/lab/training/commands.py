@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import InputError
+from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.rooms import HELD_OUT_LIBRARIES, VALIDATION_LIBRARIES, RoomRenderer, load_pack
 from langflash_core.lab.training.batches import RoomSet
 from langflash_core.lab.training.cache import (
@@ -23,19 +24,30 @@ from langflash_core.lab.training.cache import (
     fill_cache,
     rooms_renderer,
 )
-from langflash_core.lab.training.loop import LoopOptions, Validate, load_averaged, train_stage
+from langflash_core.lab.training.live import LivePhotos
+from langflash_core.lab.training.loop import (
+    LoopOptions,
+    LoopState,
+    Validate,
+    load_averaged,
+    train_stage,
+)
 from langflash_core.lab.training.mixing import MixedSet
 from langflash_core.lab.training.naming import NAMING
 from langflash_core.lab.training.parts import PartSet, run_parts
-from langflash_core.lab.training.stages import STAGES, Stage, Words, guided
+from langflash_core.lab.training.real import MODULES, JointSet, KeptPhotos, PhotoTargets, train_late
+from langflash_core.lab.training.stages import STAGES, Stage, Words, guided, language_stage
 from langflash_core.lab.training.validation import MEASURES, Validator
 from langflash_core.lab.training.words import PhraseSampler, PhraseTable, build_table
 from langflash_core.network.checkpoints.files import adopt_frozen, initial_network, save_network, start_from
 from langflash_core.network.model import LangFlashNet
+from langflash_core.network.precision import has_bfloat16
 from langflash_core.network.presets import PRESETS
 
 log = logging.getLogger(__name__)
 
+LATE = Stage("late", MODULES, (), {1: 1.0}, 6, 6e-4, language_stage)
+"""What `train late` leaves in a run for the stages after it; `real.joint_stage` says how it learns."""
 ALL_STAGES = {**STAGES, NAMING.name: NAMING}
 
 Encode = Callable[[Sequence[str]], Tensor]
@@ -142,7 +154,7 @@ def run_train(
     network = initial_network(PRESETS[preset], start, options.seed)
     done = _load_trained(network, run_dir)
     if not from_scratch:
-        done |= dict.fromkeys(_begin(network, start, ALL_STAGES.keys() - done.keys()), 0)
+        done |= dict.fromkeys(_begin(network, start, done), 0)
     for name, budget in zip(stages, minutes, strict=True):
         stage = ALL_STAGES[name]
         missing = [need for need in stage.needs if need not in done]
@@ -161,6 +173,37 @@ def run_train(
         state = train_stage(network, stage, learned, words, run_dir, own, check)
         done[name] = state.step
     return network.eval()
+
+
+def run_late(
+    folder: Path,
+    photos: PhotoFolder,
+    ids: Sequence[str],
+    kept: Sequence[str],
+    run_dir: Path,
+    start: Path,
+    encode: Encode,
+    options: LoopOptions,
+    *,
+    preset: str = "mini",
+) -> LoopState:
+    """Train the late half, and the heads that read it, on labelled photos and the cached rooms.
+
+    Args:
+        ids: of the photos to learn from. kept: of those to judge by now and then. start: weights file that
+            the run begins with.
+
+    Raises:
+        InputError: no cache, or a photo cannot be used.
+    """
+    rooms = _open(folder / "train")
+    network = initial_network(PRESETS[preset], start, options.seed)
+    _begin(network, start, ())
+    live = LivePhotos(photos, ids)
+    words = Words(PhraseSampler(phrase_table(folder, encode)), torch.Generator().manual_seed(options.seed))
+    targets = PhotoTargets.of(photos, live, encode)
+    check = KeptPhotos(LivePhotos(photos, kept), targets, options.device) if kept else None
+    return train_late(network, targets, JointSet(live, rooms), words, run_dir, options, check)
 
 
 def _open(folder: Path, limit: int | None = None, *, photos: bool = False) -> RoomSet:
@@ -242,7 +285,9 @@ def run_find_parts(
     torch.set_num_threads(1)
     network = initial_network(PRESETS[preset], start)
     done = _load_trained(network, run_dir) if run_dir is not None else {}
-    _begin(network, start, ALL_STAGES.keys() - done.keys())
+    _begin(network, start, done)
+    if has_bfloat16():
+        network.use_bfloat16()
     count = 0
     for name in ("validation", "train"):
         places = [folder / name] if name == "train" or (folder / name).is_dir() else []
@@ -281,13 +326,24 @@ def phrase_table(folder: Path, encode: Encode) -> PhraseTable:
 
 
 def _load_trained(network: LangFlashNet, run_dir: Path) -> dict[str, int]:
-    found = {name: load_averaged(network, run_dir, name) for name in ALL_STAGES}
+    """Steps of every stage in a run, whose weights the network then has; the late half, and what learned
+    with it, before those that went on."""
+    found = {name: load_averaged(network, run_dir, name) for name in (LATE.name, *ALL_STAGES)}
     return {name: counts[0] for name, counts in found.items() if counts is not None}
 
 
-def _begin(network: LangFlashNet, start: Path, names: Iterable[str]) -> list[str]:
-    """The stages among `names` whose modules could be filled from `start`."""
-    return [name for name in names if start_from(network, start, ALL_STAGES[name].modules)]
+def _begin(network: LangFlashNet, start: Path, done: Iterable[str]) -> list[str]:
+    """The stages whose modules are trained in a run or could be filled from `start`, but for `done`."""
+    done = set(done)
+    filled = {module for name in done for module in (LATE if name == LATE.name else ALL_STAGES[name]).modules}
+    if LATE.name not in done:
+        start_from(network, start, ("late",))
+    names = [name for name in ALL_STAGES if name not in done]
+    return [
+        name
+        for name in names
+        if start_from(network, start, [m for m in ALL_STAGES[name].modules if m not in filled])
+    ]
 
 
 def run_adopt(encoder: Path, local: Path, out: Path, *, preset: str = "mini") -> Path:
@@ -309,8 +365,8 @@ def run_export(
         InputError: no stage has been trained.
     """
     network = initial_network(PRESETS[preset], start)
-    trained = {name: load_averaged(network, run_dir, name) for name in ALL_STAGES}
-    _begin(network, start, [name for name, counts in trained.items() if counts is None])
+    trained = {name: load_averaged(network, run_dir, name) for name in (LATE.name, *ALL_STAGES)}
+    _begin(network, start, [name for name, counts in trained.items() if counts is not None])
     report = {
         name: {
             "steps": counts[0],

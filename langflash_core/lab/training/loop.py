@@ -12,13 +12,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, Protocol, runtime_checkable
 
 import torch
 from torch import Tensor, nn
 
-from langflash_core.lab.training.batches import RoomSet
-from langflash_core.lab.training.mixing import MixedSet, loss_of
-from langflash_core.lab.training.parts import PartSet
+from langflash_core.lab.training.mixing import loss_of
 from langflash_core.lab.training.stages import Stage, Words, modules_of
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.precision import mixed
@@ -30,6 +29,14 @@ FINAL_SHARE = 0.02
 """Of the peak learning rate, at the end of the budget."""
 
 Validate = Callable[[LangFlashNet], dict[str, float]]
+
+
+@runtime_checkable
+class Drawn(Protocol):
+    """What a stage learns from: rooms, photos, both, or parts."""
+
+    def draw(self, count: int, views: int, generator: torch.Generator) -> Any:
+        """A batch of the kind that the stage's loss reads, with `seeds` and `to(device)`."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +76,7 @@ def stage_parameters(network: LangFlashNet, stage: Stage) -> dict[str, Tensor]:
 def train_stage(
     network: LangFlashNet,
     stage: Stage,
-    rooms: RoomSet | MixedSet | PartSet,
+    rooms: Drawn,
     words: Words,
     run_dir: Path,
     options: LoopOptions,
@@ -81,8 +88,12 @@ def train_stage(
         RuntimeError: the loss stayed non-finite for 20 steps on end.
     """
     network.to(options.device)
-    trained = _freeze_all_but(network, stage)
-    optimiser = torch.optim.AdamW(trained, lr=1e-6, weight_decay=options.weight_decay, betas=(0.9, 0.99))
+    _freeze_all_but(network, stage)
+    groups = [
+        {"params": list(getattr(network, name).parameters()), "share": stage.rates.get(name, 1.0)}
+        for name in modules_of(network, stage)
+    ]
+    optimiser = torch.optim.AdamW(groups, lr=1e-6, weight_decay=options.weight_decay, betas=(0.9, 0.99))
     state = LoopState(ema={k: v.detach().clone() for k, v in stage_parameters(network, stage).items()})
     path = run_dir / f"{stage.name}.pt"
     if options.resume and path.exists():
@@ -93,25 +104,21 @@ def train_stage(
     return state
 
 
-def _freeze_all_but(network: LangFlashNet, stage: Stage) -> list[nn.Parameter]:
+def _freeze_all_but(network: LangFlashNet, stage: Stage) -> None:
     network.requires_grad_(False)
     network.eval()
-    trained = []
     for name in modules_of(network, stage):
-        module = getattr(network, name)
-        module.requires_grad_(True).train()
-        trained += list(module.parameters())
+        getattr(network, name).requires_grad_(True).train()
     for parameter in network.parameters():
         if parameter.ndim == 4:  # convolutions are twice as fast on a CPU with channels last
             parameter.data = parameter.data.contiguous(memory_format=torch.channels_last)
-    return trained
 
 
 @dataclass
 class _Training:
     network: LangFlashNet
     stage: Stage
-    rooms: RoomSet | MixedSet | PartSet
+    rooms: Drawn
     words: Words
     options: LoopOptions
     optimiser: torch.optim.Optimizer
@@ -179,7 +186,7 @@ class _Training:
             return
         rate = learning_rate(self.state.step, self._progress(), options.learning_rate or stage.learning_rate)
         for group in self.optimiser.param_groups:
-            group["lr"] = rate
+            group["lr"] = rate * group["share"]
         self.optimiser.step()
         self.state.step += 1
         self.bad = 0
@@ -268,6 +275,15 @@ def save_state(
         },
         temporary,
     )
+    os.replace(temporary, path)
+
+
+def save_cut(path: Path, network: LangFlashNet, stage: Stage, state: LoopState) -> None:
+    """What a run left in the network, as the finished stage that `load_averaged` reads; atomically."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_suffix(".part")
+    own = {key: value.detach().clone() for key, value in stage_parameters(network, stage).items()}
+    torch.save({"stage": stage.name, "ema": own, "step": state.step, "seconds": state.seconds}, temporary)
     os.replace(temporary, path)
 
 

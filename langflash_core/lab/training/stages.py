@@ -7,7 +7,7 @@ grouping, aggregation: the two chains do not read each other and can run side by
 Sizes: B scenes, V views, H W pixels, h w the head's own size, N queries, G groups, C channels.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -85,7 +85,8 @@ StageLoss = Callable[[LangFlashNet, Any, Words], Loss]
 class Stage:
     """modules: attributes of the network that learn; needs: stages whose modules are read frozen;
     views: how many views a scene gives, with their chances; learning_rate: AdamW's peak; photos: share
-    of the pictures that come from labelled photos, where some are cached."""
+    of the pictures that come from labelled photos, where some are cached; rates: what a module's rate is of
+    the stage's, 1 where it is not named."""
 
     name: str
     modules: tuple[str, ...]
@@ -95,6 +96,7 @@ class Stage:
     learning_rate: float
     loss: StageLoss
     photos: float = 0.0
+    rates: Mapping[str, float] = field(default_factory=dict)
 
 
 def depth_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
@@ -251,16 +253,17 @@ def language_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Lo
 
 def thinned(tokens: Tokens, share: float, generator: torch.Generator) -> Tokens:
     """Tokens with `share` of each view's channels set to 0 and the rest scaled up, hook by hook."""
-    hooks = []
-    for hook in tokens.hooks:
+
+    def thin(hook: Tensor) -> Tensor:
         kept = torch.rand(*hook.shape[:2], 1, hook.shape[-1], generator=generator) >= share
-        hooks.append(hook * (kept.to(hook) / (1 - share)))
-    return replace(tokens, hooks=tuple(hooks))
+        return hook * (kept.to(hook) / (1 - share))
+
+    return tokens.each(thin)
 
 
 def language_hidden(head: LanguageHead, tokens: Tokens) -> Tensor:
     """What the language head holds before its last activation: (B*V, F, 4h, 4w)."""
-    path = head.dpt((tokens.maps(0), tokens.maps(1), tokens.maps(2), tokens.maps(3))).path_1
+    path = head.dpt(tokens.named_maps()).path_1
     return head.mix(F.avg_pool2d(path, 2))
 
 
@@ -298,7 +301,7 @@ def grouping_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Lo
 
     Without a dense teacher its term is `instance_contrast` on the map that masks are read from.
     """
-    memories, finest = network.semantic_maps(tokens_of(network, batch), batch.images)
+    memories, finest = network.semantic_maps(frozen_tokens(network, batch), batch.images)
     offset_y, offset_x = torch.randint(2, (2,), generator=words.generator).tolist()
     size = (finest.shape[-2], finest.shape[-1])
     sampled = finest[..., offset_y::2, offset_x::2]
@@ -404,12 +407,19 @@ def mostly(weights: Tensor, masks: Tensor, eps: float) -> tuple[Tensor, Tensor]:
 
 
 def tokens_of(network: LangFlashNet, batch: SceneBatch) -> Tokens:
-    """The batch's cached tokens, or those the network gives now where its tokens may change."""
+    """Tokens of a batch, also what the late half says, which no cache holds: it learns."""
     if not network.caches_tokens:
         return network.encode(batch.images, batch.Ks)
-    if batch.tokens is None:
-        raise ValueError("batch: expected cached tokens, received none; cache with tokens")
-    return batch.tokens
+    if batch.tokens is not None and batch.tokens.named:
+        return batch.tokens
+    with torch.no_grad():
+        return network.encode(batch.images, batch.Ks)
+
+
+def frozen_tokens(network: LangFlashNet, batch: SceneBatch) -> Tokens:
+    """The cached tokens of the frozen encoder alone, where there are any: for stages that name nothing."""
+    cached = batch.tokens if network.caches_tokens else None
+    return tokens_of(network, batch) if cached is None else cached
 
 
 def guided(network: LangFlashNet) -> GuidedDepthNet:
@@ -465,11 +475,7 @@ def _shrink(maps: Tensor, size: tuple[int, int]) -> Tensor:
 def _views(batch: SceneBatch, chosen) -> SceneBatch:
     """The batch with only some views."""
     keep = list(chosen)
-    tokens = (
-        None
-        if batch.tokens is None
-        else replace(batch.tokens, hooks=tuple(h[:, keep] for h in batch.tokens.hooks))
-    )
+    tokens = None if batch.tokens is None else batch.tokens.views(keep)
     return SceneBatch(
         batch.images[:, keep], batch.depths[:, keep], batch.instances[:, keep],
         batch.viewmats[:, keep], batch.Ks[:, keep], tokens, batch.labels, batch.seeds, batch.partly,
@@ -483,11 +489,7 @@ def _numbers(**parts: Tensor) -> dict[str, float]:
 def one_scene(batch: SceneBatch, index: int) -> SceneBatch:
     """One scene of a batch, B = 1."""
     one = slice(index, index + 1)
-    tokens = (
-        None
-        if batch.tokens is None
-        else replace(batch.tokens, hooks=tuple(h[one] for h in batch.tokens.hooks))
-    )
+    tokens = None if batch.tokens is None else batch.tokens.scene(index)
     return SceneBatch(
         batch.images[one], batch.depths[one], batch.instances[one], batch.viewmats[one], batch.Ks[one],
         tokens, batch.labels[one], batch.seeds[one], batch.partly,

@@ -23,6 +23,7 @@ from langflash_core.lab.training.naming import measure_naming
 from langflash_core.lab.training.parts import PartSet
 from langflash_core.lab.training.stages import (
     Words,
+    frozen_tokens,
     group_masks,
     guided,
     named_parts,
@@ -71,18 +72,18 @@ def _summary(rows: list[dict[str, float | Tensor]]) -> dict[str, float]:
 
 def measure_depth(network: LangFlashNet, batch: SceneBatch, words: Words) -> dict[str, float | Tensor]:
     """AbsRel and delta1 after one scale per picture, and AbsRel in metres as predicted."""
-    assert batch.tokens is not None
-    depths = guided(network).monocular_depth(batch.tokens, batch.Ks).depths.float()
+    depths = guided(network).monocular_depth(tokens_of(network, batch), batch.Ks).depths.float()
     return _depth_rows(depths, batch.depths, metric=True)
 
 
 def measure_refine(network: LangFlashNet, batch: SceneBatch, words: Words) -> dict[str, float | Tensor]:
     """AbsRel of the refined and of the scale-aligned prior depth, true poses, no alignment after."""
-    assert batch.tokens is not None
     network = guided(network)
     prior = scaled_prior(network, batch)
     local = network.local(batch.images.flatten(0, 1))
-    maps = network.refiner(batch.images, batch.tokens, local, prior, batch.viewmats, batch.Ks)[-1]
+    maps = network.refiner(
+        batch.images, frozen_tokens(network, batch), local, prior, batch.viewmats, batch.Ks
+    )[-1]
     flat = batch.depths.flatten(0, 1)
     refined, before = (d.float().flatten(0, 1) for d in (maps.depths, prior.depths))
     return {
@@ -131,7 +132,7 @@ def group_map(batch: SceneBatch, words: Words, size: tuple[int, int]) -> Tensor:
 
 def measure_grouping(network: LangFlashNet, batch: SceneBatch, words: Words) -> dict[str, float | Tensor]:
     """Mean best IoU of each true instance among surviving masks, recall at 0.5, and their number."""
-    groups = network.group(tokens_of(network, batch), batch.images)[-1]
+    groups = network.group(frozen_tokens(network, batch), batch.images)[-1]
     size = (groups.mask_logits.shape[-2], groups.mask_logits.shape[-1])
     best, counts = [], []
     for b in range(batch.images.shape[0]):

@@ -85,6 +85,8 @@ def initial_network(preset: Preset, frozen: Path, seed: int = 0) -> LangFlashNet
         own = {k.removeprefix(f"{name}."): v for k, v in tensors.items() if k.startswith(f"{name}.")}
         own = dequantise(quantise(own)) if network.compact else own
         load_strictly(getattr(network, name), own, frozen)
+    if isinstance(network, GuidedDepthNet):
+        network.late.begin(network.encoder.vit)
     return network
 
 
@@ -98,6 +100,7 @@ def adopt_frozen(preset: Preset, encoder: Path, local: Path, out: Path, seed: in
             f"the preset '{preset.name}' takes published weights as they are; use `langflash weights import`"
         )
     load_strictly(network.encoder.vit, read_weights(encoder)[0], encoder)
+    network.late.begin(network.encoder.vit)
     load_strictly(network.local, convert(read_weights(local)[0]), local)
     save_network(network, out)
 

@@ -3,7 +3,7 @@
 n pictures of H x W pixels, a grid of h x w patches, C channels.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import torch
 from torch import Tensor, nn
@@ -12,7 +12,7 @@ from torch.nn import functional as F
 from langflash_core.network.layers.draws import drawn
 from langflash_core.network.presets import GuidedDepth
 
-_NORM_EPS = 1e-6
+NORM_EPS = 1e-6
 _FIRST_SCALE = 1e-5  # of what a fresh block adds, as the paper of layer scale has it
 
 
@@ -33,21 +33,19 @@ class PlainViT(nn.Module):
         self.cls_token = nn.Parameter(torch.zeros(1, 1, dim))
         self.pos_embed = nn.Parameter(drawn(1, preset.trained_grid**2 + 1, dim, std=0.02))
         self.patch_embed = _Patches(dim, preset.patch)
-        self.blocks = nn.ModuleList(_Block(dim, heads) for _ in range(preset.encoder_depth))
-        self.norm = nn.LayerNorm(dim, _NORM_EPS)
+        self.blocks = nn.ModuleList(Block(dim, heads) for _ in range(preset.encoder_depth))
+        self.norm = nn.LayerNorm(dim, NORM_EPS)
 
     def forward(self, images: Tensor, hooks: Sequence[int]) -> list[Tensor]:
         """Normed tokens (n, h*w, C) after every hooked block, class token left out; images (n, 3, H, W)."""
+        return [self.norm(x)[:, 1:] for x in self.states(images, hooks)]
+
+    def states(self, images: Tensor, hooks: Sequence[int]) -> list[Tensor]:
+        """What every hooked block hands on, (n, 1 + h*w, C), class token first."""
         maps = self.patch_embed(images)
         tokens = maps.flatten(2).transpose(1, 2)
         x = torch.cat((self.cls_token.expand(len(tokens), -1, -1), tokens), 1)
-        x = x + self._codes((maps.shape[-2], maps.shape[-1]))
-        given = []
-        for depth, block in enumerate(self.blocks):
-            x = block(x)
-            if depth in hooks:
-                given.append(self.norm(x)[:, 1:])
-        return given
+        return through(self.blocks, x + self._codes((maps.shape[-2], maps.shape[-1])), hooks)
 
     def _codes(self, grid: tuple[int, int]) -> Tensor:
         side = self.trained_grid
@@ -56,6 +54,22 @@ class PlainViT(nn.Module):
         learned = self.pos_embed[:, 1:].unflatten(1, (side, side)).permute(0, 3, 1, 2)
         resized = F.interpolate(learned, size=grid, mode="bicubic", antialias=True)
         return torch.cat((self.pos_embed[:, :1], resized.permute(0, 2, 3, 1).flatten(1, 2)), 1)
+
+
+def attended(qkv: Tensor, heads: int) -> Tensor:
+    """Values (n, T, C) that every head gathers; qkv (n, T, 3 C): queries, keys and values."""
+    q, k, v = qkv.unflatten(-1, (3, heads, -1)).permute(2, 0, 3, 1, 4)
+    return F.scaled_dot_product_attention(q, k, v).transpose(1, 2).flatten(2)
+
+
+def through(blocks: Iterable[nn.Module], x: Tensor, hooks: Sequence[int]) -> list[Tensor]:
+    """What the hooked ones of `blocks` hand on; x (n, 1 + h*w, C)."""
+    given = []
+    for depth, block in enumerate(blocks):
+        x = block(x)
+        if depth in hooks:
+            given.append(x)
+    return given
 
 
 class _Patches(nn.Module):
@@ -77,8 +91,7 @@ class _Attention(nn.Module):
         self.qkv, self.proj = nn.Linear(dim, 3 * dim), nn.Linear(dim, dim)
 
     def forward(self, x: Tensor) -> Tensor:
-        q, k, v = self.qkv(x).unflatten(-1, (3, self.heads, -1)).permute(2, 0, 3, 1, 4)
-        return self.proj(F.scaled_dot_product_attention(q, k, v).transpose(1, 2).flatten(2))
+        return self.proj(attended(self.qkv(x), self.heads))
 
 
 class _MLP(nn.Module):
@@ -90,7 +103,9 @@ class _MLP(nn.Module):
         return self.fc2(F.gelu(self.fc1(x)))
 
 
-class _LayerScale(nn.Module):
+class LayerScale(nn.Module):
+    """A learned factor for every channel."""
+
     def __init__(self, dim: int):
         super().__init__()
         self.gamma = nn.Parameter(torch.full((dim,), _FIRST_SCALE))
@@ -99,12 +114,14 @@ class _LayerScale(nn.Module):
         return x * self.gamma
 
 
-class _Block(nn.Module):
+class Block(nn.Module):
+    """Attention and a two-layer network, each scaled and added to what it reads."""
+
     def __init__(self, dim: int, heads: int):
         super().__init__()
-        self.norm1, self.norm2 = nn.LayerNorm(dim, _NORM_EPS), nn.LayerNorm(dim, _NORM_EPS)
+        self.norm1, self.norm2 = nn.LayerNorm(dim, NORM_EPS), nn.LayerNorm(dim, NORM_EPS)
         self.attn, self.mlp = _Attention(dim, heads), _MLP(dim)
-        self.ls1, self.ls2 = _LayerScale(dim), _LayerScale(dim)
+        self.ls1, self.ls2 = LayerScale(dim), LayerScale(dim)
 
     def forward(self, x: Tensor) -> Tensor:
         x = x + self.ls1(self.attn(self.norm1(x)))

@@ -1,5 +1,6 @@
 """The shared image encoder: pictures in, tokens of four blocks out. Run once, read by all heads."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -14,10 +15,14 @@ _STD = (0.229, 0.224, 0.225)
 
 @dataclass(frozen=True)
 class Tokens:
-    """Encoder tokens of V views: four hooks (B, V, h*w, C), after the final norm; grid (h, w)."""
+    """Encoder tokens of V views: four hooks (B, V, h*w, C), after the final norm; grid (h, w).
+
+    named: the last two hooks once more, from the half that real photos taught; () where there is none.
+    """
 
     hooks: tuple[Tensor, ...]
     grid: tuple[int, int]
+    named: tuple[Tensor, ...] = ()
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -28,9 +33,22 @@ class Tokens:
         """Hook `index` as feature maps (B*V, C, h, w)."""
         return tokens_to_maps(self.hooks[index].flatten(0, 1), self.grid)
 
+    def named_maps(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """What names are read from: the early hooks and the deep ones that real photos taught."""
+        deep = (tokens_to_maps(t.flatten(0, 1), self.grid) for t in self.named)
+        return self.maps(0), self.maps(1), *deep  # type: ignore[return-value]
+
+    def each(self, change: Callable[[Tensor], Tensor]) -> "Tokens":
+        """Every hook (B, V, h*w, C) changed alike."""
+        return Tokens(tuple(map(change, self.hooks)), self.grid, tuple(map(change, self.named)))
+
     def scene(self, index: int) -> "Tokens":
         """Those of one scene of the batch, B = 1."""
-        return Tokens(tuple(hook[index : index + 1] for hook in self.hooks), self.grid)
+        return self.each(lambda hook: hook[index : index + 1])
+
+    def views(self, keep: Sequence[int]) -> "Tokens":
+        """Those of some views."""
+        return self.each(lambda hook: hook[:, list(keep)])
 
 
 def tokens_to_maps(tokens: Tensor, grid: tuple[int, int]) -> Tensor:
@@ -53,11 +71,16 @@ class Encoder(nn.Module):
         return super().train(False)
 
     @torch.no_grad()
-    def forward(self, images: Tensor) -> Tokens:
-        """Tokens of images (B, V, 3, H, W) in [0, 1]."""
+    def forward(self, images: Tensor) -> tuple[Tokens, Tensor]:
+        """Tokens of images (B, V, 3, H, W) in [0, 1], and what `LateHalf` reads, (B*V, 1 + h*w, C)."""
         mean, std = (images.new_tensor(values)[:, None, None] for values in (_MEAN, _STD))
         flat = (images.flatten(0, 1) - mean) / std
-        maps = self.vit(flat, self.hook_blocks)
-        batch, num_views, _, height, width = images.shape
-        hooks = tuple(m.unflatten(0, (batch, num_views)) for m in maps)
-        return Tokens(hooks, (height // self.patch, width // self.patch))
+        states = self.vit.states(flat, self.hook_blocks)
+        hooks = tuple(unflattened(self.vit.norm(x)[:, 1:], images) for x in states)
+        grid = (images.shape[-2] // self.patch, images.shape[-1] // self.patch)
+        return Tokens(hooks, grid), states[1]
+
+
+def unflattened(tokens: Tensor, images: Tensor) -> Tensor:
+    """Tokens (B*V, ...) of images (B, V, 3, H, W), as (B, V, ...)."""
+    return tokens.unflatten(0, images.shape[:2])

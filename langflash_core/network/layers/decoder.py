@@ -60,17 +60,20 @@ class TwoStackDecoder(TwoStacks):
     def __init__(self, preset: Preset):
         super().__init__(preset)
         self.intrinsics = nn.Linear(9, preset.decoder_dim)
+        self.embed_named = nn.Linear(preset.encoder_dim, preset.decoder_dim, bias=False)
+        nn.init.zeros_(self.embed_named.weight)
 
     def forward(self, tokens: Tokens, Ks: Tensor) -> tuple[Tensor, Tensor]:
         """Tokens (B, V, h*w, C) after half of the layers and after the last.
 
         Args:
-            tokens: of the encoder; the last hook is decoded.
+            tokens: of the encoder; the last hook is decoded, and what real photos taught beside it.
             Ks: (B, V, 3, 3), pixels of the encoded images.
         """
         height, width = (side * self.patch for side in tokens.grid)
         camera = self.intrinsics(normalised_intrinsics(Ks, width, height))[:, :, None]
-        given = self.layers(torch.cat((self.embed(tokens.hooks[-1]), camera), 2), tokens.grid)
+        seen = self.embed(tokens.hooks[-1]) + self.embed_named(tokens.named[-1])
+        given = self.layers(torch.cat((seen, camera), 2), tokens.grid)
         middle = given[max(len(given) // 2, 1) - 1]
         return middle[:, :, :-1], given[-1][:, :, :-1]
 

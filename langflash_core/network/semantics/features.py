@@ -21,7 +21,6 @@ class LanguageHead(nn.Module):
 
     def forward(self, tokens: Tokens) -> Tensor:
         """L(x), (B, V, C, 4h, 4w), unit channel norm."""
-        maps = (tokens.maps(0), tokens.maps(1), tokens.maps(2), tokens.maps(3))
-        path = F.avg_pool2d(self.dpt(maps).path_1, 2)
+        path = F.avg_pool2d(self.dpt(tokens.named_maps()).path_1, 2)
         features = self.out(F.gelu(self.mix(path))).float()
         return F.normalize(features, dim=1).unflatten(0, tokens.shape)

@@ -18,7 +18,7 @@ from langflash_core.network.presets import GuidedDepth
 
 PLACE = 10
 """Numbers that `places` gives of a part."""
-DEEP = (2, 3)
+DEEP = 2
 """Hooks that tell what a thing is; the earlier ones tell one make of it from another."""
 _MIN_POINTS = 6
 _VOTERS = 1200
@@ -35,7 +35,7 @@ def describe(weights: Tensor, tokens: Tokens) -> Tensor:
     small = F.adaptive_avg_pool2d(weights, tokens.grid).flatten(2)  # (V, K, T)
     total = small.sum((0, 2))[:, None] + 1e-6
     count = tokens.grid[0] * tokens.grid[1]
-    means = [torch.einsum("vkt,vtc->kc", small, tokens.hooks[i][0, :, -count:].float()) / total for i in DEEP]
+    means = [torch.einsum("vkt,vtc->kc", small, hook[0, :, -count:].float()) / total for hook in tokens.named]
     return torch.cat(means, 1)
 
 
@@ -125,7 +125,7 @@ class PartNamer(nn.Module):
 
     def __init__(self, preset: GuidedDepth):
         super().__init__()
-        inputs, dim = len(DEEP) * preset.encoder_dim + PLACE + preset.language_dim, preset.naming_dim
+        inputs, dim = DEEP * preset.encoder_dim + PLACE + preset.language_dim, preset.naming_dim
         self.register_buffer("mean", torch.zeros(inputs))
         self.register_buffer("std", torch.ones(inputs))
         self.embed = nn.Linear(inputs, dim)

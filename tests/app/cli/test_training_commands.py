@@ -11,7 +11,7 @@ from app.cli.parser import LAYOUTS, build_parser
 from langflash_core.lab.photos import layouts
 from langflash_core.lab.photos.writing import FolderWriter
 from langflash_core.lab.training.shards import Label, open_shards, write_shard
-from langflash_core.network import MINI, GuidedDepthNet, save_network
+from langflash_core.network import MINI, GuidedDepthNet, load_network, save_network
 from tests.lab.rooms.conftest import TINY_PACK
 from tests.lab.training.conftest import toy_record
 
@@ -20,7 +20,9 @@ from tests.lab.training.conftest import toy_record
 def checkpoint(tmp_path_factory):
     torch.manual_seed(0)
     path = tmp_path_factory.mktemp("weights") / "drawn.safetensors"
-    save_network(GuidedDepthNet(MINI), path)
+    network = GuidedDepthNet(MINI)
+    network.late.begin(network.encoder.vit)
+    save_network(network, path)
     return path
 
 
@@ -131,6 +133,24 @@ def test_photos_are_cached(run, checkpoint, photos, tmp_path):
     assert open_shards(shard.parent)[0].record(0).labels[0].name == "wall"
 
 
+def test_the_late_half_is_trained_and_exported(run, checkpoint, photos, tmp_path):
+    """Two steps on six photos and two rooms; what comes out is a network whose late half has moved."""
+    for number in range(3, 7):
+        for folder in ("images", "labels"):
+            content = next((photos / folder).glob("1.*"))
+            (photos / folder / f"{number}{content.suffix}").write_bytes(content.read_bytes())
+    rooms = [toy_record(seed) for seed in (0, 1)]
+    write_shard(tmp_path / "cache" / "train" / "a.safetensors", rooms)
+    words = ("--photos", photos, "--minutes", "5", "--max-steps", "2", "--start", checkpoint)
+    outcome = run("train", "late", tmp_path / "cache", "-o", tmp_path / "run", *words)
+    assert outcome.code == 0 and "2 steps" in outcome.out, outcome.err
+    out = tmp_path / "w.safetensors"
+    assert run("train", "export", tmp_path / "run", "-o", out, "--start", checkpoint).code == 0
+    before, after = (load_network("mini", path).state_dict() for path in (checkpoint, out))
+    moved = {key.split(".")[0] for key in before if not torch.equal(before[key], after[key])}
+    assert moved == {"late", "language_head", "decoder", "depth_head"}
+
+
 def test_a_data_set_is_converted(run, tmp_path):
     (tmp_path / "seq").mkdir()
     Image.new("RGB", (56, 42)).save(tmp_path / "seq" / "frame-000000.color.png")
@@ -180,6 +200,13 @@ def test_posed_photos_are_judged(run, checkpoint, tmp_path):
         (["train", "cache", "-o", "out"], "either a furniture pack or a folder with --photos"),
         (["train", "cache", "p.npz", "--photos", "PHOTOS", "-o", "out"], "not both"),
         (["train", "cache", "--photos", "PHOTOS", "-o", "out", "--set", "held_out"], "no held-out set"),
+        (["train", "late", "gone", "--photos", "PHOTOS", "-o", "out", "--minutes", "1"], "no folder gone"),
+        (["train", "late", ".", "--photos", "gone", "-o", "out", "--minutes", "1"], "no folder gone/images"),
+        (["train", "late", ".", "-o", "out", "--minutes", "1"], "--photos"),
+        (
+            ["train", "late", ".", "--photos", "PHOTOS", "-o", "out", "--minutes", "1"],
+            "langflash train cache",
+        ),
         (["train", "photos", "nyu", "gone", "-o", "out"], "there is no gone"),
         (["train", "photos", "voc", "gone", "-o", "out"], "invalid choice"),
     ],

@@ -16,6 +16,7 @@ from langflash_core.lab.training.stages import (
     nearest,
     perturbed_poses,
     thinned,
+    tokens_of,
 )
 from langflash_core.lab.training.validation import MEASURES, Validator
 
@@ -70,9 +71,10 @@ def test_a_stage_can_be_measured(name, rooms, words, network):
 
 
 def test_the_drawn_pixels_read_what_the_whole_head_gives(rooms, words, network):
-    head = network().language_head.eval()
-    tokens = rooms.draw(2, 1, words.generator).tokens
+    net = network()
+    head = net.language_head.eval()
     with torch.no_grad():
+        tokens = tokens_of(net, rooms.draw(2, 1, words.generator))
         hidden = language_hidden(head, tokens)
         rows = hidden[1].flatten(1).T[[3, 100]]
         vectors = F.normalize(F.linear(F.gelu(rows), head.out.weight[:, :, 0, 0], head.out.bias), dim=-1)

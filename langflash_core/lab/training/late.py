@@ -1,0 +1,70 @@
+"""The late half that learns from real photos: whole blocks while they learn, then cut to their rank.
+
+Whole blocks learn more surely than a product of two thin matrices that starts at zero, and what they have
+learned lies in few directions: of 384, the 88 that are kept hold nearly all of it (model card).
+"""
+
+from typing import cast
+
+import torch
+from torch import Tensor, nn
+
+from langflash_core.network.encoders.late import OWN, LateHalf
+from langflash_core.network.encoders.plain import NORM_EPS, Block, PlainViT, through
+from langflash_core.network.presets import GuidedDepth
+
+
+class WholeLateHalf(nn.Module):
+    """In the place of `LateHalf` while it learns: blocks of its own, as the encoder's to begin with."""
+
+    def __init__(self, preset: GuidedDepth):
+        super().__init__()
+        self.first = preset.hooks[1] + 1
+        self.hooks = tuple(hook - self.first for hook in preset.hooks[2:])
+        self.blocks = nn.ModuleList(
+            Block(preset.encoder_dim, preset.encoder_heads) for _ in range(self.first, preset.encoder_depth)
+        )
+        self.norm = nn.LayerNorm(preset.encoder_dim, NORM_EPS)
+
+    def each(self) -> list[Block]:
+        """Its blocks."""
+        return [cast(Block, block) for block in self.blocks]
+
+    def forward(self, early: Tensor, vit: PlainViT) -> tuple[Tensor, ...]:
+        """As `LateHalf`; of `vit` nothing is read."""
+        return tuple(self.norm(x)[:, 1:] for x in through(self.blocks, early, self.hooks))
+
+
+@torch.no_grad()
+def whole(late: LateHalf, vit: PlainViT) -> WholeLateHalf:
+    """The same half as whole blocks; every block starts as the encoder's plus its correction."""
+    sizes = late.preset
+    answer = WholeLateHalf(sizes)
+    answer.norm.load_state_dict(late.norm.state_dict())
+    for own, (block, base) in zip(answer.each(), late.pairs(vit), strict=True):
+        for name in OWN:
+            own.get_parameter(name).copy_(block.get_parameter(name))
+        for (correction, layer), (_, learned) in zip(block.pairs(base), block.pairs(own), strict=True):
+            learned.weight.copy_(correction.matrix(layer))
+            learned.bias.copy_(correction.bias)
+    return answer
+
+
+@torch.no_grad()
+def cut(learned: WholeLateHalf, vit: PlainViT, preset: GuidedDepth) -> LateHalf:
+    """The nearest half whose matrices differ from the encoder's by one of `preset.late_rank`.
+
+    Source: Eckart and Young 1936 (singular values).
+    """
+    answer = LateHalf(preset)
+    answer.norm.load_state_dict(learned.norm.state_dict())
+    for own, (block, base) in zip(learned.each(), answer.pairs(vit), strict=True):
+        for name in OWN:
+            block.get_parameter(name).copy_(own.get_parameter(name))
+        for (correction, layer), (_, new) in zip(block.pairs(base), block.pairs(own), strict=True):
+            u, s, v = torch.linalg.svd((new.weight - layer.weight).double(), full_matrices=False)
+            root = s[: preset.late_rank].sqrt()
+            correction.up.copy_(u[:, : preset.late_rank] * root)
+            correction.down.copy_(root[:, None] * v[: preset.late_rank])
+            correction.bias.copy_(new.bias)
+    return answer

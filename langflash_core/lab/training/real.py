@@ -1,0 +1,271 @@
+"""The stage that teaches names and depth by real photos: late half, language head, decoder, depth head.
+
+Photos teach by a softmax over the names of 37 classes, one over fine names, and their depths; every
+second step a rendered room teaches phrases and depth as in the stages `language` and `depth`, so that
+what no photo names is not lost. Measured before: a loss over many phrases from the first step learned
+little (ARCHITECTURE).
+
+Sizes: B photos, H W pixels, h w the language head's own, P pixels, A phrases, C channels.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from langflash_core.lab.photos import PhotoFolder
+from langflash_core.lab.photos.fitting import fitted
+from langflash_core.lab.photos.names import CLASSES37
+from langflash_core.lab.training.batches import RoomSet, SceneBatch
+from langflash_core.lab.training.late import cut, whole
+from langflash_core.lab.training.live import SIZES, LabelledBatch, LivePhotos
+from langflash_core.lab.training.loop import LoopOptions, LoopState, Validate, save_cut, train_stage
+from langflash_core.lab.training.losses import depth_loss, error_loss, gradient_loss
+from langflash_core.lab.training.measures import (
+    abs_rel,
+    accuracy,
+    align_scale,
+    confusion,
+    delta1,
+    mean_iou,
+    nan_mean,
+)
+from langflash_core.lab.training.photo_names import photo_label
+from langflash_core.lab.training.stages import (
+    Loss,
+    Stage,
+    Words,
+    depth_stage,
+    guided,
+    language_stage,
+    nearest,
+    thinned,
+)
+from langflash_core.network.guided import GuidedDepthNet
+from langflash_core.network.model import LangFlashNet
+from langflash_core.network.precision import mixed
+from langflash_core.network.stereo.prior import resize
+
+MODULES = ("late", "language_head", "decoder", "depth_head")
+RATES = {"late": 0.33, "decoder": 0.33, "depth_head": 0.33}
+"""Of the stage's rate: what has learned before moves less."""
+TEMPERATURE = 16.0
+"""Factor on cosines in both softmaxes."""
+HIDDEN = 0.1
+"""Share of token channels that are hidden from the language head."""
+RARITY = 0.25
+"""A class counts frequency^-RARITY: 0 is as pixels come, 1 all classes alike."""
+CLASS_PIXELS, FINE_PIXELS = 8000, 3000
+"""Drawn from all photos of a step."""
+MIN_PHOTOS = 5
+"""A fine name that fewer photos show teaches nothing; its class still does."""
+
+
+@dataclass(frozen=True)
+class PhotoTargets:
+    """What ids of a folder are called: rows (largest id + 1,) of `classes` and of `fine`, -1 = nothing.
+
+    classes (37, C) and fine (A, C): unit texts; balance (37,): what a pixel of a class counts; against
+    (A, A) bool: which fine names speak against which (a class does not against its kinds).
+    """
+
+    classes: Tensor
+    fine: Tensor
+    class_of: Tensor
+    fine_of: Tensor
+    balance: Tensor
+    against: Tensor
+
+    @staticmethod
+    def of(
+        folder: PhotoFolder, photos: LivePhotos, encode: Callable[[Sequence[str]], Tensor]
+    ) -> "PhotoTargets":
+        """Targets of a folder, of which `photos` are learned from."""
+        size = max(folder.names) + 1
+        class_of, fine_of = torch.full((size,), -1), torch.full((size,), -1)
+        counts, shown = torch.zeros(size), torch.zeros(size)
+        for photo in photos.photos:
+            if photo.labels is not None:
+                pixels = torch.bincount(torch.from_numpy(photo.labels).flatten(), minlength=size)
+                counts, shown = counts + pixels, shown + (pixels > 0)
+        labels = {id: photo_label(name) for id, name in folder.names.items()}
+        photos_of: dict[str, float] = {}
+        for id, label in labels.items():
+            if label is not None:
+                photos_of[label.name] = photos_of.get(label.name, 0) + float(shown[id])
+        names = sorted(name for name, count in photos_of.items() if count >= MIN_PHOTOS)
+        bank = list(dict.fromkeys((*names, *CLASSES37)))
+        rows = {text: row for row, text in enumerate(bank)}
+        against = torch.ones(len(bank), len(bank), dtype=torch.bool)
+        for id, name in folder.names.items():
+            label = labels[id]
+            if name.label in CLASSES37:
+                class_of[id] = CLASSES37.index(name.label)
+            if label is not None and label.name in names:
+                fine_of[id] = rows[label.name]
+                for other in (label.group, name.label, *label.words):
+                    if other in rows and other != label.name:
+                        against[rows[label.name], rows[other]] = False
+        known = class_of >= 0
+        pixels = torch.zeros(len(CLASSES37)).index_add_(0, class_of[known], counts[known])
+        share = pixels / pixels.sum().clamp_min(1)
+        balance = share.clamp_min(1e-5) ** -RARITY
+        return PhotoTargets(
+            encode(CLASSES37), encode(bank), class_of, fine_of, balance / (balance * share).sum(), against
+        )
+
+
+@dataclass(frozen=True)
+class JointBatch:
+    """Photos, and one room of two views or None."""
+
+    photos: LabelledBatch
+    rooms: SceneBatch | None
+
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        return () if self.rooms is None else self.rooms.seeds
+
+    def to(self, device: str | torch.device) -> "JointBatch":
+        return JointBatch(self.photos.to(device), None if self.rooms is None else self.rooms.to(device))
+
+
+@dataclass
+class JointSet:
+    """Photos at every step, a room at every second; None: photos alone."""
+
+    photos: LivePhotos
+    rooms: RoomSet | None
+    _step: int = 0
+
+    def __len__(self) -> int:
+        return len(self.photos) + (0 if self.rooms is None else len(self.rooms))
+
+    def draw(self, count: int, views: int, generator: torch.Generator) -> JointBatch:
+        """`count` photos; `views` says nothing."""
+        self._step += 1
+        room = self.rooms.draw(1, 2, generator) if self.rooms is not None and self._step % 2 else None
+        return JointBatch(self.photos.draw(count, generator), room)
+
+
+def joint_stage(targets: PhotoTargets) -> Stage:
+    """The stage `late`, bound to what its photos are called."""
+    return Stage(
+        "late", MODULES, (), {1: 1.0}, 6, 6e-4,
+        lambda network, batch, words: _loss(guided(network), batch, words, targets), rates=RATES,
+    )  # fmt: skip
+
+
+def _loss(network: GuidedDepthNet, batch: JointBatch, words: Words, targets: PhotoTargets) -> Loss:
+    photos = batch.photos
+    tokens = network.encode(photos.images, photos.Ks)
+    features = network.language_head(thinned(tokens, HIDDEN, words.generator))[:, 0]
+    names, told = named_loss(features, photos.ids, targets, words.generator)
+    maps = network.monocular_depth(tokens, photos.Ks)
+    logs, errors = maps.log_depths.flatten(0, 1).float(), maps.log_errors.flatten(0, 1).float()
+    shape, slope = depth_loss(logs, photos.depths), gradient_loss(logs, photos.depths)
+    depth = shape + 0.5 * slope + 0.05 * error_loss(logs, errors, photos.depths)
+    total, told = names + 2 * depth, told | {"photos_shape": float(shape.detach())}
+    if batch.rooms is None:
+        return Loss(total, told)
+    room = replace(batch.rooms, tokens=network.encode(batch.rooms.images, batch.rooms.Ks))
+    said, seen = language_stage(network, room, words), depth_stage(network, room, words)
+    told |= {"phrases": float(said.total.detach()), "shape": seen.parts["shape"]}
+    return Loss(total + 0.5 * said.total + 2 * seen.total, told)
+
+
+def named_loss(
+    features: Tensor, ids: Tensor, targets: PhotoTargets, generator: torch.Generator
+) -> tuple[Tensor, dict[str, float]]:
+    """Cross-entropy among the classes, and half of that among fine names, each with a quarter of
+    attraction 1 - cos, which keeps features in the texts' own space.
+
+    Args:
+        features: (B, C, h, w), unit norm. ids: (B, H, W).
+    """
+    units = features.permute(0, 2, 3, 1).flatten(0, 2)
+    own = nearest(ids, (features.shape[-2], features.shape[-1])).flatten()
+    classes, fine = targets.class_of[own], targets.fine_of[own]
+    drawn = (classes >= 0).nonzero()[:, 0]
+    drawn = drawn[torch.randperm(len(drawn), generator=generator)[:CLASS_PIXELS]]
+    rows = classes[drawn]
+    weights = targets.balance[rows]
+    each = F.cross_entropy(TEMPERATURE * units[drawn] @ targets.classes.T, rows, reduction="none")
+    by_class = (each * weights).sum() / weights.sum().clamp_min(1e-6)
+    near = _attraction(units[drawn], targets.classes[rows])
+    chosen = (fine >= 0).nonzero()[:, 0]
+    if len(chosen):
+        chance = torch.bincount(fine[chosen]).float()[fine[chosen]].rsqrt()
+        picked = torch.multinomial(chance, min(FINE_PIXELS, len(chosen)), True, generator=generator)
+        chosen = chosen[picked]
+    rows = fine[chosen]
+    logits = (TEMPERATURE * units[chosen] @ targets.fine.T).masked_fill(~targets.against[rows], -1e4)
+    by_name = F.cross_entropy(logits, rows, reduction="sum") / max(len(rows), 1)
+    total = by_class + 0.5 * by_name + 0.25 * (near + _attraction(units[chosen], targets.fine[rows]))
+    return total, {"classes": float(by_class.detach()), "names": float(by_name.detach())}
+
+
+def _attraction(units: Tensor, texts: Tensor) -> Tensor:
+    return (1 - (units * texts).sum(-1)).sum() / max(len(units), 1)
+
+
+@dataclass(frozen=True)
+class KeptPhotos:
+    """Judges a network by photos that it does not learn from: 37 classes by argmax over 2D features
+    (accuracy, mIoU), and depth up to scale (AbsRel, delta < 1.25)."""
+
+    photos: LivePhotos
+    targets: PhotoTargets
+    device: str = "cpu"
+
+    def __call__(self, network: LangFlashNet) -> dict[str, float]:
+        counts = torch.zeros(len(CLASSES37), len(CLASSES37), dtype=torch.int64)
+        rel: list[float] = []
+        near: list[float] = []
+        for photo in self.photos.photos:
+            view = fitted(photo, SIZES[0])
+            images, Ks = (
+                view.rgb[None, None].to(self.device).float() / 255,
+                view.K[None, None].to(self.device),
+            )
+            with mixed(self.device):
+                tokens = network.encode(images, Ks)
+                features = network.language(tokens, images)[0].float().cpu()
+                depth = guided(network).monocular_depth(tokens, Ks).depths[0, 0].float().cpu()
+            said = torch.einsum("gc,vchw->vghw", self.targets.classes, features)
+            best = resize(said, (view.labels.shape[0], view.labels.shape[1]))[0].argmax(0)
+            counts += confusion(best.flatten(), self.targets.class_of[view.labels].flatten(), len(counts))
+            if bool((view.depths > 0).any()):
+                aligned = align_scale(depth, view.depths)
+                rel.append(abs_rel(aligned, view.depths))
+                near.append(delta1(aligned, view.depths))
+        return {
+            "classes_accuracy": accuracy(counts),
+            "classes_miou": mean_iou(counts),
+            "abs_rel": nan_mean(rel),
+            "delta1": nan_mean(near),
+        }
+
+
+def train_late(
+    network: LangFlashNet,
+    targets: PhotoTargets,
+    joint: JointSet,
+    words: Words,
+    run_dir: Path,
+    options: LoopOptions,
+    validate: Validate | None = None,
+) -> LoopState:
+    """Train the stage with whole late blocks, and cut them when the time is up: `RUN/late.pt` is what later
+    stages and `train export` read, `RUN/late_whole.pt` what a run goes on from."""
+    net = guided(network)
+    preset, vit = net.late.preset, net.encoder.vit
+    stage = replace(joint_stage(targets), name="late_whole")
+    net.late = whole(net.late, vit)  # type: ignore[assignment]
+    state = train_stage(net, stage, joint, words, run_dir, options, validate)
+    net.late = cut(net.late, vit, preset)  # type: ignore[arg-type]
+    save_cut(run_dir / "late.pt", net, replace(stage, name="late"), state)
+    return state
