@@ -9,7 +9,7 @@ from typing import cast
 import torch
 from torch import Tensor, nn
 
-from langflash_core.network.encoders.late import OWN, LateHalf
+from langflash_core.network.encoders.late import LateHalf, take_own
 from langflash_core.network.encoders.plain import NORM_EPS, Block, PlainViT, through
 from langflash_core.network.presets import GuidedDepth
 
@@ -38,12 +38,10 @@ class WholeLateHalf(nn.Module):
 @torch.no_grad()
 def whole(late: LateHalf, vit: PlainViT) -> WholeLateHalf:
     """The same half as whole blocks; every block starts as the encoder's plus its correction."""
-    sizes = late.preset
-    answer = WholeLateHalf(sizes)
+    answer = WholeLateHalf(late.preset)
     answer.norm.load_state_dict(late.norm.state_dict())
     for own, (block, base) in zip(answer.each(), late.pairs(vit), strict=True):
-        for name in OWN:
-            own.get_parameter(name).copy_(block.get_parameter(name))
+        take_own(own, block)
         for (correction, layer), (_, learned) in zip(block.pairs(base), block.pairs(own), strict=True):
             learned.weight.copy_(correction.matrix(layer))
             learned.bias.copy_(correction.bias)
@@ -59,8 +57,7 @@ def cut(learned: WholeLateHalf, vit: PlainViT, preset: GuidedDepth) -> LateHalf:
     answer = LateHalf(preset)
     answer.norm.load_state_dict(learned.norm.state_dict())
     for own, (block, base) in zip(learned.each(), answer.pairs(vit), strict=True):
-        for name in OWN:
-            block.get_parameter(name).copy_(own.get_parameter(name))
+        take_own(block, own)
         for (correction, layer), (_, new) in zip(block.pairs(base), block.pairs(own), strict=True):
             u, s, v = torch.linalg.svd((new.weight - layer.weight).double(), full_matrices=False)
             root = s[: preset.late_rank].sqrt()

@@ -187,24 +187,28 @@ def named_loss(
         features: (B, C, h, w), unit norm. ids: (B, H, W).
     """
     units = features.permute(0, 2, 3, 1).flatten(0, 2)
-    own = nearest(ids, (features.shape[-2], features.shape[-1])).flatten()
+    own = (
+        nearest(ids, (features.shape[-2], features.shape[-1])).flatten().cpu()
+    )  # drawn where the generator is
+    texts, names = targets.classes.to(units), targets.fine.to(units)
     classes, fine = targets.class_of[own], targets.fine_of[own]
     drawn = (classes >= 0).nonzero()[:, 0]
     drawn = drawn[torch.randperm(len(drawn), generator=generator)[:CLASS_PIXELS]]
-    rows = classes[drawn]
-    weights = targets.balance[rows]
-    each = F.cross_entropy(TEMPERATURE * units[drawn] @ targets.classes.T, rows, reduction="none")
+    rows = classes[drawn].to(units.device)
+    weights = targets.balance.to(units)[rows]
+    each = F.cross_entropy(TEMPERATURE * units[drawn] @ texts.T, rows, reduction="none")
     by_class = (each * weights).sum() / weights.sum().clamp_min(1e-6)
-    near = _attraction(units[drawn], targets.classes[rows])
+    near = _attraction(units[drawn], texts[rows])
     chosen = (fine >= 0).nonzero()[:, 0]
     if len(chosen):
         chance = torch.bincount(fine[chosen]).float()[fine[chosen]].rsqrt()
         picked = torch.multinomial(chance, min(FINE_PIXELS, len(chosen)), True, generator=generator)
         chosen = chosen[picked]
-    rows = fine[chosen]
-    logits = (TEMPERATURE * units[chosen] @ targets.fine.T).masked_fill(~targets.against[rows], -1e4)
+    rows = fine[chosen].to(units.device)
+    silent = ~targets.against.to(units.device)[rows]
+    logits = (TEMPERATURE * units[chosen] @ names.T).masked_fill(silent, -1e4)
     by_name = F.cross_entropy(logits, rows, reduction="sum") / max(len(rows), 1)
-    total = by_class + 0.5 * by_name + 0.25 * (near + _attraction(units[chosen], targets.fine[rows]))
+    total = by_class + 0.5 * by_name + 0.25 * (near + _attraction(units[chosen], names[rows]))
     return total, {"classes": float(by_class.detach()), "names": float(by_name.detach())}
 
 

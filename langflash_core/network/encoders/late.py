@@ -13,8 +13,15 @@ from torch.nn import functional as F
 from langflash_core.network.encoders.plain import NORM_EPS, Block, LayerScale, PlainViT, attended
 from langflash_core.network.presets import GuidedDepth
 
-OWN = ("norm1.weight", "norm1.bias", "norm2.weight", "norm2.bias", "ls1.gamma", "ls2.gamma")
+_OWN = ("norm1.weight", "norm1.bias", "norm2.weight", "norm2.bias", "ls1.gamma", "ls2.gamma")
 """What a block has for itself."""
+
+
+@torch.no_grad()
+def take_own(block: nn.Module, other: nn.Module) -> None:
+    """Give a block the norms and layer scales of another, corrected or whole."""
+    for name in _OWN:
+        block.get_parameter(name).copy_(other.get_parameter(name))
 
 
 class LateHalf(nn.Module):
@@ -42,8 +49,7 @@ class LateHalf(nn.Module):
         """Give the encoder's own tokens, until something is learned."""
         self.norm.load_state_dict(vit.norm.state_dict())
         for block, base in self.pairs(vit):
-            for name in OWN:
-                block.get_parameter(name).copy_(base.get_parameter(name))
+            take_own(block, base)
             for correction, layer in block.pairs(base):
                 correction.up.zero_()
                 correction.down.zero_()
