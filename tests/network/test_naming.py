@@ -10,7 +10,7 @@ from torch.nn import functional as F
 from langflash_core.geometry.cameras import unproject
 from langflash_core.network import MINI
 from langflash_core.network.encoders.shared import Tokens
-from langflash_core.network.semantics.naming import PLACE, PartNamer, describe, places, upright
+from langflash_core.network.semantics.naming import DEEP, PLACE, PartNamer, describe, places, upright
 
 SIDE = 64
 KS = torch.tensor([[60.0, 0, SIDE / 2], [0, 60.0, SIDE / 2], [0, 0, 1]])[None]
@@ -101,13 +101,14 @@ def test_unknown_depths_say_nothing(bad):
 
 
 def test_looks_are_means_of_the_parts_own_patches():
-    tokens = Tokens((), (4, 4), tuple(torch.randn(1, 2, 16, 384) for _ in range(2)))
+    hooks, named = (tuple(torch.randn(1, 2, 16, 384) for _ in range(count)) for count in (4, 2))
+    tokens = Tokens(hooks, (4, 4), named)
     weights = torch.zeros(2, 2, 8, 8)
     weights[0, 0, :2, :2] = 1  # one patch
     weights[:, 1] = 1
     looks = describe(weights, tokens)
-    first = torch.cat([hook[0, 0, 0] for hook in tokens.named])
-    every = torch.cat([hook[0].mean((0, 1)) for hook in tokens.named])
+    first = torch.cat([hook[0, 0, 0] for hook in (*hooks[2:], *named)])
+    every = torch.cat([hook[0].mean((0, 1)) for hook in (*hooks[2:], *named)])
     torch.testing.assert_close(looks[0], first, atol=1e-4, rtol=1e-4)  # eps 1e-6 of a weight of 1/1
     torch.testing.assert_close(looks[1], every, atol=1e-4, rtol=1e-4)
 
@@ -116,7 +117,7 @@ def test_a_new_namer_changes_nothing_and_parts_may_come_in_any_order():
     torch.manual_seed(0)
     namer = PartNamer(MINI)
     atoms = F.normalize(torch.randn(5, 384), dim=-1)
-    looks, where = torch.randn(5, 768), torch.randn(5, PLACE)
+    looks, where = torch.randn(5, DEEP * 384), torch.randn(5, PLACE)
     torch.testing.assert_close(namer(atoms, looks, where), atoms)
     torch.nn.init.normal_(namer.out.weight, std=0.02)
     order = torch.tensor([3, 0, 4, 1, 2])

@@ -47,7 +47,7 @@ from langflash_core.network.presets import PRESETS
 log = logging.getLogger(__name__)
 
 LATE = Stage("late", MODULES, (), {1: 1.0}, 6, 6e-4, language_stage)
-"""What `train late` leaves in a run for the stages after it; `real.joint_stage` says how it learns."""
+"""What `train late` leaves in a run for the stages after it; `real` says how it learns."""
 ALL_STAGES = {**STAGES, NAMING.name: NAMING}
 
 Encode = Callable[[Sequence[str]], Tensor]

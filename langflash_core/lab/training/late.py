@@ -13,6 +13,23 @@ from langflash_core.network.encoders.late import LateHalf, take_own
 from langflash_core.network.encoders.plain import NORM_EPS, Block, PlainViT, through
 from langflash_core.network.presets import GuidedDepth
 
+SKIPPED = 0.1
+"""Share of pictures that a branch of a block leaves as they are, while it learns."""
+
+
+class SkippingBlock(Block):
+    """A block whose branches leave out some pictures. Source: Huang et al. 2016 (stochastic depth)."""
+
+    def forward(self, x: Tensor) -> Tensor:
+        x = x + self._some(self.ls1(self.attn(self.norm1(x))))
+        return x + self._some(self.ls2(self.mlp(self.norm2(x))))
+
+    def _some(self, change: Tensor) -> Tensor:
+        if not self.training:
+            return change
+        kept = torch.rand(len(change), 1, 1, device=change.device) >= SKIPPED
+        return change * (kept.to(change) / (1 - SKIPPED))
+
 
 class WholeLateHalf(nn.Module):
     """In the place of `LateHalf` while it learns: blocks of its own, as the encoder's to begin with."""
@@ -22,7 +39,8 @@ class WholeLateHalf(nn.Module):
         self.first = preset.hooks[1] + 1
         self.hooks = tuple(hook - self.first for hook in preset.hooks[2:])
         self.blocks = nn.ModuleList(
-            Block(preset.encoder_dim, preset.encoder_heads) for _ in range(self.first, preset.encoder_depth)
+            SkippingBlock(preset.encoder_dim, preset.encoder_heads)
+            for _ in range(self.first, preset.encoder_depth)
         )
         self.norm = nn.LayerNorm(preset.encoder_dim, NORM_EPS)
 

@@ -20,8 +20,8 @@ from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.photos.fitting import drawn_window, fitted
 from langflash_core.types import LUMA
 
-SIZES = ((252, 196), (252, 196), (224, 224), (196, 252))
-"""(width, height) of a step's photos; landscape twice as often."""
+SIZES = ((252, 196), (252, 196), (252, 196), (224, 224), (196, 252), (308, 238))
+"""(width, height) of a step's photos, the usual one half of the time; of larger ones fewer are drawn."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,9 @@ class LivePhotos:
         return len(self.photos)
 
     def draw(self, count: int, generator: torch.Generator) -> LabelledBatch:
-        """`count` random photos, mirrored or not, at one random size."""
+        """`count` random photos, mirrored or not, at one random size; fewer at a larger one."""
         size = SIZES[int(torch.randint(len(SIZES), (1,), generator=generator))]
+        count = max(1, min(count, round(count * SIZES[0][0] * SIZES[0][1] / (size[0] * size[1]))))
         views = []
         for row in torch.randint(len(self), (count,), generator=generator).tolist():
             seed = int(torch.randint(2**31, (1,), generator=generator))

@@ -15,7 +15,7 @@ class LanguageHead(nn.Module):
         super().__init__()
         feature = preset.language_feature
         e = preset.encoder_dim
-        self.dpt = DPT((e, e, e, e), preset.dpt_dims, feature)
+        self.dpt = DPT((e, e, 2 * e, 2 * e), preset.dpt_dims, feature)
         self.mix = nn.Conv2d(feature, 2 * feature, 3, padding=1)
         self.out = nn.Conv2d(2 * feature, preset.language_dim, 1)
 

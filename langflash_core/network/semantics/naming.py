@@ -18,8 +18,9 @@ from langflash_core.network.presets import GuidedDepth
 
 PLACE = 10
 """Numbers that `places` gives of a part."""
-DEEP = 2
-"""Hooks that tell what a thing is; the earlier ones tell one make of it from another."""
+DEEP = 4
+"""Hooks that tell what a thing is, two frozen and two taught; the earlier ones tell one make of it from
+another."""
 _MIN_POINTS = 6
 _VOTERS = 1200
 _LEVEL = 0.6  # a normal within 53 degrees of the camera's own up may be the room's
@@ -35,7 +36,8 @@ def describe(weights: Tensor, tokens: Tokens) -> Tensor:
     small = F.adaptive_avg_pool2d(weights, tokens.grid).flatten(2)  # (V, K, T)
     total = small.sum((0, 2))[:, None] + 1e-6
     count = tokens.grid[0] * tokens.grid[1]
-    means = [torch.einsum("vkt,vtc->kc", small, hook[0, :, -count:].float()) / total for hook in tokens.named]
+    deep = (*tokens.hooks[-2:], *tokens.named)
+    means = [torch.einsum("vkt,vtc->kc", small, hook[0, :, -count:].float()) / total for hook in deep]
     return torch.cat(means, 1)
 
 

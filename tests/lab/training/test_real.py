@@ -125,7 +125,7 @@ def test_weather_changes_light_and_never_the_place_of_things():
 def test_a_few_steps_teach_names_and_end_in_a_cut_half(photos, targets, tmp_path):
     """Photos of two classes in two colours, six steps: the loss falls, and the run can be read again."""
     from langflash_core.lab.training.loop import LoopOptions, load_averaged
-    from langflash_core.lab.training.real import JointSet, joint_stage, train_late
+    from langflash_core.lab.training.real import MODULES, JointSet, train_late
     from langflash_core.lab.training.shards import Label
     from langflash_core.lab.training.stages import Words
     from langflash_core.lab.training.words import PhraseSampler, build_table
@@ -145,13 +145,15 @@ def test_a_few_steps_teach_names_and_end_in_a_cut_half(photos, targets, tmp_path
     options = LoopOptions(minutes=10, max_steps=6, report_s=0.0, learning_rate=3e-3)
     state = train_late(network, targets, JointSet(coloured, None), words, tmp_path, options)
     assert state.step == 6 and isinstance(network.late, LateHalf)
-    rows = [line for line in (tmp_path / "late_whole.jsonl").read_text().splitlines() if "classes" in line]
-    losses = [float(line.split('"classes": ')[1].split(",")[0].rstrip("}")) for line in rows]
-    assert losses[-1] < losses[0] and math.isfinite(losses[-1])
+    for part in ("late_whole", "late_heads"):
+        rows = [line for line in (tmp_path / f"{part}.jsonl").read_text().splitlines() if "classes" in line]
+        losses = [float(line.split('"classes": ')[1].split(",")[0].rstrip("}")) for line in rows]
+        assert losses[-1] < losses[0] and math.isfinite(losses[-1]), part
+    assert not hasattr(network, "teacher"), "it is no part of the network"
     fresh = build_network(MINI)
     assert load_averaged(fresh, tmp_path, "late") == (6, pytest.approx(state.seconds))
     ours, theirs = network.state_dict(), fresh.state_dict()
-    for name in joint_stage(targets).modules:
+    for name in MODULES:
         for key in (key for key in ours if key.startswith(f"{name}.")):
             assert torch.equal(ours[key], theirs[key]), key
     assert float(network.late.get_parameter("blocks.0.qkv.up").detach().abs().max()) > 0

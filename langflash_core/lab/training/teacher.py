@@ -1,0 +1,131 @@
+"""What teaches the late half: a plain classifier on its tokens, thrown away afterwards.
+
+A softmax over the 37 classes, one over fine names, and a depth, each read from the tokens by three thin
+layers. It learns from labels in a third of the steps that the language head needs, since names are rows of
+a matrix to it and no directions in the space of texts; the heads that stay learn afterwards, on what it
+left (model card).
+
+Sizes: B photos, V views, H W pixels, h w the token grid, N names.
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from langflash_core.lab.photos.names import CLASSES37, class_of
+from langflash_core.lab.training.losses import depth_loss, gradient_loss
+from langflash_core.lab.training.shards import NOTHING, Label
+from langflash_core.lab.training.stages import nearest
+from langflash_core.network.encoders.shared import Tokens
+from langflash_core.network.presets import GuidedDepth
+from langflash_core.network.stereo.prior import resize
+
+WIDTH = 256
+HIDDEN = 0.1
+"""Share of token channels that are hidden from it."""
+NAMED_PIXELS = 2500
+"""Drawn for fine names, smaller areas denser."""
+MIN_ROOMS = 3
+"""A name of rendered things counts if so many of them bear it."""
+_TYPICAL_LOG_DEPTH = 0.7
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of classes (-1 = none) and of names (-1 = none) by label id."""
+
+    classes: Tensor
+    names: Tensor
+
+
+@dataclass(frozen=True)
+class Names:
+    """All names that are told apart; against (N, N) bool: which speak against which; balance (37,): what
+    a pixel of a class counts."""
+
+    texts: tuple[str, ...]
+    against: Tensor
+    balance: Tensor
+    at: dict[str, int] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "at", {text: row for row, text in enumerate(self.texts)})
+
+    @staticmethod
+    def of(texts: Sequence[str], against: Tensor, balance: Tensor, rooms: Iterable[Label]) -> "Names":
+        """Names of photos, among which `against` says who is whose kind, and of enough rendered things."""
+        counts = Counter(label.name for label in rooms)
+        known = set(texts)
+        more = sorted(name for name, n in counts.items() if n >= MIN_ROOMS and name not in known)
+        every = torch.ones(len(texts) + len(more), len(texts) + len(more), dtype=torch.bool)
+        every[: len(texts), : len(texts)] = against
+        return Names((*texts, *more), every, balance)
+
+    def of_room(self, labels: Sequence[Label]) -> Rows:
+        """Rows by instance of one rendered room."""
+        classes, names = torch.full((NOTHING + 1,), -1), torch.full((NOTHING + 1,), -1)
+        for id, label in enumerate(labels):
+            found = (class_of(text) for text in (label.name, label.group, *label.words))
+            of = next((text for text in found if text is not None), None)
+            classes[id] = CLASSES37.index(of) if of in CLASSES37 else -1
+            names[id] = self.at.get(label.name, -1)
+        return Rows(classes, names)
+
+
+class Teacher(nn.Module):
+    """Tokens -> logits of classes and names and log depths at twice the grid."""
+
+    def __init__(self, preset: GuidedDepth, names: int):
+        super().__init__()
+        self.names = names
+        self.read = nn.Conv2d(3 * preset.encoder_dim, WIDTH, 1)
+        self.mix = nn.Conv2d(WIDTH, WIDTH, 3, padding=1)
+        self.say = nn.Conv2d(WIDTH, len(CLASSES37) + names + 1, 1)
+
+    def forward(self, tokens: Tokens) -> tuple[Tensor, Tensor, Tensor]:
+        """(B*V, 37, 2h, 2w), (B*V, N, 2h, 2w), (B*V, 2h, 2w)."""
+        maps = torch.cat((tokens.maps(1), *tokens.taught_maps()), 1)
+        x = F.gelu(self.read(F.dropout2d(maps, HIDDEN, self.training)))
+        x = F.interpolate(x, scale_factor=2.0, mode="bilinear")
+        said = self.say(F.gelu(self.mix(x))).float()
+        classes, names, depths = said.split((len(CLASSES37), self.names, 1), 1)
+        return classes, names, depths[:, 0] + _TYPICAL_LOG_DEPTH
+
+    def loss(
+        self,
+        tokens: Tokens,
+        ids: Tensor,
+        rows: Rows,
+        depths: Tensor,
+        names: Names,
+        generator: torch.Generator,
+    ) -> tuple[Tensor, dict[str, float]]:
+        """Cross-entropy of classes, half of that of names, and depth (shape and slopes), at every second
+        pixel; ids and depths (B*V, H, W), 0 or NaN where no depth is known."""
+        logits, named, logs = self(tokens)
+        size = (ids.shape[-2] // 2, ids.shape[-1] // 2)
+        classes = nearest(rows.classes.to(ids.device)[ids], size)
+        seen = int((classes >= 0).sum())
+        by_class = F.cross_entropy(
+            resize(logits, size), classes, names.balance.to(logits), ignore_index=-1, reduction="sum"
+        )
+        weight = names.balance.to(logits)[classes[classes >= 0]].sum() if seen else logits.new_tensor(1.0)
+        by_class = by_class / weight
+        own = nearest(rows.names.to(ids.device)[ids], (named.shape[-2], named.shape[-1])).flatten().cpu()
+        chosen = (own >= 0).nonzero()[:, 0]
+        if len(chosen):
+            chance = torch.bincount(own[chosen]).float()[own[chosen]].rsqrt()
+            drawn = torch.multinomial(chance, min(NAMED_PIXELS, len(chosen)), True, generator=generator)
+            chosen = chosen[drawn]
+        truth = own[chosen]
+        silent = ~names.against[truth].to(logits.device)
+        flat = named.permute(0, 2, 3, 1).flatten(0, 2)[chosen.to(logits.device)].masked_fill(silent, -1e4)
+        by_name = F.cross_entropy(flat, truth.to(logits.device), reduction="sum") / max(len(truth), 1)
+        logs, truths = resize(logs[:, None], size)[:, 0], nearest(depths, size)
+        depth = depth_loss(logs, truths) + 0.5 * gradient_loss(logs, truths)
+        told = {"classes": float(by_class.detach()), "names": float(by_name.detach())}
+        return by_class + 0.5 * by_name + depth, told | {"depth": float(depth.detach())}

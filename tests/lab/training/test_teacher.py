@@ -1,0 +1,91 @@
+"""The throw-away classifier: which names speak against which, and its loss against a plain loop."""
+
+import math
+
+import pytest
+import torch
+from torch.nn import functional as F
+
+from langflash_core.lab.photos.names import CLASSES37
+from langflash_core.lab.training.losses import depth_loss, gradient_loss
+from langflash_core.lab.training.shards import Label
+from langflash_core.lab.training.teacher import MIN_ROOMS, Names, Rows, Teacher
+from langflash_core.network import MINI
+from langflash_core.network.encoders.shared import Tokens
+
+AGAINST = torch.tensor([[True, True], [False, True]])
+BALANCE = torch.linspace(0.5, 1.5, len(CLASSES37))
+
+
+@pytest.fixture
+def names():
+    often = [Label("throne", "chair")] * MIN_ROOMS
+    rare = [Label("pouffe", "stool")] * (MIN_ROOMS - 1)
+    return Names.of(("chair", "swivel chair"), AGAINST, BALANCE, [*often, *rare, Label("chair", "chair")])
+
+
+def test_rendered_names_join_and_speak_against_all(names):
+    assert names.texts == ("chair", "swivel chair", "throne")
+    assert torch.equal(names.against[:2, :2], AGAINST)
+    assert names.against[2].all() and names.against[:, 2].all()
+
+
+def test_rooms_are_told_by_class_and_name(names):
+    labels = [Label("throne", "chair"), Label("zither", "musical instrument"), Label("swivel chair", "chair")]
+    rows = names.of_room(labels)
+    assert [names.texts[row] if row >= 0 else None for row in rows.names[:3].tolist()] == [
+        "throne",
+        None,
+        "swivel chair",
+    ]
+    chair = CLASSES37.index("chair")
+    assert rows.classes[:3].tolist() == [chair, -1, chair]
+    assert (rows.classes[3:] == -1).all() and (rows.names[3:] == -1).all(), "255 is nothing"
+
+
+def test_loss_is_the_weighted_cross_entropy_of_what_is_labelled(names):
+    """Classes in double precision, pixel by pixel at half the size; depth by its own losses."""
+    torch.manual_seed(0)
+    teacher = Teacher(MINI, len(names.texts)).eval()
+    hooks = tuple(torch.randn(1, 1, 4, MINI.encoder_dim) for _ in range(4))
+    tokens = Tokens(hooks, (2, 2), tuple(torch.randn(1, 1, 4, MINI.encoder_dim) for _ in range(2)))
+    ids = torch.zeros(1, 16, 16, dtype=torch.int64)
+    ids[:, :8], ids[:, 8:, :8] = 1, 2
+    chair, wall = CLASSES37.index("chair"), CLASSES37.index("wall")
+    rows = Rows(torch.tensor([-1, chair, wall]), torch.tensor([-1, 1, -1]))
+    depths = torch.rand(1, 16, 16) + 1
+    with torch.inference_mode():
+        total, told = teacher.loss(tokens, ids, rows, depths, names, torch.Generator().manual_seed(0))
+        classes, named, logs = teacher(tokens)
+        large = F.interpolate(classes.double(), size=(8, 8), mode="bilinear")[0]
+        sums = weights = 0.0
+        for y in range(8):
+            for x in range(8):
+                row = int(rows.classes[ids[0, 2 * y, 2 * x]])
+                if row >= 0:
+                    weight = float(BALANCE[row])
+                    sums += weight * float(large[:, y, x].logsumexp(0) - large[row, y, x])
+                    weights += weight
+        # Every drawn pixel is a swivel chair, against which "chair" says nothing.
+        own = [named[0, :, y, x].double() for y in range(2) for x in range(4)]
+        kept = torch.stack([torch.stack((v[1], v[2])).logsumexp(0) - v[1] for v in own])
+        logs = F.interpolate(logs[:, None], size=(8, 8), mode="bilinear")[:, 0]
+        truths = depths[:, 1::2, 1::2]
+        depth = depth_loss(logs, truths) + 0.5 * gradient_loss(logs, truths)
+    assert told["classes"] == pytest.approx(sums / weights, rel=1e-5)
+    # 8 pixels, one of which is drawn 8 times with equal chances: between the least and the most.
+    assert float(kept.min()) <= told["names"] <= float(kept.max())
+    assert told["depth"] == pytest.approx(float(depth), rel=1e-5)
+    expected = told["classes"] + 0.5 * told["names"] + told["depth"]
+    assert float(total) == pytest.approx(expected, rel=1e-5)
+
+
+def test_nothing_labelled_teaches_nothing(names):
+    teacher = Teacher(MINI, len(names.texts))
+    hooks = tuple(torch.randn(1, 1, 4, MINI.encoder_dim) for _ in range(4))
+    tokens = Tokens(hooks, (2, 2), hooks[2:])
+    ids, depths = torch.zeros(1, 16, 16, dtype=torch.int64), torch.zeros(1, 16, 16)
+    rows = Rows(torch.tensor([-1]), torch.tensor([-1]))
+    total, _ = teacher.loss(tokens, ids, rows, depths, names, torch.Generator())
+    total.backward()
+    assert float(total.detach()) == 0 and math.isfinite(float(teacher.read.weight.grad.abs().sum()))
