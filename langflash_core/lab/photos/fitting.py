@@ -16,7 +16,7 @@ from langflash_core.images.pictures import Box, centre_box, fitting_size
 from langflash_core.images.views import cropped_intrinsics
 from langflash_core.lab.photos.folder import LabelledPhoto
 
-SMALLEST_WINDOW = 0.35
+SMALLEST_WINDOW = 0.5
 """Share of a photo's area that a drawn window shows at least."""
 
 

@@ -23,6 +23,9 @@ from langflash_core.types import LUMA
 SIZES = ((252, 196), (252, 196), (252, 196), (224, 224), (196, 252), (308, 238))
 """(width, height) of a step's photos, the usual one half of the time; of larger ones fewer are drawn."""
 
+WEATHERED = 0.25
+"""Share of photos that look as if another camera had taken them; the others in somewhat other light."""
+
 
 @dataclass(frozen=True)
 class LabelledBatch:
@@ -60,7 +63,7 @@ class LivePhotos:
         for row in torch.randint(len(self), (count,), generator=generator).tolist():
             seed = int(torch.randint(2**31, (1,), generator=generator))
             view = fitted(self.photos[row], size, *drawn_window(self.photos[row], size, seed))
-            views.append((weathered(view.rgb, generator), view))
+            views.append((relit(view.rgb, generator), view))
         return LabelledBatch(
             torch.stack([rgb for rgb, _ in views])[:, None].float() / 255,
             torch.stack([view.labels for _, view in views]),
@@ -69,12 +72,31 @@ class LivePhotos:
         )
 
 
+def relit(rgb: Tensor, generator: torch.Generator) -> Tensor:
+    """A picture (3, H, W) uint8 in somewhat other light; a quarter of them as `weathered` leaves them.
+
+    All of them weathered taught half as much in the same time (model card).
+    """
+    u = torch.rand(4, generator=generator).tolist()
+    if u[0] < WEATHERED:
+        return weathered(rgb, generator)
+    x = rgb.float() / 255
+    grey = _grey(x)
+    x = (grey + (0.6 + 0.8 * u[1]) * (x - grey)) * (0.75 + 0.5 * u[2])
+    x = (x - x.mean()) * (0.75 + 0.5 * u[3]) + x.mean()
+    return (x.clamp(0, 1) * 255).round().to(torch.uint8)
+
+
+def _grey(x: Tensor) -> Tensor:
+    return (x * torch.tensor(LUMA)[:, None, None]).sum(0, keepdim=True)
+
+
 def weathered(rgb: Tensor, generator: torch.Generator) -> Tensor:
     """A picture (3, H, W) uint8 as another camera in other light might have taken it: colour of the light,
     exposure, contrast, gamma; grey (a tenth), noise (a quarter), blurred (a fifth), or JPEG (a sixth)."""
     u = torch.rand(12, generator=generator).tolist()
     x = rgb.float() / 255
-    grey = (x * torch.tensor(LUMA)[:, None, None]).sum(0, keepdim=True)
+    grey = _grey(x)
     x = grey + (0.0 if u[0] < 0.1 else 0.5 + u[1]) * (x - grey)
     light = torch.tensor([0.85 + 0.3 * value for value in u[2:5]])[:, None, None]
     x = (x * light * (0.75 + 0.5 * u[5])).clamp(0, 1)

@@ -11,7 +11,7 @@ from torch.nn import functional as F
 from langflash_core.lab.photos.fitting import fitted
 from langflash_core.lab.photos.folder import LabelledPhoto, Name, PhotoFolder
 from langflash_core.lab.photos.names import CLASSES37
-from langflash_core.lab.training.live import SIZES, LivePhotos, weathered
+from langflash_core.lab.training.live import SIZES, LivePhotos, relit, weathered
 from langflash_core.lab.training.real import TEMPERATURE, KeptPhotos, PhotoTargets, named_loss
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.guided import GuidedDepthNet
@@ -112,11 +112,12 @@ def test_photos_are_drawn_the_same_from_the_same_seed(photos):
     assert first.ids.shape == first.depths.shape == first.images[:, 0, 0].shape
 
 
-def test_weather_changes_light_and_never_the_place_of_things():
+@pytest.mark.parametrize("change", [weathered, relit])
+def test_weather_changes_light_and_never_the_place_of_things(change):
     picture = torch.zeros(3, 40, 60, dtype=torch.uint8)
     picture[:, 10:30, 20:40] = 200
     for seed in range(40):
-        changed = weathered(picture, torch.Generator().manual_seed(seed))
+        changed = change(picture, torch.Generator().manual_seed(seed))
         assert changed.shape == picture.shape and changed.dtype == torch.uint8
         bright = changed.float().mean(0)
         assert bright[14:26, 24:36].mean() > bright[:6].mean() + 30, seed
