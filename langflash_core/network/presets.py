@@ -112,6 +112,7 @@ class GuidedDepth(Preset):
     match_hook: int
     """Index into `hooks` of the tokens that correspondence reads (blocks 3-6 match best)."""
     language_feature: int
+    taught_feature: int
 
     sweep_planes: int
     sweep_range: float
@@ -155,7 +156,7 @@ MINI = GuidedDepth(
     encoder_heads=6,
     trained_grid=37,
     hooks=(2, 5, 8, 11),
-    late_rank=88,
+    late_rank=72,
     match_hook=1,
     native_area=224 * 224,
     decoder_dim=256,
@@ -165,6 +166,7 @@ MINI = GuidedDepth(
     dpt_dims=(48, 96, 128, 192),
     dpt_feature=64,
     language_feature=96,
+    taught_feature=256,
     sh_degree=0,
     sweep_planes=24,
     sweep_range=0.45,

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from langflash_core.lab.training.late import WholeLateHalf, cut, whole
+from langflash_core.lab.training.late import WholeLateHalf, cut, soften, whole
 from langflash_core.network import MINI
 from langflash_core.network.encoders.late import LateHalf
 from langflash_core.network.encoders.plain import PlainViT
@@ -74,6 +74,29 @@ def test_a_cut_is_the_nearest_of_its_rank_and_whole_blocks_come_back(vit):
             least = values[MINI.late_rank :].square().sum().sqrt()  # Eckart and Young
             assert float(lost) == pytest.approx(float(least), rel=1e-3)
             assert float(lost) > 0.1 * float(values.square().sum().sqrt()), "nothing was cut"
+
+
+def test_softening_goes_back_a_part_of_the_way(vit):
+    learned, late = moved(vit, 4), LateHalf(MINI)
+    late.begin(vit)
+    start = whole(late, vit).state_dict()
+    before = {name: value.clone() for name, value in learned.state_dict().items()}
+    soften(learned, vit, 0.75)
+    for name, value in learned.state_dict().items():
+        torch.testing.assert_close(value, start[name] + 0.75 * (before[name] - start[name]))
+
+
+def test_branches_are_skipped_only_while_it_learns(vit, states):
+    late = LateHalf(MINI)
+    late.begin(vit)
+    learned = whole(late, vit)
+    early = states[1]
+    with torch.inference_mode():
+        expected, same = late(early, vit), learned.eval()(early, vit)
+        torch.manual_seed(0)
+        other = learned.train()(early.repeat(32, 1, 1), vit)
+    assert torch.equal(same[-1], expected[-1])
+    assert len({tuple(row[0, :4].tolist()) for row in other[-1]}) > 8, "pictures lose different branches"
 
 
 def test_a_network_gives_both_halves(vit):

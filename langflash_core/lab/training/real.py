@@ -1,6 +1,6 @@
 """The stage that teaches names and depth by real photos: first the late half, then what reads it.
 
-The late half learns from a throw-away classifier (`teacher`), on photos and now and then a rendered room.
+The late half learns from a plain classifier (`teacher`), on photos and now and then a rendered room.
 Then it stays, cut to its rank, and language head, decoder and depth head learn on top: photos teach by a
 softmax over the names of 37 classes, one over fine names, and their depths; every second step a rendered
 room teaches phrases and depth as in the stages `language` and `depth`, so that what no photo names is not
@@ -21,7 +21,7 @@ from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.photos.fitting import fitted
 from langflash_core.lab.photos.names import CLASSES37
 from langflash_core.lab.training.batches import RoomSet, SceneBatch
-from langflash_core.lab.training.late import cut, whole
+from langflash_core.lab.training.late import cut, soften, whole
 from langflash_core.lab.training.live import SIZES, LabelledBatch, LivePhotos
 from langflash_core.lab.training.loop import LoopOptions, LoopState, Validate, save_cut, train_stage
 from langflash_core.lab.training.losses import depth_loss, error_loss, gradient_loss
@@ -45,7 +45,7 @@ from langflash_core.lab.training.stages import (
     nearest,
     thinned,
 )
-from langflash_core.lab.training.teacher import Names, Rows, Teacher
+from langflash_core.lab.training.teacher import Names, Rows, Teacher, hand_over
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.precision import mixed
@@ -322,6 +322,8 @@ def train_late(
     rarely = replace(joint, every=ROOMS_EVERY)
     train_stage(net, late_stage(targets, names, teacher), rarely, words, run_dir, first)
     del net.teacher
+    hand_over(teacher.cpu(), net.language_head.cpu(), targets.classes)
+    soften(net.late, vit)  # type: ignore[arg-type]
     net.late = cut(net.late, vit, preset)  # type: ignore[arg-type]
     second = replace(options, minutes=options.minutes - first.minutes)
     state = train_stage(net, heads_stage(targets), joint, words, run_dir, second, validate)

@@ -44,7 +44,6 @@ from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.pointmaps import PointMapNet
 from langflash_core.network.semantics.aggregation import average_atoms
-from langflash_core.network.semantics.features import LanguageHead
 from langflash_core.network.stereo.prior import DepthMaps, resize
 from langflash_core.splat import rasterize, view_colours
 from langflash_core.types import Camera
@@ -220,13 +219,13 @@ def novel_views(network: LangFlashNet, batch: SceneBatch) -> list[tuple[Tensor, 
 def language_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
     """L(x) against the sampled phrase of each pixel's instance; pixels are drawn class-balanced.
 
-    What follows the last 3x3 convolution runs on the drawn pixels only: it is per pixel, so
+    The last layer runs on the drawn pixels only: it is per pixel, so
     nothing changes. Channels of the tokens are dropped, so that the head names things by more
     than what gives away one piece of furniture.
     """
     head = guided(network).language_head
     tokens = thinned(tokens_of(network, batch), TOKEN_DROPOUT, words.generator)
-    hidden = language_hidden(head, tokens)  # (B*V, F, h, w)
+    hidden = head.hidden(tokens)  # (B*V, F, h, w)
     scenes = [words.sampler.draw(labels, words.generator) for labels in batch.labels]
     bank = phrase_bank(torch.cat(scenes), words)
     features, rows, true = [], [], []
@@ -241,7 +240,7 @@ def language_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Lo
             rows.append(scenes[b][named])
             true.append(holds[named])
     last = head.out
-    vectors = F.linear(F.gelu(torch.cat(features)), last.weight[:, :, 0, 0], last.bias)
+    vectors = F.linear(torch.cat(features), last.weight[:, :, 0, 0], last.bias)
     texts = words.sampler.table.embeddings.to(vectors.device)
     targets = texts[torch.cat(rows).to(vectors.device)]
     total = language_loss(
@@ -259,12 +258,6 @@ def thinned(tokens: Tokens, share: float, generator: torch.Generator) -> Tokens:
         return hook * (kept.to(hook) / (1 - share))
 
     return tokens.each(thin)
-
-
-def language_hidden(head: LanguageHead, tokens: Tokens) -> Tensor:
-    """What the language head holds before its last activation: (B*V, F, 4h, 4w)."""
-    path = head.dpt(tokens.named_maps()).path_1
-    return head.mix(F.avg_pool2d(path, 2))
 
 
 def phrase_bank(used: Tensor, words: Words, extra: int = 128) -> Tensor:

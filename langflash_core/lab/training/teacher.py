@@ -1,9 +1,9 @@
-"""What teaches the late half: a plain classifier on its tokens, thrown away afterwards.
+"""What teaches the late half: a plain classifier on its tokens, of which the reader stays.
 
 A softmax over the 37 classes, one over fine names, and a depth, each read from the tokens by three thin
-layers. It learns from labels in a third of the steps that the language head needs, since names are rows of
-a matrix to it and no directions in the space of texts; the heads that stay learn afterwards, on what it
-left (model card).
+layers. Names are rows of a matrix to it, no directions in the space of texts, so it learns from labels in a
+third of the steps that the language head needs. Afterwards its first two layers become the language head's
+second reader, and its rows of classes the texts' directions (`hand_over`).
 
 Sizes: B photos, V views, H W pixels, h w the token grid, N names.
 """
@@ -22,15 +22,20 @@ from langflash_core.lab.training.shards import NOTHING, Label
 from langflash_core.lab.training.stages import nearest
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.presets import GuidedDepth
+from langflash_core.network.semantics.features import LanguageHead, TaughtReader
 from langflash_core.network.stereo.prior import resize
 
-WIDTH = 256
 HIDDEN = 0.1
 """Share of token channels that are hidden from it."""
 NAMED_PIXELS = 2500
 """Drawn for fine names, smaller areas denser."""
 MIN_ROOMS = 3
 """A name of rendered things counts if so many of them bear it."""
+RIDGE = 0.05
+"""Of the texts' Gram matrix: names that are nearly alike are not told apart at any price."""
+OWN, VOICE = 0.1, 2.0
+"""Factors on what the language head said before and on what it says for the teacher: on photos the second is
+then twice as loud as the first, and both are small enough for the learning rate."""
 _TYPICAL_LOG_DEPTH = 0.7
 
 
@@ -82,16 +87,13 @@ class Teacher(nn.Module):
     def __init__(self, preset: GuidedDepth, names: int):
         super().__init__()
         self.names = names
-        self.read = nn.Conv2d(3 * preset.encoder_dim, WIDTH, 1)
-        self.mix = nn.Conv2d(WIDTH, WIDTH, 3, padding=1)
-        self.say = nn.Conv2d(WIDTH, len(CLASSES37) + names + 1, 1)
+        self.reader = TaughtReader(preset)
+        self.say = nn.Conv2d(preset.taught_feature, len(CLASSES37) + names + 1, 1)
 
     def forward(self, tokens: Tokens) -> tuple[Tensor, Tensor, Tensor]:
         """(B*V, 37, 2h, 2w), (B*V, N, 2h, 2w), (B*V, 2h, 2w)."""
-        maps = torch.cat((tokens.maps(1), *tokens.taught_maps()), 1)
-        x = F.gelu(self.read(F.dropout2d(maps, HIDDEN, self.training)))
-        x = F.interpolate(x, scale_factor=2.0, mode="bilinear")
-        said = self.say(F.gelu(self.mix(x))).float()
+        maps = F.dropout2d(tokens.taught_maps(), HIDDEN, self.training)
+        said = self.say(self.reader(maps)).float()
         classes, names, depths = said.split((len(CLASSES37), self.names, 1), 1)
         return classes, names, depths[:, 0] + _TYPICAL_LOG_DEPTH
 
@@ -129,3 +131,22 @@ class Teacher(nn.Module):
         depth = depth_loss(logs, truths) + 0.5 * gradient_loss(logs, truths)
         told = {"classes": float(by_class.detach()), "names": float(by_name.detach())}
         return by_class + 0.5 * by_name + depth, told | {"depth": float(depth.detach())}
+
+
+@torch.no_grad()
+def hand_over(teacher: Teacher, head: LanguageHead, classes: Tensor) -> None:
+    """Let the language head say of photos what the teacher says: its reader, and a last layer W in the
+    space of texts with texts W = rows of classes, as nearly as a ridge allows.
+
+    Args:
+        classes: unit texts of the 37 classes, (37, C).
+    """
+    head.taught.load_state_dict(teacher.reader.state_dict())
+    rows, biases = teacher.say.weight[: len(classes), :, 0, 0], teacher.say.bias[: len(classes)]
+    gram = classes @ classes.T + RIDGE * torch.eye(len(classes)).to(classes)
+    solve = torch.linalg.solve(gram, torch.cat((rows, biases[:, None]), 1))
+    joined = VOICE * classes.T @ solve  # (C, F + 1)
+    head.out.weight *= OWN
+    head.out.bias *= OWN
+    head.out.weight[:, -rows.shape[1] :, 0, 0] = joined[:, :-1]
+    head.out.bias += joined[:, -1]

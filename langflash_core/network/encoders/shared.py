@@ -33,20 +33,11 @@ class Tokens:
         """Hook `index` as feature maps (B*V, C, h, w)."""
         return tokens_to_maps(self.hooks[index].flatten(0, 1), self.grid)
 
-    def named_maps(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """What names are read from: the early hooks; the deep ones twice, frozen and taught, side by side."""
-        third, last = self.taught_maps()
-        return (
-            self.maps(0),
-            self.maps(1),
-            torch.cat((self.maps(2), third), 1),
-            torch.cat((self.maps(3), last), 1),
-        )
-
-    def taught_maps(self) -> tuple[Tensor, Tensor]:
-        """The hooks that real photos taught, as feature maps."""
-        third, last = (tokens_to_maps(t.flatten(0, 1), self.grid) for t in self.named)
-        return third, last
+    def taught_maps(self) -> Tensor:
+        """What the classifier of real photos reads, (B*V, 3C, h, w): the last early hook and those of the
+        half that photos taught."""
+        deep = (tokens_to_maps(t.flatten(0, 1), self.grid) for t in self.named)
+        return torch.cat((self.maps(1), *deep), 1)
 
     def each(self, change: Callable[[Tensor], Tensor]) -> "Tokens":
         """Every hook (B, V, h*w, C) changed alike."""

@@ -1,11 +1,29 @@
-"""Dense language features L(x): a light DPT on the encoder's own tokens, per view."""
+"""Dense language features L(x), per view, from two readers of the encoder's tokens.
 
+One is a light DPT on the frozen half, which rendered rooms taught; the other, at half its resolution, was
+the classifier from which the late half learned real photos. The last layer joins them.
+"""
+
+import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from langflash_core.network.encoders.shared import Tokens
-from langflash_core.network.layers.dpt import DPT
+from langflash_core.network.layers.dpt import DPT, double
 from langflash_core.network.presets import GuidedDepth
+
+
+class TaughtReader(nn.Module):
+    """Tokens of the half that real photos taught -> what can be told of each quarter of a patch."""
+
+    def __init__(self, preset: GuidedDepth):
+        super().__init__()
+        self.read = nn.Conv2d(3 * preset.encoder_dim, preset.taught_feature, 1)
+        self.mix = nn.Conv2d(preset.taught_feature, preset.taught_feature, 3, padding=1)
+
+    def forward(self, maps: Tensor) -> Tensor:
+        """Maps of `Tokens.taught_maps` (n, 3C, h, w) -> (n, F, 2h, 2w)."""
+        return F.gelu(self.mix(double(F.gelu(self.read(maps)), align_corners=False)))
 
 
 class LanguageHead(nn.Module):
@@ -15,12 +33,18 @@ class LanguageHead(nn.Module):
         super().__init__()
         feature = preset.language_feature
         e = preset.encoder_dim
-        self.dpt = DPT((e, e, 2 * e, 2 * e), preset.dpt_dims, feature)
+        self.dpt = DPT((e, e, e, e), preset.dpt_dims, feature)
         self.mix = nn.Conv2d(feature, 2 * feature, 3, padding=1)
-        self.out = nn.Conv2d(2 * feature, preset.language_dim, 1)
+        self.taught = TaughtReader(preset)
+        self.out = nn.Conv2d(2 * feature + preset.taught_feature, preset.language_dim, 1)
+
+    def hidden(self, tokens: Tokens) -> Tensor:
+        """What the last layer reads, (B*V, F, 4h, 4w)."""
+        levels = (tokens.maps(0), tokens.maps(1), tokens.maps(2), tokens.maps(3))
+        own = F.gelu(self.mix(F.avg_pool2d(self.dpt(levels).path_1, 2)))
+        return torch.cat((own, double(self.taught(tokens.taught_maps()), align_corners=False)), 1)
 
     def forward(self, tokens: Tokens) -> Tensor:
         """L(x), (B, V, C, 4h, 4w), unit channel norm."""
-        path = F.avg_pool2d(self.dpt(tokens.named_maps()).path_1, 2)
-        features = self.out(F.gelu(self.mix(path))).float()
+        features = self.out(self.hidden(tokens)).float()
         return F.normalize(features, dim=1).unflatten(0, tokens.shape)

@@ -12,7 +12,6 @@ from langflash_core.lab.training.stages import (
     STAGES,
     balanced_pixels,
     group_masks,
-    language_hidden,
     nearest,
     perturbed_poses,
     thinned,
@@ -75,9 +74,9 @@ def test_the_drawn_pixels_read_what_the_whole_head_gives(rooms, words, network):
     head = net.language_head.eval()
     with torch.no_grad():
         tokens = tokens_of(net, rooms.draw(2, 1, words.generator))
-        hidden = language_hidden(head, tokens)
+        hidden = head.hidden(tokens)
         rows = hidden[1].flatten(1).T[[3, 100]]
-        vectors = F.normalize(F.linear(F.gelu(rows), head.out.weight[:, :, 0, 0], head.out.bias), dim=-1)
+        vectors = F.normalize(F.linear(rows, head.out.weight[:, :, 0, 0], head.out.bias), dim=-1)
         whole = head(tokens)[1, 0].flatten(1).T[[3, 100]]
     torch.testing.assert_close(vectors, whole, atol=1e-5, rtol=1e-4)  # float32, another order of sums
 

@@ -9,9 +9,10 @@ from torch.nn import functional as F
 from langflash_core.lab.photos.names import CLASSES37
 from langflash_core.lab.training.losses import depth_loss, gradient_loss
 from langflash_core.lab.training.shards import Label
-from langflash_core.lab.training.teacher import MIN_ROOMS, Names, Rows, Teacher
+from langflash_core.lab.training.teacher import MIN_ROOMS, Names, Rows, Teacher, hand_over
 from langflash_core.network import MINI
 from langflash_core.network.encoders.shared import Tokens
+from langflash_core.network.semantics.features import LanguageHead
 
 AGAINST = torch.tensor([[True, True], [False, True]])
 BALANCE = torch.linspace(0.5, 1.5, len(CLASSES37))
@@ -80,6 +81,27 @@ def test_loss_is_the_weighted_cross_entropy_of_what_is_labelled(names):
     assert float(total) == pytest.approx(expected, rel=1e-5)
 
 
+def test_the_language_head_says_what_the_teacher_says(names):
+    """Classes by the texts as by the rows, where the head itself has nothing to say; texts apart, so the
+    ridge shrinks all logits alike."""
+    torch.manual_seed(0)
+    teacher, head = Teacher(MINI, len(names.texts)).eval(), LanguageHead(MINI).eval()
+    torch.nn.init.zeros_(head.out.weight)
+    torch.nn.init.zeros_(head.out.bias)
+    texts = torch.linalg.qr(torch.randn(MINI.language_dim, len(CLASSES37))).Q.T
+    tokens = Tokens(
+        tuple(torch.randn(1, 1, 6, MINI.encoder_dim) for _ in range(4)),
+        (2, 3),
+        tuple(torch.randn(1, 1, 6, MINI.encoder_dim) for _ in range(2)),
+    )
+    hand_over(teacher, head, texts)
+    with torch.inference_mode():
+        said = F.interpolate(teacher(tokens)[0], scale_factor=2.0, mode="bilinear")
+        own = torch.einsum("pc,chw->phw", texts, head(tokens)[0, 0])
+    norms = said.norm(dim=1, keepdim=True)
+    torch.testing.assert_close(own[None], said / norms, atol=1e-4, rtol=1e-3)
+
+
 def test_nothing_labelled_teaches_nothing(names):
     teacher = Teacher(MINI, len(names.texts))
     hooks = tuple(torch.randn(1, 1, 4, MINI.encoder_dim) for _ in range(4))
@@ -88,4 +110,4 @@ def test_nothing_labelled_teaches_nothing(names):
     rows = Rows(torch.tensor([-1]), torch.tensor([-1]))
     total, _ = teacher.loss(tokens, ids, rows, depths, names, torch.Generator())
     total.backward()
-    assert float(total.detach()) == 0 and math.isfinite(float(teacher.read.weight.grad.abs().sum()))
+    assert float(total.detach()) == 0 and math.isfinite(float(teacher.reader.read.weight.grad.abs().sum()))
