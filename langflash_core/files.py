@@ -1,6 +1,6 @@
-"""Files that are whole or absent: written beside their place, then moved onto it.
+"""Files and folders that are whole or absent: written beside their place, then moved onto it.
 
-The hidden file beside it is called `.NAME.HOST-PROCESS-RANDOM.part`. A killed process leaves its own
+The hidden one beside it is called `.NAME.HOST-PROCESS-RANDOM.part`. A killed process leaves its own
 behind; the next write into the folder from the same computer sweeps it up.
 """
 
@@ -9,6 +9,7 @@ import os
 import platform
 import re
 import secrets
+import shutil
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -68,6 +69,31 @@ def written_atomically(path: Path) -> Iterator[Path]:
         _remove(temporary)
 
 
+@contextmanager
+def filled_atomically(folder: Path) -> Iterator[Path]:
+    """A new folder beside `folder` to fill, put in its place when the block ends well; what was there goes.
+
+    Raises:
+        OutputError: the folder cannot be made or written, a file is in its place, or the disk is full.
+    """
+    make_folder(folder.parent)
+    temporary, old = _part(folder), _part(folder)
+    if os.path.isfile(folder):
+        raise OutputError(f"cannot write {folder}: a file of that name is in the way; choose another place")
+    try:
+        temporary.mkdir()
+        yield temporary
+        if os.path.isdir(folder):
+            os.replace(folder, old)
+        os.replace(temporary, folder)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(f"cannot write {folder}: {reason}; choose another place for it") from error
+    finally:
+        _remove(temporary)
+        _remove(old)
+
+
 def make_folder(folder: Path) -> None:
     """Create `folder` and its parents where missing.
 
@@ -115,6 +141,9 @@ def _runs(process: int) -> bool:
 
 def _remove(temporary: Path) -> None:
     """Best effort: the error that led here matters more."""
+    if os.path.isdir(temporary) and not os.path.islink(temporary):
+        shutil.rmtree(temporary, ignore_errors=True)
+        return
     try:
         temporary.unlink(missing_ok=True)
     except OSError:
