@@ -13,7 +13,7 @@ from langflash_core.batch.order import Order
 from langflash_core.batch.run import finish, jobs_of, left_to_do, run_jobs
 from langflash_core.batch.sets import LEDGER, SUMMARY, read_sets
 from langflash_core.errors import InputError, PromptError, WeightsError
-from langflash_core.formats import ANSWERS_OUT, CAMERAS_OUT, SCENES_OUT, VIEWS_OUT
+from langflash_core.formats import ALL_OUT, ANSWERS_OUT
 
 from ..files import check_folder, readable_file
 from ..report import say_error, write_json
@@ -21,7 +21,7 @@ from ..table import ProgressTable
 from .query import spoken
 
 INTERRUPTED = 130
-EXPORTS = (*(kind for kind in SCENES_OUT if kind != ".langflash"), *CAMERAS_OUT, *VIEWS_OUT, *ANSWERS_OUT)
+EXPORTS = tuple(kind for kind in ALL_OUT if kind != ".langflash")  # the scene itself is always written
 
 
 def run(args: Namespace, out: TextIO) -> int:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TextIO
 
 from langflash_core.errors import InputError, PromptError, SceneFileError
-from langflash_core.formats import ANSWERS_OUT, CAMERAS_OUT, SCENES_OUT, VIEWS_OUT, kind_of
+from langflash_core.formats import ALL_OUT, ANSWERS_OUT, CAMERAS_OUT, SCENES_OUT, kind_of
 from langflash_core.types import Camera, QueryResult, Scene
 
 from .. import shots
@@ -17,7 +17,6 @@ from ..report import ProgressBar
 from ..scenes import open_scene
 from .query import spoken
 
-SUFFIXES = (*SCENES_OUT, *CAMERAS_OUT, *VIEWS_OUT, *ANSWERS_OUT)
 TABLES = {".json": ".json of masks", ".csv": ".csv of boxes", ".glb": ".glb of boxes"}
 NEED_A_PHRASE = ("heat", "mask", "cutout", "labels", "boxes")
 
@@ -30,7 +29,7 @@ def run(args: Namespace, out: TextIO) -> None:
             nothing answers.
     """
     prompts = spoken(args.prompt or [])
-    suffix = kind_of(check_output_file(args.output, SUFFIXES, inputs=[args.scene]))
+    suffix = kind_of(check_output_file(args.output, ALL_OUT, inputs=[args.scene]))
     _check_words(args, suffix, prompts)
     choice = chosen_camera(args)
     readable_file(args.scene, "scene", SceneFileError)
