@@ -2,10 +2,12 @@
 
 import contextlib
 import io
+import os
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import cv2
 import numpy as np
 import torch
 from PIL import Image
@@ -39,9 +41,11 @@ def open_maker(order: Order, threads: int) -> Iterator[Callable[[Job], Made]]:
     """What makes one set after the other in this process; network and renderer are loaded once.
 
     Args:
-        threads: of torch.
+        threads: of torch, of OpenCV and of Mesa's software OpenGL, each.
     """
     torch.set_num_threads(threads)
+    cv2.setNumThreads(threads)
+    os.environ.setdefault("LP_NUM_THREADS", str(threads))
     with contextlib.ExitStack() as stack:
         maker = _Maker(order, stack)
         yield maker.make
