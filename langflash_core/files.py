@@ -20,6 +20,7 @@ from langflash_core.errors import OutputError
 # Of a shared folder, only parts of this computer can be judged by their process number.
 _HOST = hashlib.sha256(platform.node().encode()).hexdigest()[:6]
 _PART = re.compile(rf"\..*\.{_HOST}-(\d+)-[0-9a-f]{{12}}\.part", re.DOTALL)
+_HELD = "held"  # names the part that says who has a folder
 _STILL_ACTIVE = 259  # what Windows has for the exit code of a process that runs
 
 
@@ -92,6 +93,30 @@ def filled_atomically(folder: Path) -> Iterator[Path]:
     finally:
         _remove(temporary)
         _remove(old)
+
+
+@contextmanager
+def held_alone(folder: Path) -> Iterator[None]:
+    """Inside, no other process of this computer gets past this with the same folder.
+
+    Raises:
+        OutputError: one has it, or the folder cannot be made or written.
+    """
+    make_folder(folder)
+    own = _part(folder / _HELD)
+    try:
+        own.touch()
+        others = [name for name in os.listdir(folder) if name.startswith(f".{_HELD}.") and name != own.name]
+        if any(_PART.fullmatch(name) for name in others):
+            raise OutputError(
+                f"another run is writing to {folder}; wait for its end, or choose another place"
+            )
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(f"cannot write to {folder}: {reason}; choose another place") from error
+    finally:
+        _remove(own)
 
 
 def make_folder(folder: Path) -> None:

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from langflash_core.errors import OutputError
-from langflash_core.files import filled_atomically, write_atomically, written_atomically
+from langflash_core.files import filled_atomically, held_alone, write_atomically, written_atomically
 
 # Writes one part of two, says so, and waits for its end.
 WRITER = """
@@ -106,3 +106,25 @@ def test_a_folder_of_a_killed_process_is_swept_up(tmp_path):
     assert len(_parts(tmp_path)) == 1
     write_atomically(tmp_path / "other", b"whole")
     assert os.listdir(tmp_path) == ["other"]
+
+
+def test_a_folder_is_held_by_one(tmp_path):
+    place = tmp_path / "deep"
+    with held_alone(place):
+        with pytest.raises(OutputError, match="another run"), held_alone(place):
+            pass
+        assert len(_parts(place)) == 1
+    with held_alone(place), held_alone(tmp_path):
+        pass
+    assert _parts(place) == []
+
+
+def test_a_killed_process_holds_nothing(tmp_path):
+    child = (
+        "import sys, os; from langflash_core.files import held_alone; from pathlib import Path\n"
+        "with held_alone(Path(sys.argv[1])):\n    os._exit(0)"
+    )
+    subprocess.run([sys.executable, "-c", child, str(tmp_path)], check=True)
+    assert len(_parts(tmp_path)) == 1
+    with held_alone(tmp_path):
+        assert len(_parts(tmp_path)) == 1

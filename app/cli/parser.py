@@ -192,7 +192,7 @@ def _add_batch(commands) -> None:
         type=whole_count,
         metavar="N",
         help="processes side by side, which share the processors; each needs about 1 GB "
-        "(default: one a processor)",
+        "(default: one a processor, as memory allows)",
     )
     command.add_argument(
         "--address",

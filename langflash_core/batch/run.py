@@ -83,10 +83,13 @@ def finish(ledger: Ledger, names: Sequence[str]) -> None:
 
 def _row(ended: Ended) -> Row:
     job, made = ended.job, ended.made
+    reason = made.reason
+    if reason and job.folder.exists():
+        reason += "; what lies in its folder is from before"
     return Row(
         name=job.name,
-        status=FAILED if made.reason else DONE,
-        reason=made.reason,
+        status=FAILED if reason else DONE,
+        reason=reason,
         retried=ended.retried,
         seconds=made.seconds,
         photos=len(job.photos),

@@ -1,6 +1,8 @@
 """Runs by real processes whose work is to copy a word: what is done, again, lost, stopped."""
 
 import os
+import signal
+import subprocess
 import sys
 import threading
 import time
@@ -41,6 +43,15 @@ def test_bad_ones_are_a_list(place):
     assert _statuses(place.ledger()) == {"a": "failed", "b": "done", "c": "failed"}
     assert place.ledger()[0].reason == "it is no picture; take another"
     assert not (place.output / "a").exists()
+
+
+def test_what_was_there_before_a_failure_stays(place):
+    photo = place.add("a")
+    place.run()
+    photo.write_text("bad")
+    (row,) = place.run()
+    assert row.status == "failed" and row.reason.endswith("what lies in its folder is from before")
+    assert (place.output / "a" / SCENE).read_text() == "well"
 
 
 def test_only_what_is_left_or_has_changed_is_done(place):
@@ -135,6 +146,27 @@ def test_stopped_in_the_middle(place):
         photo.write_text("well")
     assert sorted(row.name for row in place.run()) == ["b", "c"]
     assert len(tries(photos[0])) == 1
+
+
+def test_the_run_itself_killed(place):
+    """Kill it with one set done and two under way: the next run does those, and sweeps up."""
+    photos = [place.add("a"), place.add("b", "slow"), place.add("c", "slow")]
+    code = (
+        "import sys; from pathlib import Path; from tests.batch.conftest import Place\n"
+        "if __name__ == '__main__': Place(Path(sys.argv[1]), Path(sys.argv[2])).run()"
+    )
+    run = subprocess.Popen([sys.executable, "-c", code, place.source, place.output], start_new_session=True)
+    patience = time.monotonic() + 60
+    while not all(tries(photo) for photo in photos) and time.monotonic() < patience:
+        time.sleep(0.05)
+    os.killpg(run.pid, signal.SIGKILL)
+    run.wait()
+    assert _statuses(place.ledger()) == {"a": "done"}
+    for photo in photos[1:]:
+        photo.write_text("well")
+    assert sorted(row.name for row in place.run()) == ["b", "c"]
+    assert [len(tries(photo)) for photo in photos] == [1, 2, 2]
+    assert sorted(os.listdir(place.output)) == ["a", "b", "c", "ledger.csv", SUMMARY]
 
 
 def test_workers_outside_the_main_thread(place):

@@ -13,6 +13,7 @@ from langflash_core.batch.order import Order
 from langflash_core.batch.run import finish, jobs_of, left_to_do, run_jobs
 from langflash_core.batch.sets import LEDGER, SUMMARY, read_sets
 from langflash_core.errors import InputError, PromptError, WeightsError
+from langflash_core.files import held_alone
 from langflash_core.formats import ALL_OUT, ANSWERS_OUT
 
 from ..files import check_folder, readable_file
@@ -21,6 +22,7 @@ from ..table import ProgressTable
 from .query import spoken
 
 INTERRUPTED = 130
+MEMORY = {"mini": 1_500_000_000, "full": 7_000_000_000}  # bytes that a worker may come to hold
 EXPORTS = tuple(kind for kind in ALL_OUT if kind != ".langflash")  # the scene itself is always written
 
 
@@ -34,20 +36,28 @@ def run(args: Namespace, out: TextIO) -> int:
     check_folder(args.output)
     sets = read_sets(args.sets, args.output)
     jobs = jobs_of(sets, args.output, order)
-    ledger = Ledger(args.output / LEDGER)
-    to_do, names = left_to_do(jobs, ledger), [each.name for each in sets]
-    stopped = False
-    try:
-        if to_do:
-            workers = _workers(args, order, len(to_do))
-            with ProgressTable(len(to_do), workers) as table:
-                run_jobs(to_do, ledger, workers, names, table.told, table.tick)
-        else:
-            ledger.begin(())
-            finish(ledger, names)
-    except KeyboardInterrupt:
-        stopped = True
+    with held_alone(args.output):
+        ledger = Ledger(args.output / LEDGER)
+        to_do = left_to_do(jobs, ledger)
+        stopped = not _worked_off(args, order, to_do, ledger, [each.name for each in sets])
     return _told(args, ledger, jobs, len(jobs) - len(to_do), stopped, out)
+
+
+def _worked_off(
+    args: Namespace, order: Order, to_do: Sequence[Job], ledger: Ledger, names: Sequence[str]
+) -> bool:
+    """Whether it came to its end; Ctrl-C stops it."""
+    if not to_do:
+        ledger.begin(())
+        finish(ledger, names)
+        return True
+    workers = _workers(args, order, len(to_do))
+    try:
+        with ProgressTable(len(to_do), workers) as table:
+            run_jobs(to_do, ledger, workers, names, table.told, table.tick)
+    except KeyboardInterrupt:
+        return False
+    return True
 
 
 def _order(args: Namespace) -> Order:
@@ -99,15 +109,25 @@ def _workers(args: Namespace, order: Order, jobs: int) -> Workers:
         return RayWorkers(_opening(order, 1), args.address, count, threads=1, card=card)
     from langflash_core.batch.processes import LocalWorkers
 
-    processors = _processors()
-    count = min(args.workers or processors, jobs)
-    return LocalWorkers(_opening(order, _threads(processors, count)), count)
+    processors, said = _processors(), _threads_said()
+    default = _as_memory_allows(max(1, processors // (said or 1)), order.preset)
+    count = min(args.workers or default, jobs)
+    return LocalWorkers(_opening(order, said or max(1, processors // count)), count)
 
 
-def _threads(processors: int, count: int) -> int:
-    """Of torch in each worker: the processors' share, unless the environment says it."""
+def _as_memory_allows(count: int, preset: str) -> int:
+    """So many workers, or fewer that fit into this machine's memory."""
+    try:
+        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):  # it cannot be asked here
+        return count
+    return max(1, min(count, memory // MEMORY[preset]))
+
+
+def _threads_said() -> int | None:
+    """How many threads a process shall have, where the environment says that."""
     said = os.environ.get("OMP_NUM_THREADS", "")
-    return int(said) if said.isdecimal() and int(said) else max(1, processors // count)
+    return int(said) if said.isdecimal() and int(said) else None
 
 
 def _opening(order: Order, threads: int) -> partial:

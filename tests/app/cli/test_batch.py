@@ -14,6 +14,7 @@ from PIL import Image
 
 from app.cli import main
 from langflash_core import pipeline
+from langflash_core.files import held_alone
 from langflash_core.resources import asset_path
 from langflash_core.scene.file import save
 
@@ -205,6 +206,12 @@ def test_another_table_called_ledger(sets, run, tmp_path):
     outcome = run("batch", sets, "-o", tmp_path)
     assert outcome.code == 2 and "not a ledger" in outcome.err
     assert (tmp_path / "ledger.csv").read_text() == "date,amount\n"
+
+
+def test_one_run_at_a_time(sets, run, tmp_path):
+    with held_alone(tmp_path):
+        outcome = run("batch", sets, "-o", tmp_path)
+    assert outcome.code == 2 and "another run is writing" in outcome.err and not os.listdir(tmp_path)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="terminals of POSIX")
