@@ -3,6 +3,7 @@
 All machines see the photos and the output under the same paths, and have LangFlash installed.
 """
 
+import logging
 import socket
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -39,7 +40,13 @@ class RayWorkers:
         _check_address(address)
         processors = count * threads if count and address == LOCAL else None
         try:
-            ray.init(address, num_cpus=processors, include_dashboard=False, log_to_driver=False)
+            ray.init(
+                address,
+                num_cpus=processors,
+                include_dashboard=False,
+                log_to_driver=False,
+                logging_level=logging.ERROR,
+            )
         except (ConnectionError, ValueError, RuntimeError) as problem:
             raise InputError(
                 f"there is no Ray cluster at {address} ({problem}); check --address"
