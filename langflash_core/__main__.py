@@ -11,6 +11,7 @@ import importlib
 import importlib.util
 import sys
 from pathlib import Path
+from typing import Any
 
 NAME = "langflash_app"
 _BESIDE = Path(__file__).resolve().parent.parent
@@ -28,6 +29,12 @@ def find_program() -> None:
     """From now on `NAME` can be imported, from a wheel or from a checkout."""
     if NAME not in sys.modules and not (_BESIDE / NAME).is_dir():
         _read_in(_BESIDE / "app")
+
+
+def in_program(module: str, function: str, *arguments: object) -> Any:
+    """Call a function of the program; by names, so that a process that was just started can, too."""
+    find_program()
+    return getattr(importlib.import_module(f"{NAME}.{module}"), function)(*arguments)
 
 
 def _read_in(folder: Path) -> None:

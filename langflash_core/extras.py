@@ -15,6 +15,7 @@ EXTRAS = {
     "torchvision": "full",
     "matplotlib": "bench",
     "h5py": "photos",
+    "ray": "cluster",
 }
 """Top-level import name -> extra in pyproject.toml."""
 

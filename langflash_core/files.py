@@ -1,6 +1,6 @@
-"""Files that are whole or absent: written beside their place, then moved onto it.
+"""Files and folders that are whole or absent: written beside their place, then moved onto it.
 
-The hidden file beside it is called `.NAME.HOST-PROCESS-RANDOM.part`. A killed process leaves its own
+The hidden one beside it is called `.NAME.HOST-PROCESS-RANDOM.part`. A killed process leaves its own
 behind; the next write into the folder from the same computer sweeps it up.
 """
 
@@ -9,6 +9,7 @@ import os
 import platform
 import re
 import secrets
+import shutil
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -19,6 +20,7 @@ from langflash_core.errors import OutputError
 # Of a shared folder, only parts of this computer can be judged by their process number.
 _HOST = hashlib.sha256(platform.node().encode()).hexdigest()[:6]
 _PART = re.compile(rf"\..*\.{_HOST}-(\d+)-[0-9a-f]{{12}}\.part", re.DOTALL)
+_HELD = "held"  # names the part that says who has a folder
 _STILL_ACTIVE = 259  # what Windows has for the exit code of a process that runs
 
 
@@ -68,6 +70,55 @@ def written_atomically(path: Path) -> Iterator[Path]:
         _remove(temporary)
 
 
+@contextmanager
+def filled_atomically(folder: Path) -> Iterator[Path]:
+    """A new folder beside `folder` to fill, put in its place when the block ends well; what was there goes.
+
+    Raises:
+        OutputError: the folder cannot be made or written, a file is in its place, or the disk is full.
+    """
+    make_folder(folder.parent)
+    temporary, old = _part(folder), _part(folder)
+    if os.path.isfile(folder):
+        raise OutputError(f"cannot write {folder}: a file of that name is in the way; choose another place")
+    try:
+        temporary.mkdir()
+        yield temporary
+        if os.path.isdir(folder):
+            os.replace(folder, old)
+        os.replace(temporary, folder)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(f"cannot write {folder}: {reason}; choose another place for it") from error
+    finally:
+        _remove(temporary)
+        _remove(old)
+
+
+@contextmanager
+def held_alone(folder: Path) -> Iterator[None]:
+    """Inside, no other process of this computer gets past this with the same folder.
+
+    Raises:
+        OutputError: one has it, or the folder cannot be made or written.
+    """
+    make_folder(folder)
+    own = _part(folder / _HELD)
+    try:
+        own.touch()
+        others = [name for name in os.listdir(folder) if name.startswith(f".{_HELD}.") and name != own.name]
+        if any(_PART.fullmatch(name) for name in others):
+            raise OutputError(
+                f"another run is writing to {folder}; wait for its end, or choose another place"
+            )
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(f"cannot write to {folder}: {reason}; choose another place") from error
+    finally:
+        _remove(own)
+
+
 def make_folder(folder: Path) -> None:
     """Create `folder` and its parents where missing.
 
@@ -115,6 +166,9 @@ def _runs(process: int) -> bool:
 
 def _remove(temporary: Path) -> None:
     """Best effort: the error that led here matters more."""
+    if os.path.isdir(temporary) and not os.path.islink(temporary):
+        shutil.rmtree(temporary, ignore_errors=True)
+        return
     try:
         temporary.unlink(missing_ok=True)
     except OSError:

@@ -12,6 +12,8 @@ USD = (".usd", ".usda", ".usdc", ".usdz")
 SCENES_IN = (".langflash", ".ply", ".splat", ".spz", ".sog", SOG_FOLDER, ".ksplat", ".glb", ".gltf", *USD)
 SCENES_OUT = (".langflash", ".ply", COMPRESSED_PLY, ".splat", ".spz", ".sog", SOG_FOLDER, ".glb", *USD)
 CAMERAS_OUT = ("cameras.txt", "transforms.json")  # and the photos, in images/ beside
+ANSWERS_OUT = (".json", ".csv")  # of phrases
+ALL_OUT = (".png", *SCENES_OUT, *CAMERAS_OUT, *ANSWERS_OUT, ".mp4", ".npz")  # what `langflash export` writes
 DROPPED = tuple(kind for kind in SCENES_IN if kind.startswith("."))  # a meta.json may be anything
 
 

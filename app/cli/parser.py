@@ -61,6 +61,7 @@ def build_parser() -> Parser:
     for add in (
         _add_view,
         _add_reconstruct,
+        _add_batch,
         _add_query,
         _add_render,
         _add_export,
@@ -157,6 +158,65 @@ def _add_reconstruct(commands) -> None:
         help="the network sees about PX x PX pixels (default: 224; full: 256)",
     )
     command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
+    _add_json(command)
+
+
+def _add_batch(commands) -> None:
+    command = _command(
+        commands,
+        "batch",
+        "many sets of photos to scenes; an interrupted run continues, and what is done is not done again",
+        epilog="The exit code is 0 when all sets are done, 1 when some failed (ledger.csv says why), "
+        "2 for bad input, 130 after Ctrl-C.",
+    )
+    command.add_argument(
+        "sets",
+        type=Path,
+        metavar="SETS",
+        help="a folder with a sub-folder of photos a place, or a .csv: per row a name and its photos, "
+        "relative to the table",
+    )
+    _add_output(command, "OUT", "gets a folder a set, ledger.csv and summary.html")
+    command.add_argument(
+        "--prompt", nargs="+", metavar="PHRASE", help="answer these in each set's first view"
+    )
+    command.add_argument(
+        "--export",
+        nargs="+",
+        metavar="ENDING",
+        help="files to write besides the scene, as `langflash export` does: .ply, .spz, .glb, .png, "
+        "transforms.json and others of the whole scene; .json (masks) and .csv (boxes) of --prompt",
+    )
+    command.add_argument(
+        "--workers",
+        type=whole_count,
+        metavar="N",
+        help="processes side by side, which share the processors; each needs about 1 GB "
+        "(default: one a processor, as memory allows)",
+    )
+    command.add_argument(
+        "--address",
+        metavar="RAY",
+        help="a Ray cluster instead of processes: host:port, auto, or local to begin one here; all its "
+        "machines see photos and OUT under the same paths",
+    )
+    command.add_argument(
+        "--preset", choices=("mini", "full"), default="mini", help="which network (default: mini)"
+    )
+    command.add_argument(
+        "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped ones"
+    )
+    command.add_argument(
+        "--fov", type=open_fov, metavar="DEG", help="field of view of the photos' longer side, of all sets"
+    )
+    command.add_argument(
+        "--size",
+        type=pixel_side,
+        metavar="PX",
+        help="the network sees about PX x PX pixels (default: 224; full: 256)",
+    )
+    command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
+    _add_backend(command)
     _add_json(command)
 
 

@@ -6,14 +6,13 @@ import importlib
 import os
 import signal
 import sys
-import traceback
 from collections.abc import Sequence
 
 from langflash_core.errors import LangFlashError
 from langflash_core.extras import optional_packages
 
 from .parser import build_parser, joined
-from .report import say_error
+from .report import explained, say_error
 
 # Imports make a million objects that stay; looking for garbage among them, as Python would do
 # every 700 of them, is a tenth of the time that torch takes.
@@ -44,19 +43,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         # more when it flushes at exit, so stdout now leads nowhere.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except OSError as error:
-        say_error(f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error))
-        return 1
-    except MemoryError:
-        say_error("out of memory; try a smaller --size or fewer photos")
-        return 1
     except Exception as error:
-        if os.environ.get("LANGFLASH_DEBUG"):
-            traceback.print_exc()
-        say_error(
-            f"a bug in LangFlash, {type(error).__name__}: {error}; "
-            "run again with LANGFLASH_DEBUG=1 in the environment and report what it prints"
-        )
+        say_error(explained(error))
         return 1
 
 

@@ -62,16 +62,19 @@ class GlRenderer:
 
 
 @contextmanager
-def open_renderer(backend: str | None) -> Iterator[Renderer]:
+def open_renderer(backend: "str | Renderer | None") -> Iterator[Renderer]:
     """A renderer for the length of a command.
 
     Args:
         backend: "gl", "torch", or None: gl, and torch with a warning where OpenGL or what speaks it is
-            missing.
+            missing. A renderer is taken as it is, and stays open.
 
     Raises:
         GraphicsError, MissingPackageError: "gl" was asked for and is not there.
     """
+    if backend is not None and not isinstance(backend, str):
+        yield backend
+        return
     if backend == "torch":
         yield TorchRenderer()
         return

@@ -5,13 +5,33 @@ import os
 import shutil
 import sys
 import time
+import traceback
 from collections.abc import Iterable
 from typing import Any, TextIO
+
+from langflash_core.errors import LangFlashError
 
 
 def one_sentence(text: str) -> str:
     """`text` on one line, whatever line breaks it came with."""
     return " ".join(text.split())
+
+
+def explained(error: Exception) -> str:
+    """An error as one sentence with a remedy; where it is a bug, LANGFLASH_DEBUG in the environment prints
+    its way there."""
+    if isinstance(error, LangFlashError):
+        return one_sentence(str(error))
+    if isinstance(error, OSError):
+        return f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
+    if isinstance(error, MemoryError):
+        return "out of memory; try a smaller --size or fewer photos"
+    if os.environ.get("LANGFLASH_DEBUG"):
+        traceback.print_exception(error)
+    return (
+        f"a bug in LangFlash, {type(error).__name__}: {error}; "
+        "run again with LANGFLASH_DEBUG=1 in the environment and report what it prints"
+    )
 
 
 def say_error(text: str) -> None:

@@ -1,12 +1,12 @@
 """`langflash export`: a scene, or what answers a phrase, as a file other programs read."""
 
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TextIO
 
 from langflash_core.errors import InputError, PromptError, SceneFileError
-from langflash_core.formats import CAMERAS_OUT, SCENES_OUT, kind_of
+from langflash_core.formats import ALL_OUT, ANSWERS_OUT, CAMERAS_OUT, SCENES_OUT, kind_of
 from langflash_core.types import Camera, QueryResult, Scene
 
 from .. import shots
@@ -17,7 +17,6 @@ from ..report import ProgressBar
 from ..scenes import open_scene
 from .query import spoken
 
-SUFFIXES = (".png", *SCENES_OUT, *CAMERAS_OUT, ".json", ".csv", ".mp4", ".npz")
 TABLES = {".json": ".json of masks", ".csv": ".csv of boxes", ".glb": ".glb of boxes"}
 NEED_A_PHRASE = ("heat", "mask", "cutout", "labels", "boxes")
 
@@ -30,25 +29,44 @@ def run(args: Namespace, out: TextIO) -> None:
             nothing answers.
     """
     prompts = spoken(args.prompt or [])
-    suffix = kind_of(check_output_file(args.output, SUFFIXES, inputs=[args.scene]))
+    suffix = kind_of(check_output_file(args.output, ALL_OUT, inputs=[args.scene]))
     _check_words(args, suffix, prompts)
     choice = chosen_camera(args)
     readable_file(args.scene, "scene", SceneFileError)
-    write: Callable[..., str] = _write_scene
     if suffix == ".mp4":
         from ..video import check_encoder
 
         check_encoder()
-        write = _write_video
-    elif suffix == ".json":
-        write = _write_boxes if args.what == "boxes" else _write_masks
-    elif suffix == ".csv" or (suffix == ".glb" and args.what == "boxes"):
-        write = _write_boxes
-    elif suffix == ".npz":
-        write = _write_numbers
-    elif suffix == ".png":
-        write = _write_pictures
+    write = _writer(suffix, args.what)
     print(f"{args.output}: {write(args, open_scene(args.scene), prompts, choice)}", file=out)
+
+
+def write_whole(scene: Scene, path: Path, renderer: Renderer, prompts: Sequence[str]) -> None:
+    """What `export` writes of a scene without further options: all of it, or of every photo's view what
+    answers the phrases where `path` is a table or masks of them (`ANSWERS_OUT`).
+
+    Raises:
+        LangFlashError: the path cannot be written, or no mask is found.
+    """
+    suffix = kind_of(path)
+    unset = dict.fromkeys(("threshold", "what", "seconds", "view", "camera", "size"))
+    asked = list(prompts) if suffix in ANSWERS_OUT else []
+    args = Namespace(
+        scene=path.parent, output=path, prompt=asked, all_views=suffix == ".csv", backend=renderer, **unset
+    )
+    _writer(suffix, None)(args, scene, asked, CameraChoice(0, None, None))
+
+
+def _writer(suffix: str, what: str | None) -> Callable[..., str]:
+    if what == "boxes" or suffix == ".csv":
+        return _write_boxes
+    others = {
+        ".mp4": _write_video,
+        ".json": _write_masks,
+        ".npz": _write_numbers,
+        ".png": _write_pictures,
+    }
+    return others.get(suffix, _write_scene)
 
 
 def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
@@ -59,7 +77,7 @@ def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
     """
     if args.threshold is not None and not prompts:
         raise PromptError('--threshold needs a phrase; add --prompt "armchair"')
-    if not prompts and (suffix in (".json", ".csv") or args.what in NEED_A_PHRASE):
+    if not prompts and (suffix in ANSWERS_OUT or args.what in NEED_A_PHRASE):
         what = f"--what {args.what}" if args.what in NEED_A_PHRASE else f"a {TABLES.get(suffix)}"
         raise PromptError(f'{what} needs a phrase; add --prompt "armchair"')
     if args.what == "heat" and len(prompts) > 1:

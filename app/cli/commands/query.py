@@ -44,7 +44,7 @@ def run(args: Namespace, out: TextIO) -> None:
             staged = write_answers(result, staging, npz=args.npz)
     files = [{kind: str(args.output / Path(path).name) for kind, path in entry.items()} for entry in staged]
     document = {"scene": str(args.scene), "view": choice.view, "backend": renderer.backend}
-    document.update(_answers(scene, result, files))
+    document.update(answers_document(scene, result, files))
     if args.json:
         write_json(document, out)
     else:
@@ -63,7 +63,10 @@ def spoken(prompts: Sequence[str]) -> list[str]:
     return phrases
 
 
-def _answers(scene: "Scene", result: "QueryResult", files: list[dict[str, str]]) -> dict[str, Any]:
+def answers_document(
+    scene: "Scene", result: "QueryResult", files: Sequence[dict[str, str]]
+) -> dict[str, Any]:
+    """What `query --json` says of a view; `files` by kind, one entry a phrase."""
     metres = scene.record.metric_scale
     return {
         "mode": result.mode,
