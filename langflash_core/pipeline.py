@@ -15,6 +15,7 @@ from torch import Tensor
 
 from langflash_core.ahead import Ahead, begin
 from langflash_core.errors import InputError, PromptError, ViewError, WeightsError
+from langflash_core.export.html import Phrases, write_html
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.views import load_views, source_pictures
@@ -23,6 +24,7 @@ from langflash_core.language.clip import load_clip_images
 from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.relevance import Mode, compile_query, relevance_maps
 from langflash_core.language.spaces import language_space
+from langflash_core.language.vocabulary import all_phrases
 from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_network
 from langflash_core.network.build import network_class
 from langflash_core.network.checkpoints.store import part_folder
@@ -194,8 +196,7 @@ def select(scene: Scene, prompts: Sequence[str], *, threshold: float | None = No
     """
     compiled = compile_query(scene, language_space(scene.semantics.space), list(prompts))
     limit = compiled.threshold if threshold is None else threshold
-    if not 0 <= limit <= 1:
-        raise PromptError(f"the threshold {limit} is out of range; relevancy needs 0 to 1")
+    _check_threshold(limit)
     best = gaussian_relevance(scene.semantics, compiled).amax(0)  # (N,)
     passing = best >= limit if scene.semantics.num_atoms else torch.zeros_like(best, dtype=torch.bool)
     if not bool(passing.any()):
@@ -205,6 +206,56 @@ def select(scene: Scene, prompts: Sequence[str], *, threshold: float | None = No
             "lower the threshold"
         )
     return scene.rows(passing)
+
+
+def web_page(
+    scene: Scene,
+    path: Path,
+    prompts: Sequence[str] = (),
+    *,
+    threshold: float | None = None,
+    title: str | None = None,
+) -> Phrases | None:
+    """Write a page that shows the scene and answers these phrases and the whole vocabulary, without a network.
+
+    Args:
+        prompts: shown as asked from the start.
+        threshold: relevancy in [0, 1] from which a phrase counts as present; None: the scene's calibration.
+        title: of the page; None: the file's name.
+
+    Returns:
+        What the page answers; None for a scene without language that was asked nothing.
+
+    Raises:
+        PromptError: a prompt or the threshold cannot be used. WeightsError: the space has no text weights.
+        OutputError: the scene holds no Gaussians, or the path cannot be written.
+    """
+    phrases = None
+    if prompts or scene.semantics.num_atoms:
+        compiled = compile_query(
+            scene,
+            language_space(scene.semantics.space),
+            list(dict.fromkeys((*prompts, *all_phrases()))),
+        )
+        limit = compiled.threshold if threshold is None else threshold
+        _check_threshold(limit)
+        atoms = compiled.factor  # of which D = atoms Q: products with phrases are the same
+        phrases = Phrases(
+            texts=compiled.texts,
+            num_asked=len(dict.fromkeys(prompts)),
+            scores=compiled.prompts @ atoms.T,
+            negatives=compiled.negatives @ atoms.T,
+            gram=atoms @ atoms.T,
+            temperature=compiled.temperature,
+            threshold=limit,
+        )
+    write_html(scene, path, phrases=phrases, title=title)
+    return phrases
+
+
+def _check_threshold(threshold: float) -> None:
+    if not 0 <= threshold <= 1:
+        raise PromptError(f"the threshold {threshold} is out of range; relevancy needs 0 to 1")
 
 
 def _posed(views: Views, viewmats: Tensor | None, preset: str) -> Views:

@@ -211,9 +211,14 @@ def _add_export(commands) -> None:
         "meta.json (a SOG in a folder), .glb, .usd, .usda, .usdc, .usdz: Gaussians; "
         "transforms.json, cameras.txt (COLMAP): photos and their poses; "
         ".json: COCO masks of --prompt; .csv, or .glb with --what boxes: their boxes; "
-        ".npz: a view as numbers; .mp4: a flight",
+        ".npz: a view as numbers; .mp4: a flight; .html: a web page that shows the scene and answers phrases",
     )
-    command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="keep only what answers one of these")
+    command.add_argument(
+        "--prompt",
+        nargs="+",
+        metavar="PHRASE",
+        help="keep only what answers one of these; of an .html: shown as asked",
+    )
     command.add_argument(
         "--threshold", type=kept_fraction, metavar="T", help="relevancy to keep, between 0 and 1"
     )

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from torch import Tensor
 
 from langflash_core.export.codebooks import palette, scalar_codebook
 from langflash_core.export.packing import smallest_three
@@ -48,13 +49,19 @@ class Quantised:
     harmonics: Palette | None
 
 
-def quantised(gaussians: Gaussians) -> Quantised:
-    """Gaussians, at least one, in their own order; harmonics to degree 3."""
-    means, quats, scales, opacities, sh = (
+def quantised(gaussians: Gaussians, means: Tensor | None = None) -> Quantised:
+    """Gaussians, at least one, in their own order; harmonics to degree 3.
+
+    Args:
+        means: (n, 3) positions instead, around another middle.
+    """
+    places = gaussians.means if means is None else means
+    quats, scales, opacities, sh = (
         values.detach().cpu().float().numpy()
-        for values in (gaussians.means, gaussians.quats, gaussians.scales, gaussians.opacities, gaussians.sh)
+        for values in (gaussians.quats, gaussians.scales, gaussians.opacities, gaussians.sh)
     )
-    logs = np.sign(means) * np.log1p(np.abs(means.astype(np.float64)))
+    around = places.detach().cpu().double().numpy()
+    logs = np.sign(around) * np.log1p(np.abs(around))
     lowest, highest = logs.min(0), logs.max(0)
     largest, others = smallest_three(quats)
     scale_book, scale_places = scalar_codebook(np.log(scales), _BOOK)

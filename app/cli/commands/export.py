@@ -17,7 +17,7 @@ from ..report import ProgressBar
 from ..scenes import open_scene
 from .query import spoken
 
-SUFFIXES = (".png", *SCENES_OUT, *CAMERAS_OUT, ".json", ".csv", ".mp4", ".npz")
+SUFFIXES = (".png", *SCENES_OUT, *CAMERAS_OUT, ".json", ".csv", ".mp4", ".npz", ".html")
 TABLES = {".json": ".json of masks", ".csv": ".csv of boxes", ".glb": ".glb of boxes"}
 NEED_A_PHRASE = ("heat", "mask", "cutout", "labels", "boxes")
 
@@ -46,6 +46,8 @@ def run(args: Namespace, out: TextIO) -> None:
         write = _write_boxes
     elif suffix == ".npz":
         write = _write_numbers
+    elif suffix == ".html":
+        write = _write_page
     elif suffix == ".png":
         write = _write_pictures
     print(f"{args.output}: {write(args, open_scene(args.scene), prompts, choice)}", file=out)
@@ -81,7 +83,7 @@ def _check_camera_words(args: Namespace, suffix: str) -> None:
         if set(looked_at) - {"size"}:
             raise InputError(f"--all-views looks from every photo; leave --{looked_at[0]} away")
         looked_at.append("all-views")
-    if suffix in (*SCENES_OUT, *CAMERAS_OUT) and looked_at and args.what != "boxes":
+    if suffix in (*SCENES_OUT, *CAMERAS_OUT, ".html") and looked_at and args.what != "boxes":
         raise InputError(f"a {suffix} holds the whole scene, not a view of it; leave --{looked_at[0]} away")
     extra = [name for name in looked_at if name != "size"]
     if suffix == ".mp4" and extra:
@@ -101,6 +103,21 @@ def _write_scene(args: Namespace, scene: Scene, prompts: list[str], choice: Came
     share = f" of {len(scene.gaussians):,}" if prompts else ""
     beside = f", its language in {side_car(args.output).name}" if _has_side_car(args.output, chosen) else ""
     return f"{len(chosen.gaussians):,}{share} Gaussians, {args.output.stat().st_size / 1e6:.1f} MB{beside}"
+
+
+def _write_page(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
+    """A web page with the whole scene; --prompt says what it shows as asked."""
+    from langflash_core import pipeline
+    from langflash_core.files import make_folder
+
+    with ProgressBar() as progress:
+        progress("reading the vocabulary", 0.2)
+        make_folder(args.output.parent)
+        phrases = pipeline.web_page(
+            scene, args.output, prompts, threshold=args.threshold, title=args.scene.stem
+        )
+    answers = f", answers {len(phrases.texts)} phrases" if phrases else ""
+    return f"{len(scene.gaussians):,} Gaussians, {args.output.stat().st_size / 1e6:.1f} MB{answers}"
 
 
 def _has_side_car(path: Path, scene: Scene) -> bool:

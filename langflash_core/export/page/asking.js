@@ -1,0 +1,141 @@
+// The panel: the box that completes phrases, and a chip for each that was asked.
+
+const MOST_SUGGESTED = 6;
+
+// Rows of the phrases that a typed text may mean, best first: whole, beginning, beginning of a word, inside.
+function completions(texts, typed, without) {
+  const sought = typed.trim().toLowerCase();
+  const rank = (text) => {
+    const at = text.indexOf(sought);
+    if (at < 0) return 4;
+    if (at === 0) return text === sought ? 0 : 1;
+    return text[at - 1] === " " ? 2 : 3;
+  };
+  return texts
+    .map((text, row) => [rank(text.toLowerCase()), text.length, row])
+    .filter(([place, , row]) => sought && place < 4 && !without.includes(row))
+    .sort((a, b) => a[0] - b[0] || a[1] - b[1])
+    .slice(0, MOST_SUGGESTED)
+    .map(([, , row]) => row);
+}
+
+function element(name, text, attributes = {}) {
+  const made = document.createElement(name);
+  made.textContent = text;
+  Object.entries(attributes).forEach(([key, value]) => made.setAttribute(key, value));
+  return made;
+}
+
+class Asking {
+  // texts: of all phrases. asked: rows of those that have a chip. changed(): another chip, or another one chosen.
+  constructor(texts, asked, changed) {
+    Object.assign(this, { texts, asked, changed });
+    this.chosen = null;
+    this.answers = new Map();  // by row: {score, found}
+    this.pointed = 0;
+    this.box = document.getElementById("box");
+    this.list = document.getElementById("suggestions");
+    this.chips = document.getElementById("chips");
+    this.note = document.getElementById("note");
+    this.box.addEventListener("input", () => this.suggest());
+    this.box.addEventListener("keydown", (event) => this.key(event));
+    this.box.addEventListener("blur", () => setTimeout(() => this.close(), 150));
+    this.draw();
+  }
+
+  // A phrase of the list gets a chip and is shown.
+  ask(row) {
+    if (!this.asked.includes(row)) this.asked.push(row);
+    this.box.value = "";
+    this.close();
+    this.choose(row);
+  }
+
+  choose(row) {
+    this.chosen = row;
+    this.draw();
+    this.changed();
+  }
+
+  drop(row) {
+    this.asked = this.asked.filter((other) => other !== row);
+    this.choose(this.chosen === row ? null : this.chosen);
+  }
+
+  // What the picture on show answers, {score, found} by row.
+  answer(answers) {
+    this.answers = answers;
+    this.draw();
+  }
+
+  suggest() {
+    this.rows = completions(this.texts, this.box.value, this.asked);
+    this.pointed = 0;
+    const unknown = this.box.value.trim() && !this.rows.length && !this.knows(this.box.value);
+    this.say(unknown ? `This page knows ${this.texts.length} phrases; this is none of them.` : "");
+    this.listed();
+  }
+
+  knows(text) {
+    return this.texts.some((known) => known.toLowerCase() === text.trim().toLowerCase());
+  }
+
+  listed() {
+    this.list.replaceChildren(...this.rows.map((row, place) => {
+      const item = element("li", this.texts[row], { role: "option", id: `option${place}`, "aria-selected": place === this.pointed });
+      item.addEventListener("pointerdown", (event) => { event.preventDefault(); this.ask(row); });
+      return item;
+    }));
+    this.list.hidden = !this.rows.length;
+    this.box.setAttribute("aria-expanded", this.rows.length > 0);
+    this.box.setAttribute("aria-activedescendant", this.rows.length ? `option${this.pointed}` : "");
+  }
+
+  close() {
+    this.rows = [];
+    this.say("");
+    this.listed();
+  }
+
+  key(event) {
+    const steps = { ArrowDown: 1, ArrowUp: -1 };
+    if (event.key === "Escape") { this.close(); this.box.blur(); }
+    else if (event.key === "Enter") this.enter();
+    else if (steps[event.key] && this.rows.length) {
+      event.preventDefault();
+      this.pointed = (this.pointed + steps[event.key] + this.rows.length) % this.rows.length;
+      this.listed();
+    }
+  }
+
+  enter() {
+    const typed = this.box.value.trim().toLowerCase();
+    const again = this.asked.find((row) => this.texts[row].toLowerCase() === typed);
+    if (again !== undefined) this.ask(again);
+    else if (this.rows && this.rows.length) this.ask(this.rows[this.pointed]);
+  }
+
+  say(sentence) {
+    this.note.textContent = sentence;
+    this.note.hidden = !sentence;
+  }
+
+  draw() {
+    this.chips.replaceChildren(...this.asked.map((row) => this.chip(row)));
+  }
+
+  chip(row) {
+    const answer = this.answers.get(row);
+    const chip = element("div", "", { class: "chip" });
+    const state = !answer ? "pending" : answer.found ? "found" : "missing";
+    chip.dataset.state = state;
+    const says = { pending: "", found: answer && answer.score.toFixed(2), missing: answer && `not found ${answer.score.toFixed(2)}` };
+    const body = element("button", this.texts[row], { "aria-pressed": row === this.chosen, title: "show where" });
+    body.append(element("small", says[state]));
+    body.addEventListener("click", () => this.choose(row === this.chosen ? null : row));
+    const gone = element("button", "×", { "aria-label": `remove ${this.texts[row]}`, class: "gone" });
+    gone.addEventListener("click", () => this.drop(row));
+    chip.append(body, gone);
+    return chip;
+  }
+}
