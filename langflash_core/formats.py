@@ -12,6 +12,7 @@ USD = (".usd", ".usda", ".usdc", ".usdz")
 SCENES_IN = (".langflash", ".ply", ".splat", ".spz", ".sog", SOG_FOLDER, ".ksplat", ".glb", ".gltf", *USD)
 SCENES_OUT = (".langflash", ".ply", COMPRESSED_PLY, ".splat", ".spz", ".sog", SOG_FOLDER, ".glb", *USD)
 CAMERAS_OUT = ("cameras.txt", "transforms.json")  # and the photos, in images/ beside
+PAGE_OUT = ".html"  # the whole scene, to be looked at and asked; no program reads it back
 DROPPED = tuple(kind for kind in SCENES_IN if kind.startswith("."))  # a meta.json may be anything
 
 

@@ -216,7 +216,7 @@ def web_page(
     threshold: float | None = None,
     title: str | None = None,
 ) -> Phrases | None:
-    """Write a page that shows the scene and answers these phrases and the whole vocabulary, without a network.
+    """Write a web page that shows the scene and answers these phrases and the whole vocabulary.
 
     Args:
         prompts: shown as asked from the start.

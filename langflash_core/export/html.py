@@ -16,7 +16,6 @@ import json
 import re
 import zlib
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -77,9 +76,7 @@ class _Column:
         return b"".join((values >> 8 * byte & 255).astype(np.uint8).tobytes() for byte in range(self.width))
 
 
-def write_html(
-    scene: Scene, path: Path, *, phrases: Phrases | None = None, title: str | None = None
-) -> None:
+def write_html(scene: Scene, path: Path, *, phrases: Phrases | None = None, title: str | None = None) -> None:
     """A page of the scene; without phrases it is looked at only.
 
     Args:
@@ -97,7 +94,7 @@ def write_html(
 
 def _page(header: dict, packed: str) -> str:
     """The whole page; what is put in is not looked through for more places to fill."""
-    folder = resources.files(__package__) / "page"
+    folder = Path(__file__).parent / "page"
 
     def source(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8")
@@ -148,9 +145,7 @@ def _encoded(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
             "threshold": phrases.threshold,
         }  # fmt: skip
         columns += _weight_columns(scene)
-        columns += [
-            _shares(name, getattr(phrases, name), header) for name in ("scores", "negatives", "gram")
-        ]
+        columns += [_shares(name, getattr(phrases, name), header) for name in ("scores", "negatives", "gram")]
     header["columns"] = [[c.name, c.values.size, c.width, c.differences] for c in columns]
     return header, b"".join(column.packed() for column in columns)
 

@@ -63,13 +63,14 @@ def quantised(gaussians: Gaussians, means: Tensor | None = None) -> Quantised:
     around = places.detach().cpu().double().numpy()
     logs = np.sign(around) * np.log1p(np.abs(around))
     lowest, highest = logs.min(0), logs.max(0)
+    span = np.where(highest > lowest, highest - lowest, 1)
     largest, others = smallest_three(quats)
     scale_book, scale_places = scalar_codebook(np.log(scales), _BOOK)
     colour_book, colour_places = scalar_codebook(sh[:, 0], _BOOK)
     return Quantised(
         lowest=lowest,
         highest=highest,
-        steps=np.round((logs - lowest) / np.where(highest > lowest, highest - lowest, 1) * _STEPS).astype(int),
+        steps=np.round((logs - lowest) / span * _STEPS).astype(int),
         largest=largest,
         turns=np.clip(np.round((others * math.sqrt(2) * 0.5 + 0.5) * 255), 0, 255).astype(int),
         scale_book=scale_book,

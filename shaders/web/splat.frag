@@ -1,5 +1,6 @@
 #version 300 es
-// Purpose: colour of one splat, and LAYERS times three numbers that it carries, at most nine, premultiplied, drawn back to front.
+// Purpose: colour of one splat, and LAYERS times three numbers that it carries, at most nine, premultiplied, drawn
+//         back to front.
 // Source: twin of splat/colour.frag. Frames: gl_FragCoord is the pixel centre, y down.
 
 precision highp float;

@@ -1,15 +1,17 @@
 #version 300 es
-// Purpose: one instanced quad per Gaussian of a web page, with its colour and what it carries for phrases.
+// Purpose: one quad per Gaussian of a web page, with its colour and what it carries for phrases. An instance is BATCH
+//         quads: one quad an instance is slow in many browsers.
 // Source: splat/project.vert and splat/quad.vert in one; the Gaussian's numbers come out of textures.
-// Frames: in world, out clip space; row 0 of the target is the top of the image. SH_DEGREE and LAYERS are set by
-//         the page.
+// Frames: in world, out clip space; row 0 of the target is the top of the image. BATCH, SH_DEGREE and LAYERS are
+//         set by the page.
 
 precision highp float;
 precision highp int;
 precision highp sampler2D;
+precision highp usampler2D;
 
-in uint in_row;  // of the Gaussian, in draw order
-
+uniform usampler2D order;      // rows of the Gaussians, in draw order
+uniform int count;             // of them
 uniform sampler2D gaussians;   // mean and opacity; quaternion wxyz; scales and row of the palette; f_dc
 uniform sampler2D palette;     // harmonics above degree 0, (S - 1) texels an entry
 uniform sampler2D numbers;     // LAYERS texels a Gaussian: three numbers for phrases each
@@ -44,7 +46,12 @@ vec3 coefficient(int base) {
 #include "harmonics.glsl"
 
 void main() {
-    int first = 4 * int(in_row);
+    int place = gl_InstanceID * BATCH + (gl_VertexID >> 2);
+    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);  // beside the image
+    if (place >= count) return;
+    int order_width = textureSize(order, 0).x;
+    int row = int(texelFetch(order, ivec2(place % order_width, place / order_width), 0).r);
+    int first = 4 * row;
     vec4 mean = texel_of(gaussians, first);
     vec4 scale = texel_of(gaussians, first + 2);
     vec3 from_eye = mean.xyz - eye;
@@ -59,7 +66,7 @@ void main() {
     centre = pos_c.xy / pos_c.z * pinhole.xy + pinhole.zw;
     whitening = vec4(1.0 / root.x, root.y, 1.0 / root.z, mean.w);
     float radius = sqrt(2.0 * log(max(mean.w / ALPHA_MIN, 1.0))) + SLACK;
-    vec2 corner = 2.0 * vec2(gl_VertexID & 1, gl_VertexID >> 1) - 1.0;
+    vec2 corner = 2.0 * vec2(gl_VertexID & 1, gl_VertexID >> 1 & 1) - 1.0;
     vec2 spread = radius * corner;
     vec2 pos_px = centre + vec2(root.x * spread.x, root.y * spread.x + root.z * spread.y);
     vec2 extent = radius * vec2(root.x, length(root.yz));
@@ -68,6 +75,6 @@ void main() {
     }
     gl_Position = vec4(2.0 * pos_px / image_size - 1.0, 0.0, 1.0);
 #if LAYERS > 0
-    for (int layer = 0; layer < LAYERS; ++layer) carried[layer] = texel_of(numbers, int(in_row) * LAYERS + layer).rgb;
+    for (int layer = 0; layer < LAYERS; ++layer) carried[layer] = texel_of(numbers, row * LAYERS + layer).rgb;
 #endif
 }

@@ -21,6 +21,7 @@ from typing import Any
 
 import pytest
 
+SECONDS = 120  # that an answer may take
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 SWITCHES = (
     "--headless=new", "--no-sandbox", "--remote-debugging-pipe", "--use-angle=swiftshader",
@@ -58,17 +59,21 @@ class Browser:
         for domain in ("Page", "Runtime", "Network", "Log"):
             self.call(f"{domain}.enable")
         self.call(
-            "Network.emulateNetworkConditions", offline=True, latency=0, downloadThroughput=0, uploadThroughput=0
+            "Network.emulateNetworkConditions",
+            offline=True,
+            latency=0,
+            downloadThroughput=0,
+            uploadThroughput=0,
         )
 
-    def call(self, method: str, seconds: float = 120, **params: Any) -> dict:
+    def call(self, method: str, **params: Any) -> dict:
         """The result of a call; what happens meanwhile is noted."""
         number = next(self._numbers)
         message = {"id": number, "method": method, "params": params}
         if self._session:
             message["sessionId"] = self._session
         os.write(self._sending, json.dumps(message).encode() + b"\0")
-        deadline = time.monotonic() + seconds
+        deadline = time.monotonic() + SECONDS
         while True:
             answer = self._received(deadline, method)
             if answer.get("id") == number:
@@ -82,12 +87,16 @@ class Browser:
         self.errors.clear()
         width, height = size
         self.call(
-            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=touch
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=touch,
         )
         self.call("Emulation.setTouchEmulationEnabled", enabled=touch)
         self.call("Page.navigate", url="about:blank")
         self.call("Page.navigate", url=path.resolve().as_uri() + fragment)
-        self.value("new Promise(done => document.readyState === 'complete' ? done(1) : onload = () => done(1))")
+        self.value("new Promise((done) => (document.readyState === 'complete' ? done() : (onload = done)))")
 
     def value(self, expression: str) -> Any:
         """What an expression gives, after its promise, as JSON."""
@@ -104,8 +113,8 @@ class Browser:
     def key(self, name: str, code: str = "", text: str = "") -> None:
         """Press and let go."""
         for kind in ("keyDown", "keyUp"):
-            words = {"type": kind, "key": name, "code": code or name}
-            self.call("Input.dispatchKeyEvent", **words, **({"text": text} if text and kind == "keyDown" else {}))
+            words = {"text": text} if text and kind == "keyDown" else {}
+            self.call("Input.dispatchKeyEvent", type=kind, key=name, code=code or name, **words)
 
     def type(self, text: str) -> None:
         """Into what has the focus."""
@@ -116,14 +125,16 @@ class Browser:
         """With the left button."""
         steps = (("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end))
         for kind, (x, y) in steps:
-            held = 0 if kind == "mouseReleased" else 1
-            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=held, clickCount=1)
+            held = {"button": "left", "buttons": 0 if kind == "mouseReleased" else 1, "clickCount": 1}
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **held)
 
     def touch(self, *moments: list[tuple[int, int]]) -> None:
         """Fingers at places, moment by moment."""
         for index, fingers in enumerate(moments):
             points = [{"x": x, "y": y, "id": number} for number, (x, y) in enumerate(fingers)]
-            self.call("Input.dispatchTouchEvent", type="touchMove" if index else "touchStart", touchPoints=points)
+            self.call(
+                "Input.dispatchTouchEvent", type="touchMove" if index else "touchStart", touchPoints=points
+            )
         self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
 
     def _received(self, deadline: float, waiting_for: str) -> dict:

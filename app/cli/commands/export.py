@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TextIO
 
 from langflash_core.errors import InputError, PromptError, SceneFileError
-from langflash_core.formats import CAMERAS_OUT, SCENES_OUT, kind_of
+from langflash_core.formats import CAMERAS_OUT, PAGE_OUT, SCENES_OUT, kind_of
 from langflash_core.types import Camera, QueryResult, Scene
 
 from .. import shots
@@ -17,7 +17,7 @@ from ..report import ProgressBar
 from ..scenes import open_scene
 from .query import spoken
 
-SUFFIXES = (".png", *SCENES_OUT, *CAMERAS_OUT, ".json", ".csv", ".mp4", ".npz", ".html")
+SUFFIXES = (".png", *SCENES_OUT, *CAMERAS_OUT, ".json", ".csv", ".mp4", ".npz", PAGE_OUT)
 TABLES = {".json": ".json of masks", ".csv": ".csv of boxes", ".glb": ".glb of boxes"}
 NEED_A_PHRASE = ("heat", "mask", "cutout", "labels", "boxes")
 
@@ -46,7 +46,7 @@ def run(args: Namespace, out: TextIO) -> None:
         write = _write_boxes
     elif suffix == ".npz":
         write = _write_numbers
-    elif suffix == ".html":
+    elif suffix == PAGE_OUT:
         write = _write_page
     elif suffix == ".png":
         write = _write_pictures
@@ -83,7 +83,7 @@ def _check_camera_words(args: Namespace, suffix: str) -> None:
         if set(looked_at) - {"size"}:
             raise InputError(f"--all-views looks from every photo; leave --{looked_at[0]} away")
         looked_at.append("all-views")
-    if suffix in (*SCENES_OUT, *CAMERAS_OUT, ".html") and looked_at and args.what != "boxes":
+    if suffix in (*SCENES_OUT, *CAMERAS_OUT, PAGE_OUT) and looked_at and args.what != "boxes":
         raise InputError(f"a {suffix} holds the whole scene, not a view of it; leave --{looked_at[0]} away")
     extra = [name for name in looked_at if name != "size"]
     if suffix == ".mp4" and extra:

@@ -62,7 +62,9 @@ class Answers {
       for (let i = 0; i < this.count; ++i) texels[4 * layers * i + first] = values[i];
     };
     write(0, this.norms);
-    rows.forEach((row, place) => write(place + 1, this.mixed(this.scores, row).map((dot, i) => dot - this.against[i])));
+    rows.forEach((row, place) => {
+      write(place + 1, this.mixed(this.scores, row).map((score, i) => score - this.against[i]));
+    });
     return { texels, layers };
   }
 

@@ -82,8 +82,12 @@ class Asking {
 
   listed() {
     this.list.replaceChildren(...this.rows.map((row, place) => {
-      const item = element("li", this.texts[row], { role: "option", id: `option${place}`, "aria-selected": place === this.pointed });
-      item.addEventListener("pointerdown", (event) => { event.preventDefault(); this.ask(row); });
+      const said = { role: "option", id: `option${place}`, "aria-selected": place === this.pointed };
+      const item = element("li", this.texts[row], said);
+      item.addEventListener("pointerdown", (event) => {
+        event.preventDefault();
+        this.ask(row);
+      });
       return item;
     }));
     this.list.hidden = !this.rows.length;
@@ -127,11 +131,9 @@ class Asking {
   chip(row) {
     const answer = this.answers.get(row);
     const chip = element("div", "", { class: "chip" });
-    const state = !answer ? "pending" : answer.found ? "found" : "missing";
-    chip.dataset.state = state;
-    const says = { pending: "", found: answer && answer.score.toFixed(2), missing: answer && `not found ${answer.score.toFixed(2)}` };
+    chip.dataset.state = !answer ? "pending" : answer.found ? "found" : "missing";
     const body = element("button", this.texts[row], { "aria-pressed": row === this.chosen, title: "show where" });
-    body.append(element("small", says[state]));
+    if (answer) body.append(element("small", (answer.found ? "" : "not found ") + answer.score.toFixed(2)));
     body.addEventListener("click", () => this.choose(row === this.chosen ? null : row));
     const gone = element("button", "×", { "aria-label": `remove ${this.texts[row]}`, class: "gone" });
     gone.addEventListener("click", () => this.drop(row));

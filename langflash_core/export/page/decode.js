@@ -1,6 +1,6 @@
 // The scene out of the page: base64, deflate, columns of small integers; export/html.py wrote them.
 
-const TEXELS = 4;  // a Gaussian takes in its texture: see shaders/web/splat.vert
+const TEXELS = 4;  // a Gaussian takes in its texture: see shaders/web/project.vert
 
 // Bytes of a base64 text that holds a zlib stream.
 async function inflated(text) {
@@ -85,6 +85,10 @@ function readPhrases(header, columns) {
   const weights = [];
   for (let place = 0; columns["atom" + place]; ++place)
     weights.push({ atoms: columns["atom" + place], shares: columns["weight" + place] });
-  const numbers = (name) => Float32Array.from(new Int16Array(columns[name].buffer), (v) => v * phrases[name + "Unit"]);
-  return { ...phrases, weights, scores: numbers("scores"), negativeScores: numbers("negatives"), gram: numbers("gram") };
+  const numbers = (name) => {
+    const unit = phrases[name + "Unit"];
+    return Float32Array.from(new Int16Array(columns[name].buffer), (value) => value * unit);
+  };
+  const [scores, negativeScores, gram] = ["scores", "negatives", "gram"].map(numbers);
+  return { ...phrases, weights, scores, negativeScores, gram };
 }

@@ -2,6 +2,7 @@
 // A target is a picture's colour (sum of T alpha c, sum of T alpha) and up to three layers of numbers.
 
 const MOST_LAYERS = 3;  // beside the colour: every WebGL 2 draws into four textures
+const BATCH = 256;  // quads an instance
 const PHRASES_A_PASS = 3 * MOST_LAYERS - 1;
 const BACKGROUND = [0.043, 0.051, 0.063];
 
@@ -19,15 +20,37 @@ class Drawing {
     this.gaussians = this.table(texels, TEXELS);
     this.palette = palette ? this.table(palette, header.bases) : this.gaussians;
     this.degree = palette ? Math.sqrt(header.bases + 1) - 1 : 0;
-    this.order = gl.createBuffer();
-    this.splats = gl.createVertexArray();
+    const width = Math.min(2048, header.count);
+    this.order = this.texture([width, Math.ceil(header.count / width)], gl.R32UI, gl.NEAREST);
+    this.rows = new Uint32Array(width * Math.ceil(header.count / width));
+    this.quads = this.batch();
     this.nothing = gl.createVertexArray();
-    gl.bindVertexArray(this.splats);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.order);
-    gl.bufferData(gl.ARRAY_BUFFER, 4 * header.count, gl.DYNAMIC_DRAW);
-    gl.enableVertexAttribArray(0);
-    gl.vertexAttribIPointer(0, 1, gl.UNSIGNED_INT, 0, 0);
-    gl.vertexAttribDivisor(0, 1);
+  }
+
+  // Two triangles of vertices 4 i to 4 i + 3 for each of BATCH quads.
+  batch() {
+    const { gl } = this;
+    const corners = [0, 1, 2, 2, 1, 3];
+    const indices = Uint16Array.from({ length: 6 * BATCH }, (_, i) => 4 * Math.floor(i / 6) + corners[i % 6]);
+    const made = gl.createVertexArray();
+    gl.bindVertexArray(made);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
+    gl.bindVertexArray(null);
+    return made;
+  }
+
+  // An empty texture of a size in pixels.
+  texture([width, height], format, filter) {
+    const { gl } = this;
+    const made = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, made);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, format, width, height);
+    for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T])
+      gl.texParameteri(gl.TEXTURE_2D, side, gl.CLAMP_TO_EDGE);
+    for (const size of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER])
+      gl.texParameteri(gl.TEXTURE_2D, size, filter);
+    return made;
   }
 
   // A texture of texels (., 4) float32, rows of whole entries of so many texels.
@@ -37,14 +60,12 @@ class Drawing {
     const count = texels.length / 4;
     const width = Math.min(entry * Math.floor(2048 / entry), Math.max(count, 1));
     const height = Math.max(1, Math.ceil(count / width));
-    if (height > most) throw new Error("The scene is too large for this graphics driver; open it on another machine.");
+    if (height > most)
+      throw new Error("The scene is too large for this graphics driver; open it on another machine.");
     const padded = new Float32Array(4 * width * height);
     padded.set(texels);
-    const texture = gl.createTexture();
-    gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, width, height, 0, gl.RGBA, gl.FLOAT, padded);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+    const texture = this.texture([width, height], gl.RGBA32F, gl.NEAREST);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RGBA, gl.FLOAT, padded);
     return texture;
   }
 
@@ -64,11 +85,7 @@ class Drawing {
     const framebuffer = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     for (let place = 0; place <= layers; ++place) {
-      const texture = gl.createTexture();
-      gl.bindTexture(gl.TEXTURE_2D, texture);
-      gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA16F, width, height);
-      for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, side, gl.CLAMP_TO_EDGE);
-      for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.LINEAR);
+      const texture = this.texture([width, height], gl.RGBA16F, gl.LINEAR);
       gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + place, gl.TEXTURE_2D, texture, 0);
       textures.push(texture);
     }
@@ -84,8 +101,7 @@ class Drawing {
   splat(target, camera, lens, numbers) {
     const { gl } = this;
     const layers = numbers ? numbers.layers : 0;
-    const rows = this.sorter.order(camera.eye, camera.turn[2]);
-    const program = this.program("splat.vert", "splat.frag", { LAYERS: layers, SH_DEGREE: this.degree });
+    const count = this.sort(camera);
     target.drawn = lens.size;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
     gl.drawBuffers(target.textures.map((_, place) => (place <= layers ? gl.COLOR_ATTACHMENT0 + place : gl.NONE)));
@@ -94,17 +110,31 @@ class Drawing {
     gl.clear(gl.COLOR_BUFFER_BIT);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    gl.bindVertexArray(this.splats);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.order);
-    gl.bufferSubData(gl.ARRAY_BUFFER, 0, rows);
+    const program = this.program("splat.vert", "splat.frag", { BATCH, LAYERS: layers, SH_DEGREE: this.degree });
     gl.useProgram(program.made);
-    this.bind(program, { gaussians: this.gaussians, palette: this.palette, numbers: layers ? numbers.texture : this.gaussians });
+    const { order, gaussians, palette } = this;
+    this.bind(program, { order, gaussians, palette, numbers: numbers ? numbers.texture : gaussians });
+    gl.uniform1i(program.place("count"), count);
     gl.uniformMatrix3fv(program.place("turn"), true, camera.turn.flat());
     gl.uniform3fv(program.place("eye"), camera.eye);
     gl.uniform4fv(program.place("pinhole"), lens.pinhole);
     gl.uniform2fv(program.place("image_size"), lens.size);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, rows.length);
+    gl.bindVertexArray(this.quads);
+    gl.drawElementsInstanced(gl.TRIANGLES, 6 * BATCH, gl.UNSIGNED_SHORT, 0, Math.ceil(count / BATCH));
     gl.disable(gl.BLEND);
+  }
+
+  // Bring the Gaussians in the order of a camera to the graphics card; how many there are to draw.
+  sort(camera) {
+    const { gl } = this;
+    const sorted = this.sorter.order(camera.eye, camera.turn[2]);
+    const width = Math.min(2048, this.header.count);
+    this.rows.set(sorted);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, this.order);
+    const height = Math.ceil(sorted.length / width);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RED_INTEGER, gl.UNSIGNED_INT, this.rows);
+    return sorted.length;
   }
 
   // A splatted target on the canvas. phrase: {threshold, temperature} of the one that glows, or null.
@@ -154,7 +184,6 @@ class Drawing {
       [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]].forEach(([kind, name]) => {
         gl.attachShader(made, this.shader(kind, name, constants));
       });
-      gl.bindAttribLocation(made, 0, "in_row");
       gl.linkProgram(made);
       if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(made));
       const places = new Map();

@@ -2,7 +2,7 @@
 // The address may say more: #view=1&ask=plant&mode=photo&bare
 
 const MOST_PIXELS = 2.1e6;         // of a picture
-const MOST_JUDGED = 512 * 512;     // pixels that scores are taken from
+const MOST_JUDGED = 320 * 320;     // pixels that scores are taken from
 const REST = 160;                  // milliseconds without a movement
 const SLOW = 40, QUICK = 22;       // milliseconds a frame, beyond which moving pictures get fewer or more pixels
 const LEAST_SCALE = 0.35;
@@ -39,13 +39,17 @@ class Page {
     const phrases = readPhrases(header, columns);
     this.answers = phrases && new Answers(phrases, header.count);
     this.lens = { pinhole: header.views[0].pinhole, size: header.viewSize };
-    this.scale = 1;
+    this.scale = 1;  // of the picture's sides while it moves
+    this.pace = QUICK;  // milliseconds a frame, on average
     this.heat = true;
     this.carried = null;
     const distance = middleDepth(this.texels, header.views[0], this.lens);
     this.orbit = new Orbit(header.views[0], distance);
-    const aimed = (x, y) => this.aim(x, y);
-    this.moving = new Moving(this.canvas, this.orbit, 0.05 * distance, () => this.shown(1).pinhole[0] / this.ratio, () => this.moved(), aimed);
+    this.moving = new Moving(this.canvas, this.orbit, 0.05 * distance, {
+      focal: () => this.shown(1).pinhole[0] / this.ratio,
+      changed: () => this.moved(),
+      aimed: (x, y) => this.aim(x, y),
+    });
     this.asking = this.answers && new Asking(phrases.texts, [...Array(phrases.asked).keys()], () => this.asked());
     this.furnish();
     addEventListener("resize", () => this.resize());
@@ -70,10 +74,10 @@ class Page {
     const said = new URLSearchParams(location.hash.slice(1));
     document.body.classList.toggle("bare", said.has("bare"));
     this.orbit.set(this.header.views[said.get("view")] || this.header.views[0], this.orbit.distance);
-    this.setHeat(said.get("mode") !== "photo");
     const row = this.answers ? this.answers.texts.indexOf(said.get("ask")) : -1;
     if (row >= 0) this.asking.ask(row);
     else if (this.answers && this.answers.asked) this.asking.choose(0);
+    this.setHeat(said.get("mode") !== "photo");
   }
 
   key(event) {
@@ -136,7 +140,6 @@ class Page {
     [this.canvas.width, this.canvas.height] = wanted.map((side) => Math.max(1, Math.round(side * this.ratio)));
     if (this.target) this.drawing.release(this.target);
     this.target = this.drawing.target([this.canvas.width, this.canvas.height], 1);
-    this.draw();
     this.moved();
   }
 
@@ -160,17 +163,19 @@ class Page {
 
   frame(time) {
     this.waiting = null;
-    const elapsed = Math.min(time - (this.last ?? time), 100);
+    const elapsed = Math.min(time - (this.last ?? time), 500);
     this.last = time;
-    if (elapsed > SLOW) this.scale = Math.max(LEAST_SCALE, 0.9 * this.scale);
-    else if (elapsed && elapsed < QUICK) this.scale = Math.min(1, 1.05 * this.scale);
+    this.pace += 0.2 * ((elapsed || this.pace) - this.pace);
+    if (this.pace > SLOW) this.scale = Math.max(LEAST_SCALE, 0.9 * this.scale);
+    else if (this.pace < QUICK) this.scale = Math.min(1, 1.05 * this.scale);
     const more = this.moving.step(elapsed);
     this.draw(this.scale);
     if (more) this.moved();
   }
 
-  draw(scale = 1) {
+  draw(scale) {
     const glows = this.heat && this.carried !== null;
+    this.sharp = scale === 1;
     this.drawing.splat(this.target, this.orbit, this.shown(scale), glows ? this.carried : null);
     this.drawing.show(this.target, glows ? this.answers : null);
   }
@@ -178,7 +183,7 @@ class Page {
   // The camera stands still: all pixels, and scores.
   rest() {
     this.last = undefined;
-    this.draw();
+    if (!this.sharp) this.draw(1);
     if (this.asking) this.asking.answer(this.judge(this.asking.asked, this.shown(this.judgedScale())));
   }
 
@@ -198,7 +203,9 @@ class Page {
       const alpha = new Float32Array(read[0].length / 4).map((_, pixel) => read[0][4 * pixel + 3]);
       some.forEach((row, place) => {
         const [layer, channel] = [1 + Math.floor((place + 1) / 3), (place + 1) % 3];
-        const relevance = alpha.map((_, pixel) => this.answers.relevance(read[1][4 * pixel], read[layer][4 * pixel + channel]));
+        const relevance = alpha.map((_, pixel) => {
+          return this.answers.relevance(read[1][4 * pixel], read[layer][4 * pixel + channel]);
+        });
         answers.set(row, { ...judged(relevance, alpha, this.answers.threshold), relevance });
       });
       this.drawing.drop(numbers);
@@ -224,11 +231,11 @@ async function open() {
   const columns = readColumns(header.columns, await inflated(find("payload").textContent));
   find("payload").remove();
   const page = new Page(header, columns);
-  find("waiting").remove();
   await new Promise(requestAnimationFrame);
-  return { page, columns, firstPicture: performance.now(), picture: (...words) => page.picture(...words) };
+  find("waiting").remove();
+  return page;
 }
 
-// For programs that drive the page: a promise.
+// For programs that drive the page: a promise of it.
 window.langflash = open();
 window.langflash.catch((error) => (find("waiting").textContent = error.message));

@@ -1,6 +1,6 @@
 // Mouse, touch and keys to movements of an Orbit; flights from one view to another.
 
-const TURN = 0.006;         // radians a pixel
+const TURN = 0.005;         // radians a pixel
 const WHEEL = 0.0012;       // of the logarithm of a distance, a pixel
 const FLIGHT = 450;         // milliseconds
 const RATES = { turn: 1.4, move: 0.7, zoom: 1.2 };  // a second: radians, distances, logarithms
@@ -12,8 +12,9 @@ const KEYS = {
 };
 
 class Moving {
-  // stage: the element that is dragged. focal(): pixels. changed(): the camera moved. aimed(x, y): a double click.
-  constructor(stage, orbit, nearest, focal, changed, aimed) {
+  // stage: the element that is dragged. nearest: distance. focal(): pixels. changed(): the camera moved.
+  // aimed(x, y): a double click.
+  constructor(stage, orbit, nearest, { focal, changed, aimed }) {
     Object.assign(this, { stage, orbit, nearest, focal, changed });
     this.fingers = new Map();
     this.pressed = new Set();
@@ -81,8 +82,9 @@ class Moving {
   // Fly to a view {eye, turn} whose subject is at `distance`; at once where people want no motion.
   fly(view, distance) {
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const from = { eye: this.orbit.eye, turn: this.orbit.turn, distance: this.orbit.distance };
     if (calm) this.orbit.set(view, distance);
-    else this.flight = { from: { eye: this.orbit.eye, turn: this.orbit.turn, distance: this.orbit.distance }, view, distance };
+    else this.flight = { from, view, distance, passed: 0 };
     this.changed();
   }
 
@@ -101,7 +103,7 @@ class Moving {
 
   soar(elapsed) {
     const { from, view, distance } = this.flight;
-    this.flight.passed = (this.flight.passed || 0) + elapsed;
+    this.flight.passed += elapsed;
     const share = Math.min(1, this.flight.passed / FLIGHT);
     const eased = share * share * (3 - 2 * share);
     const between = (a, b) => a.map((value, axis) => value + eased * (b[axis] - value));
