@@ -1,6 +1,6 @@
 """The README's picture of a web page: a wide window and a phone.
 
-python -m tests.export.page_picture assets/readme/page.png
+python -m tests.export.page_picture assets/readme/page.jpg
 """
 
 import io
@@ -18,7 +18,8 @@ from tests.export.browser import Browser, browser
 GAP = 16  # pixels
 WIDE, PHONE = (1040, 720), (360, 720)
 _RESTED = """new Promise((done) => {
-  const rested = () => document.querySelector("[data-state=pending]") ? setTimeout(rested, 100) : setTimeout(done, 1500);
+  const pending = () => document.querySelector("[data-state=pending]");
+  const rested = () => (pending() ? setTimeout(rested, 100) : setTimeout(done, 1500));
   langflash.then(rested);
 })"""
 
@@ -52,5 +53,4 @@ def _shown(page: Browser) -> Image.Image:
 
 
 if __name__ == "__main__":
-    small = picture().quantize(96, dither=Image.Dither.NONE)
-    small.save(sys.argv[1], optimize=True)
+    picture().save(sys.argv[1], quality=88, optimize=True)

@@ -288,7 +288,7 @@ def test_a_browser_without_webgl_says_so(page, file):
 
 @pytest.mark.slow
 def test_the_demo_room(page, tmp_path):
-    """Trained weights on shipped photos, many weights a Gaussian; the file's size, and when there is a picture."""
+    """Trained weights on shipped photos: answers, the file's size, and when there is a picture."""
     photos = [asset_path(f"photos/living_room_{side}.png") for side in ("left", "right")]
     trained = lf.reconstruct(photos)
     path = tmp_path / "room.html"
