@@ -231,6 +231,9 @@ def _add_export(commands) -> None:
     command.add_argument(
         "--all-views", action="store_true", help="from every photo: FILE_0, FILE_1 and so on"
     )
+    command.add_argument(
+        "--with-text", action="store_true", help="an .html answers any phrase, and is 28 MB larger"
+    )
     command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of an .mp4 (default: 6)")
     _add_camera(command)
     _add_backend(command)

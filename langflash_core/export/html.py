@@ -5,9 +5,11 @@ policy lets it load nothing. The scene is a JSON header and one deflate stream i
 16 bits a value, the low and high bytes of the wider ones apart, some as differences from the row before
 (of 16 bits: zigzag). Gaussians are stored as in `quantised.py`, their positions around the first view's
 camera, at most four weights each in 8 bits. Phrases are numbers per atom, d_k . t, in 16 bits: the page
-needs neither dictionary nor text tower, and answers those that it was made with.
+needs neither dictionary nor text tower, and answers those that it was made with. With a text model it holds
+both, deflated as they are, and answers any phrase.
 
-Axes and units are the scene's own. What is lost: photos, vectors of language, weights beyond the fourth.
+Axes and units are the scene's own. What is lost: photos, weights beyond the fourth, and without a text
+model the dictionary.
 """
 
 import base64
@@ -33,9 +35,11 @@ from langflash_core.types import Scene
 
 MOST_WEIGHTS = 4  # of a Gaussian; `langflash bench` says what the others are worth
 SCRIPTS = ("decode", "cameras", "sorting", "answers", "drawing", "moving", "asking", "main")
+READING = "words"  # beside a text model
 _SHADERS = ("splat.vert", "splat.frag", "screen.vert", "show.frag")
 _FORMAT, _VERSION = "langflash-page", 1
 _SLOT = re.compile(r"<!-- (\w+) -->")
+_COMMENT = re.compile(r"^ *//.*\n", re.MULTILINE)  # a line of its own
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,8 @@ class Phrases:
 
     texts: P phrases, the first `num_asked` of them shown at once. scores (P, K): d_k . t.
     negatives (M, K): d_k . n of what a phrase is compared with. gram (K, K): d_j . d_k.
-    temperature, threshold: as of a query in mode relevancy.
+    temperature, threshold: as of a query in mode relevancy. dictionary (K, C): d_k, where phrases are to be
+    answered that are not among the texts.
     """
 
     texts: tuple[str, ...]
@@ -54,6 +59,16 @@ class Phrases:
     gram: Tensor
     temperature: float
     threshold: float
+    dictionary: Tensor | None = None
+
+
+@dataclass(frozen=True)
+class TextModel:
+    """MiniLM for a page: weights (a safetensors file), tokens by id, and what its licences ask to be told."""
+
+    weights: bytes
+    tokens: tuple[str, ...]
+    licence: str
 
 
 @dataclass(frozen=True)
@@ -76,10 +91,18 @@ class _Column:
         return b"".join((values >> 8 * byte & 255).astype(np.uint8).tobytes() for byte in range(self.width))
 
 
-def write_html(scene: Scene, path: Path, *, phrases: Phrases | None = None, title: str | None = None) -> None:
+def write_html(
+    scene: Scene,
+    path: Path,
+    *,
+    phrases: Phrases | None = None,
+    text_model: TextModel | None = None,
+    title: str | None = None,
+) -> None:
     """A page of the scene; without phrases it is looked at only.
 
     Args:
+        text_model: reads other phrases in the page; the phrases come with their dictionary.
         title: of the page; None: the file's name.
 
     Raises:
@@ -88,27 +111,46 @@ def write_html(scene: Scene, path: Path, *, phrases: Phrases | None = None, titl
     check_some(scene.gaussians, path)
     header, payload = _encoded(scene, phrases)
     header["title"] = path.stem if title is None else title
-    packed = base64.b64encode(zlib.compress(payload, 9)).decode()
-    write_atomically(path, _page(header, packed).encode())
+    write_atomically(path, _page(header, payload, text_model).encode())
 
 
-def _page(header: dict, packed: str) -> str:
+def _page(header: dict, payload: bytes, text_model: TextModel | None) -> str:
     """The whole page; what is put in is not looked through for more places to fill."""
     folder = Path(__file__).parent / "page"
 
     def source(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8")
 
-    program = "\n".join(source(f"{name}.js") for name in SCRIPTS)
-    shaders = {name: shader_source(f"web/{name}") for name in _SHADERS}
+    names = SCRIPTS if text_model is None else (READING, *SCRIPTS)
+    program = _COMMENT.sub("", "\n".join(source(f"{name}.js") for name in names))
+    shaders = {name: _COMMENT.sub("", shader_source(f"web/{name}")) for name in _SHADERS}
     parts = {
         "title": html.escape(header["title"]),
         "style": f"<style>\n{source('page.css')}</style>",
         "header": _json_script("header", {**header, "shaders": shaders, "constants": _constants()}),
-        "payload": f'<script type="text/plain" id="payload">{packed}</script>',
+        "payload": _packed_script("payload", payload),
+        "text": _text_scripts(text_model),
         "program": f'<script>\n"use strict";\n(() => {{\n{program}}})();\n</script>',
     }
     return _SLOT.sub(lambda slot: parts[slot[1]], source("page.html"))
+
+
+def _packed_script(name: str, content: bytes) -> str:
+    """Bytes, deflated, in base64."""
+    packed = base64.b64encode(zlib.compress(content, 9)).decode()
+    return f'<script type="text/plain" id="{name}">{packed}</script>'
+
+
+def _text_scripts(model: TextModel | None) -> str:
+    if model is None:
+        return ""
+    return "\n".join(
+        (
+            _packed_script("tower", model.weights),
+            _packed_script("tokens", "\n".join(model.tokens).encode()),
+            f"<!--\n{model.licence.replace('--', '- -')}\n-->",
+        )
+    )
 
 
 def _json_script(name: str, content: dict) -> str:
@@ -141,11 +183,14 @@ def _encoded(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
     if phrases is not None:
         header["phrases"] = {
             "texts": list(phrases.texts), "asked": phrases.num_asked, "atoms": len(phrases.gram),
-            "negatives": len(phrases.negatives), "temperature": phrases.temperature,
-            "threshold": phrases.threshold,
+            "temperature": phrases.temperature, "threshold": phrases.threshold,
         }  # fmt: skip
         columns += _weight_columns(scene)
-        columns += [_shares(name, getattr(phrases, name), header) for name in ("scores", "negatives", "gram")]
+        tables = {
+            "scores": phrases.scores, "negatives": phrases.negatives, "gram": phrases.gram,
+            "dictionary": phrases.dictionary,
+        }  # fmt: skip
+        columns += [_shares(name, table, header) for name, table in tables.items() if table is not None]
     header["columns"] = [[c.name, c.values.size, c.width, c.differences] for c in columns]
     return header, b"".join(column.packed() for column in columns)
 

@@ -46,9 +46,11 @@ class _Parts(HTMLParser):
 
 @dataclass(frozen=True)
 class ReadPage:
-    """header: of the page. columns: integers by name. texts: by tag. addresses: what it links to."""
+    """header: of the page. columns: integers by name. scripts: what else is packed. texts: by tag.
+    addresses: what it links to."""
 
     header: dict
+    scripts: dict[str, bytes]
     columns: dict[str, np.ndarray]
     texts: dict[str, str]
     addresses: list[str]
@@ -91,6 +93,10 @@ class ReadPage:
         signed = self.columns[name].astype(np.uint16).view(np.int16)
         return signed.reshape(-1, phrases["atoms"]) * phrases[f"{name}Unit"]
 
+    def dictionary(self) -> np.ndarray:
+        """d_k (K, C)."""
+        return self.numbers("dictionary").reshape(self.header["phrases"]["atoms"], -1)
+
 
 def read_page(path: Path) -> ReadPage:
     """A page of `write_html`."""
@@ -98,7 +104,12 @@ def read_page(path: Path) -> ReadPage:
     parts.feed(path.read_text(encoding="utf-8"))
     scripts = dict(parts.scripts)
     header = json.loads(scripts["header"])
-    payload = zlib.decompress(base64.b64decode(scripts["payload"], validate=True))
+    packed = {
+        name: zlib.decompress(base64.b64decode(scripts[name], validate=True))
+        for name in ("payload", "tower", "tokens")
+        if name in scripts
+    }
+    payload = packed.pop("payload")
     columns, start = {}, 0
     for name, count, width, differences in header["columns"]:
         planes = np.frombuffer(payload, np.uint8, count * width, start).reshape(width, count).astype(np.int64)
@@ -110,4 +121,4 @@ def read_page(path: Path) -> ReadPage:
             values = np.cumsum(values) % (1 << 8 * width)
         columns[name] = values
     assert start == len(payload)
-    return ReadPage(header, columns, parts.texts, parts.addresses)
+    return ReadPage(header, packed, columns, parts.texts, parts.addresses)

@@ -10,13 +10,14 @@ import pytest
 import torch
 
 from langflash_core import pipeline
-from langflash_core.errors import OutputError, PromptError
+from langflash_core.errors import InputError, OutputError, PromptError
 from langflash_core.export import export
-from langflash_core.export.html import MOST_WEIGHTS, SCRIPTS, Phrases, write_html
+from langflash_core.export.html import MOST_WEIGHTS, READING, SCRIPTS, Phrases, write_html
 from langflash_core.language.answers import COVERED_ALPHA, MIN_AREA, TOP_FRACTION
 from langflash_core.language.relevance import EMPTY_NORM, compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.language.vocabulary import all_phrases
+from langflash_core.resources import asset_path
 from langflash_core.scene.bare import bare_scene
 from langflash_core.splat.projection import NEAR
 from langflash_core.types import Scene
@@ -182,17 +183,33 @@ def test_bad_questions_are_one_sentence(tmp_path, spoken_room):
     assert "phrases" not in read_page(tmp_path / "a.html").header
 
 
+def test_a_page_takes_the_text_model_along(tmp_path, spoken_room):
+    pipeline.web_page(spoken_room, tmp_path / "a.html", with_text=True)
+    page = read_page(tmp_path / "a.html")
+    assert np.allclose(page.dictionary(), spoken_room.semantics.dictionary.numpy(), atol=1e-4)
+    assert page.scripts["tower"] == asset_path("weights/minilm_l6_v2_rowint8.safetensors").read_bytes()
+    tokens = page.scripts["tokens"].decode().split("\n")
+    assert len(tokens) == 30522 and tokens.index("[SEP]") == 102
+    assert "MIT License" in (tmp_path / "a.html").read_text(encoding="utf-8")
+
+
+def test_the_text_model_fits_one_space(tmp_path):
+    with pytest.raises(InputError, match="'minilm' only, the scene speaks 'none'"):
+        pipeline.web_page(bare_scene(random_gaussians(3), "made"), tmp_path / "a.html", with_text=True)
+    assert not os.listdir(tmp_path)
+
+
 def test_a_page_links_to_nothing_and_is_small(tmp_path):
     write_html(bare_scene(random_gaussians(1), "made"), tmp_path / "a.html")
     text = (tmp_path / "a.html").read_text(encoding="utf-8")
     assert read_page(tmp_path / "a.html").addresses == []
     assert "http" not in text.replace("http-equiv", "")
     assert "default-src 'none'" in text
-    assert len(text) < 66_000
+    assert len(text) < 60_000
 
 
 def test_every_script_is_in_the_page():
-    assert {path.stem for path in PAGE.glob("*.js")} == set(SCRIPTS)
+    assert {path.stem for path in PAGE.glob("*.js")} == {READING, *SCRIPTS}
 
 
 def test_the_page_judges_by_our_numbers():

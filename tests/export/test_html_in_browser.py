@@ -18,6 +18,7 @@ import langflash_core as lf
 from langflash_core import pipeline
 from langflash_core.export.html import write_html
 from langflash_core.export.png import heat_over
+from langflash_core.language.algebra import encode_prompts
 from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.language.spaces import language_space
 from langflash_core.resources import asset_path
@@ -298,4 +299,44 @@ def test_the_demo_room(page, tmp_path):
     assert page.value(_READY) < 60_000  # milliseconds to the first picture, drawn in software
     for phrase in ("plant", "floor", "piano"):
         check_answer(page, lf.query(trained, phrase, view=0), 0)
+    assert page.errors == []
+
+
+PHRASES_OF_ALL_KINDS = (
+    "armchair", "A Wooden  Chair, please!", "Stühle für Größe", "t-shirt & jeans (blue)", "日本 table",
+    "x" * 101 + " door", "unbelievably photosynthesizing houseplants", "sofa + cushion", "chair - armchair",
+    "3.5 mm jack", "naïve café\u200b lamp",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def reading(scene, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("pages") / "reading.html"
+    pipeline.web_page(scene, path, ["armchair"], with_text=True)
+    return path
+
+
+def test_the_page_reads_words_as_we_do(page, reading):
+    """To a cosine of 1 - 1e-5: the same int8 weights, float32 here and there."""
+    page.open(reading, (320, 240))
+    page.value(_READY)
+    page.value("langflash.then((page) => page.learn('something'))")
+    read = f"{json.dumps(PHRASES_OF_ALL_KINDS)}.map((each) => [...tower.encode(each)])"
+    found = np.array(page.value(f"langflash.then((page) => page.tower).then((tower) => {read})"))
+    ours = encode_prompts(language_space("minilm"), PHRASES_OF_ALL_KINDS).numpy()
+    assert (found * ours).sum(1) == pytest.approx(np.ones(len(ours)), abs=1e-5)
+
+
+def test_a_phrase_that_the_vocabulary_lacks_is_answered(page, reading, scene):
+    page.open(reading, (640, 480))
+    page.value(_READY)
+    page.value("document.getElementById('box').focus()")
+    page.type("comfy old seat")
+    page.key("Enter")
+    until(page, "document.querySelectorAll('.chip:not([data-state=pending])').length === 2")
+    check_answer(page, lf.query(scene, "comfy old seat", view=0), 0)
+    page.value("document.getElementById('box').focus()")
+    page.type("chair - chair")
+    page.key("Enter")
+    until(page, "document.getElementById('note').textContent.includes('cancels itself out')")
     assert page.errors == []

@@ -74,6 +74,8 @@ def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
         raise InputError(f"--what {args.what} is a picture; name a .png instead of {args.output.name}")
     if args.seconds is not None and suffix != ".mp4":
         raise InputError("--seconds is for videos; name an .mp4, or leave it away")
+    if args.with_text and suffix != PAGE_OUT:
+        raise InputError("--with-text is for web pages; name an .html, or leave it away")
     _check_camera_words(args, suffix)
 
 
@@ -114,9 +116,15 @@ def _write_page(args: Namespace, scene: Scene, prompts: list[str], choice: Camer
         progress("reading the vocabulary", 0.2)
         make_folder(args.output.parent)
         phrases = pipeline.web_page(
-            scene, args.output, prompts, threshold=args.threshold, title=args.scene.stem
+            scene,
+            args.output,
+            prompts,
+            threshold=args.threshold,
+            with_text=args.with_text,
+            title=args.scene.stem,
         )
-    answers = f", answers {len(phrases.texts)} phrases" if phrases else ""
+    known = "any phrase" if args.with_text else f"{len(phrases.texts)} phrases" if phrases else ""
+    answers = f", answers {known}" if known else ""
     return f"{len(scene.gaussians):,} Gaussians, {args.output.stat().st_size / 1e6:.1f} MB{answers}"
 
 

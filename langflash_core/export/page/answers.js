@@ -8,21 +8,30 @@ const MIN_AREA = 0.0005;     // of all pixels: a smaller mask is noise
 const BINS = 4096;
 
 class Answers {
-  // phrases: of readPhrases, with scores (P, K), negativeScores (M, K), gram (K, K), flat.
+  // phrases: of readPhrases: P scores and M negatives of K numbers each; gram (K, K) and dictionary (K, C), flat.
   constructor(phrases, count) {
     Object.assign(this, phrases);
     this.count = count;
     this.norms = this.featureNorms();
     this.against = new Float32Array(count).fill(-Infinity);  // the best negative of each Gaussian
-    for (let row = 0; row < phrases.negatives; ++row) {
-      const mixed = this.mixed(this.negativeScores, row);
+    for (const negative of this.negatives) {
+      const mixed = this.mixed(negative);
       for (let i = 0; i < count; ++i) this.against[i] = Math.max(this.against[i], mixed[i]);
     }
   }
 
-  // sum_k w_ik a_k (count,) of row a of a table (., K).
-  mixed(table, row) {
-    const scores = table.subarray(row * this.atoms, (row + 1) * this.atoms);
+  // Take in a phrase by its unit vector (C,); its row.
+  learn(text, vector) {
+    const channels = vector.length;
+    const scores = new Float32Array(this.atoms).map((_, atom) => {
+      return vector.reduce((sum, value, c) => sum + value * this.dictionary[atom * channels + c], 0);
+    });
+    this.scores.push(scores);
+    return this.texts.push(text) - 1;
+  }
+
+  // sum_k w_ik a_k (count,) of scores a (K,).
+  mixed(scores) {
     const sums = new Float32Array(this.count);
     for (const { atoms, shares } of this.weights)
       for (let i = 0; i < this.count; ++i) sums[i] += shares[i] * scores[atoms[i]];
@@ -63,7 +72,7 @@ class Answers {
     };
     write(0, this.norms);
     rows.forEach((row, place) => {
-      write(place + 1, this.mixed(this.scores, row).map((score, i) => score - this.against[i]));
+      write(place + 1, this.mixed(this.scores[row]).map((score, i) => score - this.against[i]));
     });
     return { texels, layers };
   }

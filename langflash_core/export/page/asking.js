@@ -28,11 +28,13 @@ function element(name, text, attributes = {}) {
 
 class Asking {
   // texts: of all phrases. asked: rows of those that have a chip. changed(): another chip, or another one chosen.
-  constructor(texts, asked, changed) {
-    Object.assign(this, { texts, asked, changed });
+  // learn(text): takes in another phrase, a promise of its row; null where the page cannot.
+  constructor(texts, asked, { changed, learn }) {
+    Object.assign(this, { texts, asked, changed, learn });
     this.chosen = null;
     this.answers = new Map();  // by row: {score, found}
     this.pointed = 0;
+    this.rows = [];
     this.box = document.getElementById("box");
     this.list = document.getElementById("suggestions");
     this.chips = document.getElementById("chips");
@@ -70,14 +72,17 @@ class Asking {
 
   suggest() {
     this.rows = completions(this.texts, this.box.value, this.asked);
-    this.pointed = 0;
-    const unknown = this.box.value.trim() && !this.rows.length && !this.knows(this.box.value);
+    this.pointed = this.learn ? -1 : 0;  // what is typed will do where any phrase will
+    this.picked = false;  // with the arrows
+    const unknown = this.box.value.trim() && !this.rows.length && !this.learn && this.known() < 0;
     this.say(unknown ? `This page knows ${this.texts.length} phrases; this is none of them.` : "");
     this.listed();
   }
 
-  knows(text) {
-    return this.texts.some((known) => known.toLowerCase() === text.trim().toLowerCase());
+  // The row of what is typed; -1 where there is none.
+  known() {
+    const typed = this.box.value.trim().toLowerCase();
+    return this.texts.findIndex((text) => text.toLowerCase() === typed);
   }
 
   listed() {
@@ -108,15 +113,23 @@ class Asking {
     else if (steps[event.key] && this.rows.length) {
       event.preventDefault();
       this.pointed = (this.pointed + steps[event.key] + this.rows.length) % this.rows.length;
+      this.picked = true;
       this.listed();
     }
   }
 
-  enter() {
-    const typed = this.box.value.trim().toLowerCase();
-    const again = this.asked.find((row) => this.texts[row].toLowerCase() === typed);
-    if (again !== undefined) this.ask(again);
-    else if (this.rows && this.rows.length) this.ask(this.rows[this.pointed]);
+  async enter() {
+    const [typed, known] = [this.box.value.trim(), this.known()];
+    if (known >= 0 && !this.picked) this.ask(known);
+    else if (this.rows.length && (this.picked || !this.learn)) this.ask(this.rows[this.pointed]);
+    else if (this.learn && typed) {
+      this.say("Reading …");
+      try {
+        this.ask(await this.learn(typed));
+      } catch (error) {
+        this.say(error.message);
+      }
+    }
   }
 
   say(sentence) {

@@ -4,6 +4,8 @@ const TEXELS = 4;  // a Gaussian takes in its texture: see shaders/web/project.v
 
 // Bytes of a base64 text that holds a zlib stream.
 async function inflated(text) {
+  if (typeof DecompressionStream === "undefined")
+    throw new Error("This browser is too old to unpack the scene; update it, or try another.");
   const packed = atob(text);
   const bytes = new Uint8Array(packed.length);
   for (let i = 0; i < packed.length; ++i) bytes[i] = packed.charCodeAt(i);
@@ -89,6 +91,15 @@ function readPhrases(header, columns) {
     const unit = phrases[name + "Unit"];
     return Float32Array.from(new Int16Array(columns[name].buffer), (value) => value * unit);
   };
-  const [scores, negativeScores, gram] = ["scores", "negatives", "gram"].map(numbers);
-  return { ...phrases, weights, scores, negativeScores, gram };
+  const rows = (table) => Array.from({ length: table.length / phrases.atoms }, (_, row) => {
+    return table.subarray(row * phrases.atoms, (row + 1) * phrases.atoms);
+  });
+  return {
+    ...phrases,
+    weights,
+    scores: rows(numbers("scores")),
+    negatives: rows(numbers("negatives")),
+    gram: numbers("gram"),
+    dictionary: columns.dictionary ? numbers("dictionary") : null,
+  };
 }

@@ -50,7 +50,10 @@ class Page {
       changed: () => this.moved(),
       aimed: (x, y) => this.aim(x, y),
     });
-    this.asking = this.answers && new Asking(phrases.texts, [...Array(phrases.asked).keys()], () => this.asked());
+    this.asking = this.answers && new Asking(phrases.texts, [...Array(phrases.asked).keys()], {
+      changed: () => this.asked(),
+      learn: find("tower") && ((text) => this.learn(text)),
+    });
     this.furnish();
     addEventListener("resize", () => this.resize());
     this.canvas.addEventListener("webglcontextlost", () => location.reload());
@@ -67,6 +70,7 @@ class Page {
     });
     find("views").append(...views);
     for (const name of ["photo", "heat"]) find(name).addEventListener("click", () => this.setHeat(name === "heat"));
+    find("credit").hidden = !find("tower");
     find("modes").hidden = find("ask").hidden = !this.answers;
     find("helper").addEventListener("click", () => this.help());
     find("help").addEventListener("click", () => find("help").close());
@@ -129,6 +133,13 @@ class Page {
     this.carried = row === null ? null : this.drawing.upload(this.answers.numbers([row]));
     if (row !== null && !this.heat) this.setHeat(true);
     this.moved();
+  }
+
+  // The row of another phrase. The text tower is unpacked when it is first needed.
+  async learn(text) {
+    this.tower ??= Promise.all(["tower", "tokens"].map((name) => inflated(find(name).textContent)))
+      .then(([weights, tokens]) => new TextTower(weights, new TextDecoder().decode(tokens).split("\n")));
+    return this.answers.learn(text, (await this.tower).encode(text));
   }
 
   // --- sizes ---

@@ -106,6 +106,8 @@ def test_a_page_holds_the_whole_scene_and_the_phrases(run, refused, scene_file, 
     page = tmp_path / "b.html"
     assert "leave --view away" in refused("export", scene_file, "-o", page, "--view", "1")
     assert "is for videos" in refused("export", scene_file, "-o", page, "--seconds", "3")
+    assert "is for web pages" in refused("export", scene_file, "-o", tmp_path / "b.ply", "--with-text")
+    assert "'minilm' only" in refused("export", ply_file, "-o", page, "--with-text")
     assert "needs a phrase" in refused("export", scene_file, "-o", page, "--threshold", "0.5")
     assert "is a picture" in refused("export", scene_file, "-o", page, "--what", "rgb")
 
