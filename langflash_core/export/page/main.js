@@ -71,7 +71,7 @@ class Page {
     find("views").append(...views);
     for (const name of ["photo", "heat"]) find(name).addEventListener("click", () => this.setHeat(name === "heat"));
     find("credit").hidden = !find("tower");
-    find("modes").hidden = find("ask").hidden = !this.answers;
+    document.querySelectorAll(".asking").forEach((part) => (part.hidden = !this.answers));
     find("helper").addEventListener("click", () => this.help());
     find("help").addEventListener("click", () => find("help").close());
     addEventListener("keydown", (event) => this.key(event));
