@@ -25,7 +25,7 @@ from langflash_core.resources import asset_path
 from langflash_core.scene.bare import bare_scene
 from langflash_core.splat import render
 from langflash_core.types import QueryResult, Scene
-from tests.app.window.scenes import PHRASES, room
+from tests.app.window.scenes import CHAIR, PHRASES, room
 from tests.export.browser import Browser, browser, needs_browser
 from tests.export.splats import random_gaussians
 from tests.export.test_html import ODD, PAGE, phrases_of
@@ -102,7 +102,7 @@ def shown(page: Browser) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"), np.float64) / 255
 
 
-def until(page: Browser, expression: str, seconds: float = 30) -> None:
+def until(page: Browser, expression: str, seconds: float = 90) -> None:
     """Wait for something to become true."""
     deadline = time.monotonic() + seconds
     while not page.value(expression):
@@ -207,6 +207,21 @@ def test_mouse_wheel_and_keys_move_the_camera(opened):
     assert np.allclose(place(opened), start, atol=1e-6)
     opened.key("2", "Digit2", "2")
     until(opened, landed.replace("VIEW", "1"))
+
+
+def test_a_double_click_turns_around_what_lies_there(page, file, scene):
+    page.open(file, (640, 480), "#bare")
+    page.value(_READY)
+    front = np.array(CHAIR) - (0, 0, 0.2)
+    camera = scene.camera(0, 640, 480)
+    x, y = (camera.K[:2] @ torch.tensor(front, dtype=torch.float32) / front[2]).tolist()
+    for clicks in (1, 2):
+        for kind in ("mousePressed", "mouseReleased"):
+            held = {"button": "left", "clickCount": clicks}
+            page.call("Input.dispatchMouseEvent", type=kind, x=round(x), y=round(y), **held)
+    until(page, "langflash.then((page) => page.moving.flight === null && page.orbit.target[0] < -0.05)")
+    target = np.array(page.value("langflash.then((page) => page.orbit.target)"))
+    assert np.linalg.norm(target - front) < 0.05
 
 
 def test_fingers_turn_and_pinch(page, file):
