@@ -16,6 +16,7 @@ STAMP := .venv/.langflash
 PHOTOS := assets/photos/living_room_left.png assets/photos/living_room_right.png
 GL_PACKAGES := libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri libglx-mesa0
 WINDOW_PACKAGES := xvfb xdotool
+BROWSER_PACKAGES := chromium
 TRY_GL := $(BIN)/python -c 'import moderngl; moderngl.create_standalone_context(backend="egl", require=330).release()'
 
 # `install PACKAGE...` with apt, as root or through a sudo that asks for no password.
@@ -32,7 +33,7 @@ APT := install() { \
 help:
 	@sed -n '1,4s/^# //p' Makefile
 
-setup: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window
+setup: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window $(STAMP)-browser
 
 run: $(STAMP)-package $(STAMP)-gl
 	@if $(BIN)/python -c 'import glfw, sys; sys.exit(not glfw.init())' 2>/dev/null; then \
@@ -47,7 +48,7 @@ run: $(STAMP)-package $(STAMP)-gl
 	$(BIN)/langflash query out/living_room.langflash plant floor window --size 756x588 -o out/query; \
 	echo "The pictures are in $(CURDIR)/out and $(CURDIR)/out/query."
 
-test: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window
+test: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
@@ -59,7 +60,7 @@ test: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window
 # passes cover three settings, one and two threads, and two shuffled orders; SEED repeats an order.
 SEED ?= 1
 SHUFFLED = --random-order --random-order-seed
-test-machines: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window
+test-machines: setup
 	env -u ATEN_CPU_CAPABILITY OMP_NUM_THREADS=2 $(BIN)/python -m pytest
 	ATEN_CPU_CAPABILITY=avx2 OMP_NUM_THREADS=1 $(BIN)/python -m pytest $(SHUFFLED)=$(SEED)
 	ATEN_CPU_CAPABILITY=default OMP_NUM_THREADS=2 $(BIN)/python -m pytest $(SHUFFLED)=$$(($(SEED) + 1))
@@ -116,6 +117,16 @@ $(STAMP)-window: | $(STAMP)-package
 	if [ "$$(uname)" = Linux ] && ! { command -v Xvfb && command -v xdotool; } >/dev/null; then \
 		install $(WINDOW_PACKAGES) || { \
 			echo "The window's tests will be skipped: they need the packages $(WINDOW_PACKAGES)." >&2; \
+			exit 0; }; \
+	fi; \
+	touch $@
+
+# A browser for the tests of web pages; without it those tests are skipped.
+$(STAMP)-browser: | $(STAMP)-package
+	@$(APT); \
+	if [ "$$(uname)" = Linux ] && ! { command -v chromium || command -v chromium-browser || command -v google-chrome; } >/dev/null; then \
+		install $(BROWSER_PACKAGES) || { \
+			echo "The tests of web pages will be skipped: they need the package $(BROWSER_PACKAGES)." >&2; \
 			exit 0; }; \
 	fi; \
 	touch $@

@@ -15,14 +15,17 @@ from torch import Tensor
 
 from langflash_core.ahead import Ahead, begin
 from langflash_core.errors import InputError, PromptError, ViewError, WeightsError
+from langflash_core.export.html import Phrases, TextModel, write_html
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.views import load_views, source_pictures
 from langflash_core.language.answers import answer
 from langflash_core.language.clip import load_clip_images
 from langflash_core.language.gaussians import gaussian_relevance
-from langflash_core.language.relevance import Mode, compile_query, relevance_maps
+from langflash_core.language.minilm import load_minilm, shipped_files
+from langflash_core.language.relevance import Mode, compile_query, finite_dictionary, relevance_maps
 from langflash_core.language.spaces import language_space
+from langflash_core.language.vocabulary import all_phrases
 from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_network
 from langflash_core.network.build import network_class
 from langflash_core.network.checkpoints.store import part_folder
@@ -34,6 +37,7 @@ from langflash_core.network.semantics.crops import crop_atoms
 from langflash_core.network.semantics.grouping import Groups
 from langflash_core.network.semantics.lifting import lifted_weights
 from langflash_core.network.semantics.sam2 import Sam2, sam2_checkpoint
+from langflash_core.resources import asset_path
 from langflash_core.running import Progress, Run
 from langflash_core.scene.assemble import assemble
 from langflash_core.scene.prune import prune
@@ -194,8 +198,7 @@ def select(scene: Scene, prompts: Sequence[str], *, threshold: float | None = No
     """
     compiled = compile_query(scene, language_space(scene.semantics.space), list(prompts))
     limit = compiled.threshold if threshold is None else threshold
-    if not 0 <= limit <= 1:
-        raise PromptError(f"the threshold {limit} is out of range; relevancy needs 0 to 1")
+    _check_threshold(limit)
     best = gaussian_relevance(scene.semantics, compiled).amax(0)  # (N,)
     passing = best >= limit if scene.semantics.num_atoms else torch.zeros_like(best, dtype=torch.bool)
     if not bool(passing.any()):
@@ -205,6 +208,79 @@ def select(scene: Scene, prompts: Sequence[str], *, threshold: float | None = No
             "lower the threshold"
         )
     return scene.rows(passing)
+
+
+def web_page(
+    scene: Scene,
+    path: Path,
+    prompts: Sequence[str] = (),
+    *,
+    threshold: float | None = None,
+    with_text: bool = False,
+    title: str | None = None,
+) -> Phrases | None:
+    """Write a web page that shows the scene and answers these phrases and the whole vocabulary.
+
+    Args:
+        prompts: shown as asked from the start.
+        threshold: relevancy in [0, 1] from which a phrase counts as present; None: the scene's calibration.
+        with_text: the page holds the text tower of `minilm`, too, and answers any phrase; 28 MB more.
+        title: of the page; None: the file's name.
+
+    Returns:
+        What the page answers; None for a scene without language that was asked nothing.
+
+    Raises:
+        PromptError: a prompt or the threshold cannot be used. WeightsError: the space has no text weights.
+        InputError: `with_text`, and the scene speaks another space.
+        OutputError: the scene holds no Gaussians, or the path cannot be written.
+    """
+    if with_text and scene.semantics.space != "minilm":
+        raise InputError(f"a page reads words of 'minilm' only, the scene speaks '{scene.semantics.space}'")
+    phrases = None
+    if prompts or scene.semantics.num_atoms:
+        compiled = compile_query(
+            scene,
+            language_space(scene.semantics.space),
+            list(dict.fromkeys((*prompts, *all_phrases()))),
+        )
+        limit = compiled.threshold if threshold is None else threshold
+        _check_threshold(limit)
+        atoms = compiled.factor  # of which D = atoms Q: products with phrases are the same
+        phrases = Phrases(
+            texts=compiled.texts,
+            num_asked=len(dict.fromkeys(prompts)),
+            scores=compiled.prompts @ atoms.T,
+            negatives=compiled.negatives @ atoms.T,
+            gram=atoms @ atoms.T,
+            temperature=compiled.temperature,
+            threshold=limit,
+            dictionary=finite_dictionary(scene) if with_text else None,
+        )
+    text_model = _text_model() if with_text else None
+    write_html(scene, path, phrases=phrases, text_model=text_model, title=title)
+    return phrases
+
+
+def _text_model() -> TextModel:
+    """The shipped tower as a page takes it.
+
+    Raises:
+        WeightsError: its files are missing or damaged.
+    """
+    weights, _ = shipped_files()
+    ids = load_minilm().tokenizer.get_vocab()
+    licences = [asset_path(f"licences/{name}") for name in ("minilm_l6_v2.md", "minilm_l6_v2_LICENSE.txt")]
+    return TextModel(
+        weights=weights.read_bytes(),
+        tokens=tuple(sorted(ids, key=lambda token: ids[token])),
+        licence="\n".join(licence.read_text(encoding="utf-8") for licence in licences),
+    )
+
+
+def _check_threshold(threshold: float) -> None:
+    if not 0 <= threshold <= 1:
+        raise PromptError(f"the threshold {threshold} is out of range; relevancy needs 0 to 1")
 
 
 def _posed(views: Views, viewmats: Tensor | None, preset: str) -> Views:

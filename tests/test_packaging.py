@@ -179,6 +179,13 @@ def test_holds_every_shader_and_asset(wheel):
             assert sizes.get(name) == path.stat().st_size, name
 
 
+def test_holds_what_web_pages_are_made_of(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+    page = ROOT / "langflash_core" / "export" / "page"
+    assert {path.relative_to(ROOT).as_posix() for path in page.iterdir()} <= names
+
+
 def test_holds_no_tests_and_no_rubbish(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()

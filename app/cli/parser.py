@@ -271,9 +271,14 @@ def _add_export(commands) -> None:
         "meta.json (a SOG in a folder), .glb, .usd, .usda, .usdc, .usdz: Gaussians; "
         "transforms.json, cameras.txt (COLMAP): photos and their poses; "
         ".json: COCO masks of --prompt; .csv, or .glb with --what boxes: their boxes; "
-        ".npz: a view as numbers; .mp4: a flight",
+        ".npz: a view as numbers; .mp4: a flight; .html: a web page that shows the scene and answers phrases",
     )
-    command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="keep only what answers one of these")
+    command.add_argument(
+        "--prompt",
+        nargs="+",
+        metavar="PHRASE",
+        help="keep only what answers one of these; of an .html: shown as asked",
+    )
     command.add_argument(
         "--threshold", type=kept_fraction, metavar="T", help="relevancy to keep, between 0 and 1"
     )
@@ -285,6 +290,9 @@ def _add_export(commands) -> None:
     )
     command.add_argument(
         "--all-views", action="store_true", help="from every photo: FILE_0, FILE_1 and so on"
+    )
+    command.add_argument(
+        "--with-text", action="store_true", help="an .html answers any phrase, and is 28 MB larger"
     )
     command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of an .mp4 (default: 6)")
     _add_camera(command)

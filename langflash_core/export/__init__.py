@@ -11,6 +11,7 @@ from langflash_core.export import (
     compressed_ply,
     glb,
     gltf,
+    html,
     ksplat,
     npz,
     ply,
@@ -20,7 +21,7 @@ from langflash_core.export import (
     spz,
     usd,
 )
-from langflash_core.formats import COMPRESSED_PLY, SOG_FOLDER, USD, kind_of
+from langflash_core.formats import COMPRESSED_PLY, PAGE_OUT, SOG_FOLDER, USD, kind_of
 from langflash_core.scene.file import load, save
 from langflash_core.types import Frame, QueryResult, Scene
 
@@ -54,6 +55,7 @@ WRITERS: dict[str, tuple[Writer, ...]] = {
         Writer(Scene, "a scene", gltf.write_glb),
         Writer(QueryResult, "an answer", glb.write_answer),
     ),
+    PAGE_OUT: (Writer(Scene, "a scene", html.write_html),),
     cameras.COLMAP: (Writer(Scene, "a scene", cameras.write_colmap),),
     cameras.TRANSFORMS: (Writer(Scene, "a scene", cameras.write_transforms),),
     **{suffix: (Writer(Scene, "a scene", usd.write_usd),) for suffix in USD},

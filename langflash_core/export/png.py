@@ -15,8 +15,8 @@ from langflash_core.files import write_atomically
 from langflash_core.types import LUMA, Frame, QueryResult
 
 RANGES = {"cosine": (-1.0, 1.0), "relevancy": (0.0, 1.0)}
-_GLOW = 0.85  # share of the heat colour where relevance is highest
-_DIM = 0.6  # brightness of the photo where nothing was found
+GLOW = 0.85  # share of the heat colour where relevance is highest
+DIM = 0.6  # brightness of the photo where nothing was found
 
 
 def write_rgb(path: Path, rgb: Tensor) -> None:
@@ -79,8 +79,8 @@ def heat_over(relevance: Tensor, rgb: Tensor, threshold: float, mode: str) -> Te
     strength = torch.nan_to_num(relevance.float(), nan=low)
     glow = ((strength - (neutral + threshold) / 2) / (threshold - neutral)).clamp(0, 1)[..., None]
     colours = heat(0.4 + 1.2 * (strength - threshold) / max(high - threshold, 1e-6))
-    dimmed = _DIM * (0.7 * grey + 0.3 * view)
-    lit = _GLOW * colours * (0.35 + 0.65 * grey) + (1 - _GLOW) * view
+    dimmed = DIM * (0.7 * grey + 0.3 * view)
+    lit = GLOW * colours * (0.35 + 0.65 * grey) + (1 - GLOW) * view
     return dimmed * (1 - glow) + lit * glow
 
 
@@ -138,7 +138,7 @@ def write_answer(result: QueryResult, path: Path) -> None:
     view = result.frame.rgb.float().cpu().clamp(0, 1)
     grey = (view * view.new_tensor(LUMA)).sum(-1, keepdim=True)
     lit = colours[labels].float() / 255 * (0.45 + 0.55 * grey)
-    write_rgb(path, torch.where((labels > 0)[..., None], lit, _DIM * grey.expand_as(view)))
+    write_rgb(path, torch.where((labels > 0)[..., None], lit, DIM * grey.expand_as(view)))
 
 
 def to_8bit(rgb: Tensor) -> np.ndarray:

@@ -20,18 +20,18 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import torch
 from PIL import Image
 
 from langflash_core.errors import OutputError, SceneFileError
-from langflash_core.export.codebooks import palette, scalar_codebook
-from langflash_core.export.packing import check_some, from_smallest_three, morton_order, smallest_three, told
+from langflash_core.export.packing import check_some, from_smallest_three, morton_order, told
+from langflash_core.export.quantised import Palette, quantised
 from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, to_scene
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.formats import SOG_FOLDER
-from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.types import Scene
 
-_BOOK, _PALETTE, _ROW = 256, 8192, 64  # numbers, palette entries, entries a row of its picture
+_BOOK, _ROW = 256, 64  # numbers, entries a row of the palette's picture
 _LARGEST_SIDE = 16383  # pixels of a WebP
 _TAGS = 252  # alpha of a rotation whose largest entry is the first
 _MOST_META = 1 << 20  # bytes of meta.json
@@ -187,64 +187,47 @@ def _quats(stored: np.ndarray) -> np.ndarray:
 
 def _encoded(scene: Scene) -> dict[str, bytes]:
     """Files by name."""
-    gaussians = scene.gaussians.map(lambda values: values.detach().cpu().float())
-    order = morton_order(gaussians.means.double().numpy())
-    means, quats, scales, opacities, sh = (
-        values[order].numpy()
-        for values in (
-            gaussians.means, gaussians.quats, gaussians.scales, gaussians.opacities, gaussians.sh,
-        )
-    )  # fmt: skip
-    count = len(means)
-    logs = np.sign(means) * np.log1p(np.abs(means.astype(np.float64)))
-    lowest, highest = logs.min(0), logs.max(0)
-    whole = np.round((logs - lowest) / np.where(highest > lowest, highest - lowest, 1) * 65535).astype(int)
-    largest, others = smallest_three(quats)
-    turns = np.clip(np.round((others * math.sqrt(2) * 0.5 + 0.5) * 255), 0, 255)
-    scale_book, scale_places = scalar_codebook(np.log(scales), _BOOK)
-    colour_book, colour_places = scalar_codebook(sh[:, 0], _BOOK)
-    alphas = np.round(np.clip(opacities, 0, 1) * 255)[:, None]
+    order = morton_order(scene.gaussians.means.detach().cpu().double().numpy())
+    stored = quantised(scene.gaussians.rows(torch.from_numpy(order)))
     files = {
-        "means_l.webp": _picture(whole & 255),
-        "means_u.webp": _picture(whole >> 8),
-        "quats.webp": _picture(np.concatenate((turns, _TAGS + largest[:, None]), 1)),
-        "scales.webp": _picture(scale_places),
-        "sh0.webp": _picture(np.concatenate((colour_places, alphas), 1)),
+        "means_l.webp": _picture(stored.steps & 255),
+        "means_u.webp": _picture(stored.steps >> 8),
+        "quats.webp": _picture(np.concatenate((stored.turns, _TAGS + stored.largest[:, None]), 1)),
+        "scales.webp": _picture(stored.scales),
+        "sh0.webp": _picture(np.concatenate((stored.colours, stored.opacities[:, None]), 1)),
     }
     meta = {
         "version": 2,
         "asset": {"generator": "LangFlash"},
-        "count": count,
+        "count": len(stored.steps),
         "means": {
-            "mins": lowest.tolist(), "maxs": highest.tolist(), "files": ["means_l.webp", "means_u.webp"],
+            "mins": stored.lowest.tolist(), "maxs": stored.highest.tolist(),
+            "files": ["means_l.webp", "means_u.webp"],
         },
-        "scales": {"codebook": scale_book.tolist(), "files": ["scales.webp"]},
+        "scales": {"codebook": stored.scale_book.tolist(), "files": ["scales.webp"]},
         "quats": {"files": ["quats.webp"]},
-        "sh0": {"codebook": colour_book.tolist(), "files": ["sh0.webp"]},
+        "sh0": {"codebook": stored.colour_book.tolist(), "files": ["sh0.webp"]},
     }  # fmt: skip
-    num_bases = min(sh.shape[1], (MAX_SHOWN_DEGREE + 1) ** 2)
-    if num_bases > 1:
-        meta["shN"], more = _encoded_harmonics(sh[:, 1:num_bases])
+    if stored.harmonics is not None:
+        meta["shN"], more = _encoded_harmonics(stored.harmonics)
         files |= more
     return {SOG_FOLDER: json.dumps(meta).encode(), **files}
 
 
-def _encoded_harmonics(rest: np.ndarray) -> tuple[dict, dict[str, bytes]]:
-    """The entry of meta.json and the two pictures of coefficients (n, S - 1, 3)."""
-    bases = rest.shape[1]
-    entries, labels = palette(rest.reshape(len(rest), -1), _PALETTE)
-    book, places = scalar_codebook(entries, _BOOK)
-    rows = -(-len(entries) // _ROW)
+def _encoded_harmonics(harmonics: Palette) -> tuple[dict, dict[str, bytes]]:
+    """The entry of meta.json and the two pictures of a palette."""
+    count, bases, _ = harmonics.places.shape
+    rows, labels = -(-count // _ROW), harmonics.labels
     stored = np.zeros((rows * _ROW, bases, 3), np.int64)
-    stored[: len(entries)] = places.reshape(-1, bases, 3)
+    stored[:count] = harmonics.places
     files = {
         "shN_centroids.webp": _picture(stored.reshape(-1, 3), _ROW * bases),
         "shN_labels.webp": _picture(np.stack((labels & 255, labels >> 8, np.zeros_like(labels)), 1)),
     }
     described = {
-        "count": len(entries),
+        "count": count,
         "bands": math.isqrt(bases + 1) - 1,
-        "codebook": book.tolist(),
+        "codebook": harmonics.book.tolist(),
         "files": list(files),
     }
     return described, files

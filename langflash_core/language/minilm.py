@@ -118,12 +118,20 @@ def load_minilm() -> MiniLM:
     Raises:
         WeightsError: its files are missing or damaged.
     """
+    return read_minilm(*shipped_files())
+
+
+def shipped_files() -> tuple[Path, Path]:
+    """Weights and tokenizer of the shipped tower.
+
+    Raises:
+        WeightsError: they are missing.
+    """
     try:
         weights = asset_path("weights/minilm_l6_v2_rowint8.safetensors")
-        vocabulary = asset_path("weights/minilm_l6_v2_tokenizer.json")
+        return weights, asset_path("weights/minilm_l6_v2_tokenizer.json")
     except FileNotFoundError as error:
         raise WeightsError(str(error)) from error
-    return read_minilm(weights, vocabulary)
 
 
 def read_minilm(weights: Path, vocabulary: Path) -> MiniLM:

@@ -82,6 +82,12 @@ def reduce_dictionary(dictionary: Tensor) -> tuple[Tensor, Tensor]:
     return r.T.contiguous().to(dictionary), q.T.contiguous().to(dictionary)
 
 
+def finite_dictionary(scene: Scene | Semantics) -> Tensor:
+    """The dictionary (K, C) as queries see it: silent atoms, and those that are not finite, are 0."""
+    dictionary = _spoken_dictionary(scene)
+    return torch.where(finite_atoms(dictionary)[:, None], dictionary, 0.0)
+
+
 def calibration_of(scene: Scene | None, space: LanguageSpace) -> Calibration:
     """The scene's own calibration (`Record.calibration`) over the defaults of its space.
 

@@ -333,6 +333,12 @@ EVALUATED = _group_sets(_EVALUATED)
 """Phrases kept for the evaluation -> every class group that they are true of."""
 
 
+def all_phrases() -> tuple[str, ...]:
+    """Every phrase of the tables, class groups first, each once."""
+    own = (phrase for phrases in OWN.values() for phrase in phrases)
+    return tuple(dict.fromkeys((*OWN, *own, *BROADER, *EVALUATED)))
+
+
 def content(phrase: str) -> frozenset[str]:
     """The words of a phrase that carry meaning, without plurals: "the shelves" -> {"shelf"}."""
     words = frozenset(re.findall(r"[a-z0-9]+", phrase.lower())) - _STOP_WORDS

@@ -1,14 +1,7 @@
 // Purpose: colour of spherical harmonics up to degree 3; twin of langflash_core/geometry/harmonics.py.
 // Source: constants and signs of Kerbl et al. 2023.
-// Frames: direction from the camera to the Gaussian, world, unit. SH_VEC4S and SH_DEGREE are set by the program.
-
-in vec4 in_sh[SH_VEC4S];  // coefficients (S, 3), flat, padded to whole vec4s
-
-vec3 coefficient(int base) {
-    int first = 3 * base;
-    return vec3(
-        in_sh[first / 4][first % 4], in_sh[(first + 1) / 4][(first + 1) % 4], in_sh[(first + 2) / 4][(first + 2) % 4]);
-}
+// Frames: direction from the camera to the Gaussian, world, unit. SH_DEGREE is set by the program; who includes
+//         this says before where coefficients are: vec3 coefficient(int base).
 
 vec3 sh_colour(vec3 direction) {
     vec3 colour = 0.5 + 0.28209479177387814 * coefficient(0);

@@ -1,16 +1,23 @@
 #version 330 core
 // Purpose: one Gaussian to its footprint and colour, written by transform feedback in draw order.
 // Source: langflash_core/splat/projection.py is the twin.
-// Frames: in world, out pixels.
-
-#include "footprint.glsl"
-#include "harmonics.glsl"
-#include "luma.glsl"
+// Frames: in world, out pixels. SH_DEGREE and SH_VEC4S are set by the program.
 
 in vec4 in_mean;   // xyz world, w opacity
 in vec4 in_quat;   // wxyz, unit
 in vec3 in_scale;  // standard deviations, world
+in vec4 in_sh[SH_VEC4S];  // coefficients (S, 3), flat, padded to whole vec4s
 in float in_tint;  // 0 none, n / 255 for colour n - 1
+
+vec3 coefficient(int base) {
+    int first = 3 * base;
+    return vec3(
+        in_sh[first / 4][first % 4], in_sh[(first + 1) / 4][(first + 1) % 4], in_sh[(first + 2) / 4][(first + 2) % 4]);
+}
+
+#include "footprint.glsl"
+#include "harmonics.glsl"
+#include "luma.glsl"
 
 #ifndef CUT  // the bench compares with one for all
 #define CUT sqrt(2.0 * log(max(in_mean.w / ALPHA_MIN, 1.0)))  // where alpha falls below 1/255

@@ -159,7 +159,7 @@ def test_places_and_suffixes_that_cannot_be(tmp_path, result):
         (lambda: export(result, blocker / "a.npz"), "is a file"),
         (lambda: export(result, tmp_path / "nowhere" / "a.png"), "does not exist"),
         (lambda: export(result.frame, tmp_path), "suffix"),
-        (lambda: export(result, tmp_path / "a.xyz"), r"use \.compressed\.ply, \.glb, \.json, "),
+        (lambda: export(result, tmp_path / "a.xyz"), r"use \.compressed\.ply, \.glb, \.html, \.json, "),
         (lambda: export(result, tmp_path / "a.langflash"), r"holds a scene; use \.glb, \.json, \.npz, \.png"),
     ):
         with pytest.raises(OutputError, match=words) as caught:

@@ -17,7 +17,7 @@ from torch.nn.functional import normalize
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export import READERS, WRITERS, export, read, spz
 from langflash_core.export.packing import morton_order
-from langflash_core.formats import CAMERAS_OUT, DROPPED, SCENES_IN, SCENES_OUT
+from langflash_core.formats import CAMERAS_OUT, DROPPED, PAGE_OUT, SCENES_IN, SCENES_OUT
 from langflash_core.geometry.harmonics import SH_C0, sh_to_colour
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
@@ -204,7 +204,7 @@ def test_the_list_of_names_is_the_table():
     assert set(READERS) == set(SCENES_IN)
     assert {kind for kind, ws in WRITERS.items() if any(w.subject is Scene for w in ws)} == set(
         SCENES_OUT
-    ) | set(CAMERAS_OUT)
+    ) | {*CAMERAS_OUT, PAGE_OUT}
     assert set(DROPPED) == set(READERS) - {"meta.json"}
 
 

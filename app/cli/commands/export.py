@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TextIO
 
 from langflash_core.errors import InputError, PromptError, SceneFileError
-from langflash_core.formats import ALL_OUT, ANSWERS_OUT, CAMERAS_OUT, SCENES_OUT, kind_of
+from langflash_core.formats import ALL_OUT, ANSWERS_OUT, CAMERAS_OUT, PAGE_OUT, SCENES_OUT, kind_of
 from langflash_core.types import Camera, QueryResult, Scene
 
 from .. import shots
@@ -43,16 +43,17 @@ def run(args: Namespace, out: TextIO) -> None:
 
 def write_whole(scene: Scene, path: Path, renderer: Renderer, prompts: Sequence[str]) -> None:
     """What `export` writes of a scene without further options: all of it, or of every photo's view what
-    answers the phrases where `path` is a table or masks of them (`ANSWERS_OUT`).
+    answers the phrases where `path` is a table or masks of them (`ANSWERS_OUT`), a web page with them asked.
 
     Raises:
         LangFlashError: the path cannot be written, or no mask is found.
     """
     suffix = kind_of(path)
     unset = dict.fromkeys(("threshold", "what", "seconds", "view", "camera", "size"))
-    asked = list(prompts) if suffix in ANSWERS_OUT else []
+    asked = list(prompts) if suffix in (*ANSWERS_OUT, PAGE_OUT) else []
+    every = suffix == ".csv"
     args = Namespace(
-        scene=path.parent, output=path, prompt=asked, all_views=suffix == ".csv", backend=renderer, **unset
+        scene=path.parent, output=path, prompt=asked, all_views=every, backend=renderer, with_text=False, **unset
     )
     _writer(suffix, None)(args, scene, asked, CameraChoice(0, None, None))
 
@@ -65,6 +66,7 @@ def _writer(suffix: str, what: str | None) -> Callable[..., str]:
         ".json": _write_masks,
         ".npz": _write_numbers,
         ".png": _write_pictures,
+        PAGE_OUT: _write_page,
     }
     return others.get(suffix, _write_scene)
 
@@ -90,6 +92,8 @@ def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
         raise InputError(f"--what {args.what} is a picture; name a .png instead of {args.output.name}")
     if args.seconds is not None and suffix != ".mp4":
         raise InputError("--seconds is for videos; name an .mp4, or leave it away")
+    if args.with_text and suffix != PAGE_OUT:
+        raise InputError("--with-text is for web pages; name an .html, or leave it away")
     _check_camera_words(args, suffix)
 
 
@@ -99,7 +103,7 @@ def _check_camera_words(args: Namespace, suffix: str) -> None:
         if set(looked_at) - {"size"}:
             raise InputError(f"--all-views looks from every photo; leave --{looked_at[0]} away")
         looked_at.append("all-views")
-    if suffix in (*SCENES_OUT, *CAMERAS_OUT) and looked_at and args.what != "boxes":
+    if suffix in (*SCENES_OUT, *CAMERAS_OUT, PAGE_OUT) and looked_at and args.what != "boxes":
         raise InputError(f"a {suffix} holds the whole scene, not a view of it; leave --{looked_at[0]} away")
     extra = [name for name in looked_at if name != "size"]
     if suffix == ".mp4" and extra:
@@ -119,6 +123,27 @@ def _write_scene(args: Namespace, scene: Scene, prompts: list[str], choice: Came
     share = f" of {len(scene.gaussians):,}" if prompts else ""
     beside = f", its language in {side_car(args.output).name}" if _has_side_car(args.output, chosen) else ""
     return f"{len(chosen.gaussians):,}{share} Gaussians, {args.output.stat().st_size / 1e6:.1f} MB{beside}"
+
+
+def _write_page(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
+    """A web page with the whole scene; --prompt says what it shows as asked."""
+    from langflash_core import pipeline
+    from langflash_core.files import make_folder
+
+    with ProgressBar() as progress:
+        progress("reading the vocabulary", 0.2)
+        make_folder(args.output.parent)
+        phrases = pipeline.web_page(
+            scene,
+            args.output,
+            prompts,
+            threshold=args.threshold,
+            with_text=args.with_text,
+            title=args.scene.stem,
+        )
+    known = "any phrase" if args.with_text else f"{len(phrases.texts)} phrases" if phrases else ""
+    answers = f", answers {known}" if known else ""
+    return f"{len(scene.gaussians):,} Gaussians, {args.output.stat().st_size / 1e6:.1f} MB{answers}"
 
 
 def _has_side_car(path: Path, scene: Scene) -> bool:

@@ -18,6 +18,7 @@ from langflash_core.formats import ALL_OUT
 from langflash_core.language.spaces import language_space
 from langflash_core.types import Scene
 from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, stripes
+from tests.export.pages import read_page
 from tests.export.splats import damaged_files
 
 TORCH = ("--backend", "torch")
@@ -84,10 +85,31 @@ def test_splat_files_have_no_language(refused, ply_file, tmp_path):
         ("render", ply_file, "--what", "relevance", "--prompt", "armchair", "-o", tmp_path / "a.png"),
         ("export", ply_file, "--prompt", "armchair", "-o", tmp_path / "a.ply"),
         ("export", ply_file, "--prompt", "armchair", "-o", tmp_path / "a.json"),
+        ("export", ply_file, "--prompt", "armchair", "-o", tmp_path / "a.html"),
     ):
         assert "langflash reconstruct" in refused(*words, *TORCH)
     assert "no atoms" in refused("render", ply_file, "--what", "atoms", "-o", tmp_path / "a.png", *TORCH)
     assert "no view 1" in refused("render", ply_file, "--view", "1", "-o", tmp_path / "a.png", *TORCH)
+
+
+def test_a_page_holds_the_whole_scene_and_the_phrases(run, refused, scene_file, ply_file, tmp_path):
+    outcome = run(
+        "export", scene_file, "-o", tmp_path / "new" / "a.html", "--prompt", "armchair", " floor  lamp"
+    )
+    assert outcome.code == 0, outcome.err
+    assert f"{WIDTH * HEIGHT:,} Gaussians" in outcome.out and "answers" in outcome.out
+    header = read_page(tmp_path / "new" / "a.html").header
+    assert header["title"] == scene_file.stem and header["count"] == WIDTH * HEIGHT
+    assert header["phrases"]["texts"][:2] == ["armchair", "floor lamp"] and header["phrases"]["asked"] == 2
+    outcome = run("export", ply_file, "-o", tmp_path / "new" / "plain.html")
+    assert outcome.code == 0 and "answers" not in outcome.out
+    page = tmp_path / "b.html"
+    assert "leave --view away" in refused("export", scene_file, "-o", page, "--view", "1")
+    assert "is for videos" in refused("export", scene_file, "-o", page, "--seconds", "3")
+    assert "is for web pages" in refused("export", scene_file, "-o", tmp_path / "b.ply", "--with-text")
+    assert "'minilm' only" in refused("export", ply_file, "-o", page, "--with-text")
+    assert "needs a phrase" in refused("export", scene_file, "-o", page, "--threshold", "0.5")
+    assert "is a picture" in refused("export", scene_file, "-o", page, "--what", "rgb")
 
 
 @pytest.mark.parametrize("suffix", IN_ORDER)

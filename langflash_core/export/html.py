@@ -1,0 +1,259 @@
+"""A web page that holds a scene and answers phrases: one file, no network, any browser with WebGL 2.
+
+The page is `page/page.html` with its style, its program and the shaders of `shaders/web/` in it; its
+policy lets it load nothing. The scene is a JSON header and one deflate stream in base64: columns of 8 or
+16 bits a value, the low and high bytes of the wider ones apart, some as differences from the row before
+(of 16 bits: zigzag). Gaussians are stored as in `quantised.py`, their positions around the first view's
+camera, at most four weights each in 8 bits. Phrases are numbers per atom, d_k . t, in 16 bits: the page
+needs neither dictionary nor text tower, and answers those that it was made with. With a text model it holds
+both, deflated as they are, and answers any phrase.
+
+Axes and units are the scene's own. What is lost: photos, weights beyond the fourth, and without a text
+model the dictionary.
+"""
+
+import base64
+import html
+import json
+import re
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from langflash_core.export.colours import HEAT_STOPS
+from langflash_core.export.packing import check_some, morton_order
+from langflash_core.export.png import DIM, GLOW
+from langflash_core.export.quantised import quantised
+from langflash_core.files import write_atomically
+from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.graphics import shader_source
+from langflash_core.types import Scene
+
+MOST_WEIGHTS = 4  # of a Gaussian; `langflash bench` says what the others are worth
+SCRIPTS = ("decode", "cameras", "sorting", "answers", "drawing", "moving", "asking", "main")
+READING = "words"  # beside a text model
+_SHADERS = ("splat.vert", "splat.frag", "screen.vert", "show.frag")
+_FORMAT, _VERSION = "langflash-page", 1
+_SLOT = re.compile(r"<!-- (\w+) -->")
+_COMMENT = re.compile(r"^ *//.*\n", re.MULTILINE)  # a line of its own
+
+
+@dataclass(frozen=True)
+class Phrases:
+    """What a page answers, over K atoms.
+
+    texts: P phrases, the first `num_asked` of them shown at once. scores (P, K): d_k . t.
+    negatives (M, K): d_k . n of what a phrase is compared with. gram (K, K): d_j . d_k.
+    temperature, threshold: as of a query in mode relevancy. dictionary (K, C): d_k, where phrases are to be
+    answered that are not among the texts.
+    """
+
+    texts: tuple[str, ...]
+    num_asked: int
+    scores: Tensor
+    negatives: Tensor
+    gram: Tensor
+    temperature: float
+    threshold: float
+    dictionary: Tensor | None = None
+
+
+@dataclass(frozen=True)
+class TextModel:
+    """MiniLM for a page: weights (a safetensors file), tokens by id, and what its licences ask to be told."""
+
+    weights: bytes
+    tokens: tuple[str, ...]
+    licence: str
+
+
+@dataclass(frozen=True)
+class _Column:
+    """Integers under a name: `width` bytes each, as they are or as differences."""
+
+    name: str
+    values: np.ndarray
+    width: int = 1
+    differences: bool = False
+
+    def packed(self) -> bytes:
+        """As the page's program reads it."""
+        top = 1 << 8 * self.width
+        values = self.values.astype(np.int64).ravel()
+        if self.differences:
+            values = np.diff(values, prepend=0) % top
+            if self.width == 2:  # 1, -1, 2, -2, ... are 2, 1, 4, 3, ...
+                values = np.where(values < top // 2, 2 * values, 2 * (top - values) - 1)
+        return b"".join((values >> 8 * byte & 255).astype(np.uint8).tobytes() for byte in range(self.width))
+
+
+def write_html(
+    scene: Scene,
+    path: Path,
+    *,
+    phrases: Phrases | None = None,
+    text_model: TextModel | None = None,
+    title: str | None = None,
+) -> None:
+    """A page of the scene; without phrases it is looked at only.
+
+    Args:
+        text_model: reads other phrases in the page; the phrases come with their dictionary.
+        title: of the page; None: the file's name.
+
+    Raises:
+        OutputError: no Gaussian, or an unwritable path.
+    """
+    check_some(scene.gaussians, path)
+    header, payload = _encoded(scene, phrases)
+    header["title"] = path.stem if title is None else title
+    write_atomically(path, _page(header, payload, text_model).encode())
+
+
+def _page(header: dict, payload: bytes, text_model: TextModel | None) -> str:
+    """The whole page; what is put in is not looked through for more places to fill."""
+    folder = Path(__file__).parent / "page"
+
+    def source(name: str) -> str:
+        return (folder / name).read_text(encoding="utf-8")
+
+    names = SCRIPTS if text_model is None else (READING, *SCRIPTS)
+    program = _COMMENT.sub("", "\n".join(source(f"{name}.js") for name in names))
+    shaders = {name: _COMMENT.sub("", shader_source(f"web/{name}")) for name in _SHADERS}
+    parts = {
+        "title": html.escape(header["title"]),
+        "style": f"<style>\n{source('page.css')}</style>",
+        "header": _json_script("header", {**header, "shaders": shaders, "constants": _constants()}),
+        "payload": _packed_script("payload", payload),
+        "text": _text_scripts(text_model),
+        "program": f'<script>\n"use strict";\n(() => {{\n{program}}})();\n</script>',
+    }
+    return _SLOT.sub(lambda slot: parts[slot[1]], source("page.html"))
+
+
+def _packed_script(name: str, content: bytes) -> str:
+    """Bytes, deflated, in base64."""
+    packed = base64.b64encode(zlib.compress(content, 9)).decode()
+    return f'<script type="text/plain" id="{name}">{packed}</script>'
+
+
+def _text_scripts(model: TextModel | None) -> str:
+    if model is None:
+        return ""
+    return "\n".join(
+        (
+            _packed_script("tower", model.weights),
+            _packed_script("tokens", "\n".join(model.tokens).encode()),
+            f"<!--\n{model.licence.replace('--', '- -')}\n-->",
+        )
+    )
+
+
+def _json_script(name: str, content: dict) -> str:
+    """JSON that no tag can end."""
+    text = json.dumps(content, ensure_ascii=True, allow_nan=False).replace("<", "\\u003c")
+    return f'<script type="application/json" id="{name}">{text}</script>'
+
+
+def _constants() -> dict[str, str]:
+    """What `show.frag` is given, as GLSL."""
+    stops = ", ".join("vec3({})".format(", ".join(f"{part:.3f}" for part in stop)) for stop in HEAT_STOPS)
+    return {"GLOW": str(GLOW), "DIM": str(DIM), "STOPS": str(len(HEAT_STOPS)), "HEAT_STOPS": stops}
+
+
+def _encoded(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
+    """Header and columns."""
+    origin = invert_rigid(scene.viewmats[0].double())[:3, 3]
+    if scene.view_ids is None:  # in no order that says what is near
+        scene = scene.rows(torch.from_numpy(morton_order(scene.gaussians.means.double().cpu().numpy())))
+    books, columns = _gaussian_columns(scene, origin)
+    header = {
+        "format": _FORMAT,
+        "version": _VERSION,
+        "count": len(scene.gaussians),
+        "origin": origin.tolist(),
+        "views": _views(scene, origin),
+        "viewSize": list(scene.view_size),
+        **books,
+    }
+    if phrases is not None:
+        header["phrases"] = {
+            "texts": list(phrases.texts), "asked": phrases.num_asked, "atoms": len(phrases.gram),
+            "temperature": phrases.temperature, "threshold": phrases.threshold,
+        }  # fmt: skip
+        columns += _weight_columns(scene)
+        tables = {
+            "scores": phrases.scores, "negatives": phrases.negatives, "gram": phrases.gram,
+            "dictionary": phrases.dictionary,
+        }  # fmt: skip
+        columns += [_shares(name, table, header) for name, table in tables.items() if table is not None]
+    header["columns"] = [[c.name, c.values.size, c.width, c.differences] for c in columns]
+    return header, b"".join(column.packed() for column in columns)
+
+
+def _views(scene: Scene, origin: Tensor) -> list[dict]:
+    """Each photo's camera: rows of its rotation, its place from the origin, fx, fy, cx, cy in pixels."""
+    views = []
+    for viewmat, K in zip(scene.viewmats.double(), scene.Ks.double(), strict=True):
+        place = invert_rigid(viewmat)[:3, 3] - origin
+        pinhole = [K[0, 0], K[1, 1], K[0, 2], K[1, 2]]
+        views.append(
+            {
+                "turn": viewmat[:3, :3].tolist(),
+                "eye": place.tolist(),
+                "pinhole": [float(value) for value in pinhole],
+            }
+        )
+    return views
+
+
+def _gaussian_columns(scene: Scene, origin: Tensor) -> tuple[dict, list[_Column]]:
+    """What of the header the Gaussians need, and their columns."""
+    around = scene.gaussians.means.double().cpu() - origin.cpu()
+    stored = quantised(scene.gaussians.map(lambda values: values.cpu()), around)
+    columns = [_Column("largest", stored.largest), _Column("opacity", stored.opacities, differences=True)]
+    for axis in range(3):
+        columns += [
+            _Column(f"mean{axis}", stored.steps[:, axis], 2, True),
+            _Column(f"turn{axis}", stored.turns[:, axis], differences=True),
+            _Column(f"scale{axis}", stored.scales[:, axis], differences=True),
+            _Column(f"colour{axis}", stored.colours[:, axis], differences=True),
+        ]
+    header = {
+        "lowest": stored.lowest.tolist(),
+        "highest": stored.highest.tolist(),
+        "scaleBook": stored.scale_book.tolist(),
+        "colourBook": stored.colour_book.tolist(),
+    }
+    if stored.harmonics is not None:
+        palette = stored.harmonics
+        header |= {"harmonicsBook": palette.book.tolist(), "bases": palette.places.shape[1]}
+        columns += [_Column("palette", palette.places), _Column("label", palette.labels, 2)]
+    return header, columns
+
+
+def _weight_columns(scene: Scene) -> list[_Column]:
+    """The largest weights of each Gaussian, of 255 in sum."""
+    semantics = scene.semantics
+    values, places = semantics.weight_values.cpu().topk(min(MOST_WEIGHTS, semantics.weight_ids.shape[1]), 1)
+    ids = semantics.weight_ids.cpu().gather(1, places).numpy()
+    shares = torch.nan_to_num(values / values.sum(1, keepdim=True).clamp_min(1e-9)).double().numpy()
+    steps = np.round(255 * shares).astype(int)
+    ids = np.where(steps > 0, ids, 0)
+    width = 1 if semantics.num_atoms <= 256 else 2
+    columns = []
+    for place in range(steps.shape[1]):
+        columns += [_Column(f"atom{place}", ids[:, place], width), _Column(f"weight{place}", steps[:, place])]
+    return columns
+
+
+def _shares(name: str, numbers: Tensor, header: dict) -> _Column:
+    """Signed numbers in 16 bits of the largest, which the header takes."""
+    values = numbers.detach().double().cpu().numpy()
+    largest = max(float(np.abs(values).max(initial=0)), 1e-9)
+    header["phrases"][f"{name}Unit"] = largest / 32767
+    return _Column(name, np.round(values / largest * 32767).astype(int) % 65536, 2)

@@ -1,0 +1,102 @@
+// What Gaussians say to phrases, and whether a picture answers one. Twins: app/gl/fast.py and
+// langflash_core/language/answers.py, whose constants these are.
+
+const EMPTY_NORM = 1e-4;     // |F| of pixels that say nothing
+const COVERED_ALPHA = 0.5;   // from here on a pixel shows the scene
+const TOP_FRACTION = 0.001;  // of the covered pixels: their mean is the score
+const MIN_AREA = 0.0005;     // of all pixels: a smaller mask is noise
+const BINS = 4096;
+
+class Answers {
+  // phrases: of readPhrases: P scores and M negatives of K numbers each; gram (K, K) and dictionary (K, C), flat.
+  constructor(phrases, count) {
+    Object.assign(this, phrases);
+    this.count = count;
+    this.norms = this.featureNorms();
+    this.against = new Float32Array(count).fill(-Infinity);  // the best negative of each Gaussian
+    for (const negative of this.negatives) {
+      const mixed = this.mixed(negative);
+      for (let i = 0; i < count; ++i) this.against[i] = Math.max(this.against[i], mixed[i]);
+    }
+  }
+
+  // Take in a phrase by its unit vector (C,); its row.
+  learn(text, vector) {
+    const channels = vector.length;
+    const scores = new Float32Array(this.atoms).map((_, atom) => {
+      return vector.reduce((sum, value, c) => sum + value * this.dictionary[atom * channels + c], 0);
+    });
+    this.scores.push(scores);
+    return this.texts.push(text) - 1;
+  }
+
+  // sum_k w_ik a_k (count,) of scores a (K,).
+  mixed(scores) {
+    const sums = new Float32Array(this.count);
+    for (const { atoms, shares } of this.weights)
+      for (let i = 0; i < this.count; ++i) sums[i] += shares[i] * scores[atoms[i]];
+    const totals = this.shareTotals();
+    for (let i = 0; i < this.count; ++i) sums[i] /= totals[i];
+    return sums;
+  }
+
+  // What the shares of each Gaussian sum up to; 1 where it carries nothing.
+  shareTotals() {
+    if (!this.totals) {
+      this.totals = new Float32Array(this.count);
+      for (const { shares } of this.weights) for (let i = 0; i < this.count; ++i) this.totals[i] += shares[i];
+      this.totals.forEach((total, i) => (this.totals[i] = total || 1));
+    }
+    return this.totals;
+  }
+
+  // |f_i| (count,), out of w^T G w.
+  featureNorms() {
+    const totals = this.shareTotals();
+    return new Float32Array(this.count).map((_, i) => {
+      let square = 0;
+      for (const one of this.weights)
+        for (const two of this.weights)
+          square += one.shares[i] * two.shares[i] * this.gram[one.atoms[i] * this.atoms + two.atoms[i]];
+      return Math.sqrt(Math.max(square, 0)) / totals[i];
+    });
+  }
+
+  // Texels (count, layers, 4) float32 of numbers to splat: |f|, then f . t less the best negative of each phrase.
+  numbers(rows) {
+    const layers = Math.ceil((1 + rows.length) / 3);
+    const texels = new Float32Array(4 * layers * this.count);
+    const write = (place, values) => {
+      const first = 4 * Math.floor(place / 3) + (place % 3);
+      for (let i = 0; i < this.count; ++i) texels[4 * layers * i + first] = values[i];
+    };
+    write(0, this.norms);
+    rows.forEach((row, place) => {
+      write(place + 1, this.mixed(this.scores[row]).map((score, i) => score - this.against[i]));
+    });
+    return { texels, layers };
+  }
+
+  relevance(norm, difference) {
+    return norm < EMPTY_NORM ? 0 : 1 / (1 + Math.exp(-this.temperature * difference / norm));
+  }
+}
+
+// {score, found, area} of relevance and alpha, one number a pixel each.
+function judged(relevance, alpha, threshold) {
+  const covered = relevance.filter((_, pixel) => alpha[pixel] >= COVERED_ALPHA);
+  const area = covered.reduce((sum, value) => sum + (value >= threshold), 0) / relevance.length;
+  const score = meanOfHighest(covered, Math.ceil(TOP_FRACTION * covered.length));
+  return { score, area, found: score >= threshold && area >= MIN_AREA };
+}
+
+// Mean of the `most` highest of values in [0, 1]; 0 of none. Sorts the few bins that matter.
+function meanOfHighest(values, most) {
+  const bin = (value) => Math.min(BINS - 1, Math.floor(value * BINS));
+  const counts = new Uint32Array(BINS);
+  for (const value of values) ++counts[bin(value)];
+  let lowest = BINS - 1;
+  for (let passed = counts[lowest]; passed < most && lowest > 0; passed += counts[lowest]) --lowest;
+  const highest = values.filter((value) => bin(value) >= lowest).sort().slice(-most);
+  return most ? highest.reduce((sum, value) => sum + value, 0) / most : 0;
+}

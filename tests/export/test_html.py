@@ -1,0 +1,222 @@
+"""Pages: what a round trip keeps, what may stand in names, and that what they say is what we say."""
+
+import os
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from langflash_core import pipeline
+from langflash_core.errors import InputError, OutputError, PromptError
+from langflash_core.export import export
+from langflash_core.export.html import MOST_WEIGHTS, READING, SCRIPTS, Phrases, write_html
+from langflash_core.language.answers import COVERED_ALPHA, MIN_AREA, TOP_FRACTION
+from langflash_core.language.relevance import EMPTY_NORM, compile_query
+from langflash_core.language.spaces import language_space
+from langflash_core.language.vocabulary import all_phrases
+from langflash_core.resources import asset_path
+from langflash_core.scene.bare import bare_scene
+from langflash_core.splat.projection import NEAR
+from langflash_core.types import Scene
+from tests.app.window.scenes import PHRASES, room
+from tests.export.pages import ReadPage, read_page
+from tests.export.splats import random_gaussians
+from tests.splat.scenes import cloud
+
+PAGE = Path(pipeline.__file__).parent / "export" / "page"
+ODD = (
+    "\"quoted\" & 'single'",
+    "</script><script>alert(1)</script>",
+    "<!-- header -->",
+    "Stuhl für Größe 日本 🪑",
+)
+
+
+@pytest.fixture(scope="module")
+def spoken_room() -> Scene:
+    return room(language_space("minilm").encode(PHRASES))
+
+
+def phrases_of(scene: Scene, texts: tuple[str, ...]) -> Phrases:
+    """Random scores, as if these texts had been asked."""
+    rng = torch.Generator().manual_seed(0)
+    count = scene.semantics.num_atoms
+    scores = torch.rand(len(texts) + 2, count, generator=rng) * 2 - 1
+    gram = scene.semantics.dictionary @ scene.semantics.dictionary.T
+    return Phrases(texts, len(texts), scores[:-2], scores[-2:], gram, 10.0, 0.8)
+
+
+def compare(scene: Scene, page: ReadPage) -> None:
+    """Positions to half a step of 65535 of their logarithm, rotations to 8 bits, the rest to the books."""
+    before, after = scene.gaussians, page.gaussians()
+    assert len(before) == len(after) == page.header["count"]
+    around = before.means.double() - torch.tensor(page.header["origin"])
+    span = torch.tensor(page.header["highest"]) - torch.tensor(page.header["lowest"])
+    bound = 0.5 / 65535 * span * (1 + around.abs()) + 1e-6 * (1 + before.means.abs())
+    assert ((after.means - before.means).abs() <= 1.001 * bound).all()
+    apart = torch.stack([(after.quats + sign * before.quats).norm(dim=-1) for sign in (1, -1)]).amin(0)
+    assert float(4 * torch.asin((apart.double() / 2).clamp(max=1)).max()) <= 0.02
+    assert float((after.opacities - before.opacities).abs().max()) <= 0.5 / 255 + 1e-6
+    for name, values, found in (
+        ("scaleBook", before.scales.log(), after.scales.log()),
+        ("colourBook", before.sh[:, 0], after.sh[:, 0]),
+    ):
+        nearest = (values.double()[..., None] - torch.tensor(page.header[name])).abs().amin(-1)
+        assert ((found - values).abs() <= nearest + 1e-4).all()
+        assert len(page.header[name]) <= 256
+
+
+@pytest.mark.parametrize("count", [1, 2, 700])
+@pytest.mark.parametrize("degree", [0, 1, 3])
+def test_gaussians_come_back_within_the_steps(tmp_path, count, degree):
+    scene = bare_scene(random_gaussians(count, degree), "made")
+    scene = replace(scene, view_ids=torch.zeros(count, dtype=torch.int64))  # keeps the order
+    export(scene, tmp_path / "a.html")
+    page = read_page(tmp_path / "a.html")
+    compare(scene, page)
+    rest = scene.gaussians.sh[:, 1:]
+    found = page.gaussians().sh[:, 1:]
+    assert found.shape == rest.shape
+    assert not rest.numel() or float((found - rest).abs().max()) <= float(rest.amax() - rest.amin()) / 64
+
+
+def test_places_far_from_the_origin_lose_nothing_to_it(tmp_path):
+    scene = cloud(50, num_atoms=0, degree=0, dtype=torch.float32)
+    far = torch.tensor([4.0e4, -7.0e4, 1.0e4])
+    moved = replace(scene.gaussians, means=scene.gaussians.means + far)
+    viewmat = scene.viewmats.clone()
+    viewmat[:, :3, 3] -= viewmat[:, :3, :3].float() @ far
+    write_html(replace(scene, gaussians=moved, viewmats=viewmat), tmp_path / "a.html")
+    page = read_page(tmp_path / "a.html")
+    assert np.allclose(page.header["origin"], far, atol=1e-2)
+    assert max(map(abs, page.header["lowest"] + page.header["highest"])) < 2
+
+
+def test_splats_of_other_programs_are_stored_along_a_curve(tmp_path):
+    scene = bare_scene(random_gaussians(300), "made")
+    write_html(scene, tmp_path / "a.html")
+    means = (read_page(tmp_path / "a.html").gaussians().means, scene.gaussians.means)
+    ordered, plain = (float(each.diff(dim=0).norm(dim=-1).mean()) for each in means)
+    assert ordered < 0.5 * plain
+
+
+def test_an_empty_scene_is_refused_and_nothing_written(tmp_path):
+    nothing = bare_scene(random_gaussians(1), "made").rows(torch.zeros(1, dtype=torch.bool))
+    with pytest.raises(OutputError, match="no Gaussians"):
+        export(nothing, tmp_path / "a.html")
+    assert not os.listdir(tmp_path)
+
+
+def test_an_old_page_stays_whole_where_the_new_one_cannot_be_written(tmp_path, monkeypatch):
+    scene = bare_scene(random_gaussians(3), "made")
+    path = tmp_path / "a.html"
+    path.write_text("old")
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OutputError, match="No space left"):
+        write_html(scene, path)
+    assert path.read_text() == "old" and os.listdir(tmp_path) == ["a.html"]
+    with pytest.raises(OutputError, match="does not exist"):
+        write_html(scene, tmp_path / "nowhere" / "a.html")
+
+
+def test_names_may_hold_anything(tmp_path):
+    scene = cloud(5, num_atoms=3, degree=0, dtype=torch.float32)
+    for title in ODD:
+        write_html(scene, tmp_path / "a.html", phrases=phrases_of(scene, ODD), title=title)
+        page = read_page(tmp_path / "a.html")
+        assert page.header["phrases"]["texts"] == list(ODD)
+        assert page.header["title"] == page.texts["title"] == page.texts["h1"] == title
+
+
+def test_weights_and_phrases_come_back(tmp_path):
+    scene = cloud(40, num_atoms=300, kept=3, degree=0, dtype=torch.float32)
+    asked = phrases_of(scene, ("one", "two"))
+    write_html(
+        replace(scene, view_ids=torch.zeros(40, dtype=torch.int64)), tmp_path / "a.html", phrases=asked
+    )
+    page = read_page(tmp_path / "a.html")
+    # Half a step of 255 each, and the sum is brought back to 1.
+    assert np.abs(page.dense_weights() - scene.semantics.dense_weights().numpy()).max() <= 2 / 255
+    for name in ("scores", "negatives", "gram"):
+        numbers = getattr(asked, name).numpy()
+        assert np.abs(page.numbers(name) - numbers).max() <= np.abs(numbers).max() / 65000
+    assert page.header["phrases"]["asked"] == 2
+
+
+def test_only_the_largest_weights_are_kept(tmp_path):
+    scene = cloud(40, num_atoms=9, kept=8, degree=0, dtype=torch.float32)
+    write_html(scene, tmp_path / "a.html", phrases=phrases_of(scene, ("one",)))
+    found = read_page(tmp_path / "a.html").dense_weights()
+    assert ((found > 0).sum(1) <= MOST_WEIGHTS).all() and np.allclose(found.sum(1), 1)
+
+
+def test_a_page_scores_phrases_as_a_query_does(tmp_path, spoken_room):
+    asked = ["armchair", "wall - door", "armchair"]
+    said = pipeline.web_page(spoken_room, tmp_path / "a.html", asked, threshold=0.7)
+    assert said is not None
+    page = read_page(tmp_path / "a.html")
+    texts = page.header["phrases"]["texts"]
+    assert texts[:2] == ["armchair", "wall - door"] and set(all_phrases()) <= set(texts)
+    assert page.header["phrases"]["asked"] == 2 and len(set(texts)) == len(texts)
+    compiled = compile_query(spoken_room, language_space("minilm"), ["armchair", "wall - door"])
+    assert np.allclose(page.numbers("scores")[:2], (compiled.prompts @ compiled.factor.T).numpy(), atol=1e-4)
+    assert np.allclose(page.numbers("negatives"), (compiled.negatives @ compiled.factor.T).numpy(), atol=1e-4)
+    assert page.header["phrases"]["threshold"] == 0.7
+    assert page.header["phrases"]["temperature"] == compiled.temperature
+
+
+def test_bad_questions_are_one_sentence(tmp_path, spoken_room):
+    plain = bare_scene(random_gaussians(3), "made")
+    with pytest.raises(PromptError, match="no language"):
+        pipeline.web_page(plain, tmp_path / "a.html", ["chair"])
+    with pytest.raises(PromptError, match="out of range"):
+        pipeline.web_page(spoken_room, tmp_path / "a.html", ["chair"], threshold=1.5)
+    assert not os.listdir(tmp_path)
+    assert pipeline.web_page(plain, tmp_path / "a.html") is None
+    assert "phrases" not in read_page(tmp_path / "a.html").header
+
+
+def test_a_page_takes_the_text_model_along(tmp_path, spoken_room):
+    pipeline.web_page(spoken_room, tmp_path / "a.html", with_text=True)
+    page = read_page(tmp_path / "a.html")
+    assert np.allclose(page.dictionary(), spoken_room.semantics.dictionary.numpy(), atol=1e-4)
+    assert page.scripts["tower"] == asset_path("weights/minilm_l6_v2_rowint8.safetensors").read_bytes()
+    tokens = page.scripts["tokens"].decode().split("\n")
+    assert len(tokens) == 30522 and tokens.index("[SEP]") == 102
+    assert "MIT License" in (tmp_path / "a.html").read_text(encoding="utf-8")
+
+
+def test_the_text_model_fits_one_space(tmp_path):
+    with pytest.raises(InputError, match="'minilm' only, the scene speaks 'none'"):
+        pipeline.web_page(bare_scene(random_gaussians(3), "made"), tmp_path / "a.html", with_text=True)
+    assert not os.listdir(tmp_path)
+
+
+def test_a_page_links_to_nothing_and_is_small(tmp_path):
+    write_html(bare_scene(random_gaussians(1), "made"), tmp_path / "a.html")
+    text = (tmp_path / "a.html").read_text(encoding="utf-8")
+    assert read_page(tmp_path / "a.html").addresses == []
+    assert "http" not in text.replace("http-equiv", "")
+    assert "default-src 'none'" in text
+    assert len(text) < 60_000
+
+
+def test_every_script_is_in_the_page():
+    assert {path.stem for path in PAGE.glob("*.js")} == {READING, *SCRIPTS}
+
+
+def test_the_page_judges_by_our_numbers():
+    text = "".join((PAGE / name).read_text(encoding="utf-8") for name in ("answers.js", "sorting.js"))
+    said = {name: float(value) for name, value in re.findall(r"const (\w+) = ([\d.e-]+);", text)}
+    ours = {
+        "EMPTY_NORM": EMPTY_NORM, "COVERED_ALPHA": COVERED_ALPHA, "TOP_FRACTION": TOP_FRACTION,
+        "MIN_AREA": MIN_AREA, "NEAR": NEAR,
+    }  # fmt: skip
+    assert {name: said[name] for name in ours} == ours

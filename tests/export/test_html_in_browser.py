@@ -1,0 +1,357 @@
+"""Pages in a real browser, opened from the disk without a network: the same pixels, the same answers."""
+
+import base64
+import io
+import json
+import re
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+from torch.nn.functional import normalize
+
+import langflash_core as lf
+from langflash_core import pipeline
+from langflash_core.export.html import write_html
+from langflash_core.export.png import heat_over
+from langflash_core.language.algebra import encode_prompts
+from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.spaces import language_space
+from langflash_core.resources import asset_path
+from langflash_core.scene.bare import bare_scene
+from langflash_core.splat import render
+from langflash_core.types import QueryResult, Scene
+from tests.app.window.scenes import CHAIR, PHRASES, room
+from tests.export.browser import Browser, browser, needs_browser
+from tests.export.splats import random_gaussians
+from tests.export.test_html import ODD, PAGE, phrases_of
+from tests.splat.scenes import cloud
+
+pytestmark = needs_browser
+
+ASKED = ("armchair", "wall", "piano")
+LEAST_DB, LEAST_IOU = 30.0, 0.95
+_PICTURE = """langflash.then((page) => {
+  const text = (numbers) => {
+    const bytes = new Uint8Array(numbers.buffer);
+    let letters = "";
+    for (let at = 0; at < bytes.length; at += 32768)
+      letters += String.fromCharCode(...bytes.subarray(at, at + 32768));
+    return btoa(letters);
+  };
+  const { colours, answer } = page.picture(VIEW, SIZE, PHRASE);
+  return { colours: text(colours), ...answer, relevance: answer && text(answer.relevance) };
+})"""
+_READY = "langflash.then((page) => { page.drawing.read(page.target, 0); return performance.now(); })"
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A picture of the page: rgb over black and alpha (H, W); relevance (H, W) and the answer to a phrase."""
+
+    rgb: np.ndarray
+    alpha: np.ndarray
+    relevance: np.ndarray | None
+    score: float
+    found: bool
+
+
+def drawn(page: Browser, view: int, size: tuple[int, int], phrase: str | None = None) -> Drawn:
+    """What the page draws of a photo's view."""
+    words = {"VIEW": view, "SIZE": list(size), "PHRASE": phrase}
+    script = _PICTURE
+    for name, value in words.items():
+        script = script.replace(name, "undefined" if value is None else json.dumps(value))
+    found = page.value(script)
+
+    def numbers(name: str, *channels: int) -> np.ndarray:
+        content = np.frombuffer(base64.b64decode(found[name]), np.float32)
+        return content.reshape(size[1], size[0], *channels)
+
+    colours = numbers("colours", 4)
+    relevance = numbers("relevance") if phrase else None
+    return Drawn(
+        colours[..., :3], colours[..., 3], relevance, found.get("score", 0), found.get("found", False)
+    )
+
+
+def decibels(one: np.ndarray, two: np.ndarray) -> float:
+    return float(-10 * np.log10(np.mean((np.clip(one, 0, 1) - np.clip(two, 0, 1)) ** 2) + 1e-12))
+
+
+def check_answer(page: Browser, ours: QueryResult, view: int) -> None:
+    """Pixels to 30 dB; score, finding and, where it is found, the mask to an IoU of .95."""
+    (answer,) = ours.answers
+    theirs = drawn(page, view, (ours.camera.width, ours.camera.height), answer.prompt)
+    assert decibels(theirs.rgb, ours.frame.rgb.numpy()) >= LEAST_DB
+    assert theirs.found == answer.found
+    assert theirs.score == pytest.approx(answer.score, abs=0.01)
+    if answer.found:
+        assert theirs.relevance is not None
+        mask = (theirs.relevance >= answer.threshold) & (theirs.alpha >= COVERED_ALPHA)
+        expected = ours.masks[0].numpy()
+        assert (mask & expected).sum() / (mask | expected).sum() >= LEAST_IOU
+
+
+def shown(page: Browser) -> np.ndarray:
+    """The page's pixels in [0, 1]."""
+    return np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"), np.float64) / 255
+
+
+def until(page: Browser, expression: str, seconds: float = 90) -> None:
+    """Wait for something to become true."""
+    deadline = time.monotonic() + seconds
+    while not page.value(expression):
+        assert time.monotonic() < deadline, f"never true: {expression}"
+        time.sleep(0.1)
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    with browser(tmp_path_factory.mktemp("browser") / "profile") as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return room(language_space("minilm").encode(PHRASES))
+
+
+@pytest.fixture(scope="module")
+def file(scene, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("pages") / "the room.html"
+    pipeline.web_page(scene, path, ASKED)
+    return path
+
+
+@pytest.fixture
+def opened(page, file):
+    """The room's page, drawn."""
+    page.open(file, (640, 480))
+    page.value(_READY)
+    yield page
+    assert page.errors == []
+
+
+def test_it_loads_nothing_but_itself(opened, file):
+    assert opened.requests == [file.resolve().as_uri()]
+
+
+@pytest.mark.parametrize("view", [0, 1])
+@pytest.mark.parametrize("phrase", ASKED)
+def test_pixels_and_answers_are_ours(opened, scene, view, phrase):
+    check_answer(opened, lf.query(scene, phrase, view=view), view)
+
+
+def test_the_canvas_shows_the_photos_view(page, file, scene):
+    background = re.search(r"BACKGROUND = (\[.*?\])", (PAGE / "drawing.js").read_text(encoding="utf-8"))
+    assert background is not None
+    red, green, blue = json.loads(background[1])
+    ours = lf.query(
+        scene, "armchair", view=0, render=lambda s, c: render(s, c, background=(red, green, blue))
+    )
+    page.open(file, scene.view_size, "#bare&mode=photo")
+    page.value(_READY)
+    assert decibels(shown(page), ours.frame.rgb.numpy()) >= LEAST_DB
+    page.open(file, scene.view_size, "#bare&ask=armchair")
+    page.value(_READY)
+    heat = heat_over(ours.relevance[0], ours.frame.rgb, ours.answers[0].threshold, "relevancy")
+    assert decibels(shown(page), heat.numpy()) >= LEAST_DB
+    assert page.errors == []
+
+
+def test_chips_say_what_is_found(opened):
+    until(opened, "document.querySelectorAll('[data-state=pending]').length === 0")
+    states = opened.value("[...document.querySelectorAll('.chip')].map((chip) => chip.dataset.state)")
+    assert states == ["found", "found", "missing"]
+
+
+def test_a_phrase_is_completed_and_answered(opened):
+    opened.key("/", "Slash", "/")
+    until(opened, "document.activeElement.id === 'box'")
+    opened.type("flo")
+    listed = opened.value("[...document.querySelectorAll('#suggestions li')].map((item) => item.textContent)")
+    assert listed[0] == "floor" and all("flo" in text for text in listed)
+    opened.key("Enter")
+    until(opened, "document.querySelectorAll('.chip[data-state=found]').length === 3")
+    assert "floor" in opened.value("document.querySelector('#chips [aria-pressed=true]').textContent")
+    assert opened.value("document.getElementById('box').value") == ""
+    opened.type("zzz")
+    assert "none of them" in opened.value("document.getElementById('note').textContent")
+    opened.key("Escape")
+    opened.value("document.querySelector('.gone').click()")
+    assert opened.value("document.querySelectorAll('.chip').length") == 3
+
+
+def place(page: Browser) -> np.ndarray:
+    return np.array(page.value("langflash.then((page) => page.orbit.eye)"))
+
+
+def test_mouse_wheel_and_keys_move_the_camera(opened):
+    start = place(opened)
+    opened.drag((300, 240), (360, 250))
+    turned = place(opened)
+    assert np.linalg.norm(turned - start) > 0.05
+    opened.call("Input.dispatchMouseEvent", type="mouseWheel", x=300, y=240, deltaX=0, deltaY=-100)
+    nearer = place(opened)
+    assert np.linalg.norm(nearer - turned) > 0.02
+    opened.key("1", "Digit1", "1")
+    landed = (
+        "langflash.then((p) => p.orbit.eye.every((v, i) => Math.abs(v - p.header.views[VIEW].eye[i]) < 1e-6))"
+    )
+    until(opened, landed.replace("VIEW", "0"))
+    assert np.allclose(place(opened), start, atol=1e-6)
+    opened.key("2", "Digit2", "2")
+    until(opened, landed.replace("VIEW", "1"))
+
+
+def test_a_double_click_turns_around_what_lies_there(page, file, scene):
+    page.open(file, (640, 480), "#bare")
+    page.value(_READY)
+    front = np.array(CHAIR) - (0, 0, 0.2)
+    camera = scene.camera(0, 640, 480)
+    x, y = (camera.K[:2] @ torch.tensor(front, dtype=torch.float32) / front[2]).tolist()
+    for clicks in (1, 2):
+        for kind in ("mousePressed", "mouseReleased"):
+            held = {"button": "left", "clickCount": clicks}
+            page.call("Input.dispatchMouseEvent", type=kind, x=round(x), y=round(y), **held)
+    until(page, "langflash.then((page) => page.moving.flight === null && page.orbit.target[0] < -0.05)")
+    target = np.array(page.value("langflash.then((page) => page.orbit.target)"))
+    assert np.linalg.norm(target - front) < 0.05
+
+
+def test_fingers_turn_and_pinch(page, file):
+    page.open(file, (390, 844), touch=True)
+    page.value(_READY)
+    start = place(page)
+    page.touch([(100, 300)], [(160, 300)])
+    turned = place(page)
+    assert np.linalg.norm(turned - start) > 0.05
+    distance = page.value("langflash.then((page) => page.orbit.distance)")
+    page.touch([(150, 300), (250, 300)], [(100, 300), (300, 300)])
+    assert page.value("langflash.then((page) => page.orbit.distance)") < 0.8 * distance
+    assert page.value("document.documentElement.scrollWidth") == 390  # nothing sticks out
+    assert page.errors == []
+
+
+def test_gloss_is_drawn(page, tmp_path):
+    """Harmonics of degree 3, and no language: no box to type in."""
+    shiny = cloud(800, num_atoms=0, degree=3, dtype=torch.float32)
+    shiny = replace(shiny, gaussians=replace(shiny.gaussians, quats=normalize(shiny.gaussians.quats, dim=-1)))
+    write_html(shiny, tmp_path / "shiny.html")
+    page.open(tmp_path / "shiny.html", (480, 400))
+    page.value(_READY)
+    ours = render(shiny, shiny.camera(0, 480, 400), weight_maps=False)
+    assert decibels(drawn(page, 0, (480, 400)).rgb, ours.rgb.numpy()) >= LEAST_DB
+    assert page.value("document.getElementById('ask').hidden") is True
+    assert page.errors == []
+
+
+def test_one_gaussian(page, tmp_path):
+    one = bare_scene(random_gaussians(3).rows(torch.tensor([1])), "one")  # of opacity 1
+    write_html(one, tmp_path / "one.html")
+    page.open(tmp_path / "one.html", (320, 240))
+    page.value(_READY)
+    ours = render(one, one.camera(0, 320, 240), weight_maps=False)
+    assert float(ours.alphas.max()) > 0.9
+    assert decibels(drawn(page, 0, (320, 240)).rgb, ours.rgb.numpy()) >= LEAST_DB
+    assert page.errors == []
+
+
+def test_more_phrases_than_a_pass_takes(page, tmp_path):
+    """Nine numbers a pass: |f| and eight phrases; each is answered as alone."""
+    mixed = cloud(800, num_atoms=5, degree=0, dtype=torch.float32)
+    texts = tuple(f"phrase {index}" for index in range(11))
+    write_html(mixed, tmp_path / "many.html", phrases=phrases_of(mixed, texts))
+    page.open(tmp_path / "many.html", (240, 200))
+    page.value(_READY)
+
+    def scores(rows: list[int]) -> list[float]:
+        judged = f"[...page.judge({rows}, page.shown(1)).values()].map((answer) => answer.score)"
+        return page.value(f"langflash.then((page) => {judged})")
+
+    together = scores(list(range(11)))
+    for row in (0, 8, 10):
+        assert together[row] == pytest.approx(scores([row])[0], abs=1e-6)
+
+
+def test_names_are_text(page, tmp_path):
+    odd = cloud(50, num_atoms=3, degree=0, dtype=torch.float32)
+    write_html(odd, tmp_path / "odd.html", phrases=phrases_of(odd, ODD), title=ODD[1])
+    page.open(tmp_path / "odd.html", (640, 480))
+    page.value(_READY)
+    assert page.value("document.title") == ODD[1]
+    said = page.value(
+        "[...document.querySelectorAll('.chip > button:first-child')].map((each) => each.firstChild.data)"
+    )
+    assert said == list(ODD)
+    assert page.errors == [] and len(page.requests) == 1
+
+
+def test_a_browser_without_webgl_says_so(page, file):
+    script = "HTMLCanvasElement.prototype.getContext = () => null"
+    added = page.call("Page.addScriptToEvaluateOnNewDocument", source=script)["identifier"]
+    try:
+        page.open(file, (320, 240))
+        until(page, "document.getElementById('waiting').textContent.includes('no WebGL 2')")
+    finally:
+        page.call("Page.removeScriptToEvaluateOnNewDocument", identifier=added)
+
+
+@pytest.mark.slow
+def test_the_demo_room(page, tmp_path):
+    """Trained weights on shipped photos: answers, the file's size, and when there is a picture."""
+    photos = [asset_path(f"photos/living_room_{side}.png") for side in ("left", "right")]
+    trained = lf.reconstruct(photos)
+    path = tmp_path / "room.html"
+    pipeline.web_page(trained, path, ["plant", "floor", "piano"])
+    assert path.stat().st_size < 20 * len(trained.gaussians)
+    page.open(path, trained.view_size)
+    assert page.value(_READY) < 60_000  # milliseconds to the first picture, drawn in software
+    for phrase in ("plant", "floor", "piano"):
+        check_answer(page, lf.query(trained, phrase, view=0), 0)
+    assert page.errors == []
+
+
+PHRASES_OF_ALL_KINDS = (
+    "armchair", "A Wooden  Chair, please!", "Stühle für Größe", "t-shirt & jeans (blue)", "日本 table",
+    "x" * 101 + " door", "unbelievably photosynthesizing houseplants", "sofa + cushion", "chair - armchair",
+    "3.5 mm jack", "naïve café\u200b lamp",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def reading(scene, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("pages") / "reading.html"
+    pipeline.web_page(scene, path, ["armchair"], with_text=True)
+    return path
+
+
+def test_the_page_reads_words_as_we_do(page, reading):
+    """To a cosine of 1 - 1e-5: the same int8 weights, float32 here and there."""
+    page.open(reading, (320, 240))
+    page.value(_READY)
+    page.value("langflash.then((page) => page.learn('something'))")
+    read = f"{json.dumps(PHRASES_OF_ALL_KINDS)}.map((each) => [...tower.encode(each)])"
+    found = np.array(page.value(f"langflash.then((page) => page.tower).then((tower) => {read})"))
+    ours = encode_prompts(language_space("minilm"), PHRASES_OF_ALL_KINDS).numpy()
+    assert (found * ours).sum(1) == pytest.approx(np.ones(len(ours)), abs=1e-5)
+
+
+def test_a_phrase_that_the_vocabulary_lacks_is_answered(page, reading, scene):
+    page.open(reading, (640, 480))
+    page.value(_READY)
+    page.value("document.getElementById('box').focus()")
+    page.type("comfy old seat")
+    page.key("Enter")
+    until(page, "document.querySelectorAll('.chip:not([data-state=pending])').length === 2")
+    check_answer(page, lf.query(scene, "comfy old seat", view=0), 0)
+    page.value("document.getElementById('box').focus()")
+    page.type("chair - chair")
+    page.key("Enter")
+    until(page, "document.getElementById('note').textContent.includes('cancels itself out')")
+    assert page.errors == []
