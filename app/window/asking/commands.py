@@ -18,6 +18,12 @@ def change(state: State, **changes) -> State:
     return replace(state, asking=replace(state.asking, **changes))
 
 
+def lapsed(state: State) -> State:
+    """The state without scores: the Gaussians, the atoms or the negatives that they rest on are others."""
+    prompts = tuple(replace(p, score=None) for p in state.prompts)
+    return change(replace(state, prompts=prompts), histograms=(), lapses=state.asking.lapses + 1)
+
+
 # Phrases
 
 
@@ -112,7 +118,7 @@ class SetNegatives:
     negatives: tuple[str, ...]
 
     def apply(self, state: State) -> State:
-        return replace(state, negatives=self.negatives)
+        return lapsed(replace(state, negatives=self.negatives))
 
 
 @dataclass(frozen=True)
@@ -204,11 +210,17 @@ class PromptsRead:
 
 @dataclass(frozen=True)
 class Answered:
-    """Scores in the view on show: (key, text, score); a prompt edited meanwhile keeps none."""
+    """Scores in the view on show: (key, text, score); a prompt edited meanwhile keeps none.
+
+    lapses: as `Asking.lapses` was; scores that have lapsed since are dropped.
+    """
 
     scores: tuple[tuple[int, str, float], ...]
+    lapses: int = 0
 
     def apply(self, state: State) -> State:
+        if self.lapses != state.asking.lapses:
+            return state
         current = {p.key: p.text.strip() for p in state.prompts}
         for key, text, score in self.scores:
             if current.get(key) == text:
@@ -228,10 +240,11 @@ class Calibrated:
 
 @dataclass(frozen=True)
 class PhrasesCompiled:
-    """The phrases `keys`, in the order of `query`, are ready to be asked."""
+    """The phrases `keys`, in the order of `query`, are ready to be asked. lapses: as `Asking.lapses` was."""
 
     keys: tuple[int, ...]
     query: "CompiledQuery" = field(compare=False, repr=False)
+    lapses: int = 0
 
     def apply(self, state: State) -> State:
         state = Calibrated(self.query.threshold).apply(state)
@@ -240,11 +253,14 @@ class PhrasesCompiled:
 
 @dataclass(frozen=True)
 class Binned:
-    """How the pixels of the view on show score."""
+    """How the pixels of the view on show score. lapses: as for `Answered`."""
 
     histograms: tuple[Histogram, ...]
+    lapses: int = 0
 
     def apply(self, state: State) -> State:
+        if self.lapses != state.asking.lapses:
+            return state
         return change(state, histograms=self.histograms)
 
 
@@ -270,6 +286,17 @@ class AtomsDescribed:
 
     def apply(self, state: State) -> State:
         return change(state, insight=self.insight)
+
+
+@dataclass(frozen=True)
+class AtomsWeighed:
+    """Shares (K,) of what is left of the scene."""
+
+    shares: tuple[float, ...]
+
+    def apply(self, state: State) -> State:
+        insight = state.asking.insight
+        return state if insight is None else change(state, insight=replace(insight, shares=self.shares))
 
 
 @dataclass(frozen=True)
