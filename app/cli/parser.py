@@ -227,6 +227,9 @@ def _add_export(commands) -> None:
         "--all-views", action="store_true", help="from every photo: FILE_0, FILE_1 and so on"
     )
     command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of an .mp4 (default: 6)")
+    command.add_argument(
+        "--replace", action="store_true", help="also what is there by the name of a legend or a COCO picture"
+    )
     _add_camera(command)
     _add_backend(command)
 

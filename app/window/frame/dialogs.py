@@ -25,6 +25,7 @@ TITLES = {
     "save prompts": "Save the phrases",
     "load prompts": "Load phrases",
     "export": "Export",
+    "replace": "Replace?",
     "settings": "Preferences",
     "log": "Log",
 }
@@ -102,6 +103,7 @@ def _body(dialog: str) -> Callable[[State, Look], list[do.Command]]:
         "save prompts": _save_prompts,
         "load prompts": _load_prompts,
         "export": export_panel.draw,
+        "replace": export_panel.draw_replacing,
         "settings": recovery_panels.draw_settings,
         "log": _log,
     }[dialog]
