@@ -11,6 +11,7 @@ from ..editing.state import Tool
 from ..exporting import commands as export
 from ..recovery import commands as keep
 from ..scene import camera
+from ..scene import commands as show
 from ..scene.panels import in_space
 from ..scene.panels.modes import KEYED
 from ..state import State
@@ -21,11 +22,11 @@ _DIGITS = (
 )  # fmt: skip
 _MODE_KEYS = tuple(zip(_DIGITS, KEYED, strict=True))
 
-# Taken from the event itself: on a slow machine S and the release of Ctrl share a frame.
-EDIT_SHORTCUTS: dict[tuple[str, bool], do.Command] = {  # with Ctrl; the second tells whether with Shift
-    ("z", False): edit.Undo(), ("z", True): edit.Redo(), ("y", False): edit.Redo(),
-    ("a", False): edit.SelectAll(), ("d", False): edit.Deselect(), ("i", False): edit.Invert(),
-}  # fmt: skip
+_EDIT_CHORDS: tuple[tuple[imgui.Key, bool, do.Command], ...] = (  # with Ctrl; whether with Shift
+    (imgui.Key.z, False, edit.Undo()), (imgui.Key.z, True, edit.Redo()), (imgui.Key.y, False, edit.Redo()),
+    (imgui.Key.a, False, edit.SelectAll()), (imgui.Key.d, False, edit.Deselect()),
+    (imgui.Key.i, False, edit.Invert()),
+)  # fmt: skip
 _TOOL_KEYS = (
     (imgui.Key.v, Tool.MOVE), (imgui.Key.x, Tool.POINT), (imgui.Key.r, Tool.BOX),
     (imgui.Key.b, Tool.BRUSH), (imgui.Key.c, Tool.PICK),
@@ -35,23 +36,23 @@ _DOING_KEYS: tuple[tuple[imgui.Key, do.Command], ...] = (
     (imgui.Key.f, point.FrameSelection()),
 )  # fmt: skip
 BRUSH_STEP = 1.15  # of its radius, per press of [ or ]
-SHORTCUTS = {
-    "s": do.ShowDialog("save"), "o": do.ShowDialog("open"), "q": do.Leave(),
-    "e": export.ShowExport(), "p": do.ShowDialog("settings"),
-}  # fmt: skip
+_CHORDS: tuple[tuple[imgui.Key, do.Command], ...] = (
+    (imgui.Key.s, do.ShowDialog("save")), (imgui.Key.o, do.ShowDialog("open")), (imgui.Key.q, do.Leave()),
+    (imgui.Key.e, export.ShowExport()), (imgui.Key.p, do.ShowDialog("settings")),
+)  # fmt: skip
 
 
 def draw(state: State) -> list[do.Command]:
-    """Keys that work wherever the pointer is; those with Ctrl are in `SHORTCUTS`."""
+    """Keys that work wherever the pointer is."""
     io = imgui.get_io()
-    issued: list[do.Command] = []
+    issued = _chords(state)
     if imgui.is_key_pressed(imgui.Key.f1, False):
         issued.append(do.ShowDialog("help"))
     if imgui.is_key_pressed(imgui.Key.f2, False):
         issued.append(do.ShowDialog("log"))
-    if imgui.is_key_pressed(imgui.Key.escape, False) and not io.want_text_input:
+    if imgui.is_key_pressed(imgui.Key.escape, False) and not typing():
         issued += _escape(state)
-    if io.want_text_input or io.key_ctrl or state.dialog or state.info is None:
+    if typing() or io.key_ctrl or state.dialog or state.info is None:
         return issued
     if imgui.is_key_pressed(imgui.Key.h, False) or imgui.is_key_pressed(imgui.Key.home, False):
         issued.append(camera.Home())
@@ -72,15 +73,37 @@ def draw(state: State) -> list[do.Command]:
     return issued
 
 
+def typing() -> bool:
+    """Whether a text field has the keys, also one that took them in this very frame."""
+    return imgui.get_io().want_text_input or imgui.get_current_context().want_text_input_next_frame == 1
+
+
+def _chords(state: State) -> list[do.Command]:
+    """With Ctrl; AltGr is Ctrl and Alt, and types a letter."""
+    io = imgui.get_io()
+    if not io.key_ctrl or io.key_alt or state.dialog:
+        return []
+    issued = [command for key, command in _CHORDS if imgui.is_key_pressed(key, False)]
+    if typing():
+        return issued
+    return issued + [
+        command
+        for key, shift, command in _EDIT_CHORDS
+        if shift == io.key_shift and imgui.is_key_pressed(key, False)
+    ]
+
+
 def _escape(state: State) -> list[do.Command]:
-    """One step back: a menu, a dialog, an answer, a preview, a tool. Never out: one press too many would
-    end the program."""
+    """One step back: a dialog, a menu, a job, an answer, a preview, a tool. Never out: one press too many
+    would end the program."""
     editing = state.editing
     if state.dialog:
         return [do.ShowDialog(None)]
     if imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
         imgui.internal.close_popups_except_modals()
         return []
+    if state.job is not None and not state.job.cancelling:
+        return [show.CancelJob()]
     if editing.card is not None or editing.asked is not None:
         return [point.CloseCard()]
     if editing.floaters is not None:

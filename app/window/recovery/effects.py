@@ -252,6 +252,7 @@ class RecoveryEffects(Effects):
     def _kept(self, state: State) -> Kept:
         info = state.info
         path = None if info is None else info.path or (self._keeper.scene_file if self._copied else None)
+        prompts = [prompt for prompt in state.prompts if prompt.text.strip()]
         return Kept(
             photos=tuple(str(photo.path) for photo in state.photos),
             fovs=tuple(photo.fov for photo in state.photos),
@@ -259,7 +260,9 @@ class RecoveryEffects(Effects):
             edits="" if state.recovery.kept is None else str(state.recovery.kept),
             saved=info is None or info.path is not None,
             name="" if info is None else info.name,
-            phrases=tuple(prompt.text for prompt in state.prompts if prompt.text.strip()),
+            phrases=tuple(prompt.text for prompt in prompts),
+            likes=tuple(prompt.like.hex() for prompt in prompts),
+            thresholds=tuple(prompt.threshold for prompt in prompts),
             mode=state.mode.name,
             pose=None if info is None else state.pose,
         )
@@ -268,6 +271,6 @@ class RecoveryEffects(Effects):
 def _snapshot(state: State) -> tuple[Any, ...]:
     """What a change of must be kept."""
     where = None if state.info is None else (state.info.serial, state.info.path)
-    phrases = tuple(prompt.text for prompt in state.prompts)
+    phrases = tuple((prompt.text, prompt.like, prompt.threshold) for prompt in state.prompts)
     photos = tuple((photo.path, photo.fov) for photo in state.photos)
     return photos, where, phrases, state.mode, state.pose, state.recovery.kept

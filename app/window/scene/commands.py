@@ -161,10 +161,12 @@ class Reconstruct:
 
 @dataclass(frozen=True)
 class OpenScene:
-    """Read a scene file; replaces a job under way. edits: kept by an earlier session."""
+    """Read a scene file; replaces a job under way. edits: kept by an earlier session. alone: the photos in
+    the tray are not its own and go when it comes."""
 
     path: Path
     edits: Path | None = None
+    alone: bool = False
 
     def apply(self, state: State) -> State:
         title = "Restoring" if self.edits else f"Opening {self.path.name}"
@@ -195,9 +197,10 @@ class OpenPaths:
 
 @dataclass(frozen=True)
 class SceneArrived:
-    """A scene is ready: show it from its first view, ask every prompt again."""
+    """A scene is ready: show it from its first view, ask every prompt again. alone: see `OpenScene`."""
 
     info: SceneInfo
+    alone: bool = False
 
     def apply(self, state: State) -> State:
         prompts = tuple(replace(p, score=None) for p in state.prompts)
@@ -209,6 +212,7 @@ class SceneArrived:
             recovery=replace(state.recovery, edits=None, kept=None),
             asking=state.asking.without_scene(),
             info=self.info,
+            photos=() if self.alone else state.photos,
             prompts=prompts,
             job=None,
             flight=None,

@@ -49,8 +49,8 @@ class SceneEffects(Effects):
             case Reconstruct() if state.photos:
                 photos = state.photos
                 submit(ReconstructPhotos(tuple(p.path for p in photos), tuple(p.fov for p in photos)))
-            case OpenScene(path, edits):
-                submit(LoadScene(path, edits))
+            case OpenScene(path, edits, alone):
+                submit(LoadScene(path, edits, alone))
             case SaveScene(path) if state.info is not None:
                 submit(WriteScene(state.info.scene, path, state.editing.marks))
             case CancelJob():
@@ -72,7 +72,7 @@ class SceneEffects(Effects):
             if state.preferences.start_at_once:
                 perform(Reconstruct())
         elif drop.scenes:
-            perform(OpenScene(drop.scenes[0]))
+            perform(OpenScene(drop.scenes[0], alone=True))
 
     def _show(self, info: SceneInfo) -> None:
         try:
