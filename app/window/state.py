@@ -49,6 +49,17 @@ NO_STATS = Stats()
 
 
 @dataclass(frozen=True)
+class Palette:
+    """The command palette: what is typed there, and which of the commands that fit is chosen."""
+
+    text: str = ""
+    place: int = 0
+
+
+NO_PALETTE = Palette()
+
+
+@dataclass(frozen=True)
 class State:
     """The whole program.
 
@@ -75,6 +86,7 @@ class State:
     next_key: int = 1
     dialog: str | None = None
     dialog_path: str = ""
+    palette: Palette = NO_PALETTE
     stats: Stats = NO_STATS
     editing: Editing = NO_EDITING
     asking: Asking = NO_ASKING

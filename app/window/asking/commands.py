@@ -29,14 +29,45 @@ def lapsed(state: State) -> State:
 
 @dataclass(frozen=True)
 class AddPrompt:
-    """A new, empty row in a colour of its own."""
+    """A new, empty row in a colour of its own, where the next letters go."""
 
     def apply(self, state: State) -> State:
         used = {p.colour for p in state.prompts}
         free = [c for c in PALETTE if c not in used] or [PALETTE[len(state.prompts) % len(PALETTE)]]
         prompt = Prompt(state.next_key, colour=free[0])
         prompts = (*state.prompts, prompt)
-        return replace(state, prompts=prompts, active=prompt.key, next_key=state.next_key + 1)
+        state = replace(state, prompts=prompts, active=prompt.key, next_key=state.next_key + 1)
+        return change(state, caret=prompt.key)
+
+
+@dataclass(frozen=True)
+class NextPrompt:
+    """The phrase of `key` is typed: on to an empty row, or to a new one while there is room."""
+
+    key: int
+
+    def apply(self, state: State) -> State:
+        empty = next((p for p in state.prompts if not p.text.strip() and p.key != self.key), None)
+        if empty is not None:
+            return change(replace(state, active=empty.key), caret=empty.key)
+        return state if len(state.prompts) >= MOST_PROMPTS else AddPrompt().apply(state)
+
+
+@dataclass(frozen=True)
+class FocusPhrase:
+    """The next letters go to the active phrase."""
+
+    def apply(self, state: State) -> State:
+        chosen = next((p for p in state.prompts if p.key == state.active), state.prompts[0])
+        return change(state, caret=chosen.key)
+
+
+@dataclass(frozen=True)
+class CaretTaken:
+    """The field has the keys."""
+
+    def apply(self, state: State) -> State:
+        return change(state, caret=None)
 
 
 @dataclass(frozen=True)

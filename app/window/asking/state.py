@@ -85,7 +85,8 @@ class Asking:
 
     recent: phrases asked, the newest first. atom: whose weight map is on show. chosen: atoms to
     merge. prompts_path: where the last set was. usual: what the scene compares phrases with, by its
-    own calibration, once it has said so. lapses: how often what scores rest on has changed.
+    own calibration, once it has said so. lapses: how often what scores rest on has changed. caret: the
+    prompt whose field takes the keys next.
     """
 
     recent: tuple[str, ...] = ()
@@ -96,6 +97,7 @@ class Asking:
     prompts_path: Path | None = None
     usual: tuple[str, ...] = ()
     lapses: int = 0
+    caret: int | None = None
 
     def histogram(self, key: int, text: str) -> Histogram | None:
         """Of a prompt as it reads now; None until it is answered."""

@@ -3,16 +3,28 @@
 The window is stopped, as a slow frame would hold it, while a person goes on; then it sees all at once.
 """
 
+import itertools
 import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from app.window.kit import theme
 from tests.app.window.journey import PHOTOS
-from tests.app.window.test_window import MIDDLE, SIZE, Program, display, pytestmark, scene_file, x_server
+from tests.app.window.test_window import (
+    LEFT,
+    MIDDLE,
+    SIZE,
+    Program,
+    display,
+    pytestmark,
+    scene_file,
+    x_server,
+)
 
 __all__ = ["display", "pytestmark", "scene_file"]  # fixtures and the mark of the window's tests
 
@@ -76,3 +88,53 @@ def test_escape_cancels_a_job() -> None:
         state = running.until(lambda s: s["job"] is None, "the end of the job")
         assert state["scene"] is None and state["toasts"] == ["Stopped."]
         running.leave()
+
+
+def test_ctrl_f_enter_and_letters_that_come_at_once(program: Program) -> None:
+    """The letters are those of tools; none is taken."""
+    program.xdotool("mousemove", *map(str, MIDDLE), "click", "1")
+    program.at_rest()
+    with held(program):
+        program.xdotool("key", "ctrl+f", "type", "--delay", "5", "crvbx")
+        program.xdotool("key", "Return", "type", "--delay", "5", "hgf")
+    state = program.until(lambda s: [p[0] for p in s["prompts"]] == ["crvbx", "hgf"], "two phrases")
+    assert state["tool"] == "MOVE" and state["selected"] == 0 and not state["flying"]
+    assert state["recent"][0] == "crvbx"
+    program.xdotool("key", "Return")
+    program.until(lambda s: len(s["prompts"]) == 3, "a third row")
+    program.xdotool("key", "Escape", "mousemove", *map(str, MIDDLE), "click", "1")
+
+
+def test_a_command_by_its_name(program: Program) -> None:
+    with held(program):
+        program.xdotool("key", "ctrl+p", "type", "--delay", "5", "depth")
+    program.until(lambda s: s["dialog"] == "palette", "the palette")
+    program.xdotool("key", "Return")
+    program.until(lambda s: s["mode"] == "DEPTH" and s["dialog"] is None, "the depth")
+    program.xdotool("key", "ctrl+p", "sleep", "0.5", "type", "--delay", "5", "select")
+    program.until(lambda s: sum(name.startswith("Select") for name in s["items"]) > 4, "what fits")
+    program.xdotool("key", "Down", "key", "Up", "key", "Down", "key", "Return")
+    state = program.until(lambda s: s["dialog"] is None, "the second one")
+    program.xdotool("key", "ctrl+p", "sleep", "0.5", "key", "Escape")
+    state = program.until(lambda s: s["dialog"] is None, "nothing done")
+    assert state["gl_errors"] == []
+
+
+def focused(program: Program) -> np.ndarray:
+    """(h, w) bool: pixels of the screen in the colour of the focus."""
+    accent = 255 * np.array([theme.DARK.ACCENT.x, theme.DARK.ACCENT.y, theme.DARK.ACCENT.z])
+    return abs(program.client.picture(*SIZE).astype(float) - accent).max(-1) < 8
+
+
+def test_tab_shows_where_the_keys_go_and_f6_goes_to_the_next_area(program: Program) -> None:
+    program.xdotool("mousemove", *map(str, MIDDLE), "click", "1")
+    program.at_rest()
+    seen = [focused(program)]
+    for key in ("Tab", "Tab", "F6", "F6"):
+        program.xdotool("key", key, "sleep", "1.5")
+        seen.append(focused(program))
+    for before, after in itertools.pairwise(seen):
+        assert (before != after).sum() > 60  # a frame of some hundred pixels moves on
+    left, right = seen[2][:, :LEFT], seen[3][:, LEFT:]
+    assert (left & ~seen[0][:, :LEFT]).sum() > 60 and (right & ~seen[0][:, LEFT:]).sum() > 60
+    program.xdotool("key", "Escape")
