@@ -120,7 +120,7 @@ class ShowPicture:
 
 @dataclass(frozen=True)
 class ShowDialog:
-    """`which` is a key of `frame.dialogs.TITLES`; None closes."""
+    """`which` is a key of `frame.dialogs.TITLES`; None closes. Nothing waits for an answer any more."""
 
     which: str | None
 
@@ -130,7 +130,7 @@ class ShowDialog:
         path = str(_place_to_save(state)) if self.which == "save" else ""
         if self.which in PROMPT_DIALOGS:
             path = str(state.asking.prompts_path or Path.home() / f"my{PROMPTS_SUFFIX}")
-        return replace(state, dialog=self.which, dialog_path=path, palette=NO_PALETTE)
+        return replace(state, dialog=self.which, dialog_path=path, palette=NO_PALETTE, pending=())
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from ..kit.look import Look
 from ..recovery import panels as recovery_panels
 from ..scene import commands as show
 from ..scene.drops import typed_path, typed_scene
+from ..scene.panels import rooms
 from ..state import State
 from . import palette, table
 
@@ -23,6 +24,8 @@ TITLES = {
     "open": "Open",
     "help": "Mouse and keys",
     "leave": "Leave?",
+    "drop": "Where do these photos belong?",
+    "unsaved": "Edits are not saved",
     "save prompts": "Save the phrases",
     "load prompts": "Load phrases",
     "export": "Export",
@@ -51,7 +54,10 @@ GESTURES = (
     ("Esc", "one step back; cancels a job"),
 )
 _COLUMNS = ((None, "View"), ("File", "Find", "Tools", "Edit", "Program"))  # of help; None: the gestures
-_CLOSING = do.ShowDialog | show.SaveScene | show.OpenPaths | ask.SavePrompts | ask.LoadPrompts | export.Export
+_CLOSING = (
+    do.ShowDialog | show.SaveScene | show.OpenPaths | show.Instead | show.All | show.GoOn | show.SaveFirst
+    | ask.SavePrompts | ask.LoadPrompts | export.Export
+)  # fmt: skip
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
@@ -93,6 +99,8 @@ def _body(dialog: str) -> Callable[[State, Look], list[do.Command]]:
         "open": _open,
         "help": _help,
         "leave": _leave,
+        "drop": rooms.draw_drop,
+        "unsaved": rooms.draw_unsaved,
         "save prompts": _save_prompts,
         "load prompts": _load_prompts,
         "export": export_panel.draw,

@@ -104,12 +104,19 @@ def _files() -> Iterable[Entry]:
     yield Entry("Save ...", group, _shown(dialog("save")), _ctrl("s"), fa.ICON_FA_FLOPPY_DISK, in_fields=True)
     exporting = fa.ICON_FA_FILE_EXPORT
     yield Entry("Export ...", group, _shown(export.ShowExport()), _ctrl("e"), exporting, in_fields=True)
-    yield Entry("Reconstruct the photos", group, lambda s: show.Reconstruct() if s.photos else None)
+    reconstruct = show.Instead((show.Reconstruct(),))
+    yield Entry("Reconstruct the photos", group, lambda s: reconstruct if s.photos else None)
+    yield Entry("Back to the room before", group, _room_before)
     yield Entry("Cancel the reconstruction", group, lambda s: show.CancelJob() if s.job else None)
     yield Entry("Clear the tray", group, lambda s: show.ClearPhotos() if s.photos and not s.job else None)
     yield Entry(
         "Leave", group, _always(do.Leave()), _ctrl("q"), fa.ICON_FA_RIGHT_FROM_BRACKET, in_fields=True
     )
+
+
+def _room_before(state: State) -> do.Command | None:
+    free = state.rooms and state.job is None
+    return show.GoToRoom(state.rooms[0].info.serial) if free else None
 
 
 def _program() -> Iterable[Entry]:

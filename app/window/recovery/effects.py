@@ -157,13 +157,13 @@ class RecoveryEffects(Effects):
         if before.info is not None and before.editing.unsaved and before.editing.dirty:
             self._keep_edits(before)
             if before.info.path is None or before.editing.history is None or before.editing.history.done:
-                text = f"The edits of {before.info.name} are kept; open it again to go on with them."
+                text = f"The edits of {before.info.name} are kept; go back to it to go on with them."
                 self._hands.perform(Notify(text, "info"))
         self._edits_kept, self._edits_wrote, self._keep_edits_at = False, False, NEVER
         restored, self._restoring_edits = self._restoring_edits, None
-        if restored is not None and info.history is not None and info.history.done:
+        if info.history is not None and info.history.done:  # restored, or a room of this session
             self._write_edits(info, info.history)
-            if not self._keeper.own(restored):
+            if restored is not None and not self._keeper.own(restored):
                 self._hands.submit(ForgetFile(restored))
         else:
             self._hands.submit(LookForEdits(info.serial, info.scene, info.path))

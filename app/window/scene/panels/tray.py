@@ -13,7 +13,7 @@ from ...poses import FOV_RANGE
 from ...state import State
 from .. import commands as show
 from ..state import Job, Photo
-from . import stages
+from . import rooms, stages
 
 COLUMNS = 3
 _CANCEL = 104.0  # design pixels
@@ -27,6 +27,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     """The photos section."""
     issued: list[do.Command] = []
     widgets.heading("Photos")
+    issued += rooms.draw(state, look)
     if state.photos:
         issued += _tray(state, look)
     else:
@@ -249,7 +250,7 @@ def _buttons(state: State, look: Look) -> list[do.Command]:
     width = imgui.get_content_region_avail().x - others
     imgui.begin_disabled(state.choosing)
     if widgets.primary_button(f"{fa.ICON_FA_CUBES}  Reconstruct", ImVec2(width, 0)):
-        issued.append(show.Reconstruct())
+        issued.append(show.Instead((show.Reconstruct(),)))
     if not few:
         imgui.same_line()
         icon = fa.ICON_FA_HOURGLASS_HALF if state.choosing else fa.ICON_FA_WAND_MAGIC_SPARKLES
