@@ -91,15 +91,15 @@ def test_escape_cancels_a_job() -> None:
 
 
 def test_ctrl_f_enter_and_letters_that_come_at_once(program: Program) -> None:
-    """The letters are those of tools; none is taken."""
+    """The letters are those of tools and of flying; none is taken."""
     program.xdotool("mousemove", *map(str, MIDDLE), "click", "1")
-    program.at_rest()
+    before = program.at_rest()
     with held(program):
-        program.xdotool("key", "ctrl+f", "type", "--delay", "5", "crvbx")
-        program.xdotool("key", "Return", "type", "--delay", "5", "hgf")
-    state = program.until(lambda s: [p[0] for p in s["prompts"]] == ["crvbx", "hgf"], "two phrases")
-    assert state["tool"] == "MOVE" and state["selected"] == 0 and not state["flying"]
-    assert state["recent"][0] == "crvbx"
+        program.xdotool("key", "ctrl+f", "type", "--delay", "5", "wascrvbx")
+        program.xdotool("key", "Return", "type", "--delay", "5", "wdqehgf")
+    state = program.until(lambda s: [p[0] for p in s["prompts"]] == ["wascrvbx", "wdqehgf"], "two phrases")
+    assert state["tool"] == "MOVE" and state["selected"] == 0 and state["pose"] == before["pose"]
+    assert state["recent"][0] == "wascrvbx"
     program.xdotool("key", "Return")
     program.until(lambda s: len(s["prompts"]) == 3, "a third row")
     program.xdotool("key", "Escape", "mousemove", *map(str, MIDDLE), "click", "1")
