@@ -1,5 +1,6 @@
 """Files a command reads and writes: checked before the work, written all or not at all."""
 
+import json
 import os
 import shutil
 import tempfile
@@ -78,6 +79,29 @@ def check_output_file(path: Path, suffixes: tuple[str, ...] = (), inputs: Iterab
         raise OutputError(f"cannot write {path.name}: this command writes {', '.join(suffixes)}; rename -o")
     check_folder(path.parent)
     return path
+
+
+def check_beside(path: Path, document: Path, picture: Path) -> None:
+    """Prove that a file which is written unnamed, beside the one of -o, replaces only its own kind.
+
+    A legend and its picture, a COCO file and its pictures belong together where the JSON `document` that
+    is there names the `picture`.
+
+    Raises:
+        OutputError: something else has the name `path`.
+    """
+    if path.exists() and not _names(document, picture.name):
+        what = f"{path.name} would be written too, and is there as something else"
+        raise OutputError(f"{what}; choose another -o, or add --replace")
+
+
+def _names(document: Path, name: str) -> bool:
+    """Whether a JSON file has a name in it as a text."""
+    try:
+        text = document.read_text("utf-8")
+    except (OSError, ValueError):
+        return False
+    return json.dumps(name, ensure_ascii=False) in text
 
 
 @contextmanager

@@ -295,6 +295,9 @@ def _add_export(commands) -> None:
         "--with-text", action="store_true", help="an .html answers any phrase, and is 28 MB larger"
     )
     command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of an .mp4 (default: 6)")
+    command.add_argument(
+        "--replace", action="store_true", help="also what is there by the name of a legend or a COCO picture"
+    )
     _add_camera(command)
     _add_backend(command)
 

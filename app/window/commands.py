@@ -15,7 +15,7 @@ from . import poses
 from .asking.state import PROMPT_DIALOGS, PROMPTS_SUFFIX
 from .scene.drops import SCENE_SUFFIX
 from .scene.state import FLIGHT_SECONDS
-from .state import MOST_LINES, TOAST_SECONDS, Line, State, Stats, Toast
+from .state import MOST_LINES, NO_PALETTE, TOAST_SECONDS, Line, Palette, State, Stats, Toast
 
 NOTHING_TO_SAVE = "There is no scene to save; drop photos on the window first."
 
@@ -120,7 +120,7 @@ class ShowPicture:
 
 @dataclass(frozen=True)
 class ShowDialog:
-    """`which` is a key of `panels.overlays.TITLES`; None closes."""
+    """`which` is a key of `frame.dialogs.TITLES`; None closes. Nothing waits for an answer any more."""
 
     which: str | None
 
@@ -130,7 +130,7 @@ class ShowDialog:
         path = str(_place_to_save(state)) if self.which == "save" else ""
         if self.which in PROMPT_DIALOGS:
             path = str(state.asking.prompts_path or Path.home() / f"my{PROMPTS_SUFFIX}")
-        return replace(state, dialog=self.which, dialog_path=path)
+        return replace(state, dialog=self.which, dialog_path=path, palette=NO_PALETTE, pending=())
 
 
 @dataclass(frozen=True)
@@ -141,6 +141,16 @@ class EditDialogPath:
 
     def apply(self, state: State) -> State:
         return replace(state, dialog_path=self.path)
+
+
+@dataclass(frozen=True)
+class EditPalette:
+    """Other words in the command palette, or another choice."""
+
+    palette: Palette
+
+    def apply(self, state: State) -> State:
+        return replace(state, palette=self.palette)
 
 
 @dataclass(frozen=True)

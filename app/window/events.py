@@ -1,4 +1,7 @@
-"""What glfw reports: every event wakes the loop, shortcuts become commands, the rest is ImGui's."""
+"""What glfw reports: every event wakes the loop and goes to ImGui, in the order in which it came.
+
+So a key belongs to what had the focus when it was pressed, however many events share a frame.
+"""
 
 from collections.abc import Callable, Sequence
 
@@ -8,20 +11,20 @@ from imgui_bundle.python_backends.glfw_backend import GlfwRenderer
 
 from .commands import Command, Leave
 from .desktop import clipboard
-from .frame.keys import EDIT_SHORTCUTS, SHORTCUTS
 from .scene.commands import OpenPaths
-from .state import State
 
 MODIFIERS = frozenset(
     (glfw.KEY_LEFT_CONTROL, glfw.KEY_RIGHT_CONTROL, glfw.KEY_LEFT_SUPER, glfw.KEY_RIGHT_SUPER)
 )
+CHORDS = glfw.MOD_CONTROL | glfw.MOD_SUPER
+FOCUS_FRAMES = 6  # from a command until the field that it opens takes letters
 
 
 class Events:
     """The callbacks of one window.
 
-    wake: called before each event. dispatch: a command for the next frame. state: the present one.
-    rescale: the window has come to a screen of another scale.
+    wake: called before each event. dispatch: a command for the next frame. rescale: the window has come to
+    a screen of another scale.
     """
 
     def __init__(
@@ -30,13 +33,12 @@ class Events:
         backend: GlfwRenderer,
         wake: Callable[[], None],
         dispatch: Callable[[Command], None],
-        state: Callable[[], State],
         rescale: Callable[[], None],
     ) -> None:
         self._backend = backend
         self._wake = wake
         self._dispatch = dispatch
-        self._state = state
+        self._translated: dict[int, int] = {}  # keys that are down by another name
         glfw.set_key_callback(window, self._waking(self._key))
         glfw.set_char_callback(window, self._waking(backend.char_callback))
         glfw.set_cursor_pos_callback(window, self._waking(self._moved))
@@ -59,22 +61,24 @@ class Events:
         return wake
 
     def _key(self, window, key: int, scancode: int, action: int, mods: int) -> None:
-        """Shortcuts by the letter that the keyboard's layout puts there; the rest is ImGui's."""
-        if action == glfw.PRESS and mods & (glfw.MOD_CONTROL | glfw.MOD_SUPER):
-            letter = glfw.get_key_name(key, scancode)
-            edits = EDIT_SHORTCUTS.get((letter or "", bool(mods & glfw.MOD_SHIFT)))
-            if edits is not None and not imgui.get_io().want_text_input and not self._state().dialog:
-                self._dispatch(edits)
-                return
-            if letter in SHORTCUTS:
-                self._dispatch(SHORTCUTS[letter])
-                return
-        if action == glfw.RELEASE and key in MODIFIERS:
-            # ImGui would take Ctrl+A and the release of Ctrl, come in one frame, for a bare A. It ends a
-            # frame's events before a key that changes twice, so one that no keyboard has parts the two.
-            for down in (True, False):
-                self._backend.io.add_key_event(imgui.Key.f24, down)
-        self._backend.keyboard_callback(window, key, scancode, action, mods)
+        """To ImGui; with Ctrl by the letter that the keyboard's layout puts there."""
+        if action == glfw.PRESS and mods & CHORDS:
+            self._translated[key] = _by_letter(key, scancode)
+        named = self._translated.get(key, key)
+        if action == glfw.RELEASE:
+            self._translated.pop(key, None)
+            if key in MODIFIERS:
+                # ImGui would take Ctrl+A and the release of Ctrl, come in one frame, for a bare A.
+                self._pause(2)
+        self._backend.keyboard_callback(window, named, scancode, action, mods)
+        if action == glfw.PRESS and (mods & CHORDS or key in (glfw.KEY_ENTER, glfw.KEY_KP_ENTER)):
+            self._pause(FOCUS_FRAMES)  # a new field has the focus before the next letter comes
+
+    def _pause(self, frames: int) -> None:
+        """What comes next is for a later frame, an even number of them: ImGui ends a frame's events before
+        a key that changes twice, so one that no keyboard has parts them."""
+        for place in range(frames):
+            self._backend.io.add_key_event(imgui.Key.f24, place % 2 == 0)
 
     def _moved(self, _window, x: float, y: float) -> None:
         self._backend.io.add_mouse_pos_event(x, y)
@@ -93,3 +97,9 @@ class Events:
 
     def _dropped(self, _window, paths: Sequence[str]) -> None:
         self._dispatch(OpenPaths(tuple(paths)))
+
+
+def _by_letter(key: int, scancode: int) -> int:
+    """The key that bears the letter of this one on a keyboard of the United States."""
+    letter = (glfw.get_key_name(key, scancode) or "").upper()
+    return ord(letter) if len(letter) == 1 and "A" <= letter <= "Z" else key

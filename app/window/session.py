@@ -81,7 +81,7 @@ class Session:
         self._scale = desktop.interface_scale(self._window)
         theme.set_up(self._scale * remembered.scale, remembered.theme)
         self._backend = GlfwRenderer(self._window, attach_callbacks=False)
-        Events(self._window, self._backend, self._wake, self.dispatch, lambda: self.state, self._rescale)
+        Events(self._window, self._backend, self._wake, self.dispatch, self._rescale)
         self._thumbnails = Thumbnails(self._ctx)
         self._viewport = Viewport(self._ctx)
         self._worker = Worker(glfw.post_empty_event, begins=False)  # loads torch: the first frame is first
@@ -191,17 +191,22 @@ class Session:
         self._touched = self._now()
         self._awake = min(max(self._awake, AWAKE_FRAMES) + 1, MOST_AWAKE)
 
+    @property
+    def _busy(self) -> bool:
+        """Whether ImGui is still settling, or has events that it left for another frame."""
+        return self._awake > 0 or not imgui.get_current_context().input_events_queue.empty()
+
     def _due(self, now: float) -> bool:
         """Whether the next frame would show something new."""
         blink = imgui.get_io().want_text_input and now - self.state.now >= BLINK_SECONDS
         expired = any(t.until <= now for t in self.state.toasts)
         working = self.state.job is not None and now - self.state.now >= 0.1
         settle = now >= self._viewport_wants
-        return self._awake > 0 or self.state.flight is not None or blink or expired or working or settle
+        return self._busy or self.state.flight is not None or blink or expired or working or settle
 
     def _nap(self) -> float:
         """Seconds to sleep unless an event comes."""
-        if self._awake > 0 or self._inbox or self.state.flight is not None:
+        if self._busy or self._inbox or self.state.flight is not None:
             return 0.0
         now = self._now()
         moments = [self._viewport_wants, *(effects.due for effects in self._effects)]

@@ -1,6 +1,8 @@
 """Everything the window shows, as one frozen value. Commands make the next one; panels read it."""
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 from .asking.state import FIRST_PROMPT, NO_ASKING, Asking, Prompt, usable
 from .editing.state import NO_EDITING, Editing
@@ -8,7 +10,7 @@ from .exporting.state import NO_EXPORTING, Exporting
 from .poses import START, Pose
 from .recovery.preferences import DEFAULTS, Preferences
 from .recovery.state import NO_RECOVERY, Recovery
-from .scene.state import Flight, Job, Mode, Photo, SceneInfo
+from .scene.state import Flight, Job, Mode, Photo, Room, SceneInfo
 
 TOAST_SECONDS = {"info": 5.0, "error": 20.0}
 MOST_LINES = 300
@@ -49,19 +51,34 @@ NO_STATS = Stats()
 
 
 @dataclass(frozen=True)
+class Palette:
+    """The command palette: what is typed there, and which of the commands that fit is chosen."""
+
+    text: str = ""
+    place: int = 0
+
+
+NO_PALETTE = Palette()
+
+
+@dataclass(frozen=True)
 class State:
     """The whole program.
 
     now: seconds of the session's clock, set at the start of a frame. choosing: the best pair is being
     looked for. view: of the photo stood at, if any. compare: where the photo begins, 0 to 1 across the
     picture; None: not compared. negatives: the person's own; none: those of the scene. lines: the log,
-    oldest first.
+    oldest first. rooms: scenes that were on show before, the last one first. dropped: photos while it is
+    asked where they belong. pending: commands that wait for an answer about unsaved edits.
     """
 
     now: float = 0.0
     photos: tuple[Photo, ...] = ()
     choosing: bool = False
     info: SceneInfo | None = None
+    rooms: tuple[Room, ...] = ()
+    dropped: tuple[Path, ...] = ()
+    pending: tuple[Any, ...] = ()
     prompts: tuple[Prompt, ...] = (FIRST_PROMPT,)
     active: int = 0
     negatives: tuple[str, ...] = ()
@@ -75,6 +92,7 @@ class State:
     next_key: int = 1
     dialog: str | None = None
     dialog_path: str = ""
+    palette: Palette = NO_PALETTE
     stats: Stats = NO_STATS
     editing: Editing = NO_EDITING
     asking: Asking = NO_ASKING

@@ -48,7 +48,7 @@ class _Drawn:
 
 @dataclass(frozen=True)
 class View:
-    """A picture at rest, read back for the worker to score."""
+    """A picture at rest, read back for the worker to score. lapses: as `Asking.lapses` is."""
 
     serial: int
     keys: tuple[int, ...]
@@ -56,6 +56,7 @@ class View:
     relevance: "Tensor"
     camera: "Camera"
     query: "CompiledQuery"
+    lapses: int
 
 
 class Viewport:
@@ -67,6 +68,7 @@ class Viewport:
         self._serial = 0
         self._query: CompiledQuery | None = None
         self._keys: tuple[int, ...] = ()
+        self._lapses = 0  # when the query was compiled
         self._drawn: _Drawn | None = None
         self._camera: Camera | None = None
         self._pose = START
@@ -119,9 +121,10 @@ class Viewport:
         self._marks = (None, None)
         self.governor = Governor(len(scene.gaussians))
 
-    def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None") -> None:
-        """Ask the prompts `keys`, in the order of `query`; None asks nothing."""
-        self._keys, self._query = keys, query
+    def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", lapses: int = 0) -> None:
+        """Ask the prompts `keys`, in the order of `query`, compiled when `Asking.lapses` was `lapses`;
+        None asks nothing."""
+        self._keys, self._query, self._lapses = keys, query, lapses
         self._colouring = self._answered = None
         if self._renderer is not None:
             self._renderer.ask(query)
@@ -200,12 +203,14 @@ class Viewport:
             return None
         if drawn.plan.kind is not Kind.MAPS or state.now - self._moved < SETTLE_AFTER:
             return None
+        if self._lapses != state.asking.lapses:
+            return None  # the query that holds now is on its way
         key = (drawn, id(self._query))
         if key == self._answered:
             return None
         self._answered = key
-        frame = self._renderer.frame()
-        return View(drawn.serial, self._keys, frame, self._renderer.relevance(), self._camera, self._query)
+        frame, relevance = self._renderer.frame(), self._renderer.relevance()
+        return View(drawn.serial, self._keys, frame, relevance, self._camera, self._query, self._lapses)
 
     def release(self) -> None:
         """Free what the renderer holds."""

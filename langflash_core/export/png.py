@@ -85,7 +85,7 @@ def heat_over(relevance: Tensor, rgb: Tensor, threshold: float, mode: str) -> Te
 
 
 def write_labels(path: Path, labels: Tensor, names: Sequence[str]) -> None:
-    """A label map as a palette PNG, and its legend beside it as `<name>.json`.
+    """A label map as a palette PNG, and its legend beside it as `<name>.json`, which names the picture.
 
     Args:
         labels: (H, W) integers; 0 is nothing, i is `names[i - 1]`. At most 255 names.
@@ -100,7 +100,7 @@ def write_labels(path: Path, labels: Tensor, names: Sequence[str]) -> None:
     image = Image.fromarray(labels.cpu().numpy().astype(np.uint8))
     image.putpalette(colours.flatten().tolist())
     counts = torch.bincount(labels.flatten().long().cpu(), minlength=len(names) + 1)
-    legend = [
+    entries = [
         {
             "id": index,
             "label": name,
@@ -109,7 +109,8 @@ def write_labels(path: Path, labels: Tensor, names: Sequence[str]) -> None:
         }
         for index, name in enumerate(["", *names])
     ]
-    write_atomically(path.with_suffix(".json"), json.dumps(legend, indent=2, ensure_ascii=False).encode())
+    legend = json.dumps({"picture": path.name, "labels": entries}, indent=2, ensure_ascii=False)
+    write_atomically(path.with_suffix(".json"), legend.encode())
     write_atomically(path, _encoded(image))
 
 

@@ -31,9 +31,14 @@ def describe_atoms(scene: Scene) -> AtomsReport:
     dictionary = scene.semantics.dictionary.double()
     dictionary = torch.where(torch.isfinite(dictionary).all(-1, keepdim=True), dictionary, 0.0)
     unit = normalize(dictionary, dim=-1)
-    masses = _carried(scene)
     similarity = (unit @ unit.T).numpy()
-    return AtomsReport(masses / max(masses.sum(), 1e-12), alike_order(similarity), similarity)
+    return AtomsReport(atom_shares(scene), alike_order(similarity), similarity)
+
+
+def atom_shares(scene: Scene) -> np.ndarray:
+    """(K,) of the scene's opacity, sum 1; zeros where there is none."""
+    masses = _carried(scene)
+    return masses / max(masses.sum(), 1e-12)
 
 
 def alike_order(similarity: np.ndarray) -> tuple[int, ...]:

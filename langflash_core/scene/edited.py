@@ -46,10 +46,14 @@ def edited_scene(scene: Scene, marks: Marks) -> Scene:
     """
     if not marks.deleted and marks.atoms == atoms_of(scene):
         return scene
-    kept = torch.from_numpy(~marks.deleted.rows())
     joined = _joined(scene, marks.atoms)
     deleted = scene.record.num_deleted + len(marks.deleted)
-    return joined.rows(kept).with_record(num_deleted=deleted)
+    return left(joined, marks).with_record(num_deleted=deleted)
+
+
+def left(scene: Scene, marks: Marks) -> Scene:
+    """The scene without deleted Gaussians; its atoms and its record as they are."""
+    return scene.rows(torch.from_numpy(~marks.deleted.rows())) if marks.deleted else scene
 
 
 def atoms_of(scene: Scene) -> tuple[Atom, ...]:

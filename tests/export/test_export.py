@@ -91,7 +91,9 @@ def test_labels_and_their_legend_agree(tmp_path, result):
     assert labels[0, -1] == 1 and labels[-1, 0] == 2 and labels[0, 0] == 0
     png.write_labels(tmp_path / "labels.png", labels, ["chair", "door", "whale"])
     assert np.array_equal(opened(tmp_path / "labels.png"), labels.numpy())
-    legend = json.loads((tmp_path / "labels.json").read_text("utf-8"))
+    document = json.loads((tmp_path / "labels.json").read_text("utf-8"))
+    legend = document["labels"]
+    assert document["picture"] == "labels.png"  # whatever lies beside it, it says what it belongs to
     assert [entry["label"] for entry in legend] == ["", "chair", "door", "whale"]
     with Image.open(tmp_path / "labels.png") as image:
         shown = np.asarray(image.convert("RGB"))[0, WIDTH - 1]

@@ -11,7 +11,7 @@ from langflash_core.types import Camera, QueryResult, Scene
 
 from .. import shots
 from ..cameras import CameraChoice, chosen_camera
-from ..files import check_output_file, readable_file, staged_folder
+from ..files import check_beside, check_output_file, readable_file, staged_folder
 from ..renderers import Renderer, open_renderer
 from ..report import ProgressBar
 from ..scenes import open_scene
@@ -210,6 +210,8 @@ def _shots(args: Namespace, scene: Scene, choice: CameraChoice) -> tuple[list[Ca
     legends = [target.with_suffix(".json") for target in targets] if args.what == "labels" else []
     for target in (*targets, *legends):
         check_output_file(target, inputs=[args.scene])
+    for legend, target in zip(legends, targets, strict=False) if not args.replace else ():
+        check_beside(legend, legend, target)
     return cameras, targets
 
 
@@ -249,8 +251,10 @@ def _write_masks(args: Namespace, scene: Scene, prompts: list[str], choice: Came
     else:
         cameras = [choice.of(scene)]
     names = [f"{args.output.stem}_{index}.png" for index in range(len(cameras))]
-    for name in names:
-        check_output_file(args.output.with_name(name), inputs=[args.scene])
+    for picture in map(args.output.with_name, names):
+        check_output_file(picture, inputs=[args.scene])
+        if not args.replace:
+            check_beside(picture, args.output, picture)
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
         results = []
         for index, camera in enumerate(cameras):

@@ -18,19 +18,56 @@ def change(state: State, **changes) -> State:
     return replace(state, asking=replace(state.asking, **changes))
 
 
+def lapsed(state: State) -> State:
+    """The state without scores: the Gaussians, the atoms or the negatives that they rest on are others."""
+    prompts = tuple(replace(p, score=None) for p in state.prompts)
+    return change(replace(state, prompts=prompts), histograms=(), lapses=state.asking.lapses + 1)
+
+
 # Phrases
 
 
 @dataclass(frozen=True)
 class AddPrompt:
-    """A new, empty row in a colour of its own."""
+    """A new, empty row in a colour of its own, where the next letters go."""
 
     def apply(self, state: State) -> State:
         used = {p.colour for p in state.prompts}
         free = [c for c in PALETTE if c not in used] or [PALETTE[len(state.prompts) % len(PALETTE)]]
         prompt = Prompt(state.next_key, colour=free[0])
         prompts = (*state.prompts, prompt)
-        return replace(state, prompts=prompts, active=prompt.key, next_key=state.next_key + 1)
+        state = replace(state, prompts=prompts, active=prompt.key, next_key=state.next_key + 1)
+        return change(state, caret=prompt.key)
+
+
+@dataclass(frozen=True)
+class NextPrompt:
+    """The phrase of `key` is typed: on to an empty row, or to a new one while there is room."""
+
+    key: int
+
+    def apply(self, state: State) -> State:
+        empty = next((p for p in state.prompts if not p.text.strip() and p.key != self.key), None)
+        if empty is not None:
+            return change(replace(state, active=empty.key), caret=empty.key)
+        return state if len(state.prompts) >= MOST_PROMPTS else AddPrompt().apply(state)
+
+
+@dataclass(frozen=True)
+class FocusPhrase:
+    """The next letters go to the active phrase."""
+
+    def apply(self, state: State) -> State:
+        chosen = next((p for p in state.prompts if p.key == state.active), state.prompts[0])
+        return change(state, caret=chosen.key)
+
+
+@dataclass(frozen=True)
+class CaretTaken:
+    """The field has the keys."""
+
+    def apply(self, state: State) -> State:
+        return change(state, caret=None)
 
 
 @dataclass(frozen=True)
@@ -112,7 +149,7 @@ class SetNegatives:
     negatives: tuple[str, ...]
 
     def apply(self, state: State) -> State:
-        return replace(state, negatives=self.negatives)
+        return lapsed(replace(state, negatives=self.negatives))
 
 
 @dataclass(frozen=True)
@@ -204,11 +241,17 @@ class PromptsRead:
 
 @dataclass(frozen=True)
 class Answered:
-    """Scores in the view on show: (key, text, score); a prompt edited meanwhile keeps none."""
+    """Scores in the view on show: (key, text, score); a prompt edited meanwhile keeps none.
+
+    lapses: as `Asking.lapses` was; scores that have lapsed since are dropped.
+    """
 
     scores: tuple[tuple[int, str, float], ...]
+    lapses: int = 0
 
     def apply(self, state: State) -> State:
+        if self.lapses != state.asking.lapses:
+            return state
         current = {p.key: p.text.strip() for p in state.prompts}
         for key, text, score in self.scores:
             if current.get(key) == text:
@@ -228,10 +271,11 @@ class Calibrated:
 
 @dataclass(frozen=True)
 class PhrasesCompiled:
-    """The phrases `keys`, in the order of `query`, are ready to be asked."""
+    """The phrases `keys`, in the order of `query`, are ready to be asked. lapses: as `Asking.lapses` was."""
 
     keys: tuple[int, ...]
     query: "CompiledQuery" = field(compare=False, repr=False)
+    lapses: int = 0
 
     def apply(self, state: State) -> State:
         state = Calibrated(self.query.threshold).apply(state)
@@ -240,11 +284,14 @@ class PhrasesCompiled:
 
 @dataclass(frozen=True)
 class Binned:
-    """How the pixels of the view on show score."""
+    """How the pixels of the view on show score. lapses: as for `Answered`."""
 
     histograms: tuple[Histogram, ...]
+    lapses: int = 0
 
     def apply(self, state: State) -> State:
+        if self.lapses != state.asking.lapses:
+            return state
         return change(state, histograms=self.histograms)
 
 
@@ -270,6 +317,17 @@ class AtomsDescribed:
 
     def apply(self, state: State) -> State:
         return change(state, insight=self.insight)
+
+
+@dataclass(frozen=True)
+class AtomsWeighed:
+    """Shares (K,) of what is left of the scene."""
+
+    shares: tuple[float, ...]
+
+    def apply(self, state: State) -> State:
+        insight = state.asking.insight
+        return state if insight is None else change(state, insight=replace(insight, shares=self.shares))
 
 
 @dataclass(frozen=True)

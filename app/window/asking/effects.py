@@ -7,7 +7,7 @@ from ..state import State
 from ..viewport import Viewport
 from .commands import EditPrompt, LoadPrompts, PhrasesCompiled, SavePrompts, SetNegatives
 from .prompt_sets import PromptSet
-from .work import Answer, DescribeAtoms, Encode, ReadPrompts, WritePrompts
+from .work import Answer, DescribeAtoms, Encode, ReadPrompts, WeighAtoms, WritePrompts
 
 DEBOUNCE_SECONDS = 0.12  # of typing
 
@@ -36,37 +36,44 @@ class AskingEffects(Effects):
             return
         keys, texts = tuple(p.key for p in asked), tuple(p.text.strip() for p in asked)
         likes, marks = tuple(p.like for p in asked), state.editing.marks
-        self._hands.submit(Encode(info.serial, info.scene, keys, texts, state.negatives, likes, marks))
+        scene, lapses = (info.serial, info.scene), state.asking.lapses
+        self._hands.submit(Encode(*scene, keys, texts, state.negatives, likes, marks, lapses))
 
     def follow(self, command: Command, before: State, state: State) -> None:
         """Prompt sets to the disk and from it; compiled phrases to the renderer."""
         submit = self._hands.submit
         match command:
             case SceneArrived(info):
-                submit(DescribeAtoms(info.serial, info.scene))
+                submit(DescribeAtoms(info.serial, info.scene, state.editing.marks))
             case SavePrompts(path):
                 submit(WritePrompts(PromptSet(state.prompts, state.negatives), path))
             case LoadPrompts(path):
                 submit(ReadPrompts(path))
-            case PhrasesCompiled(keys, query):
-                self._viewport.ask(keys, query)
+            case PhrasesCompiled(keys, query, lapses):
+                self._viewport.ask(keys, query, lapses)
             case _:
-                pass
+                self._weigh(before, state)
         if _question(before) != _question(state):
             pause = DEBOUNCE_SECONDS if isinstance(command, EditPrompt | SetNegatives) else 0.0
             self._encode_at = self._hands.now() + pause
+
+    def _weigh(self, before: State, state: State) -> None:
+        """Have the atoms weighed again once something was deleted or is back."""
+        old, new, info = before.editing.marks, state.editing.marks, state.info
+        if info is None or info is not before.info or old is None or new is None:
+            return
+        if info.num_atoms and old.deleted != new.deleted:
+            self._hands.submit(WeighAtoms(info.serial, info.scene, new))
 
     def after_picture(self, state: State) -> None:
         """Have the view on show scored, once it rests."""
         view = self._viewport.view(state)
         if view is not None:
-            self._hands.submit(
-                Answer(view.serial, view.keys, view.relevance, view.frame, view.camera, view.query)
-            )
+            seen = (view.relevance, view.frame, view.camera, view.query)
+            self._hands.submit(Answer(view.serial, view.keys, *seen, view.lapses))
 
 
 def _question(state: State) -> tuple:
     """What an encoding depends on."""
     serial = state.info.serial if state.info else 0
-    atoms = state.editing.marks.atoms if state.editing.marks else ()
-    return serial, tuple((p.key, p.text.strip(), p.like) for p in state.asked), state.negatives, atoms
+    return serial, tuple((p.key, p.text.strip(), p.like) for p in state.asked), state.asking.lapses

@@ -60,7 +60,7 @@ FIRST_PROMPT = Prompt(key=0)
 class Insight:
     """What the worker says about the K atoms of the scene on show.
 
-    shares: of the scene's opacity, sum 1. colours: as in the atoms picture. order: alike atoms side
+    shares: of the opacity that is left, sum 1. colours: as in the atoms picture. order: alike atoms side
     by side. similarity: (K, K) cosines.
     """
 
@@ -85,7 +85,8 @@ class Asking:
 
     recent: phrases asked, the newest first. atom: whose weight map is on show. chosen: atoms to
     merge. prompts_path: where the last set was. usual: what the scene compares phrases with, by its
-    own calibration, once it has said so.
+    own calibration, once it has said so. lapses: how often what scores rest on has changed. caret: the
+    prompt whose field takes the keys next.
     """
 
     recent: tuple[str, ...] = ()
@@ -95,6 +96,8 @@ class Asking:
     chosen: tuple[int, ...] = ()
     prompts_path: Path | None = None
     usual: tuple[str, ...] = ()
+    lapses: int = 0
+    caret: int | None = None
 
     def histogram(self, key: int, text: str) -> Histogram | None:
         """Of a prompt as it reads now; None until it is answered."""

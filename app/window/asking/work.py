@@ -12,7 +12,7 @@ from langflash_core.scene.edits import Marks
 
 from ..commands import Command, Notify, ShowPicture
 from ..requests import Asked, Errand, SceneErrand
-from .commands import Answered, AtomsDescribed, Binned, PhrasesCompiled, PromptsRead
+from .commands import Answered, AtomsDescribed, AtomsWeighed, Binned, PhrasesCompiled, PromptsRead
 from .prompt_sets import PromptSet, read_prompts, write_prompts
 from .state import BINS, Histogram, Insight
 
@@ -28,6 +28,7 @@ class Encode(SceneErrand):
     """Compile phrases against a scene; milliseconds once the text tower is loaded.
 
     likes: per phrase a language vector as float32 bytes, asked instead of the text, or none.
+    lapses: as `Asking.lapses` is.
     """
 
     newest_counts = True
@@ -38,6 +39,7 @@ class Encode(SceneErrand):
     negatives: tuple[str, ...]
     likes: tuple[bytes, ...] = ()
     marks: Marks | None = None
+    lapses: int = 0
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.language.relevance import compile_query
@@ -49,7 +51,8 @@ class Encode(SceneErrand):
         space = language_space(scene.semantics.space)
         query = compile_query(scene, space, list(self.texts), negatives=list(self.negatives) or None)
         likes = {row: _vector(like) for row, like in enumerate(self.likes) if like}
-        yield PhrasesCompiled(self.keys, with_vectors(query, scene.semantics.dictionary, likes))
+        query = with_vectors(query, scene.semantics.dictionary, likes)
+        yield PhrasesCompiled(self.keys, query, self.lapses)
 
 
 def _vector(content: bytes) -> "Tensor":
@@ -69,14 +72,15 @@ class Answer(SceneErrand):
     frame: "Frame"
     camera: "Camera"
     query: "CompiledQuery"
+    lapses: int = 0
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.language.answers import answer
 
         result = answer(self.relevance, self.frame, self.camera, self.query)
         answers = zip(self.keys, result.answers, strict=True)
-        yield Answered(tuple((key, a.prompt, float(a.score)) for key, a in answers))
-        yield Binned(self.histograms())
+        yield Answered(tuple((key, a.prompt, float(a.score)) for key, a in answers), self.lapses)
+        yield Binned(self.histograms(), self.lapses)
 
     def histograms(self) -> tuple[Histogram, ...]:
         """How many covered pixels of the view score how high, by phrase."""
@@ -119,21 +123,44 @@ class DescribeAtoms(SceneErrand):
     """Look the atoms over: shares, colours, cosines, and a small picture of each that a photo shows."""
 
     scene: "Scene" = field(repr=False)
+    marks: Marks | None = None
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.export.colours import atom_colours
         from langflash_core.scene.atoms import atom_pictures, describe_atoms
 
         report = describe_atoms(self.scene)
+        shares = _shares(self.scene, self.marks)
         colours = atom_colours(self.scene.semantics.dictionary.double().numpy())
         for k, rgb in enumerate(atom_pictures(self.scene)):
             if rgb is not None:
                 yield ShowPicture(f"atom {k}", rgb)
         yield AtomsDescribed(
             Insight(
-                shares=tuple(float(share) for share in report.shares),
+                shares=shares,
                 colours=tuple((float(r), float(g), float(b)) for r, g, b in colours),
                 order=report.order,
                 similarity=report.similarity,
             )
         )
+
+
+@dataclass(frozen=True)
+class WeighAtoms(SceneErrand):
+    """How much of what is left of the scene each atom carries."""
+
+    newest_counts = True
+
+    scene: "Scene" = field(repr=False)
+    marks: Marks
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        yield AtomsWeighed(_shares(self.scene, self.marks))
+
+
+def _shares(scene: "Scene", marks: Marks | None) -> tuple[float, ...]:
+    """(K,) of the opacity that is left, sum 1."""
+    from langflash_core.scene.atoms import atom_shares
+    from langflash_core.scene.edited import left
+
+    return tuple(map(float, atom_shares(scene if marks is None else left(scene, marks))))

@@ -3,8 +3,9 @@
 from dataclasses import dataclass, replace
 
 from langflash_core.scene import edits
-from langflash_core.scene.edits import Combine, Marks, Mask
+from langflash_core.scene.edits import Combine, History, Marks, Mask
 
+from ..asking.commands import lapsed
 from ..scene.state import Mode
 from ..state import State
 from .state import STRICTNESS_RANGE, Floaters, Region
@@ -17,7 +18,7 @@ def change(state: State, **changes) -> State:
 
 def _edit(state: State, label: str, marks: Marks) -> State:
     history = state.editing.history
-    return state if history is None else change(state, history=history.edited(label, marks))
+    return state if history is None else _with_history(state, history.edited(label, marks))
 
 
 # Selecting; what must be computed is asked of the worker, and comes back as `Found`
@@ -300,4 +301,16 @@ def _on_selection(state: State, verb: str, make) -> State:
 
 def _rewound(state: State, step) -> State:
     history = state.editing.history
-    return state if history is None else change(state, history=step(history))
+    return state if history is None else _with_history(state, step(history))
+
+
+def _with_history(state: State, history: History) -> State:
+    """Another history; scores hold on only while it shows the same Gaussians with the same atoms."""
+    before = state.editing.marks
+    state = change(state, history=history)
+    return state if _spoken_of(before) == _spoken_of(history.marks) else lapsed(state)
+
+
+def _spoken_of(marks: Marks | None) -> tuple | None:
+    """What of the marks a score rests on; names do not count."""
+    return None if marks is None else (marks.visible, [(atom.into, atom.on) for atom in marks.atoms])

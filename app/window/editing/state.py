@@ -137,6 +137,10 @@ class Editing:
         return len(self.history.marks.selected) if self.history else 0
 
     @property
+    def num_deleted(self) -> int:
+        return len(self.history.marks.deleted) if self.history else 0
+
+    @property
     def dirty(self) -> bool:
         """Whether anything was marked since the last save, selections included."""
         return self.marks is not None and self.marks != self.saved

@@ -16,39 +16,59 @@ def change(state: State, **changes: Any) -> State:
 
 @dataclass(frozen=True)
 class EditForm:
-    """The export dialog as the person left it; a new kind takes its own ending."""
+    """The export dialog as the person left it; a new kind takes a name and an ending of its own."""
 
     form: ExportForm
 
     def apply(self, state: State) -> State:
         old, form = state.exporting.form, self.form
-        if form.what is not old.what and form.path.lower().endswith(old.what.suffix):
-            form = replace(form, path=form.path[: -len(old.what.suffix)] + form.what.suffix)
+        if form.what is not old.what:
+            path = _renamed(form.path, old.what, form.what) if form.path == old.path else form.path
+            form = replace(form, path=path, proposed=_renamed(form.proposed, old.what, form.what))
         return change(state, form=form)
 
 
 @dataclass(frozen=True)
 class ShowExport:
-    """Open the export dialog, with a place to write to."""
+    """Open the export dialog, with a place to write to: what the person typed for this scene, or else one
+    that is named after it."""
 
     def apply(self, state: State) -> State:
         if state.info is None:
             text = "There is no scene to export; drop photos on the window first."
             return Notify(text).apply(state)
         form = state.exporting.form
-        if not form.path:
-            form = replace(form, path=str(_place(state).with_suffix(What.RGB.suffix)))
+        proposed = str(_place(state, form.what))
+        own = form.path not in ("", form.proposed) and form.serial == state.info.serial
         selected = form.only_selected and state.editing.num_selected > 0
-        state = change(state, form=replace(form, only_selected=selected))
-        return replace(state, dialog="export")
+        form = replace(
+            form,
+            path=form.path if own else proposed,
+            proposed=proposed,
+            serial=state.info.serial,
+            only_selected=selected,
+        )
+        return replace(change(state, form=form), dialog="export")
 
 
 @dataclass(frozen=True)
 class Export:
-    """Do what the form says."""
+    """Do what the form says; asks first where a file would be replaced, unless `sure`."""
+
+    sure: bool = False
 
     def apply(self, state: State) -> State:
         return state
+
+
+@dataclass(frozen=True)
+class AskToReplace:
+    """The export would write over these files."""
+
+    there: tuple[Path, ...]
+
+    def apply(self, state: State) -> State:
+        return replace(change(state, there=self.there), dialog="replace")
 
 
 @dataclass(frozen=True)
@@ -114,10 +134,17 @@ class CopiesAt:
         return change(state, edited=self.edited, selection=self.selection)
 
 
-def _place(state: State) -> Path:
-    """Beside the scene, or beside its first photo, by a name of its own."""
+def _place(state: State, what: What) -> Path:
+    """Beside the scene, or beside its first photo, by a name of its own for each kind."""
     assert state.info is not None
     beside = state.info.path
     if beside is None:
         beside = state.photos[0].path if state.photos else Path.home() / "scene"
-    return beside.with_name(f"{beside.stem}_view")
+    return beside.with_name(f"{beside.stem}{what.ends}{what.suffix}")
+
+
+def _renamed(path: str, old: What, new: What) -> str:
+    """The path of one kind as that of another; one that does not end as its kind stays as it is."""
+    if not path.lower().endswith(old.suffix):
+        return path
+    return path[: -len(old.suffix)].removesuffix(old.ends) + new.ends + new.suffix

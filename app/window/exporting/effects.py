@@ -14,8 +14,17 @@ from ..recovery.keeper import Keeper
 from ..recovery.work import KeepCopy
 from ..scene.commands import SceneArrived
 from ..state import State
-from .commands import CancelExport, CopiesAt, Export, ExportBegan, ExportEnded, ExportProgressed, ShowExport
-from .order import Order, order, pixels, source
+from .commands import (
+    AskToReplace,
+    CancelExport,
+    CopiesAt,
+    Export,
+    ExportBegan,
+    ExportEnded,
+    ExportProgressed,
+    ShowExport,
+)
+from .order import Order, order, pixels, source, there
 from .process import Exporter, camera_json
 
 
@@ -40,9 +49,9 @@ class ExportingEffects(Effects):
                 self._ready.add(path)
                 if self._waits:
                     self._waits = False
-                    self._hands.dispatch(Export())
-            case Export():
-                self._export(state)
+                    self._hands.dispatch(Export(sure=True))  # the question, if any, is answered
+            case Export(sure):
+                self._export(state, sure)
             case CancelExport():
                 self._exporter.cancel()
             case _:
@@ -71,7 +80,7 @@ class ExportingEffects(Effects):
         there = (path if path in copies else None for path in (edited, selection))
         self._hands.perform(CopiesAt(*there))
 
-    def _export(self, state: State) -> None:
+    def _export(self, state: State, sure: bool) -> None:
         perform = self._hands.perform
         if self._exporter.running:
             perform(Notify("An export is under way; wait for it, or stop it."))
@@ -80,12 +89,16 @@ class ExportingEffects(Effects):
         if isinstance(wanted, str):
             perform(Notify(wanted))
             return
+        found = there(wanted)
+        if found and not sure:
+            perform(AskToReplace(found))
+            return
         read = source(state)
         if state.info is not None and read != state.info.path and read not in self._ready:
             self._waits = True  # goes on when the copy is complete
             return
         try:
-            self._start(wanted, state)
+            self._start(wanted, state, bool(found))
         except LangFlashError as error:
             perform(Notify(str(error)))
         except OSError as error:
@@ -93,7 +106,7 @@ class ExportingEffects(Effects):
         else:
             perform(ExportBegan(wanted.target))
 
-    def _start(self, wanted: Order, state: State) -> None:
+    def _start(self, wanted: Order, state: State, replaces: bool) -> None:
         """Raises:
         LangFlashError: the folder or the camera file cannot be written.
         OSError: the process cannot be started.
@@ -102,7 +115,7 @@ class ExportingEffects(Effects):
         if wanted.camera_file is not None:
             size = pixels(state.exporting.form.side, state.pose.aspect)
             write_atomically(wanted.camera_file, camera_json(state.pose, *size))
-        self._exporter.start(wanted.words)
+        self._exporter.start((*wanted.words, *(("--replace",) if replaces else ())))
 
     def _progressed(self, stage: str, fraction: float) -> None:
         self._hands.dispatch(ExportProgressed(stage, fraction))

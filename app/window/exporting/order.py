@@ -15,11 +15,13 @@ from .state import ExportForm, What
 
 @dataclass(frozen=True)
 class Order:
-    """What the dialog comes to: the words after `langflash`, and a camera file to write first."""
+    """What the dialog comes to: the words after `langflash`, a camera file to write first, and all files
+    that will be written."""
 
     words: tuple[str, ...]
     target: Path
     camera_file: Path | None = None
+    files: tuple[Path, ...] = ()
 
     @property
     def line(self) -> str:
@@ -40,7 +42,7 @@ def order(state: State) -> Order | str:
         return "Type a file name."
     if os.path.realpath(target) in _real(scene_file, info.path):
         return "This file is the scene itself; choose another name."
-    if _real(*_written(target, len(info.views))) & _real(*(photo.path for photo in state.photos)):
+    if _real(target, *_written(form, target, len(info.views))) & _real(*(p.path for p in state.photos)):
         return "This would replace a photo of the tray; choose another name."
     phrases, problem = _phrases(state)
     if problem:
@@ -56,12 +58,27 @@ def order(state: State) -> Order | str:
         words += ["--size", "{}x{}".format(*pixels(form.side, state.pose.aspect))]
     if form.what is What.VIDEO:
         words += ["--seconds", f"{form.seconds:g}"]
-    return Order(tuple(words), target, camera_file)
+    files = (*_written(form, target, len(info.views)), *((camera_file,) if camera_file else ()))
+    return Order(tuple(words), target, camera_file, files)
 
 
-def _written(target: Path, num_views: int) -> list[Path]:
-    """What the command may write: one file, or one a view."""
-    return [target, *(target.with_name(f"{target.stem}_{v}{target.suffix}") for v in range(num_views))]
+def _written(form: ExportForm, target: Path, num_views: int) -> tuple[Path, ...]:
+    """What the command writes: one file, or one a view, and what lies beside."""
+    what, views = form.what, range(num_views if form.all_views else 1)
+    if what is What.COCO:
+        return (target, *(target.with_name(f"{target.stem}_{view}.png") for view in views))
+    if what is What.PLY:
+        return target, target.with_name(f"{target.stem}.language.safetensors")
+    pictures = (target,)
+    if form.all_views and what.looks and what.suffix == ".png":
+        pictures = tuple(target.with_name(f"{target.stem}_{view}.png") for view in views)
+    legends = (picture.with_suffix(".json") for picture in pictures if what is What.LABELS)
+    return (*pictures, *legends)
+
+
+def there(order: Order) -> tuple[Path, ...]:
+    """Files that the order would replace."""
+    return tuple(file for file in order.files if os.path.exists(file))
 
 
 def _seen_from(state: State, target: Path) -> tuple[list[str], Path | None]:

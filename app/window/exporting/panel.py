@@ -1,6 +1,5 @@
 """The export dialog, and the export under way."""
 
-import os
 from dataclasses import replace
 
 from imgui_bundle import ImVec2, imgui
@@ -16,6 +15,7 @@ from .state import SECONDS, ExportForm, What
 
 WIDTH = 620.0  # design pixels
 COLUMNS = 4
+_NAMED = 6  # files that the question before a replacement names
 SIDES = (512, 1024, 1600, 2048, 4096)
 HINTS = {
     What.RGB: "The scene's colours, PNG",
@@ -125,8 +125,7 @@ def _order(state: State, look: Look) -> list[do.Command]:
     if isinstance(order, str):
         widgets.muted(order)
     else:
-        exists = os.path.exists(order.target) and not state.exporting.form.all_views
-        widgets.muted(f"{order.target} will be replaced." if exists else "The same on the command line:")
+        widgets.muted("The same on the command line:")
         _command_line(order.line, look)
         issued += _copy(order.line)
         for remark in written.remarks(state):
@@ -142,6 +141,25 @@ def _order(state: State, look: Look) -> list[do.Command]:
     if busy:
         imgui.same_line()
         imgui.text_colored(theme.MUTED, "one is under way")
+    return issued
+
+
+def draw_replacing(state: State, look: Look) -> list[do.Command]:
+    """The question before files are written over."""
+    there = state.exporting.there
+    alone = len(there) == 1
+    imgui.text_wrapped("This file is there already:" if alone else "These files are there already:")
+    for file in there[:_NAMED]:
+        widgets.muted(str(file))
+    if len(there) > _NAMED:
+        widgets.muted(f"and {len(there) - _NAMED} more")
+    widgets.gap(look.px(4))
+    issued: list[do.Command] = []
+    if widgets.primary_button("Replace it" if alone else "Replace them", look.vec(140, 0)):
+        issued.append(export.Export(sure=True))
+    imgui.same_line()
+    if imgui.button("Choose another name", look.vec(190, 0)):
+        issued.append(do.ShowDialog("export"))
     return issued
 
 

@@ -11,24 +11,25 @@ SECONDS = (1.0, 60.0)
 
 
 class What(Enum):
-    """What to write: the label of the choice, the ending, and the word for `--what`."""
+    """What to write: the label of the choice, the ending, the word for `--what`, and the one that ends the
+    name of its file, so that no kind takes another's."""
 
-    RGB = ("Picture", ".png", "rgb")
-    HEAT = ("Heat-map", ".png", "heat")
-    MASK = ("Mask", ".png", "mask")
-    CUTOUT = ("Cut-out", ".png", "cutout")
-    LABELS = ("Label map", ".png", "labels")
-    COCO = ("COCO masks", ".json", "")
-    BOXES_JSON = ("Boxes, JSON", ".json", "boxes")
-    BOXES_CSV = ("Boxes, CSV", ".csv", "boxes")
-    BOXES_GLB = ("Boxes, .glb", ".glb", "boxes")
-    VIDEO = ("Turntable", ".mp4", "")
-    PLY = ("Splats, .ply", ".ply", "")
-    SPZ = ("Splats, .spz", ".spz", "")
-    SOG = ("Splats, .sog", ".sog", "")
-    SPLAT = ("Splats, .splat", ".splat", "")
-    GLB = ("Splats, .glb", ".glb", "")
-    SCENE = ("Scene", ".langflash", "")
+    RGB = ("Picture", ".png", "rgb", "picture")
+    HEAT = ("Heat-map", ".png", "heat", "heat")
+    MASK = ("Mask", ".png", "mask", "mask")
+    CUTOUT = ("Cut-out", ".png", "cutout", "cutout")
+    LABELS = ("Label map", ".png", "labels", "labels")
+    COCO = ("COCO masks", ".json", "", "coco")
+    BOXES_JSON = ("Boxes, JSON", ".json", "boxes", "boxes")
+    BOXES_CSV = ("Boxes, CSV", ".csv", "boxes", "boxes_table")
+    BOXES_GLB = ("Boxes, .glb", ".glb", "boxes", "boxes_bodies")
+    VIDEO = ("Turntable", ".mp4", "", "turntable")
+    PLY = ("Splats, .ply", ".ply", "", "splats")
+    SPZ = ("Splats, .spz", ".spz", "", "splats")
+    SOG = ("Splats, .sog", ".sog", "", "splats")
+    SPLAT = ("Splats, .splat", ".splat", "", "splats")
+    GLB = ("Splats, .glb", ".glb", "", "splats")
+    SCENE = ("Scene", ".langflash", "", "copy")
 
     @property
     def label(self) -> str:
@@ -41,6 +42,11 @@ class What(Enum):
     @property
     def word(self) -> str:
         return self.value[2]
+
+    @property
+    def ends(self) -> str:
+        """What a file's name ends with, before the ending."""
+        return f"_{self.value[3]}"
 
     @property
     def needs_phrases(self) -> bool:
@@ -75,7 +81,8 @@ class What(Enum):
 class ExportForm:
     """all_views: from every photo instead of the view on show. only_found: just what answers the
     phrases. only_selected: just the selection, where Gaussians are written. side: the longer one in
-    pixels. path: as typed; an ending is added."""
+    pixels. path: as typed; an ending is added. proposed: the path that nobody has typed. serial: of the
+    scene that `path` is for."""
 
     what: What = What.RGB
     all_views: bool = False
@@ -84,6 +91,8 @@ class ExportForm:
     side: int = 1024
     seconds: float = 6.0
     path: str = ""
+    proposed: str = ""
+    serial: int = 0
 
 
 @dataclass(frozen=True)
@@ -102,12 +111,13 @@ NO_FORM = ExportForm()
 @dataclass(frozen=True)
 class Exporting:
     """The exporting half of the state. edited, selection: copies that an export reads, of the scene
-    with unsaved edits and of what is selected."""
+    with unsaved edits and of what is selected. there: files that it would replace, while it is asked."""
 
     form: ExportForm = NO_FORM
     running: Running | None = None
     edited: Path | None = None
     selection: Path | None = None
+    there: tuple[Path, ...] = ()
 
 
 NO_EXPORTING = Exporting()

@@ -15,49 +15,49 @@ from ..kit.look import Look
 from ..recovery import panels as recovery_panels
 from ..scene import commands as show
 from ..scene.drops import typed_path, typed_scene
+from ..scene.panels import rooms
 from ..state import State
+from . import palette, table
 
 TITLES = {
     "save": "Save the scene",
     "open": "Open",
     "help": "Mouse and keys",
     "leave": "Leave?",
+    "drop": "Where do these photos belong?",
+    "unsaved": "Edits are not saved",
     "save prompts": "Save the phrases",
     "load prompts": "Load phrases",
     "export": "Export",
+    "replace": "Replace?",
     "settings": "Preferences",
     "log": "Log",
+    "palette": "All commands",
 }
+_HELP, _HANDS, _KEYS = 900.0, 208.0, 150.0  # design pixels of the help, and of its keys
 WIDTHS = {  # design pixels; others 520
     "export": export_panel.WIDTH,
     "settings": 560.0,
     "log": 640.0,
-    "help": 600.0,
+    "help": _HELP,
+    "palette": palette.WIDTH,
 }
-HELP = (
+GESTURES = (
     ("Left drag", "orbit"),
     ("Middle drag, Shift + left drag", "pan"),
     ("Wheel", "zoom"),
     ("Right drag", "look around"),
     ("W A S D, Q E", "fly, down and up; Shift is faster"),
-    ("H or Home", "back to the first photo's view"),
-    ("Z, F", "show all of the scene, the selection"),
-    ("P, K", "compare with the photo; show the cameras"),
-    ("1 to 5", "colour, heat-map, labels, atoms, depth"),
-    ("6 to 0", "masks, only these, without these, dim, features"),
-    ("Up, Down in a phrase", "recent phrases"),
-    ("V, X", "move; ask what is there"),
-    ("R, B, C", "select with a box, a brush, a click"),
     ("Shift, Ctrl while selecting", "add, remove;  Alt: orbit"),
-    ("[ and ]", "a smaller, a larger brush"),
-    ("Ctrl + A, D, I", "select all, nothing, the rest"),
-    ("G, Delete", "grow, delete the selection"),
-    ("Ctrl + Z, Ctrl + Shift + Z", "undo, redo"),
-    ("Ctrl + O, Ctrl + S, Ctrl + E", "open, save, export"),
-    ("Ctrl + P, F2", "preferences, log"),
-    ("Esc, Ctrl + Q", "one step back, leave"),
+    ("Enter, Up, Down in a phrase", "the next one, recent ones"),
+    ("Tab, F6", "the next control, the next area"),
+    ("Esc", "one step back; cancels a job"),
 )
-_CLOSING = do.ShowDialog | show.SaveScene | show.OpenPaths | ask.SavePrompts | ask.LoadPrompts | export.Export
+_COLUMNS = ((None, "View"), ("File", "Find", "Tools", "Edit", "Program"))  # of help; None: the gestures
+_CLOSING = (
+    do.ShowDialog | show.SaveScene | show.OpenPaths | show.Instead | show.All | show.GoOn | show.SaveFirst
+    | ask.SavePrompts | ask.LoadPrompts | export.Export
+)  # fmt: skip
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
@@ -99,11 +99,15 @@ def _body(dialog: str) -> Callable[[State, Look], list[do.Command]]:
         "open": _open,
         "help": _help,
         "leave": _leave,
+        "drop": rooms.draw_drop,
+        "unsaved": rooms.draw_unsaved,
         "save prompts": _save_prompts,
         "load prompts": _load_prompts,
         "export": export_panel.draw,
+        "replace": export_panel.draw_replacing,
         "settings": recovery_panels.draw_settings,
         "log": _log,
+        "palette": palette.draw,
     }[dialog]
 
 
@@ -167,11 +171,26 @@ def _path_field(state: State, label: str) -> tuple[list[do.Command], bool]:
 
 
 def _help(state: State, look: Look) -> list[do.Command]:
-    for gesture, meaning in HELP:
-        imgui.text(gesture)
-        imgui.same_line(look.px(250))
-        imgui.text_colored(theme.MUTED, meaning)
+    """Gestures and the keys of the table, by group, in two columns."""
+    for column, groups in enumerate(_COLUMNS):
+        if column:
+            imgui.same_line(look.px(_HELP / 2))
+        imgui.begin_group()
+        for group in groups:
+            _help_group(group, look)
+        imgui.end_group()
     return []
+
+
+def _help_group(group: str | None, look: Look) -> None:
+    keyed = [entry for entry in table.ENTRIES if entry.group == group and entry.keys]
+    rows = [(", ".join(map(str, entry.keys)), entry.name) for entry in keyed] if group else GESTURES
+    imgui.text_colored(theme.ACCENT, group or "Mouse and hands")
+    for keys, meaning in rows:
+        imgui.text(keys)
+        imgui.same_line(look.px(_KEYS if group else _HANDS))
+        imgui.text_colored(theme.MUTED, meaning)
+    widgets.gap(look.px(4))
 
 
 def _leave(state: State, look: Look) -> list[do.Command]:
@@ -180,7 +199,7 @@ def _leave(state: State, look: Look) -> list[do.Command]:
     if widgets.primary_button("Save first", look.vec(120, 0)):
         issued.append(do.ShowDialog("save"))
     imgui.same_line()
-    if imgui.button("Leave", look.vec(120, 0)) or imgui.is_key_pressed(imgui.Key.enter):
+    if imgui.button("Leave", look.vec(120, 0)):
         issued.append(do.Leave(sure=True))
     imgui.same_line()
     if imgui.button("Stay", look.vec(120, 0)):

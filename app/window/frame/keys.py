@@ -1,6 +1,4 @@
-"""The keys that work everywhere."""
-
-from dataclasses import replace
+"""The keys that work everywhere: those of the table, Esc, and the way from area to area."""
 
 from imgui_bundle import imgui
 
@@ -8,79 +6,72 @@ from .. import commands as do
 from ..editing import commands as edit
 from ..editing import pointing as point
 from ..editing.state import Tool
-from ..exporting import commands as export
-from ..recovery import commands as keep
-from ..scene import camera
-from ..scene.panels import in_space
-from ..scene.panels.modes import KEYED
+from ..scene import commands as show
 from ..state import State
+from . import table
 
-_DIGITS = (
-    imgui.Key._1, imgui.Key._2, imgui.Key._3, imgui.Key._4, imgui.Key._5,
-    imgui.Key._6, imgui.Key._7, imgui.Key._8, imgui.Key._9, imgui.Key._0,
-)  # fmt: skip
-_MODE_KEYS = tuple(zip(_DIGITS, KEYED, strict=True))
-
-# Taken from the event itself: on a slow machine S and the release of Ctrl share a frame.
-EDIT_SHORTCUTS: dict[tuple[str, bool], do.Command] = {  # with Ctrl; the second tells whether with Shift
-    ("z", False): edit.Undo(), ("z", True): edit.Redo(), ("y", False): edit.Redo(),
-    ("a", False): edit.SelectAll(), ("d", False): edit.Deselect(), ("i", False): edit.Invert(),
-}  # fmt: skip
-_TOOL_KEYS = (
-    (imgui.Key.v, Tool.MOVE), (imgui.Key.x, Tool.POINT), (imgui.Key.r, Tool.BOX),
-    (imgui.Key.b, Tool.BRUSH), (imgui.Key.c, Tool.PICK),
-)  # fmt: skip
-_DOING_KEYS: tuple[tuple[imgui.Key, do.Command], ...] = (
-    (imgui.Key.delete, edit.Delete()), (imgui.Key.backspace, edit.Delete()), (imgui.Key.g, edit.Grow()),
-    (imgui.Key.f, point.FrameSelection()),
-)  # fmt: skip
-BRUSH_STEP = 1.15  # of its radius, per press of [ or ]
-SHORTCUTS = {
-    "s": do.ShowDialog("save"), "o": do.ShowDialog("open"), "q": do.Leave(),
-    "e": export.ShowExport(), "p": do.ShowDialog("settings"),
-}  # fmt: skip
+AREAS = ("##panel", "##toolbar", "##tools", "##views")
+"""Windows that F6 goes through, by name."""
 
 
 def draw(state: State) -> list[do.Command]:
-    """Keys that work wherever the pointer is; those with Ctrl are in `SHORTCUTS`."""
+    """Keys that work wherever the pointer is, after all that may take them in this frame."""
+    if imgui.is_key_pressed(imgui.Key.escape, False) and (state.dialog or not typing()):
+        return _escape(state)
+    if _covered(state):
+        return []
+    pressed = [entry for entry in table.ENTRIES if any(_pressed(each, entry.repeats) for each in entry.keys)]
+    commands = [entry.make(state) for entry in pressed if entry.in_fields or not typing()]
+    return [command for command in commands if command is not None]
+
+
+def typing() -> bool:
+    """Whether a text field has the keys, also one that took them in this very frame."""
+    return imgui.get_io().want_text_input or imgui.get_current_context().want_text_input_next_frame == 1
+
+
+def _pressed(chord: table.Chord, repeats: bool) -> bool:
+    """With just what is held beside it; AltGr is Ctrl and Alt, and types a letter."""
     io = imgui.get_io()
-    issued: list[do.Command] = []
-    if imgui.is_key_pressed(imgui.Key.f1, False):
-        issued.append(do.ShowDialog("help"))
-    if imgui.is_key_pressed(imgui.Key.f2, False):
-        issued.append(do.ShowDialog("log"))
-    if imgui.is_key_pressed(imgui.Key.escape, False) and not io.want_text_input:
-        issued += _escape(state)
-    if io.want_text_input or io.key_ctrl or state.dialog or state.info is None:
-        return issued
-    if imgui.is_key_pressed(imgui.Key.h, False) or imgui.is_key_pressed(imgui.Key.home, False):
-        issued.append(camera.Home())
-    if imgui.is_key_pressed(imgui.Key.z, False):
-        issued.append(camera.FrameAll())
-    if imgui.is_key_pressed(imgui.Key.p, False) and state.view is not None:
-        issued.append(camera.Compare(None if in_space.comparing(state) else 0.5))
-    if imgui.is_key_pressed(imgui.Key.k, False):
-        wanted = state.preferences
-        issued.append(keep.Prefer(replace(wanted, photos_in_space=not wanted.photos_in_space)))
-    issued += [camera.SetMode(mode) for key, mode in _MODE_KEYS if imgui.is_key_pressed(key, False)]
-    issued += [point.SetTool(tool) for key, tool in _TOOL_KEYS if imgui.is_key_pressed(key, False)]
-    issued += [command for key, command in _DOING_KEYS if imgui.is_key_pressed(key, False)]
-    if imgui.is_key_pressed(imgui.Key.left_bracket):
-        issued.append(point.SetRadius(state.editing.radius / BRUSH_STEP))
-    if imgui.is_key_pressed(imgui.Key.right_bracket):
-        issued.append(point.SetRadius(state.editing.radius * BRUSH_STEP))
-    return issued
+    held = (io.key_ctrl, io.key_alt) == (chord.ctrl, False) and (
+        io.key_shift == chord.shift or not chord.ctrl
+    )
+    return held and imgui.is_key_pressed(chord.key, repeats)
+
+
+def step_to_area(state: State) -> None:
+    """F6: the next area, its first control in a frame; Tab does so too where nothing has the focus yet.
+    To call before the windows are drawn."""
+    context, tab = imgui.get_current_context(), imgui.is_key_pressed(imgui.Key.tab, False)
+    lost = tab and not typing() and (context.nav_id == 0 or not imgui.get_io().nav_active)
+    if not (lost or imgui.is_key_pressed(imgui.Key.f6, False)) or _covered(state):
+        return
+    here = context.nav_window.name if context.nav_window is not None else ""
+    found = {name: imgui.internal.find_window_by_name(name) for name in AREAS}
+    there = [name for name, window in found.items() if window is not None and window.was_active]
+    step = 0 if lost else 1
+    following = there[(there.index(here) + step) % len(there)] if here in there else there[0]
+    imgui.internal.focus_window(found[following])
+    imgui.internal.nav_init_window(found[following], True)
+    imgui.set_nav_cursor_visible(True)
+
+
+def _covered(state: State) -> bool:
+    """Whether a dialog or a menu has the keys."""
+    return bool(state.dialog) or imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
 
 
 def _escape(state: State) -> list[do.Command]:
-    """One step back: a menu, a dialog, an answer, a preview, a tool. Never out: one press too many would
-    end the program."""
+    """One step back: a dialog, a menu, a job, an answer, a preview, a tool. Never out: one press too many
+    would end the program."""
     editing = state.editing
     if state.dialog:
         return [do.ShowDialog(None)]
     if imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
         imgui.internal.close_popups_except_modals()
         return []
+    if state.job is not None and not state.job.cancelling:
+        return [show.CancelJob()]
     if editing.card is not None or editing.asked is not None:
         return [point.CloseCard()]
     if editing.floaters is not None:

@@ -24,6 +24,7 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
         What was issued, and the size of the picture's place in framebuffer pixels.
     """
     io = imgui.get_io()
+    keys.step_to_area(state)
     width, height = io.display_size.x, io.display_size.y
     left, bar, top = splitter.width(state, look, width), look.px(theme.STATUS_HEIGHT), look.px(CANVAS_TOP)
     place, size = ImVec2(left, top), ImVec2(max(width - left, 1), max(height - bar - top, 1))
@@ -33,7 +34,7 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
     with widgets.window("##toolbar", ImVec2(left, 0), ImVec2(size.x, top)):
         imgui.set_cursor_pos_y((top - imgui.get_frame_height()) / 2)
         issued += toolbar.draw(state, look)
-    with widgets.window("##status", ImVec2(0, height - bar), ImVec2(width, bar)):
+    with widgets.window("##status", ImVec2(0, height - bar), ImVec2(width, bar), widgets.NO_KEYS):
         imgui.set_cursor_pos_y((bar - imgui.get_text_line_height()) / 2)
         status.draw(state, look)
     issued += splitter.draw(state, look, left, height - bar)
@@ -64,7 +65,7 @@ def _side(state: State, look: Look) -> list[do.Command]:
 
 def _picture(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
-    with widgets.window("##picture", place, size, imgui.WindowFlags_.no_background):
+    with widgets.window("##picture", place, size, imgui.WindowFlags_.no_background | widgets.NO_KEYS):
         imgui.pop_style_var()
         issued = canvas.draw(state, look)
     if state.info is not None and state.info.views:

@@ -6,12 +6,12 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from .. import commands as do
-from ..exporting import commands as export
 from ..kit.look import Look
 from ..recovery import commands as keep
 from ..scene import commands as show
 from ..scene import samples
 from ..state import State
+from . import table
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
@@ -27,27 +27,28 @@ def draw(state: State, look: Look) -> list[do.Command]:
 
 
 def _items(state: State) -> list[do.Command]:
-    issued: list[do.Command] = []
-    shown = state.info is not None
-    issued += _item(fa.ICON_FA_FOLDER_OPEN, "Open ...", "Ctrl+O", do.ShowDialog("open"))
+    issued = _named(state, "Open ...")
     issued += _recent(state)
     issued += _samples()
     imgui.separator()
-    issued += _item(fa.ICON_FA_FLOPPY_DISK, "Save ...", "Ctrl+S", do.ShowDialog("save"), shown)
-    issued += _item(fa.ICON_FA_FILE_EXPORT, "Export ...", "Ctrl+E", export.ShowExport(), shown)
+    issued += _named(state, "Save ...", "Export ...")
     imgui.separator()
-    issued += _item(fa.ICON_FA_GEAR, "Preferences", "Ctrl+P", do.ShowDialog("settings"))
-    issued += _item(fa.ICON_FA_LIST, "Log", "F2", do.ShowDialog("log"))
-    issued += _item(fa.ICON_FA_KEYBOARD, "Mouse and keys", "F1", do.ShowDialog("help"))
+    issued += _named(state, "All commands", "Preferences", "Log", "Mouse and keys")
     imgui.separator()
-    issued += _item(fa.ICON_FA_RIGHT_FROM_BRACKET, "Leave", "Ctrl+Q", do.Leave())
+    issued += _named(state, "Leave")
     imgui.end_popup()
     return issued
 
 
-def _item(icon: str, label: str, key: str, command: do.Command, enabled: bool = True) -> list[do.Command]:
-    pressed = imgui.menu_item(f"{icon}   {label}", key, False, enabled)[0]
-    return [command] if pressed else []
+def _named(state: State, *names: str) -> list[do.Command]:
+    """Entries of the table; greyed where there is nothing for them to do."""
+    issued: list[do.Command] = []
+    for entry in map(table.named, names):
+        command = entry.make(state)
+        label = f"{entry.icon}   {entry.name}"
+        if imgui.menu_item(label, entry.key, False, command is not None)[0] and command is not None:
+            issued.append(command)
+    return issued
 
 
 def _recent(state: State) -> list[do.Command]:
@@ -71,6 +72,6 @@ def _samples() -> list[do.Command]:
     if imgui.begin_menu(f"{fa.ICON_FA_IMAGES}   Sample photos", True):
         for label, photos in samples.pairs():
             if imgui.menu_item(label, "", False, True)[0]:
-                issued += [show.ClearPhotos(), show.OpenPaths(tuple(map(str, photos))), show.Reconstruct()]
+                issued.append(show.Instead((show.ClearPhotos(), show.AddPhotos(photos), show.Reconstruct())))
         imgui.end_menu()
     return issued

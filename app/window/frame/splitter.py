@@ -28,7 +28,12 @@ def draw(state: State, look: Look, edge: float, height: float) -> list[do.Comman
     imgui.push_style_var(imgui.StyleVar_.window_min_size, ImVec2(1, 1))
     imgui.set_next_window_pos(ImVec2(edge - grip / 2, 0))
     imgui.set_next_window_size(ImVec2(grip, height))
-    flags = widgets.PLAIN | imgui.WindowFlags_.no_background | imgui.WindowFlags_.no_focus_on_appearing
+    flags = (
+        widgets.PLAIN
+        | widgets.NO_KEYS
+        | imgui.WindowFlags_.no_background
+        | imgui.WindowFlags_.no_focus_on_appearing
+    )
     imgui.begin("##splitter", None, flags | imgui.WindowFlags_.no_bring_to_front_on_focus)
     imgui.invisible_button("grip", ImVec2(grip, max(height, 1)))
     issued: list[do.Command] = []

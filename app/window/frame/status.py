@@ -12,16 +12,16 @@ from ..state import State
 
 def draw(state: State, look: Look) -> None:
     """As many figures as fit, the rest on hover; issues nothing."""
-    figures, space = _figures(state), look.px(26)
+    texts, space = figures(state), look.px(26)
     width = imgui.get_content_region_avail().x
-    shown = fitting([imgui.calc_text_size(text).x for text in figures], space, width)
+    shown = fitting([imgui.calc_text_size(text).x for text in texts], space, width)
     with widgets.colours(text=theme.MUTED):
-        for index, text in enumerate(figures[:shown]):
+        for index, text in enumerate(texts[:shown]):
             if index:
                 imgui.same_line(0, space)
             imgui.text(text)
-    if shown < len(figures) and imgui.is_window_hovered():
-        imgui.set_tooltip("\n".join(figures[shown:]))
+    if shown < len(texts) and imgui.is_window_hovered():
+        imgui.set_tooltip("\n".join(texts[shown:]))
 
 
 def fitting(widths: Sequence[float], space: float, room: float) -> int:
@@ -30,21 +30,28 @@ def fitting(widths: Sequence[float], space: float, room: float) -> int:
     return sum(end - space <= room for end in ends)
 
 
-def _figures(state: State) -> list[str]:
+def figures(state: State) -> list[str]:
+    """What there is to say, the most wanted first."""
     stats = state.stats
-    figures = [f"frame {1000 * stats.frame_seconds:.1f} ms"]
+    said = [f"frame {1000 * stats.frame_seconds:.1f} ms"]
     if state.info is not None:
         width, height = stats.picture_size
-        figures += [
+        said += [
             f"picture {1000 * stats.picture_seconds:.0f} ms at {width} x {height}",
-            f"{state.info.num_gaussians:,} Gaussians",
+            _count(state.info.num_gaussians, state.editing.num_deleted),
             f"{state.info.num_atoms} atoms",
         ]
         hover = state.editing.hover
         if hover is not None and hover.point is not None:
             x, y, z = hover.point
-            figures.append(f"x {x:.3f}  y {y:.3f}  z {z:.3f}  depth {hover.depth:.3f}")
-    figures.append(stats.renderer)
+            said.append(f"x {x:.3f}  y {y:.3f}  z {z:.3f}  depth {hover.depth:.3f}")
+    said.append(stats.renderer)
     if stats.passes:
-        figures.append("passes: " + ", ".join(f"{kind} {count}" for kind, count in stats.passes))
-    return figures
+        said.append("passes: " + ", ".join(f"{kind} {count}" for kind, count in stats.passes))
+    return said
+
+
+def _count(num_gaussians: int, num_deleted: int) -> str:
+    """How many Gaussians there are; after a deletion how many are left."""
+    left = f"{num_gaussians - num_deleted:,} of " if num_deleted else ""
+    return f"{left}{num_gaussians:,} Gaussians"

@@ -8,6 +8,8 @@ from ..kit import theme, widgets
 from ..kit.look import Look
 from ..state import State, Toast
 
+_FLAGS = widgets.PLAIN | widgets.NO_KEYS | imgui.WindowFlags_.no_focus_on_appearing
+
 
 def draw(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
     """Messages stacked upwards from `corner`, the lower right of the picture."""
@@ -18,7 +20,7 @@ def draw(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
         imgui.set_next_window_size(ImVec2(look.px(400), 0))
         imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
         imgui.push_style_color(imgui.Col_.window_bg, imgui.get_style().color_(imgui.Col_.popup_bg))
-        imgui.begin(f"##toast{toast.key}", None, widgets.PLAIN | imgui.WindowFlags_.no_focus_on_appearing)
+        imgui.begin(f"##toast{toast.key}", None, _FLAGS)
         if not imgui.is_popup_open("", imgui.PopupFlags_.any_popup):  # menus and dialogs stay in front
             imgui.internal.bring_window_to_display_front(imgui.internal.get_current_window())
         issued += _toast(toast, look)

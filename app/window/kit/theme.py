@@ -88,6 +88,9 @@ def set_up(scale: float, name: str = "dark") -> None:
     """Fonts and style of the current ImGui context; `scale` is the interface's, 1 at 96 dpi."""
     io = imgui.get_io()
     io.set_ini_filename("")  # the program's own preferences remember the layout
+    io.config_flags |= imgui.ConfigFlags_.nav_enable_keyboard
+    imgui.get_current_context().config_nav_windowing_key_next = 0  # Ctrl+Tab: ours have no names
+    imgui.get_current_context().config_nav_windowing_key_prev = 0
     io.fonts.add_font_from_file_ttf(str(_FONTS / "Roboto" / "Roboto-Regular.ttf"), FONT_SIZE)
     icons = imgui.ImFontConfig()
     icons.merge_mode = True

@@ -8,12 +8,8 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from . import theme
 
-PLAIN = (
-    imgui.WindowFlags_.no_decoration
-    | imgui.WindowFlags_.no_move
-    | imgui.WindowFlags_.no_saved_settings
-    | imgui.WindowFlags_.no_nav
-)
+PLAIN = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings
+NO_KEYS = imgui.WindowFlags_.no_nav  # for windows that Tab and the arrows pass by
 _Value = TypeVar("_Value")
 
 

@@ -1,6 +1,7 @@
 """Preferences, and what of an earlier session is offered again."""
 
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -96,11 +97,12 @@ class EndSessionOffer:
 
 
 def restored_phrases(state: State, kept: Kept) -> State:
-    """The phrases of a kept session in rows of their own."""
+    """The phrases of a kept session in rows of their own, those that ask for a place among them."""
     rows = []
-    for text in kept.phrases:
+    for text, like, threshold in zip_longest(kept.phrases, kept.likes, kept.thresholds):
         colour = PALETTE[len(rows) % len(PALETTE)]
-        rows.append(Prompt(state.next_key + len(rows), text, colour))
+        vector = bytes.fromhex(like or "")
+        rows.append(Prompt(state.next_key + len(rows), text, colour, threshold, like=vector))
     if not rows:
         return state
     return replace(state, prompts=tuple(rows), active=rows[0].key, next_key=state.next_key + len(rows))

@@ -157,13 +157,13 @@ class RecoveryEffects(Effects):
         if before.info is not None and before.editing.unsaved and before.editing.dirty:
             self._keep_edits(before)
             if before.info.path is None or before.editing.history is None or before.editing.history.done:
-                text = f"The edits of {before.info.name} are kept; open it again to go on with them."
+                text = f"The edits of {before.info.name} are kept; go back to it to go on with them."
                 self._hands.perform(Notify(text, "info"))
         self._edits_kept, self._edits_wrote, self._keep_edits_at = False, False, NEVER
         restored, self._restoring_edits = self._restoring_edits, None
-        if restored is not None and info.history is not None and info.history.done:
+        if info.history is not None and info.history.done:  # restored, or a room of this session
             self._write_edits(info, info.history)
-            if not self._keeper.own(restored):
+            if restored is not None and not self._keeper.own(restored):
                 self._hands.submit(ForgetFile(restored))
         else:
             self._hands.submit(LookForEdits(info.serial, info.scene, info.path))
@@ -252,6 +252,7 @@ class RecoveryEffects(Effects):
     def _kept(self, state: State) -> Kept:
         info = state.info
         path = None if info is None else info.path or (self._keeper.scene_file if self._copied else None)
+        prompts = [prompt for prompt in state.prompts if prompt.text.strip()]
         return Kept(
             photos=tuple(str(photo.path) for photo in state.photos),
             fovs=tuple(photo.fov for photo in state.photos),
@@ -259,7 +260,9 @@ class RecoveryEffects(Effects):
             edits="" if state.recovery.kept is None else str(state.recovery.kept),
             saved=info is None or info.path is not None,
             name="" if info is None else info.name,
-            phrases=tuple(prompt.text for prompt in state.prompts if prompt.text.strip()),
+            phrases=tuple(prompt.text for prompt in prompts),
+            likes=tuple(prompt.like.hex() for prompt in prompts),
+            thresholds=tuple(prompt.threshold for prompt in prompts),
             mode=state.mode.name,
             pose=None if info is None else state.pose,
         )
@@ -268,6 +271,6 @@ class RecoveryEffects(Effects):
 def _snapshot(state: State) -> tuple[Any, ...]:
     """What a change of must be kept."""
     where = None if state.info is None else (state.info.serial, state.info.path)
-    phrases = tuple(prompt.text for prompt in state.prompts)
+    phrases = tuple((prompt.text, prompt.like, prompt.threshold) for prompt in state.prompts)
     photos = tuple((photo.path, photo.fov) for photo in state.photos)
     return photos, where, phrases, state.mode, state.pose, state.recovery.kept

@@ -55,7 +55,8 @@ def read(path: Path) -> Kept | None:
             shift = (float(pose["shift"][0]), float(pose["shift"][1]))
             placed = Pose(centre, rotation, shift=shift, **rest)
         lists = {name: tuple(content.pop(name)) for name in ("photos", "fovs", "phrases")}
-        kept = Kept(pose=placed, file=path, **lists, **content)
+        likes, thresholds = _asked(content, len(lists["phrases"]))
+        kept = Kept(pose=placed, file=path, likes=likes, thresholds=thresholds, **lists, **content)
         there = [os.path.isfile(photo) for photo in kept.photos]
         photos = tuple(photo for photo, here in zip(kept.photos, there, strict=True) if here)
         fovs = tuple(fov for fov, here in zip(kept.fovs, there, strict=True) if here)
@@ -64,6 +65,19 @@ def read(path: Path) -> Kept | None:
     except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError):
         return None
     return replace(kept, photos=photos, fovs=fovs, scene=scene, edits=edits)
+
+
+def _asked(content: dict, count: int) -> tuple[tuple[str, ...], tuple[float | None, ...]]:
+    """The likes and the thresholds of `count` phrases, taken out of a file's content; one of an earlier
+    version has none.
+
+    Raises:
+        ValueError, TypeError: they are damaged.
+    """
+    likes, thresholds = content.pop("likes", ()), content.pop("thresholds", ())
+    if not {len(likes), len(thresholds)} <= {0, count} or any(len(bytes.fromhex(each)) % 4 for each in likes):
+        raise ValueError(f"expected likes and thresholds of {count} phrases, or none")
+    return tuple(likes), tuple(None if each is None else float(each) for each in thresholds)
 
 
 def forget(path: Path) -> None:

@@ -11,8 +11,9 @@ from ..scene.drops import SCENE_SUFFIX
 @dataclass(frozen=True)
 class Kept:
     """What a session holds. scene: its file, or the copy kept of one that was never saved, then
-    `saved` is false. edits: the file of those that nobody saved. phrases: texts. file: where this
-    was read from."""
+    `saved` is false. edits: the file of those that nobody saved. phrases: texts. likes: of each phrase
+    the language vector that it asks instead, float32 bytes in hexadecimal digits, or none. thresholds: of
+    each phrase the person's own. file: where this was read from."""
 
     photos: tuple[str, ...] = ()
     fovs: tuple[float | None, ...] = ()
@@ -21,6 +22,8 @@ class Kept:
     saved: bool = True
     name: str = ""
     phrases: tuple[str, ...] = ()
+    likes: tuple[str, ...] = ()
+    thresholds: tuple[float | None, ...] = ()
     mode: str = "RGB"
     pose: Pose | None = None
     file: Path | None = None

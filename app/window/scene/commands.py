@@ -7,11 +7,11 @@ from typing import Any
 from langflash_core.scene.edits import Marks
 
 from .. import poses
-from ..commands import NOTHING_TO_SAVE, Notify
+from ..commands import NOTHING_TO_SAVE, Command, Notify, ShowDialog
 from ..editing.state import fresh
 from ..state import State
 from .drops import MAX_PHOTOS
-from .state import Job, Photo, SceneInfo
+from .state import MOST_ROOMS, Job, Photo, Room, SceneInfo
 
 # Photos
 
@@ -161,10 +161,12 @@ class Reconstruct:
 
 @dataclass(frozen=True)
 class OpenScene:
-    """Read a scene file; replaces a job under way. edits: kept by an earlier session."""
+    """Read a scene file; replaces a job under way. edits: kept by an earlier session. alone: the photos in
+    the tray are not its own and go when it comes."""
 
     path: Path
     edits: Path | None = None
+    alone: bool = False
 
     def apply(self, state: State) -> State:
         title = "Restoring" if self.edits else f"Opening {self.path.name}"
@@ -195,11 +197,21 @@ class OpenPaths:
 
 @dataclass(frozen=True)
 class SceneArrived:
-    """A scene is ready: show it from its first view, ask every prompt again."""
+    """A scene is ready: show it from its first view, ask every prompt again; the one before is a room to go
+    back to. alone: see `OpenScene`. room: as it was left, where it was on show before."""
 
     info: SceneInfo
+    alone: bool = False
+    room: Room | None = None
 
     def apply(self, state: State) -> State:
+        state = replace(self._shown(state), rooms=_rooms(state, self.info))
+        if self.room is None:
+            return state
+        editing = replace(state.editing, saved=self.room.saved)
+        return replace(state, photos=self.room.photos, editing=editing, pose=self.room.pose, view=None)
+
+    def _shown(self, state: State) -> State:
         prompts = tuple(replace(p, score=None) for p in state.prompts)
         history = self.info.history
         saved = None if history is None else history.moved_to(0).marks
@@ -209,12 +221,89 @@ class SceneArrived:
             recovery=replace(state.recovery, edits=None, kept=None),
             asking=state.asking.without_scene(),
             info=self.info,
+            photos=() if self.alone else state.photos,
             prompts=prompts,
             job=None,
             flight=None,
             pose=self.info.views[0] if self.info.views else poses.START,
             view=0 if self.info.views else None,
         )
+
+
+def _rooms(state: State, coming: SceneInfo) -> tuple[Room, ...]:
+    """Those to go back to once `coming` is on show; the same file twice only where there are edits."""
+    info, editing = state.info, state.editing
+    left = () if info is None else (Room(info, state.photos, editing.history, editing.saved, state.pose),)
+    rooms = (room for room in (*left, *state.rooms) if room.info.serial != coming.serial)
+    kept = (room for room in rooms if room.edited or room.info.path is None or room.info.path != coming.path)
+    return tuple(kept)[:MOST_ROOMS]
+
+
+@dataclass(frozen=True)
+class GoToRoom:
+    """Back to the scene with this number, which was on show before."""
+
+    serial: int
+
+    def apply(self, state: State) -> State:
+        return state
+
+
+# What takes the place of the scene on show
+
+
+@dataclass(frozen=True)
+class Instead:
+    """Commands that replace the scene on show; asks first where edits are not saved."""
+
+    commands: tuple[Command, ...]
+
+    def apply(self, state: State) -> State:
+        asks = state.info is not None and state.editing.unsaved
+        return replace(state, pending=self.commands, dialog="unsaved" if asks else None)
+
+
+@dataclass(frozen=True)
+class GoOn:
+    """Do what has waited, edits saved or not."""
+
+    def apply(self, state: State) -> State:
+        return replace(state, pending=(), dialog=None)
+
+
+@dataclass(frozen=True)
+class SaveFirst:
+    """Save, and go on once that is done."""
+
+    def apply(self, state: State) -> State:
+        return replace(ShowDialog("save").apply(state), pending=state.pending)
+
+
+@dataclass(frozen=True)
+class AskAboutDrop:
+    """Photos were dropped on a scene: do they belong to it?"""
+
+    photos: tuple[Path, ...]
+
+    def apply(self, state: State) -> State:
+        return replace(state, dropped=self.photos, dialog="drop")
+
+
+def dropped(state: State, photos: tuple[Path, ...], new: bool) -> Command:
+    """What takes dropped photos into the tray, alone for a `new` room, and reconstructs where the person
+    wants that at once."""
+    taken: tuple[Command, ...] = (*((ClearPhotos(),) if new else ()), AddPhotos(photos))
+    return Instead((*taken, Reconstruct())) if state.preferences.start_at_once else All(taken)
+
+
+@dataclass(frozen=True)
+class All:
+    """Several commands, one after the other."""
+
+    commands: tuple[Command, ...]
+
+    def apply(self, state: State) -> State:
+        return replace(state, dialog=None)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 from langflash_core.errors import LangFlashError
 
@@ -12,13 +13,20 @@ from ..state import State
 from ..viewport import Viewport
 from .commands import (
     AddPhotos,
+    All,
+    AskAboutDrop,
     CancelJob,
     ChoosePair,
+    GoOn,
+    GoToRoom,
+    Instead,
     OpenPaths,
     OpenScene,
     Reconstruct,
     SaveScene,
     SceneArrived,
+    SceneSaved,
+    dropped,
 )
 from .drops import sort_drop
 from .state import SceneInfo
@@ -49,8 +57,8 @@ class SceneEffects(Effects):
             case Reconstruct() if state.photos:
                 photos = state.photos
                 submit(ReconstructPhotos(tuple(p.path for p in photos), tuple(p.fov for p in photos)))
-            case OpenScene(path, edits):
-                submit(LoadScene(path, edits))
+            case OpenScene(path, edits, alone):
+                submit(LoadScene(path, edits, alone))
             case SaveScene(path) if state.info is not None:
                 submit(WriteScene(state.info.scene, path, state.editing.marks))
             case CancelJob():
@@ -60,19 +68,39 @@ class SceneEffects(Effects):
             case SceneArrived(info):
                 self._show(info)
             case _:
+                self._go_on(command, before, state)
+
+    def _go_on(self, command: Command, before: State, state: State) -> None:
+        """Commands that stand for others."""
+        waited: Sequence[Command] = ()
+        match command:
+            case Instead() if state.dialog is None:
+                self._hands.perform(GoOn())
+            case SceneSaved() if before.pending:
+                self._hands.perform(GoOn())
+            case GoOn():
+                waited = before.pending
+            case All(commands):
+                waited = commands
+            case GoToRoom(serial):
+                rooms = (room for room in state.rooms if room.info.serial == serial)
+                waited = [SceneArrived(replace(r.info, history=r.history), room=r) for r in rooms]
+            case _:
                 pass
+        for each in waited:
+            self._hands.perform(each)
 
     def _open(self, paths: Sequence[str], state: State) -> None:
         perform = self._hands.perform
         drop = sort_drop(paths)
         for sentence in drop.rejected:
             perform(Notify(sentence))
-        if drop.photos:
-            perform(AddPhotos(drop.photos))
-            if state.preferences.start_at_once:
-                perform(Reconstruct())
+        if drop.photos and state.info is not None:
+            perform(AskAboutDrop(drop.photos))
+        elif drop.photos:
+            perform(dropped(state, drop.photos, new=False))
         elif drop.scenes:
-            perform(OpenScene(drop.scenes[0]))
+            perform(Instead((OpenScene(drop.scenes[0], alone=True),)))
 
     def _show(self, info: SceneInfo) -> None:
         try:

@@ -5,15 +5,16 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from langflash_core.scene.edits import History
+from langflash_core.scene.edits import History, Marks
 
-from ..poses import Pose, Vector
+from ..poses import START, Pose, Vector
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
 
 
 FLIGHT_SECONDS = 0.7
+MOST_ROOMS = 3  # beside the one on show; a large scene takes 100 MB
 
 
 class Mode(Enum):
@@ -102,6 +103,22 @@ class SceneInfo:
     history: "History | None" = field(default=None, compare=False, repr=False)
     own_views: bool = False
     extent: tuple[Vector, Vector] | None = None
+
+
+@dataclass(frozen=True)
+class Room:
+    """A scene that was on show, as it was left: its photos, its edits, where one stood."""
+
+    info: SceneInfo
+    photos: tuple[Photo, ...] = ()
+    history: "History | None" = field(default=None, compare=False, repr=False)
+    saved: Marks | None = field(default=None, compare=False, repr=False)
+    pose: Pose = START
+
+    @property
+    def edited(self) -> bool:
+        """Whether it has edits."""
+        return self.history is not None and bool(self.history.done or self.history.undone)
 
 
 @dataclass(frozen=True)

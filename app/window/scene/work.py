@@ -47,18 +47,22 @@ class ReconstructPhotos(Job):
 
 @dataclass(frozen=True)
 class LoadScene(Job):
-    """Read a scene file; or, with `edits`, the scene and the history that an earlier session kept."""
+    """Read a scene file; or, with `edits`, the scene and the history that an earlier session kept.
+
+    alone: as in `OpenScene`.
+    """
 
     path: Path
     edits: Path | None = None
+    alone: bool = False
 
     def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> SceneArrived:
         from langflash_core.export import read
 
         scene = read(self.path)
         if self.edits is not None:
-            return SceneArrived(_restored(describe_scene(scene, serial, ""), self.edits))
-        return SceneArrived(describe_scene(scene, serial, self.path.name, self.path))
+            return SceneArrived(_restored(describe_scene(scene, serial, ""), self.edits), self.alone)
+        return SceneArrived(describe_scene(scene, serial, self.path.name, self.path), self.alone)
 
 
 def _restored(info: SceneInfo, edits: Path) -> SceneInfo:

@@ -198,7 +198,23 @@ def test_label_map_and_legend(run, scene_file, tmp_path):
     assert labels.shape == (HEIGHT, WIDTH)
     assert [int(np.median(labels[:, column])) for column in (8, 28, 50)] == [1, 2, 3]
     legend = json.loads((tmp_path / "l.json").read_text())
-    assert [entry["label"] for entry in legend] == ["", *WORDS]
+    assert legend["picture"] == "l.png" and [entry["label"] for entry in legend["labels"]] == ["", *WORDS]
+
+
+def test_what_lies_beside_is_replaced_only_by_its_own_kind(run, scene_file, tmp_path):
+    """Nobody named these files: the legend of a label map, the pictures of a COCO file."""
+    label = ("export", scene_file, "-o", tmp_path / "v.png", "--what", "labels", "--prompt", *WORDS, *TORCH)
+    masks = ("export", scene_file, "-o", tmp_path / "v.json", "--view", "0", "--prompt", *WORDS, *TORCH)
+    assert run(*masks).code == 0
+    before = (tmp_path / "v.json").read_bytes()
+    outcome = run(*label)
+    assert outcome.code == 2 and "v.json" in outcome.err and "--replace" in outcome.err
+    assert (tmp_path / "v.json").read_bytes() == before and not (tmp_path / "v.png").exists()
+    assert run(*masks).code == 0  # its own picture of the time before
+    assert run(*label, "--replace").code == 0 and run(*label).code == 0
+    outcome = run(*masks)
+    assert outcome.code == 2 and "v_0.png" in outcome.err
+    assert run(*masks, "--replace").code == 0
 
 
 # imageio-ffmpeg leaves the pipes of its finished processes to the garbage collector.

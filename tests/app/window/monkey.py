@@ -35,7 +35,7 @@ SLOPE_MB = 8.0  # a minute; a scene that leaked at each opening would be 20, a r
 KEYS = (
     *"wasdqehzfpkvxrbcg1234567890", "bracketleft", "bracketright", "Delete", "BackSpace", "Escape", "Return",
     "Tab", "shift+Tab", "Up", "Down", "Left", "Right", "Home", "End", "space", "F1", "F2", "minus", "plus",
-    *(f"ctrl+{letter}" for letter in "zyadisoepqvc"), "ctrl+shift+z", "F11",
+    *(f"ctrl+{letter}" for letter in "zyadisoepqvcf"), "ctrl+comma", "ctrl+shift+z", "F6", "F11",
 )  # fmt: skip
 WORDS = (
     "armchair",

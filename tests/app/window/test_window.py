@@ -330,6 +330,7 @@ def test_drops_a_real_drop_and_escape(program: Program, scene_file: Path, tmp_pa
     broken = tmp_path / "broken photo.jpg"
     broken.write_bytes(b"\xff\xd8\xff\xe0 cut short")
     program.client.drop(program.window, [broken], MIDDLE)
+    program.click("New room")
     state = program.until(lambda s: s["job"] is None and s["photos"] == [broken.name], "the end of the job")
     assert any(broken.name in toast for toast in state["toasts"])
     assert state["scene"] == "room.langflash"  # the old scene is still there

@@ -116,6 +116,7 @@ def test_a_reconstruction_never_blocks_the_window(program: Program) -> None:
         idle = max(lags(program, first), default=0.0)
         first = len(program._lines)
         program.client.drop(program.window, PHOTOS, (LEFT + 300, TOP + 200))
+        program.click("New room")
         program.until(lambda s: s["job"] is not None, "the job")
         while program.state["job"] is not None:
             wiggle(program, 0.5)

@@ -37,18 +37,15 @@ def field(state: State, prompt: Prompt) -> tuple[bool, str]:
     return changed, text
 
 
-def take_caret(state: State) -> bool:
-    """Whether the last field is a new one that should have the caret now; true once."""
-    storage, place = imgui.get_state_storage(), imgui.get_id("caret")
-    wanted = storage.get_int(place, 0) == len(state.prompts)
-    if wanted:
-        storage.set_int(place, 0)
-    return wanted
-
-
-def remembered(text: str) -> list[do.Command]:
-    """To call after a field: what was typed there becomes a recent phrase."""
-    return [ask.Remember(text)] if imgui.is_item_deactivated_after_edit() and text.strip() else []
+def finished(key: int, text: str) -> list[do.Command]:
+    """To call after the field of prompt `key`: what was typed there becomes a recent phrase, and Enter goes
+    on to the next one."""
+    if not text.strip() or not imgui.is_item_deactivated():
+        return []
+    issued: list[do.Command] = [ask.Remember(text)] if imgui.is_item_deactivated_after_edit() else []
+    if imgui.is_key_pressed(imgui.Key.enter) or imgui.is_key_pressed(imgui.Key.keypad_enter):
+        issued.append(ask.NextPrompt(key))
+    return issued
 
 
 def unfinished_hint() -> None:
@@ -64,8 +61,8 @@ def tools(state: State, look: Look) -> list[do.Command]:
     imgui.begin_disabled(full)
     if imgui.button(f"{fa.ICON_FA_PLUS}  Add a phrase"):
         issued.append(ask.AddPrompt())
-        imgui.get_state_storage().set_int(imgui.get_id("caret"), len(state.prompts) + 1)
     imgui.end_disabled()
+    widgets.tooltip("Enter in a phrase does the same")
     imgui.same_line(0, look.px(6))
     imgui.begin_disabled(not state.asking.recent)
     if widgets.quiet_button(f"{fa.ICON_FA_CLOCK_ROTATE_LEFT}##recent", "Recent phrases; arrow up in a field"):

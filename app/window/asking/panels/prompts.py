@@ -19,10 +19,9 @@ def draw(state: State, look: Look) -> list[do.Command]:
     """The prompts section."""
     issued: list[do.Command] = []
     widgets.heading("Find")
-    caret = state.prompts[-1].key if entry.take_caret(state) else None
     for prompt in state.prompts:
         imgui.push_id(prompt.key)
-        issued += _row(state, prompt, look, prompt.key == caret)
+        issued += _row(state, prompt, look)
         imgui.pop_id()
     issued += entry.tools(state, look)
     issued += scores.draw(state, look)
@@ -31,9 +30,9 @@ def draw(state: State, look: Look) -> list[do.Command]:
     return issued
 
 
-def _row(state: State, prompt: Prompt, look: Look, caret: bool) -> list[do.Command]:
+def _row(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     corner = imgui.get_cursor_screen_pos()
-    issued = _phrase(state, prompt, look, caret)
+    issued = _phrase(state, prompt, look)
     issued += _row_buttons(state, prompt, look)
     if prompt.text.strip() and prompt.visible and state.info is not None:
         issued += _verdict(prompt, look)
@@ -45,7 +44,7 @@ def _row(state: State, prompt: Prompt, look: Look, caret: bool) -> list[do.Comma
     return issued
 
 
-def _phrase(state: State, prompt: Prompt, look: Look, caret: bool) -> list[do.Command]:
+def _phrase(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     """Its colour and its words."""
     issued: list[do.Command] = []
     changed, colour = imgui.color_edit3("##colour", list(prompt.colour), _SWATCH)
@@ -55,11 +54,12 @@ def _phrase(state: State, prompt: Prompt, look: Look, caret: bool) -> list[do.Co
     imgui.same_line()
     imgui.set_next_item_width(imgui.get_content_region_avail().x - 3 * look.px(38))
     frame = theme.LINE if prompt.like else theme.RAISED  # a chip that stands for a place, not for its words
-    if caret:
+    if state.asking.caret == prompt.key:
         imgui.set_keyboard_focus_here()
+        issued.append(ask.CaretTaken())
     with widgets.colours(frame_bg=frame):
         changed, text = entry.field(state, prompt)
-    issued += entry.remembered(text)
+    issued += entry.finished(prompt.key, text)
     if prompt.like:
         widgets.tooltip("Asks for what the place you clicked says; type to ask for words instead")
     if imgui.is_item_activated() and state.active != prompt.key:

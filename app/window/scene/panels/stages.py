@@ -30,7 +30,7 @@ def table(timings: Mapping[str, float]) -> list[tuple[str, float]]:
 
 def draw(state: State, look: Look) -> None:
     """The table, folded away until it is asked for."""
-    rows = [] if state.info is None or state.job is not None else table(state.info.scene.record.cost.timings)
+    rows = [] if state.info is None else table(state.info.scene.record.cost.timings)
     if not rows:
         return
     shape = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width

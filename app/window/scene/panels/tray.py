@@ -13,9 +13,10 @@ from ...poses import FOV_RANGE
 from ...state import State
 from .. import commands as show
 from ..state import Job, Photo
-from . import stages
+from . import rooms, stages
 
 COLUMNS = 3
+_CANCEL = 104.0  # design pixels
 NOTABLE_SECONDS = 0.05  # of a finished stage; a shorter one is only a heading of others
 ASSUMED_FOV = 65.0  # degrees, as the core assumes where neither file nor person says
 HOW_TO_TELL = "click a photo to tell it"
@@ -26,6 +27,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     """The photos section."""
     issued: list[do.Command] = []
     widgets.heading("Photos")
+    issued += rooms.draw(state, look)
     if state.photos:
         issued += _tray(state, look)
     else:
@@ -34,6 +36,8 @@ def draw(state: State, look: Look) -> list[do.Command]:
         issued += _progress(state.job, state.now, look)
     elif state.photos:
         issued += _buttons(state, look)
+    else:
+        issued += _open_button()
     for sentence in _sentences(state):
         _warning(sentence)
     stages.draw(state, look)
@@ -232,6 +236,12 @@ def _crop(aspect: float, target: float) -> tuple[ImVec2, ImVec2]:
     return ImVec2(0, margin), ImVec2(1, 1 - margin)
 
 
+def _open_button() -> list[do.Command]:
+    """In the place of the others while there is no photo."""
+    pressed = imgui.button(f"{fa.ICON_FA_FOLDER_OPEN}  Open ...", ImVec2(-1, 0))
+    return [do.ShowDialog("open")] if pressed else []
+
+
 def _buttons(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     few = len(state.photos) < 3
@@ -240,7 +250,7 @@ def _buttons(state: State, look: Look) -> list[do.Command]:
     width = imgui.get_content_region_avail().x - others
     imgui.begin_disabled(state.choosing)
     if widgets.primary_button(f"{fa.ICON_FA_CUBES}  Reconstruct", ImVec2(width, 0)):
-        issued.append(show.Reconstruct())
+        issued.append(show.Instead((show.Reconstruct(),)))
     if not few:
         imgui.same_line()
         icon = fa.ICON_FA_HOURGLASS_HALF if state.choosing else fa.ICON_FA_WAND_MAGIC_SPARKLES
@@ -256,22 +266,38 @@ def _buttons(state: State, look: Look) -> list[do.Command]:
 
 
 def _progress(job: Job, now: float, look: Look) -> list[do.Command]:
-    """The stage under way with its bar, the finished ones with their seconds, and cancel."""
-    imgui.text(job.title)
-    for stage, seconds in job.done:
-        if seconds < NOTABLE_SECONDS:
-            continue
-        with widgets.colours(text=theme.MUTED):
-            imgui.text(f"{fa.ICON_FA_CHECK}  {stage}")
-            widgets.at_right_edge(f"{seconds:.1f} s")
-    stage = "stopping" if job.cancelling else job.stage
-    imgui.text(stage)
-    widgets.at_right_edge(f"{now - job.started:.1f} s")
-    imgui.progress_bar(job.fraction, ImVec2(-1, look.px(8)), "")
+    """Cancel, the stage under way and its bar, in the one line of the buttons: nothing moves by a stage.
+    The finished ones with their seconds on hover."""
     imgui.begin_disabled(job.cancelling)
-    pressed = imgui.button(f"{fa.ICON_FA_STOP}  Cancel", ImVec2(-1, 0))
+    pressed = imgui.button(f"{fa.ICON_FA_STOP}  Cancel", look.vec(_CANCEL, 0))
     imgui.end_disabled()
+    widgets.tooltip("Stop it  (Esc)")
+    imgui.same_line()
+    corner, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
+    seconds = f"{now - job.started:.1f} s"
+    room = width - imgui.calc_text_size(seconds).x - look.px(8)
+    imgui.align_text_to_frame_padding()
+    imgui.text(widgets.shortened("stopping" if job.cancelling else job.stage, room))
+    if imgui.is_item_hovered():
+        imgui.set_tooltip(_told(job))
+    with widgets.colours(text=theme.MUTED):
+        widgets.at_right_edge(seconds)
+    _bar(job.fraction, ImVec2(corner.x, corner.y + imgui.get_frame_height()), width, look)
     return [show.CancelJob()] if pressed else []
+
+
+def _told(job: Job) -> str:
+    """What is being done, and the finished stages with their seconds."""
+    done = [f"{stage}  {seconds:.1f} s" for stage, seconds in job.done if seconds >= NOTABLE_SECONDS]
+    return "\n".join((job.title, *done))
+
+
+def _bar(fraction: float, corner: ImVec2, width: float, look: Look) -> None:
+    """A fraction as a line from `corner` down, in the gap before the next item."""
+    canvas, height = imgui.get_window_draw_list(), look.px(4)
+    for share, colour in ((1.0, theme.LINE), (fraction, theme.ACCENT)):
+        end = ImVec2(corner.x + share * width, corner.y + height)
+        canvas.add_rect_filled(corner, end, widgets.u32(colour), look.px(2))
 
 
 def _warning(sentence: str) -> None:

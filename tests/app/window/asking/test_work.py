@@ -15,6 +15,8 @@ from app.window.asking.state import BINS
 from app.window.worker import Worker
 from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import language_space
+from langflash_core.scene.edited import first_marks
+from langflash_core.scene.edits import Mask, delete
 from langflash_core.splat import render
 from langflash_core.types import Semantics
 from tests.app.window.asking.test_prompt_sets import a_set
@@ -74,6 +76,20 @@ def test_atoms_are_described(scene) -> None:
     cosines = [[float(a @ b / np.linalg.norm(a) / np.linalg.norm(b)) for b in unit] for a in unit]
     np.testing.assert_allclose(mine.similarity, cosines, atol=1e-12)
     assert sorted(mine.order) == [0, 1, 2] and len(mine.colours) == 3
+
+
+def test_atoms_are_weighed_by_what_is_left(scene) -> None:
+    """Shares of a deleted atom are 0, as if it had never been there."""
+    marks = first_marks(scene)
+    half = delete(marks, Mask.of(scene.semantics.weight_ids[:, 0].numpy() == 1))
+    (found,) = work.WeighAtoms(6, scene, half).run(lambda: False)
+    *_, described = work.DescribeAtoms(6, scene, half).run(lambda: False)
+    assert isinstance(found, ask.AtomsWeighed) and isinstance(described, ask.AtomsDescribed)
+    np.testing.assert_allclose(found.shares, (2500 / 7400, 0.0, 4900 / 7400), atol=1e-6)
+    assert described.insight.shares == found.shares
+    nothing = delete(marks, Mask.full(len(scene.gaussians)))
+    (empty,) = work.WeighAtoms(6, scene, nothing).run(lambda: False)
+    assert isinstance(empty, ask.AtomsWeighed) and empty.shares == (0.0, 0.0, 0.0)
 
 
 def test_atoms_without_photos_or_numbers_do_no_harm(scene) -> None:

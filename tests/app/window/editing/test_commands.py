@@ -9,10 +9,12 @@ import torch
 
 from app.window import commands as do
 from app.window.asking import commands as ask
+from app.window.asking.state import BINS, Histogram
 from app.window.commands import apply
 from app.window.editing import commands as edit
 from app.window.editing import pointing as point
 from app.window.editing.state import RADIUS_RANGE, Floaters, Reading, Region, Tool
+from app.window.frame.status import figures
 from app.window.scene import commands as show
 from app.window.scene.state import FLIGHT_SECONDS, Mode
 from app.window.scene.work import describe_scene
@@ -213,3 +215,45 @@ def test_boxes_and_strokes_are_pixels() -> None:
     assert stroke[along | down].all() and stroke.sum() < 1.15 * (along | down).sum()
     half = Region(((8.0, 5.0), (2.0, 1.0))).pixels(5, 4, scale=0.5)
     assert half[:3, 1:4].all() and half.sum() == 9  # centres on the edge are inside
+
+
+def answered(state: State) -> State:
+    """With the phrase "door" found in the view on show."""
+    state = after(state, ask.EditPrompt(0, "door"), do.Tick(1.0))
+    lapses = state.asking.lapses
+    histogram = Histogram(0, "door", (1,) * BINS)
+    return after(state, ask.Answered(((0, "door", 0.99),), lapses), ask.Binned((histogram,), lapses))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [edit.Delete(), edit.Hide(), edit.Isolate(), edit.ToggleAtom(0), edit.MergeAtoms((0, 1))],
+    ids=lambda command: type(command).__name__,
+)
+def test_a_score_goes_with_what_it_rests_on(shown: State, change: do.Command) -> None:
+    """Otherwise what was deleted would still be found, and what is back would not."""
+    before = answered(after(shown, found(0, CHAIRS)))
+    assert before.prompts[0].found and before.asking.histograms
+    state = after(before, change)
+    assert state.prompts[0].score is None and state.asking.histograms == () and state.wants_maps
+    late = after(state, ask.Answered(((0, "door", 0.99),), before.asking.lapses))
+    assert late == state  # the answer was about Gaussians that are gone
+    again = answered(state)
+    assert again.prompts[0].score == 0.99
+    assert after(again, edit.Undo()).prompts[0].score is None
+
+
+def test_selecting_and_naming_keep_the_scores(shown: State) -> None:
+    state = after(answered(shown), found(0, CHAIRS), edit.RenameAtom(0, "throne"), edit.Undo())
+    assert state.prompts[0].score == 0.99 and state.asking.histograms
+
+
+def test_other_negatives_take_the_scores_away(shown: State) -> None:
+    assert after(answered(shown), ask.SetNegatives(("thing",))).prompts[0].score is None
+
+
+def test_the_status_bar_counts_what_is_left(shown: State) -> None:
+    assert "12,300 Gaussians" in figures(shown)
+    state = after(shown, found(0, CHAIRS), edit.Delete())
+    assert "9,800 of 12,300 Gaussians" in figures(state)
+    assert "12,300 Gaussians" in figures(after(state, edit.Undo()))

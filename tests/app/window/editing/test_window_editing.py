@@ -105,6 +105,20 @@ def test_brush_delete_undo_save(program: Program, tmp_path: Path) -> None:
     assert state["gl_errors"] == []
 
 
+def test_what_is_deleted_is_not_found_until_it_is_back(program: Program) -> None:
+    """In the colours, where nothing but the score needs the answer again."""
+    program.type_prompt("armchair")
+    program.until(lambda s: s["prompts"][0][2] is True, "the armchair")
+    program.click("##select")
+    state = program.until(lambda s: s["selected"] > 0 and not s["waiting"], "its Gaussians")
+    assert state["mode"] == "RGB" and state["prompts"][0][2] is True
+    program.xdotool("mousemove", *map(str, MIDDLE), "click", "1", "sleep", "0.3", "key", "Delete")
+    program.until(lambda s: s["deleted"] == 2500 and s["prompts"][0][2] is False, "not found")
+    program.xdotool("key", "ctrl+z")
+    program.until(lambda s: s["deleted"] == 0 and s["prompts"][0][2] is True, "found again")
+    assert program.state["gl_errors"] == []
+
+
 def test_what_is_this_and_find_similar(program: Program) -> None:
     press(program, "x", "POINT")
     move(program, CHAIR)

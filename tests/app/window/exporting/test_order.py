@@ -6,13 +6,19 @@ from pathlib import Path
 
 import pytest
 
+from app.window import commands as do
 from app.window.asking import commands as ask
+from app.window.effects import Hands
 from app.window.exporting import commands as export
 from app.window.exporting import order as export_form
+from app.window.exporting.effects import ExportingEffects
+from app.window.exporting.process import Exporter
 from app.window.exporting.state import What
 from app.window.poses import Pose, Vector
 from app.window.recovery import commands as keep
+from app.window.recovery.keeper import Keeper
 from app.window.scene import camera
+from app.window.scene import commands as show
 from app.window.scene.state import Photo
 from app.window.state import State
 from langflash_core.scene.edits import Atom, History, Marks, Mask
@@ -68,9 +74,7 @@ def test_the_view_on_show_a_camera_of_its_own_or_all_photos() -> None:
     assert not isinstance(every, str) and "--all-views" in every.words and every.camera_file is None
 
 
-def test_a_new_kind_takes_its_own_ending_and_an_unsaved_scene_its_copy() -> None:
-    state = form(form(scene(), path="/out/x.png"), what=What.VIDEO)
-    assert state.exporting.form.path == "/out/x.mp4"
+def test_an_unsaved_scene_is_read_from_its_copy() -> None:
     state = form(after(scene(None), keep.CopyAt(Path("/state/copy.langflash"))), path="/x")
     order = export_form.order(state)
     assert not isinstance(order, str) and order.words[1] == "/state/copy.langflash"
@@ -114,9 +118,92 @@ def test_an_export_never_replaces_a_photo() -> None:
     photos = (Photo(Path("/p/left.png")), Photo(Path("/p/left_1.png")))
     state = replace(scene(None), photos=photos)
     state = after(state, keep.CopyAt(Path("/state/copy.langflash")), export.ShowExport())
-    assert state.exporting.form.path == "/p/left_view.png"
+    assert state.exporting.form.path == "/p/left_picture.png"
     assert not isinstance(export_form.order(state), str)
     for path in ("/p/left.png", "/p/left"):
         assert "photo" in str(export_form.order(form(state, path=path)))
     views = form(state, path="/p/left.png", all_views=True)
     assert "photo" in str(export_form.order(replace(views, photos=photos[1:])))
+
+
+def written(state: State) -> set[Path]:
+    order = export_form.order(state)
+    assert not isinstance(order, str), order
+    return set(order.files)
+
+
+@pytest.mark.parametrize("all_views", [False, True])
+@pytest.mark.parametrize("moved", [False, True])
+def test_no_two_kinds_write_the_same_file(all_views: bool, moved: bool) -> None:
+    """A legend, the pictures of COCO masks and camera files among them."""
+    state = after(scene(), export.ShowExport())
+    state = after(state, camera.MoveTo(Pose(Vector(0.0, 0.0, -1.0)))) if moved else state
+    taken: dict[Path, What] = {}
+    for what in (*What, *reversed(What)):
+        state = form(state, what=what, all_views=all_views)
+        for file in written(state):
+            assert taken.setdefault(file, what) is what, file
+    assert Path("/rooms/my room_labels.json") in taken or all_views
+
+
+def test_what_a_kind_writes_beside_its_file() -> None:
+    state = form(scene(), what=What.LABELS, path="/x/a.png")
+    assert written(state) == {Path("/x/a.png"), Path("/x/a.json")}
+    every = form(state, all_views=True)
+    assert written(every) == {Path(f"/x/a_{n}.{kind}") for n in (0, 1) for kind in ("png", "json")}
+    coco = form(scene(), what=What.COCO, path="/x/a.json")
+    assert written(coco) == {Path("/x/a.json"), Path("/x/a_0.png")}
+    ply = form(scene(), what=What.PLY, path="/x/a.ply")
+    assert written(ply) == {Path("/x/a.ply"), Path("/x/a.language.safetensors")}
+
+
+def test_a_name_of_ones_own_is_kept_for_its_scene_and_named_by_kind() -> None:
+    state = form(after(scene(), export.ShowExport()), path="/out/x.png")
+    state = form(state, what=What.MASK)
+    assert state.exporting.form.path == "/out/x_mask.png"
+    assert form(state, what=What.VIDEO).exporting.form.path == "/out/x_turntable.mp4"
+    again = after(state, do.ShowDialog(None), export.ShowExport())
+    assert again.exporting.form.path == "/out/x_mask.png"
+
+
+def test_the_name_follows_the_scene() -> None:
+    """Also one that was typed: it was for the scene before. A saved scene gives its name at once."""
+    first = after(scene(), export.ShowExport())
+    assert first.exporting.form.path == "/rooms/my room_picture.png"
+    assert first.info is not None
+    other = replace(first.info, serial=2, path=Path("/rooms/kitchen.langflash"))
+    for state in (first, form(first, path="/out/x.png")):
+        state = after(state, do.ShowDialog(None), show.SceneArrived(other), export.ShowExport())
+        assert state.exporting.form.path == "/rooms/kitchen_picture.png"
+    saved = after(first, show.SceneSaved(Path("/else/hall.langflash")), export.ShowExport())
+    assert saved.exporting.form.path == "/else/hall_picture.png"
+
+
+class Desk:
+    """The effects of exporting, without a process."""
+
+    def __init__(self, state: State, monkeypatch) -> None:
+        self.state, self.ran = state, []
+        hands = Hands(self.perform, self.perform, lambda request: None, lambda: None, lambda: 0.0)
+        self.effects = ExportingEffects(hands, Keeper())
+        monkeypatch.setattr(Exporter, "start", lambda _, words: self.ran.append(words))
+
+    def perform(self, command: do.Command) -> None:
+        before, self.state = self.state, after(self.state, command)
+        self.effects.follow(command, before, self.state)
+
+
+def test_it_is_asked_before_a_file_is_replaced(monkeypatch, folders: Path) -> None:
+    path = folders / "room.langflash"
+    desk = Desk(form(scene(path), what=What.LABELS, path=str(folders / "a.png")), monkeypatch)
+    desk.perform(export.Export())
+    assert len(desk.ran) == 1 and "--replace" not in desk.ran[0]
+    desk.perform(export.ExportEnded(0, "done", ""))
+    (folders / "a.json").write_text("boxes")  # where the legend would go
+    desk.perform(export.Export())
+    assert len(desk.ran) == 1 and desk.state.dialog == "replace"
+    assert desk.state.exporting.there == (folders / "a.json",)
+    desk.perform(do.ShowDialog("export"))
+    assert desk.state.exporting.form.path == str(folders / "a.png")
+    desk.perform(export.Export(sure=True))
+    assert len(desk.ran) == 2 and desk.ran[1][-1] == "--replace" and desk.state.dialog is None

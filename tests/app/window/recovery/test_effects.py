@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 import torch
 
+from app.window.asking.state import Prompt
 from app.window.commands import Command, Notify, OfScene, Tick, apply
 from app.window.editing import commands as edit
+from app.window.editing.pointing import LIKE_THRESHOLD
 from app.window.effects import Hands
 from app.window.places import state_folder
 from app.window.recovery import commands as keep
@@ -163,3 +165,23 @@ def test_what_holds_for_one_scene_is_nothing_for_another(info) -> None:
     word = Notify("a word")
     assert apply(shown, OfScene(1, word)).toasts and not apply(shown, OfScene(2, word)).toasts
     assert apply(State(), OfScene(0, word)).toasts and not apply(State(), OfScene(1, word)).toasts
+
+
+def test_a_phrase_that_asks_for_a_place_comes_back_as_what_it_was(desk: Desk, info) -> None:
+    """Not as its words, "like this (armchair)", which mean nothing."""
+    desk.perform(show.SceneArrived(info))
+    vector = np.array([0.6, 0.8, 0.0], np.float32).tobytes()
+    similar = Prompt(5, "like this (armchair)", threshold=LIKE_THRESHOLD, like=vector)
+    desk.state = replace(desk.state, prompts=(Prompt(0, "door"), similar))
+    desk.perform(Notify("anything"))
+    desk.pass_time(1.1 * KEEP_AFTER)
+    desk.effects.close(desk.state, crashed=True)
+    (file,) = state_folder().glob("session-*.json")
+    kept = sessions.read(file)
+    assert kept is not None
+    state = apply(apply(State(), keep.OfferSession(kept)), keep.EndSessionOffer(restore=True))
+    door, again = state.prompts
+    assert (door.text, door.like, door.threshold) == ("door", b"", None)
+    assert (again.text, again.like, again.threshold) == (similar.text, vector, LIKE_THRESHOLD)
+    file.write_text(json.dumps({**json.loads(file.read_bytes()), "likes": ["", "0f"]}))
+    assert sessions.read(file) is None  # half a number is damage

@@ -7,13 +7,16 @@ import pytest
 import torch
 
 from app.window import commands as do
+from app.window.effects import Hands
 from app.window.poses import Pose
-from app.window.scene import camera
+from app.window.scene import camera, work
 from app.window.scene import commands as show
 from app.window.scene.drops import MAX_PHOTOS
+from app.window.scene.effects import SceneEffects
 from app.window.scene.state import FLIGHT_SECONDS
 from app.window.scene.work import describe_scene
 from app.window.state import State
+from langflash_core.scene.file import save
 from tests.app.window.scenes import after, room, told
 from tests.app.window.scenes import shown_scene as scene
 
@@ -112,3 +115,24 @@ def test_all_of_the_scene_is_framed_and_a_photo_compared() -> None:
     assert framed.flight is not None and framed.flight.end.centre.z < 0  # stands back
     assert after(scene(), camera.Compare(1.5)).compare == 1.0
     assert after(scene(), camera.Compare(None)).compare is None
+
+
+def test_a_scene_from_a_file_takes_the_photos_of_another_away(shown: State, info, tmp_path: Path) -> None:
+    """They would be reconstructed again, or named in an export, as if they were its own."""
+    path = tmp_path / "room.langflash"
+    save(info.scene, path)
+    asked: list[work.LoadScene] = []
+    state = [after(shown, show.AddPhotos(PATHS))]
+
+    def perform(command: do.Command) -> None:
+        state.append(after(state[-1], command))
+        effects.follow(command, state[-2], state[-1])
+
+    hands = Hands(perform, perform, asked.append, lambda: None, lambda: 0.0)  # type: ignore[arg-type]
+    effects = SceneEffects(hands, None, None, str)  # type: ignore[arg-type]
+    perform(show.OpenPaths((str(path),)))
+    assert len(state[-1].photos) == 3  # until it has come: it may be damaged
+    arrived = asked[0].run(2, lambda *_: None, lambda: False)
+    assert after(state[-1], arrived).photos == ()
+    made = after(state[-1], show.SceneArrived(info))
+    assert len(made.photos) == 3  # it was made of them

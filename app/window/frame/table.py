@@ -1,0 +1,223 @@
+"""Every command that has a name: keys, menu, palette and help are made of this one table."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+from imgui_bundle import icons_fontawesome_6 as fa
+from imgui_bundle import imgui
+
+from .. import commands as do
+from ..asking import commands as ask
+from ..asking.prompt_sets import MOST_PROMPTS
+from ..editing import commands as edit
+from ..editing import pointing as point
+from ..editing.state import Tool
+from ..exporting import commands as export
+from ..recovery import commands as keep
+from ..scene import camera
+from ..scene import commands as show
+from ..scene.panels import in_space
+from ..scene.panels.modes import KEYED
+from ..scene.state import Mode
+from ..state import State
+
+BRUSH_STEP = 1.15  # of its radius, per press of [ or ]
+_DIGITS = "1234567890"
+_SIGNS = {
+    imgui.Key.comma: ",", imgui.Key.left_bracket: "[", imgui.Key.right_bracket: "]",
+    imgui.Key.delete: "Del", imgui.Key.backspace: "Backspace", imgui.Key.home: "Home",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Chord:
+    """A key with or without Ctrl and Shift."""
+
+    key: imgui.Key
+    ctrl: bool = False
+    shift: bool = False
+
+    def __str__(self) -> str:
+        held = "Ctrl+" * self.ctrl + "Shift+" * self.shift
+        return held + _SIGNS.get(self.key, str(self.key.name).strip("_").upper())
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A command by its name. make: it for a state, or None where it has nothing to do.
+
+    in_fields: its keys work while a text field has the others. repeats: while the key is held.
+    """
+
+    name: str
+    group: str
+    make: Callable[[State], do.Command | None]
+    keys: tuple[Chord, ...] = ()
+    icon: str = ""
+    in_fields: bool = False
+    repeats: bool = False
+
+    @property
+    def key(self) -> str:
+        """Its first key, for people; empty without one."""
+        return str(self.keys[0]) if self.keys else ""
+
+
+def named(name: str) -> Entry:
+    """The entry of this name."""
+    return next(entry for entry in ENTRIES if entry.name == name)
+
+
+def matching(text: str) -> tuple[Entry, ...]:
+    """Entries with every word of `text` in group or name; names that begin with it come first."""
+    words, start = text.lower().split(), text.lower().strip()
+    found = [e for e in ENTRIES if all(word in f"{e.group} {e.name}".lower() for word in words)]
+    return tuple(sorted(found, key=lambda entry: not entry.name.lower().startswith(start)))
+
+
+def _plain(name: str) -> tuple[Chord, ...]:
+    return (Chord(getattr(imgui.Key, name)),)
+
+
+def _ctrl(name: str, shift: bool = False) -> tuple[Chord, ...]:
+    return (Chord(getattr(imgui.Key, name), ctrl=True, shift=shift),)
+
+
+def _always(command: do.Command) -> Callable[[State], do.Command | None]:
+    return lambda state: command
+
+
+def _shown(command: do.Command) -> Callable[[State], do.Command | None]:
+    """Once there is a scene."""
+    return lambda state: command if state.info is not None else None
+
+
+def _selected(command: do.Command) -> Callable[[State], do.Command | None]:
+    """Once something is selected."""
+    return lambda state: command if state.editing.num_selected else None
+
+
+def _files() -> Iterable[Entry]:
+    group, dialog = "File", do.ShowDialog
+    opening = fa.ICON_FA_FOLDER_OPEN
+    yield Entry("Open ...", group, _always(dialog("open")), _ctrl("o"), opening, in_fields=True)
+    yield Entry("Save ...", group, _shown(dialog("save")), _ctrl("s"), fa.ICON_FA_FLOPPY_DISK, in_fields=True)
+    exporting = fa.ICON_FA_FILE_EXPORT
+    yield Entry("Export ...", group, _shown(export.ShowExport()), _ctrl("e"), exporting, in_fields=True)
+    reconstruct = show.Instead((show.Reconstruct(),))
+    yield Entry("Reconstruct the photos", group, lambda s: reconstruct if s.photos else None)
+    yield Entry("Back to the room before", group, _room_before)
+    yield Entry("Cancel the reconstruction", group, lambda s: show.CancelJob() if s.job else None)
+    yield Entry("Clear the tray", group, lambda s: show.ClearPhotos() if s.photos and not s.job else None)
+    yield Entry(
+        "Leave", group, _always(do.Leave()), _ctrl("q"), fa.ICON_FA_RIGHT_FROM_BRACKET, in_fields=True
+    )
+
+
+def _room_before(state: State) -> do.Command | None:
+    free = state.rooms and state.job is None
+    return show.GoToRoom(state.rooms[0].info.serial) if free else None
+
+
+def _program() -> Iterable[Entry]:
+    group, dialog = "Program", do.ShowDialog
+    palette = fa.ICON_FA_TERMINAL
+    yield Entry("All commands", group, _always(dialog("palette")), _ctrl("p"), palette, in_fields=True)
+    settings = _always(dialog("settings"))
+    yield Entry("Preferences", group, settings, _ctrl("comma"), fa.ICON_FA_GEAR, in_fields=True)
+    yield Entry("Log", group, _always(dialog("log")), _plain("f2"), fa.ICON_FA_LIST, in_fields=True)
+    help_ = _always(dialog("help"))
+    yield Entry("Mouse and keys", group, help_, _plain("f1"), fa.ICON_FA_KEYBOARD, in_fields=True)
+
+
+def _asking() -> Iterable[Entry]:
+    group = "Find"
+    yield Entry("Type a phrase", group, _always(ask.FocusPhrase()), _ctrl("f"), in_fields=True)
+    yield Entry("Add a phrase", group, lambda s: ask.AddPrompt() if len(s.prompts) < MOST_PROMPTS else None)
+    yield Entry("Select what the phrase means", group, _meant)
+    yield Entry("Save the phrases ...", group, _always(do.ShowDialog("save prompts")))
+    yield Entry("Load phrases ...", group, _always(do.ShowDialog("load prompts")))
+    yield Entry("Dictionary", group, _dictionary)
+
+
+def _meant(state: State) -> do.Command | None:
+    prompt = state.active_prompt if state.info is not None else None
+    return None if prompt is None else edit.SelectByPhrase(prompt.key, state.editing.combine)
+
+
+def _dictionary(state: State) -> do.Command | None:
+    if state.info is None or state.info.num_atoms == 0:
+        return None
+    return ask.OpenDictionary(not state.preferences.dictionary_open)
+
+
+def _looking() -> Iterable[Entry]:
+    group = "View"
+    home = (*_plain("h"), *_plain("home"))
+    yield Entry("Back to the first photo's view", group, _shown(camera.Home()), home)
+    yield Entry("Show all of the scene", group, _shown(camera.FrameAll()), _plain("z"))
+    yield Entry("Fly to the selection", group, _shown(point.FrameSelection()), _plain("f"))
+    yield Entry("Compare with the photo", group, _compare, _plain("p"))
+    yield Entry("Show the photos' cameras", group, _cameras, _plain("k"))
+    for mode in Mode:
+        keys = _plain(f"_{_DIGITS[KEYED.index(mode)]}") if mode in KEYED else ()
+        yield Entry(f"Show: {mode.value}", group, _mode(mode), keys)
+
+
+def _mode(mode: Mode) -> Callable[[State], do.Command | None]:
+    return lambda state: camera.SetMode(mode) if mode.possible(state.info) else None
+
+
+def _compare(state: State) -> do.Command | None:
+    if state.info is None or state.view is None:
+        return None
+    return camera.Compare(None if in_space.comparing(state) else 0.5)
+
+
+def _cameras(state: State) -> do.Command | None:
+    wanted = state.preferences
+    prefer = keep.Prefer(replace(wanted, photos_in_space=not wanted.photos_in_space))
+    return prefer if state.info is not None else None
+
+
+def _tools() -> Iterable[Entry]:
+    group = "Tools"
+    for name, key, tool in (
+        ("Move around", "v", Tool.MOVE), ("What is this?", "x", Tool.POINT),
+        ("Select with a box", "r", Tool.BOX), ("Select with a brush", "b", Tool.BRUSH),
+        ("Select by a click", "c", Tool.PICK),
+    ):  # fmt: skip
+        yield Entry(name, group, _shown(point.SetTool(tool)), _plain(key))
+    yield Entry("A smaller brush", group, _brush(1 / BRUSH_STEP), _plain("left_bracket"), repeats=True)
+    yield Entry("A larger brush", group, _brush(BRUSH_STEP), _plain("right_bracket"), repeats=True)
+    yield Entry("Find floaters", group, _shown(edit.FindFloaters()))
+
+
+def _brush(factor: float) -> Callable[[State], do.Command | None]:
+    return lambda s: point.SetRadius(s.editing.radius * factor) if s.info is not None else None
+
+
+def _editing() -> Iterable[Entry]:
+    group = "Edit"
+    yield Entry("Undo", group, _undo, _ctrl("z"))
+    yield Entry("Redo", group, _redo, (*_ctrl("z", shift=True), *_ctrl("y")))
+    yield Entry("Select everything", group, _shown(edit.SelectAll()), _ctrl("a"))
+    yield Entry("Select nothing", group, _selected(edit.Deselect()), _ctrl("d"))
+    yield Entry("Select the rest", group, _shown(edit.Invert()), _ctrl("i"))
+    yield Entry("Grow the selection", group, _selected(edit.Grow()), _plain("g"))
+    deleting = (*_plain("delete"), *_plain("backspace"))
+    yield Entry("Delete the selection", group, _selected(edit.Delete()), deleting)
+    yield Entry("Hide the selection", group, _selected(edit.Hide()))
+    yield Entry("Show the selection alone", group, _selected(edit.Isolate()))
+    yield Entry("Show what is hidden", group, _shown(edit.ShowAll()))
+
+
+def _undo(state: State) -> do.Command | None:
+    return edit.Undo() if state.editing.history and state.editing.history.done else None
+
+
+def _redo(state: State) -> do.Command | None:
+    return edit.Redo() if state.editing.history and state.editing.history.undone else None
+
+
+ENTRIES: tuple[Entry, ...] = (*_files(), *_asking(), *_looking(), *_tools(), *_editing(), *_program())

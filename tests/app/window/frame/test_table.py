@@ -1,0 +1,66 @@
+"""The one table of commands, without a window."""
+
+from dataclasses import replace
+
+import pytest
+
+from app.window.commands import Command
+from app.window.editing import commands as edit
+from app.window.frame import dialogs, table
+from app.window.scene.state import Mode
+from app.window.state import State
+from langflash_core.scene.edited import first_marks
+from langflash_core.scene.edits import History, Mask
+from tests.app.window.scenes import after, shown_scene
+
+
+def with_marks() -> State:
+    """With a history, as an opened scene has."""
+    state = shown_scene()
+    assert state.info is not None
+    marks = first_marks(state.info.scene)
+    return replace(state, editing=replace(state.editing, history=History(marks), saved=marks))
+
+
+def test_names_and_keys_are_each_given_once() -> None:
+    names = [entry.name for entry in table.ENTRIES]
+    keys = [str(chord) for entry in table.ENTRIES for chord in entry.keys]
+    assert len(set(names)) == len(names) and len(set(keys)) == len(keys)
+    assert {"Ctrl+F", "Ctrl+P", "Ctrl+Shift+Z", "Ctrl+,", "F1", "[", "1", "0", "Del", "Home"} <= set(keys)
+
+
+def test_every_group_is_in_the_help() -> None:
+    shown = {group for column in dialogs._COLUMNS for group in column if group}
+    assert shown == {entry.group for entry in table.ENTRIES}
+
+
+@pytest.mark.parametrize("entry", table.ENTRIES, ids=lambda entry: entry.name)
+def test_every_command_is_found_by_its_name_and_does_something_or_says_no(entry: table.Entry) -> None:
+    assert table.matching(entry.name.upper())[0] is entry or entry in table.matching(entry.name)
+    assert table.named(entry.name) is entry
+    for state in (State(), with_marks()):
+        command = entry.make(state)
+        assert command is None or isinstance(after(state, command), State)
+
+
+def test_words_narrow_down_in_any_order() -> None:
+    assert table.matching("") == table.ENTRIES
+    assert [entry.name for entry in table.matching("map heat")] == [f"Show: {Mode.HEAT.value}"]
+    assert {entry.group for entry in table.matching("tools")} == {"Tools"}
+    assert table.matching("sel")[0].name.startswith("Sel")  # before "Delete the selection"
+    assert table.matching("no such thing") == ()
+
+
+def made(name: str, state: State) -> Command | None:
+    return table.named(name).make(state)
+
+
+def test_what_has_nothing_to_do_says_so() -> None:
+    empty, state = State(), with_marks()
+    assert made("Save ...", empty) is None and made("Undo", state) is None
+    assert made("Delete the selection", state) is None and made("Show: Agreement", state) is None
+    count = state.editing.marks.deleted.count  # type: ignore[union-attr]
+    selected = after(state, edit.Found(Mask.full(count), "replace", "here"))
+    assert made("Delete the selection", selected) == edit.Delete()
+    assert made("Undo", selected) == edit.Undo() and made("Redo", selected) is None
+    assert made("Redo", after(selected, edit.Undo())) == edit.Redo()

@@ -1,0 +1,165 @@
+"""What takes the place of a scene, and the way back to the one before, without a window."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from app.window import commands as do
+from app.window.editing import commands as edit
+from app.window.effects import Hands
+from app.window.scene import commands as show
+from app.window.scene import work
+from app.window.scene.effects import SceneEffects
+from app.window.scene.state import MOST_ROOMS, SceneInfo
+from app.window.scene.work import describe_scene
+from app.window.state import State
+from langflash_core.scene.edits import Mask
+from langflash_core.scene.file import save
+from tests.app.window.scenes import after, room
+
+PHOTOS = (Path("/p/a.jpg"), Path("/p/b.jpg"))
+SOME = Mask.of(np.arange(12_300) < 5)
+
+
+class Nothing:
+    """Takes what the renderer and the thumbnails would, and does nothing."""
+
+    def __getattr__(self, name: str):
+        return lambda *_: None
+
+
+@dataclass
+class Desk:
+    """The effects of the scene, and what they ask of the worker."""
+
+    state: State = field(default_factory=State)
+    asked: list = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: 0.0)
+        nothing = Nothing()
+        self.effects = SceneEffects(hands, nothing, nothing, str)  # type: ignore[arg-type]
+
+    def perform(self, *commands: do.Command) -> None:
+        for command in commands:
+            before, self.state = self.state, after(self.state, command)
+            self.effects.follow(command, before, self.state)
+
+    @property
+    def jobs(self) -> list[str]:
+        return [type(each).__name__ for each in self.asked if isinstance(each, work.Job)]
+
+
+@pytest.fixture(scope="module")
+def info() -> SceneInfo:
+    return describe_scene(room(torch.eye(3)), serial=1, name="room")
+
+
+@pytest.fixture
+def desk(info) -> Desk:
+    """A scene made of two photos."""
+    desk = Desk()
+    desk.perform(show.AddPhotos(PHOTOS), show.SceneArrived(info))
+    desk.asked.clear()
+    return desk
+
+
+@pytest.fixture
+def edited(desk: Desk) -> Desk:
+    desk.perform(edit.Found(SOME, "replace", "here"), edit.Delete())
+    return desk
+
+
+@pytest.fixture
+def photo(tmp_path: Path) -> Path:
+    (tmp_path / "c.jpg").write_bytes(b"a photo")
+    return tmp_path / "c.jpg"
+
+
+def names(desk: Desk) -> list[str]:
+    return [photo.path.name for photo in desk.state.photos]
+
+
+def test_photos_dropped_on_a_scene_are_asked_about(desk: Desk, photo: Path) -> None:
+    desk.perform(show.OpenPaths((str(photo),)))
+    assert desk.state.dialog == "drop" and names(desk) == ["a.jpg", "b.jpg"] and desk.jobs == []
+    desk.perform(do.ShowDialog(None))
+    assert names(desk) == ["a.jpg", "b.jpg"] and desk.jobs == []
+    for new, wanted in ((False, ["a.jpg", "b.jpg", "c.jpg"]), (True, ["c.jpg"])):
+        desk.perform(show.OpenPaths((str(photo),)))
+        desk.perform(show.dropped(desk.state, desk.state.dropped, new))
+        assert desk.state.dialog is None and names(desk) == wanted and len(desk.jobs) == 1 + new
+
+
+def test_without_a_scene_a_drop_starts_at_once(photo: Path) -> None:
+    desk = Desk()
+    desk.perform(show.OpenPaths((str(photo),)))
+    assert desk.state.dialog is None and desk.jobs == ["ReconstructPhotos"]
+
+
+def test_a_person_who_starts_by_hand_still_says_where_photos_belong(edited: Desk, photo: Path) -> None:
+    wanted = replace(edited.state.preferences, start_at_once=False)
+    edited.state = replace(edited.state, preferences=wanted)
+    edited.perform(show.OpenPaths((str(photo),)))
+    edited.perform(show.dropped(edited.state, edited.state.dropped, new=True))
+    assert names(edited) == ["c.jpg"] and edited.jobs == [] and edited.state.dialog is None
+
+
+def test_unsaved_edits_are_asked_about_before_anything_takes_their_place(
+    edited: Desk, info, photo: Path, tmp_path: Path
+) -> None:
+    other = tmp_path / "other.langflash"
+    save(info.scene, other)
+    desk = edited
+    for begins in (
+        show.Instead((show.Reconstruct(),)),
+        show.OpenPaths((str(other),)),
+        show.dropped(desk.state, (photo,), new=True),
+    ):
+        desk.perform(begins)
+        assert desk.state.dialog == "unsaved" and desk.jobs == []
+        desk.perform(do.ShowDialog(None))  # cancel
+        assert desk.state.pending == () and names(desk) == ["a.jpg", "b.jpg"] and desk.jobs == []
+    desk.perform(show.Instead((show.Reconstruct(),)), show.GoOn())
+    assert desk.jobs == ["ReconstructPhotos"] and desk.state.pending == ()
+
+
+def test_saving_first_goes_on_when_it_is_done(edited: Desk) -> None:
+    edited.perform(show.Instead((show.Reconstruct(),)), show.SaveFirst())
+    assert edited.state.dialog == "save" and edited.jobs == []
+    edited.perform(show.SaveScene(Path("/x/a.langflash")))
+    assert edited.jobs == []  # not before it is written
+    edited.perform(show.SceneSaved(Path("/x/a.langflash"), edited.state.editing.marks))
+    assert edited.jobs == ["ReconstructPhotos"] and not edited.state.editing.unsaved
+
+
+def test_a_save_dialog_that_is_closed_ends_what_waited(edited: Desk) -> None:
+    edited.perform(show.Instead((show.Reconstruct(),)), show.SaveFirst(), do.ShowDialog(None))
+    edited.perform(show.SceneSaved(Path("/x/a.langflash"), edited.state.editing.marks))
+    assert edited.jobs == []
+
+
+def test_the_room_before_comes_back_as_it_was_left(edited: Desk, info) -> None:
+    before = edited.state
+    edited.perform(show.SceneArrived(replace(info, serial=2, name="kitchen"), alone=True))
+    assert edited.state.photos == () and [r.info.name for r in edited.state.rooms] == ["room"]
+    edited.perform(show.GoToRoom(1))
+    state = edited.state
+    assert state.editing.history == before.editing.history and state.editing.unsaved
+    assert state.photos == before.photos and state.pose == before.pose
+    assert [r.info.name for r in state.rooms] == ["kitchen"]
+    edited.perform(edit.Undo(), edit.Undo())
+    assert not edited.state.editing.unsaved
+
+
+def test_rooms_are_few_and_a_file_is_there_once(desk: Desk, info) -> None:
+    for serial in range(2, MOST_ROOMS + 4):
+        desk.perform(show.SceneArrived(replace(info, serial=serial, name=str(serial))))
+    assert [room.info.serial for room in desk.state.rooms] == [5, 4, 3]
+    path = Path("/x/a.langflash")
+    for serial in (10, 11, 12):
+        desk.perform(show.SceneArrived(replace(info, serial=serial, path=path)))
+    assert [room.info.serial for room in desk.state.rooms] == [6, 5, 4]
