@@ -142,11 +142,12 @@ def hand_over(teacher: Teacher, head: LanguageHead, classes: Tensor) -> None:
         classes: unit texts of the 37 classes, (37, C).
     """
     head.taught.load_state_dict(teacher.reader.state_dict())
-    rows, biases = teacher.say.weight[: len(classes), :, 0, 0], teacher.say.bias[: len(classes)]
+    rows = teacher.say.weight[: len(classes), :, 0, 0]
+    biases = teacher.say.get_parameter("bias")[: len(classes)]
     gram = classes @ classes.T + RIDGE * torch.eye(len(classes)).to(classes)
     solve = torch.linalg.solve(gram, torch.cat((rows, biases[:, None]), 1))
     joined = VOICE * classes.T @ solve  # (C, F + 1)
-    head.out.weight *= OWN
-    head.out.bias *= OWN
-    head.out.weight[:, -rows.shape[1] :, 0, 0] = joined[:, :-1]
-    head.out.bias += joined[:, -1]
+    weight, bias = head.out.get_parameter("weight"), head.out.get_parameter("bias")
+    weight *= OWN
+    weight[:, -rows.shape[1] :, 0, 0] = joined[:, :-1]
+    bias.copy_(OWN * bias + joined[:, -1])
