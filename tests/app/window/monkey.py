@@ -17,6 +17,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Callable
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -26,6 +27,7 @@ import numpy as np
 
 from app.window.session import Session
 from tests.app.window.guarded import REFUSED, environment
+from tests.app.window.items import Items
 from tests.app.window.test_window import ROOT, x_server
 from tests.app.window.x11 import Client
 
@@ -84,6 +86,7 @@ def inside(width: int, height: int) -> None:
     """The process of the window: a line of JSON about it twice a second, until stdin ends."""
     ended = threading.Event()
     threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
+    items = Items()
     session = Staying((), (width, height))
     frames, said, latest = 0, 0.0, 0.0
     while not ended.is_set() and not session.should_close:
@@ -98,6 +101,7 @@ def inside(width: int, height: int) -> None:
                 "scene": state.info.name if state.info and state.job is None else None,
                 "unexpected": [t.text for t in state.toasts if "unexpected" in t.text],
                 "gl_errors": session.gl_errors,
+                "discard": items.now().get("Discard", [None])[0],
             }
             sys.stdout.write(json.dumps(line) + "\n")
             sys.stdout.flush()
@@ -177,6 +181,12 @@ class Hands:
         self.drop([self._scene])
         self._xdotool("mousemove", "5", str(self._size[1] - 5))
 
+    def click(self, box: list[int]) -> None:
+        """The middle of an item."""
+        left, top, right, bottom = box
+        at = (str((left + right) // 2), str((top + bottom) // 2))
+        self._xdotool("mousemove", *at, "sleep", "0.3", "click", "1", "sleep", "1")
+
     def _step(self) -> list[str]:
         r = self._random
         place = [str(r.randrange(side)) for side in self._size]
@@ -251,11 +261,13 @@ class Watched:
             found.append(errors[-3000:])
         return found
 
-    def until_scene(self, name: str) -> bool:
-        """Wait for a scene at rest."""
+    def until_scene(self, name: str, click: Callable[[list[int]], None]) -> bool:
+        """Wait for a scene at rest; edits that would be lost are to be discarded with a click."""
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end and self.process.poll() is None:
-            if self.last.get("scene") == name:
+            if self.last.get("discard"):
+                click(self.last["discard"])
+            elif self.last.get("scene") == name:
                 time.sleep(2.0)  # for what follows a scene: words of its atoms, files kept
                 return self.last.get("scene") == name
             time.sleep(0.2)
@@ -282,7 +294,7 @@ def opened(hands: Hands, watched: Watched, name: str) -> bool:
     """Open the scene, again where random input that still waited has opened another one since."""
     for _ in range(3):
         hands.open_scene()
-        if watched.until_scene(name):
+        if watched.until_scene(name, hands.click):
             return True
     return False
 
