@@ -161,12 +161,14 @@ def test_interrupted(sets, tmp_path):
     os.killpg(child.pid, signal.SIGINT)  # as a terminal does: to the workers, too
     _, rest = child.communicate(timeout=600)
     assert child.returncode == 130 and rest == "langflash: stopped; the same command goes on from here\n"
-    first = rows(tmp_path / "out")["a"]
-    assert list(rows(tmp_path / "out")) == ["a"] and (tmp_path / "out" / "summary.html").exists()
-    assert sorted(os.listdir(tmp_path / "out")) == ["a", "ledger.csv", "summary.html"]
+    first = rows(tmp_path / "out")
+    assert first["a"]["status"] == "done"
+    # On a busy machine the next set may have come to its end, before or after the ledger closed.
+    assert set(os.listdir(tmp_path / "out")) - {"b", "c"} == {"a", "ledger.csv", "summary.html"}
     done = subprocess.run(program, capture_output=True, text=True, timeout=600)
-    assert done.returncode == 0 and "3 of 3 sets done (1 before)" in done.stdout, done.stderr
-    assert rows(tmp_path / "out")["a"] == first
+    assert done.returncode == 0, done.stderr
+    assert f"3 of 3 sets done ({len(first)} before)" in done.stdout
+    assert rows(tmp_path / "out").items() >= first.items()
 
 
 @pytest.mark.parametrize(
