@@ -159,14 +159,16 @@ def test_interrupted(sets, tmp_path):
     assert child.stderr is not None
     assert child.stderr.readline().startswith("[1/3] a: done")
     os.killpg(child.pid, signal.SIGINT)  # as a terminal does: to the workers, too
-    _, rest = child.communicate(timeout=60)
+    _, rest = child.communicate(timeout=600)
     assert child.returncode == 130 and rest == "langflash: stopped; the same command goes on from here\n"
-    first = rows(tmp_path / "out")["a"]
-    assert list(rows(tmp_path / "out")) == ["a"] and (tmp_path / "out" / "summary.html").exists()
-    assert sorted(os.listdir(tmp_path / "out")) == ["a", "ledger.csv", "summary.html"]
-    done = subprocess.run(program, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0 and "3 of 3 sets done (1 before)" in done.stdout, done.stderr
-    assert rows(tmp_path / "out")["a"] == first
+    first = rows(tmp_path / "out")
+    assert first["a"]["status"] == "done"
+    # On a busy machine the next set may have come to its end, before or after the ledger closed.
+    assert set(os.listdir(tmp_path / "out")) - {"b", "c"} == {"a", "ledger.csv", "summary.html"}
+    done = subprocess.run(program, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    assert f"3 of 3 sets done ({len(first)} before)" in done.stdout
+    assert rows(tmp_path / "out").items() >= first.items()
 
 
 @pytest.mark.parametrize(
@@ -224,13 +226,13 @@ def test_the_table_on_a_terminal(sets, tmp_path):
     words = ("batch", tmp_path / "sets", "-o", tmp_path / "out", *SMALL)
     child = subprocess.Popen([sys.executable, "-m", "langflash_core", *map(str, words)], stderr=side)
     os.close(side)
-    shown, patience = b"", time.monotonic() + 60
+    shown, patience = b"", time.monotonic() + 600
     while time.monotonic() < patience:
         try:
             shown += os.read(terminal, 4096)
         except OSError:  # the other side is closed
             break
     os.close(terminal)
-    assert child.wait(60) == 1
+    assert child.wait(600) == 1
     assert b"0/1 sets" in shown and b"  damaged  0 s" in shown
     assert shown.endswith(b"\x1b[J")  # nothing of it stays
