@@ -26,7 +26,7 @@ def test_parts_of_a_room_are_called_what_they_show(rooms, network, words):
     *found, truth = parts_of(net, batch)
     assert [label.group for label in truth.labels] == ["wall", "floor", "sofa", "table"]
     assert torch.equal(truth.quality.round(decimals=4), torch.ones(4))  # a mask is wholly itself
-    assert truth.looks.shape == (4, 768)
+    assert truth.looks.shape == (4, 4 * 384)
     assert all(bool((room.quality > 0.3).all()) for room in found)
     assert all(torch.isfinite(getattr(truth, name)).all() for name in ("atoms", "looks", "places"))
 
