@@ -133,6 +133,8 @@ def _phrases(state: State) -> tuple[tuple[str, ...], str]:
     if what is What.HEAT:
         active = state.active_prompt
         return ((active.text.strip(),) if active else asked[:1]), ""
+    if what is What.PAGE:
+        return asked, ""
     wanted = what.needs_phrases or (what.takes_phrases and state.exporting.form.only_found)
     if wanted and not asked:
         return (), "There is no phrase to keep only the answers of; type one under Find first."

@@ -33,6 +33,7 @@ HINTS = {
     What.SOG: "Compressed as pictures, for SuperSplat and PlayCanvas",
     What.SPLAT: "The compact format of older web viewers",
     What.GLB: "3D Gaussians in glTF, with what they mean",
+    What.PAGE: "One HTML file for any browser, to fly through and to ask, without a network",
     What.SCENE: "With language and photos, for this program",
 }
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from langflash_core.formats import SCENES_OUT
+from langflash_core.formats import PAGE_OUT, SCENES_OUT
 
 LARGEST_SIDE = 8192  # pixels, as on the command line
 SECONDS = (1.0, 60.0)
@@ -29,6 +29,7 @@ class What(Enum):
     SOG = ("Splats, .sog", ".sog", "", "splats")
     SPLAT = ("Splats, .splat", ".splat", "", "splats")
     GLB = ("Splats, .glb", ".glb", "", "splats")
+    PAGE = ("Web page", ".html", "", "page")
     SCENE = ("Scene", ".langflash", "", "copy")
 
     @property
@@ -58,8 +59,8 @@ class What(Enum):
 
     @property
     def takes_phrases(self) -> bool:
-        """Whether phrases may narrow it down."""
-        return self is not What.RGB
+        """Whether phrases may narrow it down. A page holds everything and shows them as asked."""
+        return self not in (What.RGB, What.PAGE)
 
     @property
     def looks(self) -> bool:
@@ -69,7 +70,7 @@ class What(Enum):
     @property
     def splats(self) -> bool:
         """Whether Gaussians are written, not pictures of them."""
-        return not self.word and self.suffix in SCENES_OUT
+        return not self.word and self.suffix in (*SCENES_OUT, PAGE_OUT)
 
     @property
     def sized(self) -> bool:

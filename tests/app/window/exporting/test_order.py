@@ -43,7 +43,8 @@ def test_every_kind_says_the_command_that_does_it(what: What) -> None:
         "-o",
         f"/out/a picture{what.suffix}",
     ]
-    assert ("--prompt" in words) == what.needs_phrases and ("--view" in words) == what.looks
+    asked = what.needs_phrases or what is What.PAGE  # a page shows the phrases as asked
+    assert ("--prompt" in words) == asked and ("--view" in words) == what.looks
     assert ("--size" in words) == what.sized and ("--seconds" in words) == (what is What.VIDEO)
 
 
