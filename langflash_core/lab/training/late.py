@@ -1,7 +1,7 @@
 """The late half that learns from real photos: whole blocks while they learn, then cut to their rank.
 
 Whole blocks learn more surely than a product of two thin matrices that starts at zero, and what they have
-learned lies in few directions: of 384, the 72 that are kept name photos as well (model card).
+learned lies in few directions: of 384, the 52 that are kept name photos as well (model card).
 """
 
 from typing import cast
