@@ -51,8 +51,8 @@ def write_whole(scene: Scene, path: Path, renderer: Renderer, prompts: Sequence[
     suffix = kind_of(path)
     unset = dict.fromkeys(("threshold", "what", "seconds", "view", "camera", "size"))
     asked = list(prompts) if suffix in (*ANSWERS_OUT, PAGE_OUT) else []
-    args = Namespace(scene=path.parent, output=path, prompt=asked, backend=renderer, with_text=False, **unset)
-    args.all_views = suffix == ".csv"
+    said = {"all_views": suffix == ".csv", "with_text": False, "replace": False}
+    args = Namespace(scene=path.parent, output=path, prompt=asked, backend=renderer, **said, **unset)
     _writer(suffix, None)(args, scene, asked, CameraChoice(0, None, None))
 
 
