@@ -105,8 +105,9 @@ class Guide:
         """These phrases instead of the present ones."""
         for key in self.keys:
             self.tell(ask.RemovePrompt(key))
-        for phrase in phrases[:-1]:
-            self.tell(ask.EditPrompt(self.keys[-1], phrase), ask.AddPrompt())
+        for phrase in phrases[:-1]:  # at once: a row that has the keys would keep what is typed there
+            self.session.state = ask.EditPrompt(self.keys[-1], phrase).apply(self.session.state)
+            self.session.state = ask.CaretTaken().apply(ask.AddPrompt().apply(self.session.state))
         self.tell(ask.EditPrompt(self.keys[-1], phrases[-1]), ask.SelectPrompt(self.keys[0]))
 
     def close(self) -> None:
