@@ -270,7 +270,8 @@ def _text_model() -> TextModel:
     """
     weights, _ = shipped_files()
     ids = load_minilm().tokenizer.get_vocab()
-    licences = [asset_path(f"licences/{name}") for name in ("minilm_l6_v2.md", "minilm_l6_v2_LICENSE.txt")]
+    names = ("minilm_l6_v2.md", "minilm_l6_v2_LICENSE.txt", "xfeat_LICENSE.txt")  # Apache 2.0
+    licences = [asset_path(f"licences/{name}") for name in names]
     return TextModel(
         weights=weights.read_bytes(),
         tokens=tuple(sorted(ids, key=lambda token: ids[token])),

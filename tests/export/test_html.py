@@ -190,7 +190,8 @@ def test_a_page_takes_the_text_model_along(tmp_path, spoken_room):
     assert page.scripts["tower"] == asset_path("weights/minilm_l6_v2_rowint8.safetensors").read_bytes()
     tokens = page.scripts["tokens"].decode().split("\n")
     assert len(tokens) == 30522 and tokens.index("[SEP]") == 102
-    assert "MIT License" in (tmp_path / "a.html").read_text(encoding="utf-8")
+    text = (tmp_path / "a.html").read_text(encoding="utf-8")
+    assert "MIT License" in text and "TERMS AND CONDITIONS FOR USE, REPRODUCTION, AND DISTRIBUTION" in text
 
 
 def test_the_text_model_fits_one_space(tmp_path):
