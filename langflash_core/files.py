@@ -37,18 +37,13 @@ def write_atomically(path: Path, content: bytes | Iterable[bytes]) -> None:
         state = "is a file" if os.path.exists(folder) else "does not exist"
         raise OutputError(f"cannot write {path}: {folder} {state}; create that folder first")
     temporary = _part(path)
-    try:
+    with _cleared(path, temporary):
         with temporary.open("xb") as stream:
             for part in (content,) if isinstance(content, bytes) else content:
                 stream.write(part)
             stream.flush()
             os.fsync(stream.fileno())
         os.replace(temporary, path)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise OutputError(f"cannot write {path}: {reason}; choose another place for it") from error
-    finally:
-        _remove(temporary)
 
 
 @contextmanager
@@ -60,14 +55,9 @@ def written_atomically(path: Path) -> Iterator[Path]:
     """
     make_folder(path.parent)
     temporary = _part(path)
-    try:
+    with _cleared(path, temporary):
         yield temporary
         os.replace(temporary, path)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise OutputError(f"cannot write {path}: {reason}; choose another place for it") from error
-    finally:
-        _remove(temporary)
 
 
 @contextmanager
@@ -81,18 +71,12 @@ def filled_atomically(folder: Path) -> Iterator[Path]:
     temporary, old = _part(folder), _part(folder)
     if os.path.isfile(folder):
         raise OutputError(f"cannot write {folder}: a file of that name is in the way; choose another place")
-    try:
+    with _cleared(folder, temporary, old):
         temporary.mkdir()
         yield temporary
         if os.path.isdir(folder):
             os.replace(folder, old)
         os.replace(temporary, folder)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise OutputError(f"cannot write {folder}: {reason}; choose another place for it") from error
-    finally:
-        _remove(temporary)
-        _remove(old)
 
 
 @contextmanager
@@ -130,6 +114,23 @@ def make_folder(folder: Path) -> None:
     except OSError as error:
         reason = "a file of that name is in the way" if isinstance(error, FileExistsError) else error.strerror
         raise OutputError(f"cannot create the folder {folder}: {reason}; choose another place") from error
+
+
+@contextmanager
+def _cleared(path: Path, *temporaries: Path) -> Iterator[None]:
+    """The system's refusals inside are sentences about `path`; `temporaries` are gone afterwards.
+
+    Raises:
+        OutputError: the system refused something.
+    """
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(f"cannot write {path}: {reason}; choose another place for it") from error
+    finally:
+        for temporary in temporaries:
+            _remove(temporary)
 
 
 def _part(path: Path) -> Path:

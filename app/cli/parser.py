@@ -105,12 +105,7 @@ def _add_reconstruct(commands) -> None:
     command = _command(commands, "reconstruct", "photos of one place to a scene file")
     command.add_argument("photos", nargs="+", type=Path, metavar="PHOTO")
     _add_output(command, "SCENE", "the scene to write")
-    command.add_argument(
-        "--preset", choices=("mini", "full"), default="mini", help="which network (default: mini)"
-    )
-    command.add_argument(
-        "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped or imported ones"
-    )
+    _add_network(command)
     command.add_argument(
         "--aggregation",
         choices=("lfa", "average", "crops"),
@@ -151,6 +146,17 @@ def _add_reconstruct(commands) -> None:
         help="a transforms.json or COLMAP text model with the photos' poses and lenses: they are not sought, "
         "and the scene is in their world and unit",
     )
+    _add_json(command)
+
+
+def _add_network(command: argparse.ArgumentParser) -> None:
+    """Which network sees the photos, how large, and where."""
+    command.add_argument(
+        "--preset", choices=("mini", "full"), default="mini", help="which network (default: mini)"
+    )
+    command.add_argument(
+        "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped or imported ones"
+    )
     command.add_argument(
         "--size",
         type=pixel_side,
@@ -158,7 +164,6 @@ def _add_reconstruct(commands) -> None:
         help="the network sees about PX x PX pixels (default: 224; full: 256)",
     )
     command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
-    _add_json(command)
 
 
 def _add_batch(commands) -> None:
@@ -200,22 +205,10 @@ def _add_batch(commands) -> None:
         help="a Ray cluster instead of processes: host:port, auto, or local to begin one here; all its "
         "machines see photos and OUT under the same paths",
     )
-    command.add_argument(
-        "--preset", choices=("mini", "full"), default="mini", help="which network (default: mini)"
-    )
-    command.add_argument(
-        "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped ones"
-    )
+    _add_network(command)
     command.add_argument(
         "--fov", type=open_fov, metavar="DEG", help="field of view of the photos' longer side, of all sets"
     )
-    command.add_argument(
-        "--size",
-        type=pixel_side,
-        metavar="PX",
-        help="the network sees about PX x PX pixels (default: 224; full: 256)",
-    )
-    command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
     _add_backend(command)
     _add_json(command)
 

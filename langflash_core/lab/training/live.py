@@ -75,7 +75,7 @@ class LivePhotos:
 def relit(rgb: Tensor, generator: torch.Generator) -> Tensor:
     """A picture (3, H, W) uint8 in somewhat other light; a quarter of them as `weathered` leaves them.
 
-    All of them weathered taught half as much in the same time (model card).
+    All of them weathered taught less in the same time (model card).
     """
     u = torch.rand(4, generator=generator).tolist()
     if u[0] < WEATHERED:

@@ -280,6 +280,16 @@ def balanced_pixels(ids: Tensor, weights: Tensor, count: int, generator: torch.G
     return labelled[drawn].to(ids.device)
 
 
+def evenly_drawn(rows: Tensor, count: int, generator: torch.Generator) -> Tensor:
+    """Indices of at most `count` entries of `rows` (P,) on the CPU that are not negative, drawn again and
+    again with chance 1 / sqrt(how many bear the same number); empty if none is."""
+    chosen = (rows >= 0).nonzero()[:, 0]
+    if not len(chosen):
+        return chosen
+    chance = torch.bincount(rows[chosen]).float()[rows[chosen]].rsqrt()
+    return chosen[torch.multinomial(chance, min(count, len(chosen)), True, generator=generator)]
+
+
 def nearest(ids: Tensor, size: tuple[int, int]) -> Tensor:
     """An instance map (..., H, W) at another size, by the nearest pixel centre; never mixes ids."""
     height, width = ids.shape[-2:]

@@ -1,9 +1,9 @@
 """What teaches the late half: a plain classifier on its tokens, of which the reader stays.
 
 A softmax over the 37 classes, one over fine names, and a depth, each read from the tokens by three thin
-layers. Names are rows of a matrix to it, no directions in the space of texts, so it learns from labels in a
-third of the steps that the language head needs. Afterwards its first two layers become the language head's
-second reader, and its rows of classes the texts' directions (`hand_over`).
+layers. Names are rows of a matrix to it, no directions in the space of texts, so it learns from labels in
+a quarter of the steps that the language head took (model card). Afterwards its first two layers become the
+language head's second reader, and its rows of classes the texts' directions (`hand_over`).
 
 Sizes: B photos, V views, H W pixels, h w the token grid, N names.
 """
@@ -19,7 +19,7 @@ from torch.nn import functional as F
 from langflash_core.lab.photos.names import CLASSES37, class_of
 from langflash_core.lab.training.losses import depth_loss, gradient_loss
 from langflash_core.lab.training.shards import NOTHING, Label
-from langflash_core.lab.training.stages import nearest
+from langflash_core.lab.training.stages import evenly_drawn, nearest
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.presets import GuidedDepth
 from langflash_core.network.semantics.features import LanguageHead, TaughtReader
@@ -33,9 +33,10 @@ MIN_ROOMS = 3
 """A name of rendered things counts if so many of them bear it."""
 RIDGE = 0.05
 """Of the texts' Gram matrix: names that are nearly alike are not told apart at any price."""
-OWN, VOICE = 0.1, 2.0
-"""Factors on what the language head said before and on what it says for the teacher: on photos the second is
-then twice as loud as the first, and both are small enough for the learning rate."""
+OWN_NORM, TAUGHT_NORM = 1.3, 12.6
+"""Frobenius norms of the last layer's two parts after the handing over, whatever they were before: on photos
+what the teacher says is then twice as loud as what the head said, and both are small enough for the
+learning rate."""
 _TYPICAL_LOG_DEPTH = 0.7
 
 
@@ -110,19 +111,11 @@ class Teacher(nn.Module):
         pixel; ids and depths (B*V, H, W), 0 or NaN where no depth is known."""
         logits, named, logs = self(tokens)
         size = (ids.shape[-2] // 2, ids.shape[-1] // 2)
-        classes = nearest(rows.classes.to(ids.device)[ids], size)
-        seen = int((classes >= 0).sum())
-        by_class = F.cross_entropy(
-            resize(logits, size), classes, names.balance.to(logits), ignore_index=-1, reduction="sum"
-        )
-        weight = names.balance.to(logits)[classes[classes >= 0]].sum() if seen else logits.new_tensor(1.0)
-        by_class = by_class / weight
+        classes, balance = nearest(rows.classes.to(ids.device)[ids], size), names.balance.to(logits)
+        by_class = F.cross_entropy(resize(logits, size), classes, balance, ignore_index=-1, reduction="sum")
+        by_class = by_class / balance[classes[classes >= 0]].sum().clamp_min(1e-6)
         own = nearest(rows.names.to(ids.device)[ids], (named.shape[-2], named.shape[-1])).flatten().cpu()
-        chosen = (own >= 0).nonzero()[:, 0]
-        if len(chosen):
-            chance = torch.bincount(own[chosen]).float()[own[chosen]].rsqrt()
-            drawn = torch.multinomial(chance, min(NAMED_PIXELS, len(chosen)), True, generator=generator)
-            chosen = chosen[drawn]
+        chosen = evenly_drawn(own, NAMED_PIXELS, generator)
         truth = own[chosen]
         silent = ~names.against[truth].to(logits.device)
         flat = named.permute(0, 2, 3, 1).flatten(0, 2)[chosen.to(logits.device)].masked_fill(silent, -1e4)
@@ -146,8 +139,11 @@ def hand_over(teacher: Teacher, head: LanguageHead, classes: Tensor) -> None:
     biases = teacher.say.get_parameter("bias")[: len(classes)]
     gram = classes @ classes.T + RIDGE * torch.eye(len(classes)).to(classes)
     solve = torch.linalg.solve(gram, torch.cat((rows, biases[:, None]), 1))
-    joined = VOICE * classes.T @ solve  # (C, F + 1)
+    taught = classes.T @ solve  # (C, F + 1)
+    taught *= TAUGHT_NORM / taught[:, :-1].norm().clamp_min(1e-12)
     weight, bias = head.out.get_parameter("weight"), head.out.get_parameter("bias")
-    weight *= OWN
-    weight[:, -rows.shape[1] :, 0, 0] = joined[:, :-1]
-    bias.copy_(OWN * bias + joined[:, -1])
+    before = weight[:, : -rows.shape[1]]
+    quieter = OWN_NORM / before.norm().clamp_min(1e-12)
+    before *= quieter
+    weight[:, -rows.shape[1] :, 0, 0] = taught[:, :-1]
+    bias.copy_(quieter * bias + taught[:, -1])

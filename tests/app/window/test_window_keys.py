@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from app.window.kit import theme
 from tests.app.window.journey import PHOTOS
@@ -21,21 +20,13 @@ from tests.app.window.test_window import (
     SIZE,
     Program,
     display,
+    program,
     pytestmark,
     scene_file,
     x_server,
 )
 
-__all__ = ["display", "pytestmark", "scene_file"]  # fixtures and the mark of the window's tests
-
-
-@pytest.fixture(scope="module")
-def program(display: str, scene_file: Path) -> Iterator[Program]:
-    running = Program(display, scene_file)
-    running.until(lambda s: s["scene"] == "room.langflash", "the scene")
-    running.at_rest()
-    yield running
-    running.leave()
+__all__ = ["display", "program", "pytestmark", "scene_file"]  # fixtures and the mark of the window's tests
 
 
 @contextmanager

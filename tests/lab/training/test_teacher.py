@@ -7,7 +7,15 @@ from torch.nn import functional as F
 from langflash_core.lab.photos.names import CLASSES37
 from langflash_core.lab.training.losses import depth_loss, gradient_loss
 from langflash_core.lab.training.shards import Label
-from langflash_core.lab.training.teacher import MIN_ROOMS, Names, Rows, Teacher, hand_over
+from langflash_core.lab.training.teacher import (
+    MIN_ROOMS,
+    OWN_NORM,
+    TAUGHT_NORM,
+    Names,
+    Rows,
+    Teacher,
+    hand_over,
+)
 from langflash_core.network import MINI
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.semantics.features import LanguageHead
@@ -98,6 +106,24 @@ def test_the_language_head_says_what_the_teacher_says(names):
         own = torch.einsum("pc,chw->phw", texts, head(tokens)[0, 0])
     norms = said.norm(dim=1, keepdim=True)
     torch.testing.assert_close(own[None], said / norms, atol=1e-4, rtol=1e-3)
+
+
+def test_both_parts_are_as_loud_whatever_the_head_was(names):
+    """A head that has learned long, whose taught part is large, begins like a new one."""
+    torch.manual_seed(0)
+    teacher = Teacher(MINI, len(names.texts))
+    texts = torch.linalg.qr(torch.randn(MINI.language_dim, len(CLASSES37))).Q.T
+    for factor in (0.1, 10.0):
+        head = LanguageHead(MINI)
+        weight, bias = head.out.get_parameter("weight"), head.out.get_parameter("bias")
+        with torch.no_grad():
+            weight.mul_(factor)
+            bias.mul_(factor)
+        own = weight[:, : -MINI.taught_feature].detach().clone()
+        hand_over(teacher, head, texts)
+        before, taught = weight.split((own.shape[1], MINI.taught_feature), 1)
+        torch.testing.assert_close(before, own * OWN_NORM / own.norm())
+        assert float(taught.norm()) == pytest.approx(TAUGHT_NORM, rel=1e-5)
 
 
 def test_nothing_labelled_teaches_nothing(names):
