@@ -121,7 +121,7 @@ def test_both_parts_are_as_loud_whatever_the_head_was(names):
             bias.mul_(factor)
         own = weight[:, : -MINI.taught_feature].detach().clone()
         hand_over(teacher, head, texts)
-        before, taught = weight.split((own.shape[1], MINI.taught_feature), 1)
+        before, taught = weight.detach().split((own.shape[1], MINI.taught_feature), 1)
         torch.testing.assert_close(before, own * OWN_NORM / own.norm())
         assert float(taught.norm()) == pytest.approx(TAUGHT_NORM, rel=1e-5)
 
