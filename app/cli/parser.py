@@ -662,6 +662,12 @@ def _add_weights(commands) -> None:
     imported.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="(default: in the cache folder, where it is found)"
     )
+    imported.add_argument(
+        "--size",
+        type=pixel_side,
+        metavar="PX",
+        help="it was trained on photos of PX x PX (default: as its published name tells)",
+    )
     _add_json(imported)
     verify = _command(actions, "verify", "read every number and check that it fits its network")
     verify.add_argument(
