@@ -8,6 +8,7 @@ import json
 import logging
 import time
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -25,18 +26,13 @@ from langflash_core.lab.training.cache import (
     rooms_renderer,
 )
 from langflash_core.lab.training.live import LivePhotos
-from langflash_core.lab.training.loop import (
-    LoopOptions,
-    LoopState,
-    Validate,
-    load_averaged,
-    train_stage,
-)
+from langflash_core.lab.training.loop import LoopOptions, Validate, train_stage
 from langflash_core.lab.training.mixing import MixedSet
 from langflash_core.lab.training.naming import NAMING
 from langflash_core.lab.training.parts import PartSet, run_parts
 from langflash_core.lab.training.real import MODULES, JointSet, KeptPhotos, PhotoTargets, train_late
 from langflash_core.lab.training.stages import STAGES, Stage, Words, guided, language_stage
+from langflash_core.lab.training.states import LoopState, load_averaged
 from langflash_core.lab.training.validation import MEASURES, Validator
 from langflash_core.lab.training.words import PhraseSampler, PhraseTable, build_table
 from langflash_core.network.checkpoints.files import adopt_frozen, initial_network, save_network, start_from
@@ -164,7 +160,7 @@ def run_train(
             )
         seed = options.seed + 1000 * list(ALL_STAGES).index(name) + done.get(name, 0)
         words = Words(PhraseSampler(table), torch.Generator().manual_seed(seed))
-        own = LoopOptions(**{**options.__dict__, "minutes": budget})
+        own = replace(options, minutes=budget)
         learned = _learned(stage, folder)
         if isinstance(learned, PartSet) and name not in done:
             namer = guided(network).namer
