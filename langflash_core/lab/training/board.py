@@ -18,7 +18,6 @@ class Board:
         self._writer: Any = None
         if wanted:
             with optional_packages():
-                import tensorboard  # noqa: F401 - torch's own error says less
                 from torch.utils.tensorboard import SummaryWriter
             self._writer = SummaryWriter(str(folder))
 

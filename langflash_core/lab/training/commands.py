@@ -31,11 +31,15 @@ from langflash_core.lab.training.mixing import MixedSet
 from langflash_core.lab.training.naming import NAMING
 from langflash_core.lab.training.parts import PartSet, run_parts
 from langflash_core.lab.training.real import MODULES, JointSet, KeptPhotos, PhotoTargets, train_late
-from langflash_core.lab.training.stages import STAGES, Stage, Words, guided, language_stage
+from langflash_core.lab.training.recipes import Recipe, named_recipe, stages_of
+from langflash_core.lab.training.stages import Stage, Words, guided, language_stage, modules_of
 from langflash_core.lab.training.states import LoopState, load_averaged
 from langflash_core.lab.training.validation import MEASURES, Validator
 from langflash_core.lab.training.words import PhraseSampler, PhraseTable, build_table
+from langflash_core.network.build import network_class
 from langflash_core.network.checkpoints.files import adopt_frozen, initial_network, save_network, start_from
+from langflash_core.network.checkpoints.parts import TRAINED_HERE, fingerprint, write_part
+from langflash_core.network.checkpoints.store import network_to_train
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.precision import has_bfloat16
 from langflash_core.network.presets import PRESETS
@@ -44,7 +48,9 @@ log = logging.getLogger(__name__)
 
 LATE = Stage("late", MODULES, (), {1: 1.0}, 6, 6e-4, language_stage)
 """What `train late` leaves in a run for the stages after it; `real` says how it learns."""
-ALL_STAGES = {**STAGES, NAMING.name: NAMING}
+ALL_STAGES = stages_of("mini")
+
+_UNTRAINED = "holds no trained stage; run `langflash train run` first"
 
 Encode = Callable[[Sequence[str]], Tensor]
 SETS = ("train", "validation", "held_out")
@@ -52,13 +58,22 @@ VALIDATION_SCENES = 48
 """Judged while training, every few minutes; more would cost more time than they tell."""
 
 
-def cache_plan(kind: str, scenes: int, first_seed: int | None = None) -> CachePlan:
+def cache_plan(kind: str, scenes: int, first_seed: int | None = None, preset: str = "mini") -> CachePlan:
     """The plan of one set: train (tokens, augmented), validation (tokens; furniture that rules drew
-    from other seeds), held_out (pictures only; models by people whose library no training sees).
+    from other seeds), held_out (pictures only; models by people whose library no training sees). Squares
+    without tokens for a network that takes these.
 
     Raises:
         InputError: there is no such set.
     """
+    plan, network = _cache_plan(kind, scenes, first_seed), PRESETS[preset]
+    if not network.square:
+        return plan
+    side = round(network.native_area**0.5)
+    return replace(plan, with_tokens=False, sizes=((side, side),))
+
+
+def _cache_plan(kind: str, scenes: int, first_seed: int | None) -> CachePlan:
     if kind == "train":
         return CachePlan(first_seed or 0, scenes)
     if kind == "validation":
@@ -84,7 +99,7 @@ def cache_plan(kind: str, scenes: int, first_seed: int | None = None) -> CachePl
 def run_cache(
     out: Path,
     pack: Path,
-    start: Path,
+    start: Path | None,
     *,
     kind: str = "train",
     scenes: int = 4096,
@@ -98,11 +113,13 @@ def run_cache(
 
     Args:
         pack: furniture (`langflash rooms pack`).
-        start: weights file of the preset, whose encoder is used.
+        start: weights file of the preset, whose encoder is used; None where the cache keeps no tokens.
     """
     torch.set_num_threads(1)
-    plan = cache_plan(kind, scenes, first_seed)
-    encoder = guided(initial_network(PRESETS[preset], start)).encoder if plan.with_tokens else None
+    plan = cache_plan(kind, scenes, first_seed, preset)
+    encoder = None
+    if plan.with_tokens and start is not None:
+        encoder = guided(initial_network(PRESETS[preset], start)).encoder
     furniture = load_pack(pack)
     began = time.perf_counter()
     with RoomRenderer(furniture) as renderer:
@@ -116,7 +133,7 @@ def run_train(
     stages: Sequence[str],
     folder: Path,
     run_dir: Path,
-    start: Path,
+    start: Path | None,
     encode: Encode,
     minutes: Sequence[float],
     *,
@@ -131,44 +148,65 @@ def run_train(
 
     Args:
         start: weights file of the preset. Its frozen parts are used, and stages without a run of
-            their own begin with its heads, as far as these still fit the network.
+            their own begin with its heads, as far as these still fit the network. None: what is imported
+            for a preset that nothing is shipped for.
         from_scratch: draw the heads anew instead.
 
     Raises:
         InputError: an unknown stage, a stage whose needs have not been trained, or no cache.
     """
-    if len(stages) != len(minutes):
-        raise InputError(
-            f"{len(stages)} stages need as many minutes, received {len(minutes)}; give one number per stage"
-        )
-    for name in stages:
-        if name not in ALL_STAGES:
-            raise InputError(f"there is no stage '{name}'; choose among {', '.join(ALL_STAGES)}")
-    options = options or LoopOptions(minutes=0)
+    recipe = named_recipe(stages, minutes, preset, options or LoopOptions(minutes=0))
+    return run_recipe(recipe, folder, run_dir, start, encode, from_scratch=from_scratch)
+
+
+def run_recipe(
+    recipe: Recipe,
+    folder: Path,
+    run_dir: Path,
+    start: Path | None,
+    encode: Encode,
+    *,
+    from_scratch: bool = False,
+) -> LangFlashNet:
+    """Train the stages of a recipe; everything else as `run_train`."""
     _open(folder / "train")
     table = phrase_table(folder, encode)
-    network = initial_network(PRESETS[preset], start, options.seed)
-    done = _load_trained(network, run_dir)
-    if not from_scratch:
-        done |= dict.fromkeys(_begin(network, start, done), 0)
-    for name, budget in zip(stages, minutes, strict=True):
-        stage = ALL_STAGES[name]
+    network, done = _prepared(recipe, run_dir, start, from_scratch=from_scratch)
+    known = stages_of(recipe.preset)
+    for plan in recipe.plans:
+        stage, options = plan.stage, plan.options
         missing = [need for need in stage.needs if need not in done]
         if missing:
             raise InputError(
-                f"stage '{name}' reads {', '.join(missing)}; train that first with the same run folder"
+                f"stage '{stage.name}' reads {', '.join(missing)}; train that first with the same run folder"
             )
-        seed = options.seed + 1000 * list(ALL_STAGES).index(name) + done.get(name, 0)
+        seed = options.seed + 1000 * list(known).index(stage.name) + done.get(stage.name, 0)
         words = Words(PhraseSampler(table), torch.Generator().manual_seed(seed))
-        own = replace(options, minutes=budget)
         learned = _learned(stage, folder)
-        if isinstance(learned, PartSet) and name not in done:
+        if isinstance(learned, PartSet) and stage.name not in done:
             namer = guided(network).namer
             namer.mean, namer.std = learned.statistics()
-        check = _validator(name, folder, table, own)
-        state = train_stage(network, stage, learned, words, run_dir, own, check)
-        done[name] = state.step
+        check = _validator(stage, folder, table, options)
+        state = train_stage(network, stage, learned, words, run_dir, options, check)
+        done[stage.name] = state.step
     return network.eval()
+
+
+def _prepared(
+    recipe: Recipe, run_dir: Path, start: Path | None, *, from_scratch: bool
+) -> tuple[LangFlashNet, dict[str, int]]:
+    """The network to train, and the steps of every stage that has weights already."""
+    preset, known = PRESETS[recipe.preset], stages_of(recipe.preset)
+    if network_class(preset).compact:
+        if start is None:
+            raise InputError(f"training '{recipe.preset}' begins with a weights file; give one with --start")
+        network = initial_network(preset, start, recipe.seed)
+        done = _load_trained(network, run_dir)
+        return network, done if from_scratch else done | dict.fromkeys(_begin(network, start, done), 0)
+    drawn = {name for plan in recipe.plans for name in plan.stage.modules} if from_scratch else set()
+    network, filled = network_to_train(preset, start, recipe.seed, drawn)
+    done = {name: 0 for name, stage in known.items() if filled.issuperset(modules_of(network, stage))}
+    return network, done | _load_trained(network, run_dir)
 
 
 def run_late(
@@ -225,9 +263,10 @@ def _learned(stage: Stage, folder: Path) -> RoomSet | MixedSet | PartSet:
     return MixedSet(rooms, _open(photos, photos=True), stage.photos)
 
 
-def _validator(name: str, folder: Path, table: PhraseTable, options: LoopOptions) -> Validate | None:
+def _validator(stage: Stage, folder: Path, table: PhraseTable, options: LoopOptions) -> Validate | None:
     """The stage's measure on validation rooms and, under names that begin with "photos_", on photos."""
-    if not (folder / "validation").is_dir():
+    name = stage.name
+    if not (folder / "validation").is_dir() or name not in MEASURES:
         return None
     measure, views = MEASURES[name]
 
@@ -239,7 +278,7 @@ def _validator(name: str, folder: Path, table: PhraseTable, options: LoopOptions
         return judge(_parts(folder, "validation"))
     rooms = judge(_open(folder / "validation", VALIDATION_SCENES))
     place = _photos(folder, "validation")
-    if ALL_STAGES[name].photos == 0 or place is None:
+    if stage.photos == 0 or place is None:
         return rooms
     photos = judge(_open(place, photos=True))
     return lambda network: {
@@ -324,7 +363,8 @@ def phrase_table(folder: Path, encode: Encode) -> PhraseTable:
 def _load_trained(network: LangFlashNet, run_dir: Path) -> dict[str, int]:
     """Steps of every stage in a run, whose weights the network then has; the late half, and what learned
     with it, before those that went on."""
-    found = {name: load_averaged(network, run_dir, name) for name in (LATE.name, *ALL_STAGES)}
+    names = (LATE.name, *stages_of(network.preset.name))
+    found = {name: load_averaged(network, run_dir, name) for name in names}
     return {name: counts[0] for name, counts in found.items() if counts is not None}
 
 
@@ -349,10 +389,10 @@ def run_adopt(encoder: Path, local: Path, out: Path, *, preset: str = "mini") ->
 
 
 def run_export(
-    run_dir: Path, out: Path, start: Path, *, preset: str = "mini", metadata: dict | None = None
+    run_dir: Path, out: Path, start: Path | None, *, preset: str = "mini", metadata: dict | None = None
 ) -> Path:
     """Join the averaged weights of every stage in `run_dir` into one weights file; stages that
-    were not trained there keep the heads of `start`.
+    were not trained there keep the heads of `start`, and are left out where these are imported anyway.
 
     The header says how long each stage trained, its last validation, and `metadata` (data,
     metrics, calibration: `calibration` is what queries read).
@@ -360,6 +400,10 @@ def run_export(
     Raises:
         InputError: no stage has been trained.
     """
+    if not network_class(PRESETS[preset]).compact:
+        return _export_part(run_dir, out, start, preset)
+    if start is None:
+        raise InputError(f"exporting '{preset}' needs the weights file it began with; give it with --start")
     network = initial_network(PRESETS[preset], start)
     trained = {name: load_averaged(network, run_dir, name) for name in (LATE.name, *ALL_STAGES)}
     _begin(network, start, [name for name, counts in trained.items() if counts is not None])
@@ -373,10 +417,30 @@ def run_export(
         if counts is not None
     }
     if not report:
-        raise InputError(f"{run_dir} holds no trained stage; run `langflash train run` first")
+        raise InputError(f"{run_dir} {_UNTRAINED}")
     details = dict(metadata or {})
     network.calibration = details.pop("calibration", {})
     save_network(network, out, {"training": report, **details})
+    return out
+
+
+def _export_part(run_dir: Path, out: Path, start: Path | None, preset: str) -> Path:
+    """The modules that a run trained, for the geometry and language features that are imported."""
+    network, _ = network_to_train(PRESETS[preset], start, 0)
+    known = stages_of(preset)
+    trained = [name for name in known if load_averaged(network, run_dir, name) is not None]
+    if not trained:
+        raise InputError(f"{run_dir} {_UNTRAINED}")
+    modules = {module for name in trained for module in modules_of(network, known[name])}
+    if "decoder" in modules:
+        modules.add("encoder")  # a grouping is good for both of them together
+    tensors = {
+        name: value for name, value in network.state_dict().items() if name.partition(".")[0] in modules
+    }
+    reads = fingerprint(network.state_dict())
+    write_part(
+        out, tensors, network.preset, TRAINED_HERE, run_dir.name, side=network.trained_side, reads=reads
+    )
     return out
 
 

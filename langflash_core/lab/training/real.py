@@ -141,8 +141,9 @@ class JointBatch:
     rooms: SceneBatch | None
 
     @property
-    def seeds(self) -> tuple[int, ...]:
-        return () if self.rooms is None else self.rooms.seeds
+    def seeds(self) -> tuple[int | str, ...]:
+        """Names of the photos, and the room's seed."""
+        return self.photos.names + (() if self.rooms is None else self.rooms.seeds)
 
     def to(self, device: str | torch.device) -> "JointBatch":
         return JointBatch(self.photos.to(device), None if self.rooms is None else self.rooms.to(device))

@@ -27,6 +27,8 @@ from langflash_core.resources import weights_folder
 FORMAT = "langflash-part-1"
 REMEDY = "import the checkpoint again with `langflash weights import`"
 TRUNK = ("encoder", "decoder")
+TRAINED_HERE = "trained here"
+"""As an origin."""
 
 
 @dataclass(frozen=True)

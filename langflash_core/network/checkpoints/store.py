@@ -3,8 +3,8 @@
 A file named by the user goes before the parts of the preset's folder.
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
@@ -20,6 +20,7 @@ from langflash_core.network.checkpoints.importing import convert, read_checkpoin
 from langflash_core.network.checkpoints.origins import COPY
 from langflash_core.network.checkpoints.parts import (
     REMEDY,
+    TRAINED_HERE,
     TRUNK,
     Part,
     installed,
@@ -30,7 +31,7 @@ from langflash_core.network.checkpoints.parts import (
 from langflash_core.network.checkpoints.sharing import mismatch, settle
 from langflash_core.network.checkpoints.stored import ALIGNMENT
 from langflash_core.network.model import LangFlashNet
-from langflash_core.network.presets import Preset
+from langflash_core.network.presets import PointMaps, Preset
 from langflash_core.resources import weights_folder
 
 CLIP_FILE = "clip_vitb32.safetensors"
@@ -82,12 +83,9 @@ def assemble_network(
     Raises:
         WeightsError: a module that must have weights has none, or a part does not fit.
     """
-    parts = ([read_part(weights)] if weights is not None else []) + installed(preset)
-    for part in parts:
-        _check_preset(part, preset)
-    sources = _sources(parts)
+    sources = _sources(_parts(preset, weights))
     with torch.device("meta"):
-        network = build_network(shaped(preset, sources)).eval()
+        network = build_network(_filtering(shaped(preset, sources), sources)).eval()
     if bfloat16:
         network.use_bfloat16()
     for name, part in sources.items():
@@ -97,6 +95,49 @@ def assemble_network(
         network.trained_side = sources["decoder"].side
     network.notes = _notes(sources)
     return channels_last(network).to(device)
+
+
+def network_to_train(
+    preset: Preset, weights: Path | None, seed: int, fresh: Collection[str] = ()
+) -> tuple[LangFlashNet, set[str]]:
+    """A network of parts with every other module drawn from `seed`, and the modules that were filled.
+
+    Masks are groups by their existence, which is what training teaches.
+
+    Args:
+        weights: goes before the preset's folder. fresh: modules to draw although there are weights.
+
+    Raises:
+        WeightsError: what is never trained has no weights, or a part does not fit.
+    """
+    held = _sources(_parts(preset, weights))
+    dropped = {*fresh, *(name for name in held if name.startswith(COPY) and "grouping" in fresh)}
+    sources = {name: part for name, part in held.items() if name not in dropped}
+    torch.manual_seed(seed)
+    shape = shaped(preset, sources)
+    network = build_network(replace(shape, mask_filter=None) if isinstance(shape, PointMaps) else shape)
+    missing = [name for name in network.frozen if name not in sources]
+    if missing:
+        raise WeightsError(f"there are no weights for {', '.join(missing)}; {_advice(preset)}")
+    for name, part in sources.items():
+        _fill(network, name, part.path, "cpu")
+    return network, set(sources)
+
+
+def _filtering(preset: Preset, sources: dict[str, Part]) -> Preset:
+    """The released filter of masks reads scores as the released grouping gives them; one that was trained
+    here gives existence."""
+    if isinstance(preset, PointMaps) and "grouping" in sources and sources["grouping"].origin == TRAINED_HERE:
+        return replace(preset, mask_filter=None)
+    return preset
+
+
+def _parts(preset: Preset, weights: Path | None) -> list[Part]:
+    """What there is for a preset, in the order in which modules are looked for."""
+    parts = ([read_part(weights)] if weights is not None else []) + installed(preset)
+    for part in parts:
+        _check_preset(part, preset)
+    return parts
 
 
 def _sources(parts: Sequence[Part]) -> dict[str, Part]:
