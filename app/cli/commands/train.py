@@ -165,9 +165,16 @@ def _run(args: Namespace, out: TextIO) -> None:
             print(f"{args.output}: trained {', '.join(p.stage.name for p in recipe.plans)}", file=out)
 
 
+_OF_RECIPES = {"seed": 0, "batches": None, "precision": "auto"}
+"""Words that a recipe decides, and what they are where nobody says them."""
+
+
 def _recipe(args: Namespace, options: LoopOptions) -> Recipe:
     named = args.stages is not None or args.minutes is not None
     if args.recipe is not None and not named:
+        given = [word for word, usual in _OF_RECIPES.items() if getattr(args, word) != usual]
+        if given:
+            raise InputError(f"a recipe says itself what --{given[0]} is; leave that out, or write a recipe")
         return read_recipe(args.recipe, options)
     if args.recipe is None and args.stages is not None and args.minutes is not None:
         return named_recipe(args.stages, args.minutes, args.preset, options)

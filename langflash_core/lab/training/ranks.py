@@ -4,6 +4,7 @@ Without torchrun there is one process, and everything here answers at once.
 """
 
 import os
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -28,6 +29,8 @@ def joined(device: str) -> Iterator[str]:
     own = f"cuda:{os.environ['LOCAL_RANK']}" if device == "cuda" else device
     if device == "cuda":
         torch.cuda.set_device(own)
+    # Convolutions keep their channels last, which its buckets do not; it warns once a process.
+    warnings.filterwarnings("ignore", message="Grad strides do not match bucket view strides")
     dist.init_process_group("nccl" if device == "cuda" else "gloo")
     try:
         yield own

@@ -90,8 +90,8 @@ def read_recipe(name: str, options: LoopOptions) -> Recipe:
     """A recipe by its name, or that of a file.
 
     Args:
-        options: of the machine: device, whether to resume, when to report. What the recipe says goes
-            before them.
+        options: of the machine: device, whether to resume, when to report; `max_steps` shortens every
+            stage. What the recipe says goes before them.
 
     Raises:
         InputError: there is none, or it does not say everything, or something that nobody knows.
@@ -137,7 +137,8 @@ def _plan(entry: Any, preset: str, common: LoopOptions, path: Path) -> StagePlan
     stage = replace(
         stage, views=views, learning_rate=float(entry["learning_rate"]), photos=float(entry["photos"])
     )
-    own = replace(common, max_steps=entry["iterations"], pictures=entry["pictures"], batches=entry["batches"])
+    steps = min(entry["iterations"], common.max_steps or entry["iterations"])
+    own = replace(common, max_steps=steps, pictures=entry["pictures"], batches=entry["batches"])
     return StagePlan(stage, own)
 
 
