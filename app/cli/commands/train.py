@@ -14,7 +14,6 @@ from langflash_core.lab.photos.layouts import Source, convert
 from langflash_core.lab.training.commands import (
     run_adopt,
     run_cache,
-    run_export,
     run_find_parts,
     run_late,
     run_recipe,
@@ -23,6 +22,7 @@ from langflash_core.lab.training.loop import LoopOptions
 from langflash_core.lab.training.photos import run_photo_cache
 from langflash_core.lab.training.ranks import joined, leads
 from langflash_core.lab.training.recipes import Recipe, named_recipe, read_recipe
+from langflash_core.lab.training.trained import run_export
 from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS
 from langflash_core.resources import asset_path

@@ -209,7 +209,7 @@ class _Training:
         if self.validate is not None:
             self._validate()
         self._save()
-        if self.spent:
+        if "update" in self.spent:
             self._write({"kind": "profile", **{k: round(v, 3) for k, v in self.spent.items()}})
 
     def _finished(self) -> bool:

@@ -10,11 +10,12 @@ from torch.nn import functional as F
 
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.lab.training import recipes
-from langflash_core.lab.training.commands import cache_plan, run_export, run_recipe
+from langflash_core.lab.training.commands import cache_plan, run_recipe
 from langflash_core.lab.training.grouping import AggregationWeights, GroupingWeights
 from langflash_core.lab.training.loop import LoopOptions
 from langflash_core.lab.training.recipes import read_recipe
 from langflash_core.lab.training.shards import write_shard
+from langflash_core.lab.training.trained import run_export
 from langflash_core.network import PRESETS, PointMapNet
 from langflash_core.network.checkpoints.parts import part_folder, read_part
 from langflash_core.network.checkpoints.store import assemble_network, install
