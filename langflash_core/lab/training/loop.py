@@ -181,7 +181,7 @@ class _Training:
         self.loss: nn.Module = self.inner
         if world() > 1:
             self.loss = DistributedDataParallel(
-                self.inner, find_unused_parameters=True, broadcast_buffers=False
+                self.inner, find_unused_parameters=True, forward_sync_buffers=False
             )
 
     def go(self) -> None:

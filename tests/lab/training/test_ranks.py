@@ -23,9 +23,14 @@ STAGE = STAGES["refine"]
 OPTIONS = LoopOptions(minutes=1e6, max_steps=4, pictures=2, report_s=0.0, save_s=0.0, precision="float32")
 
 
-def _losses(run: Path, stage: str) -> list[float]:
+def _rows(run: Path, stage: str, kind: str) -> list[dict]:
+    """Of a log, without the time."""
     rows = [json.loads(line) for line in (run / f"{stage}.jsonl").read_text().splitlines()]
-    return [row["loss"] for row in rows if row["kind"] == "train"]
+    return [{**row, "seconds": 0} for row in rows if row["kind"] == kind]
+
+
+def _losses(run: Path, stage: str) -> list[float]:
+    return [row["loss"] for row in _rows(run, stage, "train")]
 
 
 @pytest.fixture
@@ -35,7 +40,7 @@ def folder(rooms) -> Path:
 
 @pytest.mark.slow
 def test_two_processes_learn_what_one_learns_of_the_same_batches(folder, tmp_path):
-    stages, steps = ["depth", "refine", "language", "grouping"], 3
+    stages, steps = ["depth", "refine", "language", "grouping", "refine!"], 3
     script = Path(__file__).with_name("shared_steps.py")
     launcher = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node=2"]
     words = [str(script), str(folder), str(tmp_path / "two"), "2", str(steps), *stages]
@@ -46,13 +51,15 @@ def test_two_processes_learn_what_one_learns_of_the_same_batches(folder, tmp_pat
         one, two = _losses(tmp_path / "one", name), _losses(tmp_path / "two", name)
         assert len(one) == steps and len(set(one)) == steps
         assert two == pytest.approx(one, rel=1e-5, abs=2e-7), name  # the log keeps seven digits
+        skipped = _rows(tmp_path / "one", name, "skipped")
+        assert skipped == _rows(tmp_path / "two", name, "skipped") and len(skipped) == name.count("!")
         a, b = (torch.load(tmp_path / run / f"{name}.pt", weights_only=True) for run in ("one", "two"))
         for key, value in a["weights"].items():
             # Gradients are added in another order: a few 1e-7 of each, and AdamW's first steps are their
             # signs, so where one is nearly 0 a weight may go the other way. Few do.
             far = (value - b["weights"][key]).abs() > 1e-6
             assert far.float().mean() < 0.01, key
-        assert len(a["draws"]) == len(b["draws"]) == 2
+        assert len(a["draws"]) == len(b["draws"]) == 2 and a["begun"] == b["begun"]
         for mine, theirs in zip(a["draws"], b["draws"], strict=True):
             assert torch.equal(mine["own"], theirs["own"]) and torch.equal(mine["common"], theirs["common"])
 
@@ -71,7 +78,14 @@ def test_one_process_with_one_batch_learns_as_ever(rooms, words, network, tmp_pa
 @pytest.mark.parametrize("batches", [1, 2])
 def test_an_interrupted_run_has_the_same_curve(batches, rooms, words, network, tmp_path):
     options = replace(OPTIONS, batches=batches)
-    whole = train_stage(network(), STAGE, rooms, words, tmp_path / "whole", options)
+
+    def noisy(net, batch, words):  # as layers that draw from torch's common generator
+        found = STAGE.loss(net, batch, words)
+        return Loss(found.total * (1 + 0.1 * torch.rand(())), found.parts)
+
+    stage, net = replace(STAGE, loss=noisy), network()
+    torch.manual_seed(5)
+    whole = train_stage(net, stage, rooms, words, tmp_path / "whole", options)
 
     class Cut(Exception):
         """Stands for a machine that stops."""
@@ -80,16 +94,19 @@ def test_an_interrupted_run_has_the_same_curve(batches, rooms, words, network, t
         seen.append(batch)
         if len(seen) > 2 * batches:
             raise Cut
-        return STAGE.loss(net, batch, words)
+        return noisy(net, batch, words)
 
     begin = replace(words, generator=torch.Generator().manual_seed(0))
+    net = network()
+    torch.manual_seed(5)
     with pytest.raises(Cut):
-        train_stage(network(), replace(STAGE, loss=cut), rooms, begin, tmp_path / "cut", options)
+        train_stage(net, replace(STAGE, loss=cut), rooms, begin, tmp_path / "cut", options)
     later = replace(words, generator=torch.Generator().manual_seed(77))  # what it draws is in the run
+    net = network()
     torch.manual_seed(99)
     with (tmp_path / "cut" / "refine.jsonl").open("a") as log:  # as if the last save had come before
         log.write(json.dumps({"stage": "refine", "step": 3, "kind": "train", "loss": 1.0}) + "\n")
-    ended = train_stage(network(), STAGE, rooms, later, tmp_path / "cut", options)
+    ended = train_stage(net, stage, rooms, later, tmp_path / "cut", options)
     assert ended.step == whole.step == 4
     assert _losses(tmp_path / "cut", "refine") == _losses(tmp_path / "whole", "refine")
     for key, value in whole.ema.items():
