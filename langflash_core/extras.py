@@ -16,6 +16,7 @@ EXTRAS = {
     "matplotlib": "bench",
     "h5py": "photos",
     "ray": "cluster",
+    "tensorboard": "board",
 }
 """Top-level import name -> extra in pyproject.toml."""
 

@@ -28,7 +28,7 @@ from langflash_core.language.spaces import language_space
 from langflash_core.language.vocabulary import all_phrases
 from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_network
 from langflash_core.network.build import network_class
-from langflash_core.network.checkpoints.store import part_folder
+from langflash_core.network.checkpoints.parts import part_folder
 from langflash_core.network.checkpoints.stored import Stored
 from langflash_core.network.model import Atoms, Geometry, Lifted, pooled_weights
 from langflash_core.network.precision import bfloat16_fails, has_bfloat16

@@ -371,7 +371,7 @@ def _add_train(commands) -> None:
     export.add_argument("run", type=Path, metavar="RUN")
     _add_output(export, "FILE", "the .safetensors to write")
     export.add_argument("--metadata", type=Path, metavar="JSON", help="an object to add to the model card")
-    _add_start(export)
+    _add_start(export, presets=("mini", "full"))
 
 
 def _add_cache(actions) -> None:
@@ -401,22 +401,23 @@ def _add_cache(actions) -> None:
     cache.add_argument(
         "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
     )
-    _add_start(cache)
+    _add_start(cache, presets=("mini", "full"))
 
 
 def _add_stages(actions) -> None:
     run = _command(actions, "run", "train stages, one after the other; continues where a run stopped")
     run.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
     _add_output(run, "RUN", "folder of checkpoints and logs")
+    run.add_argument("--stages", nargs="+", metavar="STAGE", help="such as depth refine gaussians")
+    run.add_argument("--minutes", nargs="+", type=minutes, metavar="M", help="one per stage")
     run.add_argument(
-        "--stages", nargs="+", required=True, metavar="STAGE", help="such as depth refine gaussians"
+        "--recipe", metavar="NAME", help="instead: stages with all their numbers, 'paper' or a .toml"
     )
-    run.add_argument("--minutes", nargs="+", required=True, type=minutes, metavar="M", help="one per stage")
     _add_loop(run)
     run.add_argument(
         "--from-scratch", action="store_true", help="draw the heads anew instead of going on with --start's"
     )
-    _add_start(run)
+    _add_start(run, presets=("mini", "full"))
 
 
 def _add_late(actions) -> None:
@@ -447,6 +448,14 @@ def _add_loop(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--restart", action="store_true", help="forget what the run folder holds of these stages"
     )
+    command.add_argument(
+        "--batches",
+        type=whole_count,
+        metavar="N",
+        help="that a step is made of, shared by the processes (default: one each)",
+    )
+    command.add_argument("--precision", choices=("auto", "float32", "bfloat16"), default="auto")
+    command.add_argument("--board", action="store_true", help="also write TensorBoard's logs, in RUN/board")
 
 
 def _add_convert(actions) -> None:
@@ -628,8 +637,8 @@ def _add_photo_sets(command: argparse.ArgumentParser) -> None:
     _add_backend(command)
 
 
-def _add_start(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
+def _add_start(command: argparse.ArgumentParser, presets: tuple[str, ...] = ("mini",)) -> None:
+    command.add_argument("--preset", choices=presets, default="mini", help="(default: mini)")
     command.add_argument(
         "--start",
         type=Path,
@@ -654,6 +663,12 @@ def _add_weights(commands) -> None:
     imported.add_argument("--preset", choices=("full",), default="full", help="(default: full)")
     imported.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="(default: in the cache folder, where it is found)"
+    )
+    imported.add_argument(
+        "--size",
+        type=pixel_side,
+        metavar="PX",
+        help="it was trained on photos of PX x PX (default: as its published name tells)",
     )
     _add_json(imported)
     verify = _command(actions, "verify", "read every number and check that it fits its network")

@@ -1,5 +1,6 @@
 """A network whatever its geometry: photos in, `Prediction` out. Stages run once, in order, timed."""
 
+import math
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -63,11 +64,17 @@ class LangFlashNet(nn.Module):
     """Training may read tokens from disk, because nothing that is trained changes them."""
     grouping: nn.Module
     aggregation: Aggregation
+    trained_side: int
+    """Pixels a side of the photos that the geometry was trained on, where that is known; 0: it is not."""
+    notes: tuple[str, ...]
+    """What whoever reads an answer should know of the weights."""
 
     def __init__(self, preset: Preset):
         super().__init__()
         self.preset = preset
         self.calibration: dict = {}
+        self.trained_side = 0
+        self.notes: tuple[str, ...] = ()
 
     @abstractmethod
     def use_bfloat16(self) -> "LangFlashNet":
@@ -222,6 +229,7 @@ class LangFlashNet(nn.Module):
                 for w, f, found, (_, K, own) in zip(weights, features, geometries, each, strict=True)
             ]
         timings = {name: seconds / len(scenes) for name, seconds in run.timings.items()}
+        notes = (*self.notes, *_of_another_size(self.trained_side, size))
         return [
             Prediction(
                 gaussians=geometry.gaussians,
@@ -232,7 +240,7 @@ class LangFlashNet(nn.Module):
                 depths=geometry.depths,
                 confidences=geometry.confidences,
                 unplaced=geometry.unplaced,
-                warnings=tuple(_left_out(views.names[v]) for v in geometry.unplaced),
+                warnings=(*(_left_out(views.names[v]) for v in geometry.unplaced), *notes),
                 timings=dict(timings),
             )
             for views, geometry, own_weights, dictionary in zip(
@@ -266,6 +274,17 @@ def pooled_weights(weights: Tensor, features: Tensor) -> Tensor:
     if weights.shape[1] == 0:
         return weights.new_zeros(1, len(weights), 0, features.shape[-2], features.shape[-1])
     return F.adaptive_avg_pool2d(weights, (features.shape[-2], features.shape[-1]))[None]
+
+
+def _of_another_size(trained: int, size: tuple[int, int]) -> tuple[str, ...]:
+    """A word where photos (H, W) are a quarter or more off the side that the geometry was trained on."""
+    side = (size[0] * size[1]) ** 0.5
+    if not trained or abs(math.log(side / trained)) < math.log(1.25):
+        return ()
+    return (
+        f"the geometry's weights were trained on photos of {trained} x {trained} pixels and saw "
+        f"{size[1]} x {size[0]} here, where they are less exact; choose --size {trained}",
+    )
 
 
 def _left_out(name: str) -> str:

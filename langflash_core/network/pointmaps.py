@@ -32,6 +32,7 @@ class PointMapNet(LangFlashNet):
 
     grouped: there are weights for `scratch` and `grouping`; without them groups are clusters of
     the language features. aggregated: likewise for `aggregation`; atoms are averages without.
+    Where the preset says `own_grouping`, `scratch` reads `grouping_encoder` and `grouping_decoder`.
     mixed: bfloat16 where it costs little (see `use_bfloat16`).
     """
 
@@ -52,6 +53,9 @@ class PointMapNet(LangFlashNet):
         self.scratch = ScratchPair(preset)
         self.grouping = ResidualGrouping(preset)
         self.aggregation = Aggregation(preset)
+        if preset.own_grouping:
+            self.grouping_encoder = RotaryEncoder(preset)
+            self.grouping_decoder = TwoStacks(preset, preset.norm_eps)
 
     def use_bfloat16(self) -> "PointMapNet":
         """Matrix products in bfloat16, for transformers and Gaussian heads; points stay float32.
@@ -59,7 +63,8 @@ class PointMapNet(LangFlashNet):
         A point's distance is e^|v|: an error of v there would be one of depth. Weights of the
         products are kept in bfloat16, which halves the memory as well. There is no way back.
         """
-        for part in (self.encoder, self.decoder, self.gaussian_heads, self.language_head, self.scratch):
+        quick = ("encoder", "decoder", "gaussian_heads", "language_head", "scratch")
+        for part in (getattr(self, name) for name in (*quick, *self._copies())):
             for layer in part.modules():
                 if isinstance(layer, nn.Linear | nn.Conv2d | nn.ConvTranspose2d):
                     layer.to(torch.bfloat16)
@@ -73,7 +78,8 @@ class PointMapNet(LangFlashNet):
             WeightsError: geometry or language features have none.
         """
         if not {"scratch", "grouping"} <= filled:
-            del self.scratch, self.grouping
+            for name in ("scratch", "grouping", *self._copies()):
+                delattr(self, name)
             self.grouped = False
         if "aggregation" not in filled:
             self.aggregation = Aggregation(self.preset).eval()
@@ -87,14 +93,28 @@ class PointMapNet(LangFlashNet):
 
     def encode(self, images: Tensor, Ks: Tensor) -> Tokens:
         """Encoder output and three decoder depths; a single photo is paired with itself."""
+        grid = (images.shape[-2] // self.preset.patch, images.shape[-1] // self.preset.patch)
+        hooks = self._hooks(self.encoder, self.decoder, images, Ks, grid)
+        if not self._copies():
+            return Tokens(hooks, grid)
+        grouped = self._hooks(self.grouping_encoder, self.grouping_decoder, images, Ks, grid)
+        return Tokens(hooks, grid, grouped=grouped)
+
+    def _copies(self) -> tuple[str, ...]:
+        """What is there for the grouping alone."""
+        both = ("grouping_encoder", "grouping_decoder")
+        return both if self.sizes.own_grouping and self.grouped else ()
+
+    def _hooks(
+        self, encoder: RotaryEncoder, decoder: TwoStacks, images: Tensor, Ks: Tensor, grid: tuple[int, int]
+    ) -> tuple[Tensor, ...]:
         num_views = images.shape[1]
         with self._fast(images):
-            encoded = self.encoder(images, Ks)
+            encoded = encoder(images, Ks)
             paired = encoded if num_views > 1 else encoded.expand(-1, 2, -1, -1)
-            grid = (images.shape[-2] // self.preset.patch, images.shape[-1] // self.preset.patch)
-            layers = self.decoder.layers(self.decoder.embed(paired), grid)
+            layers = decoder.layers(decoder.embed(paired), grid)
         hooks = (encoded, *(layers[depth - 1][:, :num_views] for depth in self.sizes.decoder_hooks))
-        return Tokens(tuple(hook[:, :, :-1].float() for hook in hooks), grid)
+        return tuple(hook[:, :, :-1].float() for hook in hooks)
 
     def point_maps(self, tokens: Tokens, images: Tensor) -> Tensor:
         """Points (B, V, 3, H, W) in view 0's frame."""
@@ -114,7 +134,7 @@ class PointMapNet(LangFlashNet):
     def semantic_maps(self, tokens: Tokens, images: Tensor) -> tuple[tuple[Tensor, ...], Tensor]:
         """Memories at 1, 2 and 4 times the grid, and the mask map at the picture's size."""
         with self._fast(images):
-            memories, finest = self.scratch(tokens, images)
+            memories, finest = self.scratch(tokens.for_grouping(), images)
         return tuple(memory.float() for memory in memories), finest.float()
 
     def parts(

@@ -136,6 +136,8 @@ class PointMaps(Preset):
 
     `decoder_hooks`: after how many decoder layers the heads look, besides the encoder's output.
     `mask_filter`: which masks become groups; None: `tau_exist`, as the paper has it.
+    `own_grouping`: the grouping reads an encoder and a decoder of its own, since it was trained on others
+    than those of the geometry.
     """
 
     encoder_depth: int
@@ -144,6 +146,7 @@ class PointMaps(Preset):
     norm_eps: float = 1e-6
     language: LSegSizes = LSegSizes()
     mask_filter: MaskFilter | None = MaskFilter()
+    own_grouping: bool = False
 
 
 MINI = GuidedDepth(

@@ -1,23 +1,23 @@
 """Published checkpoints in, our parts out: the round trip, and every kind of damage."""
 
+import argparse
 import json
+import os
+import sys
+from collections import OrderedDict
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from safetensors import safe_open
 from safetensors.torch import save_file
 
 from langflash_core.errors import WeightsError
-from langflash_core.network import PointMapNet, build_network, save_network
+from langflash_core.network import LangFlashNet, PointMapNet, build_network, save_network
 from langflash_core.network.checkpoints.importing import convert, read_checkpoint
-from langflash_core.network.checkpoints.store import (
-    assemble_network,
-    install,
-    installed,
-    part_folder,
-    verify_part,
-)
+from langflash_core.network.checkpoints.parts import installed, part_folder, read_part, read_tensors
+from langflash_core.network.checkpoints.store import assemble_network, install, verify_part
 from langflash_core.types import Views
 from tests.network import published
 from tests.network.sizes import TINY
@@ -126,6 +126,17 @@ class _Code:
         return (print, ("this must never be printed",))
 
 
+class _Shell:
+    """A pickle that would run something of a module that torch blocks altogether."""
+
+    def __reduce__(self):
+        return (os.system, ("echo this must never be printed",))
+
+
+class _Table(dict):
+    """An object of a class nobody here knows, filled like a table."""
+
+
 KEY = "encoder.backbone.dec_blocks2.1.cross_attn.projk.weight"
 DAMAGE = {
     "missing file": "there is no checkpoint",
@@ -136,6 +147,8 @@ DAMAGE = {
     "list": "holds no table of tensors",
     "not tensors": "things that are no tensors",
     "foreign": "none of the checkpoints",
+    "blocked code": "it wants to run (posix|nt).system",
+    "half a framework": "is not a plain checkpoint",
     "missing": "1 missing .*dec_blocks2.1.cross_attn.projk.weight",
     "surplus": "1 surplus .*encoder.backbone.more",
     "misshaped": r"1 misshaped .*projk.weight is \(3, 5\), expected \(32, 32\)",
@@ -158,6 +171,10 @@ def _damaged(kind: str, path: Path) -> Path:
             path.write_bytes(content[: len(content) // 2])
         case "code":
             torch.save({"state_dict": _Code()}, path)
+        case "blocked code":
+            torch.save({"state_dict": state, "callbacks": _Shell()}, path)
+        case "half a framework":
+            torch.save({"state_dict": _Table(state)}, path)
         case "list":
             torch.save([torch.ones(3)], path)
         case "not tensors":
@@ -191,9 +208,158 @@ def test_damaged_checkpoints_are_refused_in_one_sentence(kind, tmp_path, home, c
     assert "never" not in capsys.readouterr().out
 
 
+class _ModelCheckpoint:
+    """As training frameworks have it: its class is a key in what they save, its objects hold more of them."""
+
+    def __init__(self) -> None:
+        self.folder, self.best = Path("runs"), np.float32(0.3)
+
+    def __setstate__(self, state: object) -> None:
+        sys.stdout.write("this must never be printed")
+
+
+def test_what_lightning_1_4_saves_is_read_and_nothing_in_it_runs(tmp_path, capsys):
+    state = published.draw_lseg(TINY, channels=512)
+    saved = {
+        "epoch": 199, "global_step": 31600, "pytorch-lightning_version": "1.4.9",
+        "callbacks": {_ModelCheckpoint: {"monitor": "val_acc", "best_model_score": torch.tensor(0.3)}},
+        "optimizer_states": [{"state": {0: {"momentum_buffer": torch.ones(2)}}, "param_groups": []}],
+        "lr_schedulers": [{"base_lrs": [0.004], "lr_lambdas": [None]}],
+        "hparams_name": "kwargs",
+        "hyper_parameters": {"args": argparse.Namespace(a=Path("a")), "b": _ModelCheckpoint(), "c": _Code()},
+        "state_dict": OrderedDict(state),
+    }  # fmt: skip
+    torch.save(saved, tmp_path / "demo_e200.ckpt")
+    found = read_checkpoint(tmp_path / "demo_e200.ckpt")
+    assert found.keys() == state.keys()
+    assert all(torch.equal(found[key], value) for key, value in state.items())
+    assert convert(found, TINY, tmp_path).origin.name == "lseg"
+    assert "never" not in capsys.readouterr().out
+
+
+def _installed_pair(tmp_path, *, same: bool, grouping_first: bool) -> tuple[str, ...]:
+    """Geometry and LangFlash's file, which holds the same geometry or one 2 % away; the last notes."""
+    released = published.draw_langflash(TINY)
+    plain = published.draw_noposplat(TINY)
+    if not same:
+        noise = torch.Generator().manual_seed(3)
+        for key, value in plain.items():
+            step = torch.randn(value.shape, generator=noise) * value.norm() / value.numel() ** 0.5
+            plain[key] = value + 0.02 * step
+    files = [
+        _saved(plain, tmp_path / "mixRe10kDl3dv.ckpt"), _saved(released, tmp_path / "re10k.ckpt"),
+    ]  # fmt: skip
+    install(_saved(published.draw_lseg(TINY, channels=512), tmp_path / "demo_e200.ckpt"), TINY)
+    return [install(path, TINY).notes for path in (files[::-1] if grouping_first else files)][-1]
+
+
+def _logits(network: PointMapNet) -> torch.Tensor:
+    views = _views()
+    with torch.inference_mode():
+        tokens = network.encode(views.images[None], views.Ks[None])
+        return network.group(tokens, views.images[None])[-1].mask_logits
+
+
+@pytest.mark.parametrize("grouping_first", [False, True])
+def test_a_grouping_trained_on_the_installed_geometry_shares_it(tmp_path, grouping_first):
+    notes = _installed_pair(tmp_path, same=True, grouping_first=grouping_first)
+    assert len(notes) == 1 and "which it shares" in notes[0]
+    part = read_part(part_folder(TINY) / "grouping.safetensors")
+    assert part.modules == ("grouping", "scratch") and part.reads
+    network = assemble_network(TINY, None, "cpu")
+    assert not hasattr(network, "grouping_encoder") and network.notes == ()
+
+
+@pytest.mark.parametrize("grouping_first", [False, True])
+def test_a_grouping_trained_on_another_encoder_keeps_it_and_says_what_it_costs(tmp_path, grouping_first):
+    notes = _installed_pair(tmp_path, same=False, grouping_first=grouping_first)
+    assert len(notes) == 1 and "its own, 2 % away" in notes[0]
+    assert "GB more" in notes[0] and "twice" in notes[0]
+    network = assemble_network(TINY, None, "cpu")
+    assert isinstance(network, PointMapNet)
+    assert torch.equal(
+        network.grouping_encoder.patch.weight,
+        published.draw_langflash(TINY)["encoder.backbone.patch_embed.proj.weight"],
+    )
+    own = _logits(network)
+    network.grouping_encoder, network.grouping_decoder = network.encoder, network.decoder
+    fed_wrongly = _logits(network)
+    # Why it is kept: two per cent of the weights are several per cent of the masks' logits.
+    assert (own - fed_wrongly).norm() / own.norm() > 0.02
+    assert network.notes == () and torch.isfinite(network.predict(_views()).weights).all()
+
+
+def test_a_copy_survives_saving_and_bfloat16(tmp_path):
+    _installed_pair(tmp_path, same=False, grouping_first=False)
+    network = assemble_network(TINY, None, "cpu")
+    save_network(network, tmp_path / "whole.safetensors")
+    for path in part_folder(TINY).iterdir():
+        path.unlink()
+    verify_part(tmp_path / "whole.safetensors", TINY)
+    again = assemble_network(TINY, tmp_path / "whole.safetensors", "cpu")
+    assert isinstance(network, PointMapNet) and isinstance(again, PointMapNet)
+    assert torch.equal(_logits(network), _logits(again))
+    mixed = assemble_network(TINY, tmp_path / "whole.safetensors", "cpu", bfloat16=True)
+    kinds = {key: value.dtype for key, value in mixed.state_dict().items()}
+    assert kinds["grouping_encoder.blocks.0.attn.query.weight"] == torch.bfloat16
+
+
+def test_another_geometry_under_a_sharing_grouping_is_told(tmp_path):
+    _installed_pair(tmp_path, same=True, grouping_first=False)
+    notes = install(
+        _saved(published.draw_noposplat(TINY, seed=5), tmp_path / "re10k_3views.ckpt"), TINY
+    ).notes
+    assert len(notes) == 1 and "trained on another encoder" in notes[0]
+    prediction = assemble_network(TINY, None, "cpu").predict(_views())
+    assert any("trained on another encoder" in warning for warning in prediction.warnings)
+
+
+def test_a_grouping_whose_encoder_was_cut_off_is_told(tmp_path):
+    released = published.draw_langflash(TINY)
+    cut = {key: value for key, value in released.items() if not key.startswith("encoder.backbone.")}
+    install(_saved(published.draw_noposplat(TINY), tmp_path / "mixRe10kDl3dv.ckpt"), TINY)
+    done = install(_saved(cut, tmp_path / "re10k.ckpt"), TINY)
+    assert "was not kept" in done.notes[0]
+    assert read_part(done.paths[0]).modules == ("grouping", "scratch")
+
+
+def test_tensors_that_the_authors_gave_up_are_told_and_others_are_refused(tmp_path):
+    released = published.draw_langflash(TINY)
+    odd = {
+        "prefuse.exist_head.0.fc1.weight": torch.ones(2), "encoder.scratch_head1.to1.weight": torch.ones(3),
+        "prefuse.dec1.0.atten1.in_proj_weight": torch.ones(4), "later.anything": torch.ones(1),
+    }  # fmt: skip
+    done = install(_saved(released | odd, tmp_path / "re10k.ckpt"), TINY)
+    assert "4 tensors of it are read by nobody" in done.notes[0] and "prefuse.exist_head" in done.notes[0]
+    tensors = read_tensors(read_part(done.paths[0]), ("grouping", "scratch"))
+    assert not any("atten1" in key for key in tensors)
+    seventh = {
+        "prefuse.dec1.6.norm1.weight": torch.ones(16)
+    }  # another network: it would not be the same without
+    with pytest.raises(WeightsError, match=r"1 surplus .*dec1\.6"):
+        install(_saved(released | seventh, tmp_path / "re10k.ckpt"), TINY)
+
+
+def _of_size(network: LangFlashNet) -> list[str]:
+    return [warning for warning in network.predict(_views()).warnings if "were trained on photos" in warning]
+
+
+def test_weights_trained_at_512_say_so_when_they_see_less(tmp_path):
+    install(_saved(published.draw_lseg(TINY, channels=512), tmp_path / "demo_e200.ckpt"), TINY)
+    geometry = published.draw_noposplat(TINY)
+    install(_saved(geometry, tmp_path / "noposplat-mix-512-mixRe10kDl3dv_512x512.ckpt"), TINY)
+    network = assemble_network(TINY, None, "cpu")
+    assert network.trained_side == 512
+    said = _of_size(network)
+    assert len(said) == 1 and "512 x 512" in said[0] and "64 x 64" in said[0] and "--size 512" in said[0]
+    for name, side, told in (("mixRe10kDl3dv.ckpt", 64, 0), ("mine.ckpt", None, 0), ("re10k.ckpt", None, 1)):
+        install(_saved(geometry, tmp_path / name), TINY, side=side)
+        assert len(_of_size(assemble_network(TINY, None, "cpu"))) == told, name
+
+
 @pytest.mark.parametrize("kind", ["missing", "surplus", "misshaped", "nan", "foreign", "preset", "truncated"])
 def test_damaged_parts_are_refused(kind, tmp_path):
-    path = install(_saved(published.draw_lseg(TINY, channels=512), tmp_path / "demo.ckpt"), TINY)[0]
+    path = install(_saved(published.draw_lseg(TINY, channels=512), tmp_path / "demo.ckpt"), TINY).paths[0]
     verify_part(path, TINY)
     with safe_open(str(path), framework="pt") as file:
         tensors = {k: file.get_tensor(k) for k in file.keys()}  # noqa: SIM118

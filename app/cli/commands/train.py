@@ -4,6 +4,7 @@ import json
 import logging
 import sys
 from argparse import Namespace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -13,13 +14,15 @@ from langflash_core.lab.photos.layouts import Source, convert
 from langflash_core.lab.training.commands import (
     run_adopt,
     run_cache,
-    run_export,
     run_find_parts,
     run_late,
-    run_train,
+    run_recipe,
 )
 from langflash_core.lab.training.loop import LoopOptions
 from langflash_core.lab.training.photos import run_photo_cache
+from langflash_core.lab.training.ranks import joined, leads
+from langflash_core.lab.training.recipes import Recipe, named_recipe, read_recipe
+from langflash_core.lab.training.trained import run_export
 from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS
 from langflash_core.resources import asset_path
@@ -65,7 +68,7 @@ def _cache(args: Namespace, out: TextIO) -> None:
     count = run_cache(
         args.output,
         args.pack,
-        _start(args),
+        _start_of(args, args.preset),
         kind=args.set,
         scenes=args.scenes,
         first_seed=args.first_seed,
@@ -120,23 +123,32 @@ def _late(args: Namespace, out: TextIO) -> None:
         raise InputError(f"{args.folder} has no names.csv, so its photos name nothing; give labelled ones")
     learned = chosen_ids(folder.ids, "train")
     kept = [id for id in folder.ids if id not in learned]
-    state = run_late(
-        args.cache,
-        folder,
-        learned,
-        kept[::2],  # the other half is for the threshold
-        args.output,
-        _start(args),
-        language_space(PRESETS[args.preset].space).encode,
-        _options(args, args.minutes),
-        preset=args.preset,
-    )
-    print(f"{args.output}: trained the late half, {state.step} steps", file=out)
+    with joined(args.device) as device:
+        state = run_late(
+            args.cache,
+            folder,
+            learned,
+            kept[::2],  # the other half is for the threshold
+            args.output,
+            _start(args),
+            language_space(PRESETS[args.preset].space).encode,
+            replace(_options(args, args.minutes), device=device),
+            preset=args.preset,
+        )
+        if leads():
+            print(f"{args.output}: trained the late half, {state.step} steps", file=out)
 
 
 def _options(args: Namespace, minutes: float) -> LoopOptions:
     return LoopOptions(
-        minutes=minutes, device=args.device, seed=args.seed, max_steps=args.max_steps, resume=not args.restart
+        minutes=minutes,
+        device=args.device,
+        seed=args.seed,
+        max_steps=args.max_steps,
+        resume=not args.restart,
+        batches=args.batches,
+        precision=args.precision,
+        board=args.board,
     )
 
 
@@ -144,19 +156,29 @@ def _run(args: Namespace, out: TextIO) -> None:
     if not args.cache.is_dir():
         raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
     check_folder(args.output)
-    space = language_space(PRESETS[args.preset].space)
-    run_train(
-        args.stages,
-        args.cache,
-        args.output,
-        _start(args),
-        space.encode,
-        args.minutes,
-        preset=args.preset,
-        options=_options(args, 0),
-        from_scratch=args.from_scratch,
-    )
-    print(f"{args.output}: trained {', '.join(args.stages)}", file=out)
+    with joined(args.device) as device:
+        recipe = _recipe(args, replace(_options(args, 0), device=device))
+        encode = language_space(PRESETS[recipe.preset].space).encode
+        start = _start_of(args, recipe.preset)
+        run_recipe(recipe, args.cache, args.output, start, encode, from_scratch=args.from_scratch)
+        if leads():
+            print(f"{args.output}: trained {', '.join(p.stage.name for p in recipe.plans)}", file=out)
+
+
+_OF_RECIPES = {"seed": 0, "batches": None, "precision": "auto"}
+"""Words that a recipe decides, and what they are where nobody says them."""
+
+
+def _recipe(args: Namespace, options: LoopOptions) -> Recipe:
+    named = args.stages is not None or args.minutes is not None
+    if args.recipe is not None and not named:
+        given = [word for word, usual in _OF_RECIPES.items() if getattr(args, word) != usual]
+        if given:
+            raise InputError(f"a recipe says itself what --{given[0]} is; leave that out, or write a recipe")
+        return read_recipe(args.recipe, options)
+    if args.recipe is None and args.stages is not None and args.minutes is not None:
+        return named_recipe(args.stages, args.minutes, args.preset, options)
+    raise InputError("give either --stages with --minutes, or a --recipe; not both, not none")
 
 
 def _export(args: Namespace, out: TextIO) -> None:
@@ -164,12 +186,23 @@ def _export(args: Namespace, out: TextIO) -> None:
         raise InputError(f"there is no folder {args.run}; make it with langflash train run")
     check_output_file(args.output, (".safetensors",))
     details = None if args.metadata is None else _details(args.metadata)
-    path = run_export(args.run, args.output, _start(args), preset=args.preset, metadata=details)
+    path = run_export(
+        args.run, args.output, _start_of(args, args.preset), preset=args.preset, metadata=details
+    )
     print(f"{path}: {path.stat().st_size / 1e6:.1f} MB", file=out)
 
 
 def _start(args: Namespace) -> Path:
     path = args.start or asset_path(f"weights/{args.preset}.safetensors")
+    return readable_file(path, "weights file", WeightsError)
+
+
+def _start_of(args: Namespace, preset: str) -> Path | None:
+    """The weights file to begin with; None: none is shipped for the preset, and what was imported will do."""
+    try:
+        path = args.start or asset_path(f"weights/{preset}.safetensors")
+    except FileNotFoundError:
+        return None
     return readable_file(path, "weights file", WeightsError)
 
 

@@ -12,11 +12,12 @@ from langflash_core.errors import WeightsError
 from langflash_core.network import PRESETS, load_network
 from langflash_core.network.checkpoints.catalogue import CATALOGUE, CLIP, OTHERS, SAM2, published
 from langflash_core.network.checkpoints.download import download
-from langflash_core.network.checkpoints.store import FORMAT, install, part_folder, read_part, verify_part
+from langflash_core.network.checkpoints.parts import FORMAT, part_folder, read_part
+from langflash_core.network.checkpoints.store import install, verify_part
 from langflash_core.resources import asset_path, weights_folder
 
 from ..files import readable_file
-from ..report import ProgressBar, write_json
+from ..report import ProgressBar, say_warnings, write_json
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -97,8 +98,10 @@ def _say_file(args: Namespace, out: TextIO, path: Path) -> None:
 
 def _installed(args: Namespace, out: TextIO, checkpoint: Path, output: Path | None) -> None:
     preset = PRESETS[args.preset] if "preset" in args else PRESETS[published(args.name).preset]
-    written = install(checkpoint, preset, output)
-    _say(args, out, [_entry(written[0]), *({"path": str(p), "bytes": p.stat().st_size} for p in written[1:])])
+    done = install(checkpoint, preset, output, side=getattr(args, "size", None))
+    part, *others = done.paths
+    _say(args, out, [_entry(part), *({"path": str(p), "bytes": p.stat().st_size} for p in others)])
+    say_warnings(done.notes)
 
 
 def _present() -> list[Path]:

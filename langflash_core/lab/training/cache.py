@@ -41,7 +41,8 @@ class CachePlan:
     """What is rendered: scenes `first_seed` to `first_seed + scenes - 1`, furnished from `libraries`.
 
     with_tokens False keeps pictures only (evaluation encodes itself). One shard in
-    `three_view_every` holds three views a scene, the rest two; 0 means never.
+    `three_view_every` holds three views a scene, the rest two; 0 means never. sizes: (width, height),
+    shard by shard.
     """
 
     first_seed: int
@@ -51,6 +52,7 @@ class CachePlan:
     augment: bool = True
     scenes_per_shard: int = 32
     three_view_every: int = 4
+    sizes: tuple[tuple[int, int], ...] = SIZES
 
     def shards(self) -> Iterator["ShardPlan"]:
         """The shards in order; each has one picture size and one number of views."""
@@ -58,7 +60,7 @@ class CachePlan:
             first = self.first_seed + index * self.scenes_per_shard
             count = min(self.scenes_per_shard, self.first_seed + self.scenes - first)
             three = self.three_view_every > 0 and index % self.three_view_every == self.three_view_every - 1
-            yield ShardPlan(first, count, 3 if three else 2, SIZES[index % len(SIZES)])
+            yield ShardPlan(first, count, 3 if three else 2, self.sizes[index % len(self.sizes)])
 
 
 @dataclass(frozen=True)

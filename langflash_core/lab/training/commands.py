@@ -4,10 +4,10 @@ Plain functions; the command line only parses arguments. Text embeddings come in
 training does not import the query stage.
 """
 
-import json
 import logging
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -25,30 +25,23 @@ from langflash_core.lab.training.cache import (
     rooms_renderer,
 )
 from langflash_core.lab.training.live import LivePhotos
-from langflash_core.lab.training.loop import (
-    LoopOptions,
-    LoopState,
-    Validate,
-    load_averaged,
-    train_stage,
-)
+from langflash_core.lab.training.loop import LoopOptions, Validate, train_stage
 from langflash_core.lab.training.mixing import MixedSet
 from langflash_core.lab.training.naming import NAMING
 from langflash_core.lab.training.parts import PartSet, run_parts
-from langflash_core.lab.training.real import MODULES, JointSet, KeptPhotos, PhotoTargets, train_late
-from langflash_core.lab.training.stages import STAGES, Stage, Words, guided, language_stage
+from langflash_core.lab.training.real import JointSet, KeptPhotos, PhotoTargets, train_late
+from langflash_core.lab.training.recipes import Recipe, named_recipe, stages_of
+from langflash_core.lab.training.stages import Stage, Words, guided
+from langflash_core.lab.training.states import LoopState
+from langflash_core.lab.training.trained import begin, load_trained, prepared
 from langflash_core.lab.training.validation import MEASURES, Validator
 from langflash_core.lab.training.words import PhraseSampler, PhraseTable, build_table
-from langflash_core.network.checkpoints.files import adopt_frozen, initial_network, save_network, start_from
+from langflash_core.network.checkpoints.files import adopt_frozen, initial_network
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.precision import has_bfloat16
 from langflash_core.network.presets import PRESETS
 
 log = logging.getLogger(__name__)
-
-LATE = Stage("late", MODULES, (), {1: 1.0}, 6, 6e-4, language_stage)
-"""What `train late` leaves in a run for the stages after it; `real` says how it learns."""
-ALL_STAGES = {**STAGES, NAMING.name: NAMING}
 
 Encode = Callable[[Sequence[str]], Tensor]
 SETS = ("train", "validation", "held_out")
@@ -56,13 +49,22 @@ VALIDATION_SCENES = 48
 """Judged while training, every few minutes; more would cost more time than they tell."""
 
 
-def cache_plan(kind: str, scenes: int, first_seed: int | None = None) -> CachePlan:
+def cache_plan(kind: str, scenes: int, first_seed: int | None = None, preset: str = "mini") -> CachePlan:
     """The plan of one set: train (tokens, augmented), validation (tokens; furniture that rules drew
-    from other seeds), held_out (pictures only; models by people whose library no training sees).
+    from other seeds), held_out (pictures only; models by people whose library no training sees). Squares
+    without tokens for a network that takes these.
 
     Raises:
         InputError: there is no such set.
     """
+    plan, network = _cache_plan(kind, scenes, first_seed), PRESETS[preset]
+    if not network.square:
+        return plan
+    side = round(network.native_area**0.5)
+    return replace(plan, with_tokens=False, sizes=((side, side),))
+
+
+def _cache_plan(kind: str, scenes: int, first_seed: int | None) -> CachePlan:
     if kind == "train":
         return CachePlan(first_seed or 0, scenes)
     if kind == "validation":
@@ -88,7 +90,7 @@ def cache_plan(kind: str, scenes: int, first_seed: int | None = None) -> CachePl
 def run_cache(
     out: Path,
     pack: Path,
-    start: Path,
+    start: Path | None,
     *,
     kind: str = "train",
     scenes: int = 4096,
@@ -102,11 +104,13 @@ def run_cache(
 
     Args:
         pack: furniture (`langflash rooms pack`).
-        start: weights file of the preset, whose encoder is used.
+        start: weights file of the preset, whose encoder is used; None where the cache keeps no tokens.
     """
     torch.set_num_threads(1)
-    plan = cache_plan(kind, scenes, first_seed)
-    encoder = guided(initial_network(PRESETS[preset], start)).encoder if plan.with_tokens else None
+    plan = cache_plan(kind, scenes, first_seed, preset)
+    encoder = None
+    if plan.with_tokens and start is not None:
+        encoder = guided(initial_network(PRESETS[preset], start)).encoder
     furniture = load_pack(pack)
     began = time.perf_counter()
     with RoomRenderer(furniture) as renderer:
@@ -120,7 +124,7 @@ def run_train(
     stages: Sequence[str],
     folder: Path,
     run_dir: Path,
-    start: Path,
+    start: Path | None,
     encode: Encode,
     minutes: Sequence[float],
     *,
@@ -135,43 +139,47 @@ def run_train(
 
     Args:
         start: weights file of the preset. Its frozen parts are used, and stages without a run of
-            their own begin with its heads, as far as these still fit the network.
+            their own begin with its heads, as far as these still fit the network. None: what is imported
+            for a preset that nothing is shipped for.
         from_scratch: draw the heads anew instead.
 
     Raises:
         InputError: an unknown stage, a stage whose needs have not been trained, or no cache.
     """
-    if len(stages) != len(minutes):
-        raise InputError(
-            f"{len(stages)} stages need as many minutes, received {len(minutes)}; give one number per stage"
-        )
-    for name in stages:
-        if name not in ALL_STAGES:
-            raise InputError(f"there is no stage '{name}'; choose among {', '.join(ALL_STAGES)}")
-    options = options or LoopOptions(minutes=0)
+    recipe = named_recipe(stages, minutes, preset, options or LoopOptions(minutes=0))
+    return run_recipe(recipe, folder, run_dir, start, encode, from_scratch=from_scratch)
+
+
+def run_recipe(
+    recipe: Recipe,
+    folder: Path,
+    run_dir: Path,
+    start: Path | None,
+    encode: Encode,
+    *,
+    from_scratch: bool = False,
+) -> LangFlashNet:
+    """Train the stages of a recipe; everything else as `run_train`."""
     _open(folder / "train")
     table = phrase_table(folder, encode)
-    network = initial_network(PRESETS[preset], start, options.seed)
-    done = _load_trained(network, run_dir)
-    if not from_scratch:
-        done |= dict.fromkeys(_begin(network, start, done), 0)
-    for name, budget in zip(stages, minutes, strict=True):
-        stage = ALL_STAGES[name]
+    network, done = prepared(recipe, run_dir, start, from_scratch=from_scratch)
+    known = stages_of(recipe.preset)
+    for plan in recipe.plans:
+        stage, options = plan.stage, plan.options
         missing = [need for need in stage.needs if need not in done]
         if missing:
             raise InputError(
-                f"stage '{name}' reads {', '.join(missing)}; train that first with the same run folder"
+                f"stage '{stage.name}' reads {', '.join(missing)}; train that first with the same run folder"
             )
-        seed = options.seed + 1000 * list(ALL_STAGES).index(name) + done.get(name, 0)
+        seed = options.seed + 1000 * list(known).index(stage.name) + done.get(stage.name, 0)
         words = Words(PhraseSampler(table), torch.Generator().manual_seed(seed))
-        own = LoopOptions(**{**options.__dict__, "minutes": budget})
         learned = _learned(stage, folder)
-        if isinstance(learned, PartSet) and name not in done:
+        if isinstance(learned, PartSet) and stage.name not in done:
             namer = guided(network).namer
             namer.mean, namer.std = learned.statistics()
-        check = _validator(name, folder, table, own)
-        state = train_stage(network, stage, learned, words, run_dir, own, check)
-        done[name] = state.step
+        check = _validator(stage, folder, table, options)
+        state = train_stage(network, stage, learned, words, run_dir, options, check)
+        done[stage.name] = state.step
     return network.eval()
 
 
@@ -198,7 +206,7 @@ def run_late(
     """
     rooms = _open(folder / "train")
     network = initial_network(PRESETS[preset], start, options.seed)
-    _begin(network, start, ())
+    begin(network, start, ())
     live = LivePhotos(photos, ids)
     words = Words(PhraseSampler(phrase_table(folder, encode)), torch.Generator().manual_seed(options.seed))
     targets = PhotoTargets.of(photos, live, encode)
@@ -229,9 +237,10 @@ def _learned(stage: Stage, folder: Path) -> RoomSet | MixedSet | PartSet:
     return MixedSet(rooms, _open(photos, photos=True), stage.photos)
 
 
-def _validator(name: str, folder: Path, table: PhraseTable, options: LoopOptions) -> Validate | None:
+def _validator(stage: Stage, folder: Path, table: PhraseTable, options: LoopOptions) -> Validate | None:
     """The stage's measure on validation rooms and, under names that begin with "photos_", on photos."""
-    if not (folder / "validation").is_dir():
+    name = stage.name
+    if not (folder / "validation").is_dir() or name not in MEASURES:
         return None
     measure, views = MEASURES[name]
 
@@ -243,7 +252,7 @@ def _validator(name: str, folder: Path, table: PhraseTable, options: LoopOptions
         return judge(_parts(folder, "validation"))
     rooms = judge(_open(folder / "validation", VALIDATION_SCENES))
     place = _photos(folder, "validation")
-    if ALL_STAGES[name].photos == 0 or place is None:
+    if stage.photos == 0 or place is None:
         return rooms
     photos = judge(_open(place, photos=True))
     return lambda network: {
@@ -284,8 +293,8 @@ def run_find_parts(
     """
     torch.set_num_threads(1)
     network = initial_network(PRESETS[preset], start)
-    done = _load_trained(network, run_dir) if run_dir is not None else {}
-    _begin(network, start, done)
+    done = load_trained(network, run_dir) if run_dir is not None else {}
+    begin(network, start, done)
     if has_bfloat16():
         network.use_bfloat16()
     count = 0
@@ -325,70 +334,7 @@ def phrase_table(folder: Path, encode: Encode) -> PhraseTable:
     return table
 
 
-def _load_trained(network: LangFlashNet, run_dir: Path) -> dict[str, int]:
-    """Steps of every stage in a run, whose weights the network then has; the late half, and what learned
-    with it, before those that went on."""
-    found = {name: load_averaged(network, run_dir, name) for name in (LATE.name, *ALL_STAGES)}
-    return {name: counts[0] for name, counts in found.items() if counts is not None}
-
-
-def _begin(network: LangFlashNet, start: Path, done: Iterable[str]) -> list[str]:
-    """The stages whose modules are trained in a run or could be filled from `start`, but for `done`."""
-    done = set(done)
-    filled = {module for name in done for module in (LATE if name == LATE.name else ALL_STAGES[name]).modules}
-    if LATE.name not in done:
-        start_from(network, start, ("late",))
-    names = [name for name in ALL_STAGES if name not in done]
-    return [
-        name
-        for name in names
-        if start_from(network, start, [m for m in ALL_STAGES[name].modules if m not in filled])
-    ]
-
-
 def run_adopt(encoder: Path, local: Path, out: Path, *, preset: str = "mini") -> Path:
     """Make a file to start from out of published weights of the frozen parts (see NOTICE)."""
     adopt_frozen(PRESETS[preset], encoder, local, out)
     return out
-
-
-def run_export(
-    run_dir: Path, out: Path, start: Path, *, preset: str = "mini", metadata: dict | None = None
-) -> Path:
-    """Join the averaged weights of every stage in `run_dir` into one weights file; stages that
-    were not trained there keep the heads of `start`.
-
-    The header says how long each stage trained, its last validation, and `metadata` (data,
-    metrics, calibration: `calibration` is what queries read).
-
-    Raises:
-        InputError: no stage has been trained.
-    """
-    network = initial_network(PRESETS[preset], start)
-    trained = {name: load_averaged(network, run_dir, name) for name in (LATE.name, *ALL_STAGES)}
-    _begin(network, start, [name for name, counts in trained.items() if counts is not None])
-    report = {
-        name: {
-            "steps": counts[0],
-            "hours": round(counts[1] / 3600, 3),
-            "validation": last_validation(run_dir, name),
-        }
-        for name, counts in trained.items()
-        if counts is not None
-    }
-    if not report:
-        raise InputError(f"{run_dir} holds no trained stage; run `langflash train run` first")
-    details = dict(metadata or {})
-    network.calibration = details.pop("calibration", {})
-    save_network(network, out, {"training": report, **details})
-    return out
-
-
-def last_validation(run_dir: Path, stage: str) -> dict:
-    """The newest validation row of a stage's log; {} if it has none."""
-    path = run_dir / f"{stage}.jsonl"
-    if not path.exists():
-        return {}
-    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-    kept = [row for row in rows if row["kind"] == "validation"]
-    return {k: v for k, v in kept[-1].items() if k not in ("stage", "kind")} if kept else {}

@@ -30,16 +30,17 @@ WEATHERED = 0.25
 @dataclass(frozen=True)
 class LabelledBatch:
     """images (B, 1, 3, H, W) in [0, 1]; ids (B, H, W) int64 of the folder, 0 = not labelled; depths
-    (B, H, W) metres, 0 = unknown; Ks (B, 1, 3, 3)."""
+    (B, H, W) metres, 0 = unknown; Ks (B, 1, 3, 3); names (B): of the photos."""
 
     images: Tensor
     ids: Tensor
     depths: Tensor
     Ks: Tensor
+    names: tuple[str, ...] = ()
 
     def to(self, device: str | torch.device) -> "LabelledBatch":
-        tensors = (self.images, self.ids, self.depths, self.Ks)
-        return LabelledBatch(*(tensor.to(device) for tensor in tensors))
+        images, ids, depths, Ks = (part.to(device) for part in (self.images, self.ids, self.depths, self.Ks))
+        return LabelledBatch(images, ids, depths, Ks, self.names)
 
 
 class LivePhotos:
@@ -60,7 +61,8 @@ class LivePhotos:
         size = SIZES[int(torch.randint(len(SIZES), (1,), generator=generator))]
         count = max(1, min(count, round(count * SIZES[0][0] * SIZES[0][1] / (size[0] * size[1]))))
         views = []
-        for row in torch.randint(len(self), (count,), generator=generator).tolist():
+        rows = torch.randint(len(self), (count,), generator=generator).tolist()
+        for row in rows:
             seed = int(torch.randint(2**31, (1,), generator=generator))
             view = fitted(self.photos[row], size, *drawn_window(self.photos[row], size, seed))
             views.append((relit(view.rgb, generator), view))
@@ -69,6 +71,7 @@ class LivePhotos:
             torch.stack([view.labels for _, view in views]),
             torch.stack([view.depths for _, view in views]),
             torch.stack([view.K for _, view in views])[:, None],
+            tuple(self.photos[row].id for row in rows),
         )
 
 

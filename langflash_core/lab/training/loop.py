@@ -1,32 +1,45 @@
-"""The training loop of one stage: a time budget, warm-up and cosine, EMA, checkpoints, a log.
+"""The training loop of one stage: a budget, warm-up and cosine, EMA, checkpoints, a log.
 
 A run folder holds, per stage, `<stage>.pt` (state to continue from, EMA included) and
 `<stage>.jsonl` (one JSON object per report). Later stages read the EMA of earlier ones.
+
+A step is made of one or more batches whose gradients are averaged, by this process (accumulation) or by
+several (torchrun, DistributedDataParallel): the same numbers either way, but for rounding.
 """
 
 import json
 import logging
 import math
-import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import torch
 from torch import Tensor, nn
+from torch.nn.parallel import DistributedDataParallel
 
+from langflash_core.lab.training.board import Board
+from langflash_core.lab.training.draws import Draws, all_states, begin_draws, restore_draws
 from langflash_core.lab.training.mixing import loss_of
+from langflash_core.lab.training.ranks import agreed, everywhere, gathered, leads, world
 from langflash_core.lab.training.stages import Stage, Words, modules_of
+from langflash_core.lab.training.states import (
+    LoopState,
+    forget_later_rows,
+    restore_state,
+    save_state,
+    stage_parameters,
+)
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.precision import mixed
 
 log = logging.getLogger(__name__)
 
-WARM_UP_STEPS = 100
-FINAL_SHARE = 0.02
-"""Of the peak learning rate, at the end of the budget."""
+MAX_BAD = 20
+"""Steps on end without a finite loss; then a run gives up."""
 
 Validate = Callable[[LangFlashNet], dict[str, float]]
 
@@ -40,9 +53,25 @@ class Drawn(Protocol):
 
 
 @dataclass(frozen=True)
+class Optimising:
+    """AdamW and what surrounds it. clip: norm that gradients are cut to; warm_up: steps; final_share: of the
+    peak rate, at the end of the budget."""
+
+    weight_decay: float = 0.01
+    betas: tuple[float, float] = (0.9, 0.99)
+    clip: float = 1.0
+    warm_up: int = 100
+    final_share: float = 0.02
+
+
+@dataclass(frozen=True)
 class LoopOptions:
     """minutes: training time of this stage, all its resumed parts together; max_steps: stops
-    earlier where not None; report_s, validate_s, save_s: seconds between reports."""
+    earlier where not None; report_s, validate_s, save_s: seconds between reports.
+
+    pictures: of a batch; batches: that a step is made of, None for one a process; precision: auto, float32
+    or bfloat16; board: also write TensorBoard's logs.
+    """
 
     minutes: float
     device: str = "cpu"
@@ -52,25 +81,20 @@ class LoopOptions:
     report_s: float = 20.0
     validate_s: float = 300.0
     save_s: float = 120.0
-    ema_decay: float = 0.998
-    weight_decay: float = 0.01
     pictures: int | None = None
     learning_rate: float | None = None
+    ema_decay: float = 0.998
+    batches: int | None = None
+    precision: str = "auto"
+    board: bool = False
+    optimising: Optimising = Optimising()
 
-
-@dataclass
-class LoopState:
-    """Where a run stands: steps done, seconds trained, averaged weights by parameter name."""
-
-    step: int = 0
-    seconds: float = 0.0
-    ema: dict[str, Tensor] = field(default_factory=dict)
-
-
-def stage_parameters(network: LangFlashNet, stage: Stage) -> dict[str, Tensor]:
-    """Every parameter and buffer that the stage owns, by its name in the network."""
-    prefixes = tuple(f"{name}." for name in modules_of(network, stage))
-    return {k: v for k, v in network.state_dict().items() if k.startswith(prefixes)}
+    def computing(self) -> torch.autocast:
+        """A context in which losses are computed in the precision asked for."""
+        if self.precision == "auto":
+            return mixed(self.device)
+        kind, half = torch.device(self.device).type, self.precision == "bfloat16"
+        return torch.autocast(kind, torch.bfloat16, enabled=half)
 
 
 def train_stage(
@@ -85,7 +109,8 @@ def train_stage(
     """Train one stage until its budget is spent; the network ends with the averaged weights.
 
     Raises:
-        RuntimeError: the loss stayed non-finite for 20 steps on end.
+        RuntimeError: the loss stayed non-finite for 20 steps on end; names the batches.
+        InputError: the batches of a step cannot be shared by the processes.
     """
     network.to(options.device)
     _freeze_all_but(network, stage)
@@ -93,13 +118,19 @@ def train_stage(
         {"params": list(getattr(network, name).parameters()), "share": stage.rates.get(name, 1.0)}
         for name in modules_of(network, stage)
     ]
-    optimiser = torch.optim.AdamW(groups, lr=1e-6, weight_decay=options.weight_decay, betas=(0.9, 0.99))
+    rule = options.optimising
+    optimiser = torch.optim.AdamW(groups, lr=1e-6, weight_decay=rule.weight_decay, betas=rule.betas)
     state = LoopState(ema={k: v.detach().clone() for k, v in stage_parameters(network, stage).items()})
+    draws = begin_draws(words, options.batches, options.seed)
     path = run_dir / f"{stage.name}.pt"
     if options.resume and path.exists():
-        state = _restore(network, stage, optimiser, path)
-    run = _Training(network, stage, rooms, words, options, optimiser, state, run_dir, validate)
-    run.go()
+        state, drawn = restore_state(network, stage, optimiser, path)
+        if drawn:
+            restore_draws(draws, drawn)
+        forget_later_rows(path.with_suffix(".jsonl"), state.step)
+    with Board(run_dir / "board" / stage.name, wanted=options.board and leads()) as board:
+        run = _Training(network, stage, rooms, draws, options, optimiser, state, run_dir, validate, board)
+        run.go()
     network.load_state_dict(state.ema, strict=False)
     return state
 
@@ -114,20 +145,44 @@ def _freeze_all_but(network: LangFlashNet, stage: Stage) -> None:
             parameter.data = parameter.data.contiguous(memory_format=torch.channels_last)
 
 
+class _StageLoss(nn.Module):
+    """A stage's loss as a module: what DistributedDataParallel can watch. parts: of the last call."""
+
+    def __init__(self, network: LangFlashNet, stage: Stage):
+        super().__init__()
+        self.network, self.stage = network, stage
+        self.parts: dict[str, float] = {}
+
+    def forward(self, batch: Any, words: Words) -> Tensor:
+        loss = loss_of(self.stage.loss, self.network, batch, words)
+        self.parts = loss.parts
+        return loss.total
+
+
 @dataclass
 class _Training:
     network: LangFlashNet
     stage: Stage
     rooms: Drawn
-    words: Words
+    draws: list[Draws]
     options: LoopOptions
     optimiser: torch.optim.Optimizer
     state: LoopState
     run_dir: Path
     validate: Validate | None
+    board: Board
     sums: dict[str, float] = field(default_factory=dict)
     counted: int = 0
     bad: int = 0
+    spent: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.inner = _StageLoss(self.network, self.stage)
+        self.loss: nn.Module = self.inner
+        if world() > 1:
+            self.loss = DistributedDataParallel(
+                self.inner, find_unused_parameters=True, forward_sync_buffers=False
+            )
 
     def go(self) -> None:
         """Steps, reports, validation and checkpoints until time or steps run out."""
@@ -137,6 +192,7 @@ class _Training:
             start = time.perf_counter()
             self._step()
             self.state.seconds += time.perf_counter() - start
+            self.state.seconds = agreed(self.state.seconds, self.options.device)
             if self.state.seconds - marks["report"] >= self.options.report_s:
                 marks["report"] = self.state.seconds
                 self._report()
@@ -153,6 +209,8 @@ class _Training:
         if self.validate is not None:
             self._validate()
         self._save()
+        if "update" in self.spent:
+            self._write({"kind": "profile", **{k: round(v, 3) for k, v in self.spent.items()}})
 
     def _finished(self) -> bool:
         steps = self.options.max_steps
@@ -166,44 +224,72 @@ class _Training:
         return min(max(by_time, by_steps), 1.0)
 
     def _step(self) -> None:
-        options, stage = self.options, self.stage
-        generator = self.words.generator
-        sizes, chances = list(stage.views), torch.tensor(list(stage.views.values()))
-        views = sizes[int(torch.multinomial(chances, 1, generator=generator))]
-        count = max(1, (options.pictures or stage.pictures) // views)
-        batch = self.rooms.draw(count, views, generator).to(options.device)
-        with mixed(options.device):
-            loss = loss_of(stage.loss, self.network, batch, self.words)
         self.optimiser.zero_grad(set_to_none=True)
-        if not bool(torch.isfinite(loss.total)):
-            self._skip(batch.seeds)
-            return
-        loss.total.backward()
+        self.state.begun += 1
+        told: list[dict[str, float]] = []
+        seeds: list[Any] = []
+        for place, draws in enumerate(self.draws):
+            with draws.drawing() as words:
+                with self._spending("reading"):
+                    batch = self._draw(words.generator)
+                seeds.append(batch.seeds)
+                with self._spending("forward"), self.options.computing():
+                    total = self.loss(batch, words)
+                    good = bool(torch.isfinite(total))
+            if not everywhere(good, self.options.device):
+                self._skip(seeds[-1], good)
+                return
+            last = place + 1 == len(self.draws)
+            with self._spending("backward"), self._apart(last):
+                (total / len(self.draws)).backward()
+            told.append({"loss": float(total.detach()), **self.inner.parts})
+        with self._spending("update"):
+            self._update(told, seeds)
+
+    def _draw(self, generator: torch.Generator) -> Any:
+        sizes, chances = list(self.stage.views), torch.tensor(list(self.stage.views.values()))
+        views = sizes[int(torch.multinomial(chances, 1, generator=generator))]
+        count = max(1, (self.options.pictures or self.stage.pictures) // views)
+        seek = getattr(self.rooms, "seek", None)
+        if seek is not None:  # of sets whose steps differ
+            seek(self.state.begun)
+        return self.rooms.draw(count, views, generator).to(self.options.device)
+
+    def _apart(self, last: bool) -> AbstractContextManager:
+        """A context in which gradients stay in this process, for all batches but the last of a step."""
+        alone = isinstance(self.loss, DistributedDataParallel) and not last
+        return self.loss.no_sync() if alone else nullcontext()  # type: ignore[union-attr]
+
+    def _update(self, told: list[dict[str, float]], seeds: list[Any]) -> None:
+        options, rule = self.options, self.options.optimising
         trained = [p for group in self.optimiser.param_groups for p in group["params"]]
-        norm = nn.utils.clip_grad_norm_(trained, 1.0)
-        if not bool(torch.isfinite(norm)):
-            self._skip(batch.seeds)
+        norm = nn.utils.clip_grad_norm_(trained, rule.clip)
+        if not everywhere(bool(torch.isfinite(norm)), options.device):
+            self._skip(seeds, False)
             return
-        rate = learning_rate(self.state.step, self._progress(), options.learning_rate or stage.learning_rate)
+        peak = options.learning_rate or self.stage.learning_rate
+        rate = learning_rate(self.state.step, self._progress(), peak, rule)
         for group in self.optimiser.param_groups:
             group["lr"] = rate * group["share"]
         self.optimiser.step()
         self.state.step += 1
         self.bad = 0
         self._average()
-        self._count({"loss": float(loss.total.detach()), "norm": float(norm.detach()), **loss.parts})
+        for parts in told:
+            self._count({**parts, "norm": float(norm.detach())})
 
-    def _skip(self, seeds: tuple[int, ...]) -> None:
+    def _skip(self, seeds: Any, good: bool) -> None:
+        """Leave a step out; `good`: this process's own batch was finite."""
         self.bad += 1
-        log.warning(
-            "%s: step %d skipped, loss or gradient not finite (seeds %s)",
-            self.stage.name,
-            self.state.step,
-            seeds,
-        )
-        if self.bad >= 20:
+        named = [seeds for seeds in gathered(None if good else seeds) if seeds is not None]
+        said = "%s: step %d skipped, loss or gradient not finite (seeds %s)"
+        if leads():
+            log.warning(said, self.stage.name, self.state.step, named)
+        self._write({"kind": "skipped", "seeds": named})
+        if self.bad >= MAX_BAD:
             raise RuntimeError(
-                f"{self.stage.name}: 20 steps on end gave no finite loss; lower the learning rate"
+                f"{self.stage.name}: {MAX_BAD} steps on end gave no finite loss, the last with the batches "
+                f"{named}; lower the learning rate"
             )
 
     def _average(self) -> None:
@@ -221,17 +307,23 @@ class _Training:
         self.counted += 1
 
     def _report(self) -> None:
-        if self.counted:
-            means = {k: round(v / self.counted, 5) for k, v in self.sums.items()}
+        everyone = gathered((self.sums, self.counted))
+        counted = sum(count for _, count in everyone)
+        if counted:
+            keys = dict.fromkeys(key for sums, _ in everyone for key in sums)
+            means = {k: sum(sums.get(k, 0.0) for sums, _ in everyone) / counted for k in keys}
             rate = self.optimiser.param_groups[0]["lr"]
-            self._write({"kind": "train", "rate": rate, **means})
+            self._write({"kind": "train", "rate": rate, **{k: round(v, 7) for k, v in means.items()}})
         self.sums, self.counted = {}, 0
 
     def _validate(self) -> None:
+        """By the process that leads; the others wait for it at their next step."""
+        if not leads():
+            return
         own = {k: v.detach().clone() for k, v in stage_parameters(self.network, self.stage).items()}
         self.network.load_state_dict(self.state.ema, strict=False)
         self.network.eval()
-        with torch.inference_mode():
+        with self._spending("validation"), torch.inference_mode():
             metrics = self.validate(self.network) if self.validate is not None else {}
         self.network.load_state_dict(own, strict=False)
         for name in modules_of(self.network, self.stage):
@@ -239,67 +331,33 @@ class _Training:
         self._write({"kind": "validation", **{k: round(v, 5) for k, v in metrics.items()}})
 
     def _write(self, row: dict) -> None:
+        if not leads():
+            return
         head = {"stage": self.stage.name, "step": self.state.step, "seconds": round(self.state.seconds, 1)}
         log.info("%s", {**head, **row})
         self.run_dir.mkdir(parents=True, exist_ok=True)
         with (self.run_dir / f"{self.stage.name}.jsonl").open("a", encoding="utf-8") as file:
             file.write(json.dumps({**head, **row}) + "\n")
+        self.board.show(row["kind"], row, self.state.step)
 
     def _save(self) -> None:
-        save_state(
-            self.run_dir / f"{self.stage.name}.pt", self.network, self.stage, self.optimiser, self.state
-        )
+        with self._spending("saving"):
+            path = self.run_dir / f"{self.stage.name}.pt"
+            save_state(path, self.network, self.stage, self.optimiser, self.state, all_states(self.draws))
+
+    @contextmanager
+    def _spending(self, what: str) -> Iterator[None]:
+        """Adds the seconds inside to what `what` took. (A card is waited for: losses and norms are read.)"""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.spent[what] = self.spent.get(what, 0.0) + time.perf_counter() - start
 
 
-def learning_rate(step: int, progress: float, peak: float) -> float:
-    """Linear warm-up over `WARM_UP_STEPS`, then a cosine over the budget down to `FINAL_SHARE`."""
-    warm = min(1.0, (step + 1) / WARM_UP_STEPS)
-    cosine = FINAL_SHARE + (1 - FINAL_SHARE) * 0.5 * (1 + math.cos(math.pi * progress))
+def learning_rate(step: int, progress: float, peak: float, rule: Optimising | None = None) -> float:
+    """Linear warm-up, then a cosine over the budget down to the final share of the peak."""
+    rule = rule or Optimising()
+    warm = min(1.0, (step + 1) / rule.warm_up)
+    cosine = rule.final_share + (1 - rule.final_share) * 0.5 * (1 + math.cos(math.pi * progress))
     return peak * warm * cosine
-
-
-def save_state(
-    path: Path, network: LangFlashNet, stage: Stage, optimiser: torch.optim.Optimizer, state: LoopState
-) -> None:
-    """Everything that continues a stage, written atomically."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_suffix(".part")
-    torch.save(
-        {
-            "stage": stage.name,
-            "weights": stage_parameters(network, stage),
-            "ema": state.ema,
-            "optimiser": optimiser.state_dict(),
-            "step": state.step,
-            "seconds": state.seconds,
-        },
-        temporary,
-    )
-    os.replace(temporary, path)
-
-
-def save_cut(path: Path, network: LangFlashNet, stage: Stage, state: LoopState) -> None:
-    """What a run left in the network, as the finished stage that `load_averaged` reads; atomically."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_suffix(".part")
-    own = {key: value.detach().clone() for key, value in stage_parameters(network, stage).items()}
-    torch.save({"stage": stage.name, "ema": own, "step": state.step, "seconds": state.seconds}, temporary)
-    os.replace(temporary, path)
-
-
-def _restore(network: LangFlashNet, stage: Stage, optimiser: torch.optim.Optimizer, path: Path) -> LoopState:
-    saved = torch.load(path, map_location="cpu", weights_only=True)
-    network.load_state_dict(saved["weights"], strict=False)
-    optimiser.load_state_dict(saved["optimiser"])
-    log.info("%s: continues at step %d, %.0f s", stage.name, saved["step"], saved["seconds"])
-    return LoopState(saved["step"], saved["seconds"], saved["ema"])
-
-
-def load_averaged(network: LangFlashNet, run_dir: Path, stage_name: str) -> tuple[int, float] | None:
-    """Put a stage's averaged weights into the network; (steps, seconds), or None if it has not run."""
-    path = run_dir / f"{stage_name}.pt"
-    if not path.exists():
-        return None
-    saved = torch.load(path, map_location="cpu", weights_only=True)
-    network.load_state_dict(saved["ema"], strict=False)
-    return int(saved["step"]), float(saved["seconds"])

@@ -23,7 +23,7 @@ from langflash_core.lab.photos.names import CLASSES37
 from langflash_core.lab.training.batches import RoomSet, SceneBatch
 from langflash_core.lab.training.late import cut, soften, whole
 from langflash_core.lab.training.live import SIZES, LabelledBatch, LivePhotos
-from langflash_core.lab.training.loop import LoopOptions, LoopState, Validate, save_cut, train_stage
+from langflash_core.lab.training.loop import LoopOptions, Validate, train_stage
 from langflash_core.lab.training.losses import depth_loss, error_loss, gradient_loss
 from langflash_core.lab.training.measures import (
     abs_rel,
@@ -46,6 +46,7 @@ from langflash_core.lab.training.stages import (
     nearest,
     thinned,
 )
+from langflash_core.lab.training.states import LoopState, save_cut
 from langflash_core.lab.training.teacher import Names, Rows, Teacher, hand_over
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.model import LangFlashNet
@@ -141,8 +142,9 @@ class JointBatch:
     rooms: SceneBatch | None
 
     @property
-    def seeds(self) -> tuple[int, ...]:
-        return () if self.rooms is None else self.rooms.seeds
+    def seeds(self) -> tuple[int | str, ...]:
+        """Names of the photos, and the room's seed."""
+        return self.photos.names + (() if self.rooms is None else self.rooms.seeds)
 
     def to(self, device: str | torch.device) -> "JointBatch":
         return JointBatch(self.photos.to(device), None if self.rooms is None else self.rooms.to(device))
@@ -155,17 +157,20 @@ class JointSet:
     photos: LivePhotos
     rooms: RoomSet | None
     every: int = 2
-    _step: int = 0
+    _step: int = 1
 
     def __len__(self) -> int:
         return len(self.photos) + (0 if self.rooms is None else len(self.rooms))
 
     def draw(self, count: int, views: int, generator: torch.Generator) -> JointBatch:
         """`count` photos; `views` says nothing."""
-        self._step += 1
         turn = self._step % self.every == 1 % self.every
         room = self.rooms.draw(1, 2, generator) if self.rooms is not None and turn else None
         return JointBatch(self.photos.draw(count, generator), room)
+
+    def seek(self, step: int) -> None:
+        """What is drawn next is for this step, from 1."""
+        self._step = step
 
 
 def late_stage(targets: PhotoTargets, names: Names, teacher: Teacher) -> Stage:

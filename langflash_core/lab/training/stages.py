@@ -298,12 +298,15 @@ def nearest(ids: Tensor, size: tuple[int, int]) -> Tensor:
     return ids[..., ys[:, None], xs]
 
 
-def grouping_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
+def grouping_stage(
+    network: LangFlashNet, batch: SceneBatch, words: Words, weights: GroupingWeights | None = None
+) -> Loss:
     """L_SG after every scale of the decoder, on every second pixel of the mask map; of photos that are
     labelled in part, on the pixels that are.
 
     Without a dense teacher its term is `instance_contrast` on the map that masks are read from.
     """
+    weights = weights or GroupingWeights()
     memories, finest = network.semantic_maps(frozen_tokens(network, batch), batch.images)
     offset_y, offset_x = torch.randint(2, (2,), generator=words.generator).tolist()
     size = (finest.shape[-2], finest.shape[-1])
@@ -320,11 +323,11 @@ def grouping_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Lo
             if batch.partly:
                 seen = (own != NOTHING).flatten()
                 logits, truth = logits[:, seen], truth[:, seen]
-            loss, chosen = grouping_loss(logits, existence, truth, GroupingWeights())
+            loss, chosen = grouping_loss(logits, existence, truth, weights)
             losses.append(loss)
             if answer is answers[-1] and len(chosen.queries):
                 quality.append(float(mask_quality(logits[chosen.queries], truth[chosen.groups]).mean()))
-    total = torch.stack(losses).mean() + GroupingWeights().mse * contrast
+    total = torch.stack(losses).mean() + weights.mse * contrast
     return Loss(total, {"soft_iou": sum(quality) / max(len(quality), 1), **_numbers(contrast=contrast)})
 
 
@@ -347,7 +350,9 @@ def group_masks(ids: Tensor) -> tuple[Tensor, Tensor]:
     return (flat[None] == kept[:, None]).float(), kept
 
 
-def aggregation_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
+def aggregation_stage(
+    network: LangFlashNet, batch: SceneBatch, words: Words, weights: AggregationWeights | None = None
+) -> Loss:
     """L_LFA over the parts that the frozen grouping finds; a part is called what most of it shows."""
     losses, cosines = [], []
     for i in range(batch.images.shape[0]):
@@ -362,7 +367,8 @@ def aggregation_stage(network: LangFlashNet, batch: SceneBatch, words: Words) ->
             embeddings[bank].to(found.atoms),
             words.sampler.true(batch.labels[i])[instances][:, bank].to(found.atoms.device),
         )
-        losses.append(aggregation_loss(found.atoms, found.pooled, found.quality, texts, AggregationWeights()))
+        chosen = weights or AggregationWeights()
+        losses.append(aggregation_loss(found.atoms, found.pooled, found.quality, texts, chosen))
         cosines.append(float(F.cosine_similarity(found.atoms.detach(), texts.truth, dim=-1).mean()))
     if not losses:
         return Loss(sum(p.sum() for p in network.aggregation.parameters()) * torch.zeros(()), {"cosine": 0.0})
@@ -541,6 +547,6 @@ STAGES = {
 
 POINT_STAGES = {
     "points": Stage("points", ("decoder", "point_heads"), (), {2: 0.8, 3: 0.2}, 8, 2e-4, points_stage),
-    "grouping": STAGES["grouping"],
-    "aggregation": replace(STAGES["aggregation"], needs=("grouping",)),
+    "grouping": replace(STAGES["grouping"], needs=("points",), learning_rate=2e-4),
+    "aggregation": replace(STAGES["aggregation"], needs=("grouping",), learning_rate=2e-4),
 }

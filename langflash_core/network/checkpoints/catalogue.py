@@ -70,6 +70,11 @@ SAM2 = Published(
 OTHERS = (CLIP, SAM2)
 
 
+def trained_side(file: str) -> int:
+    """Pixels a side of the photos that the published checkpoint of this name was trained on; 0: unknown."""
+    return next((entry.size for entry in CATALOGUE if file.endswith(entry.file)), 0)
+
+
 def published(name: str) -> Published:
     """The entry called `name`.
 

@@ -16,7 +16,8 @@ from torch import Tensor
 from langflash_core.errors import WeightsError
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.network.build import build_network, network_class
-from langflash_core.network.checkpoints.store import assemble_network, finite, write_part
+from langflash_core.network.checkpoints.parts import TRAINED_HERE, write_part
+from langflash_core.network.checkpoints.store import assemble_network, finite
 from langflash_core.network.checkpoints.stored import Stored, dequantised, read_stored, weights_file
 from langflash_core.network.encoders.local import convert
 from langflash_core.network.guided import GuidedDepthNet
@@ -134,7 +135,7 @@ def save_network(network: LangFlashNet, path: Path, metadata: Mapping | None = N
             for key, value in network.state_dict().items()
             if network.aggregated or not key.startswith("aggregation.")
         }
-        write_part(path, trained, network.preset, "trained here", path.name)
+        write_part(path, trained, network.preset, TRAINED_HERE, path.name, side=network.trained_side)
         return
     header = {
         "format": FORMAT,

@@ -1,14 +1,15 @@
 """Published checkpoints to our files: read without running their code, checked, renamed.
 
-Refused with the list: tensors that are missing, surplus, misshaped, or not finite.
+Refused with the list: tensors that are missing, surplus, misshaped, or not finite. Surplus ones that
+are known to change nothing are told instead.
 """
 
 import pickle
+import re
 import struct
-import warnings
 import zipfile
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,9 @@ from torch import Tensor
 
 from langflash_core.errors import WeightsError
 from langflash_core.network.build import build_network
-from langflash_core.network.checkpoints.origins import LSEG, ORIGINS, Origin
-from langflash_core.network.presets import Preset
+from langflash_core.network.checkpoints.origins import COPY, LSEG, ORIGINS, Origin
+from langflash_core.network.checkpoints.pickles import read_pickle, stubbed
+from langflash_core.network.presets import PointMaps, Preset
 
 _SHOWN = 6  # names of each kind of trouble in a message
 _BROKEN = (
@@ -34,17 +36,19 @@ _REMEDY = "download it again, or choose another file"
 
 @dataclass(frozen=True)
 class Imported:
-    """A converted checkpoint: our tensors by our names; `clip`: CLIP's own where it carries them."""
+    """A converted checkpoint: our tensors by our names; `clip`: CLIP's own where it carries them;
+    `notes`: what its user should know, a sentence each."""
 
     origin: Origin
     tensors: dict[str, Tensor]
     clip: dict[str, Tensor]
+    notes: tuple[str, ...] = ()
 
 
 def read_checkpoint(path: Path) -> dict[str, Tensor]:
     """The state dict of a .safetensors file, or of a pickle of plain tensors.
 
-    Pickles are read with `weights_only=True`: nothing in them is executed.
+    Nothing in a pickle is executed, whatever it names.
 
     Raises:
         WeightsError: there is no such file, it cannot be read, or it holds something else.
@@ -54,7 +58,7 @@ def read_checkpoint(path: Path) -> dict[str, Tensor]:
     if path.stat().st_size == 0:
         raise WeightsError(f"{path} is empty; {_REMEDY}")
     try:
-        held = _read_safetensors(path) if path.suffix == ".safetensors" else _read_pickle(path)
+        held = _read_safetensors(path) if path.suffix == ".safetensors" else read_pickle(path)
     except pickle.UnpicklingError as error:
         wanted = _forbidden(str(error))
         raise WeightsError(f"{path} is not a plain checkpoint{wanted}; {_REMEDY}") from None
@@ -68,18 +72,14 @@ def _read_safetensors(path: Path) -> Any:
     return load_file(str(path))
 
 
-def _read_pickle(path: Path) -> Any:
-    with path.open("rb") as stream:
-        mapped = stream.read(2) == b"PK"  # the zip format can be mapped, the older one cannot
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # about pickle protocols: what cannot be read is refused anyway
-        return torch.load(path, map_location="cpu", weights_only=True, mmap=mapped)
-
-
 def _forbidden(message: str) -> str:
     """Which code a refused pickle wanted to run, where torch says so."""
-    _, found, rest = message.partition("Unsupported global: GLOBAL ")
-    return f": it wants to run {rest.split()[0]}, which is not allowed" if found and rest.split() else ""
+    found = re.search(r"[Uu]nsupported (?:global: )?GLOBAL (\S+)", message)
+    return _wants(found[1]) if found else ""
+
+
+def _wants(name: str) -> str:
+    return f": it wants to run {name}, which is not allowed"
 
 
 def _state_dict(held: Any, path: Path) -> dict[str, Tensor]:
@@ -87,6 +87,8 @@ def _state_dict(held: Any, path: Path) -> dict[str, Tensor]:
         if isinstance(held, Mapping) and isinstance(held.get(wrapper), Mapping):
             held = held[wrapper]
             break
+        if isinstance(held, Mapping) and (name := stubbed(held.get(wrapper))):
+            raise WeightsError(f"{path} is not a plain checkpoint{_wants(name)}; {_REMEDY}")
     if not isinstance(held, Mapping) or not held:
         raise WeightsError(f"{path} holds no table of tensors; {_REMEDY}")
     strange = [str(name) for name, value in held.items() if not isinstance(value, Tensor)]
@@ -120,12 +122,14 @@ def convert(state: Mapping[str, Tensor], preset: Preset, path: Path) -> Imported
         WeightsError: it is of no known kind, or does not fit the preset; with the list.
     """
     state = {name.removeprefix("net."): value for name, value in state.items()}
-    origin = recognise(state, path)
+    origin = _without_copy(recognise(state, path), state)
     wanted = _wanted(origin, preset)
     used = {origin.theirs(key)[0] for key in wanted}
+    surplus = {name for name in state.keys() - used if not origin.ignores(name)}
+    tolerated = sorted(filter(origin.tolerates, surplus))
     problems = {
         "missing": sorted(used - state.keys()),
-        "surplus": sorted(name for name in state.keys() - used if not origin.ignores(name)),
+        "surplus": sorted(surplus - set(tolerated)),
         "misshaped": [],
         "not finite": [],
     }
@@ -143,15 +147,34 @@ def convert(state: Mapping[str, Tensor], preset: Preset, path: Path) -> Imported
             part = state[name] if third is None else state[name].chunk(3)[third]
             tensors[key] = part.clone() if third is not None else part.contiguous()
     _refuse(problems, origin, path)
-    return Imported(origin, tensors, _clip_of(state) if origin is LSEG else {})
+    return Imported(origin, tensors, _clip_of(state) if origin is LSEG else {}, _unread(tolerated))
+
+
+def _without_copy(origin: Origin, state: Mapping[str, Tensor]) -> Origin:
+    """The origin as it is in a file from which somebody cut the copy that it carries."""
+    if origin.inside is None or origin.inside.marker in state:
+        return origin
+    return replace(origin, modules=tuple(m for m in origin.modules if not m.startswith(COPY)), inside=None)
+
+
+def _unread(names: list[str]) -> tuple[str, ...]:
+    told = f"{len(names)} tensors of it are read by nobody and left out ({_listed(names)})"
+    return (told,) if names else ()
 
 
 def _wanted(origin: Origin, preset: Preset) -> dict[str, tuple[int, ...]]:
     """Our tensors that this kind of checkpoint fills, and their shapes."""
     with torch.device("meta"):
-        state = build_network(preset).state_dict()
+        state = build_network(shaped(preset, origin.modules)).state_dict()
     prefixes = tuple(f"{name}." for name in origin.modules)
     return {key: tuple(value.shape) for key, value in state.items() if key.startswith(prefixes)}
+
+
+def shaped(preset: Preset, modules: Iterable[str]) -> Preset:
+    """The preset of a network that has these modules, copies for the grouping among them or not."""
+    if not isinstance(preset, PointMaps):
+        return preset
+    return replace(preset, own_grouping=any(name.startswith(COPY) for name in modules))
 
 
 def _refuse(problems: Mapping[str, list[str]], origin: Origin, path: Path) -> None:

@@ -8,6 +8,8 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
+COPY = "grouping_"
+"""Before the name of a module: a copy of it that the grouping alone reads."""
 Rule = tuple[str, str | Callable[[re.Match], str]]
 
 
@@ -17,7 +19,9 @@ class Origin:
 
     title: for people. part: what our file of it is called. marker: a tensor that only this kind
     has. modules: of the network, which it fills. rules: our names to theirs, in order. unused:
-    regular expressions of its tensors that nothing here reads.
+    regular expressions of its tensors that nothing here reads. tolerated: of tensors that are unknown
+    here and change nothing of what is read; who imports them is told. inside: the checkpoint of which it
+    carries a part, under our names with `COPY` before them.
     """
 
     name: str
@@ -27,9 +31,13 @@ class Origin:
     modules: tuple[str, ...]
     rules: tuple[Rule, ...]
     unused: tuple[str, ...]
+    tolerated: tuple[str, ...] = ()
+    inside: "Origin | None" = None
 
     def theirs(self, key: str) -> tuple[str, int | None]:
         """Their name of our tensor, and which third of its rows (None: all)."""
+        if self.inside is not None and key.startswith(COPY):
+            return self.inside.theirs(key.removeprefix(COPY))
         for pattern, replacement in self.rules:
             key = re.sub(pattern, replacement, key)
         name, _, third = key.partition("@")
@@ -39,6 +47,9 @@ class Origin:
 
     def ignores(self, name: str) -> bool:
         return any(re.fullmatch(pattern, name) for pattern in self.unused)
+
+    def tolerates(self, name: str) -> bool:
+        return any(re.fullmatch(pattern, name) for pattern in self.tolerated)
 
 
 def _counted(pattern: str, form: str) -> Rule:
@@ -141,7 +152,7 @@ LANGFLASH = Origin(
     title="LangFlash's released grouping",
     part="grouping",
     marker="query_pos.weight",
-    modules=("scratch", "grouping"),
+    modules=("scratch", "grouping", "grouping_encoder", "grouping_decoder"),
     rules=(
         _counted(r"^scratch\.(\d)\.(?:dpt\.)?", "encoder.scratch_head{}.dpt."),
         *_DPT,
@@ -170,8 +181,14 @@ LANGFLASH = Origin(
         r"prefuse\.lang_head\..*",  # a closed set of classes, read by nobody
         r"prefuse\.mask_heads\.[0-4]\..*",
         r"(fuse|encoder2|decoder|losses|distiller)\..*",
-        r"encoder\.(backbone|downstream_head\d|gaussian_param_head2?)\..*",  # its copy of NoPoSplat
+        r"encoder\.(downstream_head\d|gaussian_param_head2?)\..*",  # of its NoPoSplat the backbone is read
+        r"encoder\.backbone\.mask_token",
     ),
+    tolerated=(
+        r".*\b(exist_head|to1|atten1)\b.*",  # tried and given up by its authors
+        r"(?!query|prefuse\.dec1\.|encoder\.(backbone|scratch_head\d)\.).*",  # so does their code
+    ),
+    inside=NOPOSPLAT,
 )
 
 ORIGINS = (LANGFLASH, NOPOSPLAT, LSEG)

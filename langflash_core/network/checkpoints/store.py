@@ -1,59 +1,58 @@
-"""Imported weights on disk: one safetensors file per part of the network, as published, in float.
+"""Parts into networks: published checkpoints installed as parts, and networks assembled out of them.
 
-A part's header says which modules of the network it fills. The parts of a preset live in
-`weights/<preset>/` of the cache folder; a file named by the user goes before them.
+A file named by the user goes before the parts of the preset's folder.
 """
 
-import json
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
-from safetensors import SafetensorError, safe_open
+from safetensors import safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
 from langflash_core.errors import WeightsError
 from langflash_core.files import written_atomically
 from langflash_core.network.build import build_network
-from langflash_core.network.checkpoints.importing import convert, read_checkpoint
+from langflash_core.network.checkpoints.catalogue import trained_side
+from langflash_core.network.checkpoints.importing import convert, read_checkpoint, shaped
+from langflash_core.network.checkpoints.origins import COPY
+from langflash_core.network.checkpoints.parts import (
+    REMEDY,
+    TRAINED_HERE,
+    TRUNK,
+    Part,
+    installed,
+    part_folder,
+    read_part,
+    write_part,
+)
+from langflash_core.network.checkpoints.sharing import mismatch, settle
 from langflash_core.network.checkpoints.stored import ALIGNMENT
 from langflash_core.network.model import LangFlashNet
-from langflash_core.network.presets import Preset
+from langflash_core.network.presets import PointMaps, Preset
 from langflash_core.resources import weights_folder
 
-FORMAT = "langflash-part-1"
 CLIP_FILE = "clip_vitb32.safetensors"
-_REMEDY = "import the checkpoint again with `langflash weights import`"
 
 
 @dataclass(frozen=True)
-class Part:
-    """A file of weights: preset and modules it fills; origin and source, for people."""
+class Installed:
+    """paths: the files written, the part first. notes: what its user should know, a sentence each."""
 
-    path: Path
-    preset: str
-    modules: tuple[str, ...]
-    origin: str
-    source: str
+    paths: tuple[Path, ...]
+    notes: tuple[str, ...]
 
 
-def part_folder(preset: Preset) -> Path:
-    """Where the parts of a preset are kept."""
-    return weights_folder() / preset.name
-
-
-def installed(preset: Preset) -> list[Part]:
-    """Every part in the preset's folder, by file name."""
-    return [read_part(path) for path in sorted(part_folder(preset).glob("*.safetensors"))]
-
-
-def install(checkpoint: Path, preset: Preset, out: Path | None = None) -> list[Path]:
-    """Convert a published checkpoint; returns the files written, the part first.
+def install(
+    checkpoint: Path, preset: Preset, out: Path | None = None, *, side: int | None = None
+) -> Installed:
+    """Convert a published checkpoint.
 
     Args:
         out: where to put the part; None: the preset's folder, replacing the part of its kind.
+        side: pixels a side of the photos it was trained on; None: as the file's name tells, if it does.
 
     Raises:
         WeightsError: the checkpoint cannot be read or does not fit; nothing is written then.
@@ -61,47 +60,15 @@ def install(checkpoint: Path, preset: Preset, out: Path | None = None) -> list[P
     """
     imported = convert(read_checkpoint(checkpoint), preset, checkpoint)
     path = out or part_folder(preset) / f"{imported.origin.part}.safetensors"
-    write_part(path, imported.tensors, preset, imported.origin.title, checkpoint.name)
+    known = trained_side(checkpoint.name) if side is None else side
+    write_part(path, imported.tensors, preset, imported.origin.title, checkpoint.name, side=known)
+    notes = imported.notes + (settle(preset) if out is None else ())
     if not imported.clip:
-        return [path]
+        return Installed((path,), notes)
     clip = weights_folder() / CLIP_FILE
     with written_atomically(clip) as temporary:
         save_file({name: value.contiguous() for name, value in imported.clip.items()}, temporary)
-    return [path, clip]
-
-
-def write_part(
-    path: Path, tensors: Mapping[str, Tensor], preset: Preset, origin: str = "", source: str = ""
-) -> None:
-    """Write whole modules of a network, by our names, atomically."""
-    modules = sorted({name.partition(".")[0] for name in tensors})
-    header = {
-        "format": FORMAT, "preset": preset.name, "modules": modules, "origin": origin, "source": source,
-    }  # fmt: skip
-    whole = {name: value.detach().cpu().contiguous() for name, value in tensors.items()}
-    with written_atomically(path) as temporary:
-        save_file(whole, temporary, {"langflash": json.dumps(header)})
-
-
-def read_part(path: Path) -> Part:
-    """The header of a part.
-
-    Raises:
-        WeightsError: the file is missing, damaged, or no part.
-    """
-    try:
-        with safe_open(str(path), framework="pt") as file:
-            header = json.loads((file.metadata() or {}).get("langflash", "{}"))
-    except FileNotFoundError:
-        raise WeightsError(f"there is no weights file {path}; check the path") from None
-    except (SafetensorError, OSError, ValueError) as error:
-        raise WeightsError(f"{path} is not a readable safetensors file ({error}); {_REMEDY}") from None
-    if header.get("format") != FORMAT or not isinstance(header.get("modules"), list):
-        raise WeightsError(f"{path} was not converted for this network; {_REMEDY}")
-    return Part(
-        path, str(header.get("preset")), tuple(header["modules"]), str(header.get("origin", "")),
-        str(header.get("source", "")),
-    )  # fmt: skip
+    return Installed((path, clip), notes)
 
 
 def assemble_network(
@@ -116,24 +83,97 @@ def assemble_network(
     Raises:
         WeightsError: a module that must have weights has none, or a part does not fit.
     """
+    sources = _sources(_parts(preset, weights))
     with torch.device("meta"):
-        network = build_network(preset).eval()
+        network = build_network(_filtering(shaped(preset, sources), sources)).eval()
     if bfloat16:
         network.use_bfloat16()
-    parts = ([read_part(weights)] if weights is not None else []) + installed(preset)
-    filled: set[str] = set()
-    for part in parts:
-        if part.preset != preset.name:
-            raise WeightsError(
-                f"{part.path.name} holds weights of preset '{part.preset}', not '{preset.name}'; "
-                "choose --preset to match"
-            )
-        fresh = [name for name in part.modules if name not in filled]
-        for name in fresh:
-            _fill(network, name, part.path, device)
-        filled.update(fresh)
-    network.complete(filled, _advice(preset))
+    for name, part in sources.items():
+        _fill(network, name, part.path, device)
+    network.complete(set(sources), _advice(preset))
+    if "decoder" in sources:
+        network.trained_side = sources["decoder"].side
+    network.notes = _notes(sources)
     return channels_last(network).to(device)
+
+
+def network_to_train(
+    preset: Preset, weights: Path | None, seed: int, fresh: Collection[str] = ()
+) -> tuple[LangFlashNet, set[str]]:
+    """A network of parts with every other module drawn from `seed`, and the modules that were filled.
+
+    Masks are groups by their existence, which is what training teaches.
+
+    Args:
+        weights: goes before the preset's folder. fresh: modules to draw although there are weights.
+
+    Raises:
+        WeightsError: what is never trained has no weights, or a part does not fit.
+    """
+    held = _sources(_parts(preset, weights))
+    dropped = {*fresh, *(name for name in held if name.startswith(COPY) and "grouping" in fresh)}
+    sources = {name: part for name, part in held.items() if name not in dropped}
+    torch.manual_seed(seed)
+    shape = shaped(preset, sources)
+    network = build_network(replace(shape, mask_filter=None) if isinstance(shape, PointMaps) else shape)
+    missing = [name for name in network.frozen if name not in sources]
+    if missing:
+        raise WeightsError(f"there are no weights for {', '.join(missing)}; {_advice(preset)}")
+    for name, part in sources.items():
+        _fill(network, name, part.path, "cpu")
+    return network, set(sources)
+
+
+def _filtering(preset: Preset, sources: dict[str, Part]) -> Preset:
+    """The released filter of masks reads scores as the released grouping gives them; one that was trained
+    here gives existence."""
+    if isinstance(preset, PointMaps) and "grouping" in sources and sources["grouping"].origin == TRAINED_HERE:
+        return replace(preset, mask_filter=None)
+    return preset
+
+
+def _parts(preset: Preset, weights: Path | None) -> list[Part]:
+    """What there is for a preset, in the order in which modules are looked for."""
+    parts = ([read_part(weights)] if weights is not None else []) + installed(preset)
+    for part in parts:
+        _check_preset(part, preset)
+    return parts
+
+
+def _sources(parts: Sequence[Part]) -> dict[str, Part]:
+    """Which part fills which module: the first that can. Copies for the grouping come with it, and only
+    where it was trained on another trunk than the one there is."""
+    sources: dict[str, Part] = {}
+    for part in parts:
+        for name in part.modules:
+            sources.setdefault(name, part)
+    grouping = sources.get("grouping")
+    plain = {name: part for name, part in sources.items() if not name.startswith(COPY)}
+    if grouping is None or grouping.reads == _trunk(sources):
+        return plain
+    return plain | dict.fromkeys(grouping.copies, grouping)
+
+
+def _trunk(sources: dict[str, Part]) -> str:
+    """Fingerprint of encoder and decoder together; "" where that is unknown."""
+    held = [sources.get(name) for name in TRUNK]
+    return held[0].trunk if held[0] is not None and held[0] is held[1] else ""
+
+
+def _notes(sources: dict[str, Part]) -> tuple[str, ...]:
+    grouping = sources.get("grouping")
+    if grouping is None or any(name.startswith(COPY) for name in sources):
+        return ()
+    note = mismatch(grouping, _trunk(sources))
+    return (note,) if note else ()
+
+
+def _check_preset(part: Part, preset: Preset) -> None:
+    if part.preset != preset.name:
+        raise WeightsError(
+            f"{part.path.name} holds weights of preset '{part.preset}', not '{preset.name}'; "
+            "choose --preset to match"
+        )
 
 
 def channels_last(network: LangFlashNet) -> LangFlashNet:
@@ -150,9 +190,10 @@ def verify_part(path: Path, preset: Preset) -> None:
     Raises:
         WeightsError: it does not.
     """
+    modules = read_part(path).modules
     with torch.device("meta"):
-        network = build_network(preset)
-    for name in read_part(path).modules:
+        network = build_network(shaped(preset, modules))
+    for name in modules:
         _fill(network, name, path, "cpu")
 
 
@@ -160,7 +201,7 @@ def _fill(network: LangFlashNet, name: str, path: Path, device: str | torch.devi
     """One module from a part, strictly."""
     module = getattr(network, name, None)
     if not isinstance(module, torch.nn.Module):
-        raise WeightsError(f"{path} fills '{name}', which this network does not have; {_REMEDY}")
+        raise WeightsError(f"{path} fills '{name}', which this network does not have; {REMEDY}")
     expected = module.state_dict()
     with safe_open(str(path), framework="pt") as file:
         keys = [key.removeprefix(f"{name}.") for key in file.keys() if key.startswith(f"{name}.")]  # noqa: SIM118
@@ -174,7 +215,7 @@ def _fill(network: LangFlashNet, name: str, path: Path, device: str | torch.devi
     problems += [f"{k} holds NaN or Inf" for k, v in tensors.items() if not finite(v)]
     if problems:
         shown = "; ".join(sorted(problems)[:5]) + ("; ..." if len(problems) > 5 else "")
-        raise WeightsError(f"{path} does not fit '{name}' ({len(problems)} tensors: {shown}); {_REMEDY}")
+        raise WeightsError(f"{path} does not fit '{name}' ({len(problems)} tensors: {shown}); {REMEDY}")
     module.load_state_dict(tensors, assign=True)
 
 

@@ -18,11 +18,13 @@ class Tokens:
     """Encoder tokens of V views: four hooks (B, V, h*w, C), after the final norm; grid (h, w).
 
     named: the last two hooks once more, from the half that real photos taught; () where there is none.
+    grouped: the hooks once more, from the encoder that the grouping was trained on; () where it is this one.
     """
 
     hooks: tuple[Tensor, ...]
     grid: tuple[int, int]
     named: tuple[Tensor, ...] = ()
+    grouped: tuple[Tensor, ...] = ()
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -41,7 +43,12 @@ class Tokens:
 
     def each(self, change: Callable[[Tensor], Tensor]) -> "Tokens":
         """Every hook (B, V, h*w, C) changed alike."""
-        return Tokens(tuple(map(change, self.hooks)), self.grid, tuple(map(change, self.named)))
+        hooks, named, grouped = (tuple(map(change, kind)) for kind in (self.hooks, self.named, self.grouped))
+        return Tokens(hooks, self.grid, named, grouped)
+
+    def for_grouping(self) -> "Tokens":
+        """Those that the grouping reads."""
+        return Tokens(self.grouped or self.hooks, self.grid)
 
     def scene(self, index: int) -> "Tokens":
         """Those of one scene of the batch, B = 1."""

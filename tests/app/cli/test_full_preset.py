@@ -34,8 +34,9 @@ def checkpoints(tmp_path) -> list[Path]:
 
 
 def test_imported_checkpoints_make_a_scene(run, checkpoints, tmp_path):
-    for path in checkpoints:
-        assert run("weights", "import", path).code == 0
+    said = [run("weights", "import", path) for path in checkpoints]
+    assert all(outcome.code == 0 for outcome in said)
+    assert "which it shares" in said[-1].err  # the grouping, with the geometry
     listed = run("weights", "list", "--json").json()
     parts = [Path(entry["path"]).stem for entry in listed["weights"] if entry["preset"] == "full"]
     assert parts == ["geometry", "grouping", "language"]

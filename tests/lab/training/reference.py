@@ -1,8 +1,11 @@
-"""Slow twins of the losses: float64, loops, one number at a time."""
+"""Slow twins of the losses: float64, loops, one number at a time. And one of the training loop."""
 
 import math
 
 import numpy as np
+import torch
+
+from langflash_core.network.precision import mixed
 
 
 def depth_loss_twin(logs, targets, absolute):
@@ -100,3 +103,41 @@ def ssim_twin(left, right, window=7):
                 bottom = (p.mean() ** 2 + q.mean() ** 2 + 1e-4) * (p.var() + q.var() + 9e-4)
                 result[y, x, c] = top / bottom
     return result
+
+
+def plain_training(network, stage, rooms, words, *, steps, pictures):
+    """The loop with one batch a step, written down plainly: averaged weights, and the loss of every step.
+
+    AdamW at a rate that warms up over 100 steps and falls as a cosine to a fiftieth, gradients cut to a norm
+    of 1, averages that remember up to 500 steps.
+    """
+    prefixes = tuple(f"{name}." for name in stage.modules)
+    network.requires_grad_(False)
+    network.eval()
+    for name in stage.modules:
+        getattr(network, name).requires_grad_(True).train()
+    for parameter in network.parameters():
+        if parameter.ndim == 4:
+            parameter.data = parameter.data.contiguous(memory_format=torch.channels_last)
+    own = [p for name in stage.modules for p in getattr(network, name).parameters()]
+    optimiser = torch.optim.AdamW(own, lr=1e-6, weight_decay=0.01, betas=(0.9, 0.99))
+    averaged = {k: v.clone() for k, v in network.state_dict().items() if k.startswith(prefixes)}
+    losses = []
+    for step in range(steps):
+        sizes, chances = list(stage.views), torch.tensor(list(stage.views.values()))
+        views = sizes[int(torch.multinomial(chances, 1, generator=words.generator))]
+        batch = rooms.draw(max(1, pictures // views), views, words.generator)
+        with mixed("cpu"):
+            loss = stage.loss(network, batch, words).total
+        optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(own, 1.0)
+        fall = 0.02 + 0.98 * 0.5 * (1 + math.cos(math.pi * step / steps))
+        optimiser.param_groups[0]["lr"] = stage.learning_rate * min(1.0, (step + 1) / 100) * fall
+        optimiser.step()
+        decay = min(0.998, (2 + step) / (11 + step))
+        for key, value in network.state_dict().items():
+            if key in averaged:
+                averaged[key].lerp_(value, 1 - decay)
+        losses.append(float(loss.detach()))
+    return averaged, losses

@@ -24,6 +24,7 @@ from langflash_core.lab.training.cache import (
 )
 from langflash_core.lab.training.loop import LoopOptions
 from langflash_core.lab.training.shards import NOTHING, Shard
+from langflash_core.lab.training.trained import run_export
 from langflash_core.network import MINI, GuidedDepthNet, load_network, save_network
 from langflash_core.network.checkpoints.files import read_weights
 from tests.lab.training.conftest import encode, toy_record
@@ -142,10 +143,10 @@ def test_from_furniture_to_weights(tmp_path: Path, encoder: Path):
     with pytest.raises(InputError, match="no stage 'taste'"):
         commands.run_train(["taste"], cache, run, encoder, encode, [1])
     with pytest.raises(InputError, match="no trained stage"):
-        commands.run_export(run, tmp_path / "mini.safetensors", encoder)
+        run_export(run, tmp_path / "mini.safetensors", encoder)
     commands.run_train(["depth", "language"], cache, run, encoder, encode, [1, 1], options=options)
     details = {"data": "one room", "calibration": {"threshold": 0.7}}
-    out = commands.run_export(run, tmp_path / "mini.safetensors", encoder, metadata=details)
+    out = run_export(run, tmp_path / "mini.safetensors", encoder, metadata=details)
     header = read_weights(out)[1]
     assert header["training"]["depth"]["steps"] == 1
     assert header["data"] == "one room"

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 import torch
 
-from langflash_core.lab.training.loop import LoopOptions, learning_rate, load_averaged, train_stage
+from langflash_core.lab.training.loop import LoopOptions, learning_rate, train_stage
 from langflash_core.lab.training.stages import STAGES, Loss
+from langflash_core.lab.training.states import load_averaged
 
 OPTIONS = LoopOptions(minutes=10, max_steps=2, pictures=2, report_s=0.0, validate_s=0.0, save_s=1e9)
 STAGE = STAGES["refine"]  # the smallest
@@ -34,7 +35,7 @@ def test_a_run_continues_where_it_stopped(rooms, words, network, tmp_path: Path)
     assert all(torch.equal(fresh.state_dict()[k], v) for k, v in second.ema.items())
     assert load_averaged(fresh, tmp_path, "depth") is None
     rows = [json.loads(line) for line in (tmp_path / "refine.jsonl").read_text().splitlines()]
-    assert {row["kind"] for row in rows} == {"train", "validation"}
+    assert {row["kind"] for row in rows} == {"train", "validation", "profile"}
     assert all(math.isfinite(row["loss"]) for row in rows if row["kind"] == "train")
 
 

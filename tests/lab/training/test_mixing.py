@@ -8,7 +8,6 @@ import torch
 from langflash_core.lab.training.batches import RoomSet
 from langflash_core.lab.training.commands import (
     phrase_table,
-    run_export,
     run_find_parts,
     run_train,
 )
@@ -17,6 +16,7 @@ from langflash_core.lab.training.mixing import Mixed, MixedSet, loss_of
 from langflash_core.lab.training.parts import PartSet
 from langflash_core.lab.training.shards import NOTHING, Label, write_shard
 from langflash_core.lab.training.stages import STAGES, Loss, grouping_stage
+from langflash_core.lab.training.trained import run_export
 from langflash_core.network import MINI, load_network, save_network
 from langflash_core.network.build import build_network
 from tests.lab.training.conftest import encode, toy_record

@@ -125,10 +125,11 @@ def test_weather_changes_light_and_never_the_place_of_things(change):
 
 def test_a_few_steps_teach_names_and_end_in_a_cut_half(photos, targets, tmp_path):
     """Photos of two classes in two colours, six steps: the loss falls, and the run can be read again."""
-    from langflash_core.lab.training.loop import LoopOptions, load_averaged
+    from langflash_core.lab.training.loop import LoopOptions
     from langflash_core.lab.training.real import MODULES, JointSet, train_late
     from langflash_core.lab.training.shards import Label
     from langflash_core.lab.training.stages import Words
+    from langflash_core.lab.training.states import load_averaged
     from langflash_core.lab.training.words import PhraseSampler, build_table
     from langflash_core.network import MINI
     from langflash_core.network.build import build_network

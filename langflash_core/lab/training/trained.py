@@ -1,0 +1,128 @@
+"""What is trained already: in a run folder, in the weights a run begins with, and out of both as one file."""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+from langflash_core.errors import InputError
+from langflash_core.lab.training.real import MODULES
+from langflash_core.lab.training.recipes import Recipe, stages_of
+from langflash_core.lab.training.stages import Stage, language_stage, modules_of
+from langflash_core.lab.training.states import load_averaged
+from langflash_core.network.build import network_class
+from langflash_core.network.checkpoints.files import initial_network, save_network, start_from
+from langflash_core.network.checkpoints.parts import TRAINED_HERE, fingerprint, write_part
+from langflash_core.network.checkpoints.store import network_to_train
+from langflash_core.network.model import LangFlashNet
+from langflash_core.network.presets import PRESETS
+
+LATE = Stage("late", MODULES, (), {1: 1.0}, 6, 6e-4, language_stage)
+"""What `train late` leaves in a run for the stages after it; `real` says how it learns."""
+ALL_STAGES = stages_of("mini")
+
+_UNTRAINED = "holds no trained stage; run `langflash train run` first"
+
+
+def prepared(
+    recipe: Recipe, run_dir: Path, start: Path | None, *, from_scratch: bool
+) -> tuple[LangFlashNet, dict[str, int]]:
+    """The network to train, and the steps of every stage that has weights already."""
+    preset, known = PRESETS[recipe.preset], stages_of(recipe.preset)
+    if network_class(preset).compact:
+        if start is None:
+            raise InputError(f"training '{recipe.preset}' begins with a weights file; give one with --start")
+        network = initial_network(preset, start, recipe.seed)
+        done = load_trained(network, run_dir)
+        return network, done if from_scratch else done | dict.fromkeys(begin(network, start, done), 0)
+    drawn = {name for plan in recipe.plans for name in plan.stage.modules} if from_scratch else set()
+    network, filled = network_to_train(preset, start, recipe.seed, drawn)
+    done = {name: 0 for name, stage in known.items() if filled.issuperset(modules_of(network, stage))}
+    return network, done | load_trained(network, run_dir)
+
+
+def load_trained(network: LangFlashNet, run_dir: Path) -> dict[str, int]:
+    """Steps of every stage in a run, whose weights the network then has; the late half, and what learned
+    with it, before those that went on."""
+    names = (LATE.name, *stages_of(network.preset.name))
+    found = {name: load_averaged(network, run_dir, name) for name in names}
+    return {name: counts[0] for name, counts in found.items() if counts is not None}
+
+
+def begin(network: LangFlashNet, start: Path, done: Iterable[str]) -> list[str]:
+    """The stages whose modules are trained in a run or could be filled from `start`, but for `done`."""
+    done = set(done)
+    filled = {module for name in done for module in (LATE if name == LATE.name else ALL_STAGES[name]).modules}
+    if LATE.name not in done:
+        start_from(network, start, ("late",))
+    names = [name for name in ALL_STAGES if name not in done]
+    return [
+        name
+        for name in names
+        if start_from(network, start, [m for m in ALL_STAGES[name].modules if m not in filled])
+    ]
+
+
+def run_export(
+    run_dir: Path, out: Path, start: Path | None, *, preset: str = "mini", metadata: dict | None = None
+) -> Path:
+    """Join the averaged weights of every stage in `run_dir` into one weights file; stages that
+    were not trained there keep the heads of `start`, and are left out where these are imported anyway.
+
+    The header says how long each stage trained, its last validation, and `metadata` (data,
+    metrics, calibration: `calibration` is what queries read).
+
+    Raises:
+        InputError: no stage has been trained.
+    """
+    if not network_class(PRESETS[preset]).compact:
+        return _export_part(run_dir, out, start, preset)
+    if start is None:
+        raise InputError(f"exporting '{preset}' needs the weights file it began with; give it with --start")
+    network = initial_network(PRESETS[preset], start)
+    trained = {name: load_averaged(network, run_dir, name) for name in (LATE.name, *ALL_STAGES)}
+    begin(network, start, [name for name, counts in trained.items() if counts is not None])
+    report = {
+        name: {
+            "steps": counts[0],
+            "hours": round(counts[1] / 3600, 3),
+            "validation": last_validation(run_dir, name),
+        }
+        for name, counts in trained.items()
+        if counts is not None
+    }
+    if not report:
+        raise InputError(f"{run_dir} {_UNTRAINED}")
+    details = dict(metadata or {})
+    network.calibration = details.pop("calibration", {})
+    save_network(network, out, {"training": report, **details})
+    return out
+
+
+def _export_part(run_dir: Path, out: Path, start: Path | None, preset: str) -> Path:
+    """The modules that a run trained, for the geometry and language features that are imported."""
+    network, _ = network_to_train(PRESETS[preset], start, 0)
+    known = stages_of(preset)
+    trained = [name for name in known if load_averaged(network, run_dir, name) is not None]
+    if not trained:
+        raise InputError(f"{run_dir} {_UNTRAINED}")
+    modules = {module for name in trained for module in modules_of(network, known[name])}
+    if "decoder" in modules:
+        modules.add("encoder")  # a grouping is good for both of them together
+    tensors = {
+        name: value for name, value in network.state_dict().items() if name.partition(".")[0] in modules
+    }
+    reads = fingerprint(network.state_dict())
+    write_part(
+        out, tensors, network.preset, TRAINED_HERE, run_dir.name, side=network.trained_side, reads=reads
+    )
+    return out
+
+
+def last_validation(run_dir: Path, stage: str) -> dict:
+    """The newest validation row of a stage's log; {} if it has none."""
+    path = run_dir / f"{stage}.jsonl"
+    if not path.exists():
+        return {}
+    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
+    kept = [row for row in rows if row["kind"] == "validation"]
+    return {k: v for k, v in kept[-1].items() if k not in ("stage", "kind")} if kept else {}
