@@ -61,10 +61,23 @@ def accuracy(counts: Tensor) -> float:
 
 def class_ious(counts: Tensor) -> Tensor:
     """IoU per class, NaN for classes that never occur in the truth."""
+    hits, unions = _hits_and_unions(counts)
+    return torch.where(counts.sum(1) > 0, hits / unions.clamp_min(1), torch.nan)
+
+
+def occurring_mean_iou(counts: Tensor) -> float:
+    """Mean IoU over classes that occur in truth or prediction: what nobody labelled but somebody said is 0.
+
+    As torchmetrics' `JaccardIndex` has it, by which LSM and the paper report on ScanNet.
+    """
+    hits, unions = _hits_and_unions(counts)
+    return nan_mean((hits / unions)[unions > 0].tolist())
+
+
+def _hits_and_unions(counts: Tensor) -> tuple[Tensor, Tensor]:
     counts = counts.double()
     hits = counts.diagonal()
-    unions = counts.sum(0) + counts.sum(1) - hits
-    return torch.where(counts.sum(1) > 0, hits / unions.clamp_min(1), torch.nan)
+    return hits, counts.sum(0) + counts.sum(1) - hits
 
 
 def mean_iou(counts: Tensor, classes: Sequence[int] | None = None) -> float:
