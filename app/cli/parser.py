@@ -542,6 +542,7 @@ def _add_eval(commands) -> None:
         command.add_argument("--limit", type=whole_count, metavar="N", help="only the first N scenes")
     _add_labelled(actions)
     _add_posed(actions)
+    _add_sides(actions)
     photos = _command(actions, "photos", "a sheet to judge by eye: pairs of photos, new views, heat-maps")
     photos.add_argument("photos", nargs="+", type=Path, metavar="PHOTO", help="first and second in turn")
     _add_output(photos, "IMG", "the .png to write")
@@ -566,6 +567,34 @@ def _add_posed(actions) -> None:
     )
     command.add_argument("--limit", type=whole_count, metavar="N", help="so many pairs (default: 40)")
     _add_judging(command)
+
+
+def _add_sides(actions) -> None:
+    command = _command(actions, "sides", "scenes seen from aside: sheets, holes, layers, pictures")
+    command.add_argument(
+        "pack", type=Path, nargs="?", metavar="PACK", help="rooms, drawn with this furniture"
+    )
+    command.add_argument(
+        "--posed", type=Path, dest="folder", metavar="FOLDER", help="instead, real photos of known poses"
+    )
+    _add_description(command)
+    command.add_argument(
+        "--set", choices=("held_out", "validation"), default="held_out", help="of rooms (default: held_out)"
+    )
+    command.add_argument("--first-seed", type=seed, metavar="N", help="(default: the set's own range)")
+    command.add_argument(
+        "--apart", type=whole_count, nargs="+", metavar="N", help="numbers between two (default: 6 12 18 24)"
+    )
+    command.add_argument("--limit", type=whole_count, metavar="N", help="rooms or pairs (default: 100 or 40)")
+    command.add_argument("--lpips", type=Path, metavar="FILE", help="LPIPS weights of VGG-16, .safetensors")
+    command.add_argument(
+        "--results", type=Path, metavar="DIR", help="also keep every scene's numbers, for sides-beside"
+    )
+    _add_judging(command)
+    beside = _command(actions, "sides-beside", "two results of sides on the same scenes, beside each other")
+    beside.add_argument("before", type=Path, metavar="BEFORE", help="folder of --results")
+    beside.add_argument("after", type=Path, metavar="AFTER", help="folder of --results")
+    beside.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
 
 
 def _add_folder(command: argparse.ArgumentParser) -> None:

@@ -138,7 +138,7 @@ def judge_triple(
     """Pose, depth and the photo from between of one pair; adds to `tally`."""
     first, between, second = (folder.photo(id) for id in (triple.first, triple.between, triple.second))
     to_second, to_between = relative(first, second), relative(first, between)
-    scene, seconds = _scene_of(first, second, weights, preset, size)
+    scene, seconds = scene_of((first, second), first.intrinsics, weights=weights, preset=preset, size=size)
     placed = scene.num_views == 2
     predicted = scene.viewmats[1].cpu() if placed else torch.eye(4)
     error = pose_error(predicted, to_second.float())
@@ -150,12 +150,12 @@ def judge_triple(
         placed=float(placed),
         true_rotation=pose_error(torch.eye(4), to_second.float()).rotation,
     )
-    truths = [_seen(photo, scene) for photo in (first, second)[: scene.num_views]]
+    truths = [as_seen(photo, scene.view_size) for photo in (first, second)[: scene.num_views]]
     scale = _judge_depth(scene, truths, render, tally)
     if math.isnan(scale) and placed:
         scale = float(to_second[:3, 3].norm() / predicted[:3, 3].norm().clamp_min(1e-9))
     if not math.isnan(scale):
-        _judge_between(scene, _seen(between, scene), to_between, scale, truths[0], render, tally)
+        _judge_between(scene, as_seen(between, scene.view_size), to_between, scale, truths[0], render, tally)
 
 
 def relative(first: LabelledPhoto, other: LabelledPhoto) -> Tensor:
@@ -173,23 +173,28 @@ def relative(first: LabelledPhoto, other: LabelledPhoto) -> Tensor:
     return torch.linalg.inv(other.pose.double()) @ first.pose.double()
 
 
-def _scene_of(
-    first: LabelledPhoto, second: LabelledPhoto, weights: Path | None, preset: str, size: int | None
+def scene_of(
+    photos: Sequence[LabelledPhoto],
+    intrinsics: tuple[float, float, float, float] | None,
+    *,
+    weights: Path | None = None,
+    preset: str = "mini",
+    size: int | None = None,
 ) -> tuple[Scene, float]:
-    """The pair through the whole program, and the seconds that took."""
+    """Photos through the whole program, and the seconds that took. intrinsics: as `reconstruct` has them."""
     with tempfile.TemporaryDirectory() as folder:
-        paths = [Path(folder) / f"{photo.id}.png" for photo in (first, second)]
-        for path, photo in zip(paths, (first, second), strict=True):
+        paths = [Path(folder) / f"{photo.id}.png" for photo in photos]
+        for path, photo in zip(paths, photos, strict=True):
             Image.fromarray(photo.image).save(path, "PNG", compress_level=1)
         start = time.perf_counter()
-        scene = reconstruct(paths, preset=preset, weights=weights, intrinsics=first.intrinsics, size=size)
+        scene = reconstruct(paths, preset=preset, weights=weights, intrinsics=intrinsics, size=size)
         return scene, time.perf_counter() - start
 
 
-def _seen(photo: LabelledPhoto, scene: Scene) -> FittedPhoto:
-    """A photo as the scene's photos were cut."""
+def as_seen(photo: LabelledPhoto, size: tuple[int, int]) -> FittedPhoto:
+    """A photo as those of a scene were cut, whose `view_size` is given."""
     height, width = photo.image.shape[:2]
-    return fitted(photo, scene.view_size, centre_box(width, height, scene.view_size))
+    return fitted(photo, size, centre_box(width, height, size))
 
 
 def _judge_depth(scene: Scene, truths: Sequence[FittedPhoto], render: Render, tally: Tally) -> float:

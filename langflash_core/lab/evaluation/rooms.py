@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional as F
@@ -29,8 +28,9 @@ from langflash_core.lab.evaluation.metrics import (
     pose_error,
     presence,
 )
+from langflash_core.lab.evaluation.side_measures import DepthView, seen_by
 from langflash_core.lab.evaluation.words import OTHER, PAPER_LABELS, PARAPHRASES, absent_phrases, paper_label
-from langflash_core.lab.rooms.cameras import overlap_fraction, reproject
+from langflash_core.lab.rooms.cameras import overlap_fraction
 from langflash_core.lab.training.batches import RoomSet
 from langflash_core.lab.training.losses import ssim_map
 from langflash_core.lab.training.measures import (
@@ -362,21 +362,15 @@ def judge_views(
         _count_labels(setting, record, view, vectors, tally, torch.ones_like(shown) if view == 0 else shown)
 
 
-def seen_by_photos(record: RoomRecord, tolerance: float = 0.04) -> Tensor:
+def seen_by_photos(record: RoomRecord) -> Tensor:
     """Pixels (H, W) of the target view whose surface photo 0 or 1 sees, from true depths.
 
     What no photo saw cannot be drawn or named by any method; it is left out of the target's
     measures, alike for all of them.
     """
-    depths, viewmats, Ks = (t.double().numpy() for t in (record.depths, record.viewmats, record.Ks))
-    height, width = depths.shape[1], depths.shape[2]
-    seen = np.zeros((height, width), dtype=bool)
-    for photo in (0, 1):
-        z, u, v, valid = reproject(depths[2], viewmats[[2, photo]], Ks[[2, photo]])
-        inside = valid & (z > 0.05) & (u >= 0) & (v >= 0) & (u < width) & (v < height)
-        there = depths[photo][np.where(inside, v, 0).astype(int), np.where(inside, u, 0).astype(int)]
-        seen |= inside & (np.abs(there - z) < tolerance * z)
-    return torch.from_numpy(seen)
+    maps = (t.double().numpy() for t in (record.depths, record.viewmats, record.Ks))
+    first, second, target = (DepthView(*own) for own in zip(*maps, strict=True))
+    return torch.from_numpy(seen_by(target, [first, second]))
 
 
 def _upsampled(features: Tensor, size: tuple[int, int]) -> Tensor:
