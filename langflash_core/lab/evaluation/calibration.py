@@ -175,22 +175,6 @@ def reliability(asked: Asked, bins: int = BINS) -> list[dict]:
     return rows
 
 
-def calibration_error(scores: Tensor, truths: Tensor, bins: int = BINS) -> float:
-    """Expected calibration error: |mean score - share present| of equally wide bins, weighted by phrases.
-
-    In [0, 1]; NaN of nothing. Scores (P,) in [0, 1] are read as probabilities, which relevancy is not
-    unless this says so.
-
-    Source: Naeini, Cooper, Hauskrecht, AAAI 2015; as torchmetrics' `BinaryCalibrationError(norm="l1")`.
-    """
-    if not len(scores):
-        return math.nan
-    places = (scores.double() * bins).floor().long().clamp(0, bins - 1)
-    gaps = torch.zeros(bins, dtype=torch.float64)
-    gaps.index_add_(0, places, scores.double() - truths.double())
-    return float(gaps.abs().sum() / len(scores))
-
-
 def trade_off(asked: Asked) -> list[tuple[float, float, float]]:
     """(threshold, precision, recall) at every trial threshold where both can be measured."""
     trials = [(t, presence(asked.scores, asked.truths, t)) for t in MASK_THRESHOLDS]

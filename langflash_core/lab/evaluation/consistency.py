@@ -5,10 +5,8 @@ import math
 import numpy as np
 from jaxtyping import Float, Integer
 
+from langflash_core.lab.evaluation.side_measures import SAME
 from langflash_core.lab.rooms.cameras import reproject
-
-SAME = 0.04
-"""Relative difference of depth up to which two views see the same surface."""
 
 
 def label_consistency(

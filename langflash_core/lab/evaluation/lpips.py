@@ -4,6 +4,7 @@ The file: `features.{0,2,...,28}.{weight,bias}` of VGG-16 and `lin{0..4}.model.1
 Source: Zhang et al. 2018, "The Unreasonable Effectiveness of Deep Features as a Perceptual Metric", v0.1.
 """
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import torch
@@ -42,6 +43,19 @@ class Lpips:
         """Distance per pixel (B, H, W) of pictures (B, H, W, 3) in [0, 1], each level upsampled."""
         height, width = left.shape[1:3]
         total = left.new_zeros(len(left), height, width)
+        for distance in self._levels(left, right):
+            total += F.interpolate(distance, size=(height, width), mode="bilinear", align_corners=False)[:, 0]
+        return total
+
+    @torch.no_grad()
+    def whole(self, left: Tensor, right: Tensor) -> list[float]:
+        """The published distance of pictures (B, H, W, 3) in [0, 1], one number a pair: each level's mean,
+        added up, which is not quite the mean of `maps`."""
+        total = sum(distance.mean((1, 2, 3)) for distance in self._levels(left.clamp(0, 1), right))
+        return torch.as_tensor(total).tolist()
+
+    def _levels(self, left: Tensor, right: Tensor) -> Iterator[Tensor]:
+        """Distance (B, 1, h, w) of every level, finest first."""
         both = torch.cat((left, right)).permute(0, 3, 1, 2) * 2 - 1
         both = (both - both.new_tensor(_MEAN)[:, None, None]) / both.new_tensor(_DEVIATION)[:, None, None]
         for level, block in enumerate(_BLOCKS):
@@ -51,9 +65,7 @@ class Lpips:
                 both = F.relu(F.conv2d(both, weight, bias, padding=1))
             units = both / (both.norm(dim=1, keepdim=True) + 1e-10)
             first, second = units.chunk(2)
-            distance = F.conv2d((first - second) ** 2, self._weights[f"lin{level}.model.1.weight"])
-            total += F.interpolate(distance, size=(height, width), mode="bilinear", align_corners=False)[:, 0]
-        return total
+            yield F.conv2d((first - second) ** 2, self._weights[f"lin{level}.model.1.weight"])
 
     def __call__(self, drawn: Tensor, truth: Tensor, counted: Tensor) -> list[float]:
         """Mean over the pixels that count, one number a picture; the others are given the truth, so that

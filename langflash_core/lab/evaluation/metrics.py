@@ -126,3 +126,19 @@ def presence(scores: Tensor, present: Tensor, threshold: float) -> Presence:
         int((~found & present).sum()),
         int((~found & ~present).sum()),
     )
+
+
+def calibration_error(scores: Tensor, truths: Tensor, bins: int = 20) -> float:
+    """Expected calibration error: |mean score - share present| of equally wide bins, weighted by phrases.
+
+    In [0, 1]; NaN of nothing. Scores (P,) in [0, 1] are read as probabilities, which relevancy is not
+    unless this says so.
+
+    Source: Naeini, Cooper, Hauskrecht, AAAI 2015; as torchmetrics' `BinaryCalibrationError(norm="l1")`.
+    """
+    if not len(scores):
+        return math.nan
+    places = (scores.double() * bins).floor().long().clamp(0, bins - 1)
+    gaps = torch.zeros(bins, dtype=torch.float64)
+    gaps.index_add_(0, places, scores.double() - truths.double())
+    return float(gaps.abs().sum() / len(scores))

@@ -10,8 +10,10 @@ import importlib.util
 import numpy as np
 import pytest
 import torch
+from safetensors.torch import save_file
 
-from langflash_core.lab.evaluation.calibration import calibration_error
+from langflash_core.lab.evaluation.lpips import Lpips
+from langflash_core.lab.evaluation.metrics import calibration_error
 from langflash_core.lab.evaluation.pictures import ssim
 from langflash_core.lab.evaluation.segments import panoptic
 from langflash_core.lab.training.measures import (
@@ -27,7 +29,8 @@ from langflash_core.torchvision_fix import ensure_torchvision
 
 def other(name: str):
     """A module of somebody else's, or the test ends here."""
-    if name.startswith("torchmetrics") and importlib.util.find_spec("torchmetrics") is not None:
+    package = name.partition(".")[0]
+    if package in ("torchmetrics", "lpips") and importlib.util.find_spec(package) is not None:
         ensure_torchvision()
     return pytest.importorskip(name)
 
@@ -116,6 +119,25 @@ def test_ssim_is_that_of_scikit_image():
         sigma=1.5, use_sample_covariance=False,
     )  # fmt: skip
     assert ours == pytest.approx(theirs, abs=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning:torchvision")  # lpips calls it as it was years ago
+def test_lpips_is_that_of_its_package(tmp_path):
+    lpips = other("lpips")
+    torch.manual_seed(3)
+    theirs = lpips.LPIPS(net="vgg", pretrained=False, pnet_rand=True, verbose=False).eval()
+    state = theirs.state_dict()
+    renamed = {f"features.{k.split('.')[2]}.{k.split('.')[3]}": v for k, v in state.items() if ".slice" in k}
+    renamed |= {f"lin{n}.model.1.weight": state[f"lin{n}.model.1.weight"].abs() for n in range(5)}
+    heads = {name: value for name, value in renamed.items() if name.startswith("lin")}
+    theirs.load_state_dict(heads, strict=False)
+    save_file({name: value.contiguous() for name, value in renamed.items()}, tmp_path / "vgg.safetensors")
+    rendered, photo = (p.float()[None] for p in pictures())
+    with torch.no_grad():
+        expected = theirs(rendered.permute(0, 3, 1, 2), photo.permute(0, 3, 1, 2), normalize=True).item()
+    ours = Lpips(tmp_path / "vgg.safetensors")
+    assert ours.whole(rendered, photo) == pytest.approx([expected], rel=1e-5)  # float32 in both
+    assert ours.whole(photo, photo) == [0]
 
 
 def test_psnr_is_that_of_scikit_image():

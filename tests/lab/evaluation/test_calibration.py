@@ -1,7 +1,6 @@
 """The threshold of several sets, and what the diagram says of their scores."""
 
 import io
-import math
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from langflash_core.lab.evaluation.calibration import (
     Asked,
     best_threshold,
     calibration,
-    calibration_error,
     reliability,
     trade_off,
 )
@@ -99,10 +97,3 @@ def test_the_diagram_is_drawn():
     png = calibration_png({"rooms": asked(0.7), "photos": asked(0.6, 1)}, 0.66)
     picture = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
     assert picture.shape[1] > 600 and len(np.unique(picture.reshape(-1, 3), axis=0)) > 20
-
-
-def test_the_calibration_error_is_the_gap_between_scores_and_shares():
-    scores, truths = torch.tensor([0.9, 0.9, 0.1, 0.1]), torch.tensor([True, False, False, False])
-    assert calibration_error(scores, truths) == pytest.approx((0.4 + 0.1) / 2, abs=1e-6)
-    assert calibration_error(torch.tensor([1.0, 0.0]), torch.tensor([True, False])) == 0
-    assert math.isnan(calibration_error(torch.empty(0), torch.empty(0, dtype=torch.bool)))
