@@ -18,6 +18,8 @@ from ..files import check_output_file, readable_file
 from ..photos import chosen, opened_folder
 from ..renderers import open_renderer
 from ..report import ProgressBar, say_warnings, write_json, write_tables
+from .eval_protocol import protocol
+from .eval_report import report
 from .eval_sides import beside, sides
 from .query import spoken
 
@@ -37,6 +39,8 @@ def run(args: Namespace, out: TextIO) -> None:
         "photos": _photos,
         "photos-labelled": _photos_labelled,
         "posed": _posed,
+        "protocol": protocol,
+        "report": report,
         "sides": sides,
         "sides-beside": beside,
     }[args.action](args, out)

@@ -262,7 +262,8 @@ def _sight(judged: Judged, photo: LabelledPhoto, drawn: Drawn) -> Sight:
         pictures["depth"] = depth_picture(own.double().numpy(), longest)
         pictures["true depth"] = depth_picture(drawn.depths.double().numpy(), longest)
         numbers["depth_abs_rel"] = abs_rel(own, real)
-    return Sight(f"photo {photo.id}", pictures, numbers)
+    worth = numbers.get("labels right", -numbers.get("depth_abs_rel", math.nan))
+    return Sight(photo.id, f"photo {photo.id}", pictures, numbers, worth)
 
 
 def judge_depth(drawn: Drawn, metric: bool, tally: Tally) -> None:

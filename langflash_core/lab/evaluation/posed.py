@@ -140,7 +140,7 @@ def pair_tallies(
         judge_triple(folder, triple, render, tally, weights=weights, preset=preset, size=size, look=look)
         return tally
 
-    return collected(((f"{t.first}-{t.second}", t) for t in triples), judge, shelf)
+    return collected(((key_of(t), t) for t in triples), judge, shelf)
 
 
 @torch.no_grad()
@@ -196,7 +196,13 @@ def _sight(triple: Triple, first: FittedPhoto, target: FittedPhoto, frame: Frame
     known = {name: values[-1] for name, values in tally.numbers.items()}
     numbers = {name: known[name] for name in ("psnr", "covered", "depth_abs_rel") if name in known}
     numbers["rotation error"] = tally.poses[-1].rotation
-    return Sight(f"photos {triple.first} and {triple.second}", pictures, numbers)
+    name = f"photos {triple.first} and {triple.second}"
+    return Sight(key_of(triple), name, pictures, numbers, numbers.get("psnr", 0.0))
+
+
+def key_of(triple: Triple) -> str:
+    """What a pair's tally is kept as."""
+    return f"{triple.first}-{triple.second}"
 
 
 def relative(first: LabelledPhoto, other: LabelledPhoto) -> Tensor:

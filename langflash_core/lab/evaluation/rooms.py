@@ -485,7 +485,7 @@ def _sight(setting: Setting, record: RoomRecord, rgb: Tensor, labels: np.ndarray
     }
     right = float((labels[1] == truth)[truth >= 0].mean()) if (truth >= 0).any() else math.nan
     numbers = {name: known[name] for name in ("psnr", "depth_abs_rel", "instance_iou") if name in known}
-    return Sight(f"room {record.seed}", pictures, {"labels right": right, **numbers})
+    return Sight(str(record.seed), f"room {record.seed}", pictures, {"labels right": right, **numbers}, right)
 
 
 def seen_by_photos(record: RoomRecord) -> Tensor:

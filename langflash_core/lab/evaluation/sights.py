@@ -18,11 +18,14 @@ UNKNOWN = (38, 38, 42)
 
 @dataclass(frozen=True)
 class Sight:
-    """One scene: pictures by title, in order; numbers by title."""
+    """One scene. key: of its tally; name: for people; pictures by title, in order, all of one size; numbers
+    by title; worth: more is better, NaN where nothing was judged."""
 
+    key: str
     name: str
     pictures: Mapping[str, np.ndarray]
     numbers: Mapping[str, float]
+    worth: float
 
 
 Look = Callable[[Sight], None]

@@ -5,6 +5,7 @@ Kept as one JSON file a scene, so that a run that was ended goes on where it sto
 drawn over scenes.
 """
 
+import hashlib
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -19,6 +20,9 @@ from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.evaluation.intervals import bootstrap
 from langflash_core.lab.evaluation.metrics import PoseError, Presence
 from langflash_core.lab.evaluation.segments import ClassQuality, Panoptic
+from langflash_core.network import PRESETS
+from langflash_core.network.checkpoints.store import part_folder
+from langflash_core.resources import asset_path
 
 Item = TypeVar("Item")
 _VALUES: dict[str, type] = {kind.__name__: kind for kind in (PoseError, Presence, ClassQuality, Panoptic)}
@@ -136,6 +140,18 @@ class Shelf:
         make_folder(self.folder)
         document = {"key": self.key, "tally": plain(tally)}
         write_atomically(self.folder / f"{name}.json", json.dumps(document, allow_nan=False).encode())
+
+
+def identity(weights: Path | None, preset: str) -> str:
+    """Which weights a tally was made with: the digest of the file named or shipped, or of those installed."""
+    shipped = asset_path(f"weights/{preset}.safetensors")
+    paths = [weights] if weights is not None else [shipped] if shipped.is_file() else []
+    paths = paths or sorted(part_folder(PRESETS[preset]).glob("*.safetensors"))
+    total = hashlib.sha256(preset.encode())
+    for path in paths:
+        with path.open("rb") as stream:
+            total.update(hashlib.file_digest(stream, "sha256").digest())
+    return total.hexdigest()[:16]
 
 
 def collected(

@@ -10,6 +10,7 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 import torch
@@ -241,13 +242,8 @@ def _re10k(root: Path, cameras: Tensor, images: list[Tensor]) -> Re10kScene:
             f"{root.name} has {len(frames)} frames and cameras {tuple(cameras.shape)}; get it again"
         )
     height, width = _decoded(images[0].numpy().tobytes(), root.name).shape[:2]
-    return Re10kScene(
-        root=root,
-        ids=tuple(frames),
-        names={},
-        frames=frames,
-        **_re10k_cameras(list(frames), cameras, width, height),
-    )
+    Ks, poses = _re10k_cameras(list(frames), cameras, width, height)
+    return Re10kScene(root=root, ids=tuple(frames), names={}, frames=frames, Ks=Ks, poses=poses)
 
 
 def _re10k_cameras(
@@ -415,5 +411,5 @@ def _packed_camera(path: Path) -> tuple[Tensor, Tensor]:
             camera_matrix(float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2])),
             torch.from_numpy(pose.astype(np.float64).reshape(4, 4)),
         )
-    except (OSError, KeyError, ValueError, IndexError) as error:
+    except (OSError, KeyError, ValueError, IndexError, BadZipFile) as error:
         raise InputError(f"{path} holds no camera ({error}); unpack the data set again") from None

@@ -65,13 +65,15 @@ def class_ious(counts: Tensor) -> Tensor:
     return torch.where(counts.sum(1) > 0, hits / unions.clamp_min(1), torch.nan)
 
 
-def occurring_mean_iou(counts: Tensor) -> float:
-    """Mean IoU over classes that occur in truth or prediction: what nobody labelled but somebody said is 0.
+def occurring_mean_iou(counts: Tensor, classes: Sequence[int] | None = None) -> float:
+    """Mean IoU over classes, or those of `classes`, that occur in truth or prediction: what nobody labelled
+    but somebody said is 0.
 
     As torchmetrics' `JaccardIndex` has it, by which LSM and the paper report on ScanNet.
     """
     hits, unions = _hits_and_unions(counts)
-    return nan_mean((hits / unions)[unions > 0].tolist())
+    ious = hits / unions  # 0 / 0 is NaN
+    return nan_mean((ious if classes is None else ious[list(classes)]).tolist())
 
 
 def _hits_and_unions(counts: Tensor) -> tuple[Tensor, Tensor]:
