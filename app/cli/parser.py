@@ -29,6 +29,8 @@ from .values import (
 
 # langflash_core.lab.photos.layouts.LAYOUTS, which would bring torch along.
 LAYOUTS = ("nyu", "coco", "ade20k", "sunrgbd", "frames")
+# langflash_core.lab.evaluation.protocols.PROTOCOLS, and photos one by one.
+EVAL_PROTOCOLS = ("scannet", "3dovs", "re10k", "7scenes", "nyu")
 # The decisions that `bench` compares: app.bench.modes.AXES, which would bring torch along.
 BENCH_AXES = ("precision", "relevance", "weights", "cut", "dictionary", "resolution", "detail", "sort")
 
@@ -551,6 +553,9 @@ def _add_eval(commands) -> None:
         command.add_argument("--limit", type=whole_count, metavar="N", help="only the first N scenes")
     _add_labelled(actions)
     _add_posed(actions)
+    _add_sides(actions)
+    _add_protocol(actions)
+    _add_report(actions)
     photos = _command(actions, "photos", "a sheet to judge by eye: pairs of photos, new views, heat-maps")
     photos.add_argument("photos", nargs="+", type=Path, metavar="PHOTO", help="first and second in turn")
     _add_output(photos, "IMG", "the .png to write")
@@ -575,6 +580,67 @@ def _add_posed(actions) -> None:
     )
     command.add_argument("--limit", type=whole_count, metavar="N", help="so many pairs (default: 40)")
     _add_judging(command)
+
+
+def _add_sides(actions) -> None:
+    command = _command(actions, "sides", "scenes seen from aside: sheets, holes, layers, pictures")
+    command.add_argument(
+        "pack", type=Path, nargs="?", metavar="PACK", help="rooms, drawn with this furniture"
+    )
+    command.add_argument(
+        "--posed", type=Path, dest="folder", metavar="FOLDER", help="instead, real photos of known poses"
+    )
+    _add_description(command)
+    command.add_argument(
+        "--set", choices=("held_out", "validation"), default="held_out", help="of rooms (default: held_out)"
+    )
+    command.add_argument("--first-seed", type=seed, metavar="N", help="(default: the set's own range)")
+    command.add_argument(
+        "--apart", type=whole_count, nargs="+", metavar="N", help="numbers between two (default: 6 12 18 24)"
+    )
+    command.add_argument("--limit", type=whole_count, metavar="N", help="rooms or pairs (default: 100 or 40)")
+    command.add_argument("--lpips", type=Path, metavar="FILE", help="LPIPS weights of VGG-16, .safetensors")
+    command.add_argument(
+        "--results", type=Path, metavar="DIR", help="also keep every scene's numbers, for sides-beside"
+    )
+    _add_judging(command)
+    beside = _command(actions, "sides-beside", "two results of sides on the same scenes, beside each other")
+    beside.add_argument("before", type=Path, metavar="BEFORE", help="folder of --results")
+    beside.add_argument("after", type=Path, metavar="AFTER", help="folder of --results")
+    beside.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
+
+
+def _add_protocol(actions) -> None:
+    command = _command(actions, "protocol", "a published data set where it lies, judged as papers judge it")
+    command.add_argument("name", choices=EVAL_PROTOCOLS, metavar="NAME", help=", ".join(EVAL_PROTOCOLS))
+    command.add_argument("folder", type=Path, metavar="FOLDER", help="as unpacked; nyu: also its .mat")
+    command.add_argument(
+        "--index", type=Path, metavar="FILE", help="re10k: which views, as pixelSplat's evaluation index"
+    )
+    command.add_argument("--limit", type=whole_count, metavar="N", help="only the first N cases")
+    command.add_argument("--lpips", type=Path, metavar="FILE", help="LPIPS weights of VGG-16, .safetensors")
+    command.add_argument(
+        "--work", type=Path, metavar="DIR", help="keep what is judged there, and go on from it"
+    )
+    _add_judging(command, ("mini", "full"))
+
+
+def _add_report(actions) -> None:
+    command = _command(actions, "report", "one page of everything at hand, with intervals and pictures")
+    command.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="DIR",
+        help="folder for report.html, .md, .json, .csv; a run that was ended goes on there",
+    )  # fmt: skip
+    command.add_argument("--rooms", type=Path, metavar="CACHE", help="made by train cache: its held_out")
+    command.add_argument("--posed", type=Path, metavar="FOLDER", help="real photos of known poses")
+    command.add_argument("--photos", type=Path, metavar="FOLDER", help="real photos with labels")
+    command.add_argument(
+        "--part", choices=("all", "train", "validation"), default="all", help="of --photos (default: all)"
+    )
+    command.add_argument("--limit", type=whole_count, metavar="N", help="only N scenes of each")
+    command.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
+    command.add_argument("--weights", type=Path, metavar="PATH", help="(default: the shipped ones)")
+    _add_backend(command)
 
 
 def _add_folder(command: argparse.ArgumentParser) -> None:
@@ -610,8 +676,8 @@ def _add_choice(command: argparse.ArgumentParser, limit: str) -> None:
     command.add_argument("--limit", type=whole_count, metavar="N", help=f"only N {limit}")
 
 
-def _add_judging(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
+def _add_judging(command: argparse.ArgumentParser, presets: tuple[str, ...] = ("mini",)) -> None:
+    command.add_argument("--preset", choices=presets, default="mini", help="(default: mini)")
     command.add_argument("--weights", type=Path, metavar="PATH", help="(default: the shipped ones)")
     command.add_argument(
         "--size", type=pixel_side, metavar="PX", help="the network sees about PX x PX pixels (default: 224)"

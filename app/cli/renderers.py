@@ -45,19 +45,22 @@ class GlRenderer:
             from ..gl import SplatRenderer, offscreen_context
 
         self._context = offscreen_context()
-        self._splats = SplatRenderer(self._context)
+        with self._context:
+            self._splats = SplatRenderer(self._context)
         self._scene: Scene | None = None
 
     def __call__(self, scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame:
-        if scene is not self._scene:
-            self._splats.set_scene(scene)
-            self._scene = scene
-        self._splats.draw(camera, weight_maps=weight_maps)
-        return self._splats.frame(weight_maps=weight_maps)
+        with self._context:  # another renderer may have been current
+            if scene is not self._scene:
+                self._splats.set_scene(scene)
+                self._scene = scene
+            self._splats.draw(camera, weight_maps=weight_maps)
+            return self._splats.frame(weight_maps=weight_maps)
 
     def release(self) -> None:
         """Give the context back."""
-        self._splats.release()
+        with self._context:
+            self._splats.release()
         self._context.release()
 
 

@@ -6,10 +6,12 @@ import shutil
 import sys
 import time
 import traceback
+from argparse import Namespace
 from collections.abc import Iterable
 from typing import Any, TextIO
 
 from langflash_core.errors import LangFlashError
+from langflash_core.files import make_folder, write_atomically
 
 
 def one_sentence(text: str) -> str:
@@ -96,3 +98,14 @@ class ProgressBar:
         if self.live and self.drawn:
             self.stream.write("\r" + " " * self.drawn + "\r")
             self.stream.flush()
+
+
+def write_tables(args: Namespace, result: dict, table: str, out: TextIO) -> None:
+    """The tables to the file of -o, where one is named, and they or, with --json, the result to `out`."""
+    if args.output is not None:
+        make_folder(args.output.parent)
+        write_atomically(args.output, table.encode())
+    if args.json:
+        write_json(result, out)
+    else:
+        print(table, end="", file=out)

@@ -17,7 +17,10 @@ from langflash_core.network import load_network
 from ..files import check_output_file, readable_file
 from ..photos import chosen, opened_folder
 from ..renderers import open_renderer
-from ..report import ProgressBar, say_warnings, write_json
+from ..report import ProgressBar, say_warnings, write_json, write_tables
+from .eval_protocol import protocol
+from .eval_report import report
+from .eval_sides import beside, sides
 from .query import spoken
 
 
@@ -28,7 +31,7 @@ def run(args: Namespace, out: TextIO) -> None:
         LangFlashError: the cache, the checkpoint or the output cannot be used.
     """
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s", stream=sys.stderr)
-    if args.weights is not None:
+    if getattr(args, "weights", None) is not None:
         readable_file(args.weights, "checkpoint", WeightsError)
     {
         "rooms": _rooms,
@@ -36,6 +39,10 @@ def run(args: Namespace, out: TextIO) -> None:
         "photos": _photos,
         "photos-labelled": _photos_labelled,
         "posed": _posed,
+        "protocol": protocol,
+        "report": report,
+        "sides": sides,
+        "sides-beside": beside,
     }[args.action](args, out)
 
 
@@ -49,18 +56,7 @@ def _rooms(args: Namespace, out: TextIO) -> None:
     if args.output is not None:
         check_output_file(args.output, (".md",))
     result = run_eval(args.cache, args.weights, preset=args.preset, limit=args.limit)
-    _report(args, result, markdown(result), out)
-
-
-def _report(args: Namespace, result: dict, table: str, out: TextIO) -> None:
-    """The tables to a file where one is named, and the tables or the whole result to `out`."""
-    if args.output is not None:
-        make_folder(args.output.parent)
-        write_atomically(args.output, table.encode())
-    if args.json:
-        write_json(result, out)
-    else:
-        print(table, end="", file=out)
+    write_tables(args, result, markdown(result), out)
 
 
 def _photos_labelled(args: Namespace, out: TextIO) -> None:
@@ -79,7 +75,7 @@ def _photos_labelled(args: Namespace, out: TextIO) -> None:
         result, _ = run_photos(
             folder, ids, renderer, args.weights, preset=args.preset, size=args.size, progress=progress
         )
-    _report(args, result, photos_markdown(result), out)
+    write_tables(args, result, photos_markdown(result), out)
 
 
 def _posed(args: Namespace, out: TextIO) -> None:
@@ -98,7 +94,7 @@ def _posed(args: Namespace, out: TextIO) -> None:
         result = run_posed(
             folder, triples, renderer, args.weights, preset=args.preset, size=args.size, progress=progress
         )
-    _report(args, result, posed_markdown(result), out)
+    write_tables(args, result, posed_markdown(result), out)
 
 
 def _calibrate(args: Namespace, out: TextIO) -> None:

@@ -10,7 +10,7 @@ Sizes: H W drawn pixels, K atoms, C channels, P phrases, L fine names.
 import math
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from torch.nn import functional as F
 
 from langflash_core.images.pictures import centre_box
 from langflash_core.images.views import load_views
-from langflash_core.lab.evaluation.metrics import Presence
+from langflash_core.lab.evaluation.metrics import Presence, calibration_error
 from langflash_core.lab.evaluation.photo_words import (
     PhotoWords,
     absent_rows,
@@ -29,6 +29,9 @@ from langflash_core.lab.evaluation.photo_words import (
     photos_of_names,
 )
 from langflash_core.lab.evaluation.rooms import MASK_THRESHOLDS, MIN_SHARE, PHRASES, language_maps
+from langflash_core.lab.evaluation.segments import label_border_f
+from langflash_core.lab.evaluation.sights import Look, Sight, depth_picture, label_picture, photo_picture
+from langflash_core.lab.evaluation.tallies import Shelf, collected, merged
 from langflash_core.lab.evaluation.words import PAPER_LABELS
 from langflash_core.lab.photos import LabelledPhoto, Name, PhotoFolder
 from langflash_core.lab.photos.fitting import seen_through
@@ -137,10 +140,11 @@ def run_photos(
         InputError: the folder has no labels, or a map cannot be used. WeightsError: of the checkpoint.
     """
     judged = judged_by(folder, render, weights, preset=preset, size=size, progress=progress)
-    tally = Tally()
-    for done, id in enumerate(ids):
-        progress(f"photo {id}, {done + 1} of {len(ids)}", 0.1 + 0.9 * done / len(ids))
-        judge_photo(judged, folder.photo(id), tally)
+    tallies = []
+    for id, tally in photo_tallies(judged, folder, ids):
+        tallies.append(tally)
+        progress(f"photo {id}, {len(tallies)} of {len(ids)}", 0.1 + 0.9 * len(tallies) / len(ids))
+    tally = merged(tallies)
     result = {
         "weights": str(weights) if weights else preset,
         "folder": folder.root.name,
@@ -149,6 +153,23 @@ def run_photos(
         **summary(tally, judged.words),
     }
     return result, tally
+
+
+def photo_tallies(
+    judged: Judged,
+    folder: PhotoFolder,
+    ids: Sequence[str],
+    shelf: Shelf | None = None,
+    look: Look | None = None,
+) -> Iterator[tuple[str, Tally]]:
+    """Id and tally of every photo, in order; those on the shelf are not judged again."""
+
+    def judge(id: str) -> Tally:
+        tally = Tally()
+        judge_photo(judged, folder.photo(id), tally, look)
+        return tally
+
+    return collected(((id, id) for id in ids), judge, shelf)
 
 
 def judged_by(
@@ -205,7 +226,7 @@ def draw_photo(judged: Judged, photo: LabelledPhoto) -> tuple[Drawn, float]:
 
 
 @torch.no_grad()
-def judge_photo(judged: Judged, photo: LabelledPhoto, tally: Tally) -> None:
+def judge_photo(judged: Judged, photo: LabelledPhoto, tally: Tally, look: Look | None = None) -> None:
     """Everything about one photo; adds to `tally`."""
     drawn, seconds = draw_photo(judged, photo)
     tally.note(seconds=seconds, covered=float((drawn.frame.alphas >= COVERED_ALPHA).float().mean()))
@@ -215,6 +236,34 @@ def judge_photo(judged: Judged, photo: LabelledPhoto, tally: Tally) -> None:
         judge_names(judged, drawn, tally)
         overlap_fine(judged, drawn, tally)
         ask_photo(judged, drawn, int(photo.id) if photo.id.isdigit() else 0, tally)
+    if look is not None:
+        look(_sight(judged, photo, drawn))
+
+
+def _sight(judged: Judged, photo: LabelledPhoto, drawn: Drawn) -> Sight:
+    """The photo for people: what the scene shows from its own place."""
+    words, truth = judged.words, judged.words.classes_of[drawn.ids]
+    empty = (drawn.maps == 0).all(0)
+    found = drawn.maps[words.rows(words.classes)].argmax(0).masked_fill(empty | (truth < 0), -1)
+    pictures = {
+        "photo": photo_picture(drawn.views.images[0].permute(1, 2, 0)),
+        "drawn": photo_picture(drawn.frame.rgb),
+        "labels": label_picture(found.numpy()),
+        "true labels": label_picture(truth.numpy()),
+    }
+    numbers = {}
+    if bool((truth >= 0).any()):
+        numbers["labels right"] = float((found == truth)[truth >= 0].float().mean())
+    valid = (drawn.depths > 0) & (drawn.frame.alphas >= COVERED_ALPHA)
+    if bool(valid.any()):
+        real = torch.where(valid, drawn.depths, 0.0)
+        own = align_scale(drawn.frame.depths, real)
+        longest = float(real.max())
+        pictures["depth"] = depth_picture(own.double().numpy(), longest)
+        pictures["true depth"] = depth_picture(drawn.depths.double().numpy(), longest)
+        numbers["depth_abs_rel"] = abs_rel(own, real)
+    worth = numbers.get("labels right", -numbers.get("depth_abs_rel", math.nan))
+    return Sight(photo.id, f"photo {photo.id}", pictures, numbers, worth)
 
 
 def judge_depth(drawn: Drawn, metric: bool, tally: Tally) -> None:
@@ -248,6 +297,8 @@ def judge_names(judged: Judged, drawn: Drawn, tally: Tally) -> None:
         best = maps[words.rows(words.classes)].argmax(0).masked_fill(unanswered, -1).flatten()
         truth = words.classes_of[drawn.ids].flatten()
         tally.count(method, "classes", best, truth, len(words.classes))
+        borders = label_border_f(best.view(size).numpy(), truth.view(size).numpy())
+        tally.note(**{f"border_f_{method}": borders})
         for name, published in (("paper", False), ("published", True)):
             table = words.published if published else words.papers
             rows = torch.tensor([*(paper_row(c, published=published) for c in words.classes), -1])
@@ -330,6 +381,7 @@ def summary(tally: Tally, words: PhotoWords) -> dict:
             "presence_recall": tally.presence.recall,
             "presence_f1": tally.presence.f1,
             "presence_phrases": float(sum(len(s) for s in tally.scores)),
+            "calibration_error": calibration_error(torch.cat(tally.scores), torch.cat(tally.truths)),
         }
     labels: dict[str, dict[str, float]] = {}
     for (method, kind), counts in tally.counts.items():

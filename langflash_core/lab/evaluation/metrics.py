@@ -1,7 +1,9 @@
 """Measures of poses, points and presence; those of depth and classes are in
-`training.measures`. Every measure is NaN where nothing can be measured."""
+`training.measures`, of segments in `segments`, of pictures in `pictures`. Every measure is NaN where
+nothing can be measured."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -17,6 +19,11 @@ class PoseError:
     rotation: float
     direction: float
 
+    @property
+    def worst(self) -> float:
+        """The larger of both; rotation alone for a still camera."""
+        return self.rotation if math.isnan(self.direction) else max(self.rotation, self.direction)
+
     def right(self, rotation: float = 5.0, direction: float = 15.0) -> bool:
         """Both errors within limits; a still camera is judged by its rotation alone."""
         near = math.isnan(self.direction) or self.direction <= direction
@@ -31,6 +38,35 @@ def pose_error(predicted: Tensor, truth: Tensor) -> PoseError:
         return PoseError(rotation, math.nan)
     sine = torch.linalg.cross(left, right).norm()
     return PoseError(rotation, float(torch.rad2deg(torch.atan2(sine, left @ right))))
+
+
+POSE_LIMITS = (5.0, 10.0, 20.0)
+"""Degrees, as papers on relative pose report the area under the curve."""
+
+
+def pose_auc(errors: Sequence[float], limits: Sequence[float] = POSE_LIMITS) -> list[float]:
+    """Area under the share of poses within a limit, up to each limit, as a share of it; in [0, 1].
+
+    The curve of N sorted errors goes from (0, 0) through (e_n, n / N) and stays level after the last
+    one within the limit.
+
+    Args:
+        errors: degrees, one per pair; NaN and infinity count as never right.
+
+    Source: Sarlin et al., SuperGlue, CVPR 2020, whose curve most papers use.
+    """
+    count = len(errors)
+    if not count:
+        return [math.nan] * len(limits)
+    known = sorted(e for e in errors if math.isfinite(e))
+    areas = []
+    for limit in limits:
+        within = [e for e in known if e < limit]
+        across = [0.0, *within, limit]
+        up = [0.0, *((n + 1) / count for n in range(len(within))), len(within) / count]
+        steps = zip(across, across[1:], up, up[1:], strict=False)
+        areas.append(sum((right - left) * (low + high) / 2 for left, right, low, high in steps) / limit)
+    return areas
 
 
 def point_error(points: Tensor, depths: Tensor, K: Tensor, viewmat: Tensor, scale: float) -> float:
@@ -90,3 +126,19 @@ def presence(scores: Tensor, present: Tensor, threshold: float) -> Presence:
         int((~found & present).sum()),
         int((~found & ~present).sum()),
     )
+
+
+def calibration_error(scores: Tensor, truths: Tensor, bins: int = 20) -> float:
+    """Expected calibration error: |mean score - share present| of equally wide bins, weighted by phrases.
+
+    In [0, 1]; NaN of nothing. Scores (P,) in [0, 1] are read as probabilities, which relevancy is not
+    unless this says so.
+
+    Source: Naeini, Cooper, Hauskrecht, AAAI 2015; as torchmetrics' `BinaryCalibrationError(norm="l1")`.
+    """
+    if not len(scores):
+        return math.nan
+    places = (scores.double() * bins).floor().long().clamp(0, bins - 1)
+    gaps = torch.zeros(bins, dtype=torch.float64)
+    gaps.index_add_(0, places, scores.double() - truths.double())
+    return float(gaps.abs().sum() / len(scores))

@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 
+from langflash_core.lab.evaluation.tables import cell
 from langflash_core.lab.evaluation.words import PAPER_LABELS
 
-_PHOTOS = (
+PHOTOS = (
     ("Depth AbsRel, scale aligned", "depth_abs_rel", "one depth", "depth_abs_rel_flat"),
     ("Depth AbsRel, median photo", "depth_abs_rel_median", "", ""),
     ("Depth delta < 1.25, scale aligned", "depth_delta1", "", ""),
@@ -14,15 +15,20 @@ _PHOTOS = (
     ("Presence recall", "presence_recall", "", ""),
     ("Presence F1", "presence_f1", "", ""),
     ("Phrases asked, half of them absent", "presence_phrases", "", ""),
+    ("Calibration error of scores (ECE)", "calibration_error", "", ""),
+    ("Border F of 37 classes", "border_f_atoms", "2D features", "border_f_features"),
     ("Share of the picture that the scene covers", "covered", "", ""),
     ("Reconstruction, seconds a photo", "seconds", "", ""),
 )
-_POSED = (
+POSED = (
     ("Rotation error, median (degrees)", "pose_rotation_median", "no motion", "true_rotation_median"),
     ("Direction error, median (degrees)", "pose_direction_median", "", ""),
     ("Rotation error of placed photos, median (degrees)", "rotation_placed_median", "", ""),
     ("Direction error of placed photos, median (degrees)", "direction_placed_median", "", ""),
     ("Right pose (5 / 15 degrees)", "pose_right_share", "", ""),
+    ("Pose AUC at 5 degrees", "pose_auc_5", "", ""),
+    ("Pose AUC at 10 degrees", "pose_auc_10", "", ""),
+    ("Pose AUC at 20 degrees", "pose_auc_20", "", ""),
     ("Second photo found its place", "placed", "", ""),
     ("Depth AbsRel, each photo's scale aligned", "depth_abs_rel", "one depth", "depth_abs_rel_flat"),
     ("Depth AbsRel, median photo", "depth_abs_rel_median", "", ""),
@@ -31,11 +37,12 @@ _POSED = (
     ("PSNR of the photo between, median pair (dB)", "psnr_median", "mean colour", "psnr_mean_colour"),
     ("SSIM of the photo between, covered pixels", "ssim", "", ""),
     ("PSNR of the photo between, whole picture (dB)", "psnr_whole_picture", "", ""),
+    ("SSIM of the photo between, whole picture, Gaussian window", "ssim_whole_picture", "", ""),
     ("Share of the photo between that is covered", "covered", "", ""),
     ("Reconstruction, seconds a pair", "seconds", "", ""),
 )  # fmt: skip
-_METHODS = {"atoms": "the program: atoms drawn", "features": "2D features of the photo, no scene"}
-_LABELS = {
+METHODS = {"atoms": "the program: atoms drawn", "features": "2D features of the photo, no scene"}
+LABEL_LISTS = {
     "classes": "37 classes",
     "paper": "8 labels",
     "published": "8 labels, desks are other",
@@ -47,7 +54,7 @@ BEST = 10
 
 def photos_markdown(result: dict) -> str:
     """The tables of a `run_photos` result."""
-    lines = [*_measures(result["measures"], _PHOTOS), ""]
+    lines = [*_measures(result["measures"], PHOTOS), ""]
     if result["labels"]:
         lines += [*_label_table(result), "", *_ious(result["paper_ious"], PAPER_LABELS), ""]
         lines += [
@@ -63,11 +70,11 @@ def posed_markdown(result: dict) -> str:
     gaps = result["by_gap"]
     keys = ("pairs", "placed", "true_rotation_median", "pose_rotation_median", "pose_direction_median",
             "pose_right_share", "depth_abs_rel", "psnr")  # fmt: skip
-    lines = [*_measures(result["measures"], _POSED), ""]
+    lines = [*_measures(result["measures"], POSED), ""]
     lines.append("| numbers apart | " + " | ".join(key.replace("_", " ") for key in keys) + " |")
     lines.append("|---" * (len(keys) + 1) + "|")
     for gap, row in gaps.items():
-        lines.append(f"| {gap} | " + " | ".join(_number(row.get(key)) for key in keys) + " |")
+        lines.append(f"| {gap} | " + " | ".join(cell(row.get(key)) for key in keys) + " |")
     return "\n".join(lines) + "\n"
 
 
@@ -75,18 +82,18 @@ def _measures(measures: dict, rows: Sequence[tuple[str, str, str, str]]) -> list
     lines = ["| measure | value | trivial |", "|---|---|---|"]
     for title, key, rival, rival_key in rows:
         if key in measures:
-            other = f"{_number(measures[rival_key])} ({rival})" if rival_key in measures else ""
-            lines.append(f"| {title} | {_number(measures[key])} | {other} |")
+            other = f"{cell(measures[rival_key])} ({rival})" if rival_key in measures else ""
+            lines.append(f"| {title} | {cell(measures[key])} | {other} |")
     return lines
 
 
 def _label_table(result: dict) -> list[str]:
-    kinds = [kind for kind in _LABELS if f"{kind}_miou" in result["labels"]["atoms"]]
-    lines = ["| labels | " + " | ".join(f"{_LABELS[k]}: mIoU | accuracy" for k in kinds) + " |"]
+    kinds = [kind for kind in LABEL_LISTS if f"{kind}_miou" in result["labels"]["atoms"]]
+    lines = ["| labels | " + " | ".join(f"{LABEL_LISTS[k]}: mIoU | accuracy" for k in kinds) + " |"]
     lines.append("|---" * (2 * len(kinds) + 1) + "|")
-    for method, title in _METHODS.items():
+    for method, title in METHODS.items():
         row = result["labels"][method]
-        cells = [_number(row[f"{kind}_{what}"]) for kind in kinds for what in ("miou", "accuracy")]
+        cells = [cell(row[f"{kind}_{what}"]) for kind in kinds for what in ("miou", "accuracy")]
         lines.append(f"| {title} | " + " | ".join(cells) + " |")
     return lines
 
@@ -95,8 +102,8 @@ def _ious(ious: dict[str, dict[str, float | None]], names: Sequence[str]) -> lis
     """IoU of every label that occurs, by method."""
     kept = [name for name in names if ious["atoms"].get(name) is not None]
     lines = ["| IoU | " + " | ".join(kept) + " |", "|---" * (len(kept) + 1) + "|"]
-    for method, title in _METHODS.items():
-        lines.append(f"| {title} | " + " | ".join(_number(ious[method][name]) for name in kept) + " |")
+    for method, title in METHODS.items():
+        lines.append(f"| {title} | " + " | ".join(cell(ious[method][name]) for name in kept) + " |")
     return lines
 
 
@@ -110,12 +117,8 @@ def _fine(names: Sequence[dict]) -> list[str]:
         "| fine name | photos | IoU among fine names | IoU of the mask when asked |",
         "|---|---|---|---|",
     ]
-    lines.append(f"| mean of {len(names)} | | {_number(means[0])} | {_number(means[1])} |")
+    lines.append(f"| mean of {len(names)} | | {cell(means[0])} | {cell(means[1])} |")
     for row in listed:
-        cells = (str(row["photos"]), _number(row["iou"]), _number(row["asked_iou"]))
+        cells = (str(row["photos"]), cell(row["iou"]), cell(row["asked_iou"]))
         lines.append(f"| {row['name']} | " + " | ".join(cells) + " |")
     return lines
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}"

@@ -10,7 +10,7 @@ Sizes: H W pixels as the network saw the photos.
 import math
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -21,7 +21,10 @@ from torch import Tensor
 from langflash_core.errors import InputError
 from langflash_core.images.pictures import centre_box
 from langflash_core.lab.evaluation.labelled import Render, rounded
-from langflash_core.lab.evaluation.metrics import PoseError, pose_error
+from langflash_core.lab.evaluation.metrics import POSE_LIMITS, PoseError, pose_auc, pose_error
+from langflash_core.lab.evaluation.pictures import ssim
+from langflash_core.lab.evaluation.sights import Look, Sight, error_picture, photo_picture
+from langflash_core.lab.evaluation.tallies import Shelf, collected, merged
 from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
 from langflash_core.lab.photos.fitting import FittedPhoto, fitted
 from langflash_core.lab.training.losses import ssim_map
@@ -29,7 +32,7 @@ from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, n
 from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.pipeline import reconstruct
 from langflash_core.running import Progress
-from langflash_core.types import Camera, Scene
+from langflash_core.types import Camera, Frame, Scene
 
 APART = (6, 12, 18, 24)
 """Numbers between the photos of a pair, in turn."""
@@ -105,23 +108,39 @@ def run_posed(
     Raises:
         InputError: the folder lacks a pose. WeightsError: the checkpoint does not fit.
     """
-    tallies: dict[int, Tally] = {}
-    for done, triple in enumerate(triples):
-        progress(f"pair {triple.first} and {triple.second}", done / len(triples))
-        tally = tallies.setdefault(triple.apart, Tally())
-        judge_triple(folder, triple, render, tally, weights=weights, preset=preset, size=size)
-    whole = Tally()
-    for tally in tallies.values():
-        whole.poses += tally.poses
-        for name, values in tally.numbers.items():
-            whole.numbers.setdefault(name, []).extend(values)
+    by_gap: dict[int, list[Tally]] = {}
+    tallies = pair_tallies(folder, triples, render, weights, preset=preset, size=size)
+    for done, (triple, (name, tally)) in enumerate(zip(triples, tallies, strict=True), start=1):
+        progress(f"pair {name}", done / len(triples))
+        by_gap.setdefault(triple.apart, []).append(tally)
     return {
         "weights": str(weights) if weights else preset,
         "folder": folder.root.name,
         "pairs": len(triples),
-        "measures": summary(whole),
-        "by_gap": {str(gap): summary(tally) for gap, tally in sorted(tallies.items())},
+        "measures": summary(merged([tally for several in by_gap.values() for tally in several])),
+        "by_gap": {str(gap): summary(merged(several)) for gap, several in sorted(by_gap.items())},
     }
+
+
+def pair_tallies(
+    folder: PhotoFolder,
+    triples: Sequence[Triple],
+    render: Render,
+    weights: Path | None = None,
+    *,
+    preset: str = "mini",
+    size: int | None = None,
+    shelf: Shelf | None = None,
+    look: Look | None = None,
+) -> Iterator[tuple[str, Tally]]:
+    """Name and tally of every pair, in order; those on the shelf are not judged again."""
+
+    def judge(triple: Triple) -> Tally:
+        tally = Tally()
+        judge_triple(folder, triple, render, tally, weights=weights, preset=preset, size=size, look=look)
+        return tally
+
+    return collected(((key_of(t), t) for t in triples), judge, shelf)
 
 
 @torch.no_grad()
@@ -134,11 +153,12 @@ def judge_triple(
     weights: Path | None = None,
     preset: str = "mini",
     size: int | None = None,
+    look: Look | None = None,
 ) -> None:
     """Pose, depth and the photo from between of one pair; adds to `tally`."""
     first, between, second = (folder.photo(id) for id in (triple.first, triple.between, triple.second))
     to_second, to_between = relative(first, second), relative(first, between)
-    scene, seconds = _scene_of(first, second, weights, preset, size)
+    scene, seconds = scene_of((first, second), first.intrinsics, weights=weights, preset=preset, size=size)
     placed = scene.num_views == 2
     predicted = scene.viewmats[1].cpu() if placed else torch.eye(4)
     error = pose_error(predicted, to_second.float())
@@ -150,12 +170,39 @@ def judge_triple(
         placed=float(placed),
         true_rotation=pose_error(torch.eye(4), to_second.float()).rotation,
     )
-    truths = [_seen(photo, scene) for photo in (first, second)[: scene.num_views]]
-    scale = _judge_depth(scene, truths, render, tally)
+    truths = [as_seen(photo, scene.view_size) for photo in (first, second)[: scene.num_views]]
+    frames = [render(scene, scene.camera(view)) for view in range(len(truths))]
+    scale = judge_depth(frames, truths, tally)
     if math.isnan(scale) and placed:
         scale = float(to_second[:3, 3].norm() / predicted[:3, 3].norm().clamp_min(1e-9))
-    if not math.isnan(scale):
-        _judge_between(scene, _seen(between, scene), to_between, scale, truths[0], render, tally)
+    if math.isnan(scale):
+        return
+    target = as_seen(between, scene.view_size)
+    frame = render(scene, moved_camera(to_between, scale, target, scene.view_size))
+    judge_picture(frame, target, tally, truths[0])
+    if look is not None:
+        look(_sight(triple, truths[0], target, frame, tally))
+
+
+def _sight(triple: Triple, first: FittedPhoto, target: FittedPhoto, frame: Frame, tally: Tally) -> Sight:
+    """The pair for people, with the numbers that its tally ended with."""
+    start, truth = (p.rgb.permute(1, 2, 0).float() / 255 for p in (first, target))
+    pictures = {
+        "first photo": photo_picture(start),
+        "photo between": photo_picture(truth),
+        "drawn": photo_picture(frame.rgb),
+        "error": error_picture(frame.rgb, truth, (frame.alphas >= COVERED_ALPHA).numpy()),
+    }
+    known = {name: values[-1] for name, values in tally.numbers.items()}
+    numbers = {name: known[name] for name in ("psnr", "covered", "depth_abs_rel") if name in known}
+    numbers["rotation error"] = tally.poses[-1].rotation
+    name = f"photos {triple.first} and {triple.second}"
+    return Sight(key_of(triple), name, pictures, numbers, numbers.get("psnr", 0.0))
+
+
+def key_of(triple: Triple) -> str:
+    """What a pair's tally is kept as."""
+    return f"{triple.first}-{triple.second}"
 
 
 def relative(first: LabelledPhoto, other: LabelledPhoto) -> Tensor:
@@ -173,31 +220,35 @@ def relative(first: LabelledPhoto, other: LabelledPhoto) -> Tensor:
     return torch.linalg.inv(other.pose.double()) @ first.pose.double()
 
 
-def _scene_of(
-    first: LabelledPhoto, second: LabelledPhoto, weights: Path | None, preset: str, size: int | None
+def scene_of(
+    photos: Sequence[LabelledPhoto],
+    intrinsics: tuple[float, float, float, float] | None,
+    *,
+    weights: Path | None = None,
+    preset: str = "mini",
+    size: int | None = None,
 ) -> tuple[Scene, float]:
-    """The pair through the whole program, and the seconds that took."""
+    """Photos through the whole program, and the seconds that took. intrinsics: as `reconstruct` has them."""
     with tempfile.TemporaryDirectory() as folder:
-        paths = [Path(folder) / f"{photo.id}.png" for photo in (first, second)]
-        for path, photo in zip(paths, (first, second), strict=True):
+        paths = [Path(folder) / f"{photo.id}.png" for photo in photos]
+        for path, photo in zip(paths, photos, strict=True):
             Image.fromarray(photo.image).save(path, "PNG", compress_level=1)
         start = time.perf_counter()
-        scene = reconstruct(paths, preset=preset, weights=weights, intrinsics=first.intrinsics, size=size)
+        scene = reconstruct(paths, preset=preset, weights=weights, intrinsics=intrinsics, size=size)
         return scene, time.perf_counter() - start
 
 
-def _seen(photo: LabelledPhoto, scene: Scene) -> FittedPhoto:
-    """A photo as the scene's photos were cut."""
+def as_seen(photo: LabelledPhoto, size: tuple[int, int]) -> FittedPhoto:
+    """A photo as those of a scene were cut, whose `view_size` is given."""
     height, width = photo.image.shape[:2]
-    return fitted(photo, scene.view_size, centre_box(width, height, scene.view_size))
+    return fitted(photo, size, centre_box(width, height, size))
 
 
-def _judge_depth(scene: Scene, truths: Sequence[FittedPhoto], render: Render, tally: Tally) -> float:
+def judge_depth(frames: Sequence[Frame], truths: Sequence[FittedPhoto], tally: Tally) -> float:
     """Drawn depth of every photo, each with its own scale; returns metres per scene unit by the first
     (NaN: not known)."""
     scale = math.nan
-    for view, truth in enumerate(truths):
-        frame = render(scene, scene.camera(view))
+    for view, (frame, truth) in enumerate(zip(frames, truths, strict=True)):
         depths = torch.where(frame.alphas >= COVERED_ALPHA, truth.depths, 0.0)
         valid = (depths > 0) & (frame.depths > 0)
         if not bool(valid.any()):
@@ -213,22 +264,23 @@ def _judge_depth(scene: Scene, truths: Sequence[FittedPhoto], render: Render, ta
     return scale
 
 
-def _judge_between(
-    scene: Scene,
-    photo: FittedPhoto,
-    viewmat: Tensor,
-    scale: float,
-    first: FittedPhoto,
-    render: Render,
-    tally: Tally,
-) -> None:
-    """The scene from where the photo between was taken; pixels that the scene covers, and all of them."""
+def moved_camera(viewmat: Tensor, scale: float, photo: FittedPhoto, size: tuple[int, int]) -> Camera:
+    """The camera of a photo in the scene's units, of which one is `scale` of the pose's."""
     moved = viewmat.float().clone()
     moved[:3, 3] /= scale
-    frame = render(scene, Camera(moved, photo.K, *scene.view_size))
+    return Camera(moved, photo.K, *size)
+
+
+def judge_picture(frame: Frame, photo: FittedPhoto, tally: Tally, first: FittedPhoto) -> None:
+    """The scene from where a photo was taken that it was not made of; pixels that the scene covers, and all
+    of them."""
     truth, start = (p.rgb.permute(1, 2, 0).float() / 255 for p in (photo, first))
     shown = frame.alphas >= COVERED_ALPHA
-    tally.note(covered=float(shown.float().mean()), psnr_whole_picture=psnr(frame.rgb, truth))
+    tally.note(
+        covered=float(shown.float().mean()),
+        psnr_whole_picture=psnr(frame.rgb, truth),
+        ssim_whole_picture=ssim(frame.rgb, truth),
+    )
     if bool(shown.any()):
         flat = truth[shown].mean(0).expand_as(truth)
         tally.note(
@@ -251,4 +303,6 @@ def summary(tally: Tally) -> dict[str, float | None]:
         "pose_right_share": nan_mean(float(error.right()) for error in tally.poses),
         "pairs": float(len(tally.poses)),
     }
+    areas = pose_auc([error.worst for error in tally.poses])
+    measures |= {f"pose_auc_{limit:g}": area for limit, area in zip(POSE_LIMITS, areas, strict=True)}
     return rounded(dict(sorted(measures.items())))

@@ -11,7 +11,7 @@ Sizes: V views, H W pixels, K atoms, G class groups, C channels, P phrases.
 import logging
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -22,15 +22,24 @@ from torch.nn import functional as F
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import unproject
+from langflash_core.lab.evaluation.consistency import label_consistency
 from langflash_core.lab.evaluation.metrics import (
+    POSE_LIMITS,
     PoseError,
     Presence,
+    calibration_error,
     point_error,
+    pose_auc,
     pose_error,
     presence,
 )
+from langflash_core.lab.evaluation.pictures import ssim
+from langflash_core.lab.evaluation.segments import Panoptic, instance_iou, label_border_f, panoptic
+from langflash_core.lab.evaluation.side_measures import DepthView, seen_by
+from langflash_core.lab.evaluation.sights import Look, Sight, error_picture, label_picture, photo_picture
+from langflash_core.lab.evaluation.tallies import Shelf, collected, merged
 from langflash_core.lab.evaluation.words import OTHER, PAPER_LABELS, PARAPHRASES, absent_phrases, paper_label
-from langflash_core.lab.rooms.cameras import overlap_fraction, reproject
+from langflash_core.lab.rooms.cameras import overlap_fraction
 from langflash_core.lab.training.batches import RoomSet
 from langflash_core.lab.training.losses import ssim_map
 from langflash_core.lab.training.measures import (
@@ -63,6 +72,7 @@ PHRASES = 20
 MASK_THRESHOLDS = tuple(round(0.3 + 0.01 * step, 2) for step in range(70))
 MEDIANS = ("depth_abs_rel", "depth_abs_rel_view_0_twice", "points_view_1")
 """Of these the median room is told beside the mean, which a few wrong poses dominate."""
+STUFF = frozenset({"wall", "floor", "ceiling"})
 MIN_SHARE = 0.004
 """Of view 0: a thing counts as there from this share of its pixels on (200 of 224 x 224)."""
 
@@ -71,7 +81,8 @@ MIN_SHARE = 0.004
 class Tally:
     """What a run collects: numbers per scene by name, confusion counts by (row, view, label set),
     presence scores, per present phrase its mask's IoU at each of `MASK_THRESHOLDS`, and per
-    paraphrase its IoU and that of the plain names, a pair for each scene that shows it."""
+    paraphrase its IoU and that of the plain names, a pair for each scene that shows it; segments of the
+    target view against true instances."""
 
     numbers: dict[str, list[float]] = field(default_factory=dict)
     counts: dict[tuple[str, str, str], Tensor] = field(default_factory=dict)
@@ -80,6 +91,7 @@ class Tally:
     poses: list[tuple[PoseError, float]] = field(default_factory=list)
     mask_ious: list[Tensor] = field(default_factory=list)
     paraphrases: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+    panoptic: Panoptic = field(default_factory=Panoptic)
 
     def note(self, **values: float) -> None:
         for name, value in values.items():
@@ -137,23 +149,46 @@ def run_eval(
     Raises:
         InputError: there is no such cache. WeightsError: the weights do not fit.
     """
+    setting, held_out = open_rooms(data, weights, preset=preset, limit=limit)
+    tallies: dict[str, Tally] = {}
+    for name, tally in room_tallies(setting, held_out):
+        tallies[name] = tally
+        log.info("scene %s (%d of %d)", name, len(tallies), len(held_out))
+    return {
+        "weights": str(weights) if weights else preset,
+        "scenes": len(tallies),
+        "seeds": [min(map(int, tallies)), max(map(int, tallies))],
+        "threshold": setting.threshold,
+        "temperature": setting.temperature,
+        **summary(merged(list(tallies.values())), setting),
+    }
+
+
+def open_rooms(
+    data: Path, weights: Path | None = None, *, preset: str = "mini", limit: int | None = None
+) -> tuple[Setting, RoomSet]:
+    """What `run_eval` judges with, and the rooms that it judges.
+
+    Raises:
+        InputError: there is no such cache. WeightsError: the weights do not fit.
+    """
     held_out = _rooms(data / "held_out", limit)
     network = load_network(preset, weights)
     groups = sorted({label.group for label in held_out.labels()})
-    setting = Setting.of(network, groups, _median_depth(data))
-    tally, seeds = Tally(), []
-    for record in _records(held_out):
-        judge_scene(setting, record, tally)
-        seeds.append(record.seed)
-        log.info("scene %d (%d of %d)", record.seed, len(seeds), len(held_out))
-    return {
-        "weights": str(weights) if weights else preset,
-        "scenes": len(seeds),
-        "seeds": [min(seeds), max(seeds)],
-        "threshold": setting.threshold,
-        "temperature": setting.temperature,
-        **summary(tally, setting),
-    }
+    return Setting.of(network, groups, _median_depth(data)), held_out
+
+
+def room_tallies(
+    setting: Setting, rooms: RoomSet, shelf: Shelf | None = None, look: Look | None = None
+) -> Iterator[tuple[str, Tally]]:
+    """Seed and tally of every room, in order; those on the shelf are not judged again."""
+
+    def judge(record: RoomRecord) -> Tally:
+        tally = Tally()
+        judge_scene(setting, record, tally, look)
+        return tally
+
+    return collected(((str(record.seed), record) for record in _records(rooms)), judge, shelf)
 
 
 def asked_rooms(network: LangFlashNet, data: Path, *, limit: int | None = None) -> Tally:
@@ -205,17 +240,18 @@ def views_of(record: RoomRecord, chosen: Sequence[int]) -> Views:
     )
 
 
-def judge_scene(setting: Setting, record: RoomRecord, tally: Tally) -> None:
+def judge_scene(setting: Setting, record: RoomRecord, tally: Tally, look: Look | None = None) -> None:
     """Everything about one scene of at least three views; adds to `tally`."""
     views = views_of(record, (0, 1))
     start = time.perf_counter()
     prediction = setting.network.predict(views)
     tally.note(seconds=time.perf_counter() - start)
+    tally.note(**{f"stage_{name}_seconds": value for name, value in prediction.timings.items()})
     truth = record.depths.float()
     scale = _scale(prediction.depths[0], truth[0])
     judge_geometry(setting, record, prediction, scale, tally)
     ask_phrases(setting, record, prediction, tally)
-    judge_views(setting, record, prediction, scale, tally)
+    judge_views(setting, record, prediction, scale, tally, look)
 
 
 def _scale(depths: Tensor, truth: Tensor) -> float:
@@ -322,9 +358,17 @@ def language_maps(network: LangFlashNet, views: Views) -> tuple[Tensor, Tokens]:
 
 
 def judge_views(
-    setting: Setting, record: RoomRecord, prediction: Prediction, scale: float, tally: Tally
+    setting: Setting,
+    record: RoomRecord,
+    prediction: Prediction,
+    scale: float,
+    tally: Tally,
+    look: Look | None = None,
 ) -> None:
-    """Picture of the target view, and labels of photo 0 and the target view by every method."""
+    """Picture of the target view, and labels of photo 0 and the target view by every method.
+
+    look: shown the target view, for pictures of a report.
+    """
     network = setting.network
     source, target = views_of(record, (0, 1)), views_of(record, (2,))
     with torch.no_grad():
@@ -359,24 +403,100 @@ def judge_views(
             "lfa": torch.einsum("khw,kc->hwc", weights, prediction.dictionary),
             "true_masks_lfa": torch.einsum("khw,kc->hwc", exact, true_atoms),
         }
-        _count_labels(setting, record, view, vectors, tally, torch.ones_like(shown) if view == 0 else shown)
+        counted = torch.ones_like(shown) if view == 0 else shown
+        _count_labels(setting, record, view, vectors, tally, counted)
+    found = torch.einsum("khw,kc->hwc", prediction.weights[0], prediction.dictionary) @ setting.texts.T
+    beside = torch.einsum("khw,kc->hwc", maps, prediction.dictionary) @ setting.texts.T
+    labels = torch.stack((found.argmax(-1), beside.argmax(-1).masked_fill(~shown, -1))).numpy()
+    judge_target(setting, record, prediction, maps, labels, tally)
+    tally.note(ssim_whole_picture=ssim(rgb, photo))
+    if look is not None:
+        look(_sight(setting, record, rgb, labels, tally))
 
 
-def seen_by_photos(record: RoomRecord, tolerance: float = 0.04) -> Tensor:
+def judge_target(
+    setting: Setting,
+    record: RoomRecord,
+    prediction: Prediction,
+    maps: Tensor,
+    labels: np.ndarray,
+    tally: Tally,
+) -> None:
+    """Segments and borders of the target view where a photo sees it, and whether it is named as photo 0.
+
+    Walls, floor and ceiling are one segment each, as benchmarks count what cannot be counted.
+
+    Args:
+        maps: (K, H, W), drawn. labels: (2, H, W), rows of `setting.groups` in photo 0 and, where a photo
+            sees it, in the target view; -1 elsewhere.
+    """
+    truth = _class_rows(setting, record, 2)
+    truth[labels[1] < 0] = -1
+    instances = np.where(truth < 0, -1, record.instances[2].numpy().astype(np.int64))
+    atoms = maps.argmax(0).numpy()
+    kinds = (prediction.dictionary @ setting.texts.T).argmax(1).tolist()
+    true_kinds = {i: setting.groups.index(label.group) for i, label in enumerate(record.labels)}
+    stuff = {row for row, group in enumerate(setting.groups) if group in STUFF}
+
+    def joined(ids: np.ndarray, kind_of: dict[int, int]) -> tuple[np.ndarray, dict[int, int]]:
+        merged_ids = {i: -2 - kind if kind in stuff else i for i, kind in kind_of.items()}
+        table = np.array([merged_ids.get(i, i) for i in range(max([*kind_of, 0]) + 1)])
+        places = {target: n for n, target in enumerate(sorted(set(table.tolist())))}
+        numbered = np.array([places[i] for i in table.tolist()])
+        classes = {places[merged_ids[i]]: kind for i, kind in kind_of.items()}
+        return np.where(ids < 0, -1, numbered[ids.clip(0)]), classes
+
+    found, found_classes = joined(atoms, dict(enumerate(kinds)))
+    real, real_classes = joined(instances, true_kinds)
+    tally.panoptic += panoptic(found, real, found_classes, real_classes)
+    tally.note(
+        instance_iou=instance_iou(found, real, smallest=round(MIN_SHARE * real.size)),
+        border_f=label_border_f(labels[1], truth),
+        label_consistency=label_consistency(
+            labels,
+            record.depths[[0, 2]].double().numpy(),
+            record.viewmats[[0, 2]].double().numpy(),
+            record.Ks[[0, 2]].double().numpy(),
+        ),
+    )
+
+
+def _class_rows(setting: Setting, record: RoomRecord, view: int) -> np.ndarray:
+    """Row of `setting.groups` of every pixel (H, W) of a view, -1 for none."""
+    table = np.full(256, -1, dtype=np.int64)
+    for index, label in enumerate(record.labels):
+        table[index] = setting.groups.index(label.group)
+    return table[record.instances[view].numpy().astype(np.int64)]
+
+
+def _sight(setting: Setting, record: RoomRecord, rgb: Tensor, labels: np.ndarray, tally: Tally) -> Sight:
+    """The room for people, with the numbers that its tally ended with."""
+    first, photo = (record.rgb[view].permute(1, 2, 0).float() / 255 for view in (0, 2))
+    seen = labels[1] >= 0
+    truth = np.where(seen, _class_rows(setting, record, 2), -1)
+    known = {name: values[-1] for name, values in tally.numbers.items()}
+    pictures = {
+        "first photo": photo_picture(first),
+        "another view": photo_picture(photo),
+        "drawn": photo_picture(rgb),
+        "error": error_picture(rgb, photo, seen),
+        "labels": label_picture(labels[1]),
+        "true labels": label_picture(truth),
+    }
+    right = float((labels[1] == truth)[truth >= 0].mean()) if (truth >= 0).any() else math.nan
+    numbers = {name: known[name] for name in ("psnr", "depth_abs_rel", "instance_iou") if name in known}
+    return Sight(str(record.seed), f"room {record.seed}", pictures, {"labels right": right, **numbers}, right)
+
+
+def seen_by_photos(record: RoomRecord) -> Tensor:
     """Pixels (H, W) of the target view whose surface photo 0 or 1 sees, from true depths.
 
     What no photo saw cannot be drawn or named by any method; it is left out of the target's
     measures, alike for all of them.
     """
-    depths, viewmats, Ks = (t.double().numpy() for t in (record.depths, record.viewmats, record.Ks))
-    height, width = depths.shape[1], depths.shape[2]
-    seen = np.zeros((height, width), dtype=bool)
-    for photo in (0, 1):
-        z, u, v, valid = reproject(depths[2], viewmats[[2, photo]], Ks[[2, photo]])
-        inside = valid & (z > 0.05) & (u >= 0) & (v >= 0) & (u < width) & (v < height)
-        there = depths[photo][np.where(inside, v, 0).astype(int), np.where(inside, u, 0).astype(int)]
-        seen |= inside & (np.abs(there - z) < tolerance * z)
-    return torch.from_numpy(seen)
+    maps = (t.double().numpy() for t in (record.depths, record.viewmats, record.Ks))
+    first, second, target = (DepthView(*own) for own in zip(*maps, strict=True))
+    return torch.from_numpy(seen_by(target, [first, second]))
 
 
 def _upsampled(features: Tensor, size: tuple[int, int]) -> Tensor:
@@ -504,12 +624,18 @@ def summary(tally: Tally, setting: Setting) -> dict:
         "pose_direction_median": float(directions.nanmedian()),
         "pose_right_share": nan_mean(float(error.right()) for error in overlapping),
         "pose_pairs_overlapping": float(len(overlapping)),
+        "panoptic_quality": tally.panoptic.mean(),
+        "panoptic_segmentation": tally.panoptic.mean("segmentation"),
+        "panoptic_recognition": tally.panoptic.mean("recognition"),
+        "calibration_error": calibration_error(scores, truths),
         "presence_precision": found.precision,
         "presence_recall": found.recall,
         "presence_f1": found.f1,
         "presence_f1_always_found": always.f1,
         "presence_phrases": float(len(scores)),
     }
+    areas = pose_auc([error.worst for error, _ in tally.poses])
+    geometry |= {f"pose_auc_{limit:g}": area for limit, area in zip(POSE_LIMITS, areas, strict=True)}
     if geometry.get("name_iou"):
         geometry["paraphrase_share"] = geometry["paraphrase_iou"] / geometry["name_iou"]
     labels: dict[str, dict[str, float]] = {}
@@ -518,7 +644,7 @@ def summary(tally: Tally, setting: Setting) -> dict:
         row[f"{view}_{kind}_accuracy"] = pixel_accuracy(counts)
         row[f"{view}_{kind}_miou"] = mean_iou(counts)
         if kind == "groups":
-            things = [i for i, g in enumerate(setting.groups) if g not in ("wall", "floor", "ceiling")]
+            things = [i for i, g in enumerate(setting.groups) if g not in STUFF]
             row[f"{view}_objects_miou"] = mean_iou(counts, things)
     paper = tally.counts.get(("lfa", "target", "paper"))
     per_label: dict[str, float] = {}

@@ -112,14 +112,14 @@ class PhotoFolder:
         Raises:
             InputError: the map is missing, damaged, or holds an id that names.csv lacks.
         """
-        path = self.root / "labels" / f"{id}.png"
-        ids = _read_map(path, "label map").astype(np.int64)
+        ids = self.stored_labels(id)
         unknown = set(np.unique(ids).tolist()) - self.names.keys() - {0}
         if unknown:
             raise InputError(
-                f"{path} holds the id {min(unknown)}, which names.csv does not list; add it there"
+                f"the label map of photo {id} in {self.root} holds the id {min(unknown)}, which names.csv "
+                "does not list; add it there"
             )
-        return _cropped(ids, self.crop, path)
+        return _cropped(ids, self.crop, id)
 
     def depths(self, id: str) -> tuple[np.ndarray, bool] | None:
         """Depths (H, W) float32, cropped, 0 = unknown, and whether they are metres; None: no map.
@@ -127,15 +127,27 @@ class PhotoFolder:
         Raises:
             InputError: the map is damaged.
         """
+        stored = self.stored_depths(id)
+        return None if stored is None else (_cropped(stored[0], self.crop, id), stored[1])
+
+    def stored_image(self, id: str) -> np.ndarray:
+        """Pixels (H, W, 3) uint8 before the crop."""
+        return np.asarray(read_photo(photo_path(self.root, id)).image.convert("RGB"))
+
+    def stored_labels(self, id: str) -> np.ndarray:
+        """Ids (H, W) int64 before the crop."""
+        return read_map(self.root / "labels" / f"{id}.png", "label map").astype(np.int64)
+
+    def stored_depths(self, id: str) -> tuple[np.ndarray, bool] | None:
+        """As `depths`, before the crop."""
         path = self.root / "depths" / f"{id}.png"
         if not path.is_file():
             return None
-        steps = _read_map(path, "depth map")
+        steps = read_map(path, "depth map")
         unit = self.depth_unit
         if unit is None and steps.dtype != np.uint8:
             unit = MILLIMETRE
-        values = steps.astype(np.float32) * (1.0 if unit is None else unit)
-        return _cropped(values, self.crop, path), unit is not None
+        return steps.astype(np.float32) * (1.0 if unit is None else unit), unit is not None
 
     def photo(self, id: str) -> LabelledPhoto:
         """Everything about one photo.
@@ -143,8 +155,7 @@ class PhotoFolder:
         Raises:
             ImageError: the picture cannot be used. InputError: a map cannot, or differs in size.
         """
-        path = photo_path(self.root, id)
-        image = _cropped(np.asarray(read_photo(path).image.convert("RGB")), self.crop, path)
+        image = _cropped(self.stored_image(id), self.crop, id)
         labels = self.labels(id) if self.labelled else None
         depths, metric = self.depths(id) or (None, False)
         for what, found in (("label map", labels), ("depth map", depths)):
@@ -219,13 +230,13 @@ def _moved(K: Tensor, crop: Crop) -> Tensor:
     return moved
 
 
-def _cropped(values: np.ndarray, crop: Crop | None, path: Path) -> np.ndarray:
+def _cropped(values: np.ndarray, crop: Crop | None, id: str) -> np.ndarray:
     if crop is None:
         return values
     left, top, right, bottom = crop
     if not (0 <= left < right <= values.shape[1] and 0 <= top < bottom <= values.shape[0]):
         raise InputError(
-            f"the crop {left},{top},{right},{bottom} does not fit into {path.name} ({_size(values)} pixels); "
+            f"the crop {left},{top},{right},{bottom} does not fit into photo {id} ({_size(values)} pixels); "
             "give LEFT,TOP,RIGHT,BOTTOM inside it"
         )
     return values[top:bottom, left:right]
@@ -235,7 +246,7 @@ def _size(values: np.ndarray) -> str:
     return f"{values.shape[1]} x {values.shape[0]}"
 
 
-def _read_map(path: Path, what: str) -> np.ndarray:
+def read_map(path: Path, what: str) -> np.ndarray:
     """(H, W) uint8 or uint16."""
     try:
         with Image.open(path) as opened:

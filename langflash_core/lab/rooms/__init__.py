@@ -15,7 +15,7 @@ from langflash_core.lab.rooms.layout import Instance, Room, make_room
 from langflash_core.lab.rooms.pack import Pack, build_pack, load_pack
 from langflash_core.lab.rooms.preview import contact_sheet
 from langflash_core.lab.rooms.render import RoomRenderer
-from langflash_core.lab.rooms.sample import RoomViews, render_room
+from langflash_core.lab.rooms.sample import RoomViews, StagedRoom, render_room, staged_room
 
 __all__ = [
     "HELD_OUT_LIBRARIES",
@@ -28,10 +28,12 @@ __all__ = [
     "Room",
     "RoomRenderer",
     "RoomViews",
+    "StagedRoom",
     "build_pack",
     "contact_sheet",
     "load_catalogue",
     "load_pack",
     "make_room",
     "render_room",
+    "staged_room",
 ]

@@ -233,6 +233,11 @@ def _view_between(
     return look_at(eye, eye + forward, float(rng.normal(0, math.radians(2.0))))
 
 
+def stands_free(room: Room, eye: Float[np.ndarray, " 3"]) -> bool:
+    """Whether a camera fits there: inside the room (its world), and 12 cm or more from every box."""
+    return _stands_free(room, _Boxes.of(room), eye)
+
+
 def _stands_free(room: Room, boxes: _Boxes, eye: Float[np.ndarray, " 3"]) -> bool:
     return not boxes.blocks(eye, 0.12) and room.shell.holds(eye, eye, 0.2)
 

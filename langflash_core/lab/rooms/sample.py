@@ -1,6 +1,6 @@
 """One training or test sample: a room seen in V views. H W pixels; world = first camera, metres."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -17,7 +17,7 @@ from langflash_core.lab.rooms.catalogue import TRAIN_LIBRARIES
 from langflash_core.lab.rooms.layout import Room, make_room
 from langflash_core.lab.rooms.pack import Pack
 from langflash_core.lab.rooms.render import Picture, RoomRenderer
-from langflash_core.lab.rooms.sensor import expose, meter, random_sensor
+from langflash_core.lab.rooms.sensor import Sensor, expose, meter, random_sensor
 
 _ROOM_TRIES = 60
 _STRUCTURAL = 3  # wall, floor, ceiling
@@ -51,6 +51,43 @@ class RoomViews:
     seed: int
 
 
+@dataclass(frozen=True)
+class StagedRoom:
+    """A sample, and what it takes to look at its room from elsewhere.
+
+    Attributes:
+        views: the sample.
+        room: what is drawn.
+        home: world of the room (y up) -> world of the sample, the first camera.
+        sensor: that took all photos. grey: what it was brought to (`meter`).
+    """
+
+    views: RoomViews
+    room: Room
+    home: Float[np.ndarray, "4 4"]
+    sensor: Sensor
+    grey: float
+
+    def look(
+        self,
+        renderer: RoomRenderer,
+        viewmat: Float[np.ndarray, "4 4"],
+        K: Float[np.ndarray, "3 3"],
+        size: tuple[int, int],
+    ) -> tuple[UInt8[np.ndarray, "H W 3"], Float[np.ndarray, "H W"]]:
+        """Photo and z-depth (m, 0 where nothing) of the room that `renderer` was last given.
+
+        The photo is exposed as the sample's are, but through a perfect lens and sensor: no vignette,
+        blur, noise or JPEG.
+
+        Args:
+            viewmat: world of the sample -> camera. K: pixels. size: (height, width).
+        """
+        picture = renderer.draw(viewmat @ self.home, K, size)
+        perfect = replace(self.sensor, vignette=0.0, noise=0.0, blur=0.0, quality=0)
+        return expose(picture.radiance, perfect, np.random.default_rng(0), self.grey), picture.depth
+
+
 def render_room(
     seed: int,
     pack: Pack,
@@ -60,6 +97,19 @@ def render_room(
     size: tuple[int, int] = (224, 224),
     libraries: tuple[str, ...] = TRAIN_LIBRARIES,
 ) -> RoomViews:
+    """The photos of `staged_room`, which says what the arguments are."""
+    return staged_room(seed, pack, renderer, num_views=num_views, size=size, libraries=libraries).views
+
+
+def staged_room(
+    seed: int,
+    pack: Pack,
+    renderer: RoomRenderer,
+    *,
+    num_views: int = 2,
+    size: tuple[int, int] = (224, 224),
+    libraries: tuple[str, ...] = TRAIN_LIBRARIES,
+) -> StagedRoom:
     """Lay out a room, choose cameras, draw and photograph it; the same seed gives the same sample.
 
     Args:
@@ -93,7 +143,7 @@ def render_room(
             continue
         overlap = _least_overlap(pictures, cameras)
         if overlap is not None:
-            return _views(seed, room, cameras, pictures, overlap, rng)
+            return _staged(seed, room, cameras, pictures, overlap, rng)
     raise ValueError(
         f"seed: no usable views in {_ROOM_TRIES} rooms of seed {seed}; libraries {libraries} may be too poor"
     )
@@ -131,14 +181,14 @@ def _least_overlap(pictures: list[Picture], cameras: CameraSet) -> float | None:
     return shared[0] if shared else 1.0
 
 
-def _views(
+def _staged(
     seed: int,
     room: Room,
     cameras: CameraSet,
     pictures: list[Picture],
     overlap: float,
     rng: np.random.Generator,
-) -> RoomViews:
+) -> StagedRoom:
     sensor = random_sensor(rng)
     grey = float(np.mean([meter(p.radiance) for p in pictures]))
     ids = np.stack([p.ids for p in pictures])
@@ -147,7 +197,7 @@ def _views(
     relabel[present] = np.arange(1, len(present) + 1)
     kept = [room.instances[i - 1] for i in present]
     home = np.linalg.inv(cameras.viewmats[0])
-    return RoomViews(
+    views = RoomViews(
         images=np.stack([expose(p.radiance, sensor, rng, grey) for p in pictures]),
         depths=np.stack([p.depth for p in pictures]).astype(np.float32),
         instances=relabel[ids],
@@ -158,3 +208,4 @@ def _views(
         overlap=overlap,
         seed=seed,
     )
+    return StagedRoom(views, room, cameras.viewmats[0], sensor, grey)

@@ -6,6 +6,7 @@ An empty selection (no valid pixel, no group) gives a zero that still carries a 
 """
 
 import math
+from collections.abc import Callable
 
 import torch
 from torch import Tensor
@@ -255,12 +256,21 @@ def ssim_map(left: Tensor, right: Tensor, *, window: int = 7, peak: float = 1.0)
         pad = window // 2
         return F.avg_pool2d(F.pad(maps, (pad,) * 4, mode="reflect"), window, 1)
 
+    return structural_similarity(first, second, smooth, peak)[0].permute(1, 2, 0)
+
+
+def structural_similarity(
+    first: Tensor, second: Tensor, smooth: Callable[[Tensor], Tensor], peak: float = 1.0
+) -> Tensor:
+    """Structural similarity of maps under a window; `smooth` is the weighted mean over it.
+
+    Source: Wang et al. 2004, eq. 13, with its constants .01 and .03.
+    """
     mean1, mean2 = smooth(first), smooth(second)
     var1 = smooth(first * first) - mean1**2
     var2 = smooth(second * second) - mean2**2
     covariance = smooth(first * second) - mean1 * mean2
     c1, c2 = (0.01 * peak) ** 2, (0.03 * peak) ** 2
-    ratio = ((2 * mean1 * mean2 + c1) * (2 * covariance + c2)) / (
+    return ((2 * mean1 * mean2 + c1) * (2 * covariance + c2)) / (
         (mean1**2 + mean2**2 + c1) * (var1 + var2 + c2)
     )
-    return ratio[0].permute(1, 2, 0)

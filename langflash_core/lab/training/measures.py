@@ -61,10 +61,25 @@ def accuracy(counts: Tensor) -> float:
 
 def class_ious(counts: Tensor) -> Tensor:
     """IoU per class, NaN for classes that never occur in the truth."""
+    hits, unions = _hits_and_unions(counts)
+    return torch.where(counts.sum(1) > 0, hits / unions.clamp_min(1), torch.nan)
+
+
+def occurring_mean_iou(counts: Tensor, classes: Sequence[int] | None = None) -> float:
+    """Mean IoU over classes, or those of `classes`, that occur in truth or prediction: what nobody labelled
+    but somebody said is 0.
+
+    As torchmetrics' `JaccardIndex` has it, by which LSM and the paper report on ScanNet.
+    """
+    hits, unions = _hits_and_unions(counts)
+    ious = hits / unions  # 0 / 0 is NaN
+    return nan_mean((ious if classes is None else ious[list(classes)]).tolist())
+
+
+def _hits_and_unions(counts: Tensor) -> tuple[Tensor, Tensor]:
     counts = counts.double()
     hits = counts.diagonal()
-    unions = counts.sum(0) + counts.sum(1) - hits
-    return torch.where(counts.sum(1) > 0, hits / unions.clamp_min(1), torch.nan)
+    return hits, counts.sum(0) + counts.sum(1) - hits
 
 
 def mean_iou(counts: Tensor, classes: Sequence[int] | None = None) -> float:

@@ -202,7 +202,7 @@ def test_posed_photos_are_judged(run, checkpoint, tmp_path):
         (["eval", "photos-labelled", "PHOTOS", "--part", "validation"], "choose another --part or --only"),
         (["eval", "photos-labelled", "PHOTOS", "--only", "9-7"], "--only"),
         (["eval", "photos-labelled", "PHOTOS", "--crop", "9,9,3,3"], "--crop"),
-        (["eval", "photos-labelled", "PHOTOS", "--crop", "0,0,99,9"], "does not fit into 1.png"),
+        (["eval", "photos-labelled", "PHOTOS", "--crop", "0,0,99,9"], "does not fit into photo 1"),
         (["eval", "photos-labelled", "PHOTOS", "-o", "table.txt"], "this command writes .md"),
         (["eval", "posed", "PHOTOS"], "has no poses.txt"),
         (["eval", "calibrate", ".", "--plot", "plot.jpg"], "this command writes .png"),

@@ -72,3 +72,24 @@ def test_absent_phrases_are_absent_and_unlike():
     phrases = absent_phrases(["chair"], groups, vectors, 3, torch.Generator().manual_seed(0))
     assert sorted(phrases) == ["bed", "lamp", "sofa"]
     assert absent_phrases(list(groups), groups, vectors, 3, torch.Generator()) == []
+
+
+def test_the_area_under_the_curve_of_poses():
+    assert metrics.pose_auc([0.0, 0.0]) == [1, 1, 1]
+    assert metrics.pose_auc([30.0, math.nan, math.inf]) == [0, 0, 0]
+    # One error of 5: the curve rises from 0 to 1 between 0 and 5 degrees, and stays there.
+    assert metrics.pose_auc([5.0]) == pytest.approx([0, 0.75, 0.875])
+    assert metrics.pose_auc([5.0, 40.0]) == pytest.approx([0, 0.375, 0.4375])
+    assert all(math.isnan(area) for area in metrics.pose_auc([]))
+
+
+def test_the_worst_of_a_still_camera_is_its_rotation():
+    assert metrics.PoseError(3, math.nan).worst == 3
+    assert metrics.PoseError(3, 8).worst == 8
+
+
+def test_the_calibration_error_is_the_gap_between_scores_and_shares():
+    scores, truths = torch.tensor([0.9, 0.9, 0.1, 0.1]), torch.tensor([True, False, False, False])
+    assert metrics.calibration_error(scores, truths) == pytest.approx((0.4 + 0.1) / 2, abs=1e-6)
+    assert metrics.calibration_error(torch.tensor([1.0, 0.0]), torch.tensor([True, False])) == 0
+    assert math.isnan(metrics.calibration_error(torch.empty(0), torch.empty(0, dtype=torch.bool)))

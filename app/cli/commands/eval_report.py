@@ -1,0 +1,81 @@
+"""`langflash eval report`: everything that is at hand, judged and put on one page."""
+
+import shlex
+import sys
+import time
+from argparse import Namespace
+from pathlib import Path
+from typing import TextIO
+
+from langflash_core.errors import InputError
+from langflash_core.files import make_folder, write_atomically
+from langflash_core.lab.photos import PhotoFolder, chosen_ids, open_folder
+
+from ...bench.machine import host
+from ..files import check_folder
+from ..renderers import open_renderer
+from ..report import ProgressBar
+
+WORK = "work"
+"""Inside the output: tallies and pictures, so that a run that was ended goes on where it stopped."""
+
+
+def report(args: Namespace, out: TextIO) -> None:
+    """Write report.html, .md, .json and .csv.
+
+    Raises:
+        LangFlashError: there is nothing to judge, or a source, the checkpoint or the output cannot be used.
+    """
+    if (args.rooms, args.posed, args.photos) == (None, None, None):
+        raise InputError("there is nothing to judge; give --rooms, --posed or --photos")
+    if args.rooms is not None and not args.rooms.is_dir():
+        raise InputError(f"there is no folder {args.rooms}; make it with langflash train cache")
+    posed, photos = _posed_folder(args.posed), _labelled_folder(args.photos)
+    check_folder(args.output)
+    from langflash_core.lab.evaluation import report_page
+    from langflash_core.lab.evaluation.report import PUBLISHED, Sources, Workplace, sections
+    from langflash_core.lab.evaluation.tallies import identity
+
+    ids = () if photos is None else chosen_ids(photos.ids, args.part)
+    sources = Sources(args.rooms, posed, photos, ids, args.limit)
+    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+        place = Workplace(renderer, args.output / WORK, args.weights, args.preset, progress)
+        found = list(sections(sources, place))
+        drawn_by = renderer.backend
+    name = args.weights.name if args.weights else args.preset
+    made = report_page.Report(
+        found,
+        PUBLISHED,
+        shlex.join(["langflash", *sys.argv[1:]]),
+        {**host(), "renderer": drawn_by},
+        f"{name} ({identity(args.weights, args.preset)})",
+        time.strftime("%Y-%m-%d"),
+    )
+    make_folder(args.output)
+    for suffix, text in (
+        ("html", report_page.html(made)),
+        ("md", report_page.markdown(made)),
+        ("json", report_page.document(made)),
+        ("csv", report_page.numbers_csv(made)),
+    ):
+        write_atomically(args.output / f"report.{suffix}", text.encode())
+    told = ", ".join(f"{section.title}: {section.result['scenes']}" for section in found)
+    print(f"{args.output / 'report.html'}: {told}", file=out)
+
+
+def _posed_folder(path: Path | None) -> PhotoFolder | None:
+    if path is None:
+        return None
+    folder = open_folder(path)
+    if folder.poses is None:
+        raise InputError(f"{path} has no poses.txt; add it, or leave --posed out")
+    return folder
+
+
+def _labelled_folder(path: Path | None) -> PhotoFolder | None:
+    if path is None:
+        return None
+    folder = open_folder(path)
+    if not folder.labelled:
+        raise InputError(f"{path} has no names.csv, so nothing in it is labelled; add one, and labels/")
+    return folder

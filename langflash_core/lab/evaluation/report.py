@@ -1,0 +1,254 @@
+"""`langflash eval report`: every set that is at hand, judged scene by scene, as sections of one report.
+
+Each section is what the command of its name judges (`eval rooms`, `posed`, `photos-labelled`), with an
+interval of every number, pictures, and a plot of speed against error. What is kept in the work folder is
+not judged again, unless weights or options changed.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from langflash_core.errors import InputError
+from langflash_core.lab.evaluation import labelled, posed, rooms
+from langflash_core.lab.evaluation.photo_tables import LABEL_LISTS, PHOTOS, POSED
+from langflash_core.lab.evaluation.photo_tables import METHODS as PHOTO_METHODS
+from langflash_core.lab.evaluation.posed import APART, PAIRS, chosen_triples, pair_tallies
+from langflash_core.lab.evaluation.report_parts import (
+    Gallery,
+    Plot,
+    Point,
+    Section,
+    Table,
+    labels_table,
+    measures_table,
+)
+from langflash_core.lab.evaluation.sights import Look
+from langflash_core.lab.evaluation.speed import PAPER_MS
+from langflash_core.lab.evaluation.tables import COLUMNS, MEASURES, METHODS, cell
+from langflash_core.lab.evaluation.tallies import Shelf, identity, intervals, merged
+from langflash_core.lab.photos import PhotoFolder
+from langflash_core.running import Progress
+
+WORST, BEST = 6, 2
+"""Scenes shown of a section."""
+DRAWS = 300
+PUBLISHED = Table(
+    "",
+    ("system", "data", "measure", "value"),
+    (
+        ("LangFlash (Li et al. 2026), main table", "ScanNet, 40 scenes", "mIoU, accuracy", "0.7416, 0.8718"),
+        ("LangFlash, table of K, K = 128", "ScanNet, 40 scenes", "mIoU, accuracy", "0.7144, 0.8547"),
+        ("EPS3D (arXiv 2606.08980)", "as published", "panoptic quality, instance mIoU", "0.530, 0.42"),
+        ("Instok3D (arXiv 2606.29513), one vector a group", "ScanNet", "mIoU", "0.635"),
+        ("Instok3D, plus 8 residual channels", "ScanNet", "mIoU", "0.657"),
+        *(
+            (f"LangFlash: {stage}", "2 photos of 256 x 256, unnamed GPU", "ms", f"{ms:g}")
+            for stage, ms in PAPER_MS.items()
+        ),
+    ),
+)
+"""What papers say of themselves, on data that is not here; `eval protocol` judges on theirs."""
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What is at hand: a cache of rooms, posed and labelled photos (None: not there), and of each only so
+    many."""
+
+    rooms: Path | None = None
+    posed: PhotoFolder | None = None
+    photos: PhotoFolder | None = None
+    photo_ids: Sequence[str] = ()
+    limit: int | None = None
+
+
+@dataclass(frozen=True)
+class Workplace:
+    """render: draws scenes; folder: where tallies and pictures are kept; weights, preset: as everywhere."""
+
+    render: labelled.Render
+    folder: Path
+    weights: Path | None = None
+    preset: str = "mini"
+    progress: Progress = lambda stage, fraction: None
+
+    def shelf(self, section: str, kind: type, **key: object) -> Shelf:
+        key = {"weights": identity(self.weights, self.preset), **key}
+        return Shelf(self.folder / section, key, kind)
+
+
+def sections(sources: Sources, place: Workplace) -> Iterator[Section]:
+    """A section of each source, as soon as it is judged.
+
+    Raises:
+        InputError: there is no source, or one cannot be used. WeightsError: of the checkpoint.
+    """
+    wanted = [s for s in (sources.rooms, sources.posed, sources.photos) if s is not None]
+    if not wanted:
+        raise InputError("there is nothing to judge; give --rooms, --posed or --photos")
+    if sources.rooms is not None:
+        yield rooms_section(sources.rooms, place, sources.limit)
+    if sources.posed is not None:
+        yield posed_section(sources.posed, place, sources.limit)
+    if sources.photos is not None:
+        yield photos_section(sources.photos, sources.photo_ids or sources.photos.ids, place, sources.limit)
+
+
+def rooms_section(data: Path, place: Workplace, limit: int | None = None) -> Section:
+    """Furnished rooms whose furniture no training saw, every rival in the same run."""
+    setting, held_out = rooms.open_rooms(data, place.weights, preset=place.preset, limit=limit)
+    shelf = place.shelf("rooms", rooms.Tally, data=data.resolve().name, groups=len(setting.groups))
+    kept, gallery = _told(
+        place, shelf, len(held_out), lambda look: rooms.room_tallies(setting, held_out, shelf, look)
+    )
+    result, bounds = _summed(kept, lambda tally: rooms.summary(tally, setting))
+    seeds = sorted(map(int, kept))
+    about = (
+        f"{len(kept)} rooms, seeds {seeds[0]} to {seeds[-1]}, furniture held out from training; two photos "
+        "make the scene, a third view judges it where a photo sees the surface."
+    )
+    columns = {column: column.replace("_", " ").replace("miou", "mIoU") for column in COLUMNS}
+    return Section(
+        "rooms",
+        "Rooms",
+        about,
+        {"scenes": len(kept), **result},
+        bounds,
+        (
+            measures_table("Measures", MEASURES, result["measures"], bounds),
+            labels_table("Labels, every rival in the same run", METHODS, columns, result["labels"], bounds),
+            _stage_table(result["measures"]),
+        ),
+        _room_plots(result, bounds),
+        gallery.shown(list(kept), WORST, BEST),
+    )
+
+
+def posed_section(folder: PhotoFolder, place: Workplace, limit: int | None = None) -> Section:
+    """Pairs of real photos whose poses somebody measured."""
+    triples = chosen_triples(folder.ids, limit or PAIRS, APART)
+    shelf = place.shelf("posed", posed.Tally, folder=folder.root.name)
+    kept, gallery = _told(
+        place,
+        shelf,
+        len(triples),
+        lambda look: pair_tallies(
+            folder, triples, place.render, place.weights, preset=place.preset, shelf=shelf, look=look
+        ),
+    )
+    result, bounds = _summed(kept, lambda tally: {"measures": posed.summary(tally)})
+    about = (
+        f"{len(kept)} pairs of {folder.root.name}, {', '.join(map(str, APART))} numbers apart; the photo "
+        "half-way between is drawn from its true place."
+    )
+    return Section(
+        "posed",
+        "Real photos of known poses",
+        about,
+        {"scenes": len(kept), **result},
+        bounds,
+        (measures_table("Measures", POSED, result["measures"], bounds),),
+        (),
+        gallery.shown(list(kept), WORST, BEST),
+    )
+
+
+def photos_section(
+    folder: PhotoFolder, ids: Sequence[str], place: Workplace, limit: int | None = None
+) -> Section:
+    """Single real photos that somebody labelled."""
+    chosen = list(ids)[:limit]
+    judged = labelled.judged_by(folder, place.render, place.weights, preset=place.preset)
+    shelf = place.shelf("photos", labelled.Tally, folder=folder.root.name, words=len(judged.words.phrases))
+    kept, gallery = _told(
+        place, shelf, len(chosen), lambda look: labelled.photo_tallies(judged, folder, chosen, shelf, look)
+    )
+    result, bounds = _summed(kept, lambda tally: labelled.summary(tally, judged.words))
+    columns = {
+        f"{kind}_{what}": f"{text}: {name}"
+        for kind, text in LABEL_LISTS.items()
+        for what, name in (("miou", "mIoU"), ("accuracy", "accuracy"))
+    }
+    return Section(
+        "photos",
+        "Real photos with labels",
+        f"{len(kept)} photos of {folder.root.name}, each reconstructed alone and asked as anybody would ask.",
+        {"scenes": len(kept), **result},
+        bounds,
+        (
+            measures_table("Measures", PHOTOS, result["measures"], bounds),
+            labels_table("Labels", PHOTO_METHODS, columns, result["labels"], bounds),
+        ),
+        (),
+        gallery.shown(list(kept), WORST, BEST),
+    )
+
+
+def _told(
+    place: Workplace, shelf: Shelf, count: int, run: Callable[[Look], Iterator[tuple[str, Any]]]
+) -> tuple[dict[str, Any], Gallery]:
+    """Tallies by name as they come, with progress, and the gallery of their sights."""
+    section = shelf.folder.name
+    gallery = Gallery(shelf.folder / "pictures")
+    kept: dict[str, Any] = {}
+    place.progress(section, 0.0)
+    for name, tally in run(gallery.add):
+        kept[name] = tally
+        place.progress(f"{section}: {name}, {len(kept)} of {count}", len(kept) / max(count, 1))
+    if not kept:
+        raise InputError(f"no scene of the section {section} was judged; give a source that holds some")
+    return kept, gallery
+
+
+def _summed(
+    kept: Mapping[str, Any], summary: Callable[[Any], Mapping[str, Any]]
+) -> tuple[dict[str, Any], dict[str, list[float] | None]]:
+    tallies = list(kept.values())
+    return dict(summary(merged(tallies))), intervals(tallies, summary, draws=DRAWS)
+
+
+def _stages(measures: Mapping[str, float | None]) -> dict[str, float]:
+    """Mean seconds of the network's stages, in order of what they take."""
+    found = {
+        name.removeprefix("stage_").removesuffix("_seconds"): value
+        for name, value in measures.items()
+        if name.startswith("stage_") and value is not None
+    }
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def _stage_table(measures: Mapping[str, float | None]) -> Table:
+    rows = [(name, cell(1000 * value).removesuffix(".000")) for name, value in _stages(measures).items()]
+    return Table("Seconds by stage of the network", ("stage, two photos", "ms, mean"), rows)
+
+
+def _room_plots(result: Mapping[str, Any], bounds: Mapping[str, Sequence[float] | None]) -> tuple[Plot, ...]:
+    """Ways to name what a new view shows: what the stages take that each needs, and how wrong it is."""
+    stages = _stages(result["measures"])
+    whole = sum(stages.values())
+    needed = {
+        "features": stages.get("encoder", 0.0) + stages.get("language features", 0.0),
+        "averaged": whole - stages.get("aggregation", 0.0),
+        "lfa": whole,
+    }
+    points = []
+    for method, seconds in needed.items():
+        error = result["labels"].get(method, {}).get("target_groups_miou")
+        if error is None or seconds <= 0:
+            continue
+        around = bounds.get(f"labels/{method}/target_groups_miou")
+        flipped = None if around is None else [1 - around[1], 1 - around[0]]
+        points.append(Point(METHODS[method], seconds, 1 - error, flipped))
+    if not points or math.isclose(whole, 0):
+        return ()
+    return (
+        Plot(
+            "Speed against error: names in a new view",
+            "seconds for two photos, network alone (2D features: the new view's own photo)",
+            "1 - mIoU over class groups",
+            points,
+        ),
+    )

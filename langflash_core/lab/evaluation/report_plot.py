@@ -1,0 +1,94 @@
+"""Speed against error as SVG: a point a way of doing it, its interval as a line, the best lower left."""
+
+import math
+from collections.abc import Callable, Sequence
+from html import escape
+
+from langflash_core.lab.evaluation.report_parts import Plot, Point
+from langflash_core.lab.evaluation.sights import label_colour
+
+WIDTH, HEIGHT = 640, 340
+LEFT, RIGHT, TOP, BOTTOM = 62, 24, 18, 48
+
+
+def svg(plot: Plot) -> str:
+    """The plot as one <svg> element; seconds are logarithmic where they differ by more than ten times."""
+    points = [p for p in plot.points if math.isfinite(p.seconds) and math.isfinite(p.error)]
+    if not points:
+        return ""
+    seconds = [max(p.seconds, 1e-6) for p in points]
+    logarithmic = max(seconds) > 10 * min(seconds)
+    across = _ticks(seconds, logarithmic)
+    highs = [p.bounds[1] if p.bounds else p.error for p in points]
+    lows = [p.bounds[0] if p.bounds else p.error for p in points]
+    up = _ticks([*highs, *lows], False)
+
+    def x(value: float) -> float:
+        low, high = across[0], across[-1]
+        share = math.log(value / low) / math.log(high / low) if logarithmic else (value - low) / (high - low)
+        return LEFT + share * (WIDTH - LEFT - RIGHT)
+
+    def y(value: float) -> float:
+        return HEIGHT - BOTTOM - (value - up[0]) / (up[-1] - up[0]) * (HEIGHT - TOP - BOTTOM)
+
+    parts = [
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" role="img" '
+        f'aria-label="{escape(plot.title)}" xmlns="http://www.w3.org/2000/svg">'
+    ]
+    bottom, right = HEIGHT - BOTTOM, WIDTH - RIGHT
+    for tick in up:
+        place = f"{y(tick):.1f}"
+        parts.append(f'<line class="grid" x1="{LEFT}" x2="{right}" y1="{place}" y2="{place}"/>')
+        parts.append(f'<text x="{LEFT - 8}" y="{y(tick) + 4:.1f}" text-anchor="end">{tick:.3g}</text>')
+    for tick in across:
+        place = f"{x(tick):.1f}"
+        parts.append(f'<line class="grid" x1="{place}" x2="{place}" y1="{TOP}" y2="{bottom}"/>')
+        parts.append(f'<text x="{place}" y="{bottom + 17}" text-anchor="middle">{tick:.3g}</text>')
+    middle = (LEFT + WIDTH - RIGHT) / 2
+    parts.append(f'<text x="{middle}" y="{HEIGHT - 8}" text-anchor="middle">{escape(plot.across)}</text>')
+    parts.append(
+        f'<text transform="translate(14 {(TOP + HEIGHT - BOTTOM) / 2}) rotate(-90)" '
+        f'text-anchor="middle">{escape(plot.up)}</text>'
+    )
+    for row, (point, own) in enumerate(zip(points, seconds, strict=True)):
+        parts += _mark(point, x(own), y, _dark(label_colour(row)))
+    return "\n".join([*parts, "</svg>"])
+
+
+def _mark(point: Point, x: float, y: Callable[[float], float], colour: str) -> list[str]:
+    """Point, interval and name; the name stands where there is room."""
+    after = x < WIDTH * 0.6
+    place, anchor = (x + 9, "start") if after else (x - 9, "end")
+    parts = []
+    if point.bounds is not None:
+        low, high = y(point.bounds[0]), y(point.bounds[1])
+        parts.append(
+            f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{low:.1f}" y2="{high:.1f}" '
+            f'stroke="{colour}" stroke-width="2"/>'
+        )
+    parts.append(f'<circle cx="{x:.1f}" cy="{y(point.error):.1f}" r="5" fill="{colour}"/>')
+    parts.append(
+        f'<text class="name" x="{place:.1f}" y="{y(point.error) + 4:.1f}" '
+        f'text-anchor="{anchor}">{escape(point.name)}</text>'
+    )
+    return parts
+
+
+def _dark(colour: tuple[int, int, int]) -> str:
+    """Readable on white paper and on black."""
+    return f"rgb({', '.join(str(value * 3 // 4) for value in colour)})"
+
+
+def _ticks(values: Sequence[float], logarithmic: bool) -> list[float]:
+    """Round numbers around the values, at least two."""
+    low, high = min(values), max(values)
+    if logarithmic:
+        powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+        marks = [round(m * 10.0**p, 12) for p in powers for m in (1, 2, 5)]
+        below, above = max(m for m in marks if m <= low), min(m for m in marks if m >= high)
+        return [m for m in marks if below <= m <= above]
+    reach = (high - low) or abs(high) or 1.0
+    step = 10.0 ** math.floor(math.log10(reach))
+    step = next(step * m for m in (0.2, 0.5, 1, 2, 5) if reach / (step * m) <= 5)
+    first, last = math.floor(low / step - 0.2), math.ceil(high / step + 0.2)
+    return [round(n * step, 12) for n in range(first, last + 1)]

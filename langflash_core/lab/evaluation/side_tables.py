@@ -1,0 +1,95 @@
+"""Results of `langflash eval sides` as markdown: one version, or two on the same rooms and pairs."""
+
+import math
+from collections.abc import Iterator
+
+from langflash_core.lab.evaluation.sides import grouped, number
+from langflash_core.lab.training.measures import nan_mean
+
+_LOOK = (
+    ("PSNR (dB)", "psnr"),
+    ("SSIM", "ssim"),
+    ("LPIPS", "lpips"),
+    ("sheets (% of drawn)", "sheets"),
+    ("holes (% of seen)", "holes"),
+    ("seen by a photo (%)", "seen"),
+)
+_SHARES = ("sheets", "holes", "seen")
+_ONCE = (
+    ("Depth boundaries in the photos, F1", "boundary_f1"),
+    ("Layers: distance of the two photos' surfaces, median (% of depth)", "layers_median"),
+    ("Layers, 90th percentile (% of depth)", "layers_p90"),
+    ("Distance of drawn points from their true places, median (% of depth)", "misfit"),
+    ("Rotation error, median (degrees)", "rotation_median"),
+    ("Direction error, median (degrees)", "direction_median"),
+    ("Second photo found its place", "placed"),
+    ("Reconstruction, seconds", "seconds"),
+)
+_PERCENT = (*_SHARES, "layers_median", "layers_p90", "misfit")
+
+
+def sides_markdown(result: dict) -> str:
+    """The tables of a `run_sides` result: what a scene has once, and by where it is seen from."""
+    measures, looks = result["measures"], result["by_look"]
+    lines = [f"| measure | mean of {len(result['cases'])} |", "|---|---|"]
+    lines += [f"| {title} | {_told(key, measures[key])} |" for title, key in _ONCE]
+    columns = [(title, key) for title, key in _LOOK if any(key in row for row in looks.values())]
+    lines += ["", "| seen from | scenes | " + " | ".join(title for title, _ in columns) + " |"]
+    lines.append("|---" * (len(columns) + 2) + "|")
+    for group, row in looks.items():
+        cells = [str(row["cases"]), *(_told(key, row.get(key)) for _, key in columns)]
+        lines.append(f"| {_place(group)} | " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def beside_markdown(before: dict, after: dict) -> str:
+    """Two results beside each other, over the cases and looks that both have: means, and the mean
+    difference with its standard error over cases."""
+    cases, others = ({row["name"]: row for row in result["cases"]} for result in (before, after))
+    pairs = [(row, others[name]) for name, row in cases.items() if name in others]
+    lines = [f"| measure ({len(pairs)} scenes) | before | after | difference |", "|---|---|---|---|"]
+    for title, key in _ONCE:
+        name = key.removesuffix("_median") if key.startswith(("rotation", "direction")) else key
+        values = [(number(old[name]), number(new[name])) for old, new in pairs]
+        lines += _row(title.replace(", median (degrees)", " (degrees)"), key, values)
+    for group in [group for group in before["by_look"] if group in after["by_look"]]:
+        for title, key in _LOOK:
+            lines += _row(f"{_place(group)}: {title}", key, list(_looks(pairs, group, key)))
+    return "\n".join(lines) + "\n"
+
+
+def _looks(pairs: list[tuple[dict, dict]], group: str, key: str) -> Iterator[tuple[float, float]]:
+    """Means of a group in each case, before and after, over looks of one name."""
+    for old, new in pairs:
+        shared = old["looks"].keys() & new["looks"].keys()
+        means = [
+            grouped({"looks": {name: row["looks"][name] for name in shared}}).get(group, {})
+            for row in (old, new)
+        ]
+        yield number(means[0].get(key)), number(means[1].get(key))
+
+
+def _row(title: str, key: str, values: list[tuple[float, float]]) -> list[str]:
+    kept = [(old, new) for old, new in values if not (math.isnan(old) or math.isnan(new))]
+    if not kept:
+        return []
+    changes = [new - old for old, new in kept]
+    mean = nan_mean(changes)
+    spread = math.sqrt(sum((c - mean) ** 2 for c in changes) / max(len(changes) - 1, 1) / len(changes))
+    old, new = (nan_mean(side) for side in zip(*kept, strict=True))
+    cells = (_told(key, old), _told(key, new), f"{_told(key, mean, '+')} ± {_told(key, spread)}")
+    return [f"| {title} | " + " | ".join(cells) + " |"]
+
+
+def _place(group: str) -> str:
+    if group == "0":
+        return "the photos' own places"
+    if group == "between":
+        return "between the photos"
+    return f"{group} degrees aside" if group.isdigit() else f"{group} degrees"
+
+
+def _told(key: str, value: float | None, sign: str = "") -> str:
+    if value is None or math.isnan(value):
+        return "-"
+    return format(100 * value, f"{sign}.2f") if key in _PERCENT else format(value, f"{sign}.3f")

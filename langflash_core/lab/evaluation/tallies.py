@@ -1,0 +1,193 @@
+"""What a run collects scene by scene: added up, kept on disk, and read again.
+
+A tally is a dataclass of lists (joined), dictionaries (their values added), tensors and numbers (added).
+Kept as one JSON file a scene, so that a run that was ended goes on where it stopped, and intervals can be
+drawn over scenes.
+"""
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import torch
+from torch import Tensor
+
+from langflash_core.files import make_folder, write_atomically
+from langflash_core.lab.evaluation.intervals import bootstrap
+from langflash_core.lab.evaluation.metrics import PoseError, Presence
+from langflash_core.lab.evaluation.segments import ClassQuality, Panoptic
+from langflash_core.network import PRESETS
+from langflash_core.network.checkpoints.store import part_folder
+from langflash_core.resources import asset_path
+
+Item = TypeVar("Item")
+_VALUES: dict[str, type] = {kind.__name__: kind for kind in (PoseError, Presence, ClassQuality, Panoptic)}
+_TYPES = {str(kind): kind for kind in (torch.int64, torch.float32, torch.float64, torch.bool)}
+
+
+def merged(tallies: Sequence[Item]) -> Item:
+    """One tally of several, in order.
+
+    Raises:
+        ValueError: there is none.
+    """
+    if not tallies:
+        raise ValueError("tallies: expected at least one, received none")
+    kind = type(tallies[0])
+    assert is_dataclass(kind)
+    return kind(**{f.name: _sum([getattr(t, f.name) for t in tallies]) for f in fields(kind)})  # type: ignore[return-value]
+
+
+def _sum(values: Sequence[Any]) -> Any:
+    first = values[0]
+    if isinstance(first, list):
+        return [entry for value in values for entry in value]
+    if isinstance(first, dict):
+        keys = dict.fromkeys(key for value in values for key in value)
+        return {key: _sum([value[key] for value in values if key in value]) for key in keys}
+    if isinstance(first, tuple):
+        return tuple(map(sum, zip(*values, strict=True)))
+    total = first
+    for value in values[1:]:
+        total = total + value
+    return total
+
+
+def plain(value: Any) -> Any:
+    """A tally, or what is in one, as JSON can hold it; `revived` is the way back."""
+    if isinstance(value, Tensor):
+        places = value.nonzero()
+        return {
+            "of": "tensor",
+            "type": str(value.dtype),
+            "shape": list(value.shape),
+            "places": places.tolist(),
+            "values": plain(value[tuple(places.T)].tolist()),
+        }
+    if is_dataclass(value) and not isinstance(value, type):
+        entries = {f.name: plain(getattr(value, f.name)) for f in fields(value)}
+        return {"of": type(value).__name__, "fields": entries}
+    if isinstance(value, dict):
+        return {"of": "dict", "entries": [[plain(key), plain(entry)] for key, entry in value.items()]}
+    if isinstance(value, tuple):
+        return {"of": "tuple", "entries": [plain(entry) for entry in value]}
+    if isinstance(value, list):
+        return [plain(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return {"of": "float", "text": str(value)}
+    return value
+
+
+def revived(document: Any, kinds: Mapping[str, type]) -> Any:
+    """What `plain` was given.
+
+    Args:
+        kinds: dataclasses that may occur besides those of `metrics` and `segments`, by name.
+
+    Raises:
+        ValueError, KeyError, TypeError: the document is something else.
+    """
+    if isinstance(document, list):
+        return [revived(entry, kinds) for entry in document]
+    if not isinstance(document, dict):
+        return document
+    match document["of"]:
+        case "tensor":
+            tensor = torch.zeros(document["shape"], dtype=_TYPES[document["type"]])
+            if document["places"]:
+                places = torch.tensor(document["places"])
+                tensor[tuple(places.T)] = torch.tensor(revived(document["values"], {}), dtype=tensor.dtype)
+            return tensor
+        case "dict":
+            return {revived(key, kinds): revived(entry, kinds) for key, entry in document["entries"]}
+        case "tuple":
+            return tuple(revived(entry, kinds) for entry in document["entries"])
+        case "float":
+            return float(document["text"])
+        case name:
+            kind = {**_VALUES, **kinds}[name]
+            return kind(**{key: revived(entry, kinds) for key, entry in document["fields"].items()})
+
+
+@dataclass(frozen=True)
+class Shelf:
+    """A folder of kept tallies, `name`.json each; `key`: what must be the same for one to be used again."""
+
+    folder: Path
+    key: Mapping[str, object]
+    kind: type
+
+    def read(self, name: str) -> Any | None:
+        """The tally of a scene; None where there is none, or one that was made otherwise."""
+        try:
+            document = json.loads((self.folder / f"{name}.json").read_bytes())
+            if document["key"] != json.loads(json.dumps(self.key)):
+                return None
+            return revived(document["tally"], {self.kind.__name__: self.kind})
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+
+    def write(self, name: str, tally: Any) -> None:
+        """Keep a tally.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        make_folder(self.folder)
+        document = {"key": self.key, "tally": plain(tally)}
+        write_atomically(self.folder / f"{name}.json", json.dumps(document, allow_nan=False).encode())
+
+
+def identity(weights: Path | None, preset: str) -> str:
+    """Which weights a tally was made with: the digest of the file named or shipped, or of those installed."""
+    shipped = asset_path(f"weights/{preset}.safetensors")
+    paths = [weights] if weights is not None else [shipped] if shipped.is_file() else []
+    paths = paths or sorted(part_folder(PRESETS[preset]).glob("*.safetensors"))
+    total = hashlib.sha256(preset.encode())
+    for path in paths:
+        with path.open("rb") as stream:
+            total.update(hashlib.file_digest(stream, "sha256").digest())
+    return total.hexdigest()[:16]
+
+
+def collected(
+    items: Iterable[tuple[str, Item]],
+    judge: Callable[[Item], Any],
+    shelf: Shelf | None = None,
+) -> Iterator[tuple[str, Any]]:
+    """(name, tally) of every item: from the shelf, or judged now and kept there."""
+    for name, item in items:
+        tally = None if shelf is None else shelf.read(name)
+        if tally is None:
+            tally = judge(item)
+            if shelf is not None:
+                shelf.write(name, tally)
+        yield name, tally
+
+
+def numbers_of(document: Mapping[str, Any], before: str = "") -> dict[str, float]:
+    """Every number of a nested result by its path ("measures/psnr"); null is NaN, lists are left out."""
+    found: dict[str, float] = {}
+    for key, value in document.items():
+        path = f"{before}{key}"
+        if isinstance(value, Mapping):
+            found |= numbers_of(value, f"{path}/")
+        elif value is None or (isinstance(value, int | float) and not isinstance(value, bool)):
+            found[path] = math.nan if value is None else float(value)
+    return found
+
+
+def intervals(
+    tallies: Sequence[Item], summary: Callable[[Item], Mapping[str, Any]], *, draws: int = 300
+) -> dict[str, list[float] | None]:
+    """Where each number of a summary lies in 95 % of draws of scenes, by the paths of `numbers_of`; None:
+    unknown."""
+    found = bootstrap(tallies, lambda chosen: numbers_of(summary(merged(chosen))), draws=draws)
+    return {
+        name: None if math.isnan(low) or math.isnan(high) else [round(low, 4), round(high, 4)]
+        for name, (low, high) in found.items()
+    }
