@@ -597,11 +597,14 @@ def _add_sides(actions) -> None:
     command.add_argument(
         "--results", type=Path, metavar="DIR", help="also keep every scene's numbers, for sides-beside"
     )
+    command.add_argument("--sheet", type=Path, metavar="IMG", help="also six scenes from aside, as .png")
     _add_judging(command)
     beside = _command(actions, "sides-beside", "two results of sides on the same scenes, beside each other")
     beside.add_argument("before", type=Path, metavar="BEFORE", help="folder of --results")
     beside.add_argument("after", type=Path, metavar="AFTER", help="folder of --results")
     beside.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
+    beside.add_argument("--sheet", type=Path, metavar="IMG", help="also six scenes of both, as .png")
+    beside.set_defaults(json=False)
 
 
 def _add_folder(command: argparse.ArgumentParser) -> None:
