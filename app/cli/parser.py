@@ -257,6 +257,7 @@ def _add_render(commands) -> None:
     command.add_argument(
         "--prompt", nargs="+", metavar="PHRASE", help="for relevance (one) and labels (any number)"
     )
+    _add_fade(command)
     _add_backend(command)
     _add_json(command)
 
@@ -299,6 +300,7 @@ def _add_export(commands) -> None:
         "--replace", action="store_true", help="also what is there by the name of a legend or a COCO picture"
     )
     _add_camera(command)
+    _add_fade(command)
     _add_backend(command)
 
 
@@ -710,6 +712,12 @@ def _add_camera(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument(
         "--size", type=size, metavar="WxH", help="pixels to draw (default: as the network saw it)"
+    )
+
+
+def _add_fade(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--fade", action="store_true", help="leave out what no photo looked at from about there, softly"
     )
 
 

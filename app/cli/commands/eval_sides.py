@@ -66,7 +66,7 @@ def sides(args: Namespace, out: TextIO) -> None:
     if args.results is not None:
         make_folder(args.results)
         write_atomically(args.results / NUMBERS, json.dumps(result, indent=1).encode())
-    if args.sheet is not None:
+    if args.sheet is not None and args.results is not None:
         _write_sheet(args.sheet, [("drawn", args.results)])
     write_tables(args, result, sides_markdown(result), out)
 
