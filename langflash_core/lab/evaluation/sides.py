@@ -180,6 +180,8 @@ def _judged(
         rgb, shown = drawn.frame.rgb.cpu(), torch.from_numpy(seen)
         numbers["holes"] = float((depths[seen] == 0).mean())
         numbers["psnr"] = psnr(rgb[shown], look.rgb[shown])
+        both = shown & torch.from_numpy(depths > 0)
+        numbers["psnr_covered"] = psnr(rgb[both], look.rgb[both]) if bool(both.any()) else math.nan
         numbers["ssim"] = float(ssim_map(rgb.clamp(0, 1), look.rgb)[shown].mean())
         if lpips is not None and look.group in PERCEIVED:
             numbers["lpips"] = lpips(rgb[None], look.rgb[None], shown[None])[0]
