@@ -19,9 +19,8 @@ from langflash_core.geometry.cameras import invert_rigid, transform, unproject
 from langflash_core.types import Camera, Frame, Scene
 
 FULL, NONE = 30.0, 75.0
-"""Degrees aside up to which a surface is shown whole, and from which it is not shown at all. On rooms a
-picture loses half of what it loses at 45 degrees within the first 20, and most things lean by then; halfway
-the fade passes what the edges of things cannot show."""
+"""Degrees aside up to which a surface is shown whole, and from which it is not shown at all. Chosen by eye on
+the demo pairs: at 45 degrees a table still stands, at 65 what was smeared behind things hides them."""
 COSINES = math.cos(math.radians(NONE)), math.cos(math.radians(FULL))
 
 
