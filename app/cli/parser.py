@@ -252,6 +252,7 @@ def _add_render(commands) -> None:
     command.add_argument(
         "--prompt", nargs="+", metavar="PHRASE", help="for relevance (one) and labels (any number)"
     )
+    _add_fade(command)
     _add_backend(command)
     _add_json(command)
 
@@ -294,6 +295,7 @@ def _add_export(commands) -> None:
         "--replace", action="store_true", help="also what is there by the name of a legend or a COCO picture"
     )
     _add_camera(command)
+    _add_fade(command)
     _add_backend(command)
 
 
@@ -603,11 +605,14 @@ def _add_sides(actions) -> None:
     command.add_argument(
         "--results", type=Path, metavar="DIR", help="also keep every scene's numbers, for sides-beside"
     )
+    command.add_argument("--sheet", type=Path, metavar="IMG", help="also six scenes from aside, as .png")
     _add_judging(command)
     beside = _command(actions, "sides-beside", "two results of sides on the same scenes, beside each other")
     beside.add_argument("before", type=Path, metavar="BEFORE", help="folder of --results")
     beside.add_argument("after", type=Path, metavar="AFTER", help="folder of --results")
     beside.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
+    beside.add_argument("--sheet", type=Path, metavar="IMG", help="also six scenes of both, as .png")
+    beside.set_defaults(json=False)
 
 
 def _add_protocol(actions) -> None:
@@ -752,6 +757,12 @@ def _add_camera(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument(
         "--size", type=size, metavar="WxH", help="pixels to draw (default: as the network saw it)"
+    )
+
+
+def _add_fade(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--fade", action="store_true", help="leave out what no photo looked at from about there, softly"
     )
 
 

@@ -64,9 +64,21 @@ class GlRenderer:
         self._context.release()
 
 
+class Fading:
+    """A renderer whose frames fade where no photo looked from about there; see `scene.trust`."""
+
+    def __init__(self, inner: Renderer) -> None:
+        self.inner, self.backend = inner, inner.backend
+
+    def __call__(self, scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame:
+        from langflash_core.scene.trust import faded
+
+        return faded(self.inner(scene, camera, weight_maps=weight_maps), camera, scene)
+
+
 @contextmanager
-def open_renderer(backend: "str | Renderer | None") -> Iterator[Renderer]:
-    """A renderer for the length of a command.
+def open_renderer(backend: "str | Renderer | None", *, fade: bool = False) -> Iterator[Renderer]:
+    """A renderer for the length of a command; `fade`: as `Fading`.
 
     Args:
         backend: "gl", "torch", or None: gl, and torch with a warning where OpenGL or what speaks it is
@@ -75,6 +87,10 @@ def open_renderer(backend: "str | Renderer | None") -> Iterator[Renderer]:
     Raises:
         GraphicsError, MissingPackageError: "gl" was asked for and is not there.
     """
+    if fade:
+        with open_renderer(backend) as inner:
+            yield Fading(inner)
+        return
     if backend is not None and not isinstance(backend, str):
         yield backend
         return

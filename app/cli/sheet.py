@@ -60,12 +60,12 @@ def _views(scene: Scene, pair: Sequence[Path], renderer: Renderer) -> list[np.nd
     nearness = (near / shown.depths.clamp_min(near)) * (shown.alphas > 0.5)
     photos = [_photo(path, (own.width, own.height)) for path in pair]
     return [
-        _captioned(photos[0], pair[0].name),
-        _captioned(photos[1], pair[1].name),
-        _captioned(to_8bit(shown.rgb), "view 0"),
-        _captioned(to_8bit(renderer(scene, between, weight_maps=False).rgb), "between"),
-        _captioned(to_8bit(renderer(scene, beside, weight_maps=False).rgb), "beside view 0"),
-        _captioned(to_8bit(heat(nearness)), "nearness"),
+        captioned(photos[0], pair[0].name),
+        captioned(photos[1], pair[1].name),
+        captioned(to_8bit(shown.rgb), "view 0"),
+        captioned(to_8bit(renderer(scene, between, weight_maps=False).rgb), "between"),
+        captioned(to_8bit(renderer(scene, beside, weight_maps=False).rgb), "beside view 0"),
+        captioned(to_8bit(heat(nearness)), "nearness"),
     ]
 
 
@@ -76,7 +76,7 @@ def _answers(scene: Scene, renderer: Renderer, prompts: Sequence[str]) -> list[n
     for answer, relevance in zip(result.answers, result.relevance, strict=True):
         view = heat_over(relevance, result.frame.rgb, answer.threshold, result.mode)
         verdict = f"{answer.score:.2f}" if answer.found else f"not found ({answer.score:.2f})"
-        cells.append(_captioned(to_8bit(view), f"{answer.prompt}: {verdict}"))
+        cells.append(captioned(to_8bit(view), f"{answer.prompt}: {verdict}"))
     return cells
 
 
@@ -102,7 +102,8 @@ def _photo(path: Path, size: tuple[int, int]) -> np.ndarray:
         return np.asarray(photo.convert("RGB").resize(size, Image.Resampling.LANCZOS))
 
 
-def _captioned(picture: np.ndarray, text: str) -> np.ndarray:
+def captioned(picture: np.ndarray, text: str) -> np.ndarray:
+    """A picture (H, W, 3) with a line of text over it."""
     height, width = picture.shape[:2]
     cell = Image.new("RGB", (width + 4, height + _CAPTION + 4))
     cell.paste(Image.fromarray(picture), (2, _CAPTION))

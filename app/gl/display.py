@@ -7,11 +7,12 @@ import moderngl
 import numpy as np
 
 from langflash_core.language.answers import COVERED_ALPHA
-from langflash_core.types import Camera
+from langflash_core.scene.trust import COSINES
+from langflash_core.types import Camera, Scene
 
 from .packed import PackedMaps
 from .painter import Painter, Textures, Uniforms
-from .photos import SAME, WORST, PhotoDepths
+from .photos import MOST_PHOTOS, SAME, WORST, PhotoDepths, photo_places
 from .targets import ColourTarget, LayerTarget
 from .weights import Maps
 
@@ -78,6 +79,18 @@ class Display:
             "show_rgb.frag",
             {**drawn.colour, **drawn.depth},
             {"background": drawn.background},
+        )
+
+    def faded(self, drawn: Drawn, scene: Scene) -> moderngl.Texture:
+        """The colours over their background, which takes over where no photo looked from about there."""
+        low, high = COSINES
+        return self._filled(
+            ("faded",),
+            (drawn.key, drawn.background),
+            "show_faded.frag",
+            {**drawn.colour, **drawn.depth},
+            {"background": drawn.background, **photo_places(scene, drawn.camera)},
+            {"MAX_PHOTOS": MOST_PHOTOS, "COS_NONE": low, "COS_FULL": high},
         )
 
     def depth(self, drawn: Drawn, span: Span, which: int) -> moderngl.Texture:

@@ -69,6 +69,14 @@ class PhotoDepths:
         self.texture.release()
 
 
+def photo_places(scene: Scene, camera: Camera) -> dict[str, np.ndarray | int]:
+    """Values of show_faded.frag: where the photos of a scene stand as a picture's camera has them."""
+    eyes = np.zeros((MOST_PHOTOS, 3))
+    places = np.linalg.inv(_numbers(scene.viewmats[:MOST_PHOTOS]))[:, :, 3]
+    eyes[: len(places)] = (places @ _numbers(camera.viewmat).T)[:, :3]
+    return {"num_photos": len(places), "pinhole": _pinhole(camera), "eyes": eyes}
+
+
 def _small(camera: Camera) -> Camera:
     ratio = min(1.0, LONGEST_SIDE / max(camera.width, camera.height))
     return camera.resized(max(1, round(camera.width * ratio)), max(1, round(camera.height * ratio)))

@@ -270,6 +270,14 @@ class SplatRenderer:
         picture = self._drawn()
         return picture.view.display.rgb(picture.drawn)
 
+    def faded_texture(self) -> moderngl.Texture:
+        """`rgb_texture` that fades where no photo looked from about there; the same where nobody knows of
+        the photos, and from their own places."""
+        picture = self._drawn()
+        scene = picture.scene.scene
+        display = picture.view.display
+        return display.rgb(picture.drawn) if scene.view_ids is None else display.faded(picture.drawn, scene)
+
     def heat_texture(
         self,
         prompt: int = 0,

@@ -6,6 +6,7 @@ inside a panel of any shape: the box always fits, so an input view shows all of 
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,6 +21,8 @@ MIN_REACH = 0.02  # scene units; nearer than this the pivot is inside the lens
 MIN_POLE_DEGREES = 4.0  # how near to straight up or down an orbit may come
 FOV_RANGE = (15.0, 120.0)
 FRAME_MARGIN = 1.08  # around what is framed
+NEAR, FARTHEST = 45.0, 70.0  # degrees aside of the photos: orbits slow down, and stop
+SLOWING_STEP = 2.0  # degrees
 
 
 class Vector(NamedTuple):
@@ -126,6 +129,37 @@ def orbit(pose: Pose, yaw: float, pitch: float) -> Pose:
     turned = look(pose, yaw, pitch)
     centre = pose.pivot - pose.reach * turned.axes[:, 2]
     return replace(turned, centre=Vector(*centre.tolist()))
+
+
+def orbit_near(pose: Pose, yaw: float, pitch: float, places: Sequence[Vector]) -> Pose:
+    """`orbit`, slower and slower to a stop between `NEAR` and `FARTHEST` degrees from the nearest of some
+    places, as the pivot sees them. It is free without places, on the way back, and for who went farther
+    on another way."""
+    if not places:
+        return orbit(pose, yaw, pitch)
+    # In small steps, so that a quick drag ends where a slow one does.
+    steps = max(1, math.ceil(math.degrees(max(abs(yaw), abs(pitch))) / SLOWING_STEP))
+    for _ in range(steps):
+        pose = _slowed(pose, yaw / steps, pitch / steps, places)
+    return pose
+
+
+def _slowed(pose: Pose, yaw: float, pitch: float, places: Sequence[Vector]) -> Pose:
+    turned = orbit(pose, yaw, pitch)
+    before, after = (degrees_aside(at, places) for at in (pose, turned))
+    if after <= max(before, NEAR) or before > FARTHEST:
+        return turned
+    share = (FARTHEST - max(before, NEAR)) / (FARTHEST - NEAR)
+    held = orbit(pose, yaw * share, pitch * share)
+    return pose if degrees_aside(held, places) > FARTHEST else held
+
+
+def degrees_aside(pose: Pose, places: Sequence[Vector]) -> float:
+    """Angle at the pivot between the camera and the nearest of some places, at least one."""
+    own, others = np.array(pose.centre) - pose.pivot, np.array(places) - pose.pivot
+    lengths = np.linalg.norm(own) * np.linalg.norm(others, axis=1)
+    cosine = float(np.max(others @ own / np.maximum(lengths, 1e-12)))
+    return math.degrees(math.acos(min(max(cosine, -1.0), 1.0)))
 
 
 def look(pose: Pose, yaw: float, pitch: float) -> Pose:

@@ -256,10 +256,13 @@ class Viewport:
         if (mode.answers and (not asked or len(asked) != len(self._keys))) or not mode.possible(state.info):
             mode = Mode.RGB
         active = next((i for i, p in enumerate(asked) if p.key == state.active), 0)
-        colouring = (mode, active, state.asking.atom, tuple((p.colour, p.cut) for p in asked))
+        near = state.preferences.near_photos
+        colouring = (mode, active, state.asking.atom, near, tuple((p.colour, p.cut) for p in asked))
         if colouring != self._colouring:
             self._colouring = colouring
-            self._texture = _picture(renderer, mode, asked, active, state.asking.atom)
+            faded = near and mode is Mode.RGB
+            picture = _picture(renderer, mode, asked, active, state.asking.atom)
+            self._texture = renderer.faded_texture() if faded else picture
 
 
 def _picture(

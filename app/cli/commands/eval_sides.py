@@ -1,14 +1,17 @@
 """`langflash eval sides` and `sides-beside`: scenes seen from aside, by one version of the code or by two."""
 
+import io
 import json
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.files import make_folder, write_atomically
+from langflash_core.lab.evaluation.labelled import Render
+from langflash_core.lab.evaluation.side_subjects import Case
 from langflash_core.lab.rooms import RoomRenderer, load_pack
 from langflash_core.types import Camera, Frame, Scene
 
@@ -18,7 +21,7 @@ from ..renderers import Renderer, open_renderer
 from ..report import ProgressBar, write_tables
 
 ROOMS, PAIRS = 100, 40
-NUMBERS = "sides.json"
+NUMBERS, PICTURES = "sides.json", "pictures"
 """What --results holds."""
 
 
@@ -36,26 +39,68 @@ def sides(args: Namespace, out: TextIO) -> None:
         check_output_file(args.output, (".md",))
     if args.results is not None:
         check_folder(args.results)
+    if args.sheet is not None:
+        _check_sheet(args)
     from langflash_core.lab.evaluation.lpips import Lpips
     from langflash_core.lab.evaluation.side_tables import sides_markdown
     from langflash_core.lab.evaluation.sides import run_sides
 
     lpips = None if args.lpips is None else Lpips(readable_file(args.lpips, "LPIPS file", WeightsError))
     with _cases(args) as (cases, count), open_renderer(args.backend) as renderer, ProgressBar() as progress:
+        render = _colour_only(renderer)
         result = run_sides(
             cases,
             count,
-            _colour_only(renderer),
+            render,
             args.weights,
             preset=args.preset,
             size=args.size,
             lpips=lpips,
             progress=progress,
+            made=_pictures(args, render),
         )
+        if args.results is not None and args.pack is not None:
+            from ..side_sheet import draw_pairs
+
+            draw_pairs(args.results / PICTURES, render, args.weights)
     if args.results is not None:
         make_folder(args.results)
         write_atomically(args.results / NUMBERS, json.dumps(result, indent=1).encode())
+    if args.sheet is not None and args.results is not None:
+        _write_sheet(args.sheet, [("drawn", args.results)])
     write_tables(args, result, sides_markdown(result), out)
+
+
+def _check_sheet(args: Namespace) -> None:
+    check_output_file(args.sheet, (".png",))
+    if args.results is None or args.pack is None:
+        raise InputError("--sheet shows what --results keeps of rooms; give a furniture pack and --results")
+
+
+def _pictures(args: Namespace, render: Render) -> Callable[[Case, Scene], None]:
+    """Keeps what the first rooms show, where results are kept."""
+    shown = 0
+
+    def made(case: Case, scene: Scene) -> None:
+        nonlocal shown
+        from ..side_sheet import ROOMS as SHOWN
+        from ..side_sheet import draw_room
+
+        if args.results is not None and args.pack is not None and shown < SHOWN:
+            draw_room(args.results / PICTURES, shown, case, scene, render)
+            shown += 1
+
+    return made
+
+
+def _write_sheet(path: Path, versions: Sequence[tuple[str, Path]]) -> None:
+    from ..side_sheet import side_sheet
+
+    sheet = side_sheet([(title, folder / PICTURES) for title, folder in versions])
+    stream = io.BytesIO()
+    sheet.save(stream, "PNG", optimize=True)
+    make_folder(path.parent)
+    write_atomically(path, stream.getvalue())
 
 
 def beside(args: Namespace, out: TextIO) -> None:
@@ -66,12 +111,15 @@ def beside(args: Namespace, out: TextIO) -> None:
     """
     if args.output is not None:
         check_output_file(args.output, (".md",))
+    if args.sheet is not None:
+        check_output_file(args.sheet, (".png",))
     from langflash_core.lab.evaluation.side_tables import beside_markdown
 
     before, after = (_numbers(folder) for folder in (args.before, args.after))
     if not {row["name"] for row in before["cases"]} & {row["name"] for row in after["cases"]}:
         raise InputError("these results have no scene in common; make both with the same rooms or pairs")
-    args.json = False
+    if args.sheet is not None:
+        _write_sheet(args.sheet, [("before", args.before), ("after", args.after)])
     write_tables(args, {}, beside_markdown(before, after), out)
 
 
@@ -95,7 +143,7 @@ def _cases(args: Namespace) -> Iterator[tuple[Iterator, int]]:
         yield room_cases(pack, renderer, kind=args.set, count=count, first=args.first_seed), count
 
 
-def _colour_only(renderer: Renderer):
+def _colour_only(renderer: Renderer) -> Render:
     def render(scene: Scene, camera: Camera) -> Frame:
         return renderer(scene, camera, weight_maps=False)
 

@@ -51,7 +51,7 @@ def write_whole(scene: Scene, path: Path, renderer: Renderer, prompts: Sequence[
     suffix = kind_of(path)
     unset = dict.fromkeys(("threshold", "what", "seconds", "view", "camera", "size"))
     asked = list(prompts) if suffix in (*ANSWERS_OUT, PAGE_OUT) else []
-    said = {"all_views": suffix == ".csv", "with_text": False, "replace": False}
+    said = {"all_views": suffix == ".csv", "with_text": False, "replace": False, "fade": False}
     args = Namespace(scene=path.parent, output=path, prompt=asked, backend=renderer, **said, **unset)
     _writer(suffix, None)(args, scene, asked, CameraChoice(0, None, None))
 
@@ -103,6 +103,8 @@ def _check_camera_words(args: Namespace, suffix: str) -> None:
         looked_at.append("all-views")
     if suffix in (*SCENES_OUT, *CAMERAS_OUT, PAGE_OUT) and looked_at and args.what != "boxes":
         raise InputError(f"a {suffix} holds the whole scene, not a view of it; leave --{looked_at[0]} away")
+    if args.fade and suffix in (*SCENES_OUT, *CAMERAS_OUT, PAGE_OUT) and args.what != "boxes":
+        raise InputError(f"a {suffix} holds the whole scene, and only views fade; leave --fade away")
     extra = [name for name in looked_at if name != "size"]
     if suffix == ".mp4" and extra:
         raise InputError(f"a video moves between the views by itself; leave --{extra[0]} away")
@@ -159,7 +161,7 @@ def _write_pictures(args: Namespace, scene: Scene, prompts: list[str], choice: C
     cameras, targets = _shots(args, scene, choice)
     with (
         ProgressBar() as progress,
-        open_renderer(args.backend) as renderer,
+        open_renderer(args.backend, fade=args.fade) as renderer,
         staged_folder(args.output.parent) as staging,
     ):
         results = []
@@ -182,7 +184,7 @@ def _write_numbers(args: Namespace, scene: Scene, prompts: list[str], choice: Ca
     from langflash_core.files import make_folder
 
     camera = choice.of(scene)
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+    with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade) as renderer:
         progress("drawing", 0.2)
         make_folder(args.output.parent)
         if prompts:
@@ -227,7 +229,7 @@ def _told(args: Namespace, prompts: list[str], results: list[QueryResult], camer
 def _write_boxes(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
     """Where each phrase is and how large, as JSON, CSV or glTF; a row or a box per phrase and view."""
     cameras = _shots(args, scene, choice)[0] if args.all_views else [choice.of(scene)]
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+    with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade) as renderer:
         results = []
         for index, camera in enumerate(cameras):
             progress("drawing", index / len(cameras))
@@ -253,7 +255,7 @@ def _write_masks(args: Namespace, scene: Scene, prompts: list[str], choice: Came
         check_output_file(picture, inputs=[args.scene])
         if not args.replace:
             check_beside(picture, args.output, picture)
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+    with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade) as renderer:
         results = []
         for index, camera in enumerate(cameras):
             progress("drawing", index / len(cameras))
@@ -274,7 +276,7 @@ def _write_video(args: Namespace, scene: Scene, prompts: list[str], choice: Came
     cameras = video.tour(scene, args.size or scene.view_size, args.seconds or video.SECONDS)
     with (
         ProgressBar() as progress,
-        open_renderer(args.backend) as renderer,
+        open_renderer(args.backend, fade=args.fade) as renderer,
         staged_folder(args.output.parent) as staging,
     ):
         video.write(staging / args.output.name, chosen, cameras, renderer, progress)

@@ -36,7 +36,7 @@ def run(args: Namespace, out: TextIO) -> None:
     scene = open_scene(args.scene)
     _check_atom(args.what, scene)
     camera = choice.of(scene)
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+    with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade) as renderer:
         progress("drawing", 0.2)
         pixels, more = _draw(args.what, prompts, scene, camera, renderer)
     write_picture(args.output, pixels)

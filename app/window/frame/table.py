@@ -159,6 +159,7 @@ def _looking() -> Iterable[Entry]:
     yield Entry("Fly to the selection", group, _shown(point.FrameSelection()), _plain("f"))
     yield Entry("Compare with the photo", group, _compare, _plain("p"))
     yield Entry("Show the photos' cameras", group, _cameras, _plain("k"))
+    yield Entry("Keep to what the photos saw", group, _near_photos)
     for mode in Mode:
         keys = _plain(f"_{_DIGITS[KEYED.index(mode)]}") if mode in KEYED else ()
         yield Entry(f"Show: {mode.value}", group, _mode(mode), keys)
@@ -177,6 +178,12 @@ def _compare(state: State) -> do.Command | None:
 def _cameras(state: State) -> do.Command | None:
     wanted = state.preferences
     prefer = keep.Prefer(replace(wanted, photos_in_space=not wanted.photos_in_space))
+    return prefer if state.info is not None else None
+
+
+def _near_photos(state: State) -> do.Command | None:
+    wanted = state.preferences
+    prefer = keep.Prefer(replace(wanted, near_photos=not wanted.near_photos))
     return prefer if state.info is not None else None
 
 

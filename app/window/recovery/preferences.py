@@ -26,7 +26,8 @@ _PLACES = 20_000  # pixels; beyond this a window position is no position
 class Preferences:
     """theme: of THEMES. scale: of the interface, on top of the monitor's. speed: of flying, a
     factor. touch_pad: two fingers turn, with Ctrl they zoom. photos_in_space: the cameras' frusta
-    are drawn. start_at_once: dropped photos are reconstructed without asking. panel_width: design
+    are drawn. near_photos: the picture fades, and orbits slow down, where no photo looked from about
+    there. start_at_once: dropped photos are reconstructed without asking. panel_width: design
     pixels. window: x, y, width, height in screen pixels, or none. dictionary: the same of the
     dictionary's window inside it, design pixels, and whether it is open. recent: newest first."""
 
@@ -35,6 +36,7 @@ class Preferences:
     speed: float = 1.0
     touch_pad: bool = False
     photos_in_space: bool = False
+    near_photos: bool = True
     start_at_once: bool = True
     panel_width: float = 348.0
     window: tuple[int, ...] = ()

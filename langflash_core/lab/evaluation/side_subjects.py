@@ -11,6 +11,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from langflash_core.errors import InputError
 from langflash_core.lab.evaluation.posed import Triple, as_seen, relative
 from langflash_core.lab.evaluation.side_measures import (
     DepthView,
@@ -183,8 +184,12 @@ def _worth(looks: Sequence[Look], photos: Sequence[Look]) -> list[Look]:
 
 
 def posed_cases(folder: PhotoFolder, triples: Sequence[Triple]) -> Iterator[Case]:
-    """Pairs of a posed folder: the photo from between, and for each of `ANGLES` the photo of the folder
-    that was taken the nearest to it, counted from the nearer photo of the pair."""
+    """Pairs of a posed folder: the photo from between, and for each of `ANGLES` a photo of the folder that
+    was taken from about there, counted from the nearer photo of the pair.
+
+    Raises:
+        InputError, when its truth is asked for: a photo has no depth, or no pose.
+    """
     for triple in triples:
         photos = tuple(folder.photo(id) for id in (triple.first, triple.second))
 
@@ -194,6 +199,10 @@ def posed_cases(folder: PhotoFolder, triples: Sequence[Triple]) -> Iterator[Case
             photos: tuple[LabelledPhoto, ...] = photos,
         ) -> Subject:
             own = tuple(_photo_look(photo, photos[0], size, "0") for photo in photos)
+            if not (own[0].view.depths > 0).any():
+                raise InputError(
+                    f"photo {triple.first} has no depth in metres, which is needed; add it, or --depth-unit"
+                )
             between = _photo_look(folder.photo(triple.between), photos[0], size, "between")
             aside = _looks_aside(folder, triple, photos[0], own, size)
             return Subject(own, tuple(_worth([between, *aside], own)))

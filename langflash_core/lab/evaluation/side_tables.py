@@ -7,7 +7,8 @@ from langflash_core.lab.evaluation.sides import grouped, number
 from langflash_core.lab.training.measures import nan_mean
 
 _LOOK = (
-    ("PSNR (dB)", "psnr"),
+    ("PSNR, holes black (dB)", "psnr"),
+    ("PSNR of what is covered (dB)", "psnr_covered"),
     ("SSIM", "ssim"),
     ("LPIPS", "lpips"),
     ("sheets (% of drawn)", "sheets"),

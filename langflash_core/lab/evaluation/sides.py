@@ -9,7 +9,7 @@ Sizes: H W pixels of the network's photos.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -56,11 +56,13 @@ def run_sides(
     size: int | None = None,
     lpips: Lpips | None = None,
     progress: Progress = lambda stage, fraction: None,
+    made: Callable[[Case, Scene], None] = lambda case, scene: None,
 ) -> dict:
     """Judge a checkpoint, and the code that runs it.
 
     Args:
         count: of the cases. render: draws a scene. size: as `reconstruct` has it. lpips: None leaves it out.
+        made: is given every scene.
 
     Returns:
         Plain JSON: "cases" with the numbers of each, "measures" and "by_look" their means.
@@ -72,6 +74,7 @@ def run_sides(
     for done, case in enumerate(cases):
         progress(case.name, done / max(count, 1))
         scene, seconds = scene_of(case.photos, case.intrinsics, weights=weights, preset=preset, size=size)
+        made(case, scene)
         row = judge(scene, case.truth(scene.view_size), render, lpips)
         judged.append({"name": case.name, "seconds": round(seconds, 3), **row})
     if not judged:
@@ -177,6 +180,8 @@ def _judged(
         rgb, shown = drawn.frame.rgb.cpu(), torch.from_numpy(seen)
         numbers["holes"] = float((depths[seen] == 0).mean())
         numbers["psnr"] = psnr(rgb[shown], look.rgb[shown])
+        both = shown & torch.from_numpy(depths > 0)
+        numbers["psnr_covered"] = psnr(rgb[both], look.rgb[both]) if bool(both.any()) else math.nan
         numbers["ssim"] = float(ssim_map(rgb.clamp(0, 1), look.rgb)[shown].mean())
         if lpips is not None and look.group in PERCEIVED:
             numbers["lpips"] = lpips(rgb[None], look.rgb[None], shown[None])[0]

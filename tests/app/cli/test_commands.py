@@ -6,12 +6,15 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from PIL import Image
 
+import langflash_core
 from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS
 
 TORCH = ("--backend", "torch")
@@ -132,6 +135,43 @@ def test_render(run, scene_file, tmp_path, what, backend):
     assert pixels(path).shape[:2] == (HEIGHT, WIDTH)
     assert np.ptp(pixels(path)) > 20  # it shows something
     assert os.listdir(path.parent) == ["a.png"]
+
+
+@pytest.fixture
+def of_photos(scene_file, tmp_path) -> Path:
+    """The scene, of which it is known that the first photo made it."""
+    scene = langflash_core.load(scene_file)
+    path = tmp_path / "of_photos.langflash"
+    view_ids = torch.zeros(len(scene.gaussians), dtype=torch.int64)
+    langflash_core.save(replace(scene, view_ids=view_ids), path)
+    return path
+
+
+@pytest.mark.parametrize("backend", ["gl", "torch"])
+def test_what_no_photo_looked_at_from_there_fades(run, of_photos, tmp_path, backend):
+    scene = langflash_core.load(of_photos)
+    plain, aside = tmp_path / "plain.png", tmp_path / "camera.json"
+    own = scene.camera(0)
+    viewmat = own.viewmat.clone()
+    viewmat[0, 3] -= 0.9  # 33 degrees and more aside of what is still in the picture
+    size = {"width": own.width, "height": own.height}
+    aside.write_text(json.dumps({"viewmat": viewmat.tolist(), "K": own.K.tolist(), **size}))
+    pictures = {}
+    for place in (["--view", "0"], ["--camera", str(aside)]):
+        for fade in ([], ["--fade"]):
+            outcome = run("render", of_photos, "-o", plain, *place, *fade, "--backend", backend)
+            assert outcome.code == 0, outcome.err
+            pictures[place[0], bool(fade)] = pixels(plain)
+    assert np.array_equal(pictures["--view", True], pictures["--view", False])
+    assert pictures["--camera", True].sum() < pictures["--camera", False].sum()
+
+
+def test_only_views_of_known_photos_fade(run, scene_file, of_photos, tmp_path):
+    outcome = run("export", of_photos, "-o", tmp_path / "a.ply", "--fade")
+    assert outcome.code == 2 and "leave --fade away" in outcome.err
+    assert run("export", of_photos, "-o", tmp_path / "a.png", "--fade", *TORCH).code == 0
+    outcome = run("export", scene_file, "-o", tmp_path / "b.png", "--fade", *TORCH)
+    assert outcome.code == 2 and "leave --fade out" in outcome.err and not (tmp_path / "b.png").exists()
 
 
 def test_rendered_weights_are_the_stripe(run, scene_file, tmp_path):

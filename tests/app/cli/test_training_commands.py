@@ -12,6 +12,7 @@ from langflash_core.lab.photos import layouts
 from langflash_core.lab.photos.writing import FolderWriter
 from langflash_core.lab.training.shards import Label, open_shards, write_shard
 from langflash_core.network import MINI, GuidedDepthNet, load_network, save_network
+from tests.lab.evaluation.real_photos import write_folder
 from tests.lab.rooms.conftest import TINY_PACK
 from tests.lab.training.conftest import toy_record
 
@@ -87,6 +88,14 @@ def test_weights_verify_notices_damage(run, checkpoint, tmp_path):
         (["train", "export", "gone", "-o", "w.safetensors"], "there is no folder gone"),
         (["eval", "rooms", "gone"], "there is no folder gone"),
         (["eval", "calibrate", "gone"], "there is no folder gone"),
+        (["eval", "sides"], "give either a furniture pack or a folder with --posed"),
+        (["eval", "sides", "p.npz", "--posed", "."], "not both"),
+        (["eval", "sides", "gone.npz"], "no furniture pack at gone.npz"),
+        (["eval", "sides", "p.npz", "--size", "224"], "leave --size out"),
+        (["eval", "sides", "p.npz", "--sheet", "a.png"], "give a furniture pack and --results"),
+        (["eval", "sides", "p.npz", "--lpips", "gone"], "no LPIPS file at gone"),
+        (["eval", "sides", "p.npz", "--lpips", TINY_PACK], "is no safetensors file"),
+        (["eval", "sides-beside", "gone", "gone"], "no result of eval sides at gone/sides.json"),
         (["weights", "verify", "gone"], "no checkpoint at gone"),
         (["weights"], "ACTION"),
     ],
@@ -194,9 +203,44 @@ def test_posed_photos_are_judged(run, checkpoint, tmp_path):
     assert "Depth" not in outcome.out
 
 
+@pytest.mark.slow
+def test_rooms_are_judged_and_shown_from_aside(run, checkpoint, tmp_path, monkeypatch):
+    """Two scenes of the network's own size, by an untrained network."""
+    monkeypatch.setattr("app.cli.side_sheet.PAIRS", ("toy",))
+    sheet, kept = tmp_path / "new" / "sheet.png", tmp_path / "kept"
+    words = ("--weights", checkpoint, "--limit", "1", "--results", kept, "--sheet", sheet)
+    outcome = run("eval", "sides", TINY_PACK, *words)
+    assert outcome.code == 0, outcome.err
+    assert "| the photos' own places | 1 |" in outcome.out
+    assert np.asarray(Image.open(sheet)).std() > 10
+    assert len(list((kept / "pictures").iterdir())) == 4 + 4 + 4  # a room, its truth, a pair
+    both = tmp_path / "both.png"
+    assert run("eval", "sides-beside", kept, kept, "--sheet", both).code == 0
+    assert np.asarray(Image.open(both)).shape[1] > np.asarray(Image.open(sheet)).shape[1]
+
+
+def test_posed_photos_are_judged_from_aside(run, checkpoint, tmp_path):
+    posed = write_folder(tmp_path / "posed", 7).root
+    words = ("--weights", checkpoint, "--size", "56", "--backend", "torch", "--apart", "6")
+    outcome = run("eval", "sides", "--posed", posed, *words, "--results", tmp_path / "now", "--json")
+    assert outcome.code == 0, outcome.err
+    (row,) = outcome.json()["cases"]
+    assert row["name"] == "001-007" and {"001", "004"} <= row["looks"].keys()
+    table = tmp_path / "new" / "table.md"
+    beside = run("eval", "sides-beside", tmp_path / "now", tmp_path / "now", "-o", table)
+    assert beside.code == 0 and beside.out == table.read_text()
+    assert "| between the photos: PSNR, holes black (dB) |" in beside.out and "+0.000 ± 0.000" in beside.out
+    without = run("eval", "sides-beside", tmp_path / "now", tmp_path / "now", "--sheet", tmp_path / "a.png")
+    assert without.code == 2 and "holds no pictures" in without.err
+    for depths in (posed / "depths").iterdir():
+        depths.unlink()
+    assert "has no depth in metres" in run("eval", "sides", "--posed", posed, *words).err
+
+
 @pytest.mark.parametrize(
     ("words", "hint"),
     [
+        (["eval", "sides", "--posed", "PHOTOS"], "has no poses.txt"),
         (["eval", "photos-labelled", "gone"], "there is no folder gone/images"),
         (["eval", "photos-labelled", "PHOTOS", "--only", "7-9"], "none of the 2 photos is chosen"),
         (["eval", "photos-labelled", "PHOTOS", "--part", "validation"], "choose another --part or --only"),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from langflash_core.scene.trust import faded
 from tests.app.gl.questions import question
 from tests.splat.scenes import camera, cloud, maps_of, scene_of, splats
 
@@ -148,3 +149,29 @@ def test_what_is_missing_is_named(renderer):
         renderer.heat_texture(0, "jet")
     with pytest.raises(ValueError, match="1 x 1"):
         renderer.draw(dataclasses.replace(camera(), width=0))
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.6, 1.6])
+def test_faded_is_the_frame_fading_over_the_background(asked, aside):
+    scene = dataclasses.replace(
+        cloud(1500, 12, dtype=torch.float32), view_ids=torch.zeros(1500, dtype=torch.int64)
+    )
+    asked.set_scene(scene)
+    shot, background = camera(), torch.tensor((0.0, 0.5, 1.0))
+    viewmat = shot.viewmat.clone()
+    viewmat[0, 3] -= aside * scene.gaussians.means[:, 2].mean()
+    shot = dataclasses.replace(shot, viewmat=viewmat)
+    asked.draw(shot)
+    black = asked.frame()
+    asked.draw(shot, background=(0.0, 0.5, 1.0))
+    shown = pixels(asked.faded_texture())[..., :3]
+    fading = faded(black, shot, scene)
+    expected = fading.rgb + (1 - fading.alphas[..., None]) * background
+    # Eight bits: half a step, and the depth of a thin pixel is a quotient of two halves.
+    np.testing.assert_allclose(shown, expected.clamp(0, 1).numpy(), atol=2.5 / 255)
+    same = np.array_equal(shown, pixels(asked.rgb_texture)[..., :3])
+    assert same if aside == 0 else not same
+
+
+def test_nothing_fades_where_nobody_knows_the_photos(asked):
+    assert asked.faded_texture() is asked.rgb_texture

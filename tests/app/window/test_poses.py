@@ -1,6 +1,7 @@
 """Camera control: pure functions against hand-made cases and the core's own geometry."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -118,3 +119,26 @@ def test_median_reach_looks_only_at_the_middle_and_the_front() -> None:
 
 def _angle(a: Rotation, b: Rotation) -> float:
     return math.acos(min(abs(float(np.dot(a, b))), 1.0))
+
+
+def test_an_orbit_slows_down_far_from_the_photos_and_comes_back_freely() -> None:
+    start, places = Pose(reach=2.0), (Vector(0.0, 0.0, 0.0), Vector(0.2, 0.0, 0.0))
+    step = math.radians(5)
+    free, pose = start, start
+    angles = []
+    for _ in range(40):
+        free = poses.orbit(free, step, 0.0)
+        pose = poses.orbit_near(pose, step, 0.0, places)
+        angles.append(poses.degrees_aside(pose, places))
+    assert angles[7] < poses.NEAR < angles[12]  # as an orbit without limit up to there
+    near, unheld = poses.orbit_near(start, step, 0.0, places), poses.orbit_near(start, step, 0.0, ())
+    np.testing.assert_allclose(near.centre, unheld.centre, atol=EXACT)
+    assert all(later >= earlier - 1e-9 for earlier, later in pairwise(angles))
+    assert poses.FARTHEST - 3 < angles[-1] <= poses.FARTHEST
+    assert poses.degrees_aside(free, places) > 90
+    back = poses.orbit_near(pose, -step, 0.0, places)
+    np.testing.assert_allclose(back.centre, poses.orbit(pose, -step, 0.0).centre, atol=EXACT)
+    # One quick drag ends where many slow ones do; who flew farther is not held.
+    quick = poses.orbit_near(start, 40 * step, 0.0, places)
+    assert poses.degrees_aside(quick, places) == pytest.approx(angles[-1], abs=1.0)
+    assert poses.orbit_near(free, step, 0.0, places) != free

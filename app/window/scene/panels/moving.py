@@ -8,6 +8,7 @@ from ... import poses
 from ...kit.look import Look
 from ...poses import Pose
 from ...state import State
+from ..near import places_to_keep_to
 
 TURN = math.radians(0.3)  # per pixel at scale 1
 ZOOM = 0.9  # of the distance, per notch of the wheel
@@ -37,23 +38,23 @@ def pointed(state: State, look: Look, size: ImVec2) -> Pose:
             unit = poses.units_per_pixel(pose, round(size.x), round(size.y))
             pose = poses.pan(pose, -dx * unit, -dy * unit)
         else:
-            pose = poses.orbit(pose, -dx * turn, -dy * turn)
+            pose = poses.orbit_near(pose, -dx * turn, -dy * turn, places_to_keep_to(state))
     if imgui.is_item_hovered() and (io.mouse_wheel or io.mouse_wheel_h):
-        pose = _scrolled(pose, state.preferences.touch_pad, look, size)
+        pose = _scrolled(pose, state, look, size)
     return pose
 
 
-def _scrolled(pose: Pose, touch_pad: bool, look: Look, size: ImVec2) -> Pose:
+def _scrolled(pose: Pose, state: State, look: Look, size: ImVec2) -> Pose:
     """The wheel zooms; two fingers on a touch pad turn, zoom with Ctrl (which a pinch sends), slide
     with Shift."""
     io = imgui.get_io()
-    if not touch_pad or io.key_ctrl:
+    if not state.preferences.touch_pad or io.key_ctrl:
         return poses.zoom(pose, ZOOM**io.mouse_wheel)
     across, along = SCROLL * io.mouse_wheel_h, SCROLL * io.mouse_wheel
     if io.key_shift:
         unit = poses.units_per_pixel(pose, round(size.x), round(size.y)) * look.scale
         return poses.pan(pose, -across * unit, -along * unit)
-    return poses.orbit(pose, across * TURN, along * TURN)
+    return poses.orbit_near(pose, across * TURN, along * TURN, places_to_keep_to(state))
 
 
 def _held(button: int) -> bool:
