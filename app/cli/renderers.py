@@ -2,13 +2,18 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from langflash_core.errors import GraphicsError, MissingPackageError
 from langflash_core.extras import optional_packages
 from langflash_core.types import Camera, Frame, Scene
 
 from .report import say_warnings
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from langflash_core.language.relevance import CompiledQuery
 
 
 class Renderer(Protocol):
@@ -17,6 +22,10 @@ class Renderer(Protocol):
     backend: str
 
     def __call__(self, scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame: ...
+
+    def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
+        """A frame and relevance (P, H, W), for pictures that move: gl answers as the moving window does."""
+        ...
 
 
 class TorchRenderer:
@@ -28,6 +37,13 @@ class TorchRenderer:
         from langflash_core.splat import render
 
         return render(scene, camera, weight_maps=weight_maps)
+
+    def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
+        from langflash_core.language.relevance import relevance_maps
+
+        frame = self(scene, camera)
+        assert frame.weight_maps is not None
+        return frame, relevance_maps(frame.weight_maps, compiled)
 
 
 class GlRenderer:
@@ -47,13 +63,25 @@ class GlRenderer:
         self._context = offscreen_context()
         self._splats = SplatRenderer(self._context)
         self._scene: Scene | None = None
+        self._asked: CompiledQuery | None = None
 
     def __call__(self, scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame:
+        self._show(scene)
+        self._splats.draw(camera, weight_maps=weight_maps)
+        return self._splats.frame(weight_maps=weight_maps)
+
+    def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
+        self._show(scene)
+        if compiled is not self._asked:
+            self._splats.ask(compiled)
+            self._asked = compiled
+        self._splats.draw(camera, weight_maps=False, fast=True)
+        return self._splats.frame(), self._splats.relevance()
+
+    def _show(self, scene: Scene) -> None:
         if scene is not self._scene:
             self._splats.set_scene(scene)
             self._scene = scene
-        self._splats.draw(camera, weight_maps=weight_maps)
-        return self._splats.frame(weight_maps=weight_maps)
 
     def release(self) -> None:
         """Give the context back."""

@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image
 from torch import Tensor
 
 from langflash_core import pipeline
 from langflash_core.export.colours import heat
 from langflash_core.export.png import heat_over, to_8bit
+from langflash_core.export.sheet import captioned
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.quaternions import matrices_to_quats, quats_to_matrices
 from langflash_core.types import Camera, Scene
@@ -21,7 +22,6 @@ PROMPTS = (
     "book", "floor", "plant", "flower pot", "table", "picture frame", "monitor", "chair", "door", "toy",
 )  # fmt: skip
 _HEIGHT = 240  # pixels of one picture
-_CAPTION = 18
 _BESIDE = 0.6  # of the baseline, to the outside of view 0
 _NEAR_SHARE = 0.05  # of a view's depths are nearer than where the depth colours begin
 
@@ -60,12 +60,12 @@ def _views(scene: Scene, pair: Sequence[Path], renderer: Renderer) -> list[np.nd
     nearness = (near / shown.depths.clamp_min(near)) * (shown.alphas > 0.5)
     photos = [_photo(path, (own.width, own.height)) for path in pair]
     return [
-        _captioned(photos[0], pair[0].name),
-        _captioned(photos[1], pair[1].name),
-        _captioned(to_8bit(shown.rgb), "view 0"),
-        _captioned(to_8bit(renderer(scene, between, weight_maps=False).rgb), "between"),
-        _captioned(to_8bit(renderer(scene, beside, weight_maps=False).rgb), "beside view 0"),
-        _captioned(to_8bit(heat(nearness)), "nearness"),
+        captioned(photos[0], pair[0].name),
+        captioned(photos[1], pair[1].name),
+        captioned(to_8bit(shown.rgb), "view 0"),
+        captioned(to_8bit(renderer(scene, between, weight_maps=False).rgb), "between"),
+        captioned(to_8bit(renderer(scene, beside, weight_maps=False).rgb), "beside view 0"),
+        captioned(to_8bit(heat(nearness)), "nearness"),
     ]
 
 
@@ -76,7 +76,7 @@ def _answers(scene: Scene, renderer: Renderer, prompts: Sequence[str]) -> list[n
     for answer, relevance in zip(result.answers, result.relevance, strict=True):
         view = heat_over(relevance, result.frame.rgb, answer.threshold, result.mode)
         verdict = f"{answer.score:.2f}" if answer.found else f"not found ({answer.score:.2f})"
-        cells.append(_captioned(to_8bit(view), f"{answer.prompt}: {verdict}"))
+        cells.append(captioned(to_8bit(view), f"{answer.prompt}: {verdict}"))
     return cells
 
 
@@ -100,11 +100,3 @@ def _between(first: Tensor, second: Tensor, share: float) -> Tensor:
 def _photo(path: Path, size: tuple[int, int]) -> np.ndarray:
     with Image.open(path) as photo:
         return np.asarray(photo.convert("RGB").resize(size, Image.Resampling.LANCZOS))
-
-
-def _captioned(picture: np.ndarray, text: str) -> np.ndarray:
-    height, width = picture.shape[:2]
-    cell = Image.new("RGB", (width + 4, height + _CAPTION + 4))
-    cell.paste(Image.fromarray(picture), (2, _CAPTION))
-    ImageDraw.Draw(cell).text((4, 1), text, fill=(235, 235, 235), font=ImageFont.load_default(13))
-    return np.asarray(cell)
