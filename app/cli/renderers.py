@@ -11,6 +11,7 @@ from langflash_core.types import Camera, Frame, Scene
 from .report import say_warnings
 
 if TYPE_CHECKING:
+    import numpy as np
     from torch import Tensor
 
     from langflash_core.language.relevance import CompiledQuery
@@ -22,6 +23,10 @@ class Renderer(Protocol):
     backend: str
 
     def __call__(self, scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame: ...
+
+    def colours(self, scene: Scene, camera: Camera) -> "np.ndarray":
+        """(H, W, 3) uint8, for pictures that move: gl reads nothing else back."""
+        ...
 
     def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
         """A frame and relevance (P, H, W), for pictures that move: gl answers as the moving window does."""
@@ -37,6 +42,11 @@ class TorchRenderer:
         from langflash_core.splat import render
 
         return render(scene, camera, weight_maps=weight_maps)
+
+    def colours(self, scene: Scene, camera: Camera) -> "np.ndarray":
+        from langflash_core.export.png import to_8bit
+
+        return to_8bit(self(scene, camera, weight_maps=False).rgb)
 
     def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
         from langflash_core.language.relevance import relevance_maps
@@ -69,6 +79,14 @@ class GlRenderer:
         self._show(scene)
         self._splats.draw(camera, weight_maps=weight_maps)
         return self._splats.frame(weight_maps=weight_maps)
+
+    def colours(self, scene: Scene, camera: Camera) -> "np.ndarray":
+        import numpy as np
+
+        self._show(scene)
+        self._splats.draw(camera, weight_maps=False)
+        texels = np.frombuffer(self._splats.rgb_texture.read(), np.uint8)
+        return np.ascontiguousarray(texels.reshape(camera.height, camera.width, 4)[..., :3])
 
     def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
         self._show(scene)
