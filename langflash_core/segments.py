@@ -141,7 +141,8 @@ def surface(scene: Scene, members: Tensor, cameras: Sequence[Camera], render: Re
     Raises:
         MissingPackageError: scikit-image is not installed.
     """
-    part = scene.rows(members)
+    finite = torch.isfinite(scene.gaussians.means).all(1).to(members.device)
+    part = scene.rows(members & finite)
     if not len(part.gaussians):
         return None
     means = part.gaussians.means.detach().cpu().double().numpy()

@@ -124,6 +124,19 @@ def test_thresholds_and_scenes_without_language():
     assert everything.members.all() and everything.counts == (1,)
 
 
+def test_numbers_that_are_none_are_left_out():
+    scene, owner = chairs()
+    scene.gaussians.means[0] = torch.nan
+    parts = parts_of(scene, owner)
+    view = segments.segmented_view(segments.carrying(scene, parts), parts, scene.camera(0), render)
+    assert torch.isfinite(view.mattes).all() and view.masks[0].any()
+    cut = segments.cut_out(scene, parts.members[0], view.camera, view.mattes[0], render)
+    assert torch.isfinite(cut).all()
+    pytest.importorskip("skimage")
+    mesh = segments.surface(scene, owner == 0, [scene.camera(0, 320, 240)], render)
+    assert mesh is not None and np.isfinite(mesh.vertices).all()
+
+
 def test_a_surface_is_where_the_thing_is():
     pytest.importorskip("skimage")
     scene, owner = chairs()

@@ -80,7 +80,7 @@ def taken_apart(
     found = segments.segment(scene, prompts, threshold=threshold)
     if not found.things:
         raise PromptError(
-            f"nothing in the scene answers {', '.join(found.prompts)} (best score {max(found.scores):.3f}, "
+            f"not found in the scene: {', '.join(found.prompts)} (best score {max(found.scores):.3f}, "
             f"threshold {found.threshold:.3f}); lower --threshold"
         )
     if max(len(found.things), len(prompts)) > MOST:

@@ -11,6 +11,7 @@ from PIL import Image
 from app.cli import video
 from app.cli.renderers import GlRenderer, TorchRenderer
 from langflash_core.errors import ViewError
+from langflash_core.export.png import to_8bit
 from langflash_core.geometry.cameras import rotation_angle_degrees
 from tests.app.cli.conftest import stripes
 
@@ -128,6 +129,18 @@ def test_a_heat_map_film_glows_where_the_phrase_is(backend):
     assert plain[:, :15].mean() < 1.2 * plain[:, 30:].mean()
     if isinstance(renderer, GlRenderer):
         renderer.release()
+
+
+def test_gl_reads_the_colours_that_the_frame_has():
+    scene, renderer = stripes(), GlRenderer()
+    camera = scene.camera(0, 64, 48)
+    frame = to_8bit(renderer(scene, camera, weight_maps=False).rgb).astype(int)
+    assert (
+        np.abs(renderer.colours(scene, camera) - frame).max() <= 1
+    )  # both round, one of float16 in a shader
+    exact = TorchRenderer().colours(scene, camera).astype(int)
+    assert np.abs(frame - exact).max() <= 2
+    renderer.release()
 
 
 def test_an_animated_webp(run, scene_file, tmp_path):
