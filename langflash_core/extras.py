@@ -15,6 +15,8 @@ EXTRAS = {
     "torchvision": "full",
     "matplotlib": "bench",
     "h5py": "photos",
+    "skimage": "views",
+    "OpenEXR": "views",
     "ray": "cluster",
     "tensorboard": "board",
 }

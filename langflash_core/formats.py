@@ -13,8 +13,10 @@ SCENES_IN = (".langflash", ".ply", ".splat", ".spz", ".sog", SOG_FOLDER, ".kspla
 SCENES_OUT = (".langflash", ".ply", COMPRESSED_PLY, ".splat", ".spz", ".sog", SOG_FOLDER, ".glb", *USD)
 CAMERAS_OUT = ("cameras.txt", "transforms.json")  # and the photos, in images/ beside
 ANSWERS_OUT = (".json", ".csv")  # of phrases
+FILMS_OUT = (".mp4", ".webp")
+DEPTH_OUT = ".exr"
 PAGE_OUT = ".html"  # the whole scene, to be looked at and asked; no program reads it back
-ALL_OUT = (".png", *SCENES_OUT, *CAMERAS_OUT, *ANSWERS_OUT, ".mp4", ".npz", PAGE_OUT)
+ALL_OUT = (".png", *SCENES_OUT, *CAMERAS_OUT, *ANSWERS_OUT, *FILMS_OUT, ".npz", DEPTH_OUT, PAGE_OUT)
 """What `langflash export` writes."""
 DROPPED = tuple(kind for kind in SCENES_IN if kind.startswith("."))  # a meta.json may be anything
 

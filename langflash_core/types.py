@@ -301,6 +301,66 @@ class QueryResult:
     camera: Camera
 
 
+@dataclass(frozen=True)
+class Segments:
+    """What P phrases are made of, in 3D and so the same in every view.
+
+    scores (P,): mean relevancy of the thousandth of the Gaussians that answers best. members (P, N)
+    bool: Gaussians of relevancy `threshold` and more; of a phrase that is not found, none. instances
+    (P, N) int64: which connected thing of the phrase each belongs to, from 1; 0 for others and crumbs.
+
+    Raises:
+        ValueError: sizes disagree.
+    """
+
+    prompts: tuple[str, ...]
+    scores: tuple[float, ...]
+    threshold: float
+    members: Tensor
+    instances: Tensor
+
+    def __post_init__(self) -> None:
+        for name in ("members", "instances"):
+            _shape(name, getattr(self, name), (len(self.prompts), *self.members.shape[1:]))
+
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """Connected things of each phrase."""
+        return tuple(int(row.max()) if row.numel() else 0 for row in self.instances)
+
+    @property
+    def things(self) -> tuple[tuple[int, int], ...]:
+        """Phrase (from 0) and number in it (from 1) of every connected thing, in order."""
+        return tuple((phrase, n + 1) for phrase, count in enumerate(self.counts) for n in range(count))
+
+
+@dataclass(frozen=True)
+class SegmentedView:
+    """One view of P phrases and their T connected things, edges as fine as they were drawn.
+
+    mattes (P, H, W) in [0, 1]: sum_i T_i a_i over the Gaussians of a phrase, the share of the pixel's
+    light that comes from it; union (H, W) likewise, of all phrases together. things (H, W) int64: 0, or
+    1 + the place in `Segments.things` of what most of the pixel shows.
+    """
+
+    camera: Camera
+    frame: Frame
+    mattes: Tensor
+    union: Tensor
+    things: Tensor
+
+    @property
+    def masks(self) -> Tensor:
+        """(P, H, W) bool: at least half of the pixel is the phrase."""
+        return self.mattes >= 0.5
+
+    @property
+    def labels(self) -> Tensor:
+        """(H, W) int64: 1 + the phrase that most of the pixel is, where it is in a mask; else 0."""
+        best, which = torch.where(self.masks, self.mattes, 0.0).max(0)
+        return torch.where(best > 0, which + 1, 0)
+
+
 def _shape(name: str, values: Tensor, expected: tuple[int, ...]) -> None:
     if tuple(values.shape) != expected:
         raise ValueError(f"{name}: expected shape {expected}, received {tuple(values.shape)}")

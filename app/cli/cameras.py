@@ -69,13 +69,25 @@ def read_camera(path: Path) -> Camera:
     readable_file(path, "camera file", ViewError)
     try:
         fields = json.loads(path.read_bytes())
+    except (ValueError, RecursionError):
+        fields = None
+    return camera_of(fields, str(path))
+
+
+def camera_of(fields: Any, path: str) -> Camera:
+    """A camera from what a JSON file holds, as `read_camera`; `path` names it in messages.
+
+    Raises:
+        ViewError: as `read_camera`.
+    """
+    try:
         viewmat, K = _matrix(fields["viewmat"], 4), _matrix(fields["K"], 3)
         width, height = fields["width"], fields["height"]
     except KeyError as missing:
         raise ViewError(
             f"{path} has no {missing}; a camera file holds viewmat, K, width and height"
         ) from None
-    except (json.JSONDecodeError, UnicodeDecodeError, TypeError, RecursionError):
+    except TypeError:
         raise ViewError(
             f"{path} is not a camera file: expected a JSON object with viewmat, K, width and height"
         ) from None

@@ -116,7 +116,8 @@ def staged_folder(folder: Path) -> Iterator[Path]:
     staging = Path(tempfile.mkdtemp(prefix=".langflash-", dir=_nearest(folder)))
     try:
         yield staging
-        move_all({file: folder / file.name for file in sorted(staging.iterdir())})
+        files = (file for file in sorted(staging.rglob("*")) if file.is_file())
+        move_all({file: folder / file.relative_to(staging) for file in files})
     finally:
         shutil.rmtree(staging, ignore_errors=True)
 

@@ -27,6 +27,9 @@ from .values import (
     whole_count,
 )
 
+WHATS = (
+    "rgb", "heat", "mask", "soft", "cutout", "labels", "instances", "depth", "boxes", "surface",
+)  # fmt: skip
 # langflash_core.lab.photos.layouts.LAYOUTS, which would bring torch along.
 LAYOUTS = ("nyu", "coco", "ade20k", "sunrgbd", "frames")
 # langflash_core.lab.evaluation.protocols.PROTOCOLS, and photos one by one.
@@ -263,11 +266,12 @@ def _add_export(commands) -> None:
     _add_output(
         command,
         "FILE",
-        ".png: a picture, or a cut-out with --prompt; .langflash, .ply, .compressed.ply, .splat, .spz, .sog, "
-        "meta.json (a SOG in a folder), .glb, .usd, .usda, .usdc, .usdz: Gaussians; "
-        "transforms.json, cameras.txt (COLMAP): photos and their poses; "
+        "with --segmented a folder; else .png: a picture, or a cut-out with --prompt; .langflash, .ply, "
+        ".compressed.ply, .splat, .spz, .sog, meta.json (a SOG in a folder), .glb, .usd, .usda, .usdc, "
+        ".usdz: Gaussians; transforms.json, cameras.txt (COLMAP): photos and their poses; "
         ".json: COCO masks of --prompt; .csv, or .glb with --what boxes: their boxes; "
-        ".npz: a view as numbers; .mp4: a flight; .html: a web page that shows the scene and answers phrases",
+        ".npz: a view as numbers; .exr: its depth; .mp4, .webp: a flight; "
+        ".html: a web page that shows the scene and answers phrases",
     )
     command.add_argument(
         "--prompt",
@@ -280,9 +284,17 @@ def _add_export(commands) -> None:
     )
     command.add_argument(
         "--what",
-        choices=("rgb", "heat", "mask", "cutout", "labels", "boxes"),
-        help="of a .png: colours, a heat-map, a mask, a cut-out with transparency (default with --prompt), "
-        "or phrase numbers with a legend as .json; boxes: a .json, .csv or .glb of places and sizes",
+        choices=WHATS,
+        help="of a .png: colours, a heat-map, a mask, a soft mask of 16 bits, a cut-out with transparency "
+        "(default with --prompt), numbers of phrases or of instances with a legend as .json, or depth in "
+        "steps of 16 bits; boxes: a .json, .csv or .glb of places and sizes; surface: a .glb; of a video: "
+        "heat",
+    )
+    command.add_argument(
+        "--segmented",
+        action="store_true",
+        help="a folder: of every photo's view masks, soft masks, cut-outs and instances of --prompt, and "
+        "depth; boxes, surfaces, a contact sheet and manifest.json",
     )
     command.add_argument(
         "--all-views", action="store_true", help="from every photo: FILE_0, FILE_1 and so on"
@@ -290,7 +302,13 @@ def _add_export(commands) -> None:
     command.add_argument(
         "--with-text", action="store_true", help="an .html answers any phrase, and is 28 MB larger"
     )
-    command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of an .mp4 (default: 6)")
+    command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of a video (default: 6)")
+    command.add_argument(
+        "--path",
+        metavar="WAY",
+        help="of a video: photos, from one to the next and back (default); orbit, around what is shown; or a "
+        "JSON list of cameras as of --camera, each with its time in seconds, or evenly spread",
+    )
     command.add_argument(
         "--replace", action="store_true", help="also what is there by the name of a legend or a COCO picture"
     )

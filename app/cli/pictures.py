@@ -66,16 +66,6 @@ def depth_picture(frame: Frame) -> np.ndarray:
     return to_8bit(heat(levels) * seen[..., None])
 
 
-def cut_out(frame: Frame, masks: Tensor) -> np.ndarray:
-    """(H, W, 4): the picture where any mask (P, H, W) holds, transparent elsewhere."""
-    kept = masks.any(0).cpu()[..., None]
-    alphas = frame.alphas.detach().cpu().float()[..., None]
-    # The frame is premultiplied over black; PNG wants straight colour.
-    straight = frame.rgb.detach().cpu().float() / alphas.clamp_min(1 / 255)
-    opaque = to_8bit((alphas * kept).expand(-1, -1, 3))[..., :1]
-    return np.concatenate([to_8bit(straight * kept), opaque], -1)
-
-
 def _weights(frame: Frame) -> Tensor:
     if frame.weight_maps is None:
         raise ValueError("frame: expected weight maps, received none")

@@ -2,13 +2,19 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from langflash_core.errors import GraphicsError, MissingPackageError
 from langflash_core.extras import optional_packages
 from langflash_core.types import Camera, Frame, Scene
 
 from .report import say_warnings
+
+if TYPE_CHECKING:
+    import numpy as np
+    from torch import Tensor
+
+    from langflash_core.language.relevance import CompiledQuery
 
 
 class Renderer(Protocol):
@@ -17,6 +23,14 @@ class Renderer(Protocol):
     backend: str
 
     def __call__(self, scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame: ...
+
+    def colours(self, scene: Scene, camera: Camera) -> "np.ndarray":
+        """(H, W, 3) uint8, for pictures that move: gl reads nothing else back."""
+        ...
+
+    def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
+        """A frame and relevance (P, H, W), for pictures that move: gl answers as the moving window does."""
+        ...
 
 
 class TorchRenderer:
@@ -28,6 +42,18 @@ class TorchRenderer:
         from langflash_core.splat import render
 
         return render(scene, camera, weight_maps=weight_maps)
+
+    def colours(self, scene: Scene, camera: Camera) -> "np.ndarray":
+        from langflash_core.export.png import to_8bit
+
+        return to_8bit(self(scene, camera, weight_maps=False).rgb)
+
+    def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
+        from langflash_core.language.relevance import relevance_maps
+
+        frame = self(scene, camera)
+        assert frame.weight_maps is not None
+        return frame, relevance_maps(frame.weight_maps, compiled)
 
 
 class GlRenderer:
@@ -48,14 +74,36 @@ class GlRenderer:
         with self._context:
             self._splats = SplatRenderer(self._context)
         self._scene: Scene | None = None
+        self._asked: CompiledQuery | None = None
 
     def __call__(self, scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame:
         with self._context:  # another renderer may have been current
-            if scene is not self._scene:
-                self._splats.set_scene(scene)
-                self._scene = scene
+            self._show(scene)
             self._splats.draw(camera, weight_maps=weight_maps)
             return self._splats.frame(weight_maps=weight_maps)
+
+    def colours(self, scene: Scene, camera: Camera) -> "np.ndarray":
+        import numpy as np
+
+        with self._context:
+            self._show(scene)
+            self._splats.draw(camera, weight_maps=False)
+            texels = np.frombuffer(self._splats.rgb_texture.read(), np.uint8)
+        return np.ascontiguousarray(texels.reshape(camera.height, camera.width, 4)[..., :3])
+
+    def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
+        with self._context:
+            self._show(scene)
+            if compiled is not self._asked:
+                self._splats.ask(compiled)
+                self._asked = compiled
+            self._splats.draw(camera, weight_maps=False, fast=True)
+            return self._splats.frame(), self._splats.relevance()
+
+    def _show(self, scene: Scene) -> None:
+        if scene is not self._scene:
+            self._splats.set_scene(scene)
+            self._scene = scene
 
     def release(self) -> None:
         """Give the context back."""
@@ -74,6 +122,17 @@ class Fading:
         from langflash_core.scene.trust import faded
 
         return faded(self.inner(scene, camera, weight_maps=weight_maps), camera, scene)
+
+    def colours(self, scene: Scene, camera: Camera) -> "np.ndarray":
+        from langflash_core.export.png import to_8bit
+
+        return to_8bit(self(scene, camera, weight_maps=False).rgb)
+
+    def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
+        from langflash_core.scene.trust import faded
+
+        frame, relevance = self.inner.answered(scene, camera, compiled)
+        return faded(frame, camera, scene), relevance
 
 
 @contextmanager

@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image
 from torch import Tensor
 
 from langflash_core import pipeline
 from langflash_core.export.colours import heat
 from langflash_core.export.png import heat_over, to_8bit
+from langflash_core.export.sheet import captioned
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.quaternions import matrices_to_quats, quats_to_matrices
 from langflash_core.types import Camera, Scene
@@ -21,7 +22,6 @@ PROMPTS = (
     "book", "floor", "plant", "flower pot", "table", "picture frame", "monitor", "chair", "door", "toy",
 )  # fmt: skip
 _HEIGHT = 240  # pixels of one picture
-_CAPTION = 18
 _BESIDE = 0.6  # of the baseline, to the outside of view 0
 _NEAR_SHARE = 0.05  # of a view's depths are nearer than where the depth colours begin
 
@@ -100,12 +100,3 @@ def _between(first: Tensor, second: Tensor, share: float) -> Tensor:
 def _photo(path: Path, size: tuple[int, int]) -> np.ndarray:
     with Image.open(path) as photo:
         return np.asarray(photo.convert("RGB").resize(size, Image.Resampling.LANCZOS))
-
-
-def captioned(picture: np.ndarray, text: str) -> np.ndarray:
-    """A picture (H, W, 3) with a line of text over it."""
-    height, width = picture.shape[:2]
-    cell = Image.new("RGB", (width + 4, height + _CAPTION + 4))
-    cell.paste(Image.fromarray(picture), (2, _CAPTION))
-    ImageDraw.Draw(cell).text((4, 1), text, fill=(235, 235, 235), font=ImageFont.load_default(13))
-    return np.asarray(cell)

@@ -31,20 +31,17 @@ def write_answered(what: str, path: Path, result: QueryResult) -> None:
     """One picture of an answer.
 
     Args:
-        what: "heat" (of the first phrase), or of the phrases that are there "mask", "cutout" with
-            transparency, "labels" with a legend beside it.
+        what: "heat" (of the first phrase), or of the phrases that are there "mask", or "labels" with a
+            legend beside it.
     """
-    found = result.masks[[answer.found for answer in result.answers]]
     if what == "labels":
         write_labels(path, label_map(result), [answer.prompt for answer in result.answers])
     elif what == "mask":
-        write_mask(path, found.any(0))
-    elif what == "heat":
+        write_mask(path, result.masks.any(0))
+    else:
         threshold = result.answers[0].threshold
         lit = heat_over(result.relevance[0], result.frame.rgb, threshold, result.mode)
         pictures.write_picture(path, to_8bit(lit))
-    else:
-        pictures.write_picture(path, pictures.cut_out(result.frame, found))
 
 
 def box_rows(

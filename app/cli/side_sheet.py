@@ -15,6 +15,7 @@ from torch import Tensor
 
 from langflash_core.errors import InputError
 from langflash_core.export.png import to_8bit
+from langflash_core.export.sheet import captioned
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.evaluation.side_pictures import SHOWN, room_pictures, scene_pictures
@@ -22,8 +23,6 @@ from langflash_core.lab.evaluation.side_subjects import Case
 from langflash_core.pipeline import reconstruct
 from langflash_core.resources import asset_path
 from langflash_core.types import Scene
-
-from .sheet import captioned
 
 ROOMS = 3
 """So many of the first rooms are shown."""

@@ -1,4 +1,4 @@
-"""Boxes of phrases as binary glTF, for Blender, game engines and web viewers.
+"""Boxes and surfaces of phrases as binary glTF, for Blender, game engines and web viewers.
 
 glTF has +x to the left, +y up and +z forward; scenes have +x to the right and +y down. One half turn
 about z leads from one to the other, as for the splats (`gltf.py`), so that both lie together.
@@ -6,7 +6,7 @@ about z leads from one to the other, as for the splats (`gltf.py`), so that both
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -14,7 +14,11 @@ from jaxtyping import Float
 from langflash_core.errors import PromptError
 from langflash_core.export.colours import label_colours
 from langflash_core.files import write_atomically
+from langflash_core.geometry.fusion import Surface
 from langflash_core.types import QueryResult
+
+if TYPE_CHECKING:
+    import trimesh
 
 _TO_GLTF = np.diag([-1.0, -1.0, 1.0, 1.0])
 _OPACITY = 0.35  # what stands in the box stays visible
@@ -62,6 +66,33 @@ def write_boxes(boxes: Sequence[tuple[str, dict[str, Any]]], path: Path) -> None
         )
         body.visual = TextureVisuals(material=material)
         scene.add_geometry(body, node_name=name, geom_name=name, transform=_TO_GLTF @ _pose(box))
+    _write(scene, path)
+
+
+def write_surfaces(surfaces: Sequence[tuple[str, Surface]], path: Path, scale: float = 1.0) -> None:
+    """Coloured meshes, a node each, called what they are called here; seen from both sides.
+
+    Args:
+        scale: of lengths, to the unit that the file is to have.
+
+    Raises:
+        OutputError: the path cannot be written.
+        PromptError: there are none.
+    """
+    if not surfaces:
+        raise PromptError("no view shows a surface of it, so there is none to write; lower the threshold")
+    import trimesh
+    from trimesh.visual.color import ColorVisuals
+
+    scene = trimesh.Scene(base_frame="langflash")
+    for name, surface in surfaces:
+        mesh = trimesh.Trimesh(scale * surface.vertices, surface.faces, process=False)
+        mesh.visual = ColorVisuals(mesh, vertex_colors=surface.colours)
+        scene.add_geometry(mesh, node_name=name, geom_name=name, transform=_TO_GLTF)
+    _write(scene, path)
+
+
+def _write(scene: "trimesh.Scene", path: Path) -> None:
     content = scene.export(file_type="glb")
     assert isinstance(content, bytes)
     write_atomically(path, content)

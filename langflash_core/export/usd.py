@@ -1,7 +1,8 @@
 """OpenUSD's ParticleField3DGaussianSplat: one prim with arrays, all values activated, through usd-core.
 
 Axes of the file are right, up, back, said with it as upAxis Y; rotations are quaternions, scales lengths,
-opacities in [0, 1]; harmonics have all bases of a Gaussian together. Stages in half precision, Z up,
+opacities in [0, 1]; harmonics have all bases of a Gaussian together. A unit is said to be as many metres as
+the scene knows, else one. Stages in half precision, Z up,
 and under transformed parents are read too.
 
 Source: OpenUSD 26.03 and later, the schemas of usdVol (generatedSchema.usda).
@@ -138,6 +139,8 @@ def _write_stage(scene: Scene, path: Path, pxr) -> None:
     )
     stage = pxr.Usd.Stage.CreateNew(str(path))
     pxr.UsdGeom.SetStageUpAxis(stage, pxr.UsdGeom.Tokens.y)
+    # Unsaid, a unit is a centimetre to OpenUSD.
+    pxr.UsdGeom.SetStageMetersPerUnit(stage, scene.record.metric_scale or 1.0)
     field = pxr.UsdVol.ParticleField3DGaussianSplat.Define(stage, "/Splats")
     stage.SetDefaultPrim(field.GetPrim())
     arrays = pxr.Vt

@@ -73,7 +73,7 @@ def load_history(path: Path, scene: Scene, first: Marks) -> History:
         history = History(first, (), tuple(reversed(done))).moved_to(len(done))
         whole = History(history.marks, history.done, undone)
         whole.moved_to(len(done) + len(undone))  # what can be redone must fit as well
-    except (ValueError, LookupError, TypeError, AttributeError, zlib.error) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, zlib.error) as error:
         raise SceneFileError(f"{path.name} is damaged ({error}); edit the scene again") from error
     return whole
 
@@ -114,6 +114,6 @@ def _read(path: Path) -> dict:
         raise SceneFileError(f"{path} does not exist; check the path") from error
     except OSError as error:
         raise SceneFileError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
-    except (ValueError, LookupError, TypeError, RecursionError) as error:
+    except (ValueError, LookupError, TypeError, ArithmeticError, RecursionError) as error:
         raise SceneFileError(f"{path.name} is damaged ({error}); edit the scene again") from error
     return content

@@ -1,4 +1,6 @@
-"""Damaged splat files by the thousand: every reader gives a whole scene or one sentence, and little memory.
+"""Damaged files by the thousand: every reader gives something whole or one sentence, and little memory.
+
+Scenes of all formats, language beside a .ply, edits, photos, poses, camera files and key frames.
 
     python -m tests.export.mutations [--count 10000] [--seed 0]
 
@@ -16,18 +18,31 @@ import tempfile
 import tracemalloc
 import zipfile
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pillow_heif
+from PIL import Image
 
-from langflash_core.errors import OutputError, SceneFileError
+from app.cli.cameras import read_camera
+from app.cli.video import along, read_key_frames
+from langflash_core.errors import InputError, OutputError
 from langflash_core.export import export, read
+from langflash_core.export.cameras import read_posed
+from langflash_core.images.decode import read_photo
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
+from langflash_core.scene.edited import first_marks
+from langflash_core.scene.edits import History, Marks, Mask, hide, rename_atom
+from langflash_core.scene.edits_file import load_history, save_history, scene_digest
+from tests.app.cli.conftest import stripes
 from tests.export.splats import ksplat_bytes, random_gaussians
 
 EXTREMES = [0, 1, 0xFF, 0x7F, 0xFFFFFFFF, 0x7FFFFFFF, 0x80000000, 1 << 24, 0xFFFF]
+PHOTOS = (".jpg", ".png", ".webp", ".tiff", ".gif", ".bmp", ".ppm", ".avif", ".heic")
+JSONS = ("a.edits", "one.camera.json", "two.keys.json", "transforms.json")
 MOST_MEMORY = 64 * 2**20  # bytes that reading one of these files of some 10 kB may take
 
 
@@ -48,6 +63,36 @@ def whole_files(folder: Path, count: int = 60) -> dict[str, bytes]:
     for level in (0, 2):
         files[f"level{level}.ksplat"] = ksplat_bytes(random_gaussians(700, 1), level)
     return files
+
+
+def other_files(folder: Path) -> dict[str, bytes]:
+    """What is read besides splats: a small whole file of every kind, by name, with what belongs to it."""
+    scene = stripes()
+    ys, xs = np.mgrid[:48, :64]
+    pixels = np.stack((4 * xs, 5 * ys, xs + ys), -1).astype(np.uint8)
+    photo = Image.fromarray(pixels)
+    names = ["a.jpg", "a.png", "a.webp", "a.tiff", "a.gif", "a.bmp", "a.ppm", "a.avif"]
+    for name in names:
+        photo.save(folder / name)
+    Image.fromarray(pixels[..., 0].astype(np.uint16) * 257).save(folder / "deep.png")
+    pillow_heif.from_pillow(photo).save(folder / "a.heic")
+    export(scene, folder / "spoken.ply")
+    marks = Marks.untouched(len(scene.gaussians), scene.semantics.num_atoms)
+    history = History(marks).edited("hide", hide(marks, Mask.of(scene.gaussians.means[:, 0].numpy() > 0)))
+    history = history.edited("rename", rename_atom(history.marks, 0, "seat"))
+    save_history(history.undo(), scene_digest(scene), {"name": "made"}, folder / "a.edits")
+    posed = replace(scene, photos=((folder / "a.jpg").read_bytes(),) * 2)
+    posed = posed.with_record(photos=("left.jpg", "right.jpg"))
+    export(posed, folder / "transforms.json")
+    export(posed, folder / "cameras.txt")
+    views = [
+        {"viewmat": scene.viewmats[v].tolist(), "K": scene.Ks[v].tolist(), "width": 56, "height": 42}
+        for v in range(2)
+    ]
+    (folder / "one.camera.json").write_text(json.dumps(views[0]))
+    (folder / "two.keys.json").write_text(json.dumps(views))
+    names += ["deep.png", "a.heic", "spoken.language.safetensors", *JSONS, "cameras.txt", "images.txt"]
+    return {name: (folder / name).read_bytes() for name in names}
 
 
 def mutated(content: bytes, other: bytes, rng: np.random.Generator) -> bytes:
@@ -75,6 +120,8 @@ def mutated(content: bytes, other: bytes, rng: np.random.Generator) -> bytes:
 
 def damaged_inside(name: str, content: bytes, other: bytes, rng: np.random.Generator) -> bytes:
     """Damage below the wrapping of a packed file; others as `mutated`."""
+    if name in JSONS:
+        return json.dumps(lied(json.loads(content), rng)).encode()
     if name == "three.spz":
         return gzip.compress(mutated(gzip.decompress(content), other, rng), 1)
     if not name.endswith(".sog"):
@@ -90,12 +137,12 @@ def damaged_inside(name: str, content: bytes, other: bytes, rng: np.random.Gener
     return packed.getvalue()
 
 
-def lied(meta: dict, rng: np.random.Generator) -> dict:
+def lied(meta, rng: np.random.Generator):
     """One value of a document replaced by one that it should not have."""
-    wrong = [None, -1, 10**12, 1.5, "x", [], {}, [1e308] * 3, ["../meta.json"]]
+    wrong = [None, -1, 10**12, 1.5, float("inf"), float("nan"), "x", [], {}, [1e308] * 3, ["../meta.json"]]
     path, here = [], meta
-    while isinstance(here, dict) and here:
-        key = list(here)[rng.integers(0, len(here))]
+    while isinstance(here, dict | list) and here and (not path or rng.random() < 0.8):
+        key = list(here)[rng.integers(0, len(here))] if isinstance(here, dict) else rng.integers(0, len(here))
         path.append(key)
         here = here[key]
     inner = meta
@@ -118,16 +165,33 @@ def outcome(path: Path) -> str:
     """ "read" or "refused".
 
     Raises:
-        AssertionError: the scene is not whole, or the sentence is none. Whatever a reader lets through.
+        AssertionError: what was read is not whole, or the sentence is none. Whatever a reader lets through.
     """
     try:
-        scene = read(path)
-    except SceneFileError as error:
+        reader_of(path)()
+    except InputError as error:
         sentence = str(error)
-        assert "\n" not in sentence and "; " in sentence and len(sentence) < 400, sentence
+        assert "\n" not in sentence and len(sentence) < 500, sentence
+        assert "; " in sentence or path.name in sentence, sentence
         return "refused"
-    check_scene(scene)
     return "read"
+
+
+def reader_of(path: Path) -> Callable[[], object]:
+    """What reads a file of this name, and looks at what it read."""
+    name = path.name
+    if name in ("transforms.json", "cameras.txt", "images.txt"):
+        return lambda: read_posed(path.with_name("cameras.txt") if name == "images.txt" else path)
+    if name == "a.edits":
+        return lambda: load_history(path, stripes(), first_marks(stripes()))
+    if name == "one.camera.json":
+        return lambda: read_camera(path)
+    if name == "two.keys.json":
+        return lambda: along(*read_key_frames(path, None), (16, 12))
+    if path.suffix in PHOTOS:
+        return lambda: read_photo(path).image.load()
+    scene = path.with_name("spoken.ply") if name.endswith(".language.safetensors") else path
+    return lambda: check_scene(read(scene))
 
 
 def main() -> int:
@@ -139,9 +203,9 @@ def main() -> int:
     tracemalloc.start()
     most = 0
     with tempfile.TemporaryDirectory() as folder:
-        files = whole_files(Path(folder))
+        files = whole_files(Path(folder)) | other_files(Path(folder))
         for index, (name, content) in enumerate(damages(files, args.count, args.seed)):
-            path = Path(folder) / f"x{name}"
+            path = Path(folder) / name
             path.write_bytes(content)
             tracemalloc.reset_peak()
             try:
@@ -152,6 +216,7 @@ def main() -> int:
                 kept.write_bytes(content)
                 sys.stdout.write(f"{kept}: {type(error).__name__}: {error}\n")
             most = max(most, tracemalloc.get_traced_memory()[1])
+            path.write_bytes(files[name])  # others may need it
     for key in sorted(found):
         sys.stdout.write(f"{key:32} {found[key]}\n")
     sys.stdout.write(f"{args.count} files, {found['CRASH']} crashes, at most {most / 1e6:.0f} MB\n")

@@ -14,14 +14,19 @@ from PIL import Image
 
 from langflash_core.errors import SceneFileError
 from langflash_core.export import read
-from tests.export.mutations import damages, outcome, whole_files
+from tests.export.mutations import damages, other_files, outcome, whole_files
 
 ROOM = 8 * 2**20  # bytes that any reader may take, beside twice what the file says it holds
 
 
 @pytest.fixture(scope="module")
-def files(tmp_path_factory) -> dict[str, bytes]:
-    return whole_files(tmp_path_factory.mktemp("whole"))
+def folder(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("whole")
+
+
+@pytest.fixture(scope="module")
+def files(folder) -> dict[str, bytes]:
+    return whole_files(folder)
 
 
 def refused(path: Path) -> tuple[str, int]:
@@ -35,13 +40,15 @@ def refused(path: Path) -> tuple[str, int]:
         tracemalloc.stop()
 
 
-def test_mutated_files_are_read_or_refused(files, tmp_path):
-    """A sample; `python -m tests.export.mutations` makes thousands."""
+@pytest.mark.parametrize("kind", ["splats", "others"])
+def test_mutated_files_are_read_or_refused(files, folder, kind):
+    """A sample of 440 and more; `python -m tests.export.mutations` makes thousands."""
+    whole = files if kind == "splats" else other_files(folder)
     found = set()
-    for name, content in damages(files, 20 * len(files), seed=7):
-        path = tmp_path / f"x{name}"
-        path.write_bytes(content)
-        found.add(outcome(path))
+    for name, content in damages(whole, 20 * len(whole), seed=7):
+        (folder / name).write_bytes(content)
+        found.add(outcome(folder / name))
+        (folder / name).write_bytes(whole[name])
     assert found == {"read", "refused"}
 
 

@@ -239,6 +239,8 @@ def with_done(text: str, **changes) -> str:
         lambda text: with_done(text, flips={"gone": ""}),
         lambda text: with_done(text, swaps=[[7, [1, "", True], [1, "", False]]]),
         lambda text: json.dumps({**json.loads(text), "version": 99}),
+        lambda text: json.dumps({**json.loads(text), "version": float("inf")}),
+        lambda text: with_done(text, swaps=[[float("inf"), [1, "", True], [1, "", False]]]),
     ],
 )
 def test_a_damaged_history_is_refused(scene, tmp_path: Path, spoil):

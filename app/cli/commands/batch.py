@@ -14,7 +14,7 @@ from langflash_core.batch.run import finish, jobs_of, left_to_do, run_jobs
 from langflash_core.batch.sets import LEDGER, SUMMARY, read_sets
 from langflash_core.errors import InputError, PromptError, WeightsError
 from langflash_core.files import held_alone
-from langflash_core.formats import ALL_OUT, ANSWERS_OUT
+from langflash_core.formats import ALL_OUT, ANSWERS_OUT, FILMS_OUT
 
 from ..files import check_folder, readable_file
 from ..report import say_error, write_json
@@ -94,7 +94,7 @@ def _check_exports(exports: Sequence[str], prompts: Sequence[str]) -> None:
             raise InputError(f"--export {name} is not an ending that is written; choose {', '.join(EXPORTS)}")
         if name in ANSWERS_OUT and not prompts:
             raise PromptError(f'--export {name} needs a phrase; add --prompt "armchair"')
-    if ".mp4" in exports:
+    if set(FILMS_OUT) & set(exports):
         from ..video import check_encoder
 
         check_encoder()

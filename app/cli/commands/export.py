@@ -6,19 +6,34 @@ from pathlib import Path
 from typing import TextIO
 
 from langflash_core.errors import InputError, PromptError, SceneFileError
-from langflash_core.formats import ALL_OUT, ANSWERS_OUT, CAMERAS_OUT, PAGE_OUT, SCENES_OUT, kind_of
+from langflash_core.formats import (
+    ALL_OUT,
+    ANSWERS_OUT,
+    CAMERAS_OUT,
+    FILMS_OUT,
+    PAGE_OUT,
+    SCENES_OUT,
+    kind_of,
+)
 from langflash_core.types import Camera, QueryResult, Scene
 
 from .. import shots
 from ..cameras import CameraChoice, chosen_camera
-from ..files import check_beside, check_output_file, readable_file, staged_folder
+from ..files import check_beside, check_folder, check_output_file, readable_file, staged_folder
 from ..renderers import Renderer, open_renderer
 from ..report import ProgressBar
 from ..scenes import open_scene
 from .query import spoken
 
+OF_GAUSSIANS = ("cutout", "soft", "instances")  # decided in 3D, the same in all views
 TABLES = {".json": ".json of masks", ".csv": ".csv of boxes", ".glb": ".glb of boxes"}
-NEED_A_PHRASE = ("heat", "mask", "cutout", "labels", "boxes")
+NEED_A_PHRASE = ("heat", "mask", "soft", "cutout", "labels", "instances", "boxes", "surface")
+KINDS = {
+    "boxes": tuple(TABLES),
+    "surface": (".glb",),
+    "depth": (".png", ".exr"),
+    "heat": (".png", *FILMS_OUT),
+}
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -29,15 +44,15 @@ def run(args: Namespace, out: TextIO) -> None:
             nothing answers.
     """
     prompts = spoken(args.prompt or [])
-    suffix = kind_of(check_output_file(args.output, ALL_OUT, inputs=[args.scene]))
+    suffix = _checked_output(args)
     _check_words(args, suffix, prompts)
     choice = chosen_camera(args)
     readable_file(args.scene, "scene", SceneFileError)
-    if suffix == ".mp4":
+    if suffix in FILMS_OUT:
         from ..video import check_encoder
 
         check_encoder()
-    write = _writer(suffix, args.what)
+    write = _write_segmented if args.segmented else _writer(suffix, args.what)
     print(f"{args.output}: {write(args, open_scene(args.scene), prompts, choice)}", file=out)
 
 
@@ -49,7 +64,7 @@ def write_whole(scene: Scene, path: Path, renderer: Renderer, prompts: Sequence[
         LangFlashError: the path cannot be written, or no mask is found.
     """
     suffix = kind_of(path)
-    unset = dict.fromkeys(("threshold", "what", "seconds", "view", "camera", "size"))
+    unset = dict.fromkeys(("threshold", "what", "seconds", "path", "view", "camera", "size"))
     asked = list(prompts) if suffix in (*ANSWERS_OUT, PAGE_OUT) else []
     said = {"all_views": suffix == ".csv", "with_text": False, "replace": False, "fade": False}
     args = Namespace(scene=path.parent, output=path, prompt=asked, backend=renderer, **said, **unset)
@@ -59,14 +74,30 @@ def write_whole(scene: Scene, path: Path, renderer: Renderer, prompts: Sequence[
 def _writer(suffix: str, what: str | None) -> Callable[..., str]:
     if what == "boxes" or suffix == ".csv":
         return _write_boxes
+    if what == "surface":
+        return _write_surface
+    if what == "depth" or suffix == ".exr":
+        return _write_depth
     others = {
-        ".mp4": _write_video,
+        **dict.fromkeys(FILMS_OUT, _write_video),
         ".json": _write_masks,
         ".npz": _write_numbers,
         ".png": _write_pictures,
         PAGE_OUT: _write_page,
     }
     return others.get(suffix, _write_scene)
+
+
+def _checked_output(args: Namespace) -> str:
+    """What the name of -o says it is; "" for a folder.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    if not args.segmented:
+        return kind_of(check_output_file(args.output, ALL_OUT, inputs=[args.scene]))
+    check_folder(args.output)
+    return ""
 
 
 def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
@@ -82,14 +113,18 @@ def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
         raise PromptError(f'{what} needs a phrase; add --prompt "armchair"')
     if args.what == "heat" and len(prompts) > 1:
         raise PromptError("--what heat draws one phrase; use --what labels for several")
-    if args.what == "rgb" and prompts:
-        raise PromptError("--what rgb takes no --prompt; use --what cutout, mask, heat or labels")
-    if args.what == "boxes" and suffix not in TABLES:
-        raise InputError(f"--what boxes takes a .json, .csv or .glb; name one instead of {args.output.name}")
-    if args.what not in (None, "boxes") and suffix != ".png":
-        raise InputError(f"--what {args.what} is a picture; name a .png instead of {args.output.name}")
-    if args.seconds is not None and suffix != ".mp4":
-        raise InputError("--seconds is for videos; name an .mp4, or leave it away")
+    if args.segmented and (not prompts or args.what is not None):
+        raise PromptError('--segmented needs phrases and no --what; add --prompt "armchair"')
+    if prompts and (args.what in ("rgb", "depth") or suffix == ".exr"):
+        what = f"--what {args.what}" if args.what else "an .exr of depth"
+        raise PromptError(f"{what} takes no --prompt; use --what cutout, mask, heat or labels")
+    allowed = (".png",) if args.what is None else KINDS.get(args.what, (".png",))
+    if args.what is not None and suffix not in allowed:
+        ends = " or ".join(allowed)
+        raise InputError(f"--what {args.what} takes a {ends}; name one instead of {args.output.name}")
+    for name in ("seconds", "path"):
+        if getattr(args, name) is not None and suffix not in FILMS_OUT:
+            raise InputError(f"--{name} is for videos; name an .mp4 or .webp, or leave it away")
     if args.with_text and suffix != PAGE_OUT:
         raise InputError("--with-text is for web pages; name an .html, or leave it away")
     _check_camera_words(args, suffix)
@@ -97,17 +132,19 @@ def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
 
 def _check_camera_words(args: Namespace, suffix: str) -> None:
     looked_at = [name for name in ("view", "camera", "size") if getattr(args, name) is not None]
+    if args.segmented and args.all_views:
+        raise InputError("--segmented looks from every photo by itself; leave --all-views away")
     if args.all_views:
         if set(looked_at) - {"size"}:
             raise InputError(f"--all-views looks from every photo; leave --{looked_at[0]} away")
         looked_at.append("all-views")
     if suffix in (*SCENES_OUT, *CAMERAS_OUT, PAGE_OUT) and looked_at and args.what != "boxes":
-        raise InputError(f"a {suffix} holds the whole scene, not a view of it; leave --{looked_at[0]} away")
+        raise InputError(f"a {suffix} holds what all views show, not one; leave --{looked_at[0]} away")
     if args.fade and suffix in (*SCENES_OUT, *CAMERAS_OUT, PAGE_OUT) and args.what != "boxes":
         raise InputError(f"a {suffix} holds the whole scene, and only views fade; leave --fade away")
     extra = [name for name in looked_at if name != "size"]
-    if suffix == ".mp4" and extra:
-        raise InputError(f"a video moves between the views by itself; leave --{extra[0]} away")
+    if suffix in FILMS_OUT and extra:
+        raise InputError(f"a video moves by itself; leave --{extra[0]} away, or say --path")
 
 
 def _write_scene(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
@@ -157,8 +194,12 @@ def _selected(args: Namespace, scene: Scene, prompts: list[str]) -> Scene:
 
 
 def _write_pictures(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
-    """A picture per camera: colours, one phrase's heat-map, a mask, a cut-out, or labels with a legend."""
+    """A picture per camera: colours, one phrase's heat-map, masks, a cut-out, or labels with a legend."""
     cameras, targets = _shots(args, scene, choice)
+    if prompts and args.what in (None, *OF_GAUSSIANS):
+        from ..segmented.files import write_parts
+
+        return write_parts(args, scene, prompts, cameras, targets)
     with (
         ProgressBar() as progress,
         open_renderer(args.backend, fade=args.fade) as renderer,
@@ -170,7 +211,7 @@ def _write_pictures(args: Namespace, scene: Scene, prompts: list[str], choice: C
             place = staging / target.name
             if prompts:
                 results.append(_answer(args, scene, prompts, camera, renderer))
-                shots.write_answered(args.what or "cutout", place, results[-1])
+                shots.write_answered(args.what, place, results[-1])
             else:
                 shots.write_plain(place, renderer(scene, camera, weight_maps=False))
         if prompts:
@@ -202,12 +243,13 @@ def _shots(args: Namespace, scene: Scene, choice: CameraChoice) -> tuple[list[Ca
     """
     output = args.output
     if args.all_views:
-        cameras = [scene.camera(view, *(args.size or (None, None))) for view in range(scene.num_views)]
+        cameras = _photos_or(args, scene, choice)
         names = [f"{output.stem}_{view}{output.suffix}" for view in range(scene.num_views)]
         targets = [output.with_name(name) for name in names]
     else:
         cameras, targets = [choice.of(scene)], [output]
-    legends = [target.with_suffix(".json") for target in targets] if args.what == "labels" else []
+    with_legend = args.what in ("labels", "instances")
+    legends = [target.with_suffix(".json") for target in targets] if with_legend else []
     for target in (*targets, *legends):
         check_output_file(target, inputs=[args.scene])
     for legend, target in zip(legends, targets, strict=False) if not args.replace else ():
@@ -241,15 +283,47 @@ def _write_boxes(args: Namespace, scene: Scene, prompts: list[str], choice: Came
     return f"{found} of {len(rows)} found"
 
 
+def _write_depth(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
+    from ..segmented.files import write_depth
+
+    return write_depth(args, scene, *_shots(args, scene, choice))
+
+
+def _write_surface(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
+    from ..segmented.files import write_surface
+
+    return write_surface(args, scene, prompts)
+
+
+def _write_segmented(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
+    """The folder of every photo's view, or of the one that is named."""
+    from ..segmented.folder import write_folder
+    from ..segmented.subject import taken_apart
+
+    cameras = _photos_or(args, scene, choice)
+    numbers = list(range(len(cameras))) if _of_photos(args) else [choice.view]
+    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+        subject = taken_apart(scene, prompts, args.threshold, cameras, numbers, renderer)
+        return write_folder(args.output, subject, args, progress)
+
+
+def _of_photos(args: Namespace) -> bool:
+    """Whether no view is named, so that every photo's is meant."""
+    return args.view is None and args.camera is None
+
+
+def _photos_or(args: Namespace, scene: Scene, choice: CameraChoice) -> list[Camera]:
+    if not _of_photos(args):
+        return [choice.of(scene)]
+    return [scene.camera(view, *(args.size or (None, None))) for view in range(scene.num_views)]
+
+
 def _write_masks(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
     """COCO instances of one view, or of every photo's, with the views' pictures beside the file."""
     from langflash_core.export.coco import write_coco
     from langflash_core.export.png import write_rgb
 
-    if args.view is None and args.camera is None:
-        cameras = [scene.camera(view, *(args.size or (None, None))) for view in range(scene.num_views)]
-    else:
-        cameras = [choice.of(scene)]
+    cameras = _photos_or(args, scene, choice)
     names = [f"{args.output.stem}_{index}.png" for index in range(len(cameras))]
     for picture in map(args.output.with_name, names):
         check_output_file(picture, inputs=[args.scene])
@@ -272,14 +346,16 @@ def _write_masks(args: Namespace, scene: Scene, prompts: list[str], choice: Came
 def _write_video(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
     from .. import video
 
-    chosen = _selected(args, scene, prompts)
-    cameras = video.tour(scene, args.size or scene.view_size, args.seconds or video.SECONDS)
+    heat = args.what == "heat"
+    chosen = scene if heat else _selected(args, scene, prompts)
+    cameras = video.way(args.path, scene, chosen, args.size, args.seconds)
+    asked = video.asked(scene, prompts[0], args.threshold) if heat else None
     with (
         ProgressBar() as progress,
         open_renderer(args.backend, fade=args.fade) as renderer,
         staged_folder(args.output.parent) as staging,
     ):
-        video.write(staging / args.output.name, chosen, cameras, renderer, progress)
+        video.write(staging / args.output.name, chosen, cameras, renderer, progress, asked)
     return f"{len(cameras) / video.RATE:.1f} s, {cameras[0].width} x {cameras[0].height}"
 
 

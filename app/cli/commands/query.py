@@ -81,11 +81,6 @@ def answers_document(
 
 def answer_fields(answer: "PromptAnswer", scale: float) -> dict[str, Any]:
     """The JSON of one answer; positions and sizes multiplied by `scale` (metres per scene unit)."""
-    box = answer.box and {
-        "center": [scale * value for value in answer.box["center"]],
-        "axes": [list(axis) for axis in answer.box["axes"]],
-        "size": [scale * value for value in answer.box["size"]],
-    }
     return {
         "prompt": answer.prompt,
         "found": answer.found,
@@ -93,7 +88,16 @@ def answer_fields(answer: "PromptAnswer", scale: float) -> dict[str, Any]:
         "threshold": answer.threshold,
         "area": answer.area,
         "centroid": answer.centroid and [scale * value for value in answer.centroid],
-        "box": box,
+        "box": answer.box and scaled_box(answer.box, scale),
+    }
+
+
+def scaled_box(box: dict[str, Any], scale: float) -> dict[str, Any]:
+    """Place and size multiplied by `scale`."""
+    return {
+        "center": [scale * value for value in box["center"]],
+        "axes": [list(axis) for axis in box["axes"]],
+        "size": [scale * value for value in box["size"]],
     }
 
 

@@ -147,4 +147,4 @@ def _renamed(path: str, old: What, new: What) -> str:
     """The path of one kind as that of another; one that does not end as its kind stays as it is."""
     if not path.lower().endswith(old.suffix):
         return path
-    return path[: -len(old.suffix)].removesuffix(old.ends) + new.ends + new.suffix
+    return path[: len(path) - len(old.suffix)].removesuffix(old.ends) + new.ends + new.suffix

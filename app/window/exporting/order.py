@@ -48,6 +48,8 @@ def order(state: State) -> Order | str:
     if problem:
         return problem
     words = ["export", str(scene_file), "-o", str(target)]
+    if form.what is What.SEGMENTED:
+        words.append("--segmented")
     if form.what.word:
         words += ["--what", form.what.word]
     if phrases:
@@ -56,7 +58,7 @@ def order(state: State) -> Order | str:
     words += seen_from
     if form.what.sized:
         words += ["--size", "{}x{}".format(*pixels(form.side, state.pose.aspect))]
-    if form.what is What.VIDEO:
+    if form.what.film:
         words += ["--seconds", f"{form.seconds:g}"]
     files = (*_written(form, target, len(info.views)), *((camera_file,) if camera_file else ()))
     return Order(tuple(words), target, camera_file, files)
@@ -72,7 +74,8 @@ def _written(form: ExportForm, target: Path, num_views: int) -> tuple[Path, ...]
     pictures = (target,)
     if form.all_views and what.looks and what.suffix == ".png":
         pictures = tuple(target.with_name(f"{target.stem}_{view}.png") for view in views)
-    legends = (picture.with_suffix(".json") for picture in pictures if what is What.LABELS)
+    with_legend = what in (What.LABELS, What.INSTANCES)
+    legends = (picture.with_suffix(".json") for picture in pictures if with_legend)
     return (*pictures, *legends)
 
 
@@ -87,7 +90,7 @@ def _seen_from(state: State, target: Path) -> tuple[list[str], Path | None]:
     if not form.what.looks:
         return [], None
     if form.all_views:
-        return ["--all-views"], None
+        return ([] if form.what is What.SEGMENTED else ["--all-views"]), None
     if state.view is not None:
         return ["--view", str(state.view)], None
     camera_file = target.with_name(f"{target.stem}.camera.json")
@@ -109,12 +112,13 @@ def source(state: State) -> Path | None:
 
 
 def typed_target(form: ExportForm) -> Path | None:
-    """The file as typed, with the ending of what is written; None while it names none."""
+    """The file, or folder, as typed, with the ending of what is written; None while it names none."""
     text = form.path.strip()
     path = typed_path(text)
-    if not text or not path.name or os.path.isdir(path):
+    if not text or not path.name or (os.path.isdir(path) and form.what.suffix):
         return None
-    return path if path.suffix.lower() == form.what.suffix else path.with_name(path.name + form.what.suffix)
+    ends = not form.what.suffix or path.suffix.lower() == form.what.suffix
+    return path if ends else path.with_name(path.name + form.what.suffix)
 
 
 def pixels(side: int, aspect: float) -> tuple[int, int]:
@@ -130,7 +134,7 @@ def _phrases(state: State) -> tuple[tuple[str, ...], str]:
     asked = tuple(prompt.text.strip() for prompt in state.asked)
     if what.needs_phrases and not asked:
         return (), f"{what.label} needs a phrase; type one under Find first."
-    if what is What.HEAT:
+    if what.of_one_phrase:
         active = state.active_prompt
         return ((active.text.strip(),) if active else asked[:1]), ""
     if what is What.PAGE:
@@ -144,7 +148,7 @@ def _phrases(state: State) -> tuple[tuple[str, ...], str]:
 def _threshold(state: State) -> list[str]:
     """The person's own threshold, where all phrases that take part share one."""
     active = state.active_prompt
-    part = [active] if state.exporting.form.what is What.HEAT and active else list(state.asked)
+    part = [active] if state.exporting.form.what.of_one_phrase and active else list(state.asked)
     own = {prompt.threshold for prompt in part}
     threshold = next(iter(own)) if len(own) == 1 else None
     if threshold is None or not 0.0 < threshold < 1.0:
@@ -161,7 +165,7 @@ def remarks(state: State) -> list[str]:
         notes.append(f"The {why} not saved: the command reads a copy that goes when the window closes.")
     if not (form.what.needs_phrases or form.only_found):
         return notes
-    if form.what is not What.HEAT and len({prompt.threshold for prompt in state.asked}) > 1:
+    if not form.what.of_one_phrase and len({prompt.threshold for prompt in state.asked}) > 1:
         notes.append("The thresholds differ, so the calibrated one is used for all.")
     if state.negatives:
         notes.append("Phrases are compared with the usual ones, not with your own.")

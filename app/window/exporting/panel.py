@@ -21,13 +21,20 @@ HINTS = {
     What.RGB: "The scene's colours, PNG",
     What.HEAT: "Where the active phrase fits, over the colours",
     What.MASK: "White where any phrase is found",
+    What.SOFT: "How much of each pixel any phrase is, grey of 16 bits",
     What.CUTOUT: "What the phrases find, on transparency (RGBA)",
     What.LABELS: "Phrase numbers as a palette PNG, and a legend as JSON",
+    What.INSTANCES: "A number for each connected thing: three chairs are three; and a legend",
+    What.DEPTH: "16-bit PNG; the length of one step is in the file",
+    What.SEGMENTED: "Masks, cut-outs, instances, depth, boxes, surfaces, a contact sheet and a manifest",
     What.COCO: "Instance masks as COCO JSON, and the pictures they belong to",
     What.BOXES_JSON: "Place, axes and size of what each phrase finds",
     What.BOXES_CSV: "The same as a table",
     What.BOXES_GLB: "The same as bodies, for Blender and other 3D programs",
+    What.SURFACE: "A coloured mesh of what each phrase finds, fused from depth",
     What.VIDEO: "A round through all views, H.264",
+    What.WEBP: "The same for pages and messages, without a player",
+    What.HEAT_VIDEO: "The round with the active phrase's heat-map, H.264",
     What.PLY: "3D Gaussians as other viewers read them",
     What.SPZ: "Compressed, for phones and the web",
     What.SOG: "Compressed as pictures, for SuperSplat and PlayCanvas",
@@ -82,7 +89,7 @@ def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
         imgui.same_line()
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.MUTED, "px")
-    if what is What.VIDEO:
+    if what.film:
         _label("Length", look)
         width = imgui.get_content_region_avail().x
         changed, seconds = widgets.slider(

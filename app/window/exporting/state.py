@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from langflash_core.formats import PAGE_OUT, SCENES_OUT
+from langflash_core.formats import FILMS_OUT, PAGE_OUT, SCENES_OUT
 
 LARGEST_SIDE = 8192  # pixels, as on the command line
 SECONDS = (1.0, 60.0)
@@ -17,13 +17,20 @@ class What(Enum):
     RGB = ("Picture", ".png", "rgb", "picture")
     HEAT = ("Heat-map", ".png", "heat", "heat")
     MASK = ("Mask", ".png", "mask", "mask")
+    SOFT = ("Soft mask", ".png", "soft", "soft")
     CUTOUT = ("Cut-out", ".png", "cutout", "cutout")
     LABELS = ("Label map", ".png", "labels", "labels")
+    INSTANCES = ("Instances", ".png", "instances", "instances")
+    DEPTH = ("Depth", ".png", "depth", "depth")
+    SEGMENTED = ("All of it, folder", "", "", "segmented")
     COCO = ("COCO masks", ".json", "", "coco")
     BOXES_JSON = ("Boxes, JSON", ".json", "boxes", "boxes")
     BOXES_CSV = ("Boxes, CSV", ".csv", "boxes", "boxes_table")
     BOXES_GLB = ("Boxes, .glb", ".glb", "boxes", "boxes_bodies")
+    SURFACE = ("Surfaces, .glb", ".glb", "surface", "surfaces")
     VIDEO = ("Turntable", ".mp4", "", "turntable")
+    WEBP = ("Turntable, .webp", ".webp", "", "turntable")
+    HEAT_VIDEO = ("Heat-map, .mp4", ".mp4", "heat", "heat_turntable")
     PLY = ("Splats, .ply", ".ply", "", "splats")
     SPZ = ("Splats, .spz", ".spz", "", "splats")
     SOG = ("Splats, .sog", ".sog", "", "splats")
@@ -53,19 +60,29 @@ class What(Enum):
     def needs_phrases(self) -> bool:
         """Whether there is nothing to write without a phrase."""
         return self in (
-            What.HEAT, What.MASK, What.CUTOUT, What.LABELS, What.COCO,
-            What.BOXES_JSON, What.BOXES_CSV, What.BOXES_GLB,
+            What.HEAT, What.HEAT_VIDEO, What.MASK, What.SOFT, What.CUTOUT, What.LABELS, What.INSTANCES,
+            What.SEGMENTED, What.COCO, What.BOXES_JSON, What.BOXES_CSV, What.BOXES_GLB, What.SURFACE,
         )  # fmt: skip
+
+    @property
+    def of_one_phrase(self) -> bool:
+        """Whether it shows the active phrase alone."""
+        return self in (What.HEAT, What.HEAT_VIDEO)
 
     @property
     def takes_phrases(self) -> bool:
         """Whether phrases may narrow it down. A page holds everything and shows them as asked."""
-        return self not in (What.RGB, What.PAGE)
+        return self not in (What.RGB, What.DEPTH, What.PAGE)
 
     @property
     def looks(self) -> bool:
         """Whether it is seen from a camera."""
-        return self is not What.VIDEO and not self.splats
+        return not (self.film or self.splats or self is What.SURFACE)
+
+    @property
+    def film(self) -> bool:
+        """Whether it moves, and has a length."""
+        return self.suffix in FILMS_OUT
 
     @property
     def splats(self) -> bool:
@@ -75,7 +92,7 @@ class What(Enum):
     @property
     def sized(self) -> bool:
         """Whether it has a size in pixels."""
-        return self.looks or self is What.VIDEO
+        return self.looks or self.film
 
 
 @dataclass(frozen=True)

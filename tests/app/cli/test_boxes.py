@@ -46,7 +46,7 @@ def test_every_photo_has_its_boxes(run, scene_file, tmp_path):
     [
         ("a.glb", ("--what", "boxes"), "--prompt"),
         ("a.glb", ("--what", "boxes", "--prompt", "submarine", "--backend", "torch"), "lower the threshold"),
-        ("a.png", ("--what", "boxes", "--prompt", "armchair"), ".json, .csv or .glb"),
+        ("a.png", ("--what", "boxes", "--prompt", "armchair"), ".json or .csv or .glb"),
     ],
 )
 def test_what_cannot_be(refused, scene_file, tmp_path, name, words, hint):  # noqa: F811

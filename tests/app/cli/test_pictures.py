@@ -30,7 +30,6 @@ def test_empty_pixels_stay_black():
     empty = Frame(torch.zeros(1, 2, 3), torch.zeros(1, 2), torch.zeros(1, 2), torch.zeros(1, 2, 2))
     assert not pictures.depth_picture(empty).any()
     assert not pictures.atom_picture(empty, torch.eye(2)).any()
-    assert not pictures.cut_out(empty, torch.ones(1, 1, 2, dtype=torch.bool)).any()
 
 
 def test_depth_runs_from_near_to_far():
@@ -59,9 +58,3 @@ def test_atoms_and_weights():
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) == 2
     none = Frame(torch.ones(2, 2, 3), torch.ones(2, 2), torch.ones(2, 2), torch.zeros(2, 2, 0))
     assert not pictures.atom_picture(none, torch.zeros(0, 8)).any()
-
-
-def test_cut_out_is_straight_colour():
-    half = Frame(torch.full((1, 2, 3), 0.25), torch.full((1, 2), 0.5), torch.ones(1, 2))
-    pixels = pictures.cut_out(half, torch.tensor([[[True, False]]]))
-    assert pixels.tolist() == [[[128, 128, 128, 128], [0, 0, 0, 0]]]  # 0.25 / 0.5, alpha 0.5

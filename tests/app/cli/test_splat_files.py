@@ -109,7 +109,7 @@ def test_a_page_holds_the_whole_scene_and_the_phrases(run, refused, scene_file, 
     assert "is for web pages" in refused("export", scene_file, "-o", tmp_path / "b.ply", "--with-text")
     assert "'minilm' only" in refused("export", ply_file, "-o", page, "--with-text")
     assert "needs a phrase" in refused("export", scene_file, "-o", page, "--threshold", "0.5")
-    assert "is a picture" in refused("export", scene_file, "-o", page, "--what", "rgb")
+    assert "takes a .png" in refused("export", scene_file, "-o", page, "--what", "rgb")
 
 
 @pytest.mark.parametrize("suffix", IN_ORDER)
@@ -256,11 +256,27 @@ def test_video_without_its_package(refused, scene_file, tmp_path, monkeypatch):
         ("a", [], ".png"),
         ("a.json", [], "--prompt"),
         ("a.png", ["--what", "labels"], "--prompt"),
-        ("a.ply", ["--what", "labels", "--prompt", "armchair"], "a .png instead"),
+        ("a.ply", ["--what", "labels", "--prompt", "armchair"], "takes a .png"),
         ("a.ply", ["--view", "0"], "leave --view away"),
         ("a.splat", ["--size", "9x9"], "leave --size away"),
         ("a.mp4", ["--view", "0"], "leave --view away"),
         ("a.png", ["--seconds", "3"], "--seconds"),
+        ("a.png", ["--path", "orbit"], "--path is for videos"),
+        ("a.webp", ["--what", "heat"], "--prompt"),
+        ("a.mp4", ["--what", "labels", "--prompt", "armchair"], "takes a .png"),
+        ("a.png", ["--what", "surface", "--prompt", "armchair"], "takes a .glb"),
+        ("a.glb", ["--what", "surface"], "--prompt"),
+        ("a.glb", ["--what", "surface", "--prompt", "armchair", "--view", "0"], "leave --view away"),
+        ("a.png", ["--what", "instances"], "--prompt"),
+        ("a.png", ["--what", "soft"], "--prompt"),
+        ("a.png", ["--what", "depth", "--prompt", "armchair"], "takes no --prompt"),
+        ("a.exr", ["--prompt", "armchair"], "takes no --prompt"),
+        ("a.ply", ["--what", "depth"], "takes a .png or .exr"),
+        ("a", ["--segmented"], "--segmented needs phrases"),
+        ("a", ["--segmented", "--prompt", "armchair", "--what", "mask"], "no --what"),
+        ("a", ["--segmented", "--prompt", "armchair", "--all-views"], "leave --all-views away"),
+        ("a", ["--segmented", "--prompt", "armchair", "--seconds", "2"], "--seconds is for videos"),
+        ("a", ["--segmented", "--prompt", "submarine", *TORCH], "lower --threshold"),
         ("a.mp4", ["--seconds", "0"], "--seconds"),
         ("a.ply", ["--threshold", "0.5"], "--prompt"),
     ],

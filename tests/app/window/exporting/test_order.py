@@ -45,7 +45,8 @@ def test_every_kind_says_the_command_that_does_it(what: What) -> None:
     ]
     asked = what.needs_phrases or what is What.PAGE  # a page shows the phrases as asked
     assert ("--prompt" in words) == asked and ("--view" in words) == what.looks
-    assert ("--size" in words) == what.sized and ("--seconds" in words) == (what is What.VIDEO)
+    assert ("--size" in words) == what.sized and ("--seconds" in words) == what.film
+    assert ("--segmented" in words) == (what is What.SEGMENTED)
 
 
 def wrong(state: State) -> str:
@@ -163,8 +164,19 @@ def test_a_name_of_ones_own_is_kept_for_its_scene_and_named_by_kind() -> None:
     state = form(state, what=What.MASK)
     assert state.exporting.form.path == "/out/x_mask.png"
     assert form(state, what=What.VIDEO).exporting.form.path == "/out/x_turntable.mp4"
+    folder = form(state, what=What.SEGMENTED)
+    assert folder.exporting.form.path == "/out/x_segmented"
+    assert form(folder, what=What.RGB).exporting.form.path == "/out/x_picture.png"
     again = after(state, do.ShowDialog(None), export.ShowExport())
     assert again.exporting.form.path == "/out/x_mask.png"
+
+
+def test_a_folder_may_be_there_already_and_is_asked_about(tmp_path) -> None:
+    state = form(scene(), what=What.SEGMENTED, path=str(tmp_path))
+    order = export_form.order(state)
+    assert not isinstance(order, str) and export_form.there(order) == (tmp_path,)
+    every = export_form.order(form(state, all_views=True))
+    assert not isinstance(every, str) and not {"--all-views", "--view", "--camera"} & set(every.words)
 
 
 def test_the_name_follows_the_scene() -> None:

@@ -1,0 +1,1 @@
+"""`langflash export --segmented`: every view of a scene taken apart by phrases, in one folder."""

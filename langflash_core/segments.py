@@ -1,0 +1,161 @@
+"""Phrases as parts of the scene: which Gaussians, which connected things, and how every view shows them.
+
+Membership is decided once, in 3D, so masks of all views agree. A view's mattes are splatted like weight
+maps: with b_ip = 1 where Gaussian i is of phrase p,
+
+    matte_p(x) = sum_i T_i alpha_i b_ip,   cut-out_p(x) = sum_i T_i alpha_i b_ip c_i / matte_p(x),
+
+so an edge has the thing's own colour, whatever stands behind or before it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from langflash_core.errors import PromptError
+from langflash_core.geometry.fusion import DepthView, Surface, fuse
+from langflash_core.geometry.harmonics import SH_C0
+from langflash_core.language.answers import (
+    BOX_QUANTILES,
+    COVERED_ALPHA,
+    MIN_AREA,
+    oriented_box,
+    presence_scores,
+)
+from langflash_core.language.gaussians import gaussian_relevance
+from langflash_core.language.relevance import compile_query
+from langflash_core.language.spaces import language_space
+from langflash_core.scene.instances import disc_radii, instances
+from langflash_core.types import Camera, Frame, Record, Scene, SegmentedView, Segments, Semantics
+
+Render = Callable[..., Frame]  # (scene, camera, weight_maps=True)
+_LEAST = 1 / 255  # of a matte that has a colour
+
+
+def segment(scene: Scene, prompts: Sequence[str], *, threshold: float | None = None) -> Segments:
+    """The Gaussians that answer each phrase, and the connected things among them.
+
+    A phrase is found where a connected thing answers it; of what is not found, nothing is a member.
+
+    Args:
+        threshold: relevancy in [0, 1]; None: the scene's calibration.
+
+    Raises:
+        PromptError: a prompt or the threshold cannot be used. WeightsError: the space has no text weights.
+    """
+    compiled = compile_query(scene, language_space(scene.semantics.space), list(prompts))
+    limit = compiled.threshold if threshold is None else threshold
+    if not 0 <= limit <= 1:
+        raise PromptError(f"the threshold {limit} is out of range; relevancy needs 0 to 1")
+    relevance = gaussian_relevance(scene.semantics, compiled)  # (P, N)
+    members = (relevance >= limit) & (scene.semantics.num_atoms > 0)
+    least = MIN_AREA * scene.view_size[0] * scene.view_size[1]  # Gaussians are about a photo's pixel large
+    members &= (members.sum(1) >= least)[:, None]
+    scores = presence_scores(relevance[:, None], torch.ones_like(relevance[:1], dtype=torch.bool))
+    numbers = [torch.from_numpy(instances(scene.gaussians, row.cpu().numpy())) for row in members]
+    return Segments(compiled.texts, tuple(scores.tolist()), float(limit), members.cpu(), torch.stack(numbers))
+
+
+def boxes(scene: Scene, segments: Segments) -> list[dict]:
+    """Oriented box (`oriented_box`) of every connected thing's centres, in the order of `things`."""
+    means = scene.gaussians.means.detach().cpu()
+    return [oriented_box(means[segments.instances[phrase] == number]) for phrase, number in segments.things]
+
+
+def segmented_view(scene: Scene, segments: Segments, camera: Camera, render: Render) -> SegmentedView:
+    """How a view shows the phrases; `scene` as `carrying` gives it, made once for all views."""
+    frame = render(scene, camera)
+    maps = frame.weight_maps
+    assert maps is not None, "render draws weight maps unless told otherwise"
+    count, num_things = len(segments.prompts), len(segments.things)
+    mattes, union, parts = maps.movedim(-1, 0).clamp(0, 1).split((count, 1, num_things))
+    view = SegmentedView(
+        camera, replace(frame, weight_maps=None), mattes, union[0], torch.zeros_like(union[0]).long()
+    )
+    if not num_things:
+        return view
+    phrases = torch.tensor([phrase for phrase, _ in segments.things])
+    most = torch.where(view.masks[phrases] & (2 * parts >= mattes[phrases]), parts, 0.0)
+    best, which = most.max(0)
+    return replace(view, things=torch.where(best > 0, which + 1, 0))
+
+
+def carrying(scene: Scene, segments: Segments) -> Scene:
+    """The scene with membership for weights: atoms are the phrases, their union, then the things."""
+    count = len(segments.prompts)
+    union = segments.members.any(0)
+    first = (
+        torch.tensor([0, *segments.counts[:-1]]).cumsum(0) + count + 1
+    )  # atom of each phrase's first thing
+    numbers = segments.instances.T  # (N, P)
+    ids = torch.cat(
+        (
+            torch.arange(count + 1).expand(len(union), -1),
+            torch.where(numbers > 0, first + numbers - 1, 0),
+        ),
+        1,
+    )
+    values = torch.cat((segments.members.T, union[:, None], numbers > 0), 1).float()
+    atoms = torch.ones(count + 1 + len(segments.things), 1)
+    plain = replace(scene, record=Record())  # names and silences are of the scene's own atoms
+    return replace(plain, semantics=Semantics(ids, values, atoms, scene.semantics.space))
+
+
+def cut_out(scene: Scene, members: Tensor, camera: Camera, matte: Tensor, render: Render) -> Tensor:
+    """What some Gaussians add to a view, straight colour and alpha.
+
+    All others are drawn black, so they cover and add nothing: no colour of a neighbour is at the edges.
+
+    Args:
+        members: (N,) bool. matte: (H, W), theirs in this view.
+
+    Returns:
+        (H, W, 4) in [0, 1]; colour is 0 where the matte is.
+    """
+    rgb = render(_blackened(scene, ~members), camera, weight_maps=False).rgb
+    colour = torch.where((matte >= _LEAST)[..., None], rgb / matte.clamp_min(_LEAST)[..., None], 0.0)
+    return torch.cat((colour, matte[..., None]), -1).clamp(0, 1)
+
+
+def _blackened(scene: Scene, rows: Tensor) -> Scene:
+    """The scene with some Gaussians black from everywhere: colour is 0.5 + SH_C0 sh_0, clamped at 0."""
+    sh = torch.where(rows.to(scene.gaussians.sh.device)[:, None, None], 0.0, scene.gaussians.sh)
+    sh[rows, 0] = -1 / SH_C0
+    return replace(scene, gaussians=replace(scene.gaussians, sh=sh))
+
+
+def surface(scene: Scene, members: Tensor, cameras: Sequence[Camera], render: Render) -> Surface | None:
+    """The surface of some Gaussians alone, fused from their depths in several views.
+
+    A voxel is as large as the discs of the Gaussians are: finer would show their grid.
+
+    Args:
+        members: (N,) bool.
+
+    Returns:
+        None where no view shows half of a pixel of them.
+
+    Raises:
+        MissingPackageError: scikit-image is not installed.
+    """
+    finite = torch.isfinite(scene.gaussians.means).all(1).to(members.device)
+    part = scene.rows(members & finite)
+    if not len(part.gaussians):
+        return None
+    means = part.gaussians.means.detach().cpu().double().numpy()
+    low, high = np.quantile(means, BOX_QUANTILES, axis=0)
+    views = [_depth_view(render(part, camera, weight_maps=False), camera) for camera in cameras]
+    return fuse(views, low, high, 2 * float(np.median(disc_radii(part.gaussians))))
+
+
+def _depth_view(frame: Frame, camera: Camera) -> DepthView:
+    """Depths where at least half of a pixel is covered."""
+    alphas = frame.alphas.cpu()
+    depths = torch.where(alphas >= COVERED_ALPHA, frame.depths.cpu(), 0.0)
+    straight = frame.rgb.cpu() / alphas.clamp_min(_LEAST)[..., None]
+    colours = (straight.clamp(0, 1) * 255).round().byte()
+    matrices = camera.viewmat.cpu().double().numpy(), camera.K.cpu().double().numpy()
+    return DepthView(depths.double().numpy(), colours.numpy(), *matrices)

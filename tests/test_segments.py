@@ -1,0 +1,153 @@
+"""Phrases as parts of a scene: one membership for all views, edges without a neighbour's colour."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from langflash_core import segments
+from langflash_core.errors import PromptError
+from langflash_core.geometry.harmonics import SH_C0
+from langflash_core.splat import render
+from langflash_core.types import Camera, Gaussians, Scene, Segments, Semantics
+from tests.app.cli.conftest import HEIGHT, WIDTH, stripes
+
+COLOURS = torch.tensor([[0.9, 0.1, 0.1], [0.1, 0.9, 0.1], [0.1, 0.1, 0.9]])
+
+
+def chairs() -> tuple[Scene, torch.Tensor]:
+    """Three squares that face the camera, the third nearer and before a part of the second; whose is what."""
+    ys, xs = torch.meshgrid(torch.arange(15.0), torch.arange(15.0), indexing="ij")
+    square = torch.stack((xs, ys, torch.zeros_like(xs)), -1).reshape(-1, 3) * 0.02
+    places = torch.tensor([[-0.6, -0.15, 1.0], [0.05, -0.15, 1.0], [0.12, -0.05, 0.7]])
+    means = torch.cat([square + place for place in places])
+    owner = torch.arange(3).repeat_interleave(len(square))
+    count = len(means)
+    gaussians = Gaussians(
+        means,
+        torch.tensor([1.0, 0, 0, 0]).repeat(count, 1),
+        torch.tensor([0.014, 0.014, 0.002]).repeat(count, 1),
+        torch.full((count,), 0.95),
+        ((COLOURS[owner] - 0.5) / SH_C0)[:, None],
+    )
+    semantics = Semantics(torch.zeros(count, 0).long(), torch.zeros(count, 0), torch.zeros(0, 4), "test")
+    K = torch.tensor([[60.0, 0, 40], [0, 60.0, 30], [0, 0, 1.0]])
+    return Scene(gaussians, semantics, torch.eye(4)[None], K[None], (80, 60)), owner
+
+
+def parts_of(scene: Scene, owner: torch.Tensor) -> Segments:
+    """The first two squares are "chair", the third is "box"."""
+    chair, box = owner < 2, owner == 2
+    members = torch.stack((chair, box))
+    numbers = torch.stack((torch.where(chair, owner + 1, 0), box.long()))
+    return Segments(("chair", "box"), (1.0, 1.0), 0.5, members, numbers)
+
+
+def view_of(camera: Camera | None = None):
+    scene, owner = chairs()
+    parts = parts_of(scene, owner)
+    seen = camera or scene.camera(0)
+    return scene, parts, segments.segmented_view(segments.carrying(scene, parts), parts, seen, render)
+
+
+def test_mattes_are_sums_of_what_their_gaussians_add():
+    """The twin: weights as features of plain compositing, one phrase at a time."""
+    scene, parts, view = view_of()
+    for phrase, members in enumerate(parts.members):
+        atom = Semantics(torch.zeros(len(members), 1).long(), members[:, None].float(), torch.ones(1, 1), "t")
+        twin = render(Scene(scene.gaussians, atom, scene.viewmats, scene.Ks, (80, 60)), scene.camera(0))
+        assert twin.weight_maps is not None
+        torch.testing.assert_close(view.mattes[phrase], twin.weight_maps[..., 0])
+    torch.testing.assert_close(view.union, view.mattes.sum(0))  # no Gaussian is of both
+
+
+def test_instances_are_told_apart_in_every_view():
+    shifted = torch.eye(4)
+    shifted[0, 3] = -0.2
+    scene, parts, view = view_of()
+    _, _, moved = view_of(Camera(shifted, scene.Ks[0], 80, 60))
+    assert parts.things == ((0, 1), (0, 2), (1, 1)) and parts.counts == (2, 1)
+    for seen, left in ((view, 4 + 0), (moved, 4 - 12)):  # 0.2 units are 12 pixels at depth 1
+        assert seen.things[30, max(0, left + 5)] == 1  # the first square
+        assert set(seen.things[seen.masks[0]].unique().tolist()) <= {1, 2}
+        assert set(seen.things[seen.masks[1]].unique().tolist()) <= {2, 3}
+        assert not seen.things[~seen.masks.any(0)].any()
+
+
+def test_labels_are_of_the_phrase_that_shows_most():
+    _, _, view = view_of()
+    assert torch.equal(view.labels > 0, view.masks.any(0))
+    assert torch.equal(view.labels == 2, view.masks[1] & ~(view.mattes[0] > view.mattes[1]))
+
+
+def test_a_cut_out_has_no_colour_of_its_neighbours():
+    scene, parts, view = view_of()
+    for phrase, channel in ((1, 2), (0, None)):
+        cut = segments.cut_out(scene, parts.members[phrase], view.camera, view.mattes[phrase], render)
+        edge = (cut[..., 3] > 0.05) & (cut[..., 3] < 0.95)
+        assert edge.any()  # soft
+        if channel is not None:
+            # Of one colour throughout, also where the mixture on screen is half another's.
+            error = (cut[..., :3][edge] - COLOURS[2]).abs().max()
+            assert float(error) < 1e-4  # float32 over a matte of 0.05
+            assert float((view.frame.rgb[edge] - COLOURS[2]).abs().max()) > 0.3
+        torch.testing.assert_close(cut[..., 3], view.mattes[phrase].clamp(0, 1))
+
+
+def test_the_parts_and_what_is_left_make_the_picture_again():
+    scene, parts, view = view_of()
+    total = torch.zeros(60, 80, 3)
+    for phrase in range(2):
+        cut = segments.cut_out(scene, parts.members[phrase], view.camera, view.mattes[phrase], render)
+        total += cut[..., :3] * cut[..., 3:]
+    drawn = view.mattes.sum(0)[..., None] > 0.02  # below 1/255 a matte has no colour
+    assert float(((total - view.frame.rgb) * drawn).abs().max()) < 2 / 255
+
+
+def test_words_find_their_stripe():
+    scene = stripes()
+    parts = segments.segment(scene, ["armchair", "submarine"])
+    assert parts.counts == (1, 0) and not parts.members[1].any()
+    assert parts.scores[0] > parts.threshold > parts.scores[1]
+    view = segments.segmented_view(segments.carrying(scene, parts), parts, scene.camera(0), render)
+    third = WIDTH // 3
+    assert view.masks[0, :, : third - 2].all() and not view.masks[0, :, third + 2 :].any()
+    (box,) = segments.boxes(scene, parts)
+    assert box["center"][0] == pytest.approx(-0.53, abs=0.05) and view.frame.rgb.shape == (HEIGHT, WIDTH, 3)
+
+
+def test_thresholds_and_scenes_without_language():
+    with pytest.raises(PromptError, match="out of range"):
+        segments.segment(stripes(), ["armchair"], threshold=1.5)
+    everything = segments.segment(stripes(), ["armchair"], threshold=0.0)
+    assert everything.members.all() and everything.counts == (1,)
+
+
+def test_numbers_that_are_none_are_left_out():
+    scene, owner = chairs()
+    scene.gaussians.means[0] = torch.nan
+    parts = parts_of(scene, owner)
+    view = segments.segmented_view(segments.carrying(scene, parts), parts, scene.camera(0), render)
+    assert torch.isfinite(view.mattes).all() and view.masks[0].any()
+    cut = segments.cut_out(scene, parts.members[0], view.camera, view.mattes[0], render)
+    assert torch.isfinite(cut).all()
+    pytest.importorskip("skimage")
+    mesh = segments.surface(scene, owner == 0, [scene.camera(0, 320, 240)], render)
+    assert mesh is not None and np.isfinite(mesh.vertices).all()
+
+
+def test_a_surface_is_where_the_thing_is():
+    pytest.importorskip("skimage")
+    scene, owner = chairs()
+    cameras = [scene.camera(0, 320, 240)]
+    mesh = segments.surface(scene, owner == 2, cameras, render)
+    assert mesh is not None and segments.surface(scene, owner > 5, cameras, render) is None
+    # Centres are at depth 0.7; a voxel is 0.028.
+    assert np.abs(mesh.vertices[:, 2] - 0.7).max() < 0.014
+    area = (
+        np.linalg.norm(np.cross(*np.diff(mesh.vertices[mesh.faces], axis=1).swapaxes(0, 1)), axis=1).sum() / 2
+    )
+    assert area == pytest.approx(0.28**2, rel=0.25)  # half a voxel at each rim
+    assert np.abs(mesh.colours.mean(0) - 255 * COLOURS[2].numpy()).max() < 3
+    assert math.isfinite(float(mesh.vertices.sum()))
