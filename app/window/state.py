@@ -37,7 +37,8 @@ class Line:
 
 @dataclass(frozen=True)
 class Stats:
-    """Figures of the status bar; the session refreshes them every frame."""
+    """Figures of the status bar; the session refreshes them every frame. settling: a finer picture than the
+    one on show is being drawn."""
 
     frame_seconds: float = 0.0
     picture_seconds: float = 0.0
@@ -45,6 +46,7 @@ class Stats:
     renderer: str = ""
     depth_range: tuple[float, float] = (0.0, 1.0)
     passes: tuple[tuple[str, int], ...] = ()
+    settling: bool = False
 
 
 NO_STATS = Stats()

@@ -196,6 +196,14 @@ class OpenPaths:
 
 
 @dataclass(frozen=True)
+class Loaded:
+    """The worker has loaded what drawing needs: while there is no scene, shaders can be compiled."""
+
+    def apply(self, state: State) -> State:
+        return state
+
+
+@dataclass(frozen=True)
 class SceneArrived:
     """A scene is ready: show it from its first view, ask every prompt again; the one before is a room to go
     back to. alone: see `OpenScene`. room: as it was left, where it was on show before."""

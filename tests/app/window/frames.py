@@ -1,4 +1,4 @@
-"""How late frames come, from launch to the end of a first phrase, an orbit in heat-map mode and three exports.
+"""How late frames come, from launch to the end of a first phrase, an orbit and three exports.
 
     python -m tests.app.window.frames [--size 1280x800] [--code FOLDER ...] [--photos A B]
 
@@ -10,6 +10,7 @@ version of the program to measure; they follow each other in one run.
 import argparse
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -102,7 +103,9 @@ class Watched(Program):
     def since(self, moment: float, holds) -> float:
         """Seconds from `moment` to the first line that satisfies `holds`."""
         with self._changed:
-            return next((line["at"] - moment for line in self._lines if line["at"] > moment and holds(line)), -1)
+            return next(
+                (line["at"] - moment for line in self._lines if line["at"] > moment and holds(line)), -1
+            )
 
     def end(self) -> dict:
         self._process.terminate()
@@ -124,7 +127,10 @@ def walk(someone: Watched, phrase: str) -> Iterator[tuple[str, float]]:
     someone.quiet(2.5)
     full = someone.state["picture"]
     scored = lambda line: line["prompts"][0][0] == phrase and line["prompts"][0][1] is not None  # noqa: E731
-    yield f"full picture {full} with its score", someone.since(typed, lambda s: scored(s) and s["picture"] == full)
+    yield (
+        f"full picture {full} with its score",
+        someone.since(typed, lambda s: scored(s) and s["picture"] == full),
+    )
     someone.phase("orbit")
     left = (someone.size[0] + 330) // 2
     for turn in (1, -1, 1):
@@ -158,7 +164,8 @@ def _place() -> Iterator[Path]:
 def measure(code: Path, size: tuple[int, int], photos: list[Path], phrase: str) -> None:
     """One session, and what there is to say of it."""
     with _place() as folder, x_server(*size) as display:
-        someone = Watched(display, size, code, folder, photos)
+        copies = [Path(shutil.copy(photo, folder)) for photo in photos]  # exports go beside them
+        someone = Watched(display, size, code, folder, copies)
         try:
             told = list(walk(someone, phrase))
         finally:
