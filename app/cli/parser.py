@@ -7,6 +7,7 @@ from typing import NoReturn
 
 import langflash_core
 from langflash_core.errors import InputError
+from langflash_core.formats import COLOUR_MAPS
 
 from .values import (
     above_zero,
@@ -22,6 +23,7 @@ from .values import (
     pixel_side,
     seed,
     size,
+    span,
     view_index,
     what,
     whole_count,
@@ -30,7 +32,9 @@ from .values import (
 # langflash_core.lab.photos.layouts.LAYOUTS, which would bring torch along.
 LAYOUTS = ("nyu", "coco", "ade20k", "sunrgbd", "frames")
 # The decisions that `bench` compares: app.bench.modes.AXES, which would bring torch along.
-BENCH_AXES = ("precision", "relevance", "weights", "cut", "dictionary", "resolution", "detail", "sort")
+BENCH_AXES = (
+    "precision", "relevance", "weights", "cut", "dictionary", "resolution", "detail", "rasteriser", "sort",
+)  # fmt: skip
 
 
 class UsageError(InputError):
@@ -220,6 +224,18 @@ def _add_batch(commands) -> None:
     _add_json(command)
 
 
+def _add_colours(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--colormap",
+        choices=COLOUR_MAPS,
+        default=COLOUR_MAPS[0],
+        help=f"of heat-maps (default: {COLOUR_MAPS[0]}, which colour-blind eyes read too)",
+    )
+    command.add_argument(
+        "--span", type=span, metavar="LOW,HIGH", help="relevance of its first and last colour"
+    )
+
+
 def _add_query(commands) -> None:
     command = _command(commands, "query", "where in a scene is each phrase? heat-maps, masks and numbers")
     command.add_argument("scene", type=Path, metavar="SCENE")
@@ -240,6 +256,7 @@ def _add_query(commands) -> None:
     command.add_argument(
         "--npz", action="store_true", help="also write relevance, masks, depth and rgb as arrays"
     )
+    _add_colours(command)
 
 
 def _add_render(commands) -> None:
@@ -257,6 +274,7 @@ def _add_render(commands) -> None:
     command.add_argument(
         "--prompt", nargs="+", metavar="PHRASE", help="for relevance (one) and labels (any number)"
     )
+    _add_colours(command)
     _add_backend(command)
     _add_json(command)
 
@@ -288,6 +306,7 @@ def _add_export(commands) -> None:
         help="of a .png: colours, a heat-map, a mask, a cut-out with transparency (default with --prompt), "
         "or phrase numbers with a legend as .json; boxes: a .json, .csv or .glb of places and sizes",
     )
+    _add_colours(command)
     command.add_argument(
         "--all-views", action="store_true", help="from every photo: FILE_0, FILE_1 and so on"
     )

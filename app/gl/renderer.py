@@ -18,9 +18,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from langflash_core.colormaps import COLOUR_MAPS
 from langflash_core.errors import GraphicsError
 from langflash_core.export.colours import heat
+from langflash_core.formats import COLOUR_MAPS
 from langflash_core.language.relevance import CompiledQuery
 from langflash_core.splat.projection import ALPHA_MIN, NEAR
 from langflash_core.types import Camera, Frame, Scene

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
-from langflash_core.colormaps import COLOUR_MAPS
+from langflash_core.colormaps import HeatColours
 from langflash_core.scene.edits import Marks, Mask
 
 from .artist import Artist, Asked
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
 
 BACKGROUND = (0.055, 0.06, 0.07)  # the theme's canvas
-COLORMAP = COLOUR_MAPS[0]
 STILLS = (0.5, 1.0)
 """Scales of the still pictures that follow each other where OpenGL runs on the processor."""
 MOST_THREADS = 8  # of a still picture
@@ -402,10 +401,11 @@ class Viewport:
         if self._still is not None and not self._tells(self._still, state):
             return  # what is on show stays until the answer is there
         active = next((i for i, p in enumerate(asked) if p.key == state.active), 0)
-        colouring = (mode, active, state.asking.atom, tuple((p.colour, p.cut) for p in asked))
+        colours = state.heat_colours
+        colouring = (mode, active, state.asking.atom, tuple((p.colour, p.cut) for p in asked), colours)
         if colouring != self._colouring:
             self._colouring = colouring
-            self._texture = _picture(renderer, mode, asked, active, state.asking.atom)
+            self._texture = _picture(renderer, mode, asked, active, state.asking.atom, colours)
 
 
 def torch_of(values: np.ndarray) -> "Tensor":
@@ -416,34 +416,36 @@ def torch_of(values: np.ndarray) -> "Tensor":
 
 
 def _picture(
-    renderer: "SplatRenderer", mode: Mode, asked: list[Prompt], active: int, atom: int
+    renderer: "SplatRenderer", mode: Mode, asked: list[Prompt], active: int, atom: int, shades: HeatColours
 ) -> moderngl.Texture:
     """The texture that shows a mode; `asked` in the order of the query, not empty where it `answers`."""
     colours = np.array([p.colour for p in asked], np.float32)
     cuts = np.array([p.cut for p in asked], np.float32)
     match mode:
         case Mode.HEAT:
-            return renderer.heat_texture(active, COLORMAP, asked[active].cut, True)
+            return renderer.heat_texture(
+                active, shades.colormap, asked[active].cut, True, shades.ends(asked[active].cut)
+            )
         case Mode.LABELS:
             return renderer.label_texture(colours, min(p.cut for p in asked))
         case Mode.MASKS | Mode.ISOLATE | Mode.HIDE | Mode.DIM:
             return renderer.mask_texture(MASKS[mode], colours, cuts)
         case Mode.MARGIN:
-            return renderer.margin_texture(asked[0].cut, margin_span(len(asked)), COLORMAP)
+            return renderer.margin_texture(asked[0].cut, margin_span(len(asked)), shades.colormap)
         case Mode.ATOMS:
             return renderer.atom_texture()
         case Mode.WEIGHT:
-            return renderer.weight_texture(atom)
+            return renderer.weight_texture(atom, shades.colormap)
         case Mode.FEATURES:
             return renderer.feature_texture()
         case Mode.TRANSMITTANCE:
-            return renderer.transmittance_texture()
+            return renderer.transmittance_texture(shades.colormap)
         case Mode.COVERAGE:
             return renderer.coverage_texture()
         case Mode.AGREEMENT:
-            return renderer.agreement_texture()
+            return renderer.agreement_texture(shades.colormap)
         case Mode.DEPTH:
-            return renderer.depth_texture()
+            return renderer.depth_texture(shades.colormap)
         case Mode.RGB:
             return renderer.rgb_texture
 

@@ -6,7 +6,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from langflash_core.colormaps import COLOUR_MAPS, colour_stops
+from langflash_core.colormaps import colour_stops
+from langflash_core.formats import COLOUR_MAPS
 
 _GOLDEN = 0.61803398875  # successive hues stay far apart for any number of labels
 

@@ -5,8 +5,17 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TextIO
 
+from langflash_core.colormaps import HeatColours
 from langflash_core.errors import InputError, PromptError, SceneFileError
-from langflash_core.formats import ALL_OUT, ANSWERS_OUT, CAMERAS_OUT, PAGE_OUT, SCENES_OUT, kind_of
+from langflash_core.formats import (
+    ALL_OUT,
+    ANSWERS_OUT,
+    CAMERAS_OUT,
+    COLOUR_MAPS,
+    PAGE_OUT,
+    SCENES_OUT,
+    kind_of,
+)
 from langflash_core.types import Camera, QueryResult, Scene
 
 from .. import shots
@@ -88,6 +97,8 @@ def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
         raise InputError(f"--what boxes takes a .json, .csv or .glb; name one instead of {args.output.name}")
     if args.what not in (None, "boxes") and suffix != ".png":
         raise InputError(f"--what {args.what} is a picture; name a .png instead of {args.output.name}")
+    if args.what != "heat" and (args.span is not None or args.colormap != COLOUR_MAPS[0]):
+        raise InputError("--colormap and --span colour heat-maps; add --what heat, or leave them away")
     if args.seconds is not None and suffix != ".mp4":
         raise InputError("--seconds is for videos; name an .mp4, or leave it away")
     if args.with_text and suffix != PAGE_OUT:
@@ -157,6 +168,7 @@ def _selected(args: Namespace, scene: Scene, prompts: list[str]) -> Scene:
 def _write_pictures(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
     """A picture per camera: colours, one phrase's heat-map, a mask, a cut-out, or labels with a legend."""
     cameras, targets = _shots(args, scene, choice)
+    colours = HeatColours(args.colormap, args.span)
     with (
         ProgressBar() as progress,
         open_renderer(args.backend) as renderer,
@@ -168,7 +180,7 @@ def _write_pictures(args: Namespace, scene: Scene, prompts: list[str], choice: C
             place = staging / target.name
             if prompts:
                 results.append(_answer(args, scene, prompts, camera, renderer))
-                shots.write_answered(args.what or "cutout", place, results[-1])
+                shots.write_answered(args.what or "cutout", place, results[-1], colours)
             else:
                 shots.write_plain(place, renderer(scene, camera, weight_maps=False))
         if prompts:

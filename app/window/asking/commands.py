@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ..scene.state import Mode
 from ..state import State
 from .prompt_sets import MOST_PROMPTS, PromptSet
-from .state import MOST_RECENT, PALETTE, Histogram, Insight, Prompt
+from .state import LEAST_SPAN, MOST_RECENT, PALETTE, Histogram, Insight, Prompt
 
 if TYPE_CHECKING:
     from langflash_core.language.relevance import CompiledQuery
@@ -119,6 +119,19 @@ class SetThreshold:
 
     def apply(self, state: State) -> State:
         return _change_prompt(state, self.key, threshold=self.threshold)
+
+
+@dataclass(frozen=True)
+class SetSpan:
+    """Relevance of the first and the last colour of heat-maps; None: by the threshold."""
+
+    span: tuple[float, float] | None
+
+    def apply(self, state: State) -> State:
+        if self.span is None:
+            return change(state, span=None)
+        low, high = sorted(min(max(end, 0.0), 1.0) for end in self.span)
+        return change(state, span=(min(low, 1 - LEAST_SPAN), max(high, low + LEAST_SPAN)))
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ PALETTE = (
 )
 
 MOST_RECENT = 20
+LEAST_SPAN = 0.01  # of relevance, between the first and the last colour
 PROMPT_DIALOGS = ("save prompts", "load prompts")
 PROMPTS_SUFFIX = ".prompts.json"
 BINS = 50  # of a histogram of scores, over [0, 1]
@@ -86,7 +87,8 @@ class Asking:
     recent: phrases asked, the newest first. atom: whose weight map is on show. chosen: atoms to
     merge. prompts_path: where the last set was. usual: what the scene compares phrases with, by its
     own calibration, once it has said so. lapses: how often what scores rest on has changed. caret: the
-    prompt whose field takes the keys next.
+    prompt whose field takes the keys next. span: relevance of the first and the last colour of a heat-map,
+    the person's own; None: by the threshold.
     """
 
     recent: tuple[str, ...] = ()
@@ -98,6 +100,7 @@ class Asking:
     usual: tuple[str, ...] = ()
     lapses: int = 0
     caret: int | None = None
+    span: tuple[float, float] | None = None
 
     def histogram(self, key: int, text: str) -> Histogram | None:
         """Of a prompt as it reads now; None until it is answered."""

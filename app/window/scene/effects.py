@@ -4,8 +4,9 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from langflash_core.colormaps import COLOUR_MAPS, colour_bar
+from langflash_core.colormaps import colour_bar
 from langflash_core.errors import LangFlashError
+from langflash_core.formats import COLOUR_MAPS
 
 from ..commands import Command, Notify
 from ..effects import Effects, Hands

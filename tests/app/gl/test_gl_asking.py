@@ -11,7 +11,8 @@ from app.gl.colours import feature_axes
 from app.gl.display import COUNT_COLOURS
 from app.gl.painter import Painter
 from app.gl.photos import SAME, WORST, PhotoDepths
-from langflash_core.colormaps import COLOUR_MAPS, colour_bar
+from langflash_core.colormaps import colour_bar
+from langflash_core.formats import COLOUR_MAPS
 from langflash_core.splat import render
 from langflash_core.types import Scene
 from tests.app.gl.questions import full_relevance, question

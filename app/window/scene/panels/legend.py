@@ -2,8 +2,6 @@
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from langflash_core.colormaps import COLOUR_MAPS
-
 from ...asking.state import margin_span
 from ...kit import theme, widgets
 from ...kit.look import Look
@@ -43,8 +41,8 @@ def _body(state: State, look: Look) -> None:
     elif mode is Mode.HEAT:
         prompt = state.active_prompt
         assert prompt is not None
-        middle = (prompt.cut + 1) / 2
-        _bar(prompt.text, COLOUR_MAPS[0], (f"{prompt.cut:.2f}", f"{middle:.2f}", "1.00"), look)
+        low, high = state.heat_colours.ends(prompt.cut)
+        _bar(prompt.text, state.preferences.colormap, _numbers(low, high), look)
     elif mode is Mode.MARGIN:
         _margin(state, look)
     elif mode in (Mode.LABELS, Mode.MASKS, Mode.ISOLATE, Mode.HIDE, Mode.DIM):
@@ -52,13 +50,21 @@ def _body(state: State, look: Look) -> None:
     elif mode is Mode.DEPTH:
         near, far = state.stats.depth_range
         middle = 2 / (1 / max(near, 1e-9) + 1 / max(far, 1e-9))
-        _bar("Depth, scene units", COLOUR_MAPS[0], (f"{far:.2f}", f"{middle:.2f}", f"{near:.2f}"), look)
+        _bar(
+            "Depth, scene units",
+            state.preferences.colormap,
+            (f"{far:.2f}", f"{middle:.2f}", f"{near:.2f}"),
+            look,
+        )
     elif mode is Mode.WEIGHT:
         _bar(
-            f"Weight of {state.editing.atom_name(state.asking.atom)}", COLOUR_MAPS[0], ("0", "0.5", "1"), look
+            f"Weight of {state.editing.atom_name(state.asking.atom)}",
+            state.preferences.colormap,
+            ("0", "0.5", "1"),
+            look,
         )
     elif mode is Mode.TRANSMITTANCE:
-        _bar("Light that passes every splat", COLOUR_MAPS[0], ("0", "0.5", "1"), look)
+        _bar("Light that passes every splat", state.preferences.colormap, ("0", "0.5", "1"), look)
     elif mode is Mode.FEATURES:
         widgets.muted("The three main axes of the language features, as red, green and blue.")
     elif mode is Mode.ATOMS:
@@ -73,7 +79,11 @@ def _margin(state: State, look: Look) -> None:
     low, high = margin_span(len(state.asked))
     alone = len(state.asked) == 1
     title = f"{state.asked[0].text}, over its threshold" if alone else "Best phrase over the second best"
-    _bar(title, COLOUR_MAPS[0], (f"{low:.2f}", f"{(low + high) / 2:.2f}", f"{high:.2f}"), look)
+    _bar(title, state.preferences.colormap, _numbers(low, high), look)
+
+
+def _numbers(low: float, high: float) -> tuple[str, ...]:
+    return tuple(f"{value:.2f}" for value in (low, (low + high) / 2, high))
 
 
 def _bar(title: str, colormap: str, numbers: tuple[str, ...], look: Look) -> None:
@@ -121,7 +131,7 @@ def _trust(state: State, look: Look) -> None:
             imgui.text(name)
     else:
         numbers = ("0 %", f"{50 * WORST:.0f} %", f"{100 * WORST:.0f} %")
-        _bar("Photos disagree on depth by", COLOUR_MAPS[0], numbers, look)
+        _bar("Photos disagree on depth by", state.preferences.colormap, numbers, look)
         _swatch((0.3, 0.3, 0.3), look)
         imgui.text_colored(theme.MUTED, "fewer than two can tell")
     assert state.info is not None
