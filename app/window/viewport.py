@@ -402,7 +402,13 @@ class Viewport:
             return  # what is on show stays until the answer is there
         active = next((i for i, p in enumerate(asked) if p.key == state.active), 0)
         colours = state.heat_colours
-        colouring = (mode, active, state.asking.atom, tuple((p.colour, p.cut) for p in asked), colours)
+        colouring = (
+            mode,
+            active,
+            state.asking.atom,
+            tuple((p.colour, p.cut, p.shown_from) for p in asked),
+            colours,
+        )
         if colouring != self._colouring:
             self._colouring = colouring
             self._texture = _picture(renderer, mode, asked, active, state.asking.atom, colours)
@@ -424,7 +430,7 @@ def _picture(
     match mode:
         case Mode.HEAT:
             return renderer.heat_texture(
-                active, shades.colormap, asked[active].cut, True, shades.ends(asked[active].cut)
+                active, shades.colormap, asked[active].shown_from, True, shades.ends(asked[active].cut)
             )
         case Mode.LABELS:
             return renderer.label_texture(colours, min(p.cut for p in asked))

@@ -69,6 +69,19 @@ def presence_scores(relevance: Tensor, covered: Tensor) -> Tensor:
     return inside.topk(math.ceil(TOP_FRACTION * count), dim=1).values.mean(1)
 
 
+def best_places(
+    relevance: Tensor, frame: Frame, camera: Camera
+) -> tuple[tuple[float, float, float] | None, ...]:
+    """Where each of P maps (P, H, W) is highest among the covered pixels, scene units; None without any."""
+    covered = frame.alphas >= COVERED_ALPHA
+    if not covered.any():
+        return (None,) * len(relevance)
+    points = world_points(frame.depths, camera).flatten(0, 1)
+    best = relevance.masked_fill(~covered, -torch.inf).flatten(1).argmax(1)
+    places = (points[row].tolist() for row in best)
+    return tuple((x, y, z) for x, y, z in places)
+
+
 def world_points(depths: Tensor, camera: Camera) -> Tensor:
     """World points (H, W, 3) of z-depths (H, W) seen by `camera`."""
     Ks, viewmat = camera.K.to(depths), camera.viewmat.to(depths)

@@ -1,9 +1,11 @@
 """What can happen while asking: phrases, their answers, the dictionary."""
 
 from dataclasses import dataclass, field, replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..poses import Vector
 from ..scene.state import Mode
 from ..state import State
 from .prompt_sets import MOST_PROMPTS, PromptSet
@@ -93,7 +95,9 @@ class EditPrompt:
     text: str
 
     def apply(self, state: State) -> State:
-        after = _change_prompt(state, self.key, text=self.text, score=None, like=b"")
+        after = _change_prompt(
+            state, self.key, text=self.text, score=None, like=b"", place=None, foreign=False
+        )
         first = not state.asked and bool(after.asked)
         mode = Mode.HEAT if first and state.mode is Mode.RGB else after.mode
         return replace(after, mode=mode, active=self.key)
@@ -256,19 +260,20 @@ class PromptsRead:
 class Answered:
     """Scores in the view on show: (key, text, score); a prompt edited meanwhile keeps none.
 
-    lapses: as `Asking.lapses` was; scores that have lapsed since are dropped.
+    lapses: as `Asking.lapses` was; scores that have lapsed since are dropped. places: where each fits best.
     """
 
     scores: tuple[tuple[int, str, float], ...]
     lapses: int = 0
+    places: tuple[Vector | None, ...] = ()
 
     def apply(self, state: State) -> State:
         if self.lapses != state.asking.lapses:
             return state
         current = {p.key: p.text.strip() for p in state.prompts}
-        for key, text, score in self.scores:
+        for (key, text, score), place in zip_longest(self.scores, self.places):
             if current.get(key) == text:
-                state = _change_prompt(state, key, score=score)
+                state = _change_prompt(state, key, score=score, place=place)
         return state
 
 
@@ -284,14 +289,18 @@ class Calibrated:
 
 @dataclass(frozen=True)
 class PhrasesCompiled:
-    """The phrases `keys`, in the order of `query`, are ready to be asked. lapses: as `Asking.lapses` was."""
+    """The phrases `keys`, in the order of `query`, are ready to be asked. lapses: as `Asking.lapses` was.
+    foreign: those that read like another language."""
 
     keys: tuple[int, ...]
     query: "CompiledQuery" = field(compare=False, repr=False)
     lapses: int = 0
+    foreign: tuple[int, ...] = ()
 
     def apply(self, state: State) -> State:
         state = Calibrated(self.query.threshold).apply(state)
+        for key in self.keys:
+            state = _change_prompt(state, key, foreign=key in self.foreign)
         return state if state.negatives else change(state, usual=self.query.negative_texts)
 
 
