@@ -26,13 +26,13 @@ class HeatColours:
     def ends(self, threshold: float, highest: float = 1.0) -> tuple[float, float]:
         """Relevance of the first and the last colour.
 
-        Without a span of its own, from a third of the way below the threshold to half of the way from it to
-        `highest`: what just passes is 0.4 up the scale, well away from the dark.
+        Without a span of its own the last colour is the `highest` relevance there can be, and what just
+        passes is 0.4 up the scale, well away from the dark.
         """
         if self.span is not None:
             return self.span
         room = max(highest - threshold, 1e-6)
-        return threshold - room / 3, threshold + room / 2
+        return threshold - room * 2 / 3, threshold + room
 
 
 @lru_cache

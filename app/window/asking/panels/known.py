@@ -10,8 +10,8 @@ from .. import commands as ask
 
 MOST = 10
 LEAST_SHARE = 0.004  # of what is left of the scene; smaller groups are seldom what they are called
-KNOWS = "The shipped model names 68 % of a real photo's area right among 37 kinds of things, 81 % among 8."
-"""assets/weights/mini_card.md, "Real photos"."""
+KNOWS = "Names 68 % of a real room right among 37 kinds of things; understands English."
+"""assets/weights/mini_card.md, "Real photos": atoms drawn, by area."""
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
@@ -20,11 +20,10 @@ def draw(state: State, look: Look) -> list[do.Command]:
     if not found or state.info is None:
         return []
     issued: list[do.Command] = []
-    imgui.text_colored(theme.MUTED, "Here are")
-    if state.info.scene.record.preset == "mini":
-        widgets.tooltip(KNOWS)
     asked = {prompt.text.strip().lower() for prompt in state.prompts}
     imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(8, 3))
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.MUTED, "Here are")
     right = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
     for name in found:
         width = imgui.calc_text_size(name).x + look.px(16)

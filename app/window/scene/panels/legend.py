@@ -11,6 +11,7 @@ from . import tray
 
 _WIDTH = 244.0  # design pixels
 _MARGIN = 12.0
+_VIEWS = 78.0
 _ATOMS_NAMED = 6
 _FLAGS = widgets.PLAIN | imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_focus_on_appearing
 
@@ -19,7 +20,8 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
     """The legend of the present mode; nothing for plain colours."""
     if state.info is None or state.mode is Mode.RGB:
         return
-    corner = ImVec2(place.x + size.x - look.px(_MARGIN), place.y + size.y - look.px(_MARGIN))
+    raised = look.px(_VIEWS) if covers_views(size.x / look.scale, len(state.info.views)) else 0.0
+    corner = ImVec2(place.x + size.x - look.px(_MARGIN), place.y + size.y - look.px(_MARGIN) - raised)
     imgui.set_next_window_pos(corner, 0, ImVec2(1, 1))
     imgui.set_next_window_size(ImVec2(look.px(_WIDTH), 0))
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
@@ -30,6 +32,11 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
         _body(state, look)
         imgui.end()
     imgui.pop_style_var(2)
+
+
+def covers_views(width: float, count: int) -> bool:
+    """Whether it would lie on the buttons of so many viewpoints, in a picture so wide, design pixels."""
+    return width < _WIDTH + 2 * _MARGIN + 16 + 84 * count + 42
 
 
 def _body(state: State, look: Look) -> None:
