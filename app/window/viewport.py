@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 BACKGROUND = (0.055, 0.06, 0.07)  # the theme's canvas
 STILLS = (0.5, 1.0)
 """Scales of the still pictures that follow each other where OpenGL runs on the processor."""
+LONG_SECONDS = 0.1  # a picture that took as long is painted in the next frame
 MOST_THREADS = 8  # of a still picture
 SHOWN_ALPHA = 0.5  # as in the answers: from here on a pixel shows the scene
 MASKS = {Mode.MASKS: "flat", Mode.ISOLATE: "isolate", Mode.HIDE: "hide", Mode.DIM: "dim"}
@@ -78,7 +79,10 @@ class Viewport:
         self._ctx = ctx
         self._notify = notify
         self._artist: Artist | None = None  # where OpenGL runs on the processor
-        self._fresh = False
+        self._failed: object = None  # the order that came to nothing, which is not repeated
+        self._fresh = False  # a scene has just been taken
+        self._unpainted = False  # a picture was drawn that the next frame paints
+        self._carried = True  # whether Gaussians have their numbers for the query
         self._warming: Iterator[None] | None = None
         self._still: Still | None = None  # that is on show
         self._finished: tuple[_Drawn, Still, float] | None = None  # to be shown; seconds that it took
@@ -150,7 +154,7 @@ class Viewport:
         self._marks = (None, None)
         self._shown: tuple[np.ndarray, np.ndarray] | None = None
         self._still = self._finished = None
-        self._fresh = True
+        self._fresh, self._unpainted = True, False
         if self._artist is not None:
             self._artist.drop()
         elif renderer.in_software:
@@ -162,6 +166,7 @@ class Viewport:
         None asks nothing."""
         self._keys, self._query, self._lapses = keys, query, lapses
         self._colouring = self._answered = None
+        self._carried = query is None
         if self._renderer is not None:
             self._renderer.ask(query)
 
@@ -224,7 +229,7 @@ class Viewport:
             return float("inf")
         if (state.pose, size) != (self._pose, self._size):
             self._pose, self._size, self._moved = state.pose, size, state.now
-        if self._fresh:  # to take a scene took a frame's time: the picture is for the next one
+        if self._fresh:  # to take a scene took a frame's time
             self._fresh = False
             return 0.0
         kind = _kind(state)
@@ -243,10 +248,21 @@ class Viewport:
         still = state.now - self._moved
         moving = Kind.COLOUR if kind is Kind.FAST and self._query is None else kind
         wanted = _Drawn(self._serial, state.pose, size, self.governor.moving(moving), self._marked)
-        if not self._covers(wanted):
+        if self._unpainted:
+            self._unpainted = False
+        elif not self._covers(wanted):
+            if not self._carried and self._renderer is not None:
+                self._carried = True
+                self._renderer.carry()
+                return 0.0
             self._draw(wanted, moving=True)
+            self._unpainted = self.picture_seconds > LONG_SECONDS
+            if self._unpainted:
+                return 0.0
         done = artist.take()
-        if done is not None and isinstance(done[0], _Drawn) and done[1] is not None:
+        if done is not None and done[1] is None:
+            self._failed = done[0]
+        elif done is not None and isinstance(done[0], _Drawn):
             self._finished = done[0], *done[1]
         self._bring(wanted, state)
         if still >= SETTLE_AFTER:
@@ -263,10 +279,13 @@ class Viewport:
         if scale is None or self._finished is not None:
             still = self._still if self._finished is None else self._finished[1]
             if still is not None and not self._tells(still, state):
-                asked = self._questions(state)
-                artist.order((still.key, id(self._query), state.mode), lambda stopping: asked(still))
+                asked, name = self._questions(state), (still.key, id(self._query), state.mode)
+                if name != self._failed:
+                    artist.order(name, lambda stopping: asked(still) or True)
             return
         name = wanted.at(kind, scale)
+        if name == self._failed:
+            return
         width, height = (max(8, round(side * scale)) for side in wanted.size)
         camera, info, shown = to_camera(wanted.pose, width, height), state.info, self._shown
         assert info is not None
