@@ -1,4 +1,5 @@
-"""Which scene files there are, by name alone: light enough for the command line and the window to ask.
+"""Which scene files there are, and which colour maps, by name alone: light enough for the command line and
+the window to ask.
 
 A name ends in a suffix, or in `.compressed.ply`, or is a whole one:
 `meta.json` is a SOG in a folder, `cameras.txt` COLMAP's model in one.
@@ -27,3 +28,7 @@ def kind_of(path: Path) -> str:
     if name in (SOG_FOLDER, *CAMERAS_OUT):
         return name
     return COMPRESSED_PLY if name.endswith(COMPRESSED_PLY) else path.suffix.lower()
+
+
+COLOUR_MAPS = ("heat", "viridis", "cividis", "inferno", "turbo", "grey")
+"""By name. The first is everybody's usual one, in window, files and command line."""

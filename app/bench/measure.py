@@ -6,6 +6,7 @@ projection, colours, weight maps, relevance of all phrases. `ctx.finish()` stand
 after. Encoding text and reading pixels back are not part of it.
 """
 
+import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -21,6 +22,7 @@ from langflash_core.types import Camera, Scene
 from ..gl import SplatRenderer
 from ..gl.canvas import Canvas
 from ..gl.splats import SplatBuffers
+from ..gl.still import draw_still
 from .cases import Case
 from .errors import Errors, View, errors_of, true_view
 from .modes import DEFAULT, Mode
@@ -128,6 +130,14 @@ class _Bench:
         self.ctx.finish()
         return renderer
 
+    def draw(self, renderer: SplatRenderer, mode: Mode, camera: Camera) -> None:
+        """One picture, its weight maps too unless the mode has none."""
+        if mode.still:
+            threads = os.cpu_count() or 1
+            renderer.bring(draw_still(self._scenes[_scene_key(mode)], camera, threads=threads))
+        else:
+            renderer.draw(camera, fast=mode.fast)
+
     def ask(self, renderer: SplatRenderer, mode: Mode, other: bool = False) -> None:
         """The case's phrases; `other`: other numbers of equal work."""
         question = self.question(mode)
@@ -184,7 +194,7 @@ def _errors(bench: _Bench, frames: tuple[int, ...], progress: Progress) -> dict[
         drawn = []
         for frame, true in zip(frames, truth, strict=True):
             renderer = bench.prepared(mode, frame)
-            renderer.draw(bench.camera(mode, frame), fast=mode.fast)
+            bench.draw(renderer, mode, bench.camera(mode, frame))
             drawn.append(View(renderer.frame().rgb, renderer.relevance(), true.covered))
         errors[mode] = errors_of(drawn, truth, bench.case.compiled.threshold)
     return errors
@@ -206,7 +216,7 @@ def _time_frame(bench: _Bench, mode: Mode, frame: int, into: Times) -> None:
 
     def moving() -> None:
         with bench.timer:
-            renderer.draw(camera, fast=mode.fast)
+            bench.draw(renderer, mode, camera)
             renderer.heat_texture(0)
 
     def another() -> None:

@@ -24,6 +24,7 @@ class Mode:
     that the scene has. share: of the Gaussians, the others widened. fast: relevance from numbers
     splatted beside the colour. shrink: of the picture's sides. splats: what the scene is uploaded to.
     answers: who answers, None: the renderer's own choice. whole: asked in all C channels of D.
+    still: drawn on the processor, as the window does where OpenGL runs there too (app/gl/still.py).
     colours: whether the picture's colours may differ from the default's, not its answers alone.
     """
 
@@ -38,6 +39,7 @@ class Mode:
     answers: MakeAnswers | None = None
     whole: bool = False
     colours: bool = False
+    still: bool = False
 
     def scene(self, scene: Scene) -> Scene:
         """The scene as this mode draws it: fewer Gaussians, or the largest weights of each, renormalised."""
@@ -67,6 +69,8 @@ MODES = (
     Mode("dictionary", "Gram matrix", answers=gram_answers),
     Mode("resolution", "half resolution", shrink=2, colours=True),
     Mode("detail", "quarter of Gaussians", share=0.25, colours=True),
+    Mode("rasteriser", "tiles on the processor", still=True, colours=True),
+    Mode("rasteriser", "such tiles at half resolution", still=True, shrink=2, colours=True),
     Mode("sort", "stale sort", splats=StaleOrder, colours=True),
 )
 AXES = tuple(dict.fromkeys(mode.axis for mode in MODES[1:]))

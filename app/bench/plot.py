@@ -26,6 +26,7 @@ _COLOURS = {
     "resolution": "#c43d3d",
     "detail": "#8a6d3b",
     "sort": "#15878f",
+    "rasteriser": "#6b7f1f",
 }
 _INK, _GRID = "#3a3a40", "#dcdce2"
 _DPI = 100

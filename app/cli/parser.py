@@ -7,6 +7,7 @@ from typing import NoReturn
 
 import langflash_core
 from langflash_core.errors import InputError
+from langflash_core.formats import COLOUR_MAPS
 
 from .values import (
     above_zero,
@@ -22,6 +23,7 @@ from .values import (
     pixel_side,
     seed,
     size,
+    span,
     view_index,
     what,
     whole_count,
@@ -35,7 +37,9 @@ LAYOUTS = ("nyu", "coco", "ade20k", "sunrgbd", "frames")
 # langflash_core.lab.evaluation.protocols.PROTOCOLS, and photos one by one.
 EVAL_PROTOCOLS = ("scannet", "3dovs", "re10k", "7scenes", "nyu")
 # The decisions that `bench` compares: app.bench.modes.AXES, which would bring torch along.
-BENCH_AXES = ("precision", "relevance", "weights", "cut", "dictionary", "resolution", "detail", "sort")
+BENCH_AXES = (
+    "precision", "relevance", "weights", "cut", "dictionary", "resolution", "detail", "rasteriser", "sort",
+)  # fmt: skip
 
 
 class UsageError(InputError):
@@ -218,6 +222,18 @@ def _add_batch(commands) -> None:
     _add_json(command)
 
 
+def _add_colours(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--colormap",
+        choices=COLOUR_MAPS,
+        default=COLOUR_MAPS[0],
+        help=f"of heat-maps (default: {COLOUR_MAPS[0]}, which colour-blind eyes read too)",
+    )
+    command.add_argument(
+        "--span", type=span, metavar="LOW,HIGH", help="relevance of its first and last colour"
+    )
+
+
 def _add_query(commands) -> None:
     command = _command(commands, "query", "where in a scene is each phrase? heat-maps, masks and numbers")
     command.add_argument("scene", type=Path, metavar="SCENE")
@@ -238,6 +254,7 @@ def _add_query(commands) -> None:
     command.add_argument(
         "--npz", action="store_true", help="also write relevance, masks, depth and rgb as arrays"
     )
+    _add_colours(command)
 
 
 def _add_render(commands) -> None:
@@ -256,6 +273,7 @@ def _add_render(commands) -> None:
         "--prompt", nargs="+", metavar="PHRASE", help="for relevance (one) and labels (any number)"
     )
     _add_fade(command)
+    _add_colours(command)
     _add_backend(command)
     _add_json(command)
 
@@ -296,6 +314,7 @@ def _add_export(commands) -> None:
         help="a folder: of every photo's view masks, soft masks, cut-outs and instances of --prompt, and "
         "depth; boxes, surfaces, a contact sheet and manifest.json",
     )
+    _add_colours(command)
     command.add_argument(
         "--all-views", action="store_true", help="from every photo: FILE_0, FILE_1 and so on"
     )

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from langflash_core.colormaps import HeatColours
 from langflash_core.export import glb
-from langflash_core.export.png import heat_over, label_map, to_8bit, write_labels, write_mask
+from langflash_core.export.png import USUAL, heat_over, label_map, to_8bit, write_labels, write_mask
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.types import Frame, QueryResult, Scene
 
@@ -27,12 +28,13 @@ def write_plain(path: Path, frame: Frame) -> None:
     pictures.write_picture(path, to_8bit(frame.rgb))
 
 
-def write_answered(what: str, path: Path, result: QueryResult) -> None:
+def write_answered(what: str, path: Path, result: QueryResult, colours: HeatColours = USUAL) -> None:
     """One picture of an answer.
 
     Args:
         what: "heat" (of the first phrase), or of the phrases that are there "mask", or "labels" with a
             legend beside it.
+        colours: of the heat-map.
     """
     if what == "labels":
         write_labels(path, label_map(result), [answer.prompt for answer in result.answers])
@@ -40,7 +42,7 @@ def write_answered(what: str, path: Path, result: QueryResult) -> None:
         write_mask(path, result.masks.any(0))
     else:
         threshold = result.answers[0].threshold
-        lit = heat_over(result.relevance[0], result.frame.rgb, threshold, result.mode)
+        lit = heat_over(result.relevance[0], result.frame.rgb, threshold, result.mode, colours)
         pictures.write_picture(path, to_8bit(lit))
 
 

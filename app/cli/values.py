@@ -125,6 +125,17 @@ def numbers(text: str) -> tuple[tuple[int, int], ...]:
     return tuple(ranges)
 
 
+def span(text: str) -> tuple[float, float]:
+    """`LOW,HIGH`: two numbers from -1 to 1, the first below the second."""
+    low, comma, high = text.partition(",")
+    if not comma:
+        raise ArgumentTypeError(f"expected LOW,HIGH such as 0.5,1, received {text!r}")
+    ends = _number(low), _number(high)
+    if not -1 <= ends[0] < ends[1] <= 1:
+        raise ArgumentTypeError(f"expected LOW below HIGH, both from -1 to 1, received {text}")
+    return ends
+
+
 def what(text: str) -> tuple[str, int | None]:
     """A picture's kind, and for `weights:K` the atom K."""
     kind, colon, atom = text.partition(":")

@@ -12,8 +12,9 @@ import torch
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.spatial.transform import Rotation, RotationSpline
 
+from langflash_core.colormaps import HeatColours
 from langflash_core.errors import InputError, LangFlashError, ViewError
-from langflash_core.export.png import heat_over, to_8bit
+from langflash_core.export.png import USUAL, heat_over, to_8bit
 from langflash_core.language.relevance import CompiledQuery, compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.running import Progress
@@ -88,11 +89,12 @@ def write(
     renderer: Renderer,
     progress: Progress,
     heat: CompiledQuery | None = None,
+    colours: HeatColours = USUAL,
 ) -> None:
     """Draw every camera into an H.264 file, or an animated WebP that begins again at its end.
 
     Args:
-        heat: over the colours; None: colours alone.
+        heat: over the colours; None: colours alone. colours: of the heat-map.
 
     Raises:
         LangFlashError: the encoder stopped.
@@ -102,19 +104,25 @@ def write(
         film.send(None)
         for index, camera in enumerate(cameras):
             progress("drawing", index / len(cameras))
-            film.send(picture(scene, camera, renderer, heat).tobytes())
+            film.send(picture(scene, camera, renderer, heat, colours).tobytes())
     except OSError as error:
         raise LangFlashError(f"the video encoder stopped ({error}); try another --size") from error
     finally:
         film.close()
 
 
-def picture(scene: Scene, camera: Camera, renderer: Renderer, heat: CompiledQuery | None) -> np.ndarray:
+def picture(
+    scene: Scene,
+    camera: Camera,
+    renderer: Renderer,
+    heat: CompiledQuery | None,
+    colours: HeatColours = USUAL,
+) -> np.ndarray:
     """(H, W, 3) uint8."""
     if heat is None:
         return renderer.colours(scene, camera)
     frame, relevance = renderer.answered(scene, camera, heat)
-    return to_8bit(heat_over(relevance[0], frame.rgb, heat.threshold, heat.mode))
+    return to_8bit(heat_over(relevance[0], frame.rgb, heat.threshold, heat.mode, colours))
 
 
 def _encoder(path: Path, size: tuple[int, int]) -> Generator[None, bytes | None, None]:

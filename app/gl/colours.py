@@ -1,19 +1,6 @@
-"""Colours of the window's pictures alone: of phrases without their own, of features; colour maps by name."""
+"""Colours of the window's pictures alone: of phrases without their own, of features."""
 
 import numpy as np
-
-COLOUR_MAPS = ("turbo", "inferno", "grey")
-
-
-def colour_map(name: str) -> int:
-    """Number of a colour map in colormaps.glsl.
-
-    Raises:
-        ValueError: there is none of this name.
-    """
-    if name not in COLOUR_MAPS:
-        raise ValueError(f"colormap: expected one of {COLOUR_MAPS}, received {name!r}")
-    return COLOUR_MAPS.index(name)
 
 
 def hues(count: int) -> np.ndarray:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
+from langflash_core.colormaps import colour_stops
 from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.scene.trust import COSINES
 from langflash_core.types import Camera, Scene
@@ -93,37 +94,37 @@ class Display:
             {"MAX_PHOTOS": MOST_PHOTOS, "COS_NONE": low, "COS_FULL": high},
         )
 
-    def depth(self, drawn: Drawn, span: Span, which: int) -> moderngl.Texture:
-        """Depth as a colour of map `which`; `span`: depths of its first and last colour."""
+    def depth(self, drawn: Drawn, span: Span, colormap: str) -> moderngl.Texture:
+        """Depth as a colour of a map; `span`: depths of its first and last colour."""
         return self._filled(
             ("depth",),
-            (drawn.key, span, which),
+            (drawn.key, span, colormap),
             "show_depth.frag",
             drawn.depth,
-            {"depth_range": span, "which_map": which},
+            {"depth_range": span, "colour_stops": colour_stops(colormap)},
         )
 
-    def transmittance(self, drawn: Drawn, which: int) -> moderngl.Texture:
+    def transmittance(self, drawn: Drawn, colormap: str) -> moderngl.Texture:
         """What passes every splat, 0 to 1."""
         return self._filled(
             ("transmittance",),
-            (drawn.key, which),
+            (drawn.key, colormap),
             "show_transmittance.frag",
             drawn.depth,
-            {"which_map": which},
+            {"colour_stops": colour_stops(colormap)},
         )
 
-    def trust(self, drawn: Drawn, photos: PhotoDepths, own: bool, which: int) -> moderngl.Texture:
+    def trust(self, drawn: Drawn, photos: PhotoDepths, own: bool, colormap: str) -> moderngl.Texture:
         """Agreement of the photos' own depths, or else how many photos see each pixel."""
         limit = {"WORST": WORST} if own else {"SAME": SAME}
         return self._filled(
             ("trust", own),
-            (drawn.key,),
+            (drawn.key, colormap),
             "show_agreement.frag" if own else "show_coverage.frag",
             {**drawn.colour, **drawn.depth, "photo_depths": photos.texture},
             {
                 "count_colours": np.array(COUNT_COLOURS),
-                "which_map": which,
+                "colour_stops": colour_stops(colormap),
                 "opacity": _TRUST_OPACITY,
                 **photos.uniforms(drawn.camera),
             },
@@ -139,18 +140,18 @@ class Display:
         prompt: int,
         threshold: float,
         span: Span,
-        which: int,
+        colormap: str,
         over_rgb: bool,
     ) -> moderngl.Texture:
         """One prompt's relevance from `threshold` on; `span`: that of the first and the last colour."""
         return self._filled(
             ("heat", prompt),
-            (*answer.key, threshold, span, which, over_rgb),
+            (*answer.key, threshold, span, colormap, over_rgb),
             "show_heat.frag",
             {**drawn.colour, **answer.relevance},
             {
                 "prompt": prompt,
-                "which_map": which,
+                "colour_stops": colour_stops(colormap),
                 "threshold": threshold,
                 "span": span,
                 "opacity": _HEAT_OPACITY if over_rgb else 1.0,
@@ -201,19 +202,19 @@ class Display:
         )
 
     def margin(
-        self, drawn: Drawn, answer: Answer, threshold: float, span: Span, which: int, over_rgb: bool
+        self, drawn: Drawn, answer: Answer, threshold: float, span: Span, colormap: str, over_rgb: bool
     ) -> moderngl.Texture:
         """The best prompt's relevance less the second best's; of one prompt, less `threshold`."""
         return self._filled(
             ("margin",),
-            (*answer.key, threshold, span, which, over_rgb),
+            (*answer.key, threshold, span, colormap, over_rgb),
             "show_margin.frag",
             {**drawn.colour, **answer.relevance},
             {
                 "num_prompts": answer.num_phrases,
                 "threshold": threshold,
                 "span": span,
-                "which_map": which,
+                "colour_stops": colour_stops(colormap),
                 "opacity": _TRUST_OPACITY if over_rgb else 1.0,
             },
             _COVERED,
@@ -221,7 +222,7 @@ class Display:
 
     # --- of weight maps -------------------------------------------------------------------------
 
-    def weight(self, maps: Maps, atom: int, which: int) -> moderngl.Texture:
+    def weight(self, maps: Maps, atom: int, colormap: str) -> moderngl.Texture:
         """One atom's weight map, 0 to 1."""
         places = np.flatnonzero(maps.atoms == atom)
 
@@ -230,10 +231,13 @@ class Display:
             if len(places):
                 textures = {"weight_maps": maps.array}
                 self._painter.fill(
-                    into, "show_weight.frag", textures, {"place": int(places[0]), "which_map": which}
+                    into,
+                    "show_weight.frag",
+                    textures,
+                    {"place": int(places[0]), "colour_stops": colour_stops(colormap)},
                 )
 
-        return self._picture(("weight",), (maps.version, atom, which), paint)
+        return self._picture(("weight",), (maps.version, atom, colormap), paint)
 
     def atoms(self, maps: Maps, colours: np.ndarray) -> moderngl.Texture:
         """sum_k W_k c_k for colours (K, 3), on black."""
@@ -250,6 +254,18 @@ class Display:
                 self._packed.combine(into, fragment, maps, columns[maps.atoms])
 
         return self._picture(kind, (maps.version,), paint)
+
+    def brought(self, kind: str, key: Hashable, make: Callable[[], np.ndarray]) -> moderngl.Texture:
+        """A picture (H, W, 3) in [0, 1] that is not made by a shader."""
+
+        def paint(into: moderngl.Framebuffer) -> None:
+            rgba = np.full((self._size[1], self._size[0], 4), 255, np.uint8)
+            rgba[..., :3] = np.clip(255 * make() + 0.5, 0, 255)
+            texture = into.color_attachments[0]
+            assert isinstance(texture, moderngl.Texture)
+            texture.write(rgba)
+
+        return self._picture((kind,), key, paint)
 
     # --- inside ---------------------------------------------------------------------------------
 

@@ -8,6 +8,8 @@ Relevance: four phrases a layer.
 
 import math
 
+from langflash_core.colormaps import NUM_STOPS
+
 ATOMS_A_LAYER = 3
 LAYERS_A_PASS = 8
 ATOMS_A_PASS = ATOMS_A_LAYER * LAYERS_A_PASS
@@ -16,6 +18,7 @@ ATOMS_PACKED = math.lcm(ATOMS_A_LAYER, ATOMS_A_TEXEL)  # at once: whole layers t
 PHRASES_A_LAYER = 4
 
 DEFINES = {
+    "STOPS": NUM_STOPS,
     "ATOMS_A_LAYER": ATOMS_A_LAYER,
     "ATOMS_A_TEXEL": ATOMS_A_TEXEL,
     "ATOMS_PACKED": ATOMS_PACKED,

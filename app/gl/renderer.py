@@ -10,6 +10,7 @@ programs live as long as the context (canvas.py).
 """
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import moderngl
@@ -18,19 +19,22 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import GraphicsError
+from langflash_core.export.colours import heat
+from langflash_core.formats import COLOUR_MAPS
 from langflash_core.language.relevance import CompiledQuery
 from langflash_core.splat.projection import ALPHA_MIN, NEAR
 from langflash_core.types import Camera, Frame, Scene
 
 from .answers import MakeAnswers, ShaderAnswers
 from .canvas import Canvas, Precision
-from .colours import colour_map, hues
+from .colours import hues
 from .display import MASK_STYLES, Answer, Background, Drawn
 from .host import HostAnswers, draws_in_software
 from .layout import PHRASES_A_LAYER
 from .question import Question
 from .scene import Level, LiveScene, MakeSplats
 from .splats import SplatBuffers
+from .still import Still, StillMaps, mixture
 from .targets import context_lives, read
 from .view import ViewTargets
 from .weights import Maps
@@ -47,15 +51,90 @@ class _Picture:
     view: ViewTargets
     drawn: Drawn
     fast: bool
+    depth_range: tuple[float, float]
+
+    def lay(self) -> None:
+        """Draw colour and depth again where another renderer of this canvas drew since."""
+        self.view.draw_colour(self.level)
 
     @property
     def maps(self) -> Maps:
         """Its weight maps, drawn unless they are there."""
         return self.view.maps.of(self.level)
 
-    def answers_fast(self, question: Question) -> bool:
-        """Whether the answer comes from the fast mode: exact maps that are there are better."""
-        return self.fast and question.fits_fast and not self.view.maps.shows(self.level)
+    def weights(self, x: int, y: int) -> np.ndarray | None:
+        """(K,) of a pixel, once its weight maps are drawn."""
+        there = self.view.maps.shows(self.level)
+        return self.maps.pixel(x, y, self.scene.num_atoms) if there else None
+
+    def read_maps(self) -> np.ndarray:
+        """(H, W, K) float32."""
+        return self.maps.read(self.scene.num_atoms)
+
+    def answer(self, question: Question) -> Answer:
+        """Relevance, from the fast mode or else from weight maps: those that are there are better."""
+        fast = self.fast and question.fits_fast and not self.view.maps.shows(self.level)
+        layers = (self.view.fast if fast else self.view.exact)(question, self.level)
+        return Answer(layers, question.num_phrases, (self.drawn.key, question.key, fast))
+
+    def atoms(self) -> moderngl.Texture:
+        return self.view.display.atoms(self.maps, self.scene.atom_colours)
+
+    def features(self) -> moderngl.Texture:
+        return self.view.display.features(self.maps, self.scene.feature_columns)
+
+    def weight(self, atom: int, colormap: str) -> moderngl.Texture:
+        return self.view.display.weight(self.maps, atom, colormap)
+
+
+@dataclass(frozen=True)
+class _StillPicture:
+    """What the last `bring` gave, with the same face as `_Picture`."""
+
+    scene: LiveScene
+    still: Still
+    view: ViewTargets
+    drawn: Drawn
+
+    @property
+    def depth_range(self) -> tuple[float, float]:
+        return self.still.depth_range
+
+    @property
+    def maps(self) -> StillMaps:
+        if self.still.maps is None:
+            raise ValueError("bring: expected a picture with weight maps, received one without")
+        return self.still.maps
+
+    def lay(self) -> None:
+        self.view.take(self.still)
+
+    def weights(self, x: int, y: int) -> np.ndarray | None:
+        return None if self.still.maps is None else self.maps.pixel(x, y)
+
+    def read_maps(self) -> np.ndarray:
+        return self.maps.weights.float().numpy()
+
+    def answer(self, question: Question) -> Answer:
+        layers = self.view.told(question, self.still)
+        return Answer(layers, question.num_phrases, (self.drawn.key, question.key, False))
+
+    def atoms(self) -> moderngl.Texture:
+        return self._mixed("atoms", self.scene.atom_colours)
+
+    def features(self) -> moderngl.Texture:
+        return self._mixed("features", self.scene.feature_columns)
+
+    def _mixed(self, kind: str, columns: np.ndarray) -> moderngl.Texture:
+        make = partial(mixture, self.still, columns)
+        return self.view.display.brought(kind, (self.still.key,), make)
+
+    def weight(self, atom: int, colormap: str) -> moderngl.Texture:
+        return self.view.display.brought(
+            "weight",
+            (self.still.key, atom, colormap),
+            lambda: heat(self.maps.weights[..., atom], colormap).numpy(),
+        )
 
 
 class SplatRenderer:
@@ -101,7 +180,7 @@ class SplatRenderer:
         self._splats = splats
         self._scene: LiveScene | None = None
         self._question: Question | None = None
-        self._picture: _Picture | None = None
+        self._picture: _Picture | _StillPicture | None = None
 
     # --- what to draw -----------------------------------------------------------------------
 
@@ -128,6 +207,17 @@ class SplatRenderer:
         if self._scene is None or shown.shape != (count,) or tints.shape != (count,):
             raise ValueError(f"mark: expected {count} rows, received {shown.shape} and {tints.shape}")
         self._scene.mark(shown, tints)
+
+    @property
+    def in_software(self) -> bool:
+        """Whether OpenGL runs on the processor, so that still pictures are drawn better beside it."""
+        return draws_in_software(self._ctx)
+
+    def columns(self, features: bool) -> np.ndarray:
+        """Of the atoms: colours (K, 3), or those of the features picture (K, 4)."""
+        if self._scene is None:
+            raise ValueError("columns: expected set_scene before, received no scene")
+        return self._scene.feature_columns if features else self._scene.atom_colours
 
     @property
     def num_dropped(self) -> int:
@@ -169,13 +259,27 @@ class SplatRenderer:
         level = self._scene.level(share)
         level.prepare(camera)
         drawn = Drawn(view.colour, camera, background, level.places_key)
-        picture = _Picture(self._scene, level, view, drawn, fast)
-        if self._question is not None and picture.answers_fast(self._question):
-            view.fast(self._question, level)
+        picture = _Picture(self._scene, level, view, drawn, fast, level.splats.depth_range)
+        if self._question is not None and fast and self._question.fits_fast:
+            picture.answer(self._question)
         view.draw_colour(level)
         if weight_maps and not fast:
             view.maps.of(level)
         self._picture = picture
+
+    def bring(self, still: Still, background: Background = (0.0, 0.0, 0.0)) -> None:
+        """Take a picture of the scene that was drawn elsewhere (still.py) instead of drawing one.
+
+        Raises:
+            ValueError: there is no scene.
+            GraphicsError: the image is larger than the driver's textures.
+        """
+        if self._scene is None:
+            raise ValueError("bring: expected set_scene before, received no scene")
+        view = self._canvas.view((still.camera.width, still.camera.height))
+        view.take(still)
+        drawn = Drawn(view.colour, still.camera, background, still.key)
+        self._picture = _StillPicture(self._scene, still, view, drawn)
 
     def ask(self, compiled: CompiledQuery | None, answers: MakeAnswers | None = None) -> None:
         """Set the phrases; costs no splat pass while the weight maps are drawn.
@@ -223,7 +327,7 @@ class SplatRenderer:
         sums, alphas = np.moveaxis(read(picture.drawn.target.depth).reshape(height, width, 2), -1, 0)
         covered = alphas >= ALPHA_MIN
         depths = np.where(covered, sums / np.where(covered, alphas, 1.0), 0.0).astype(np.float32)
-        maps = torch.from_numpy(picture.maps.read(picture.scene.num_atoms)) if weight_maps else None
+        maps = torch.from_numpy(picture.read_maps()) if weight_maps else None
         under = np.asarray(picture.drawn.background, np.float32)
         rgb = torch.from_numpy(colour[..., :3] + (1 - alphas[..., None]) * under)
         return Frame(rgb, torch.from_numpy(alphas.copy()), torch.from_numpy(depths), maps)
@@ -237,9 +341,7 @@ class SplatRenderer:
         content = picture.drawn.target.framebuffer.read((x, y, 1, 1), 2, attachment=1, dtype="f4")
         total, alpha = np.frombuffer(content, np.float32).tolist()
         depth = total / alpha if alpha >= ALPHA_MIN else 0.0
-        if not picture.view.maps.shows(picture.level):
-            return alpha, depth, None
-        return alpha, depth, picture.maps.pixel(x, y, picture.scene.num_atoms)
+        return alpha, depth, picture.weights(x, y)
 
     def relevance(self) -> Tensor:
         """Relevance (P, H, W) float32 of the phrases asked, 0 where the view is empty.
@@ -281,7 +383,7 @@ class SplatRenderer:
     def heat_texture(
         self,
         prompt: int = 0,
-        colormap: str = "turbo",
+        colormap: str = COLOUR_MAPS[0],
         threshold: float | None = None,
         over_rgb: bool = True,
         span: tuple[float, float] | None = None,
@@ -290,7 +392,7 @@ class SplatRenderer:
 
         Args:
             prompt: from 0, in the order asked.
-            colormap: turbo, inferno or grey.
+            colormap: of langflash_core/export/colours.py.
             threshold: relevance below it is not shown; None: the query's own.
             over_rgb: over the dimmed photo colours, or alone on black.
             span: relevance of the first and last colour; None: threshold to 1.
@@ -298,13 +400,12 @@ class SplatRenderer:
         Raises:
             ValueError: nothing was asked or drawn, no such prompt or colour map.
         """
-        which = colour_map(colormap)
         picture, answer, usual = self._answered()
         if not 0 <= prompt < answer.num_phrases:
             raise ValueError(f"prompt: expected 0 to {answer.num_phrases - 1}, received {prompt}")
         limit = usual if threshold is None else threshold
         chosen = (min(limit, 0.999), 1.0) if span is None else span
-        return picture.view.display.heat(picture.drawn, answer, prompt, limit, chosen, which, over_rgb)
+        return picture.view.display.heat(picture.drawn, answer, prompt, limit, chosen, colormap, over_rgb)
 
     def label_texture(
         self, colours: np.ndarray | None = None, threshold: float | None = None
@@ -339,101 +440,84 @@ class SplatRenderer:
         self,
         threshold: float,
         span: tuple[float, float],
-        colormap: str = "turbo",
+        colormap: str = COLOUR_MAPS[0],
         over_rgb: bool = True,
     ) -> moderngl.Texture:
         """The best prompt's relevance less the second best's; of one prompt, less `threshold`."""
-        which = colour_map(colormap)
         picture, answer, _ = self._answered()
-        return picture.view.display.margin(picture.drawn, answer, threshold, span, which, over_rgb)
+        return picture.view.display.margin(picture.drawn, answer, threshold, span, colormap, over_rgb)
 
     def atom_texture(self) -> moderngl.Texture:
         """Every atom in its own colour (principal axes of the dictionary), on black."""
-        picture = self._drawn()
-        return picture.view.display.atoms(picture.maps, picture.scene.atom_colours)
+        return self._drawn().atoms()
 
-    def weight_texture(self, atom: int, colormap: str = "inferno") -> moderngl.Texture:
+    def weight_texture(self, atom: int, colormap: str = COLOUR_MAPS[0]) -> moderngl.Texture:
         """One atom's weight map, 0 to 1.
 
         Raises:
             ValueError: there is no such atom.
         """
-        picture, which = self._drawn(), colour_map(colormap)
+        picture = self._drawn()
         if not 0 <= atom < picture.scene.num_atoms:
             raise ValueError(f"atom: expected 0 to {picture.scene.num_atoms - 1}, received {atom}")
-        return picture.view.display.weight(picture.maps, atom, which)
+        return picture.weight(atom, colormap)
 
     def feature_texture(self) -> moderngl.Texture:
         """Principal axes of F(p) = W D as colours, the same in every view; empty pixels black."""
-        picture = self._drawn()
-        return picture.view.display.features(picture.maps, picture.scene.feature_columns)
+        return self._drawn().features()
 
-    def depth_texture(self, colormap: str = "turbo") -> moderngl.Texture:
+    def depth_texture(self, colormap: str = COLOUR_MAPS[0]) -> moderngl.Texture:
         """Depth as a colour, near to far over the middle 96 % of the Gaussians in view."""
-        which, picture = colour_map(colormap), self._drawn()
-        near, far = picture.level.splats.depth_range
+        picture = self._drawn()
+        near, far = picture.depth_range
         span = (float(near), float(max(far, near * 1.001)))
-        return picture.view.display.depth(picture.drawn, span, which)
+        return picture.view.display.depth(picture.drawn, span, colormap)
 
-    def transmittance_texture(self, colormap: str = "inferno") -> moderngl.Texture:
+    def transmittance_texture(self, colormap: str = COLOUR_MAPS[0]) -> moderngl.Texture:
         """What passes every splat, 0 to 1."""
-        picture, which = self._drawn(), colour_map(colormap)
-        return picture.view.display.transmittance(picture.drawn, which)
+        picture = self._drawn()
+        return picture.view.display.transmittance(picture.drawn, colormap)
 
     def coverage_texture(self) -> moderngl.Texture:
         """How many photos saw what each pixel shows, in `COUNT_COLOURS`; the first call draws their views."""
-        return self._trust_texture(own=False)
+        return self._trust_texture(False, COLOUR_MAPS[0])
 
-    def agreement_texture(self) -> moderngl.Texture:
+    def agreement_texture(self, colormap: str = COLOUR_MAPS[0]) -> moderngl.Texture:
         """How well the photos' own depths agree at each pixel; grey where fewer than two can tell.
 
         Raises:
             ValueError: the scene does not say which photo made which Gaussian.
         """
-        return self._trust_texture(own=True)
+        return self._trust_texture(True, colormap)
 
-    def _trust_texture(self, own: bool) -> moderngl.Texture:
+    def _trust_texture(self, own: bool, colormap: str) -> moderngl.Texture:
         picture = self._drawn()
         photos = picture.scene.photo_depths(own)
-        return picture.view.display.trust(picture.drawn, photos, own, colour_map("turbo"))
-
-    def colour_bar(self, colormap: str) -> np.ndarray:
-        """A colour map from left to right, (1, 256, 3) uint8."""
-        texture = self._ctx.texture((256, 1), 4)
-        framebuffer = self._ctx.framebuffer([texture])
-        which = colour_map(colormap)
-        self._canvas.painter.fill(framebuffer, "show_bar.frag", {}, {"width": 256.0, "which_map": which})
-        shown = np.frombuffer(texture.read(), np.uint8).reshape(1, 256, 4)[..., :3].copy()
-        framebuffer.release()
-        texture.release()
-        return shown
+        return picture.view.display.trust(picture.drawn, photos, own, colormap)
 
     @property
     def depth_range(self) -> tuple[float, float]:
         """Depths of the first and the last colour of `depth_texture`, scene units."""
         if self._picture is not None:
-            return self._picture.level.splats.depth_range
+            return self._picture.depth_range
         return (NEAR, 1.0) if self._scene is None else self._scene.whole.splats.depth_range
 
     # --- inside -------------------------------------------------------------------------------
 
-    def _drawn(self) -> _Picture:
+    def _drawn(self) -> "_Picture | _StillPicture":
         """The picture asked for last; drawn again where another renderer of this canvas drew since."""
         picture = self._picture
         if picture is None or not self._canvas.holds(picture.view):
             raise ValueError("renderer: expected draw(...) before, received no view")
-        picture.view.draw_colour(picture.level)
+        picture.lay()
         return picture
 
-    def _answered(self) -> tuple[_Picture, Answer, float]:
+    def _answered(self) -> "tuple[_Picture | _StillPicture, Answer, float]":
         """The picture, the answer over it, and the threshold that the question brings along."""
         picture, question = self._drawn(), self._question
         if question is None:
             raise ValueError("relevance: expected ask(...) before, received no query")
-        fast = picture.answers_fast(question)
-        layers = (picture.view.fast if fast else picture.view.exact)(question, picture.level)
-        key = (picture.drawn.key, question.key, fast)
-        return picture, Answer(layers, question.num_phrases, key), question.compiled.threshold
+        return picture, picture.answer(question), question.compiled.threshold
 
     # --- the end ------------------------------------------------------------------------------
 

@@ -55,6 +55,11 @@ class Level:
             self._camera = None
         self._projected = False
 
+    @property
+    def depth_range(self) -> tuple[float, float]:
+        """Depths of the middle 96 % of the Gaussians in view, scene units."""
+        return self.splats.depth_range
+
     def norms(self, factor: np.ndarray) -> np.ndarray:
         """|f_i| (N,) of the level's Gaussians over a dictionary with factor R (K, r); kept for the last R."""
         named = factor.tobytes()

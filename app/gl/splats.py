@@ -19,6 +19,7 @@ from .layout import ATOMS_A_LAYER
 _ROW_TEXELS = 4096
 _ROWS_AT_ONCE = 1 << 16  # Gaussians: 12 MB of coefficients of degree 3
 TINTS = ((0.16, 0.56, 1.0), (1.0, 0.22, 0.20))  # colours of tint 1, selected, and tint 2, to be deleted
+TINTED = 0.75  # share of the tint; the rest and the shading stay, so that shapes can be seen
 _PLACE_FLOATS = 11  # place (4), shape (4), colour (3)
 _WIDEST = 1e12  # scene units: wider Gaussians are flat over any view, and float32 squares end at 1e38
 
@@ -172,7 +173,7 @@ class SplatBuffers:
         """Footprints and colours of the chosen Gaussians into `places`, in draw order."""
         program = self._programs.get(
             "project.vert",
-            defines={"SH_DEGREE": self.sh_degree, "SH_VEC4S": self._sh_vec4s},
+            defines={"SH_DEGREE": self.sh_degree, "SH_VEC4S": self._sh_vec4s, "TINTED": TINTED},
             varyings=("out_place", "out_shape", "out_colour"),
         )
         viewmat = camera.viewmat.detach().cpu().double().numpy()

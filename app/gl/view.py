@@ -1,14 +1,18 @@
 """What lives as long as the picture's size: colour, depth, weight maps, relevance, pictures to show."""
 
+import numpy as np
+
 from .answers import Answers, MakeAnswers
 from .colour import draw_colour
 from .display import Display
 from .fast import FastPasses
+from .layout import PHRASES_A_LAYER, num_groups
 from .packed import PackedMaps
 from .painter import Painter
 from .question import Question
 from .scene import Level
-from .targets import ColourTarget, LayerTarget
+from .still import Still
+from .targets import NUMPY_TYPES, ColourTarget, Layers, LayerTarget
 from .weights import WeightMaps
 
 
@@ -29,6 +33,8 @@ class ViewTargets:
         self._shown = 0  # places in `colour`
         self._answers: dict[MakeAnswers, Answers] = {}
         self._fast: FastPasses | None = None
+        self._told = Layers(painter.ctx, size, "f4")
+        self._tells = (0, 0)  # picture and question of `_told`
 
     def draw_colour(self, level: Level) -> None:
         """Colour and depth of the level as it stands, unless they are there."""
@@ -37,6 +43,27 @@ class ViewTargets:
         draw_colour(self._painter.programs, level.splats, self.colour.framebuffer)
         self._painter.passes["colour"] += 1
         self._shown = level.places_key
+
+    def take(self, still: Still) -> None:
+        """Colour and depth of a picture drawn elsewhere, unless they are there."""
+        if self._shown == still.key:
+            return
+        for texture, values in ((self.colour.colour, still.colour), (self.colour.depth, still.depth)):
+            texture.write(np.ascontiguousarray(values, NUMPY_TYPES[texture.dtype]))
+        self._shown = still.key
+
+    def told(self, question: Question, still: Still) -> LayerTarget:
+        """Relevance of a picture drawn elsewhere, unless it is there."""
+        assert still.maps is not None
+        told = self._told.exactly(num_groups(question.num_phrases))
+        if (still.key, question.key) != self._tells:
+            height, width = still.depth.shape[:2]
+            texels = np.zeros((told.num_layers, height, width, PHRASES_A_LAYER), np.float32)
+            for phrase, values in enumerate(still.maps.relevance(question.compiled)):
+                texels[phrase // PHRASES_A_LAYER, :, :, phrase % PHRASES_A_LAYER] = values
+            told.array.write(texels)
+            self._tells = still.key, question.key
+        return told
 
     def exact(self, question: Question, level: Level) -> LayerTarget:
         """Relevance from the weight maps, which are drawn unless they are there."""
@@ -83,5 +110,5 @@ class ViewTargets:
             answers.release()
         self._answers.clear()
         self._release_fast()
-        for owned in (self.display, self.packed, self.maps, self.colour):
+        for owned in (self._told, self.display, self.packed, self.maps, self.colour):
             owned.release()

@@ -167,6 +167,14 @@ class Leave:
 
 
 @dataclass(frozen=True)
+class PictureDrawn:
+    """A still picture is ready to be shown."""
+
+    def apply(self, state: State) -> State:
+        return state
+
+
+@dataclass(frozen=True)
 class Measured:
     """Figures for the status bar."""
 

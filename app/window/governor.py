@@ -58,10 +58,11 @@ _START = 2  # rung of an unknown machine
 
 @dataclass(frozen=True)
 class Governor:
-    """For one scene. full_seconds: what a full picture of a kind cost last, smoothed; rungs: where
-    on the ladder a kind moves."""
+    """For one scene. slow: where OpenGL runs on the processor. full_seconds: what a full picture of a kind
+    cost last, smoothed; rungs: where on the ladder a kind moves."""
 
     num_gaussians: int = 0
+    slow: bool = False
     full_seconds: dict[Kind, float] = field(default_factory=dict)
     rungs: dict[Kind, int] = field(default_factory=dict)
 
@@ -105,7 +106,7 @@ class Governor:
         """By the cost of another kind, or in the middle."""
         expected = self._expected(kind, math.inf)
         if expected == math.inf:
-            return _START
+            return len(self.ladder) - 1 if self.slow else _START
         fits = (i for i, (scale, _) in enumerate(self.ladder) if expected * scale**2 <= MOVING_SECONDS)
         return next(fits, len(self.ladder) - 1)
 

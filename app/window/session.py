@@ -19,7 +19,7 @@ from langflash_core.errors import LangFlashError
 
 from . import desktop
 from .asking.effects import AskingEffects
-from .commands import Command, CopyText, Measured, Notify, OfScene, ShowPicture, Tick, apply
+from .commands import Command, CopyText, Measured, Notify, OfScene, PictureDrawn, ShowPicture, Tick, apply
 from .editing.effects import EditingEffects
 from .effects import Effects, Hands
 from .events import Events
@@ -83,7 +83,7 @@ class Session:
         self._backend = GlfwRenderer(self._window, attach_callbacks=False)
         Events(self._window, self._backend, self._wake, self.dispatch, self._rescale)
         self._thumbnails = Thumbnails(self._ctx)
-        self._viewport = Viewport(self._ctx)
+        self._viewport = Viewport(self._ctx, lambda: self._post(PictureDrawn()))
         self._worker = Worker(glfw.post_empty_event, begins=False)  # loads torch: the first frame is first
         self._renderer_name = desktop.short_name(self._ctx.info["GL_RENDERER"])
         self._effects: tuple[Effects, ...] = ()
@@ -263,6 +263,7 @@ class Session:
             self._renderer_name,
             self._viewport.depth_range,
             self._viewport.passes,
+            self._viewport.settling,
         )
         self._perform(Measured(stats))
         return drawing

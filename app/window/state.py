@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from langflash_core.colormaps import HeatColours
+
 from .asking.state import FIRST_PROMPT, NO_ASKING, Asking, Prompt, usable
 from .editing.state import NO_EDITING, Editing
 from .exporting.state import NO_EXPORTING, Exporting
@@ -37,7 +39,8 @@ class Line:
 
 @dataclass(frozen=True)
 class Stats:
-    """Figures of the status bar; the session refreshes them every frame."""
+    """Figures of the status bar; the session refreshes them every frame. settling: a finer picture than the
+    one on show is being drawn."""
 
     frame_seconds: float = 0.0
     picture_seconds: float = 0.0
@@ -45,6 +48,7 @@ class Stats:
     renderer: str = ""
     depth_range: tuple[float, float] = (0.0, 1.0)
     passes: tuple[tuple[str, int], ...] = ()
+    settling: bool = False
 
 
 NO_STATS = Stats()
@@ -65,7 +69,8 @@ NO_PALETTE = Palette()
 class State:
     """The whole program.
 
-    now: seconds of the session's clock, set at the start of a frame. choosing: the best pair is being
+    now: seconds of the session's clock, set at the start of a frame. aside: photos of the scene on show while
+    those of a new room are in the tray. choosing: the best pair is being
     looked for. view: of the photo stood at, if any. compare: where the photo begins, 0 to 1 across the
     picture; None: not compared. negatives: the person's own; none: those of the scene. lines: the log,
     oldest first. rooms: scenes that were on show before, the last one first. dropped: photos while it is
@@ -74,6 +79,7 @@ class State:
 
     now: float = 0.0
     photos: tuple[Photo, ...] = ()
+    aside: tuple[Photo, ...] = ()
     choosing: bool = False
     info: SceneInfo | None = None
     rooms: tuple[Room, ...] = ()
@@ -112,6 +118,11 @@ class State:
         """The prompt whose heat-map is on show: the active one, or else the first that is asked."""
         asked = self.asked
         return next((p for p in asked if p.key == self.active), asked[0] if asked else None)
+
+    @property
+    def heat_colours(self) -> HeatColours:
+        """How heat-maps are coloured, here and in files."""
+        return HeatColours(self.preferences.colormap, self.asking.span)
 
     @property
     def wants_maps(self) -> bool:

@@ -4,15 +4,19 @@ Owns the `SplatRenderer`. Draws a new picture only when the pose, the panel, the
 is asked for has changed; a new phrase on a resting picture is a query pass and no splat pass.
 """
 
+import os
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
 
+from langflash_core.colormaps import HeatColours
 from langflash_core.scene.edits import Marks, Mask
 
+from .artist import Artist, Asked
 from .asking.state import Prompt, margin_span
 from .editing.state import Point, Reading, strongest
 from .governor import SETTLE_AFTER, Governor, Kind, Plan
@@ -27,10 +31,14 @@ if TYPE_CHECKING:
     from langflash_core.types import Camera, Frame, Scene
 
     from ..gl import SplatRenderer
+    from ..gl.still import Still
 
 
 BACKGROUND = (0.055, 0.06, 0.07)  # the theme's canvas
-COLORMAP = "turbo"
+STILLS = (0.5, 1.0)
+"""Scales of the still pictures that follow each other where OpenGL runs on the processor."""
+LONG_SECONDS = 0.1  # a picture that took as long is painted in the next frame
+MOST_THREADS = 8  # of a still picture
 SHOWN_ALPHA = 0.5  # as in the answers: from here on a pixel shows the scene
 MASKS = {Mode.MASKS: "flat", Mode.ISOLATE: "isolate", Mode.HIDE: "hide", Mode.DIM: "dim"}
 
@@ -44,6 +52,10 @@ class _Drawn:
     size: tuple[int, int]  # of the panel, pixels
     plan: Plan
     marked: int
+
+    def at(self, kind: Kind, scale: float) -> "_Drawn":
+        """The same seen in another plan."""
+        return replace(self, plan=Plan(kind, scale))
 
 
 @dataclass(frozen=True)
@@ -62,8 +74,18 @@ class View:
 class Viewport:
     """Draws the scene into textures of `ctx`. Main thread only; `release` may be called twice."""
 
-    def __init__(self, ctx: moderngl.Context) -> None:
+    def __init__(self, ctx: moderngl.Context, notify: Callable[[], None] = lambda: None) -> None:
+        """notify: called from a thread when `update` has something new to show."""
         self._ctx = ctx
+        self._notify = notify
+        self._artist: Artist | None = None  # where OpenGL runs on the processor
+        self._failed: object = None  # the order that came to nothing, which is not repeated
+        self._fresh = False  # a scene has just been taken
+        self._unpainted = False  # a picture was drawn that the next frame paints
+        self._carried = True  # whether Gaussians have their numbers for the query
+        self._warming: Iterator[None] | None = None
+        self._still: Still | None = None  # that is on show
+        self._finished: tuple[_Drawn, Still, float] | None = None  # to be shown; seconds that it took
         self._renderer: SplatRenderer | None = None
         self._serial = 0
         self._query: CompiledQuery | None = None
@@ -75,6 +97,7 @@ class Viewport:
         self._size = (0, 0)  # of the panel, pixels
         self._moved = 0.0
         self._marks: tuple[Marks | None, Mask | None] = (None, None)
+        self._shown: tuple[np.ndarray, np.ndarray] | None = None  # and tints, as the renderer has them
         self._marked = 0  # how often; names the marks in what is drawn
         self._answered: tuple | None = None
         self._colouring: tuple | None = None
@@ -98,10 +121,23 @@ class Viewport:
         """Depths of the first and the last colour of the depth picture, scene units."""
         return (0.0, 1.0) if self._renderer is None else self._renderer.depth_range
 
-    def colour_bar(self, colormap: str) -> np.ndarray:
-        """A colour map from left to right, (1, n, 3) uint8; after the first scene."""
-        assert self._renderer is not None
-        return self._renderer.colour_bar(colormap)
+    def _made(self) -> "SplatRenderer":
+        """The renderer, once torch is loaded."""
+        if self._renderer is None:
+            from ..gl import SplatRenderer  # loads torch; the worker has by now
+
+            self._renderer = SplatRenderer(self._ctx)
+        return self._renderer
+
+    def warm(self) -> bool:
+        """Compile shaders while there is no scene, a few a call; whether there is more to do."""
+        if self._serial:
+            return False
+        if self._warming is None:
+            from ..gl.warming import warm_up
+
+            self._warming = warm_up(self._made())
+        return next(self._warming, self) is not self
 
     def set_scene(self, serial: int, scene: "Scene") -> None:
         """Upload a scene; the first one builds the renderer.
@@ -109,23 +145,28 @@ class Viewport:
         Raises:
             GraphicsError: the OpenGL here cannot do it.
         """
-        if self._renderer is None:
-            from ..gl import SplatRenderer  # loads torch; the worker has by now
-
-            self._renderer = SplatRenderer(self._ctx)
-        renderer = self._renderer
+        self._warming = None
+        renderer = self._made()
         renderer.set_scene(scene)
         renderer.ask(None)
         self._serial, self._query, self._keys = serial, None, ()
         self._drawn = self._texture = self._colouring = self._answered = None
         self._marks = (None, None)
-        self.governor = Governor(len(scene.gaussians))
+        self._shown: tuple[np.ndarray, np.ndarray] | None = None
+        self._still = self._finished = None
+        self._fresh, self._unpainted = True, False
+        if self._artist is not None:
+            self._artist.drop()
+        elif renderer.in_software:
+            self._artist = Artist(self._notify)
+        self.governor = Governor(len(scene.gaussians), slow=self._artist is not None)
 
     def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", lapses: int = 0) -> None:
         """Ask the prompts `keys`, in the order of `query`, compiled when `Asking.lapses` was `lapses`;
         None asks nothing."""
         self._keys, self._query, self._lapses = keys, query, lapses
         self._colouring = self._answered = None
+        self._carried = query is None
         if self._renderer is not None:
             self._renderer.ask(query)
 
@@ -140,7 +181,8 @@ class Viewport:
         tints = marks.selected.rows().astype(np.uint8)
         if doomed is not None:
             tints[doomed.rows()] = 2
-        self._renderer.mark(marks.visible.rows(), tints)
+        self._shown = marks.visible.rows(), tints
+        self._renderer.mark(*self._shown)
         self._marked += 1
 
     @property
@@ -187,14 +229,126 @@ class Viewport:
             return float("inf")
         if (state.pose, size) != (self._pose, self._size):
             self._pose, self._size, self._moved = state.pose, size, state.now
-        still = state.now - max(self._moved, touched)
+        if self._fresh:  # to take a scene took a frame's time
+            self._fresh = False
+            return 0.0
         kind = _kind(state)
+        if self._artist is not None:
+            return self._update_beside(self._artist, state, size, kind)
+        still = state.now - max(self._moved, touched)
         resting = self.governor.resting(kind, still)
         wanted = _Drawn(self._serial, state.pose, size, resting or self.governor.moving(kind), self._marked)
         if not self._covers(wanted):
             self._draw(wanted, moving=resting is None)
         self._colour(state)
         return self.governor.next_rest(still)
+
+    def _update_beside(self, artist: Artist, state: State, size: tuple[int, int], kind: Kind) -> float:
+        """`update` where OpenGL runs on the processor: small pictures at once, still ones by the artist."""
+        still = state.now - self._moved
+        moving = Kind.COLOUR if kind is Kind.FAST and self._query is None else kind
+        wanted = _Drawn(self._serial, state.pose, size, self.governor.moving(moving), self._marked)
+        if self._unpainted:
+            self._unpainted = False
+        elif not self._covers(wanted):
+            if not self._carried and self._renderer is not None:
+                self._carried = True
+                self._renderer.carry()
+                return 0.0
+            self._draw(wanted, moving=True)
+            self._unpainted = self.picture_seconds > LONG_SECONDS
+            if self._unpainted:
+                return 0.0
+        done = artist.take()
+        if done is not None and done[1] is None:
+            self._failed = done[0]
+        elif done is not None and isinstance(done[0], _Drawn):
+            self._finished = done[0], *done[1]
+        self._bring(wanted, state)
+        if still >= SETTLE_AFTER:
+            self._order(artist, wanted, Kind.COLOUR if kind is Kind.COLOUR else Kind.MAPS, state)
+        else:
+            artist.drop()
+        self._colour(state)
+        return max(SETTLE_AFTER - still, 0.0) if still < SETTLE_AFTER else float("inf")
+
+    def _order(self, artist: Artist, wanted: _Drawn, kind: Kind, state: State) -> None:
+        """The next still picture, or what the one on show does not tell yet."""
+        scales = (scale for scale in STILLS if not self._covers(wanted.at(kind, scale)))
+        scale = next(scales, None)
+        if scale is None or self._finished is not None:
+            still = self._still if self._finished is None else self._finished[1]
+            if still is not None and not self._tells(still, state):
+                asked, name = self._questions(state), (still.key, id(self._query), state.mode)
+                if name != self._failed:
+                    artist.order(name, lambda stopping: asked(still) or True)
+            return
+        name = wanted.at(kind, scale)
+        if name == self._failed:
+            return
+        width, height = (max(8, round(side * scale)) for side in wanted.size)
+        camera, info, shown = to_camera(wanted.pose, width, height), state.info, self._shown
+        assert info is not None
+        asked, scene, maps = self._questions(state), info.scene, kind is Kind.MAPS
+
+        def work(stopping: Asked) -> "tuple[Still, float]":
+            from ..gl.still import draw_still
+
+            start = time.perf_counter()
+            threads = min(os.cpu_count() or 1, MOST_THREADS)
+            drawn = draw_still(
+                scene, camera, marks=shown, weight_maps=maps, threads=threads, stopping=stopping
+            )
+            asked(drawn)
+            return drawn, time.perf_counter() - start
+
+        artist.order(name, work)
+
+    def _questions(self, state: State) -> "Callable[[Still], None]":
+        """What is to be made of a still picture on the artist's thread, so that showing it is quick."""
+        query, columns = self._query, None
+        if state.mode in (Mode.ATOMS, Mode.FEATURES) and self._renderer is not None:
+            columns = self._renderer.columns(state.mode is Mode.FEATURES)
+
+        def ask(still: "Still") -> None:
+            if still.maps is not None:
+                if query is not None:
+                    still.maps.relevance(query)
+                if columns is not None:
+                    still.maps.mixed(columns)
+            _ = still.frame
+
+        return ask
+
+    def _tells(self, still: "Still", state: State) -> bool:
+        """Whether showing a still picture in the present mode needs no long work."""
+        if still.maps is None:
+            return True
+        if self._query is not None and not still.maps.answers(self._query):
+            return False
+        if state.mode not in (Mode.ATOMS, Mode.FEATURES) or self._renderer is None:
+            return True
+        return still.maps.mixes(self._renderer.columns(state.mode is Mode.FEATURES))
+
+    def _bring(self, wanted: _Drawn, state: State) -> None:
+        """Show the still picture that is finished, once it tells all that is asked of it."""
+        if self._finished is None:
+            return
+        name, still, seconds = self._finished
+        if replace(name, plan=wanted.plan) != wanted:
+            self._finished = None  # of what is no longer on show
+        if self._finished is None or not self._tells(still, state) or self._renderer is None:
+            return
+        self._finished = None
+        self._renderer.bring(still, BACKGROUND)
+        self._camera, self._drawn, self._still, self._colouring = still.camera, name, still, None
+        self.picture_seconds = seconds
+        self.picture_size = (still.camera.width, still.camera.height)
+
+    @property
+    def settling(self) -> bool:
+        """Whether a finer picture than the one on show is being drawn."""
+        return self._artist is not None and self._artist.busy
 
     def view(self, state: State) -> View | None:
         """The resting view to score, once per picture and query; None when there is nothing new."""
@@ -208,12 +362,20 @@ class Viewport:
         key = (drawn, id(self._query))
         if key == self._answered:
             return None
+        if self._still is not None and not self._tells(self._still, state):
+            return None
         self._answered = key
-        frame, relevance = self._renderer.frame(), self._renderer.relevance()
+        if self._still is not None and self._still.maps is not None:
+            frame, relevance = self._still.frame, torch_of(self._still.maps.relevance(self._query))
+        else:
+            frame, relevance = self._renderer.frame(), self._renderer.relevance()
         return View(drawn.serial, self._keys, frame, relevance, self._camera, self._query, self._lapses)
 
     def release(self) -> None:
         """Free what the renderer holds."""
+        if self._artist is not None:
+            self._artist.stop()
+            self._artist = None
         if self._renderer is not None:
             self._renderer.release()
             self._renderer = None
@@ -243,7 +405,7 @@ class Viewport:
         seconds = time.perf_counter() - start
         self.governor = self.governor.learn(plan, seconds, moving)
         self.picture_seconds, self.picture_size = seconds, (width, height)
-        self._drawn, self._colouring = wanted, None
+        self._drawn, self._colouring, self._still = wanted, None, None
 
     def _colour(self, state: State) -> None:
         """Choose the texture for the mode; repaint it only when something it shows has changed."""
@@ -255,45 +417,63 @@ class Viewport:
         mode = state.mode if drawn.plan.covers(replace(drawn.plan, kind=_kind(state))) else Mode.RGB
         if (mode.answers and (not asked or len(asked) != len(self._keys))) or not mode.possible(state.info):
             mode = Mode.RGB
+        if self._still is not None and not self._tells(self._still, state):
+            return  # what is on show stays until the answer is there
         active = next((i for i, p in enumerate(asked) if p.key == state.active), 0)
-        near = state.preferences.near_photos
-        colouring = (mode, active, state.asking.atom, near, tuple((p.colour, p.cut) for p in asked))
+        colours = state.heat_colours
+        colouring = (
+            mode,
+            active,
+            state.asking.atom,
+            state.preferences.near_photos,
+            tuple((p.colour, p.cut, p.shown_from) for p in asked),
+            colours,
+        )
         if colouring != self._colouring:
             self._colouring = colouring
-            faded = near and mode is Mode.RGB
-            picture = _picture(renderer, mode, asked, active, state.asking.atom)
+            faded = state.preferences.near_photos and mode is Mode.RGB
+            picture = _picture(renderer, mode, asked, active, state.asking.atom, colours)
             self._texture = renderer.faded_texture() if faded else picture
 
 
+def torch_of(values: np.ndarray) -> "Tensor":
+    """The same numbers as a tensor."""
+    import torch
+
+    return torch.from_numpy(values)
+
+
 def _picture(
-    renderer: "SplatRenderer", mode: Mode, asked: list[Prompt], active: int, atom: int
+    renderer: "SplatRenderer", mode: Mode, asked: list[Prompt], active: int, atom: int, shades: HeatColours
 ) -> moderngl.Texture:
     """The texture that shows a mode; `asked` in the order of the query, not empty where it `answers`."""
     colours = np.array([p.colour for p in asked], np.float32)
     cuts = np.array([p.cut for p in asked], np.float32)
     match mode:
         case Mode.HEAT:
-            return renderer.heat_texture(active, COLORMAP, asked[active].cut, True)
+            return renderer.heat_texture(
+                active, shades.colormap, asked[active].shown_from, True, shades.ends(asked[active].cut)
+            )
         case Mode.LABELS:
             return renderer.label_texture(colours, min(p.cut for p in asked))
         case Mode.MASKS | Mode.ISOLATE | Mode.HIDE | Mode.DIM:
             return renderer.mask_texture(MASKS[mode], colours, cuts)
         case Mode.MARGIN:
-            return renderer.margin_texture(asked[0].cut, margin_span(len(asked)), COLORMAP)
+            return renderer.margin_texture(asked[0].cut, margin_span(len(asked)), shades.colormap)
         case Mode.ATOMS:
             return renderer.atom_texture()
         case Mode.WEIGHT:
-            return renderer.weight_texture(atom)
+            return renderer.weight_texture(atom, shades.colormap)
         case Mode.FEATURES:
             return renderer.feature_texture()
         case Mode.TRANSMITTANCE:
-            return renderer.transmittance_texture()
+            return renderer.transmittance_texture(shades.colormap)
         case Mode.COVERAGE:
             return renderer.coverage_texture()
         case Mode.AGREEMENT:
-            return renderer.agreement_texture()
+            return renderer.agreement_texture(shades.colormap)
         case Mode.DEPTH:
-            return renderer.depth_texture()
+            return renderer.depth_texture(shades.colormap)
         case Mode.RGB:
             return renderer.rgb_texture
 

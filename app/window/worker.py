@@ -24,7 +24,7 @@ from langflash_core.errors import Cancelled, LangFlashError
 
 from .commands import Command, Notify, OfScene
 from .requests import Errand, Job, SceneErrand
-from .scene.commands import JobCancelled, JobFailed, Progressed
+from .scene.commands import JobCancelled, JobFailed, Loaded, Progressed
 
 log = logging.getLogger(__name__)
 
@@ -113,6 +113,7 @@ class Worker:
     def _run(self) -> None:
         try:
             _import_heavy()
+            self._put(Loaded())
         except Exception as error:  # a broken installation: say so, and let each request say it again
             self._put(Notify(_unexpected(error)))
         foresight = list(AHEAD)

@@ -5,8 +5,10 @@ import unicodedata
 from collections.abc import Sequence
 from pathlib import Path
 
+from langflash_core.colormaps import HeatColours
 from langflash_core.export.npz import write_npz
 from langflash_core.export.png import (
+    USUAL,
     label_map,
     write_heat,
     write_labels,
@@ -20,11 +22,13 @@ from langflash_core.types import QueryResult
 _MAX_NAME = 60
 
 
-def write_answers(result: QueryResult, folder: Path, *, npz: bool = False) -> list[dict[str, str]]:
+def write_answers(
+    result: QueryResult, folder: Path, *, npz: bool = False, colours: HeatColours = USUAL
+) -> list[dict[str, str]]:
     """Write `rgb.png`, `labels.png` + `labels.json`, and `<prompt>_{mask,heat,relevance}.png`.
 
     Args:
-        folder: created where missing. npz: `query.npz` as well.
+        folder: created where missing. npz: `query.npz` as well. colours: of the heat-maps.
 
     Returns:
         Per prompt the paths of its own files and of the shared ones, by kind.
@@ -44,7 +48,7 @@ def write_answers(result: QueryResult, folder: Path, *, npz: bool = False) -> li
         own = {kind: folder / f"{name}_{kind}.png" for kind in ("mask", "heat", "relevance")}
         relevance, threshold = result.relevance[index], result.answers[index].threshold
         write_mask(own["mask"], result.masks[index])
-        write_heat(own["heat"], relevance, result.frame.rgb, threshold, result.mode)
+        write_heat(own["heat"], relevance, result.frame.rgb, threshold, result.mode, colours)
         write_relevance(own["relevance"], relevance, result.mode)
         files.append({kind: str(path) for kind, path in {**own, **shared}.items()})
     return files

@@ -6,18 +6,19 @@ import numpy as np
 import torch
 from torch import Tensor
 
-# Own scale: night blue, violet, red, orange, pale yellow; its luma rises all along, so that it
-# also reads in grey and for colour-blind eyes.
-HEAT_STOPS = (
-    (0.05, 0.05, 0.20), (0.33, 0.07, 0.47), (0.74, 0.15, 0.38), (0.96, 0.47, 0.14), (1.00, 0.80, 0.25),
-    (1.00, 0.98, 0.80),
-)  # fmt: skip
+from langflash_core.colormaps import colour_stops
+from langflash_core.formats import COLOUR_MAPS
+
 _GOLDEN = 0.61803398875  # successive hues stay far apart for any number of labels
 
 
-def heat(values: Tensor) -> Tensor:
-    """Colours (..., 3) in [0, 1] of values (...) in [0, 1]; outside is clamped, NaN is 0."""
-    stops = torch.tensor(HEAT_STOPS, dtype=torch.float32, device=values.device)
+def heat(values: Tensor, colormap: str = COLOUR_MAPS[0]) -> Tensor:
+    """Colours (..., 3) in [0, 1] of values (...) in [0, 1]; outside is clamped, NaN is 0.
+
+    Raises:
+        ValueError: there is no such colour map.
+    """
+    stops = torch.from_numpy(colour_stops(colormap)).to(values.device)
     position = torch.nan_to_num(values.float(), nan=0.0).clamp(0, 1) * (len(stops) - 1)
     lower = position.floor().clamp_max(len(stops) - 2).long()
     share = (position - lower)[..., None]

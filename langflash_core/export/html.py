@@ -24,7 +24,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from langflash_core.export.colours import HEAT_STOPS
+from langflash_core.colormaps import HEAT_STOPS
 from langflash_core.export.packing import check_some, morton_order
 from langflash_core.export.png import DIM, GLOW
 from langflash_core.export.quantised import quantised

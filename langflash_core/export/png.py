@@ -10,10 +10,12 @@ import torch
 from PIL import Image
 from torch import Tensor
 
+from langflash_core.colormaps import HeatColours
 from langflash_core.export.colours import heat, label_colours
 from langflash_core.files import write_atomically
 from langflash_core.types import LUMA, Frame, QueryResult
 
+USUAL = HeatColours()
 RANGES = {"cosine": (-1.0, 1.0), "relevancy": (0.0, 1.0)}
 GLOW = 0.85  # share of the heat colour where relevance is highest
 DIM = 0.6  # brightness of the photo where nothing was found
@@ -54,12 +56,21 @@ def write_relevance(path: Path, relevance: Tensor, mode: str, bits: int = 16) ->
     write_grey(path, relevance, *RANGES[mode], bits)
 
 
-def write_heat(path: Path, relevance: Tensor, rgb: Tensor, threshold: float, mode: str) -> None:
+def write_heat(
+    path: Path,
+    relevance: Tensor,
+    rgb: Tensor,
+    threshold: float,
+    mode: str,
+    colours: HeatColours = USUAL,
+) -> None:
     """Relevance glowing over the view (`heat_over`)."""
-    write_rgb(path, heat_over(relevance, rgb, threshold, mode))
+    write_rgb(path, heat_over(relevance, rgb, threshold, mode, colours))
 
 
-def heat_over(relevance: Tensor, rgb: Tensor, threshold: float, mode: str) -> Tensor:
+def heat_over(
+    relevance: Tensor, rgb: Tensor, threshold: float, mode: str, colours: HeatColours = USUAL
+) -> Tensor:
     """The view dimmed and grey where relevance is low, and in heat colours from the threshold on.
 
     The scale is fixed by the threshold and the mode's range, never by the map's own maximum: a
@@ -67,6 +78,7 @@ def heat_over(relevance: Tensor, rgb: Tensor, threshold: float, mode: str) -> Te
 
     Args:
         relevance: (H, W). rgb: (H, W, 3) in [0, 1]. threshold: of presence.
+        colours: the colour map, and what its ends mean.
 
     Returns:
         (H, W, 3) in [0, 1].
@@ -78,9 +90,10 @@ def heat_over(relevance: Tensor, rgb: Tensor, threshold: float, mode: str) -> Te
     grey = (view * view.new_tensor(LUMA)).sum(-1, keepdim=True)
     strength = torch.nan_to_num(relevance.float(), nan=low)
     glow = ((strength - (neutral + threshold) / 2) / (threshold - neutral)).clamp(0, 1)[..., None]
-    colours = heat(0.4 + 1.2 * (strength - threshold) / max(high - threshold, 1e-6))
+    first, last = colours.ends(threshold, high)
+    shades = heat((strength - first) / max(last - first, 1e-6), colours.colormap)
     dimmed = DIM * (0.7 * grey + 0.3 * view)
-    lit = GLOW * colours * (0.35 + 0.65 * grey) + (1 - GLOW) * view
+    lit = GLOW * shades * (0.35 + 0.65 * grey) + (1 - GLOW) * view
     return dimmed * (1 - glow) + lit * glow
 
 

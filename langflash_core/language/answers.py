@@ -14,6 +14,7 @@ from langflash_core.language.relevance import CompiledQuery
 from langflash_core.types import Camera, Frame, PromptAnswer, QueryResult
 
 COVERED_ALPHA = 0.5  # a pixel shows the scene, rather than the background, from here on
+_PEAK = 0.01  # of relevance
 TOP_FRACTION = 0.001  # of the covered pixels: their mean is the score, so no stray pixel decides
 MIN_AREA = 0.0005  # of all pixels: a smaller mask is noise (154 pixels at 640 x 480)
 BOX_QUANTILES = (0.02, 0.98)  # of the mask's points along each axis: drops edges that bleed in depth
@@ -67,6 +68,26 @@ def presence_scores(relevance: Tensor, covered: Tensor) -> Tensor:
     if count == 0:
         return relevance.new_zeros(relevance.shape[0])
     return inside.topk(math.ceil(TOP_FRACTION * count), dim=1).values.mean(1)
+
+
+def best_places(
+    relevance: Tensor, frame: Frame, camera: Camera
+) -> tuple[tuple[float, float, float] | None, ...]:
+    """Where each of P maps (P, H, W) is highest among the covered pixels, scene units; None without any.
+
+    Of those within `_PEAK` of the highest it is the one nearest to their middle, not one at an edge.
+    """
+    covered = frame.alphas >= COVERED_ALPHA
+    if not covered.any():
+        return (None,) * len(relevance)
+    points = world_points(frame.depths, camera).flatten(0, 1)
+    rows = covered.flatten().nonzero().squeeze(1)
+    places = []
+    for values in relevance.flatten(1)[:, rows]:
+        peak = points[rows[values >= values.max() - _PEAK]]
+        x, y, z = peak[(peak - peak.median(0).values).norm(dim=1).argmin()].tolist()
+        places.append((x, y, z))
+    return tuple(places)
 
 
 def world_points(depths: Tensor, camera: Camera) -> Tensor:

@@ -1,7 +1,7 @@
 #version 330 core
 // Purpose: one Gaussian to its footprint and colour, written by transform feedback in draw order.
 // Source: langflash_core/splat/projection.py is the twin.
-// Frames: in world, out pixels. SH_DEGREE and SH_VEC4S are set by the program.
+// Frames: in world, out pixels. SH_DEGREE, SH_VEC4S and TINTED are set by the program.
 
 in vec4 in_mean;   // xyz world, w opacity
 in vec4 in_quat;   // wxyz, unit
@@ -23,7 +23,6 @@ vec3 coefficient(int base) {
 #define CUT sqrt(2.0 * log(max(in_mean.w / ALPHA_MIN, 1.0)))  // where alpha falls below 1/255
 #endif
 
-const float TINTED = 0.75;       // share of the tint; the rest and the shading stay, so that shapes can be seen
 const float HALF_MAX = 65504.0;  // of float16: sums of T alpha c stay finite in every target
 
 uniform mat4 viewmat;      // world to camera

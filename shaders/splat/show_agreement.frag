@@ -8,7 +8,6 @@
 #include "luma.glsl"
 #include "photos.glsl"
 
-uniform int which_map;
 uniform float opacity;
 
 out vec4 out_colour;
@@ -25,6 +24,6 @@ void main() {
         worst = max(worst, abs(ratio - 1.0));
     }
     vec3 grey = grey_photo(pixel);
-    vec3 shade = mix(grey, colour_map(which_map, worst / WORST), opacity);
+    vec3 shade = mix(grey, colour_map(worst / WORST), opacity);
     out_colour = vec4(pos_c.z > 0.0 ? (seen < 2 ? 0.5 * grey : shade) : vec3(0.0), 1.0);
 }

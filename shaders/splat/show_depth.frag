@@ -5,7 +5,6 @@
 
 uniform sampler2D depth;      // sum of T alpha z, sum of T alpha
 uniform vec2 depth_range;     // nearest, farthest, scene units
-uniform int which_map;
 
 out vec4 out_colour;
 
@@ -15,5 +14,5 @@ void main() {
     float alpha = sums.y;
     float z = max(sums.x / max(alpha, 1e-6), 1e-9);
     float t = (1.0 / z - 1.0 / depth_range.y) / max(1.0 / depth_range.x - 1.0 / depth_range.y, 1e-9);
-    out_colour = vec4(alpha < 1.0 / 255.0 ? vec3(0.0) : colour_map(which_map, t), 1.0);
+    out_colour = vec4(alpha < 1.0 / 255.0 ? vec3(0.0) : colour_map(t), 1.0);
 }

@@ -8,7 +8,6 @@
 uniform sampler2D colour;
 uniform sampler2DArray relevance;  // PHRASES_A_LAYER each
 uniform int prompt;
-uniform int which_map;
 uniform float threshold;
 uniform vec2 span;                 // relevance shown as the first and the last colour
 uniform float opacity;             // of the heat where it is shown; 1: alone
@@ -20,7 +19,7 @@ void main() {
     float value = texelFetch(relevance, ivec3(pixel, prompt / PHRASES_A_LAYER), 0)[prompt % PHRASES_A_LAYER];
     vec4 photo = texelFetch(colour, pixel, 0);
     vec3 rgb = clamp(photo.rgb, 0.0, 1.0);
-    vec3 heat = colour_map(which_map, (value - span.x) / max(span.y - span.x, 1e-6));
+    vec3 heat = colour_map((value - span.x) / max(span.y - span.x, 1e-6));
     float grey = luma(rgb);
     vec3 under = mix(rgb, vec3(0.5 * grey), opacity < 1.0 ? 0.6 : 1.0);
     vec3 over = mix(rgb, heat, opacity);

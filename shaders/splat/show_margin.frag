@@ -11,7 +11,6 @@ uniform sampler2DArray relevance;  // PHRASES_A_LAYER each
 uniform int num_prompts;
 uniform float threshold;           // of the only prompt
 uniform vec2 span;                 // margins shown as the first and the last colour
-uniform int which_map;
 uniform float opacity;             // over the photo in grey; 1: alone
 
 out vec4 out_colour;
@@ -27,6 +26,6 @@ void main() {
         best = max(best, value);
     }
     float grey = luma(clamp(photo.rgb, 0.0, 1.0));
-    vec3 shade = colour_map(which_map, (best - second - span.x) / (span.y - span.x));
+    vec3 shade = colour_map((best - second - span.x) / (span.y - span.x));
     out_colour = vec4(photo.a >= COVERED_ALPHA ? mix(vec3(grey), shade, opacity) : vec3(0.0), 1.0);
 }

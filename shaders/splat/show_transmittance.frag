@@ -5,11 +5,10 @@
 #include "colormaps.glsl"
 
 uniform sampler2D depth;  // second channel: sum of T alpha
-uniform int which_map;
 
 out vec4 out_colour;
 
 void main() {
     float passed = 1.0 - texelFetch(depth, ivec2(gl_FragCoord.xy), 0).g;
-    out_colour = vec4(colour_map(which_map, passed), 1.0);
+    out_colour = vec4(colour_map(passed), 1.0);
 }

@@ -6,11 +6,10 @@
 
 uniform sampler2DArray weight_maps;  // ATOMS_A_LAYER each
 uniform int place;                   // of the atom among those in view
-uniform int which_map;
 
 out vec4 out_colour;
 
 void main() {
     float weight = texelFetch(weight_maps, ivec3(gl_FragCoord.xy, place / ATOMS_A_LAYER), 0)[place % ATOMS_A_LAYER];
-    out_colour = vec4(colour_map(which_map, weight), 1.0);
+    out_colour = vec4(colour_map(weight), 1.0);
 }

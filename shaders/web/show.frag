@@ -36,7 +36,7 @@ void main() {
         float neutral = min(0.5, threshold - 0.02);
         float glow = clamp((value - 0.5 * (neutral + threshold)) / (threshold - neutral), 0.0, 1.0);
         float grey = luma(view);
-        vec3 colour = heat(0.4 + 1.2 * (value - threshold) / max(1.0 - threshold, 1e-6));
+        vec3 colour = heat(0.4 + 0.6 * (value - threshold) / max(1.0 - threshold, 1e-6));
         vec3 lit = GLOW * colour * (0.35 + 0.65 * grey) + (1.0 - GLOW) * view;
         view = mix(DIM * (0.7 * vec3(grey) + 0.3 * view), lit, glow);
     }

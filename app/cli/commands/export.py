@@ -5,11 +5,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TextIO
 
+from langflash_core.colormaps import HeatColours
 from langflash_core.errors import InputError, PromptError, SceneFileError
 from langflash_core.formats import (
     ALL_OUT,
     ANSWERS_OUT,
     CAMERAS_OUT,
+    COLOUR_MAPS,
     FILMS_OUT,
     PAGE_OUT,
     SCENES_OUT,
@@ -64,9 +66,10 @@ def write_whole(scene: Scene, path: Path, renderer: Renderer, prompts: Sequence[
         LangFlashError: the path cannot be written, or no mask is found.
     """
     suffix = kind_of(path)
-    unset = dict.fromkeys(("threshold", "what", "seconds", "path", "view", "camera", "size"))
+    unset = dict.fromkeys(("threshold", "what", "seconds", "path", "view", "camera", "size", "span"))
     asked = list(prompts) if suffix in (*ANSWERS_OUT, PAGE_OUT) else []
-    said = {"all_views": suffix == ".csv", "with_text": False, "replace": False, "fade": False}
+    off = dict.fromkeys(("with_text", "replace", "fade"), False)
+    said = {"all_views": suffix == ".csv", "colormap": COLOUR_MAPS[0], **off}
     args = Namespace(scene=path.parent, output=path, prompt=asked, backend=renderer, **said, **unset)
     _writer(suffix, None)(args, scene, asked, CameraChoice(0, None, None))
 
@@ -125,6 +128,8 @@ def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
     for name in ("seconds", "path"):
         if getattr(args, name) is not None and suffix not in FILMS_OUT:
             raise InputError(f"--{name} is for videos; name an .mp4 or .webp, or leave it away")
+    if args.what != "heat" and (args.span is not None or args.colormap != COLOUR_MAPS[0]):
+        raise InputError("--colormap and --span colour heat-maps; add --what heat, or leave them away")
     if args.with_text and suffix != PAGE_OUT:
         raise InputError("--with-text is for web pages; name an .html, or leave it away")
     _check_camera_words(args, suffix)
@@ -200,6 +205,7 @@ def _write_pictures(args: Namespace, scene: Scene, prompts: list[str], choice: C
         from ..segmented.files import write_parts
 
         return write_parts(args, scene, prompts, cameras, targets)
+    colours = HeatColours(args.colormap, args.span)
     with (
         ProgressBar() as progress,
         open_renderer(args.backend, fade=args.fade) as renderer,
@@ -211,7 +217,7 @@ def _write_pictures(args: Namespace, scene: Scene, prompts: list[str], choice: C
             place = staging / target.name
             if prompts:
                 results.append(_answer(args, scene, prompts, camera, renderer))
-                shots.write_answered(args.what, place, results[-1])
+                shots.write_answered(args.what, place, results[-1], colours)
             else:
                 shots.write_plain(place, renderer(scene, camera, weight_maps=False))
         if prompts:
@@ -355,7 +361,8 @@ def _write_video(args: Namespace, scene: Scene, prompts: list[str], choice: Came
         open_renderer(args.backend, fade=args.fade) as renderer,
         staged_folder(args.output.parent) as staging,
     ):
-        video.write(staging / args.output.name, chosen, cameras, renderer, progress, asked)
+        colours = HeatColours(args.colormap, args.span)
+        video.write(staging / args.output.name, chosen, cameras, renderer, progress, asked, colours)
     return f"{len(cameras) / video.RATE:.1f} s, {cameras[0].width} x {cameras[0].height}"
 
 

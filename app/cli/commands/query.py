@@ -25,6 +25,7 @@ def run(args: Namespace, out: TextIO) -> None:
     checked_scene(args.scene)
     check_folder(args.output)
     from langflash_core import pipeline
+    from langflash_core.colormaps import HeatColours
     from langflash_core.export.answers import write_answers
 
     from ..cameras import chosen_camera
@@ -41,7 +42,9 @@ def run(args: Namespace, out: TextIO) -> None:
         )
         progress("writing", 0.8)
         with staged_folder(args.output) as staging:
-            staged = write_answers(result, staging, npz=args.npz)
+            staged = write_answers(
+                result, staging, npz=args.npz, colours=HeatColours(args.colormap, args.span)
+            )
     files = [{kind: str(args.output / Path(path).name) for kind, path in entry.items()} for entry in staged]
     document = {"scene": str(args.scene), "view": choice.view, "backend": renderer.backend}
     document.update(answers_document(scene, result, files))

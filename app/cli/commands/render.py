@@ -5,6 +5,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from langflash_core.colormaps import HeatColours
 from langflash_core.errors import InputError, PromptError, SceneFileError
 from langflash_core.export.colours import label_colours
 from langflash_core.export.png import heat_over, to_8bit
@@ -38,7 +39,9 @@ def run(args: Namespace, out: TextIO) -> None:
     camera = choice.of(scene)
     with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade) as renderer:
         progress("drawing", 0.2)
-        pixels, more = _draw(args.what, prompts, scene, camera, renderer)
+        pixels, more = _draw(
+            args.what, prompts, scene, camera, renderer, HeatColours(args.colormap, args.span)
+        )
     write_picture(args.output, pixels)
     document = {
         "file": str(args.output),
@@ -76,12 +79,17 @@ def _check_atom(what: tuple[str, int | None], scene: Scene) -> None:
 
 
 def _draw(
-    what: tuple[str, int | None], prompts: list[str], scene: Scene, camera: Camera, renderer: Renderer
+    what: tuple[str, int | None],
+    prompts: list[str],
+    scene: Scene,
+    camera: Camera,
+    renderer: Renderer,
+    colours: HeatColours,
 ) -> tuple[np.ndarray, dict[str, Any]]:
     """The pixels, and what JSON says about them beyond the file."""
     kind, atom = what
     if kind in NEEDS_PROMPT:
-        return _draw_answer(kind, prompts, scene, camera, renderer)
+        return _draw_answer(kind, prompts, scene, camera, renderer, colours)
     frame = renderer(scene, camera, weight_maps=kind in ("atoms", "weights"))
     if kind == "depth":
         seen = frame.depths[frame.depths > 0]
@@ -95,7 +103,12 @@ def _draw(
 
 
 def _draw_answer(
-    kind: str, prompts: list[str], scene: Scene, camera: Camera, renderer: Renderer
+    kind: str,
+    prompts: list[str],
+    scene: Scene,
+    camera: Camera,
+    renderer: Renderer,
+    colours: HeatColours,
 ) -> tuple[np.ndarray, dict[str, Any]]:
     from langflash_core import pipeline
 
@@ -103,8 +116,8 @@ def _draw_answer(
     entries = [{"prompt": each.prompt, "found": each.found, "score": each.score} for each in result.answers]
     if kind == "relevance":
         threshold = result.answers[0].threshold
-        pixels = to_8bit(heat_over(result.relevance[0], result.frame.rgb, threshold, result.mode))
-        return pixels, {"prompts": entries}
+        lit = heat_over(result.relevance[0], result.frame.rgb, threshold, result.mode, colours)
+        return to_8bit(lit), {"prompts": entries}
     for entry, colour in zip(entries, label_colours(len(prompts)), strict=True):
         entry["colour"] = "#" + bytes(colour).hex()
     return pictures.label_picture(result), {"prompts": entries}

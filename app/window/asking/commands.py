@@ -1,13 +1,15 @@
 """What can happen while asking: phrases, their answers, the dictionary."""
 
 from dataclasses import dataclass, field, replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..poses import Vector
 from ..scene.state import Mode
 from ..state import State
 from .prompt_sets import MOST_PROMPTS, PromptSet
-from .state import MOST_RECENT, PALETTE, Histogram, Insight, Prompt
+from .state import LEAST_SPAN, MOST_RECENT, PALETTE, Histogram, Insight, Prompt
 
 if TYPE_CHECKING:
     from langflash_core.language.relevance import CompiledQuery
@@ -93,7 +95,9 @@ class EditPrompt:
     text: str
 
     def apply(self, state: State) -> State:
-        after = _change_prompt(state, self.key, text=self.text, score=None, like=b"")
+        after = _change_prompt(
+            state, self.key, text=self.text, score=None, like=b"", place=None, foreign=False
+        )
         first = not state.asked and bool(after.asked)
         mode = Mode.HEAT if first and state.mode is Mode.RGB else after.mode
         return replace(after, mode=mode, active=self.key)
@@ -119,6 +123,19 @@ class SetThreshold:
 
     def apply(self, state: State) -> State:
         return _change_prompt(state, self.key, threshold=self.threshold)
+
+
+@dataclass(frozen=True)
+class SetSpan:
+    """Relevance of the first and the last colour of heat-maps; None: by the threshold."""
+
+    span: tuple[float, float] | None
+
+    def apply(self, state: State) -> State:
+        if self.span is None:
+            return change(state, span=None)
+        low, high = sorted(min(max(end, 0.0), 1.0) for end in self.span)
+        return change(state, span=(min(low, 1 - LEAST_SPAN), max(high, low + LEAST_SPAN)))
 
 
 @dataclass(frozen=True)
@@ -243,19 +260,20 @@ class PromptsRead:
 class Answered:
     """Scores in the view on show: (key, text, score); a prompt edited meanwhile keeps none.
 
-    lapses: as `Asking.lapses` was; scores that have lapsed since are dropped.
+    lapses: as `Asking.lapses` was; scores that have lapsed since are dropped. places: where each fits best.
     """
 
     scores: tuple[tuple[int, str, float], ...]
     lapses: int = 0
+    places: tuple[Vector | None, ...] = ()
 
     def apply(self, state: State) -> State:
         if self.lapses != state.asking.lapses:
             return state
         current = {p.key: p.text.strip() for p in state.prompts}
-        for key, text, score in self.scores:
+        for (key, text, score), place in zip_longest(self.scores, self.places):
             if current.get(key) == text:
-                state = _change_prompt(state, key, score=score)
+                state = _change_prompt(state, key, score=score, place=place)
         return state
 
 
@@ -271,14 +289,18 @@ class Calibrated:
 
 @dataclass(frozen=True)
 class PhrasesCompiled:
-    """The phrases `keys`, in the order of `query`, are ready to be asked. lapses: as `Asking.lapses` was."""
+    """The phrases `keys`, in the order of `query`, are ready to be asked. lapses: as `Asking.lapses` was.
+    foreign: those that read like another language."""
 
     keys: tuple[int, ...]
     query: "CompiledQuery" = field(compare=False, repr=False)
     lapses: int = 0
+    foreign: tuple[int, ...] = ()
 
     def apply(self, state: State) -> State:
         state = Calibrated(self.query.threshold).apply(state)
+        for key in self.keys:
+            state = _change_prompt(state, key, foreign=key in self.foreign)
         return state if state.negatives else change(state, usual=self.query.negative_texts)
 
 

@@ -1,4 +1,5 @@
-"""Prompt sets in small JSON files: phrases with colour, visibility and threshold, and the negatives."""
+"""Prompt sets in small JSON files: phrases with colour, visibility and threshold, the language
+vectors of those that ask for a place, and the negatives."""
 
 import json
 import math
@@ -31,7 +32,13 @@ def write_prompts(chosen: PromptSet, path: Path) -> None:
         OutputError: the place cannot be written.
     """
     rows = [
-        {"text": p.text, "colour": list(p.colour), "visible": p.visible, "threshold": p.threshold}
+        {
+            "text": p.text,
+            "colour": list(p.colour),
+            "visible": p.visible,
+            "threshold": p.threshold,
+            **({"like": p.like.hex()} if p.like else {}),
+        }
         for p in chosen.prompts
         if p.text.strip()
     ]
@@ -76,13 +83,16 @@ def _parsed(document: dict) -> PromptSet:
 def _prompt(row: dict, place: int) -> Prompt:
     colour = row.get("colour", PALETTE[place])
     red, green, blue = (_number(value) for value in colour)
-    threshold = row.get("threshold")
+    threshold, like = row.get("threshold"), bytes.fromhex(row.get("like", ""))
+    if len(like) % 4:
+        raise ValueError("expected whole numbers of a language vector")
     return Prompt(
         key=place,
         text=_phrase(row["text"]),
         colour=(red, green, blue),
         threshold=None if threshold is None else _number(threshold),
         visible=bool(row.get("visible", True)),
+        like=like,
     )
 
 

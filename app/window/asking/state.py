@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..poses import Vector
+
 # Told apart by people with the common colour-vision deficiencies, on dark ground.
 PALETTE = (
     (0.96, 0.62, 0.16),
@@ -19,6 +21,7 @@ PALETTE = (
 )
 
 MOST_RECENT = 20
+LEAST_SPAN = 0.01  # of relevance, between the first and the last colour
 PROMPT_DIALOGS = ("save prompts", "load prompts")
 PROMPTS_SUFFIX = ".prompts.json"
 BINS = 50  # of a histogram of scores, over [0, 1]
@@ -30,7 +33,8 @@ class Prompt:
     """One phrase. `key` never changes; `score` is None until the view on show is answered.
 
     threshold: the person's own, or None for the calibrated one. calibrated: what None means.
-    like: a language vector as float32 bytes that is asked instead of the words.
+    like: a language vector as float32 bytes that is asked instead of the words. place: where in the scene it
+    fits best. foreign: its words read like another language.
     """
 
     key: int
@@ -41,6 +45,8 @@ class Prompt:
     visible: bool = True
     score: float | None = None
     like: bytes = field(default=b"", repr=False)
+    place: Vector | None = None
+    foreign: bool = False
 
     @property
     def found(self) -> bool | None:
@@ -48,11 +54,30 @@ class Prompt:
         return None if self.score is None else self.score >= self.cut
 
     @property
+    def maybe(self) -> bool:
+        """Whether the view shows something that nearly passes."""
+        return self.score is not None and self.lowest <= self.score < self.cut
+
+    @property
     def cut(self) -> float:
         """The threshold in force."""
         return self.calibrated if self.threshold is None else self.threshold
 
+    @property
+    def lowest(self) -> float:
+        """The score from which a phrase may be there, below the threshold."""
+        return self.cut - (1 - MAYBE) * max(self.cut - EVEN, 0.0)
 
+    @property
+    def shown_from(self) -> float:
+        """Relevance from which its heat-map shows something: of a near miss, what comes nearest."""
+        return self.lowest if self.maybe else self.cut
+
+
+EVEN = 0.5  # relevancy of what fits no better than what it is compared with
+MAYBE = 0.7
+"""Of the way from there to the threshold. In the shipped room, at a threshold of 0.85, things that are not
+there reach 0.70 (of 14: a toilet), a curtain 0.80 and a rug 0.83."""
 FIRST_PROMPT = Prompt(key=0)
 
 
@@ -86,7 +111,8 @@ class Asking:
     recent: phrases asked, the newest first. atom: whose weight map is on show. chosen: atoms to
     merge. prompts_path: where the last set was. usual: what the scene compares phrases with, by its
     own calibration, once it has said so. lapses: how often what scores rest on has changed. caret: the
-    prompt whose field takes the keys next.
+    prompt whose field takes the keys next. span: relevance of the first and the last colour of a heat-map,
+    the person's own; None: by the threshold.
     """
 
     recent: tuple[str, ...] = ()
@@ -98,6 +124,7 @@ class Asking:
     usual: tuple[str, ...] = ()
     lapses: int = 0
     caret: int | None = None
+    span: tuple[float, float] | None = None
 
     def histogram(self, key: int, text: str) -> Histogram | None:
         """Of a prompt as it reads now; None until it is answered."""

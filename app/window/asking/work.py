@@ -3,6 +3,7 @@ atoms. Heavy imports wait until they are needed."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import repeat
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ import numpy as np
 from langflash_core.scene.edits import Marks
 
 from ..commands import Command, Notify, ShowPicture
+from ..poses import Vector
 from ..requests import Asked, Errand, SceneErrand
 from .commands import Answered, AtomsDescribed, AtomsWeighed, Binned, PhrasesCompiled, PromptsRead
 from .prompt_sets import PromptSet, read_prompts, write_prompts
@@ -42,6 +44,7 @@ class Encode(SceneErrand):
     lapses: int = 0
 
     def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.language.minilm import reads_foreign
         from langflash_core.language.relevance import compile_query
         from langflash_core.language.spaces import language_space
         from langflash_core.language.words import with_vectors
@@ -52,7 +55,10 @@ class Encode(SceneErrand):
         query = compile_query(scene, space, list(self.texts), negatives=list(self.negatives) or None)
         likes = {row: _vector(like) for row, like in enumerate(self.likes) if like}
         query = with_vectors(query, scene.semantics.dictionary, likes)
-        yield PhrasesCompiled(self.keys, query, self.lapses)
+        spoken = zip(self.keys, self.texts, self.likes or repeat(b""), strict=False)
+        words = [(key, text) for key, text, like in spoken if not like] if space.name == "minilm" else []
+        foreign = tuple(key for key, text in words if reads_foreign(text))
+        yield PhrasesCompiled(self.keys, query, self.lapses, foreign)
 
 
 def _vector(content: bytes) -> "Tensor":
@@ -75,11 +81,13 @@ class Answer(SceneErrand):
     lapses: int = 0
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        from langflash_core.language.answers import answer
+        from langflash_core.language.answers import answer, best_places
 
         result = answer(self.relevance, self.frame, self.camera, self.query)
         answers = zip(self.keys, result.answers, strict=True)
-        yield Answered(tuple((key, a.prompt, float(a.score)) for key, a in answers), self.lapses)
+        scores = tuple((key, a.prompt, float(a.score)) for key, a in answers)
+        places = best_places(self.relevance, self.frame, self.camera)
+        yield Answered(scores, self.lapses, tuple(p and Vector(*p) for p in places))
         yield Binned(self.histograms(), self.lapses)
 
     def histograms(self) -> tuple[Histogram, ...]:

@@ -8,6 +8,8 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
+from langflash_core.formats import COLOUR_MAPS
+
 from ..scene.drops import typed_path
 from ..state import State
 from .state import ExportForm, What
@@ -54,6 +56,8 @@ def order(state: State) -> Order | str:
         words += ["--what", form.what.word]
     if phrases:
         words += ["--prompt", *phrases, *_threshold(state)]
+    if form.what is What.HEAT:
+        words += _colours(state)
     seen_from, camera_file = _seen_from(state, target)
     words += seen_from
     if form.what.sized:
@@ -62,6 +66,16 @@ def order(state: State) -> Order | str:
         words += ["--seconds", f"{form.seconds:g}"]
     files = (*_written(form, target, len(info.views)), *((camera_file,) if camera_file else ()))
     return Order(tuple(words), target, camera_file, files)
+
+
+def _colours(state: State) -> list[str]:
+    """The window's own colour map and range."""
+    colours, words = state.heat_colours, []
+    if colours.colormap != COLOUR_MAPS[0]:
+        words += ["--colormap", colours.colormap]
+    if colours.span is not None:
+        words += ["--span", "{:.4g},{:.4g}".format(*colours.span)]
+    return words
 
 
 def _written(form: ExportForm, target: Path, num_views: int) -> tuple[Path, ...]:

@@ -36,6 +36,8 @@ def figures(state: State) -> list[str]:
     said = [f"frame {1000 * stats.frame_seconds:.1f} ms"]
     if state.info is not None:
         width, height = stats.picture_size
+        if stats.settling:
+            said.append("a finer picture is being drawn")
         said += [
             f"picture {1000 * stats.picture_seconds:.0f} ms at {width} x {height}",
             _count(state.info.num_gaussians, state.editing.num_deleted),

@@ -111,10 +111,14 @@ def shortened(text: str, width: float) -> str:
     """The text, cut with an ellipsis where it is wider than `width` interface pixels."""
     if imgui.calc_text_size(text).x <= width:
         return text
-    kept = len(text)
-    while kept > 1 and imgui.calc_text_size(text[:kept].rstrip() + "...").x > width:
-        kept -= 1
-    return text[:kept].rstrip() + "..."
+    fits, wide = 1, len(text)  # letters that are kept at the least, and that are too many
+    while wide - fits > 1:
+        middle = (fits + wide) // 2
+        if imgui.calc_text_size(text[:middle].rstrip() + "...").x > width:
+            wide = middle
+        else:
+            fits = middle
+    return text[:fits].rstrip() + "..."
 
 
 def sentence(text: str) -> str:

@@ -99,10 +99,12 @@ class EndSessionOffer:
 def restored_phrases(state: State, kept: Kept) -> State:
     """The phrases of a kept session in rows of their own, those that ask for a place among them."""
     rows = []
-    for text, like, threshold in zip_longest(kept.phrases, kept.likes, kept.thresholds):
-        colour = PALETTE[len(rows) % len(PALETTE)]
-        vector = bytes.fromhex(like or "")
-        rows.append(Prompt(state.next_key + len(rows), text, colour, threshold, like=vector))
+    told = (kept.phrases, kept.likes, kept.thresholds, kept.colours, kept.visible)
+    for text, like, threshold, colour, visible in zip_longest(*told):
+        shade = colour or PALETTE[len(rows) % len(PALETTE)]
+        vector, shown = bytes.fromhex(like or ""), visible is not False
+        row = Prompt(state.next_key + len(rows), text, shade, threshold, visible=shown, like=vector)
+        rows.append(row)
     if not rows:
         return state
     return replace(state, prompts=tuple(rows), active=rows[0].key, next_key=state.next_key + len(rows))

@@ -263,6 +263,8 @@ class RecoveryEffects(Effects):
             phrases=tuple(prompt.text for prompt in prompts),
             likes=tuple(prompt.like.hex() for prompt in prompts),
             thresholds=tuple(prompt.threshold for prompt in prompts),
+            colours=tuple(prompt.colour for prompt in prompts),
+            visible=tuple(prompt.visible for prompt in prompts),
             mode=state.mode.name,
             pose=None if info is None else state.pose,
         )
@@ -271,6 +273,6 @@ class RecoveryEffects(Effects):
 def _snapshot(state: State) -> tuple[Any, ...]:
     """What a change of must be kept."""
     where = None if state.info is None else (state.info.serial, state.info.path)
-    phrases = tuple((prompt.text, prompt.like, prompt.threshold) for prompt in state.prompts)
+    phrases = tuple((p.text, p.like, p.threshold, p.colour, p.visible) for p in state.prompts)
     photos = tuple((photo.path, photo.fov) for photo in state.photos)
     return photos, where, phrases, state.mode, state.pose, state.recovery.kept

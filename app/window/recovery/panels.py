@@ -5,6 +5,8 @@ from dataclasses import replace
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from langflash_core.formats import COLOUR_MAPS
+
 from .. import commands as do
 from ..kit import theme, widgets
 from ..kit.look import Look
@@ -24,6 +26,8 @@ def draw_settings(state: State, look: Look) -> list[do.Command]:
     new = old
     _label("Theme", look)
     new = replace(new, theme=widgets.choice([(name.capitalize(), name) for name in THEMES], old.theme))
+    _label("Colour map", look)
+    new = replace(new, colormap=widgets.choice([(name, name) for name in COLOUR_MAPS], old.colormap))
     _label("Size of the interface", look)
     sizes = [(f"{scale:.0%}", scale) for scale in (0.75, 1.0, 1.25, 1.5, 2.0)]
     new = replace(new, scale=widgets.choice(sizes, old.scale))

@@ -11,6 +11,7 @@ from typing import Any
 
 from langflash_core.errors import OutputError
 from langflash_core.files import make_folder, write_atomically
+from langflash_core.formats import COLOUR_MAPS
 
 from ..places import config_folder
 
@@ -24,14 +25,15 @@ _PLACES = 20_000  # pixels; beyond this a window position is no position
 
 @dataclass(frozen=True)
 class Preferences:
-    """theme: of THEMES. scale: of the interface, on top of the monitor's. speed: of flying, a
-    factor. touch_pad: two fingers turn, with Ctrl they zoom. photos_in_space: the cameras' frusta
+    """theme: of THEMES. colormap: of heat-maps. scale: of the interface, on top of the monitor's. speed: of
+    flying, a factor. touch_pad: two fingers turn, with Ctrl they zoom. photos_in_space: the cameras' frusta
     are drawn. near_photos: the picture fades, and orbits slow down, where no photo looked from about
     there. start_at_once: dropped photos are reconstructed without asking. panel_width: design
     pixels. window: x, y, width, height in screen pixels, or none. dictionary: the same of the
     dictionary's window inside it, design pixels, and whether it is open. recent: newest first."""
 
     theme: str = "dark"
+    colormap: str = COLOUR_MAPS[0]
     scale: float = 1.0
     speed: float = 1.0
     touch_pad: bool = False
@@ -105,6 +107,8 @@ def _fitting(name: str, value: Any) -> Any:
         return value if isinstance(value, bool) else None
     if name == "theme":
         return value if value in THEMES else None
+    if name == "colormap":
+        return value if value in COLOUR_MAPS else None
     if isinstance(default, float):
         low, high = {"scale": SCALES, "speed": SPEEDS, "panel_width": PANEL_WIDTHS}[name]
         number = isinstance(value, int | float) and not isinstance(value, bool)

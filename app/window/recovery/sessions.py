@@ -55,8 +55,8 @@ def read(path: Path) -> Kept | None:
             shift = (float(pose["shift"][0]), float(pose["shift"][1]))
             placed = Pose(centre, rotation, shift=shift, **rest)
         lists = {name: tuple(content.pop(name)) for name in ("photos", "fovs", "phrases")}
-        likes, thresholds = _asked(content, len(lists["phrases"]))
-        kept = Kept(pose=placed, file=path, likes=likes, thresholds=thresholds, **lists, **content)
+        asked = _asked(content, len(lists["phrases"]))
+        kept = Kept(pose=placed, file=path, **asked, **lists, **content)
         there = [os.path.isfile(photo) for photo in kept.photos]
         photos = tuple(photo for photo, here in zip(kept.photos, there, strict=True) if here)
         fovs = tuple(fov for fov, here in zip(kept.fovs, there, strict=True) if here)
@@ -67,17 +67,27 @@ def read(path: Path) -> Kept | None:
     return replace(kept, photos=photos, fovs=fovs, scene=scene, edits=edits)
 
 
-def _asked(content: dict, count: int) -> tuple[tuple[str, ...], tuple[float | None, ...]]:
-    """The likes and the thresholds of `count` phrases, taken out of a file's content; one of an earlier
-    version has none.
+def _asked(content: dict, count: int) -> dict[str, tuple]:
+    """What is kept of `count` phrases beside their words, taken out of a file's content; one of an earlier
+    version has less.
 
     Raises:
         ValueError, TypeError: they are damaged.
     """
-    likes, thresholds = content.pop("likes", ()), content.pop("thresholds", ())
-    if not {len(likes), len(thresholds)} <= {0, count} or any(len(bytes.fromhex(each)) % 4 for each in likes):
-        raise ValueError(f"expected likes and thresholds of {count} phrases, or none")
-    return tuple(likes), tuple(None if each is None else float(each) for each in thresholds)
+    lists = {name: content.pop(name, ()) for name in ("likes", "thresholds", "colours", "visible")}
+    if not {len(each) for each in lists.values()} <= {0, count}:
+        raise ValueError(f"expected likes, thresholds and looks of {count} phrases, or none")
+    if any(len(bytes.fromhex(each)) % 4 for each in lists["likes"]):
+        raise ValueError("expected whole numbers of a language vector")
+    colours = tuple(tuple(min(max(float(part), 0.0), 1.0) for part in each) for each in lists["colours"])
+    if any(len(each) != 3 for each in colours):
+        raise ValueError("expected three numbers of a colour")
+    return {
+        "likes": tuple(lists["likes"]),
+        "thresholds": tuple(None if each is None else float(each) for each in lists["thresholds"]),
+        "colours": colours,
+        "visible": tuple(bool(each) for each in lists["visible"]),
+    }
 
 
 def forget(path: Path) -> None:

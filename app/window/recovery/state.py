@@ -13,7 +13,7 @@ class Kept:
     """What a session holds. scene: its file, or the copy kept of one that was never saved, then
     `saved` is false. edits: the file of those that nobody saved. phrases: texts. likes: of each phrase
     the language vector that it asks instead, float32 bytes in hexadecimal digits, or none. thresholds: of
-    each phrase the person's own. file: where this was read from."""
+    each phrase the person's own. colours, visible: of each phrase. file: where this was read from."""
 
     photos: tuple[str, ...] = ()
     fovs: tuple[float | None, ...] = ()
@@ -24,6 +24,8 @@ class Kept:
     phrases: tuple[str, ...] = ()
     likes: tuple[str, ...] = ()
     thresholds: tuple[float | None, ...] = ()
+    colours: tuple[tuple[float, float, float], ...] = ()
+    visible: tuple[bool, ...] = ()
     mode: str = "RGB"
     pose: Pose | None = None
     file: Path | None = None

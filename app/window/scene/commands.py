@@ -53,6 +53,14 @@ class ClearPhotos:
 
 
 @dataclass(frozen=True)
+class SetPhotosAside:
+    """Empty the tray for a new room; the photos come back where it cannot be made."""
+
+    def apply(self, state: State) -> State:
+        return replace(state, photos=(), aside=state.photos)
+
+
+@dataclass(frozen=True)
 class PhotoFailed:
     """A photo could not be read for its thumbnail."""
 
@@ -196,6 +204,14 @@ class OpenPaths:
 
 
 @dataclass(frozen=True)
+class Loaded:
+    """The worker has loaded what drawing needs: while there is no scene, shaders can be compiled."""
+
+    def apply(self, state: State) -> State:
+        return state
+
+
+@dataclass(frozen=True)
 class SceneArrived:
     """A scene is ready: show it from its first view, ask every prompt again; the one before is a room to go
     back to. alone: see `OpenScene`. room: as it was left, where it was on show before."""
@@ -224,6 +240,7 @@ class SceneArrived:
             photos=() if self.alone else state.photos,
             prompts=prompts,
             job=None,
+            aside=(),
             flight=None,
             pose=self.info.views[0] if self.info.views else poses.START,
             view=0 if self.info.views else None,
@@ -233,7 +250,11 @@ class SceneArrived:
 def _rooms(state: State, coming: SceneInfo) -> tuple[Room, ...]:
     """Those to go back to once `coming` is on show; the same file twice only where there are edits."""
     info, editing = state.info, state.editing
-    left = () if info is None else (Room(info, state.photos, editing.history, editing.saved, state.pose),)
+    left = (
+        ()
+        if info is None
+        else (Room(info, state.aside or state.photos, editing.history, editing.saved, state.pose),)
+    )
     rooms = (room for room in (*left, *state.rooms) if room.info.serial != coming.serial)
     kept = (room for room in rooms if room.edited or room.info.path is None or room.info.path != coming.path)
     return tuple(kept)[:MOST_ROOMS]
@@ -292,7 +313,7 @@ class AskAboutDrop:
 def dropped(state: State, photos: tuple[Path, ...], new: bool) -> Command:
     """What takes dropped photos into the tray, alone for a `new` room, and reconstructs where the person
     wants that at once."""
-    taken: tuple[Command, ...] = (*((ClearPhotos(),) if new else ()), AddPhotos(photos))
+    taken: tuple[Command, ...] = (*((SetPhotosAside(),) if new else ()), AddPhotos(photos))
     return Instead((*taken, Reconstruct())) if state.preferences.start_at_once else All(taken)
 
 
@@ -358,7 +379,7 @@ class JobFailed:
     sentence: str
 
     def apply(self, state: State) -> State:
-        return Notify(self.sentence).apply(replace(state, job=None))
+        return Notify(self.sentence).apply(_ended(state))
 
 
 @dataclass(frozen=True)
@@ -366,7 +387,12 @@ class JobCancelled:
     """The job ended because the person stopped it."""
 
     def apply(self, state: State) -> State:
-        return Notify("Stopped.", "info").apply(replace(state, job=None))
+        return Notify("Stopped.", "info").apply(_ended(state))
+
+
+def _ended(state: State) -> State:
+    """Without its job: the tray is that of the scene on show."""
+    return replace(state, job=None, photos=state.aside or state.photos, aside=())
 
 
 def _change_photo(state: State, path: Path, **changes: Any) -> State:

@@ -4,7 +4,9 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
+from langflash_core.colormaps import colour_bar
 from langflash_core.errors import LangFlashError
+from langflash_core.formats import COLOUR_MAPS
 
 from ..commands import Command, Notify
 from ..effects import Effects, Hands
@@ -20,6 +22,7 @@ from .commands import (
     GoOn,
     GoToRoom,
     Instead,
+    Loaded,
     OpenPaths,
     OpenScene,
     Reconstruct,
@@ -31,8 +34,6 @@ from .commands import (
 from .drops import sort_drop
 from .state import SceneInfo
 from .work import FindPair, LoadScene, MakeThumbnails, ReconstructPhotos, WriteScene
-
-COLORMAPS = ("turbo", "inferno")  # of colour-bars
 
 
 class SceneEffects(Effects):
@@ -67,6 +68,8 @@ class SceneEffects(Effects):
                 submit(FindPair(tuple(photo.path for photo in state.photos)))
             case SceneArrived(info):
                 self._show(info)
+            case Loaded() if state.info is None and self._viewport.warm():
+                self._hands.dispatch(Loaded())
             case _:
                 self._go_on(command, before, state)
 
@@ -110,6 +113,6 @@ class SceneEffects(Effects):
         for index, photo in enumerate(info.scene.photos):
             with suppress(OSError):  # a scene whose small photos are damaged still shows; buttons get numbers
                 self._thumbnails.put_encoded(f"view {index}", photo)
-        for colormap in COLORMAPS:
-            self._thumbnails.put(f"bar {colormap}", self._viewport.colour_bar(colormap))
+        for colormap in COLOUR_MAPS:
+            self._thumbnails.put(f"bar {colormap}", colour_bar(colormap))
         self._entitle(f"{info.name} - LangFlash")

@@ -333,3 +333,15 @@ def test_window_needs_a_display(scene_file, tmp_path):
     assert done.stderr.startswith("langflash: ") and done.stderr.count("\n") == 1
     missing = subprocess.run([*words, "gone.jpg"], capture_output=True, text=True, env=hidden, timeout=60)
     assert missing.returncode == 2 and "gone.jpg" in missing.stderr
+
+
+def test_heat_maps_are_coloured_as_asked(run, scene_file, tmp_path):
+    pictures = []
+    for index, words in enumerate(([], ["--colormap", "grey"], ["--colormap", "grey", "--span", "0,1"])):
+        path = tmp_path / f"{index}.png"
+        done = run("export", scene_file, "-o", path, "--what", "heat", "--prompt", "armchair", *words)
+        assert done.code == 0
+        pictures.append(np.asarray(Image.open(path)))
+    assert len({picture.tobytes() for picture in pictures}) == 3
+    refused = run("export", scene_file, "-o", tmp_path / "x.png", "--colormap", "grey")
+    assert refused.code == 2 and "--what heat" in refused.err

@@ -11,6 +11,8 @@ from app.gl.colours import feature_axes
 from app.gl.display import COUNT_COLOURS
 from app.gl.painter import Painter
 from app.gl.photos import SAME, WORST, PhotoDepths
+from langflash_core.colormaps import colour_bar
+from langflash_core.formats import COLOUR_MAPS
 from langflash_core.splat import render
 from langflash_core.types import Scene
 from tests.app.gl.questions import full_relevance, question
@@ -229,7 +231,7 @@ def test_agreement_is_the_worst_ratio_of_two_photos_own_depths(exact):
     exact.set_scene(stereo(double=False))
     exact.draw(SEEN_FROM)
     picture = pixels(exact.agreement_texture())
-    bar = exact.colour_bar("turbo")[0] / 255
+    bar = colour_bar(COLOUR_MAPS[0])[0] / 255
     expected = bar[(worst / WORST * 255).round().clip(0, 255).astype(int)]
     shade = (picture - 0.7 * expected)[both]  # what is left is grey
     # Pixels at the block's edge fall on either side of it in float32.

@@ -139,9 +139,9 @@ def person(size: tuple[int, int] = SIZE, words: tuple[str, ...] = ()) -> Iterato
 
 
 def lit(canvas: np.ndarray) -> np.ndarray:
-    """(h, w) bool: what the heat-map marks; nothing in the grey photos is red."""
+    """(h, w) bool: what the heat-map marks in yellow; nothing in the grey photos is."""
     red, green, blue = np.moveaxis(canvas.astype(int), -1, 0)
-    return (red > 90) & (red > 2 * green) & (red > 2 * blue)
+    return (red > 120) & (red > blue + 24) & (green > blue + 16)
 
 
 def walk(someone: Person) -> Iterator[Shot]:

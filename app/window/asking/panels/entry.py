@@ -31,10 +31,19 @@ def field(state: State, prompt: Prompt) -> tuple[bool, str]:
         data.insert_chars(0, recent[at] if at >= 0 else "")
         return 0
 
+    _reload(prompt.text)
     changed, text = imgui.input_text_with_hint("##text", HINT, prompt.text, _FLAGS, recall)
     if imgui.is_item_activated():
         storage.set_int(place, -1)
     return changed, text
+
+
+def _reload(text: str) -> None:
+    """Where a command has set another text than the field with the caret holds, the command wins: the field
+    keeps its own until it is told."""
+    held = imgui.internal.get_input_text_state(imgui.get_id("##text"))
+    if held is not None and imgui.internal.get_active_id() == held.id_ and held.get_text() != text:
+        held.reload_user_buf_and_move_to_end()
 
 
 def finished(key: int, text: str) -> list[do.Command]:

@@ -10,7 +10,7 @@ from ...kit.look import Look
 from ...state import State
 from .. import commands as ask
 from ..state import Prompt, usable
-from . import entry, scores
+from . import entry, known, scores
 
 _SWATCH = imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label | imgui.ColorEditFlags_.no_tooltip
 
@@ -24,7 +24,11 @@ def draw(state: State, look: Look) -> list[do.Command]:
         issued += _row(state, prompt, look)
         imgui.pop_id()
     issued += entry.tools(state, look)
+    if not state.asked:  # what there is to ask comes first until something is asked
+        issued += known.draw(state, look)
     issued += scores.draw(state, look)
+    if state.asked:
+        issued += known.draw(state, look)
     widgets.gap(look.px(2))
     issued += _negatives(state)
     return issued
@@ -101,6 +105,9 @@ def _verdict(prompt: Prompt, look: Look) -> list[do.Command]:
         imgui.text_colored(theme.MUTED, "...")
     elif prompt.found:
         imgui.text_colored(theme.GOOD, f"{fa.ICON_FA_CHECK} found")
+    elif prompt.maybe:
+        imgui.text_colored(theme.ACCENT, f"{fa.ICON_FA_QUESTION} maybe")
+        widgets.tooltip("Nearly: the picture shows faintly, in a ring, what comes nearest")
     else:
         imgui.text_colored(theme.BAD, f"{fa.ICON_FA_XMARK} not found")
     if prompt.score is not None:
@@ -112,6 +119,8 @@ def _verdict(prompt: Prompt, look: Look) -> list[do.Command]:
     changed, cut = widgets.slider("##threshold", prompt.cut, (0.0, 1.0), f"{prompt.cut:.2f}", tip, width)
     if changed:
         issued.append(ask.SetThreshold(prompt.key, cut))
+    if prompt.foreign:
+        widgets.muted("This reads like another language, or a rare word; phrases are understood in English.")
     if prompt.threshold is not None and imgui.button(f"{fa.ICON_FA_ROTATE_LEFT}  Calibrated threshold"):
         issued.append(ask.SetThreshold(prompt.key, None))
     imgui.unindent(look.px(36))

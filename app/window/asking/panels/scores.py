@@ -2,6 +2,7 @@
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui, implot
+from imgui_bundle import icons_fontawesome_6 as fa
 
 from ... import commands as do
 from ...kit import theme, widgets
@@ -31,7 +32,26 @@ def draw(state: State, look: Look) -> list[do.Command]:
         opened = imgui.tree_node_ex(f"{title}###scores", shape | imgui.TreeNodeFlags_.default_open)
     if not opened:
         return []
-    return _plot(prompt, np.array(found.counts, float), look)
+    return _plot(prompt, np.array(found.counts, float), look) + _span(state, prompt, look)
+
+
+def _span(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
+    """From where to where the colours of the heat-map reach."""
+    low, high = state.heat_colours.ends(prompt.cut)
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.MUTED, "Colours from")
+    imgui.same_line()
+    reset = look.px(36)
+    imgui.set_next_item_width(imgui.get_content_region_avail().x - reset)
+    changed, first, last = imgui.drag_float_range2("##span", low, high, 0.005, 0.0, 1.0, "%.2f", "%.2f")
+    widgets.tooltip("Relevance of the first and the last colour; drag, or double-click and type")
+    imgui.same_line(0, look.px(2))
+    imgui.begin_disabled(state.asking.span is None)
+    back = widgets.quiet_button(f"{fa.ICON_FA_ROTATE_LEFT}##span", "By the threshold")
+    imgui.end_disabled()
+    if back:
+        return [ask.SetSpan(None)]
+    return [ask.SetSpan((first, last))] if changed else []
 
 
 def _plot(prompt: Prompt, counts: np.ndarray, look: Look) -> list[do.Command]:

@@ -26,6 +26,10 @@ _COMBINES: tuple[tuple[Combine, str, str], ...] = (
     ("remove", fa.ICON_FA_MINUS, "Take from the selection  (Ctrl)"),
 )
 _BUTTON = 36.0  # design pixels of a tool's side
+_SMALLEST = 22.0
+_GAP = 4.0
+_AROUND = 34.0  # of the strip, beside its tools: its edge and two lines
+_VIEWS = 92.0  # that the viewpoints below it take
 _MARGIN = 12.0
 _LONG = 610.0  # width of everything a selection can do, in one line
 _BAR = (
@@ -36,7 +40,8 @@ _BAR = (
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
     """Strip and bars over the picture at `place`."""
     corner = ImVec2(place.x + look.px(_MARGIN), place.y + look.px(_MARGIN))
-    issued, _ = _panel("##tools", corner, look, lambda: _strip(state, look), tight=True)
+    side = tool_side(size.y / look.scale)
+    issued, _ = _panel("##tools", corner, look, lambda: _strip(state, look, side), tight=True)
     room = size.x - look.px(_BUTTON + 22 + 2 * _MARGIN)
     corner = ImVec2(corner.x + look.px(_BUTTON + 22), corner.y)
     bars = []
@@ -57,6 +62,15 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     return issued
 
 
+def tool_side(height: float) -> float:
+    """A tool's side, so that the strip ends above the viewpoints; all in design pixels.
+
+    height: of the picture's place.
+    """
+    room = (height - _MARGIN - _AROUND - _VIEWS) / (len(_TOOLS) + 3) - _GAP
+    return min(max(room, _SMALLEST), _BUTTON)
+
+
 def _panel(
     name: str, corner: ImVec2, look: Look, body, tight: bool = False
 ) -> tuple[list[do.Command], float]:
@@ -72,11 +86,11 @@ def _panel(
     return issued, height
 
 
-def _strip(state: State, look: Look) -> list[do.Command]:
+def _strip(state: State, look: Look, wide: float) -> list[do.Command]:
     issued: list[do.Command] = []
     editing = state.editing
-    side = look.vec(_BUTTON, _BUTTON)
-    imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
+    side = look.vec(wide, wide)
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(_GAP, _GAP))
     for tool, icon, tip in _TOOLS:
         if _tool_button(icon, editing.tool is tool, side, tip):
             issued.append(point.SetTool(tool))

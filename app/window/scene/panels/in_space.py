@@ -25,9 +25,27 @@ def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Comm
         return []
     if comparing(state):
         return _compare(state, look, corner, size)
+    _candidates(state, look, corner, size)
     if state.preferences.photos_in_space and state.flight is None:
         return _frusta(state, look, corner, size)
     return []
+
+
+def _candidates(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
+    """A ring around what comes nearest to each phrase that may be there."""
+    for prompt in state.asked:
+        if not prompt.maybe or prompt.place is None:
+            continue
+        found = project(np.array([prompt.place]), state.pose, size)
+        if found is None:
+            continue
+        x, y = found[1][0]
+        if not (0 <= x < size.x and 0 <= y < size.y):
+            continue
+        at, colour = ImVec2(corner.x + x, corner.y + y), widgets.u32(widgets.rgba(prompt.colour))
+        imgui.get_window_draw_list().add_circle(at, look.px(26), colour, 0, look.px(2))
+        below = ImVec2(at.x + look.px(30), at.y - look.px(10))
+        _caption(look, below, f"{prompt.text.strip()}?", 0.0)
 
 
 def comparing(state: State) -> bool:

@@ -11,6 +11,7 @@ from . import tray
 
 _WIDTH = 244.0  # design pixels
 _MARGIN = 12.0
+_VIEWS = 78.0
 _ATOMS_NAMED = 6
 _FLAGS = widgets.PLAIN | imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_focus_on_appearing
 
@@ -19,7 +20,8 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
     """The legend of the present mode; nothing for plain colours."""
     if state.info is None or state.mode is Mode.RGB:
         return
-    corner = ImVec2(place.x + size.x - look.px(_MARGIN), place.y + size.y - look.px(_MARGIN))
+    raised = look.px(_VIEWS) if covers_views(size.x / look.scale, len(state.info.views)) else 0.0
+    corner = ImVec2(place.x + size.x - look.px(_MARGIN), place.y + size.y - look.px(_MARGIN) - raised)
     imgui.set_next_window_pos(corner, 0, ImVec2(1, 1))
     imgui.set_next_window_size(ImVec2(look.px(_WIDTH), 0))
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
@@ -32,6 +34,11 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
     imgui.pop_style_var(2)
 
 
+def covers_views(width: float, count: int) -> bool:
+    """Whether it would lie on the buttons of so many viewpoints, in a picture so wide, design pixels."""
+    return width < _WIDTH + 2 * _MARGIN + 16 + 84 * count + 42
+
+
 def _body(state: State, look: Look) -> None:
     mode = state.mode
     if not mode.possible(state.info):
@@ -41,8 +48,8 @@ def _body(state: State, look: Look) -> None:
     elif mode is Mode.HEAT:
         prompt = state.active_prompt
         assert prompt is not None
-        middle = (prompt.cut + 1) / 2
-        _bar(prompt.text, "turbo", (f"{prompt.cut:.2f}", f"{middle:.2f}", "1.00"), look)
+        low, high = state.heat_colours.ends(prompt.cut)
+        _bar(prompt.text, state.preferences.colormap, _numbers(low, high), look)
     elif mode is Mode.MARGIN:
         _margin(state, look)
     elif mode in (Mode.LABELS, Mode.MASKS, Mode.ISOLATE, Mode.HIDE, Mode.DIM):
@@ -50,11 +57,21 @@ def _body(state: State, look: Look) -> None:
     elif mode is Mode.DEPTH:
         near, far = state.stats.depth_range
         middle = 2 / (1 / max(near, 1e-9) + 1 / max(far, 1e-9))
-        _bar("Depth, scene units", "turbo", (f"{far:.2f}", f"{middle:.2f}", f"{near:.2f}"), look)
+        _bar(
+            "Depth, scene units",
+            state.preferences.colormap,
+            (f"{far:.2f}", f"{middle:.2f}", f"{near:.2f}"),
+            look,
+        )
     elif mode is Mode.WEIGHT:
-        _bar(f"Weight of {state.editing.atom_name(state.asking.atom)}", "inferno", ("0", "0.5", "1"), look)
+        _bar(
+            f"Weight of {state.editing.atom_name(state.asking.atom)}",
+            state.preferences.colormap,
+            ("0", "0.5", "1"),
+            look,
+        )
     elif mode is Mode.TRANSMITTANCE:
-        _bar("Light that passes every splat", "inferno", ("0", "0.5", "1"), look)
+        _bar("Light that passes every splat", state.preferences.colormap, ("0", "0.5", "1"), look)
     elif mode is Mode.FEATURES:
         widgets.muted("The three main axes of the language features, as red, green and blue.")
     elif mode is Mode.ATOMS:
@@ -69,7 +86,11 @@ def _margin(state: State, look: Look) -> None:
     low, high = margin_span(len(state.asked))
     alone = len(state.asked) == 1
     title = f"{state.asked[0].text}, over its threshold" if alone else "Best phrase over the second best"
-    _bar(title, "turbo", (f"{low:.2f}", f"{(low + high) / 2:.2f}", f"{high:.2f}"), look)
+    _bar(title, state.preferences.colormap, _numbers(low, high), look)
+
+
+def _numbers(low: float, high: float) -> tuple[str, ...]:
+    return tuple(f"{value:.2f}" for value in (low, (low + high) / 2, high))
 
 
 def _bar(title: str, colormap: str, numbers: tuple[str, ...], look: Look) -> None:
@@ -117,7 +138,7 @@ def _trust(state: State, look: Look) -> None:
             imgui.text(name)
     else:
         numbers = ("0 %", f"{50 * WORST:.0f} %", f"{100 * WORST:.0f} %")
-        _bar("Photos disagree on depth by", "turbo", numbers, look)
+        _bar("Photos disagree on depth by", state.preferences.colormap, numbers, look)
         _swatch((0.3, 0.3, 0.3), look)
         imgui.text_colored(theme.MUTED, "fewer than two can tell")
     assert state.info is not None

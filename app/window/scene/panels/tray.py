@@ -22,6 +22,8 @@ ASSUMED_FOV = 65.0  # degrees, as the core assumes where neither file nor person
 HOW_TO_TELL = "click a photo to tell it"
 _DRAGGED = "photo"  # what a card is called while it is dragged
 
+ONE_PHOTO = "depth is a guess from one photo; a second one from a step aside measures it"
+
 
 def draw(state: State, look: Look) -> list[do.Command]:
     """The photos section."""
@@ -49,6 +51,8 @@ def _sentences(state: State) -> list[str]:
     said = [photo.problem for photo in state.photos if photo.problem]
     said += [note for photo in state.photos for note in photo.notes]
     said += state.info.warnings if state.info else ()
+    if state.info is not None and len(state.info.views) == 1 and state.info.scene.photos:
+        said.append(ONE_PHOTO)
     return sentences(said)
 
 

@@ -17,7 +17,7 @@ from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core.errors import PromptError
 from langflash_core.language.algebra import terms
-from tests.app.window.scenes import after, room
+from tests.app.window.scenes import after, room, shown_scene
 
 
 @pytest.fixture(scope="module")
@@ -166,3 +166,11 @@ def test_without_own_negatives_the_scene_says_what_phrases_are_compared_with() -
     assert (state.negatives, state.asking.usual) == ((), ("wall",))
     own = ask.PhrasesCompiled((), query).apply(replace(State(), negatives=("thing",)))
     assert own.asking.usual != ("wall",)
+
+
+def test_a_range_of_colours_is_kept_in_order_and_apart() -> None:
+    state = after(shown_scene(), ask.SetSpan((0.9, 0.2)))
+    assert state.asking.span == (0.2, 0.9) and state.heat_colours.ends(0.5) == (0.2, 0.9)
+    low, high = after(state, ask.SetSpan((1.0, 1.0))).asking.span or (0, 0)
+    assert 0 <= low < high <= 1.01
+    assert after(state, ask.SetSpan(None)).heat_colours.ends(0.4)[0] < 0.4

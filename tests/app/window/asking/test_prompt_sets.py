@@ -92,3 +92,16 @@ def test_the_dialogs_propose_a_place_and_close(tmp_path: Path) -> None:
     state = after(state, ask.SavePrompts(tmp_path / "a.json"), do.ShowDialog("load prompts"))
     assert state.dialog_path == str(tmp_path / "a.json")
     assert after(state, ask.LoadPrompts(tmp_path / "a.json")).dialog is None
+
+
+def test_a_phrase_that_asks_for_a_place_is_saved_with_it(tmp_path: Path) -> None:
+    """Its words, "like this (door)", mean nothing by themselves."""
+    path = tmp_path / "a.prompts.json"
+    like = bytes(range(16))
+    write_prompts(PromptSet((Prompt(0, "like this (door)", like=like),), ()), path)
+    assert read_prompts(path).prompts[0].like == like
+    broken = json.loads(path.read_text())
+    broken["prompts"][0]["like"] = "zz"
+    path.write_text(json.dumps(broken))
+    with pytest.raises(PromptError, match="no usable prompt set"):
+        read_prompts(path)

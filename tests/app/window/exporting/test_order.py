@@ -220,3 +220,15 @@ def test_it_is_asked_before_a_file_is_replaced(monkeypatch, folders: Path) -> No
     assert desk.state.exporting.form.path == str(folders / "a.png")
     desk.perform(export.Export(sure=True))
     assert len(desk.ran) == 2 and desk.ran[1][-1] == "--replace" and desk.state.dialog is None
+
+
+def test_a_heat_map_is_exported_in_the_window_s_own_colours() -> None:
+    state = form(scene(), what=What.HEAT, path="/out/heat")
+    usual = export_form.order(state)
+    assert not isinstance(usual, str) and "--colormap" not in usual.words and "--span" not in usual.words
+    own = keep.Prefer(replace(state.preferences, colormap="viridis"))
+    order = export_form.order(after(state, own, ask.SetSpan((0.25, 0.9))))
+    assert not isinstance(order, str)
+    assert "--colormap viridis --span 0.25,0.9" in order.line
+    other = export_form.order(form(after(state, own), what=What.MASK))
+    assert not isinstance(other, str) and "--colormap" not in other.words

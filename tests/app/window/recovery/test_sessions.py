@@ -1,5 +1,6 @@
 """A session outlives the process that dies, and only that."""
 
+import json
 import os
 import signal
 import subprocess
@@ -9,14 +10,17 @@ from pathlib import Path
 from app.window.places import state_folder
 from app.window.poses import Pose, Vector
 from app.window.recovery import sessions
+from app.window.recovery.commands import restored_phrases
 from app.window.recovery.keeper import Keeper
 from app.window.recovery.state import Kept
+from app.window.state import State
 
 ROOT = Path(__file__).parents[4]
 DYING = """
 import os, sys, signal
 from app.window.recovery.keeper import Keeper
 from app.window.recovery.state import Kept
+from app.window.state import State
 keeper = Keeper()
 keeper.scene_file.parent.mkdir(parents=True, exist_ok=True)
 keeper.scene_file.write_bytes(b"a scene")
@@ -81,3 +85,14 @@ def test_damage_and_emptiness_are_passed_over_and_removed(folders: Path) -> None
         (state_folder() / name).write_bytes(content)
     assert sessions.left_behind() is None
     assert list(state_folder().iterdir()) == []
+
+
+def test_phrases_come_back_in_their_colours_shown_or_not(folders: Path) -> None:
+    colours = ((0.1, 0.2, 0.3), (0.9, 0.8, 0.7))
+    kept = Kept(phrases=("door", "chair"), colours=colours, visible=(False, True))
+    path = folders / "kept.json"
+    path.write_text(json.dumps(sessions.fields(kept)))
+    read = sessions.read(path)
+    assert read is not None and (read.colours, read.visible) == (colours, (False, True))
+    rows = restored_phrases(State(), read).prompts
+    assert [(row.colour, row.visible) for row in rows] == [(colours[0], False), (colours[1], True)]

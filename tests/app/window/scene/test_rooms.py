@@ -13,12 +13,12 @@ from app.window.effects import Hands
 from app.window.scene import commands as show
 from app.window.scene import work
 from app.window.scene.effects import SceneEffects
-from app.window.scene.state import MOST_ROOMS, SceneInfo
+from app.window.scene.state import MOST_ROOMS, Photo, SceneInfo
 from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core.scene.edits import Mask
 from langflash_core.scene.file import save
-from tests.app.window.scenes import after, room
+from tests.app.window.scenes import after, room, shown_scene
 
 PHOTOS = (Path("/p/a.jpg"), Path("/p/b.jpg"))
 SOME = Mask.of(np.arange(12_300) < 5)
@@ -163,3 +163,21 @@ def test_rooms_are_few_and_a_file_is_there_once(desk: Desk, info) -> None:
     for serial in (10, 11, 12):
         desk.perform(show.SceneArrived(replace(info, serial=serial, path=path)))
     assert [room.info.serial for room in desk.state.rooms] == [6, 5, 4]
+
+
+@pytest.mark.parametrize("end", [show.JobFailed("nothing to see"), show.JobCancelled()])
+def test_where_a_new_room_cannot_be_made_the_tray_is_as_before(end) -> None:
+    state = replace(shown_scene(), photos=(Photo(Path("old.png")),))
+    state = after(state, show.SetPhotosAside(), show.AddPhotos((Path("new.png"),)), show.Reconstruct())
+    assert [p.path.name for p in state.photos] == ["new.png"]
+    state = after(state, end)
+    assert [p.path.name for p in state.photos] == ["old.png"] and state.job is None
+
+
+def test_the_room_left_keeps_its_own_photos() -> None:
+    state = replace(shown_scene(), photos=(Photo(Path("old.png")),))
+    state = after(state, show.SetPhotosAside(), show.AddPhotos((Path("new.png"),)), show.Reconstruct())
+    assert state.info is not None
+    state = after(state, show.SceneArrived(replace(state.info, serial=2, path=None)))
+    assert [p.path.name for p in state.photos] == ["new.png"]
+    assert [p.path.name for p in state.rooms[0].photos] == ["old.png"]

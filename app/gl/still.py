@@ -1,0 +1,163 @@
+"""Pictures drawn on the processor, by threads of Python, for machines without a graphics card.
+
+There OpenGL runs on the processor too, and weight maps cost it eight times the colours: every splat blends
+into eight targets. `langflash_core/splat/tiles.py` composites colours and all weights in one product, in some
+three times the colours' time, and any thread may call it, so that no frame waits. A renderer takes the
+result (`SplatRenderer.bring`) and shows it like its own.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import count
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from langflash_core.language.relevance import CompiledQuery, relevance_maps
+from langflash_core.splat.projection import ALPHA_MIN, NEAR, drawable_rows, project, view_colours
+from langflash_core.splat.tiles import rasterize_tiles
+from langflash_core.types import LUMA, Camera, Frame, Scene
+
+from .splats import TINTED, TINTS
+
+_PIXELS_AT_ONCE = 1 << 16
+_KEPT = 4  # answers of a picture, the newest
+_HALF_MAX = 65504.0
+_names = count(1)
+
+
+@dataclass(frozen=True)
+class StillMaps:
+    """Weight maps (H, W, K) float16 of one still picture, and what was made of them."""
+
+    weights: Tensor = field(repr=False)
+    _made: dict[tuple, np.ndarray] = field(default_factory=dict, repr=False, compare=False)
+
+    def pixel(self, x: int, y: int) -> np.ndarray:
+        """(K,) float32 of one pixel."""
+        return self.weights[y, x].float().numpy()
+
+    def relevance(self, compiled: CompiledQuery) -> np.ndarray:
+        """(P, H, W) float32; computed once for a question."""
+        return self._kept(_name(compiled), lambda: relevance_maps(self.weights, compiled).float().numpy())
+
+    def answers(self, compiled: CompiledQuery) -> bool:
+        """Whether the relevance is there already."""
+        return _name(compiled) in self._made
+
+    def mixes(self, columns: np.ndarray) -> bool:
+        """Whether the mixture of these columns is there already."""
+        return ("mixed", np.ascontiguousarray(columns, np.float32).tobytes()) in self._made
+
+    def mixed(self, columns: np.ndarray) -> np.ndarray:
+        """sum_k W_k c_k, (H, W, n) float32, for columns c (K, n); computed once for these."""
+        table = torch.from_numpy(np.ascontiguousarray(columns, np.float32))
+        pixels = self.weights.flatten(0, 1).split(_PIXELS_AT_ONCE)
+
+        def mix() -> np.ndarray:
+            parts = torch.cat([part.float() @ table for part in pixels])
+            return parts.unflatten(0, self.weights.shape[:2]).numpy()
+
+        return self._kept(("mixed", table.numpy().tobytes()), mix)
+
+    def _kept(self, key: tuple, make: Callable[[], np.ndarray]) -> np.ndarray:
+        if key not in self._made:
+            made = make()
+            while len(self._made) >= _KEPT:
+                self._made.pop(next(iter(self._made)))
+            self._made[key] = made
+        return self._made[key]
+
+
+def _name(compiled: CompiledQuery) -> tuple:
+    """Of a question: all that its answer depends on."""
+    tensors = (compiled.factor, compiled.prompts, compiled.negatives)
+    return (*(t.detach().cpu().numpy().tobytes() for t in tensors), compiled.temperature, compiled.mode)
+
+
+@dataclass(frozen=True)
+class Still:
+    """One picture. colour: (H, W, 4) float16, premultiplied, with alpha. depth: (H, W, 2) float32, sums of
+    T alpha z and of T alpha. maps: None where nobody asked for them. `key` names its content."""
+
+    camera: Camera
+    colour: np.ndarray = field(repr=False)
+    depth: np.ndarray = field(repr=False)
+    depth_range: tuple[float, float]
+    maps: StillMaps | None
+    key: int = field(default_factory=lambda: -next(_names))  # below those of what OpenGL draws
+
+    @cached_property
+    def frame(self) -> Frame:
+        """The picture over black as tensors, without its weight maps."""
+        sums, alphas = np.moveaxis(self.depth, -1, 0)
+        covered = alphas >= ALPHA_MIN
+        depths = np.where(covered, sums / np.where(covered, alphas, 1.0), 0.0).astype(np.float32)
+        rgb = torch.from_numpy(self.colour[..., :3].astype(np.float32))
+        return Frame(rgb, torch.from_numpy(alphas.copy()), torch.from_numpy(depths), None)
+
+
+def mixture(still: Still, columns: np.ndarray) -> np.ndarray:
+    """Colours (H, W, 3) that columns (K, 3 or 4) of the atoms mix to: as show_atoms.frag, and where a fourth
+    column counts the weights, as show_features.frag."""
+    assert still.maps is not None
+    mixed = still.maps.mixed(columns)
+    if columns.shape[1] == 3:
+        return mixed
+    weights = mixed[..., 3:]
+    return np.where(weights >= ALPHA_MIN, mixed[..., :3] / np.maximum(weights, 1e-6), 0.0)
+
+
+def draw_still(
+    scene: Scene,
+    camera: Camera,
+    *,
+    marks: tuple[np.ndarray, np.ndarray] | None = None,
+    weight_maps: bool = True,
+    threads: int = 1,
+    stopping: Callable[[], bool] = lambda: False,
+) -> Still:
+    """Draw a scene as `SplatRenderer.draw` does.
+
+    Args:
+        marks: shown (N,) bool and tints (N,) uint8, as `SplatRenderer.mark` takes them.
+        threads, stopping: as `rasterize_tiles`.
+
+    Raises:
+        Cancelled: `stopping` said so.
+    """
+    kept = drawable_rows(scene)
+    if marks is not None:
+        kept &= torch.from_numpy(marks[0])
+    gaussians = scene.gaussians.map(lambda v: v.detach()[kept])
+    footprints = project(gaussians.map(lambda v: v.double()), camera)
+    colours = view_colours(gaussians, camera).float().clamp_max(_HALF_MAX)
+    if marks is not None:
+        colours = _tinted(colours, torch.from_numpy(marks[1])[kept])
+    depths = torch.zeros(len(gaussians)).index_copy(0, footprints.ids, footprints.depths.float())
+    features = [torch.cat((colours, depths[:, None]), -1)]
+    if weight_maps:
+        features.append(scene.semantics.dense_weights().detach()[kept].half())
+    maps, alphas = rasterize_tiles(footprints, features, camera, threads=threads, stopping=stopping)
+    colour = torch.cat((maps[0][..., :3], alphas[..., None]), -1).half().numpy()
+    depth = torch.stack((maps[0][..., 3], alphas), -1).numpy()
+    still = StillMaps(maps[1]) if weight_maps else None
+    return Still(camera, colour, depth, _middle(footprints.depths), still)
+
+
+def _middle(depths: Tensor) -> tuple[float, float]:
+    """Near and far (n,) of the middle 96 % of the Gaussians in view, nearest first."""
+    if not len(depths):
+        return (NEAR, 1.0)
+    margin = len(depths) // 50
+    return (float(depths[margin]), float(depths[-1 - margin]))
+
+
+def _tinted(colours: Tensor, tints: Tensor) -> Tensor:
+    """As project.vert: the tint in the colour's own brightness, mixed in."""
+    table = torch.tensor(((0.0, 0.0, 0.0), *TINTS))
+    grey = colours.clamp_max(1.0) @ torch.tensor(LUMA)
+    wanted = table[tints.long()] * (0.35 + 0.75 * grey)[:, None]
+    return torch.where((tints > 0)[:, None], torch.lerp(colours, wanted, TINTED), colours)

@@ -1,0 +1,193 @@
+"""The rasteriser for processors: the same sums as the reference, in float32, tile by tile.
+
+A picture is cut into tiles of 8 x 8 pixels. A tile's Gaussians are composited front to back, `_BLOCK` at a
+time and many tiles at once: per block the alphas (B, n, 64), their transmittances by n products, and one
+matrix product with the features. A tile is done when no pixel of it lets more than `STOP` of the light pass,
+which bounds what is left out: |F - F_reference| <= STOP max |f|, beside float32's rounding. Every step is a
+call into torch on a few hundred kilobytes, so it runs beside other threads of Python and can be stopped
+between two of them.
+
+Twin: `reference.rasterize`, tests/splat/test_tiles.py. Source: own; tiles and stop as in Kerbl et al. 2023.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from langflash_core.errors import Cancelled
+from langflash_core.types import Camera
+
+from .projection import ALPHA_MAX, ALPHA_MIN, Footprints
+
+TILE = 8  # pixels a side
+STOP = 1e-4  # transmittance below which a pixel is full
+_BLOCK = 16  # Gaussians of a tile composited at once
+_TILES_AT_ONCE = 256  # 1 MB of alphas a block: within a core's cache
+_PIXELS = TILE * TILE
+_BELOW_MIN = float(np.nextafter(np.float32(ALPHA_MIN), np.float32(0)))
+_WORTH_PACKING = 0.75  # share of tiles that go on, from which down those that are done are put away
+
+
+def rasterize_tiles(
+    footprints: Footprints,
+    features: Sequence[Tensor],
+    camera: Camera,
+    threads: int = 1,
+    stopping: Callable[[], bool] = lambda: False,
+) -> tuple[list[Tensor], Tensor]:
+    """Composite features front to back, as `reference.rasterize` does, without gradients.
+
+    Args:
+        footprints: of N Gaussians as the camera sees them, better float64.
+        features: (N, F) each, finite, composited as they are, in float32.
+        camera: size of the image.
+        threads: that share the tiles.
+        stopping: asked every few milliseconds, whether nobody wants the picture any more.
+
+    Returns:
+        maps (H, W, F) = sum_i T_i alpha_i f_i over black, each in the dtype of its features, and alphas
+        (H, W) = 1 - T, float32.
+
+    Raises:
+        ValueError: features differ in number.
+        Cancelled: `stopping` said so.
+    """
+    counts = {some.shape[0] for some in features}
+    if len(counts) != 1:
+        raise ValueError(f"features: expected as many rows of each, received {sorted(counts)}")
+    with torch.no_grad():
+        lists = _tile_lists(footprints, camera.width, camera.height)
+        table = _Table.of(footprints, [some.detach().cpu().float() for some in features])
+        columns, rows = lists.grid
+        shapes = [(some.shape[1], some.dtype) for some in features] + [(1, torch.float32)]
+        images = [torch.zeros(rows * columns, _PIXELS, wide, dtype=dtype) for wide, dtype in shapes]
+
+    def fill(tiles: Tensor) -> None:
+        if stopping():
+            raise Cancelled("the picture is no longer wanted")
+        with torch.no_grad():
+            _composite(table, lists, tiles, images)
+
+    shares = lists.tiles.split(_TILES_AT_ONCE)
+    # Each of our threads computes alone: those of torch's own pool would wait for each other at every call.
+    with ThreadPoolExecutor(max(1, threads), initializer=lambda: torch.set_num_threads(1)) as pool:
+        for _ in pool.map(fill, shares):
+            pass
+    *maps, alphas = (_untiled(image, lists.grid)[: camera.height, : camera.width] for image in images)
+    return maps, alphas[..., 0]
+
+
+def _untiled(image: Tensor, grid: tuple[int, int]) -> Tensor:
+    """(tiles, 64, F) to (H, W, F), whole tiles."""
+    columns, rows = grid
+    image = image.view(rows, columns, TILE, TILE, -1).permute(0, 2, 1, 3, 4)
+    return image.reshape(rows * TILE, columns * TILE, -1)
+
+
+@dataclass(frozen=True)
+class _Lists:
+    """Which Gaussians reach which tile: `members`, nearest first, of tile t from `starts[t]` on,
+    `counts[t]` of them. tiles: those with members, the longest first. grid: columns and rows."""
+
+    members: Tensor
+    starts: Tensor
+    counts: Tensor
+    tiles: Tensor
+    grid: tuple[int, int]
+
+
+def _tile_lists(footprints: Footprints, width: int, height: int) -> _Lists:
+    columns, rows = -(-width // TILE), -(-height // TILE)
+    x0, y0, x1, y1 = footprints.boxes().numpy().T
+    left, top = np.clip(x0, 0, width) // TILE, np.clip(y0, 0, height) // TILE
+    wide = np.maximum(-(-np.clip(x1, 0, width) // TILE) - left, 0)
+    tall = np.maximum(-(-np.clip(y1, 0, height) // TILE) - top, 0)
+    pairs = wide * tall
+    members = np.repeat(np.arange(len(pairs), dtype=np.int32), pairs)
+    local = np.arange(len(members)) - np.repeat(np.cumsum(pairs) - pairs, pairs)
+    across = wide[members]
+    tile = (top[members] + local // across) * columns + left[members] + local % across
+    small = np.uint16 if columns * rows <= 1 << 16 else np.uint32  # sixteen bits are sorted by counting
+    order = np.argsort(tile.astype(small), kind="stable")  # pairs came nearest first, and stay so
+    counts = np.bincount(tile, minlength=columns * rows)
+    longest = np.argsort(-counts, kind="stable")[: np.count_nonzero(counts)]
+    starts = np.cumsum(counts) - counts
+    return _Lists(
+        torch.from_numpy(members[order].astype(np.int64)),
+        torch.from_numpy(starts),
+        torch.from_numpy(counts),
+        torch.from_numpy(longest),
+        (columns, rows),
+    )
+
+
+@dataclass(frozen=True)
+class _Table:
+    """What is composited, nearest first; the last row is a Gaussian that nobody sees.
+
+    shapes: (n + 1, 6) centre, 1 / l11, l21, 1 / l22, opacity. features: (n + 1, F + 1), the last one 1.
+    """
+
+    shapes: Tensor
+    features: Tensor
+
+    @staticmethod
+    def of(footprints: Footprints, features: Sequence[Tensor]) -> "_Table":
+        l11, l21, l22 = footprints.roots.unbind(-1)
+        parts = (footprints.centres, (1 / l11)[:, None], l21[:, None], (1 / l22)[:, None])
+        shapes = torch.cat((*parts, footprints.opacities[:, None]), -1).float()
+        ids = footprints.ids
+        carried = torch.cat((*(some[ids] for some in features), torch.ones(len(ids), 1)), -1)
+        return _Table(*(torch.cat((v, v.new_zeros(1, v.shape[1]))) for v in (shapes, carried)))
+
+
+def _composite(table: _Table, lists: _Lists, tiles: Tensor, images: list[Tensor]) -> None:
+    """Fill some tiles of the images (tiles, 64, F)."""
+    columns = lists.grid[0]
+    offsets = torch.arange(TILE, dtype=torch.float32) + 0.5
+    xs = (tiles % columns * TILE)[:, None] + offsets  # (B, 8)
+    ys = (tiles // columns * TILE)[:, None] + offsets
+    starts, counts = lists.starts[tiles], lists.counts[tiles]
+    passing = torch.ones(len(tiles), _PIXELS)
+    sums = torch.zeros(len(tiles), _PIXELS, table.features.shape[1])
+    nobody = len(table.shapes) - 1
+    first = 0
+    while len(tiles):
+        place = torch.arange(first, first + _BLOCK)
+        index = lists.members[(starts[:, None] + place).clamp_max_(len(lists.members) - 1)]
+        index.masked_fill_(place >= counts[:, None], nobody)
+        weights = _alphas(table.shapes[index], xs, ys)
+        for i in range(_BLOCK):
+            passing.sub_(weights[:, i].mul_(passing))  # T alpha; T (1 - alpha) = T - T alpha
+        sums.baddbmm_(weights.transpose(1, 2), table.features[index])
+        first += _BLOCK
+        going = (counts > first) & (passing.amax(1) > STOP)
+        if int(going.sum()) <= _WORTH_PACKING * len(tiles):
+            done = ~going
+            _put(images, tiles[done], sums[done])
+            tiles, xs, ys, starts, counts = (v[going] for v in (tiles, xs, ys, starts, counts))
+            passing, sums = passing[going], sums[going]
+
+
+def _put(images: list[Tensor], tiles: Tensor, sums: Tensor) -> None:
+    first = 0
+    for image in images:
+        wide = image.shape[-1]
+        image[tiles] = sums[..., first : first + wide].to(image.dtype)
+        first += wide
+
+
+def _alphas(shapes: Tensor, xs: Tensor, ys: Tensor) -> Tensor:
+    """alpha (B, n, 64) of Gaussians (B, n, 6) at the pixels of their tiles, 0 below 1/255."""
+    x, y, inverse_x, shear, inverse_y, opacity = shapes.unsqueeze(-1).unbind(2)  # (B, n, 1)
+    u = (xs[:, None] - x) * inverse_x  # (B, n, 8)
+    v = (ys[:, None] - y) * inverse_y
+    skew = u * (shear * inverse_y)
+    v = v[..., :, None] - skew[..., None, :]  # rows, columns
+    power = v.square_().add_(u.square()[..., None, :]).mul_(-0.5)
+    alphas = power.exp_().flatten(2).mul_(opacity).clamp_max_(ALPHA_MAX)
+    return torch.threshold_(alphas, _BELOW_MIN, 0.0)

@@ -1,0 +1,113 @@
+"""Pictures drawn beside the window are those that the renderer draws."""
+
+import numpy as np
+import pytest
+import torch
+
+from app.gl import SplatRenderer
+from app.gl.still import draw_still
+from app.gl.warming import warm_up
+from langflash_core.splat import render
+from tests.app.gl.questions import full_relevance, psnr, question
+from tests.splat.scenes import camera, cloud, maps_of, turned
+
+COUNT = 1500
+SEEN = camera(96, 80, 80.0, turned(0.15, (0.1, 0.0, 0.1)))
+STEP = 2  # of 255: float16 against float16, drawn in another order, and the rounding of RGBA8
+
+
+@pytest.fixture
+def scene():
+    made = cloud(COUNT, num_atoms=30, dtype=torch.float32)
+    made.gaussians.means[7] = float("nan")
+    return made
+
+
+def pixels(texture) -> np.ndarray:
+    return np.frombuffer(texture.read(), np.uint8).reshape(80, 96, 4).astype(int)
+
+
+def test_a_still_picture_agrees_with_the_reference(scene) -> None:
+    still = draw_still(scene, SEEN, threads=2)
+    expected = render(scene, SEEN)
+    # Colours and weights are kept as float16: see test_gl_against_reference.
+    assert psnr(still.frame.rgb, expected.rgb) >= 60
+    assert still.maps is not None
+    assert (still.maps.weights.double() - maps_of(expected)).abs().mean() < 2e-4
+    solid = expected.alphas > 0.5
+    assert ((still.frame.depths - expected.depths).abs()[solid] / expected.depths[solid]).mean() <= 1e-4
+    asked = question(scene, 3)
+    answered = torch.from_numpy(still.maps.relevance(asked)).double()
+    assert (answered - full_relevance(scene, asked, maps_of(expected).double())).abs().mean() < 2e-3
+
+
+@pytest.mark.parametrize("what", ["rgb", "heat", "label", "atom", "feature", "depth", "weight"])
+def test_a_renderer_shows_it_as_its_own(gl, scene, what: str) -> None:
+    renderer = SplatRenderer(gl)
+    renderer.set_scene(scene)
+    renderer.ask(question(scene, 2))
+
+    def shown() -> np.ndarray:
+        picture = renderer.rgb_texture if what == "rgb" else None
+        many = {"weight": (3,)}.get(what, ())
+        return pixels(picture or getattr(renderer, f"{what}_texture")(*many))
+
+    renderer.draw(SEEN)
+    own = shown()
+    passes = renderer.passes["weights"], renderer.passes["colour"]
+    renderer.bring(draw_still(scene, SEEN))
+    brought = shown()
+    assert (renderer.passes["weights"], renderer.passes["colour"]) == passes  # no splat is drawn for it
+    different = abs(own - brought).max(-1)
+    # A threshold, or the depth's range, that a pixel lies just beside: few pixels differ by more.
+    # What lies just beside the image counts for OpenGL's range of depths, and moves its colours a little.
+    assert np.mean(different > (8 if what == "depth" else STEP)) < 0.02
+    renderer.release()
+
+
+def test_it_is_drawn_as_marked(gl, scene) -> None:
+    random = np.random.default_rng(0)
+    marks = random.random(COUNT) < 0.7, random.integers(0, 3, COUNT).astype(np.uint8)
+    renderer = SplatRenderer(gl)
+    renderer.set_scene(scene)
+    renderer.mark(*marks)
+    renderer.draw(SEEN)
+    own = renderer.frame()
+    renderer.release()
+    still = draw_still(scene, SEEN, marks=marks, weight_maps=False)
+    assert still.maps is None and psnr(still.frame.rgb, own.rgb) >= 50
+
+
+def test_pixels_of_it_can_be_read(gl, scene) -> None:
+    renderer = SplatRenderer(gl)
+    renderer.set_scene(scene)
+    still = draw_still(scene, SEEN)
+    renderer.bring(still)
+    alpha, depth, weights = renderer.pixel(40, 30)
+    assert alpha == pytest.approx(float(still.frame.alphas[30, 40]), abs=1e-6)
+    assert depth == pytest.approx(float(still.frame.depths[30, 40]), abs=1e-5)
+    assert weights is not None and weights.sum() == pytest.approx(alpha, abs=5e-3)
+    renderer.release()
+
+
+def test_an_answer_is_computed_once(scene) -> None:
+    maps = draw_still(scene, SEEN).maps
+    assert maps is not None
+    asked = question(scene, 1)
+    assert not maps.answers(asked)
+    first = maps.relevance(asked)
+    assert maps.answers(asked) and maps.relevance(asked) is first
+
+
+def test_shaders_are_compiled_ahead(gl, scene) -> None:
+    """What comes first in a window finds its programs made."""
+    renderer = SplatRenderer(gl)
+    steps = sum(1 for _ in warm_up(renderer))
+    assert steps >= 4  # one at a time, a frame between two of them
+    programs = renderer._canvas.painter.programs._made
+    before = set(programs)
+    renderer.set_scene(cloud(50, degree=0, dtype=torch.float32))
+    renderer.draw(SEEN, weight_maps=False)
+    _ = renderer.rgb_texture
+    assert set(programs) == before
+    renderer.release()

@@ -1,0 +1,119 @@
+"""Found, maybe, not found; what the scene knows; phrases in another language."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from app.window.asking import commands as ask
+from app.window.asking.panels import known
+from app.window.asking.state import EVEN, Insight, Prompt
+from app.window.asking.work import Encode
+from app.window.editing.pointing import AtomsNamed
+from app.window.poses import Vector
+from app.window.scene.panels import tray
+from langflash_core.language.answers import best_places
+from langflash_core.language.minilm import reads_foreign
+from langflash_core.language.spaces import language_space
+from langflash_core.resources import asset_path
+from langflash_core.scene.edited import first_marks
+from langflash_core.scene.edits import History
+from langflash_core.splat import render
+from langflash_core.types import Frame
+from tests.app.window.scenes import PHRASES, after, room, shown_scene
+
+
+@pytest.mark.parametrize(
+    "score, found, maybe", [(0.9, True, False), (0.84, False, True), (0.76, False, True), (0.7, False, False)]
+)
+def test_a_near_miss_is_neither_found_nor_not(score: float, found: bool, maybe: bool) -> None:
+    prompt = Prompt(0, "curtain", score=score, calibrated=0.85)
+    assert (prompt.found, prompt.maybe) == (found, maybe)
+    assert prompt.shown_from < prompt.cut if maybe else prompt.shown_from == prompt.cut
+
+
+def test_what_fits_no_better_than_anything_is_never_maybe() -> None:
+    for cut in (0.3, 0.5, 0.85, 1.0):
+        prompt = Prompt(0, "x", threshold=cut, score=min(EVEN, cut) - 0.01)
+        assert not prompt.maybe and prompt.lowest <= cut
+
+
+def test_an_answer_says_where_it_fits_best_until_the_words_change() -> None:
+    place = Vector(1.0, 2.0, 3.0)
+    state = after(shown_scene(), ask.Answered(((0, "door", 0.8),), 0, (place,)))
+    assert state.prompts[0].place == place
+    assert after(state, ask.EditPrompt(0, "doors")).prompts[0].place is None
+    assert after(shown_scene(), ask.Answered(((0, "door", 0.8),))).prompts[0].score == 0.8
+
+
+def test_the_best_place_is_where_the_map_is_highest() -> None:
+    scene = room(torch.eye(3))
+    camera = scene.camera(0, 56, 42)
+    frame = render(scene, camera, weight_maps=False)
+    relevance = torch.zeros(2, 42, 56)
+    relevance[0, 30, 10] = 0.7
+    relevance[1, 5, 40] = 0.6
+    first, second = best_places(relevance, frame, camera)
+    assert first is not None and second is not None
+    assert first[2] == pytest.approx(float(frame.depths[30, 10]), abs=1e-5)
+    assert first[0] < 0 < second[0] and first[1] > 0 > second[1]
+    empty = Frame(torch.zeros(42, 56, 3), torch.zeros(42, 56), torch.zeros(42, 56))
+    assert best_places(relevance, empty, camera) == (None, None)
+
+
+@pytest.mark.parametrize("text", ["stuhl", "die lampe", "fenêtre", "silla", "der teppich", "椅子家具"])
+def test_another_language_is_told(text: str) -> None:
+    assert reads_foreign(text)
+
+
+@pytest.mark.parametrize("text", ["armchair", "bookcases", "a red doormat", "café table", "tv", "", "12"])
+def test_english_is_not(text: str) -> None:
+    assert not reads_foreign(text)
+
+
+def test_a_foreign_phrase_is_marked_with_its_compiled_question() -> None:
+    scene = room(language_space("minilm").encode(list(PHRASES)))
+    encode = Encode(
+        1, scene, (4, 7, 9), ("stuhl", "chair", "haus"), (), (b"", b"", bytes(4 * 383) + b"\0\0\x80?")
+    )
+    (compiled,) = encode.run(lambda: False)
+    assert isinstance(compiled, ask.PhrasesCompiled) and compiled.foreign == (4,)
+    state = replace(shown_scene(), prompts=(Prompt(4, "stuhl"), Prompt(7, "chair", foreign=True)))
+    state = after(state, compiled)
+    assert [prompt.foreign for prompt in state.prompts] == [True, False]
+
+
+def test_chips_are_what_the_scene_shows_most_of_each_once() -> None:
+    state = shown_scene()
+    assert known.things(state) == ()
+    insight = Insight((0.2, 0.5, 0.001), ((0.0,) * 3,) * 3, (0, 1, 2), np.eye(3))
+    names = AtomsNamed((("wall", "side"), ("Floor",), ("crumb",)))
+    assert state.info is not None
+    history = History(first_marks(state.info.scene))
+    state = replace(state, editing=replace(state.editing, history=history))
+    state = after(state, ask.AtomsDescribed(insight), names)
+    assert known.things(state) == ("floor", "wall")
+    silent = tuple(replace(atom, on=k != 1) for k, atom in enumerate(history.marks.atoms))
+    marks = replace(history.marks, atoms=silent)
+    muted = replace(state, editing=replace(state.editing, history=History(marks)))
+    assert known.things(muted) == ("wall",)
+
+
+def test_a_chip_asks_its_word() -> None:
+    state = after(shown_scene(), ask.AskAgain("floor"))
+    assert [prompt.text for prompt in state.prompts] == ["door", "floor"]
+
+
+def test_what_the_model_knows_is_what_its_card_says() -> None:
+    card = asset_path("weights/mini_card.md").read_text()
+    assert "37 classes, atoms drawn" in card and ".307 / .676" in card and "68 %" in known.KNOWS
+
+
+def test_one_photo_is_told_to_leave_depth_a_guess() -> None:
+    state = shown_scene()
+    assert state.info is not None
+    one = replace(state, info=replace(state.info, views=state.info.views[:1]))
+    told = [sentence for sentence in tray._sentences(one) if "depth is a guess" in sentence.lower()]
+    assert len(told) == 1
+    assert not any("guess" in sentence.lower() for sentence in tray._sentences(state))
