@@ -12,6 +12,7 @@ from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.geometry.quaternions import matrices_to_quats
 from langflash_core.network.layers.dpt import DPT
+from langflash_core.network.occlusion import extended
 from langflash_core.network.presets import Preset
 from langflash_core.network.stereo.prior import DepthMaps, resize
 from langflash_core.types import Gaussians
@@ -96,11 +97,14 @@ def assemble_gaussians(
 ) -> Gaussians:
     """Gaussians of one scene, N = V*H*W in the order (v h w), world = view 0.
 
+    Each is on its pixel's ray, but for the last ones of a background (`occlusion`).
+
     Args:
         raw: (V, 7, H, W) of the head. images: (V, 3, H, W) in [0, 1].
         depth_maps: (V, H, W). viewmats: (V, 4, 4). Ks: (V, 3, 3) pixels.
     """
     pos_c, axes, scales = footprints(depth_maps.depths, Ks)
+    pos_c, scales = extended(pos_c, scales, depth_maps.log_depths, Ks)
     poses = invert_rigid(viewmats)
     means = torch.einsum("vij,vhwj->vhwi", poses[:, :3, :3], pos_c) + poses[:, None, None, :3, 3]
     quats = matrices_to_quats(poses[:, None, None, :3, :3] @ axes)

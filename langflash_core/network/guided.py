@@ -23,10 +23,12 @@ from langflash_core.network.semantics.features import LanguageHead
 from langflash_core.network.semantics.grouping import ScratchHead, SemanticGrouping, group_weights, surviving
 from langflash_core.network.semantics.naming import PartNamer, describe, places
 from langflash_core.network.semantics.splitting import split_groups
+from langflash_core.network.stereo.agreement import agreed
 from langflash_core.network.stereo.alignment import Correction
 from langflash_core.network.stereo.keypoints import KeyPoints, match_photos, match_sources
 from langflash_core.network.stereo.poses import PoseInput, Poses, estimate_poses
 from langflash_core.network.stereo.prior import DepthHead, DepthMaps
+from langflash_core.network.stereo.sharpening import sharpened
 from langflash_core.network.stereo.sweep import DepthRefiner
 from langflash_core.running import Run
 from langflash_core.types import Views
@@ -129,7 +131,7 @@ class GuidedDepthNet(LangFlashNet):
         return self.namer(atoms, describe(weights, seen.tokens), where)
 
     def reconstruct(self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: Run) -> Geometry:
-        """Depth, poses, refined depth, Gaussians."""
+        """Depth, poses, refined depth with edges that agrees between photos, Gaussians."""
         with run.stage("depth"):
             levels = self.levels(tokens, Ks)
             prior = self.depth_head(levels, tokens)
@@ -140,6 +142,8 @@ class GuidedDepthNet(LangFlashNet):
             viewmats = torch.from_numpy(poses.viewmats).to(images)[None]
         with run.stage("refinement"):
             maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)
+            maps = replace(maps, log_depths=sharpened(maps.log_depths, images[0]))
+            maps = _agreed(maps, poses, viewmats[0], Ks[0])
         with run.stage("Gaussians"):
             raw = self.gaussian_head(levels, images)
             gaussians = assemble_gaussians(raw[0], images[0], maps, viewmats[0], Ks[0])
@@ -176,6 +180,15 @@ class GuidedDepthNet(LangFlashNet):
             )
             for v in range(views.num_views)
         ]
+
+
+def _agreed(maps: DepthMaps, poses: Poses, viewmats: Tensor, Ks: Tensor) -> DepthMaps:
+    """Maps (V, H, W); those of known pose show one surface."""
+    placed = [v for v in range(len(viewmats)) if v not in poses.guessed]
+    part = DepthMaps(maps.log_depths[placed], maps.log_errors[placed])
+    log_depths = maps.log_depths.clone()
+    log_depths[placed] = agreed(part, viewmats[placed], Ks[placed]).log_depths
+    return replace(maps, log_depths=log_depths)
 
 
 def _known(views: Views) -> np.ndarray | None:

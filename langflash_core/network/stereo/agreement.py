@@ -1,0 +1,167 @@
+"""One surface where several photos see one: depth maps are bent and blended until they agree.
+
+What a sweep leaves is a slow difference between the maps of two photos, some percent of depth: two
+sheets, a halftone where their Gaussians interleave. Every map is carried into every other one. A
+smooth correction of log depth for each, bilinear between a few knots, takes out what differs slowly
+(one sparse robust least squares over all maps at once), and where they then agree to within `_SAME`
+both take the mean, weighted by what each expects of its errors.
+
+Sizes: V views, H W pixels, S knots a side, P pixels that are compared.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from langflash_core.geometry.cameras import invert_rigid, pixel_grid, project, transform, unproject
+from langflash_core.network.stereo.prior import DepthMaps
+
+_KNOTS = 5  # a side
+_STEP = 4  # every fourth pixel of a row and of a column is compared for the correction
+_ITERATIONS = 3
+_SCALE = 0.04  # relative difference from which a pixel speaks less and less (Geman-McClure)
+_INDEPENDENT = 400  # pixels go together: all compared ones count as this many
+_EXPECTED = 0.075  # of a knot, where nothing is compared
+_BEND = 0.06  # of a knot against its neighbour
+_SAME = 0.06  # maps that differ by less, relatively, show one surface
+_ROUNDS = 2
+
+
+@dataclass(frozen=True)
+class Carried:
+    """Pixels of one map as another photo sees them.
+
+    log_depths: (P,) their log z there. places: (P, 2), -1 to 1 over that picture. inside: (P,) in view.
+    """
+
+    log_depths: Tensor
+    places: Tensor
+    inside: Tensor
+
+
+def agreed(maps: DepthMaps, viewmats: Tensor, Ks: Tensor) -> DepthMaps:
+    """Maps (V, H, W) that agree where they show one surface; the expected errors stay.
+
+    One view, or views that share nothing, come back as they are.
+
+    Args:
+        viewmats: (V, 4, 4) of the maps' unit. Ks: (V, 3, 3), pixels of the maps.
+
+    Source: own derivation; the blend is that of depth-map fusion (Merrell et al. 2007).
+    """
+    logs = maps.log_depths
+    if len(logs) < 2:
+        return maps
+    logs = straightened(logs, viewmats, Ks)
+    for _ in range(_ROUNDS):
+        logs = blended(logs, maps.log_errors, viewmats, Ks)
+    return DepthMaps(logs, maps.log_errors)
+
+
+def carried(
+    points: Tensor, viewmats: Tensor, Ks: Tensor, view: int, other: int, size: tuple[int, int]
+) -> Carried:
+    """Points (P, 3) in the frame of `view`'s camera, seen from `other`, whose picture is `size` = (H, W)."""
+    pos_o = transform(viewmats[other] @ invert_rigid(viewmats[view]), points)
+    height, width = size
+    places = (project(pos_o, Ks[other]) / pos_o.new_tensor([width, height]) * 2 - 1).clamp(-4, 4)
+    inside = (pos_o[:, 2] > 1e-4) & (places.abs() <= 1).all(-1)
+    return Carried(pos_o[:, 2].clamp_min(1e-4).log(), places, inside)
+
+
+def sampled(maps: Tensor, places: Tensor) -> Tensor:
+    """Bilinear values of a map (H, W) at places (P, 2) of -1 to 1."""
+    return F.grid_sample(maps[None, None], places[None, None], padding_mode="border", align_corners=False)[
+        0, 0, 0
+    ]
+
+
+def straightened(log_depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
+    """Log depths (V, H, W) plus the smooth corrections under which they differ least.
+
+    With r the log depth that the other map has less the one that is carried there, and hat functions
+    h over the knots, the corrections c minimise sum rho(r + h(x') c_other - h(x) c_own) and what is
+    expected of c: small, and alike at neighbouring knots.
+    """
+    num_views, height, width = log_depths.shape
+    sparse = (slice(_STEP // 2, None, _STEP), slice(_STEP // 2, None, _STEP))
+    grid = pixel_grid(width, height, like=log_depths) / log_depths.new_tensor([width, height]) * 2 - 1
+    hats = knot_weights(grid.flatten(0, 1))  # (H W, S^2)
+    own_hats = hats.unflatten(0, (height, width))[sparse].flatten(0, 1).double()
+    prior = _expectation(hats.device)
+    knots = prior.new_zeros(num_views, _KNOTS**2)
+    logs = log_depths
+    for _ in range(_ITERATIONS):
+        points = [unproject(own.exp(), K)[sparse].flatten(0, 1) for own, K in zip(logs, Ks, strict=True)]
+        normal = torch.block_diag(*[prior] * num_views)
+        right = -(knots @ prior).flatten()
+        sums = _comparisons(logs, points, own_hats, viewmats, Ks)
+        knots = knots + torch.linalg.solve(normal + sums[0], right + sums[1]).view_as(knots)
+        logs = log_depths + (knots.to(hats) @ hats.T).view_as(log_depths)
+    return logs
+
+
+def _comparisons(
+    logs: Tensor, points: list[Tensor], own_hats: Tensor, viewmats: Tensor, Ks: Tensor
+) -> tuple[Tensor, Tensor]:
+    """Normal matrix (V S^2, V S^2) and right side (V S^2,) of all pairs of maps, float64."""
+    num_views, size, width = len(logs), (logs.shape[1], logs.shape[2]), _KNOTS**2
+    normal = own_hats.new_zeros(num_views, width, num_views, width)
+    right, count = own_hats.new_zeros(num_views, width), 0
+    for a in range(num_views):
+        for b in range(num_views):
+            if a == b:
+                continue
+            there = carried(points[a], viewmats, Ks, a, b, size)
+            left = own_hats[there.inside]
+            other = knot_weights(there.places[there.inside]).double()
+            gap = (sampled(logs[b], there.places) - there.log_depths)[there.inside].double()
+            weights = (1 + (gap / _SCALE) ** 2) ** -2 / _SCALE**2
+            weighted, weighted_other = left * weights[:, None], other * weights[:, None]
+            normal[a, :, a] += weighted.T @ left
+            normal[b, :, b] += weighted_other.T @ other
+            normal[a, :, b] -= weighted.T @ other
+            normal[b, :, a] -= weighted_other.T @ left
+            right[a] += weighted.T @ gap
+            right[b] -= weighted_other.T @ gap
+            count += len(gap)
+    share = min(1.0, _INDEPENDENT / max(count, 1))
+    return normal.flatten(2).flatten(0, 1) * share, right.flatten() * share
+
+
+def knot_weights(places: Tensor) -> Tensor:
+    """Hat functions (P, S^2) of the knots at places (P, 2) of -1 to 1; rows sum to 1."""
+    knots = torch.linspace(-1, 1, _KNOTS, dtype=places.dtype, device=places.device)
+    hats = (1 - (places[..., None] - knots).abs() * ((_KNOTS - 1) / 2)).clamp_min(0)  # (P, 2, S)
+    return (hats[:, 1, :, None] * hats[:, 0, None, :]).flatten(1)
+
+
+def _expectation(device: torch.device) -> Tensor:
+    """Inverse covariance (S^2, S^2) of one map's knots, float64."""
+    along = torch.eye(_KNOTS, dtype=torch.float64, device=device).diff(dim=0)
+    bend, one = along.T @ along, torch.eye(_KNOTS, dtype=torch.float64, device=device)
+    rough = torch.kron(bend, one) + torch.kron(one, bend)
+    return torch.eye(_KNOTS**2, dtype=torch.float64, device=device) / _EXPECTED**2 + rough / _BEND**2
+
+
+def blended(log_depths: Tensor, log_errors: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
+    """Log depths (V, H, W): where others show the same surface, the mean of all, weighted by 1 / b^2."""
+    num_views, height, width = log_depths.shape
+    blended_logs = []
+    for a in range(num_views):
+        points = unproject(log_depths[a].exp(), Ks[a]).flatten(0, 1)
+        own = log_depths[a].flatten()
+        total = (-2 * log_errors[a]).exp().flatten()
+        change = torch.zeros_like(own)
+        for b in range(num_views):
+            if a == b:
+                continue
+            there = carried(points, viewmats, Ks, a, b, (height, width))
+            gap = sampled(log_depths[b], there.places) - there.log_depths
+            same = there.inside & (gap.abs() < _SAME)
+            weight = (-2 * sampled(log_errors[b], there.places)).exp() * same
+            change, total = change + weight * gap.nan_to_num(), total + weight
+        blended_logs.append((own + change / total).view(height, width))
+    return torch.stack(blended_logs)

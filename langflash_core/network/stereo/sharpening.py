@@ -1,0 +1,138 @@
+"""Edges of depth where the photo has them: two candidate depths a pixel and a choice between them.
+
+The maps of the sweep are four times coarser than the photo and go smoothly from a thing to the wall
+behind it; every pixel of that slope would become a Gaussian in mid-air. Around a pixel the depths
+are parted in two at their middle, where what is flat counts and what slopes hardly does. If the two
+parts lie further apart than a slanted plane would have them, the pixel belongs to one of them, to
+the one whose colours it has, and takes its depth: never a mean of both.
+
+Sizes: V views, H W pixels. Depths are log z.
+
+Source: own derivation; the choice by colour is that of joint bilateral upsampling (Kopf et al. 2007), with
+the mode instead of the mean (Min et al. 2012).
+"""
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+REACH = 12
+"""Pixels: as far as a map smears an edge, 16 pixels a token."""
+_RINGS = ((3, 6), (7, 9), (REACH, 12))  # radius in pixels, places looked at
+_NEARBY = 12.0  # pixels, standard deviation of what a place counts
+_FLAT = 0.01  # log depth a pixel: a slope of this counts half
+_COLOUR = 0.08  # standard deviation of what is one colour, of 1
+_CHROMA = 1.5  # hue counts more than light, which shadows change
+_LEAST_GAP = 0.15  # log depth between the parts
+_PARTED = 4.5  # gap in standard deviations within the parts; a slanted plane has 3.2
+_LEAST_FLAT = 0.1  # weight of a part below which nobody knows its depth
+_WHERE = 1.5  # what the side of the slope counts beside the colours, where those say nothing
+_FLOOR = 0.02  # weight of colours that say nothing
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """Near (first) and far part (second) around every pixel (2, V, H, W): weight, mean, mean square."""
+
+    weights: Tensor
+    means: Tensor
+    squares: Tensor
+
+    @property
+    def spreads(self) -> Tensor:
+        return (self.squares - self.means**2).clamp_min(0).sqrt()
+
+
+def sharpened(log_depths: Tensor, images: Tensor) -> Tensor:
+    """Log depths (V, H, W) whose edges are where those of the images (V, 3, H, W) in [0, 1] are.
+
+    Where no two depths can be told apart nothing changes.
+    """
+    places = _places()
+    margin = (REACH,) * 4
+    depths = F.pad(log_depths[:, None], margin, mode="replicate")
+    flat = F.pad(_flatness(log_depths)[:, None], margin, mode="replicate")
+    near, far = -F.max_pool2d(-depths, 2 * REACH + 1, 1), F.max_pool2d(depths, 2 * REACH + 1, 1)
+    middle = (near + far)[:, 0] / 2
+    first = _parted(depths, flat, middle, places)
+    middle = first.means.mean(0)
+    colours = _colours(images)
+    blurred = F.pad(F.avg_pool2d(F.pad(colours, (1,) * 4, mode="replicate"), 3, 1), margin, mode="replicate")
+    plain, alike = (
+        _parted(depths, flat, middle, places),
+        _parted(depths, flat, middle, places, colours, blurred),
+    )
+    gap = plain.means[1] - plain.means[0]
+    within = ((plain.weights * plain.spreads**2).sum(0) / plain.weights.sum(0)).sqrt()
+    two = (gap > _LEAST_GAP) & (gap > _PARTED * within) & (plain.weights.amin(0) > _LEAST_FLAT)
+    belongs = (alike.weights + _FLOOR * plain.weights).log() - plain.weights.log()
+    vote = belongs[1] - belongs[0] + _WHERE * ((log_depths - middle) / gap.clamp_min(1e-6) * 2).clamp(-1, 1)
+    vote = F.avg_pool2d(F.pad(vote[:, None], (1,) * 4, mode="replicate"), 3, 1)[:, 0]
+    return torch.where(two, _taken(log_depths, vote > 0, plain, alike), log_depths)
+
+
+def _taken(log_depths: Tensor, far: Tensor, plain: _Parts, alike: _Parts) -> Tensor:
+    """The depth of the part that a pixel belongs to; its own where that lies within the part."""
+    chosen = [
+        torch.where(far, of[1], of[0]) for of in (plain.means, plain.spreads, alike.means, alike.weights)
+    ]
+    mean, spread, own, known = chosen
+    target = torch.where(known > _FLOOR, own, mean)
+    reach = 2 * spread + 0.01
+    return torch.where((log_depths - mean).abs() <= reach, log_depths, target)
+
+
+def _places() -> list[tuple[int, int]]:
+    """(row, column) on rings, each turned against the one before, and the pixel itself."""
+    found = [(0, 0)]
+    for turn, (radius, count) in enumerate(_RINGS):
+        angles = [2 * math.pi * (i + 0.5 * (turn % 2)) / count for i in range(count)]
+        found += [(round(radius * math.sin(a)), round(radius * math.cos(a))) for a in angles]
+    return found
+
+
+def _flatness(log_depths: Tensor) -> Tensor:
+    """(V, H, W) in (0, 1]: 1 where depth does not change, 1/2 at a slope of `_FLAT` a pixel."""
+    wide = F.pad(log_depths[:, None], (1,) * 4, mode="replicate")[:, 0]
+    across, down = wide[:, 1:-1, 2:] - wide[:, 1:-1, :-2], wide[:, 2:, 1:-1] - wide[:, :-2, 1:-1]
+    return 1 / (1 + (across**2 + down**2) / (2 * _FLAT) ** 2)
+
+
+def _colours(images: Tensor) -> Tensor:
+    """(V, 4, H, W): light, and how each colour differs from it."""
+    light = images.mean(1, keepdim=True)
+    return torch.cat((light, _CHROMA * (images - light)), 1)
+
+
+def _parted(
+    depths: Tensor,
+    flat: Tensor,
+    middle: Tensor,
+    places: list[tuple[int, int]],
+    colours: Tensor | None = None,
+    blurred: Tensor | None = None,
+) -> _Parts:
+    """What lies nearer and farther than the middle; with colours, what also looks like the pixel."""
+    height, width = middle.shape[-2:]
+    sums = middle.new_zeros(3, 2, *middle.shape)
+    for row, column in places:
+        rows, columns = (
+            slice(REACH + row, REACH + row + height),
+            slice(REACH + column, REACH + column + width),
+        )
+        weight = flat[:, 0, rows, columns] * math.exp(-(row**2 + column**2) / (2 * _NEARBY**2))
+        if colours is not None and blurred is not None:
+            differs = ((blurred[:, :, rows, columns] - colours) ** 2).sum(1)
+            weight = weight * torch.exp(-differs / (2 * _COLOUR**2))
+        depth = depths[:, 0, rows, columns]
+        nearer = torch.where(depth < middle, weight, torch.zeros_like(weight))
+        for part, own in enumerate((nearer, weight - nearer)):
+            sums[0, part] += own
+            sums[1, part] += own * depth
+            sums[2, part] += own * depth * depth
+    weights = sums[0] + 1e-6
+    means = (sums[1] + 1e-6 * middle) / weights
+    return _Parts(weights, means, (sums[2] + 1e-6 * middle**2) / weights)
