@@ -340,6 +340,24 @@ def test_tensors_that_the_authors_gave_up_are_told_and_others_are_refused(tmp_pa
         install(_saved(released | seventh, tmp_path / "re10k.ckpt"), TINY)
 
 
+def test_parts_of_older_versions_are_read_and_say_what_they_do_not_know(tmp_path):
+    install(_saved(published.draw_lseg(TINY, channels=512), tmp_path / "demo_e200.ckpt"), TINY)
+    _saved(published.draw_noposplat(TINY), tmp_path / "mixRe10kDl3dv_512x512.ckpt")
+    install(tmp_path / "mixRe10kDl3dv_512x512.ckpt", TINY)
+    released = published.draw_langflash(TINY)
+    cut = {key: value for key, value in released.items() if not key.startswith("encoder.backbone.")}
+    install(_saved(cut, tmp_path / "re10k.ckpt"), TINY)
+    for path in part_folder(TINY).iterdir():
+        with safe_open(str(path), framework="pt") as file:
+            tensors = {key: file.get_tensor(key).clone() for key in file.keys()}  # noqa: SIM118
+            header = json.loads(file.metadata()["langflash"])
+        older = {name: header[name] for name in ("format", "preset", "modules", "origin", "source")}
+        save_file(tensors, path, {"langflash": json.dumps(older)})
+    network = assemble_network(TINY, None, "cpu")
+    assert network.trained_side == 512  # the source tells
+    assert len(network.notes) == 1 and "import its checkpoint again" in network.notes[0]
+
+
 def _of_size(network: LangFlashNet) -> list[str]:
     return [warning for warning in network.predict(_views()).warnings if "were trained on photos" in warning]
 

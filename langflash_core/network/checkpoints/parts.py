@@ -20,8 +20,9 @@ from torch import Tensor
 
 from langflash_core.errors import WeightsError
 from langflash_core.files import written_atomically
+from langflash_core.network.checkpoints.catalogue import trained_side
 from langflash_core.network.checkpoints.origins import COPY
-from langflash_core.network.presets import Preset
+from langflash_core.network.presets import PointMaps, Preset
 from langflash_core.resources import weights_folder
 
 FORMAT = "langflash-part-1"
@@ -37,7 +38,8 @@ class Part:
 
     side: pixels a side of the photos it was trained on; 0: unknown. trunk: fingerprint of the encoder and
     decoder in it; "": it holds none. reads: that of the trunk its grouping was trained on; "": it holds
-    no grouping, or nobody knows.
+    no grouping, or nobody knows. filtered: its grouping's scores are for the preset's filter of masks; else
+    they are existence.
     """
 
     path: Path
@@ -48,6 +50,7 @@ class Part:
     side: int = 0
     trunk: str = ""
     reads: str = ""
+    filtered: bool = True
 
     @property
     def copies(self) -> tuple[str, ...]:
@@ -89,6 +92,7 @@ def write_part(
     header = {
         "format": FORMAT, "preset": preset.name, "modules": modules, "origin": origin, "source": source,
         "side": side, "trunk": trunk, "reads": reads,
+        "filtered": isinstance(preset, PointMaps) and preset.mask_filter is not None,
     }  # fmt: skip
     whole = {name: value.detach().cpu().contiguous() for name, value in tensors.items()}
     with written_atomically(path) as temporary:
@@ -110,11 +114,12 @@ def read_part(path: Path) -> Part:
         raise WeightsError(f"{path} is not a readable safetensors file ({error}); {REMEDY}") from None
     if header.get("format") != FORMAT or not isinstance(header.get("modules"), list):
         raise WeightsError(f"{path} was not converted for this network; {REMEDY}")
-    side = header.get("side", 0)
+    source = str(header.get("source", ""))
+    side = header.get("side", trained_side(source))  # older parts say nothing but their source
     return Part(
-        path, str(header.get("preset")), tuple(header["modules"]), str(header.get("origin", "")),
-        str(header.get("source", "")), side if isinstance(side, int) else 0,
-        str(header.get("trunk", "")), str(header.get("reads", "")),
+        path, str(header.get("preset")), tuple(header["modules"]), str(header.get("origin", "")), source,
+        side if isinstance(side, int) else 0, str(header.get("trunk", "")), str(header.get("reads", "")),
+        bool(header.get("filtered", True)),
     )  # fmt: skip
 
 

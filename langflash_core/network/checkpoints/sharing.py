@@ -54,7 +54,9 @@ def mismatch(grouping: Part, trunk: str) -> str:
 
 
 def _drop_copy(grouping: Part, preset: Preset) -> None:
-    kept = read_tensors(grouping, set(grouping.modules) - set(grouping.copies))
+    mapped = read_tensors(grouping, set(grouping.modules) - set(grouping.copies))
+    kept = {name: value.clone() for name, value in mapped.items()}  # of the file that is written over
+    del mapped
     write_part(
         grouping.path, kept, preset, grouping.origin, grouping.source,
         side=grouping.side, reads=grouping.reads,

@@ -20,7 +20,6 @@ from langflash_core.network.checkpoints.importing import convert, read_checkpoin
 from langflash_core.network.checkpoints.origins import COPY
 from langflash_core.network.checkpoints.parts import (
     REMEDY,
-    TRAINED_HERE,
     TRUNK,
     Part,
     installed,
@@ -91,8 +90,7 @@ def assemble_network(
     for name, part in sources.items():
         _fill(network, name, part.path, device)
     network.complete(set(sources), _advice(preset))
-    if "decoder" in sources:
-        network.trained_side = sources["decoder"].side
+    network.trained_side = _side(sources)
     network.notes = _notes(sources)
     return channels_last(network).to(device)
 
@@ -121,13 +119,15 @@ def network_to_train(
         raise WeightsError(f"there are no weights for {', '.join(missing)}; {_advice(preset)}")
     for name, part in sources.items():
         _fill(network, name, part.path, "cpu")
+    network.trained_side = _side(sources)
     return network, set(sources)
 
 
 def _filtering(preset: Preset, sources: dict[str, Part]) -> Preset:
-    """The released filter of masks reads scores as the released grouping gives them; one that was trained
+    """The preset's filter of masks reads scores as the released grouping gives them; one that was trained
     here gives existence."""
-    if isinstance(preset, PointMaps) and "grouping" in sources and sources["grouping"].origin == TRAINED_HERE:
+    grouping = sources.get("grouping")
+    if isinstance(preset, PointMaps) and grouping is not None and not grouping.filtered:
         return replace(preset, mask_filter=None)
     return preset
 
@@ -158,6 +158,10 @@ def _trunk(sources: dict[str, Part]) -> str:
     """Fingerprint of encoder and decoder together; "" where that is unknown."""
     held = [sources.get(name) for name in TRUNK]
     return held[0].trunk if held[0] is not None and held[0] is held[1] else ""
+
+
+def _side(sources: dict[str, Part]) -> int:
+    return sources["decoder"].side if "decoder" in sources else 0
 
 
 def _notes(sources: dict[str, Part]) -> tuple[str, ...]:
