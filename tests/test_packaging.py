@@ -22,6 +22,8 @@ from langflash_core.resources import asset_path
 
 ROOT = Path(__file__).resolve().parent.parent
 OTHERS = "others_app-1.0"
+# What a package is imported as, where it may not be installed or does not tell.
+IMPORTED_AS = {"scikit-image": "skimage", "openexr": "OpenEXR"}
 USED_BY_OTHERS = {"pyopengl": "imgui-bundle's backend for glfw draws through it"}
 pytestmark = pytest.mark.slow
 
@@ -223,13 +225,16 @@ def test_every_dependency_is_used(metadata):
         name = canonical(requirement.name)
         if extra == "dev" or name == "langflash" or name in USED_BY_OTHERS:
             continue
-        assert tops.get(name, {name}) & imported, f"nothing imports {name}"
+        assert {*tops.get(name, ()), IMPORTED_AS.get(name, name)} & imported, f"nothing imports {name}"
 
 
 def test_the_extra_that_is_named_brings_the_package(metadata):
     owners = packages_distributions()
     for top, extra in EXTRAS.items():
-        names = {canonical(name) for name in owners.get(top, [top])}  # ray may be absent; its name is its own
+        unknown = [name for name, imported in IMPORTED_AS.items() if imported == top] or [
+            top
+        ]  # ray is called ray
+        names = {canonical(name) for name in owners.get(top, unknown)}
         assert names & {canonical(r.name) for r, e in requirements(metadata) if e == extra}, top
         assert not names & {canonical(r.name) for r in core_requirements(metadata)}, top
 
