@@ -7,6 +7,7 @@ from imgui_bundle import imgui
 
 from ..kit import theme, widgets
 from ..kit.look import Look
+from ..scene.near import FADING, degrees_from_photos
 from ..state import State
 
 
@@ -34,6 +35,9 @@ def figures(state: State) -> list[str]:
     """What there is to say, the most wanted first."""
     stats = state.stats
     said = [f"frame {1000 * stats.frame_seconds:.1f} ms"]
+    aside = degrees_from_photos(state)
+    if aside > FADING:
+        said.append(f"{aside:.0f} degrees aside of the photos: less is known here")
     if state.info is not None:
         width, height = stats.picture_size
         if stats.settling:
