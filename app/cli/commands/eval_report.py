@@ -9,10 +9,11 @@ from typing import TextIO
 
 from langflash_core.errors import InputError
 from langflash_core.files import make_folder, write_atomically
-from langflash_core.lab.photos import PhotoFolder, chosen_ids, open_folder
+from langflash_core.lab.photos import PhotoFolder, open_folder
 
 from ...bench.machine import host
 from ..files import check_folder
+from ..photos import chosen
 from ..renderers import open_renderer
 from ..report import ProgressBar
 
@@ -26,6 +27,7 @@ def report(args: Namespace, out: TextIO) -> None:
     Raises:
         LangFlashError: there is nothing to judge, or a source, the checkpoint or the output cannot be used.
     """
+    args.only = None
     if (args.rooms, args.posed, args.photos) == (None, None, None):
         raise InputError("there is nothing to judge; give --rooms, --posed or --photos")
     if args.rooms is not None and not args.rooms.is_dir():
@@ -36,7 +38,7 @@ def report(args: Namespace, out: TextIO) -> None:
     from langflash_core.lab.evaluation.report import PUBLISHED, Sources, Workplace, sections
     from langflash_core.lab.evaluation.tallies import identity
 
-    ids = () if photos is None else chosen_ids(photos.ids, args.part)
+    ids = () if photos is None else chosen(args, photos)
     sources = Sources(args.rooms, posed, photos, ids, args.limit)
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
         place = Workplace(renderer, args.output / WORK, args.weights, args.preset, progress)

@@ -30,7 +30,14 @@ from langflash_core.lab.evaluation.photo_words import (
 )
 from langflash_core.lab.evaluation.rooms import MASK_THRESHOLDS, MIN_SHARE, PHRASES, language_maps
 from langflash_core.lab.evaluation.segments import label_border_f
-from langflash_core.lab.evaluation.sights import Look, Sight, depth_picture, label_picture, photo_picture
+from langflash_core.lab.evaluation.sights import (
+    Look,
+    Sight,
+    depth_picture,
+    label_picture,
+    legend_of,
+    photo_picture,
+)
 from langflash_core.lab.evaluation.tallies import Shelf, collected, merged
 from langflash_core.lab.evaluation.words import PAPER_LABELS
 from langflash_core.lab.photos import LabelledPhoto, Name, PhotoFolder
@@ -263,7 +270,8 @@ def _sight(judged: Judged, photo: LabelledPhoto, drawn: Drawn) -> Sight:
         pictures["true depth"] = depth_picture(drawn.depths.double().numpy(), longest)
         numbers["depth_abs_rel"] = abs_rel(own, real)
     worth = numbers.get("labels right", -numbers.get("depth_abs_rel", math.nan))
-    return Sight(photo.id, f"photo {photo.id}", pictures, numbers, worth)
+    legend = legend_of(words.classes, found.numpy(), truth.numpy())
+    return Sight(photo.id, f"photo {photo.id}", pictures, numbers, worth, legend)
 
 
 def judge_depth(drawn: Drawn, metric: bool, tally: Tally) -> None:

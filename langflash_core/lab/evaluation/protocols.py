@@ -12,12 +12,12 @@ from langflash_core.errors import InputError
 from langflash_core.lab.evaluation.posed import APART, PAIRS, chosen_triples
 from langflash_core.lab.evaluation.words import OTHER, PAPER_LABELS
 from langflash_core.lab.photos import Name, PhotoFolder
+from langflash_core.lab.photos.layouts import read_table
 from langflash_core.lab.photos.published import (
     open_frames,
     open_masked,
     open_scannet,
     re10k_scenes,
-    read_table,
     scannet_names,
 )
 

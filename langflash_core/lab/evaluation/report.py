@@ -27,7 +27,7 @@ from langflash_core.lab.evaluation.report_parts import (
 )
 from langflash_core.lab.evaluation.sights import Look
 from langflash_core.lab.evaluation.speed import PAPER_MS
-from langflash_core.lab.evaluation.tables import COLUMNS, MEASURES, METHODS, cell
+from langflash_core.lab.evaluation.tables import COLUMNS, MEASURES, METHODS
 from langflash_core.lab.evaluation.tallies import Shelf, identity, intervals, merged
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.running import Progress
@@ -55,8 +55,8 @@ PUBLISHED = Table(
 
 @dataclass(frozen=True)
 class Sources:
-    """What is at hand: a cache of rooms, posed and labelled photos (None: not there), and of each only so
-    many."""
+    """What is at hand: a cache of rooms, posed and labelled photos (None: not there). photo_ids: none means
+    all; limit: rooms, and pairs of posed photos."""
 
     rooms: Path | None = None
     posed: PhotoFolder | None = None
@@ -94,7 +94,7 @@ def sections(sources: Sources, place: Workplace) -> Iterator[Section]:
     if sources.posed is not None:
         yield posed_section(sources.posed, place, sources.limit)
     if sources.photos is not None:
-        yield photos_section(sources.photos, sources.photo_ids or sources.photos.ids, place, sources.limit)
+        yield photos_section(sources.photos, sources.photo_ids or sources.photos.ids, place)
 
 
 def rooms_section(data: Path, place: Workplace, limit: int | None = None) -> Section:
@@ -156,15 +156,12 @@ def posed_section(folder: PhotoFolder, place: Workplace, limit: int | None = Non
     )
 
 
-def photos_section(
-    folder: PhotoFolder, ids: Sequence[str], place: Workplace, limit: int | None = None
-) -> Section:
+def photos_section(folder: PhotoFolder, ids: Sequence[str], place: Workplace) -> Section:
     """Single real photos that somebody labelled."""
-    chosen = list(ids)[:limit]
     judged = labelled.judged_by(folder, place.render, place.weights, preset=place.preset)
     shelf = place.shelf("photos", labelled.Tally, folder=folder.root.name, words=len(judged.words.phrases))
     kept, gallery = _told(
-        place, shelf, len(chosen), lambda look: labelled.photo_tallies(judged, folder, chosen, shelf, look)
+        place, shelf, len(ids), lambda look: labelled.photo_tallies(judged, folder, ids, shelf, look)
     )
     result, bounds = _summed(kept, lambda tally: labelled.summary(tally, judged.words))
     columns = {
@@ -221,7 +218,7 @@ def _stages(measures: Mapping[str, float | None]) -> dict[str, float]:
 
 
 def _stage_table(measures: Mapping[str, float | None]) -> Table:
-    rows = [(name, cell(1000 * value).removesuffix(".000")) for name, value in _stages(measures).items()]
+    rows = [(name, f"{1000 * value:,.0f}") for name, value in _stages(measures).items()]
     return Table("Seconds by stage of the network", ("stage, two photos", "ms, mean"), rows)
 
 

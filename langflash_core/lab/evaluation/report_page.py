@@ -37,6 +37,8 @@ figure { margin: 0 0 22px; }
 figcaption { display: flex; flex-wrap: wrap; gap: 4px 18px; margin-bottom: 4px; }
 figcaption b { min-width: 9em; }
 .titles { display: grid; color: var(--soft); font-size: 13px; }
+.legend { display: flex; flex-wrap: wrap; gap: 0 14px; color: var(--soft); font-size: 13px; }
+.legend i { display: inline-block; width: 11px; height: 11px; margin-right: 5px; border-radius: 2px; }
 figure img { width: 100%; display: block; border-radius: 4px; }
 svg { max-width: 100%; height: auto; }
 svg text { font: 12px system-ui, sans-serif; fill: var(--soft); }
@@ -98,20 +100,34 @@ def _figure(shown: Shown) -> str:
         for name, value in shown.numbers.items()
     )
     titles = "".join(f"<span>{escape(title)}</span>" for title in shown.titles)
+    legend = "".join(
+        f'<span><i style="background: rgb{tuple(colour)}"></i>{escape(label)}</span>'
+        for label, colour in shown.legend.items()
+    )
     return (
         f"<figure><figcaption><b>{escape(shown.name)}</b>{numbers}</figcaption>"
         f'<div class="titles" style="grid-template-columns: repeat({len(shown.titles)}, 1fr)">{titles}</div>'
-        f'<img loading="lazy" alt="{escape(shown.name)}" src="{shown.uri}"></figure>'
+        f'<img loading="lazy" alt="{escape(shown.name)}" src="{shown.uri}">'
+        f'<div class="legend">{legend}</div></figure>'
     )
 
 
 def _table(table: Table) -> str:
     head = "".join(f"<th>{escape(text)}</th>" for text in table.header)
+    wide = len(table.header) > 4
     body = "".join(
-        "<tr>" + "".join(f"<td>{escape(text)}</td>" for text in row) + "</tr>" for row in table.rows
+        "<tr>" + "".join(f"<td>{_cell(text, wide)}</td>" for text in row) + "</tr>" for row in table.rows
     )
     title = f"<h3>{escape(table.title)}</h3>" if table.title else ""
     return f"{title}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _cell(text: str, wide: bool) -> str:
+    """In wide tables an interval stands below its number."""
+    number, bracket, rest = text.partition(" (")
+    if wide and bracket and number[:1].isdigit():
+        return f'{escape(number)}<br><small class="soft">({escape(rest)}</small>'
+    return escape(text)
 
 
 def _machine(facts: Mapping[str, Any]) -> Table:

@@ -58,6 +58,7 @@ class Shown:
     numbers: Mapping[str, float]
     worth: float
     strip: bytes
+    legend: Mapping[str, Sequence[int]] = field(default_factory=dict)
 
     @property
     def uri(self) -> str:
@@ -141,6 +142,7 @@ class Gallery:
         document = {
             "name": sight.name,
             "titles": list(sight.pictures),
+            "legend": {label: list(colour) for label, colour in sight.legend.items()},
             "numbers": numbers,
             "worth": 0.0 if math.isnan(sight.worth) else float(sight.worth),
         }
@@ -160,6 +162,7 @@ class Gallery:
                         document["numbers"],
                         document["worth"],
                         strip,
+                        document["legend"],
                     )
                 )
             except (OSError, ValueError, KeyError, TypeError):

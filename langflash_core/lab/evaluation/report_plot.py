@@ -50,13 +50,14 @@ def svg(plot: Plot) -> str:
         f'<text transform="translate(14 {(TOP + HEIGHT - BOTTOM) / 2}) rotate(-90)" '
         f'text-anchor="middle">{escape(plot.up)}</text>'
     )
-    for row, (point, own) in enumerate(zip(points, seconds, strict=True)):
-        parts += _mark(point, x(own), y, _dark(label_colour(row)))
+    levels = _apart([y(point.error) for point in points])
+    for row, (point, own, level) in enumerate(zip(points, seconds, levels, strict=True)):
+        parts += _mark(point, x(own), y, level, _dark(label_colour(row)))
     return "\n".join([*parts, "</svg>"])
 
 
-def _mark(point: Point, x: float, y: Callable[[float], float], colour: str) -> list[str]:
-    """Point, interval and name; the name stands where there is room."""
+def _mark(point: Point, x: float, y: Callable[[float], float], level: float, colour: str) -> list[str]:
+    """Point, interval and name; the name stands at `level`, where there is room."""
     after = x < WIDTH * 0.6
     place, anchor = (x + 9, "start") if after else (x - 9, "end")
     parts = []
@@ -68,10 +69,19 @@ def _mark(point: Point, x: float, y: Callable[[float], float], colour: str) -> l
         )
     parts.append(f'<circle cx="{x:.1f}" cy="{y(point.error):.1f}" r="5" fill="{colour}"/>')
     parts.append(
-        f'<text class="name" x="{place:.1f}" y="{y(point.error) + 4:.1f}" '
+        f'<text class="name" x="{place:.1f}" y="{level + 4:.1f}" '
         f'text-anchor="{anchor}">{escape(point.name)}</text>'
     )
     return parts
+
+
+def _apart(levels: Sequence[float], least: float = 15) -> list[float]:
+    """The same heights, moved down where two names would touch."""
+    moved = list(levels)
+    last = -math.inf
+    for place in sorted(range(len(moved)), key=lambda place: moved[place]):
+        moved[place] = last = max(moved[place], last + least)
+    return moved
 
 
 def _dark(colour: tuple[int, int, int]) -> str:

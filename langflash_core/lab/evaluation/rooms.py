@@ -36,7 +36,14 @@ from langflash_core.lab.evaluation.metrics import (
 from langflash_core.lab.evaluation.pictures import ssim
 from langflash_core.lab.evaluation.segments import Panoptic, instance_iou, label_border_f, panoptic
 from langflash_core.lab.evaluation.side_measures import DepthView, seen_by
-from langflash_core.lab.evaluation.sights import Look, Sight, error_picture, label_picture, photo_picture
+from langflash_core.lab.evaluation.sights import (
+    Look,
+    Sight,
+    error_picture,
+    label_picture,
+    legend_of,
+    photo_picture,
+)
 from langflash_core.lab.evaluation.tallies import Shelf, collected, merged
 from langflash_core.lab.evaluation.words import OTHER, PAPER_LABELS, PARAPHRASES, absent_phrases, paper_label
 from langflash_core.lab.rooms.cameras import overlap_fraction
@@ -485,7 +492,9 @@ def _sight(setting: Setting, record: RoomRecord, rgb: Tensor, labels: np.ndarray
     }
     right = float((labels[1] == truth)[truth >= 0].mean()) if (truth >= 0).any() else math.nan
     numbers = {name: known[name] for name in ("psnr", "depth_abs_rel", "instance_iou") if name in known}
-    return Sight(str(record.seed), f"room {record.seed}", pictures, {"labels right": right, **numbers}, right)
+    numbers = {"labels right": right, **numbers}
+    legend = legend_of(setting.groups, labels[1], truth)
+    return Sight(str(record.seed), f"room {record.seed}", pictures, numbers, right, legend)
 
 
 def seen_by_photos(record: RoomRecord) -> Tensor:

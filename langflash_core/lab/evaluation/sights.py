@@ -4,8 +4,8 @@ Pictures are (H, W, 3) uint8.
 """
 
 import colorsys
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float, Integer, UInt8
@@ -19,13 +19,14 @@ UNKNOWN = (38, 38, 42)
 @dataclass(frozen=True)
 class Sight:
     """One scene. key: of its tally; name: for people; pictures by title, in order, all of one size; numbers
-    by title; worth: more is better, NaN where nothing was judged."""
+    by title; worth: more is better, NaN where nothing was judged; legend: labels that occur, by colour."""
 
     key: str
     name: str
     pictures: Mapping[str, np.ndarray]
     numbers: Mapping[str, float]
     worth: float
+    legend: Mapping[str, tuple[int, int, int]] = field(default_factory=dict)
 
 
 Look = Callable[[Sight], None]
@@ -66,6 +67,13 @@ def label_picture(labels: Integer[np.ndarray, "H W"]) -> Picture:
     rows = int(labels.max(initial=0)) + 1
     colours = np.array([*(label_colour(row) for row in range(rows)), UNKNOWN], dtype=np.uint8)
     return colours[np.where(labels < 0, rows, labels)]
+
+
+def legend_of(names: Sequence[str], *maps: Integer[np.ndarray, "H W"]) -> dict[str, tuple[int, int, int]]:
+    """Colours of the labels that cover at least a hundredth of one of the maps; `names`: by label."""
+    shares = [np.bincount(labels[labels >= 0], minlength=len(names)) / labels.size for labels in maps]
+    common = np.max(shares, axis=0) >= 0.01
+    return {names[row]: label_colour(row) for row in np.flatnonzero(common).tolist()}
 
 
 def depth_picture(depths: Float[np.ndarray, "H W"], longest: float) -> Picture:

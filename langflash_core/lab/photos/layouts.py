@@ -80,12 +80,12 @@ def from_nyu(source: Source, writer: FolderWriter) -> None:
         writer.depths(id, mat.item("depths", index))
         writer.camera(id, *NYU_CAMERA)
     names = mat.texts("names")
-    labels = _forty(source.further.get("classes"), len(names))
+    labels = forty_classes(source.further.get("classes"), len(names))
     table = {i + 1: (name, label) for i, (name, label) in enumerate(zip(names, labels, strict=True))}
     writer.finish(table, "NYU Depth v2, Silberman et al. 2012", crop=list(NYU_FRAME))
 
 
-def _forty(path: Path | None, count: int) -> list[str | None]:
+def forty_classes(path: Path | None, count: int) -> list[str | None]:
     """Class of every name by classMapping40.mat; None of each without that file."""
     if path is None:
         return [None] * count
@@ -229,14 +229,26 @@ LAYOUTS: dict[str, Callable[[Source, FolderWriter], None]] = {
 }
 
 
-def _json(path: Path, keys: tuple[str, ...]) -> dict:
+def read_table(path: Path) -> dict:
+    """A JSON object.
+
+    Raises:
+        InputError: it cannot be read, or is something else.
+    """
     try:
         document = json.loads(path.read_bytes())
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); check the path") from None
     except ValueError as error:
         raise InputError(f"{path} is not JSON ({error}); download it again") from None
-    missing = [key for key in keys if not isinstance(document, dict) or key not in document]
+    if not isinstance(document, dict):
+        raise InputError(f"{path} is no table of names; download it again")
+    return document
+
+
+def _json(path: Path, keys: tuple[str, ...]) -> dict:
+    document = read_table(path)
+    missing = [key for key in keys if key not in document]
     if missing:
         raise InputError(f"{path} holds no '{missing[0]}'; it is not the file this layout needs")
     return document

@@ -6,7 +6,6 @@ executed. A labelled id is one of `names`; 0 is not labelled.
 
 import csv
 import io
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,7 +26,13 @@ from langflash_core.lab.photos.folder import (
     order,
     read_map,
 )
-from langflash_core.lab.photos.layouts import KINECT_CAMERA, NYU_CAMERA, NYU_FRAME
+from langflash_core.lab.photos.layouts import (
+    KINECT_CAMERA,
+    NYU_CAMERA,
+    NYU_FRAME,
+    forty_classes,
+    read_table,
+)
 from langflash_core.lab.photos.matlab import MatFile, open_mat
 from langflash_core.lab.photos.names import CLASSES40, class_of, spoken
 
@@ -71,14 +76,11 @@ def open_nyu(path: Path, split: str | None = "testNdxs") -> NyuFile:
     if split is not None and splits.is_file():
         numbers = sorted(int(n) for n in open_mat(splits).array(split).ravel())
     texts = mat.texts("names")
-    labels = [class_of(text) for text in texts]
-    if mapping.is_file():
-        forty = open_mat(mapping)
-        classes, rows = forty.texts("className"), forty.array("mapClass").ravel().astype(int).tolist()
-        labels = [spoken(classes[row - 1]) if row else None for row in rows]
+    published = forty_classes(mapping if mapping.is_file() else None, len(texts))
+    labels = [spoken(c) if c else class_of(t) for t, c in zip(texts, published, strict=True)]
     names = {
         n: Name(spoken(text), label)
-        for n, (text, label) in enumerate(zip(texts, labels, strict=False), start=1)
+        for n, (text, label) in enumerate(zip(texts, labels, strict=True), start=1)
     }
     ids = tuple(f"{n:04d}" for n in numbers)
     Ks = dict.fromkeys(ids, camera_matrix(*NYU_CAMERA))
@@ -350,23 +352,6 @@ def _tensors(path: Path) -> object:
         raise InputError(f"there is no {path}, which the data set lists; get it again") from None
     except Exception as error:  # torch's many: damaged archives, refused code
         raise InputError(f"{path} cannot be read safely ({type(error).__name__}); get it again") from None
-
-
-def read_table(path: Path) -> dict:
-    """A JSON object, as indices of scenes are.
-
-    Raises:
-        InputError: it cannot be read.
-    """
-    try:
-        document = json.loads(path.read_bytes())
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror}); check the folder") from None
-    except ValueError as error:
-        raise InputError(f"{path} is not JSON ({error}); get it again") from None
-    if not isinstance(document, dict):
-        raise InputError(f"{path} is no table of scenes; get it again")
-    return document
 
 
 def _first(folder: Path, stem: str, suffixes: tuple[str, ...]) -> Path:

@@ -1,11 +1,14 @@
 """`langflash eval protocol` from end to end: the shipped network, and the paper's at a size for tests."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import torch
+from safetensors.torch import save_file
 
 from langflash_core.lab.photos import PhotoFolder
+from langflash_core.language.clip import build_clip, load_clip
 from langflash_core.network import PRESETS
 from tests.lab.photos import layouts_made as made
 from tests.network import published
@@ -25,8 +28,8 @@ def scannet(wall: PhotoFolder, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def tiny_full(run, tmp_path, monkeypatch) -> None:
-    """The preset `full` in small, random checkpoints in the published form imported; CLIP comes with LSeg."""
+def tiny_full(run, tmp_path, monkeypatch) -> Iterator[None]:
+    """The preset `full` in small: random checkpoints in the published form imported, and a random CLIP."""
     monkeypatch.setenv("LANGFLASH_HOME", str(tmp_path / "home"))
     monkeypatch.setitem(PRESETS, "full", TINY)
     drawn = {
@@ -37,6 +40,12 @@ def tiny_full(run, tmp_path, monkeypatch) -> None:
     for name, state in drawn.items():
         torch.save({"state_dict": state}, tmp_path / name)
         assert run("weights", "import", tmp_path / name).code == 0
+    tower = build_clip()
+    state = {name: tensor.contiguous() for name, tensor in tower.model.state_dict().items()}
+    save_file(state, tmp_path / "home" / "weights" / "clip_vitb32.safetensors")
+    load_clip.cache_clear()
+    yield
+    load_clip.cache_clear()
 
 
 def test_the_shipped_network_is_judged_and_what_is_kept_is_used_again(run, scannet: Path, tmp_path: Path):

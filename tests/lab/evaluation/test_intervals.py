@@ -15,7 +15,7 @@ def means(values) -> dict[str, float]:
 def test_the_interval_of_a_mean_is_that_of_the_normal_distribution():
     values = np.random.default_rng(3).normal(5, 2, 400).tolist()
     low, high = bootstrap(values, means, draws=2000)["mean"]
-    error = np.std(values) / math.sqrt(len(values))
+    error = float(np.std(values)) / math.sqrt(len(values))
     # 2,000 draws know the 2.5 % quantile to about .06 standard errors (1 sigma).
     assert low == pytest.approx(np.mean(values) - 1.96 * error, abs=0.2 * error)
     assert high == pytest.approx(np.mean(values) + 1.96 * error, abs=0.2 * error)

@@ -10,7 +10,7 @@ import torch
 from scipy.io import savemat
 
 from langflash_core.errors import InputError
-from langflash_core.lab.photos import PhotoFolder
+from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
 from langflash_core.lab.photos.published import (
     open_frames,
     open_masked,
@@ -25,6 +25,12 @@ from tests.lab.photos import layouts_made as made
 @pytest.fixture(scope="module")
 def wall(tmp_path_factory) -> PhotoFolder:
     return made.wall(tmp_path_factory.mktemp("wall") / "photos", 5)
+
+
+def assert_placed(photo: LabelledPhoto, truth: LabelledPhoto) -> None:
+    """The same pose; cameras of RealEstate10K are float32."""
+    assert photo.pose is not None and truth.pose is not None
+    assert torch.allclose(photo.pose, truth.pose, atol=1e-6)
 
 
 def assert_same(photo, truth, *, scale: int = 10, colours: float = 12) -> None:
@@ -46,7 +52,7 @@ def test_a_scene_of_lsm_is_read(wall: PhotoFolder, tmp_path: Path):
     assert scene.ids == ("0", "20", "40", "60", "80")
     photo, truth = scene.photo("40"), wall.photo("003")
     assert_same(photo, truth)
-    assert torch.allclose(photo.pose, truth.pose)
+    assert_placed(photo, truth)
 
 
 def test_a_scene_extracted_from_scannet_is_read(wall: PhotoFolder, tmp_path: Path):
@@ -64,7 +70,7 @@ def test_chunks_of_realestate10k_are_read(wall: PhotoFolder, tmp_path: Path):
     assert list(dict(re10k_scenes(tmp_path / "test", {"bbbb": 0}))) == ["bbbb"]
     photo, truth = scenes["bbbb"].photo("000002"), wall.photo("003")
     assert_same(photo, truth)
-    assert torch.allclose(photo.pose, truth.pose, atol=1e-6)  # float32 cameras
+    assert_placed(photo, truth)
     assert photo.labels is None and photo.depths is None
 
 
@@ -102,7 +108,7 @@ def test_masks_of_3d_ovs_are_read(wall: PhotoFolder, tmp_path: Path):
 def test_photos_annotated_in_that_manner_may_have_cameras(wall: PhotoFolder, tmp_path: Path):
     made.masked_scene(wall, tmp_path / "room", with_cameras=True)
     photo = open_masked(tmp_path / "room").photo("03")
-    assert torch.allclose(photo.pose, wall.photo("004").pose, atol=1e-6)
+    assert_placed(photo, wall.photo("004"))
     (tmp_path / "room" / "segmentations" / "00" / "wall.png").unlink()
     with pytest.raises(InputError, match=r"wall\.png"):
         open_masked(tmp_path / "room").labels("00")
@@ -113,6 +119,7 @@ def test_frames_of_7_scenes_are_read(wall: PhotoFolder, tmp_path: Path):
     scene = open_frames(tmp_path / "seq-01")
     assert scene.ids == ("000000", "000001", "000002", "000003")
     photo = scene.photo("000001")
+    assert photo.depths is not None and photo.K is not None
     assert (photo.depths[0] == 0).all() and np.allclose(photo.depths[1:], 2)
     assert photo.labels is None and float(photo.K[0, 0]) == 585
 
@@ -131,7 +138,7 @@ def test_the_labelled_nyu_is_read(tmp_path: Path):
     photo = folder.photo("0002")
     assert photo.image.shape == (426, 560, 3) and (photo.image == images[45:471, 41:601, :, 1]).all()
     assert (photo.labels == labels[45:471, 41:601, 1]).all()
-    assert np.allclose(photo.depths, depths[45:471, 41:601, 1])
+    assert photo.depths is not None and np.allclose(photo.depths, depths[45:471, 41:601, 1])
     assert folder.names[2].label == "night stand"
     savemat(tmp_path / "splits.mat", {"trainNdxs": [[1]], "testNdxs": [[2], [3]]})
     assert open_nyu(path).ids == ("0002", "0003") and len(open_nyu(path, None).ids) == 3
