@@ -1,4 +1,4 @@
-"""What renderers draw with and on: the programs of a context, and targets of one size at a time."""
+"""What renderers draw with and on: the programs of a context, and targets of the last two sizes."""
 
 from typing import Literal
 
@@ -11,6 +11,7 @@ from .painter import Painter
 from .view import ViewTargets
 
 Precision = Literal["float16", "float32"]
+_KEPT = 2  # sizes
 _DTYPES = {"float16": "f2", "float32": "f4"}
 
 
@@ -35,33 +36,37 @@ class Canvas:
             )
         self.painter = Painter(ctx)
         self.precision = precision
-        self._view: ViewTargets | None = None
+        self._views: list[ViewTargets] = []  # the newest last
 
     def view(self, size: tuple[int, int]) -> ViewTargets:
-        """The targets of (width, height) pixels; those of another size are given back.
+        """The targets of (width, height) pixels.
+
+        Those of the size before are kept, so that what they show can stay until the new ones are painted;
+        older ones are given back.
 
         Raises:
             ValueError: the size has no pixels.
             GraphicsError: it is larger than the driver's textures.
         """
-        if self._view is None or self._view.size != size:
+        found = next((view for view in self._views if view.size == size), None)
+        if found is None:
             _check(size, self.painter.ctx.info["GL_MAX_TEXTURE_SIZE"])
-            self._drop()
-            self._view = ViewTargets(self.painter, size, _DTYPES[self.precision])
-        return self._view
+            while len(self._views) >= _KEPT:
+                self._views.pop(0).release()
+            found = ViewTargets(self.painter, size, _DTYPES[self.precision])
+        else:
+            self._views.remove(found)
+        self._views.append(found)
+        return found
 
     def holds(self, view: ViewTargets) -> bool:
         """Whether these targets are still there to be read."""
-        return self._view is view
-
-    def _drop(self) -> None:
-        if self._view is not None:
-            self._view.release()
-        self._view = None
+        return view in self._views
 
     def release(self) -> None:
         """Give everything back; what is drawn next makes it anew."""
-        self._drop()
+        while self._views:
+            self._views.pop().release()
         self.painter.release()
 
 

@@ -359,6 +359,8 @@ class Viewport:
             return None
         if self._lapses != state.asking.lapses:
             return None  # the query that holds now is on its way
+        if (drawn.pose, drawn.size, drawn.marked) != (state.pose, self._size, self._marked):
+            return None  # and so is the picture
         key = (drawn, id(self._query))
         if key == self._answered:
             return None

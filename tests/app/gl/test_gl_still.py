@@ -111,3 +111,15 @@ def test_shaders_are_compiled_ahead(gl, scene) -> None:
     _ = renderer.rgb_texture
     assert set(programs) == before
     renderer.release()
+
+
+def test_what_is_on_show_stays_while_another_size_is_drawn(gl, scene) -> None:
+    """A window shows the picture before until the next one is painted."""
+    renderer = SplatRenderer(gl)
+    renderer.set_scene(scene)
+    renderer.draw(SEEN, weight_maps=False)
+    shown = renderer.rgb_texture
+    before = pixels(shown)
+    renderer.draw(SEEN.resized(48, 40), weight_maps=False)
+    assert np.array_equal(pixels(shown), before)
+    renderer.release()

@@ -87,7 +87,8 @@ def test_a_foreign_phrase_is_marked_with_its_compiled_question() -> None:
 def test_chips_are_what_the_scene_shows_most_of_each_once() -> None:
     state = shown_scene()
     assert known.things(state) == ()
-    insight = Insight((0.2, 0.5, 0.001), ((0.0,) * 3,) * 3, (0, 1, 2), np.eye(3))
+    black = (0.0, 0.0, 0.0)
+    insight = Insight((0.2, 0.5, 0.001), (black, black, black), (0, 1, 2), np.eye(3))
     names = AtomsNamed((("wall", "side"), ("Floor",), ("crumb",)))
     assert state.info is not None
     history = History(first_marks(state.info.scene))
