@@ -36,10 +36,9 @@ def _gap(logs: torch.Tensor, viewmats: torch.Tensor) -> torch.Tensor:
 def test_maps_that_agree_stay():
     logs, viewmats = _wall()
     kept = agreed(DepthMaps(logs, torch.full_like(logs, -3.0)), viewmats, KS)
-    # Bilinear log depth of a plane is off by its second difference, 2e-4 here, and at the rim, where a
-    # picture goes on as its last pixel is, by half a pixel's slope.
-    assert (kept.log_depths - logs).abs().max() < 5e-3
-    assert (kept.log_depths - logs)[:, 4:-4, 4:-4].abs().max() < 1e-3
+    # Bilinear log depth of a plane is off by its second difference, 2e-4 here, and at a picture's rim, which
+    # goes on as its last pixel is, by up to half a pixel's slope times the other's share.
+    assert (kept.log_depths - logs).abs().max() < 2e-3
 
 
 def test_a_slow_difference_goes():

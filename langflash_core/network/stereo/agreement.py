@@ -3,7 +3,7 @@
 What a sweep leaves is a slow difference between the maps of two photos, some percent of depth: two
 sheets, a halftone where their Gaussians interleave. Every map is carried into every other one. A
 smooth correction of log depth for each, bilinear between a few knots, takes out what differs slowly
-(one sparse robust least squares over all maps at once), and where they then agree to within `_SAME`
+(one robust least squares over all maps at once), and where they then agree to within `_SAME`
 both take the mean, weighted by what each expects of its errors.
 
 Sizes: V views, H W pixels, S knots a side, P pixels that are compared.
@@ -26,7 +26,6 @@ _INDEPENDENT = 400  # pixels go together: all compared ones count as this many
 _EXPECTED = 0.075  # of a knot, where nothing is compared
 _BEND = 0.06  # of a knot against its neighbour
 _SAME = 0.06  # maps that differ by less, relatively, show one surface
-_ROUNDS = 2
 
 
 @dataclass(frozen=True)
@@ -54,9 +53,7 @@ def agreed(maps: DepthMaps, viewmats: Tensor, Ks: Tensor) -> DepthMaps:
     logs = maps.log_depths
     if len(logs) < 2:
         return maps
-    logs = straightened(logs, viewmats, Ks)
-    for _ in range(_ROUNDS):
-        logs = blended(logs, maps.log_errors, viewmats, Ks)
+    logs = blended(straightened(logs, viewmats, Ks), maps.log_errors, viewmats, Ks)
     return DepthMaps(logs, maps.log_errors)
 
 
