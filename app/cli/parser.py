@@ -671,7 +671,7 @@ def _add_report(actions) -> None:
     command = _command(actions, "report", "one page of everything at hand, with intervals and pictures")
     command.add_argument(
         "-o", "--output", type=Path, required=True, metavar="DIR",
-        help="folder for report.html, .md, .json, .csv; a run that was ended goes on there",
+        help="folder for report.html, .md, .json, .csv; a run that was ended goes on from its work/",
     )  # fmt: skip
     command.add_argument("--rooms", type=Path, metavar="CACHE", help="made by train cache: its held_out")
     command.add_argument("--posed", type=Path, metavar="FOLDER", help="real photos of known poses")

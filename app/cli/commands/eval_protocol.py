@@ -99,6 +99,7 @@ def _shelf(args: Namespace, kind: type):
         "folder": args.folder.resolve().name,
         "weights": identity(args.weights, args.preset),
         "size": args.size,
+        "index": None if args.index is None else args.index.name,
         "lpips": args.lpips is not None,
     }
     return Shelf(args.work / args.name, key, kind)
