@@ -84,7 +84,7 @@ def test_sums_are_those_of_a_pixel_by_itself():
             r, c = min(max(row + down, 0), 39), min(max(column + across, 0), 35)
             gap = ((colours[0, :, r, c] - colours[0, :, row, column]) ** 2).sum()
             weight = float(flat[0, r, c]) * math.exp(-(down**2 + across**2) / (2 * 12.0**2))
-            weight *= math.exp(-float(gap) / (2 * 0.08**2))
+            weight *= math.exp(max(-float(gap) / (2 * 0.08**2), -20.0))
             part = int(logs[0, r, c] >= 0.5)
             sums[part] += weight, weight * float(logs[0, r, c])
         for part in (0, 1):

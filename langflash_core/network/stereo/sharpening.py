@@ -30,6 +30,7 @@ _LEAST_GAP = 0.15  # log depth between the parts
 _PARTED = 4.5  # gap in standard deviations within the parts; a slanted plane has 3.2
 _LEAST_FLAT = 0.1  # weight of a part below which nobody knows its depth
 _WHERE = 1.5  # what the side of the slope counts beside the colours, where those say nothing
+_LEAST_EXPONENT = -20.0  # numbers too small for a normal float are slow to add
 _FLOOR = 0.02  # weight of colours that say nothing
 
 
@@ -55,8 +56,7 @@ def sharpened(log_depths: Tensor, images: Tensor) -> Tensor:
     margin = (REACH,) * 4
     depths = F.pad(log_depths[:, None], margin, mode="replicate")
     flat = F.pad(_flatness(log_depths)[:, None], margin, mode="replicate")
-    near, far = -F.max_pool2d(-depths, 2 * REACH + 1, 1), F.max_pool2d(depths, 2 * REACH + 1, 1)
-    middle = (near + far)[:, 0] / 2
+    middle = (_farthest(depths) - _farthest(-depths))[:, 0] / 2
     first = _parted(depths, flat, middle, places)
     middle = first.means.mean(0)
     colours = _colours(images)
@@ -72,6 +72,12 @@ def sharpened(log_depths: Tensor, images: Tensor) -> Tensor:
     vote = belongs[1] - belongs[0] + _WHERE * ((log_depths - middle) / gap.clamp_min(1e-6) * 2).clamp(-1, 1)
     vote = F.avg_pool2d(F.pad(vote[:, None], (1,) * 4, mode="replicate"), 3, 1)[:, 0]
     return torch.where(two, _taken(log_depths, vote > 0, plain, alike), log_depths)
+
+
+def _farthest(depths: Tensor) -> Tensor:
+    """Largest value within `REACH` rows and columns, (V, 1, H, W) of padded maps."""
+    side = 2 * REACH + 1
+    return F.max_pool2d(F.max_pool2d(depths, (side, 1), 1), (1, side), 1)
 
 
 def _taken(log_depths: Tensor, far: Tensor, plain: _Parts, alike: _Parts) -> Tensor:
@@ -125,8 +131,11 @@ def _parted(
         )
         weight = flat[:, 0, rows, columns] * math.exp(-(row**2 + column**2) / (2 * _NEARBY**2))
         if colours is not None and blurred is not None:
-            differs = ((blurred[:, :, rows, columns] - colours) ** 2).sum(1)
-            weight = weight * torch.exp(-differs / (2 * _COLOUR**2))
+            around = blurred[:, :, rows, columns]
+            differs = sum(
+                ((a - b) ** 2 for a, b in zip(around.unbind(1), colours.unbind(1), strict=True)), 0.0
+            )
+            weight = weight * torch.exp((differs * (-0.5 / _COLOUR**2)).clamp_min(_LEAST_EXPONENT))
         depth = depths[:, 0, rows, columns]
         nearer = torch.where(depth < middle, weight, torch.zeros_like(weight))
         for part, own in enumerate((nearer, weight - nearer)):
