@@ -132,16 +132,16 @@ def _parted(
         weight = flat[:, 0, rows, columns] * math.exp(-(row**2 + column**2) / (2 * _NEARBY**2))
         if colours is not None and blurred is not None:
             around = blurred[:, :, rows, columns]
-            differs = sum(
-                ((a - b) ** 2 for a, b in zip(around.unbind(1), colours.unbind(1), strict=True)), 0.0
-            )
+            differs = torch.zeros_like(weight)
+            for theirs, own in zip(around.unbind(1), colours.unbind(1), strict=True):
+                differs += (theirs - own) ** 2
             weight = weight * torch.exp((differs * (-0.5 / _COLOUR**2)).clamp_min(_LEAST_EXPONENT))
         depth = depths[:, 0, rows, columns]
         nearer = torch.where(depth < middle, weight, torch.zeros_like(weight))
-        for part, own in enumerate((nearer, weight - nearer)):
-            sums[0, part] += own
-            sums[1, part] += own * depth
-            sums[2, part] += own * depth * depth
+        for part, share in enumerate((nearer, weight - nearer)):
+            sums[0, part] += share
+            sums[1, part] += share * depth
+            sums[2, part] += share * depth * depth
     weights = sums[0] + 1e-6
     means = (sums[1] + 1e-6 * middle) / weights
     return _Parts(weights, means, (sums[2] + 1e-6 * middle**2) / weights)
