@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from app.bench.modes import AXES
-from app.cli.parser import BENCH_AXES
+from app.cli.words.judging import BENCH_AXES
 from app.gl import offscreen_context
 from langflash_core.errors import GraphicsError
 from langflash_core.scene.file import save

@@ -7,7 +7,8 @@ import pytest
 import torch
 from PIL import Image
 
-from app.cli.parser import LAYOUTS, build_parser
+from app.cli.parser import build_parser
+from app.cli.words.training import LAYOUTS
 from langflash_core.lab.photos import layouts
 from langflash_core.lab.photos.writing import FolderWriter
 from langflash_core.lab.training.shards import Label, open_shards, write_shard

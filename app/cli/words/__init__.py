@@ -1,0 +1,1 @@
+"""What each command may be told. Only the standard library is imported here."""

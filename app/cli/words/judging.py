@@ -1,0 +1,239 @@
+"""The words of what says how fast and how good everything is."""
+
+import argparse
+from pathlib import Path
+
+from ..values import above_zero, atom_count, numbers, pixel_side, seed, size, whole_count
+from .shared import add_backend, add_description, add_json, add_output, new_actions, new_command
+
+# langflash_core.lab.evaluation.protocols.PROTOCOLS, and photos one by one.
+EVAL_PROTOCOLS = ("scannet", "3dovs", "re10k", "7scenes", "nyu")
+# The decisions that `bench` compares: app.bench.modes.AXES, which would bring torch along.
+BENCH_AXES = (
+    "precision", "relevance", "weights", "cut", "dictionary", "resolution", "detail", "rasteriser", "sort",
+)  # fmt: skip
+
+
+def add_bench(commands) -> None:
+    """`langflash bench`."""
+    command = new_command(commands, "bench", "how fast each way of drawing is, and what it gets wrong")
+    command.add_argument("scene", nargs="?", type=Path, metavar="SCENE")
+    command.add_argument("--synthetic", type=whole_count, metavar="N", help="a generated room of N Gaussians")
+    command.add_argument(
+        "--paper",
+        action="store_true",
+        help="the paper's size: 131,072 Gaussians, 128 atoms, 1 and 16 phrases, 988x731 and 1920x1080",
+    )
+    command.add_argument(
+        "--atoms", type=atom_count, metavar="K", help="generated atoms, for a scene that has none"
+    )
+    command.add_argument(
+        "--spread", type=above_zero, metavar="F", help="generated Gaussians F times as wide: more overdraw"
+    )
+    command.add_argument("--prompt", nargs="+", metavar="PHRASE", help="up to 16 (default: three of a home)")
+    command.add_argument(
+        "--size", type=size, metavar="WxH", help="pixels to draw (default: as the network saw it)"
+    )
+    command.add_argument("--frames", type=whole_count, metavar="N", help="of the camera's way (default: 8)")
+    command.add_argument("--only", nargs="+", choices=BENCH_AXES, help="what to compare (default: all)")
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="FOLDER", help="also write bench.json, bench.csv and bench.png"
+    )
+    add_json(command)
+
+
+def add_bench_network(commands) -> None:
+    """`langflash bench network`."""
+    command = new_command(
+        commands, "bench-network", "how long each stage of the network takes (also: bench network)"
+    )
+    command.add_argument("--preset", choices=("mini", "full"), default="full", help="(default: full)")
+    weights = command.add_mutually_exclusive_group()
+    weights.add_argument(
+        "--weights", type=Path, metavar="PATH", help="(default: the shipped or imported ones)"
+    )
+    weights.add_argument("--random", action="store_true", help="draw them: the times are the same")
+    command.add_argument(
+        "--views", type=whole_count, nargs="+", default=[2], metavar="V", help="(default: 2)"
+    )
+    command.add_argument(
+        "--atoms", type=whole_count, nargs="+", default=[128], metavar="K", help="(default: 128)"
+    )
+    command.add_argument(
+        "--repeats", type=whole_count, default=3, metavar="N", help="the median counts (default: 3)"
+    )
+    command.add_argument("--size", type=pixel_side, metavar="PX", help="(default: 224; full: 256)")
+    command.add_argument(
+        "--float32", action="store_true", help="leave bfloat16 out, which is slow where a CPU lacks it"
+    )
+    command.add_argument("--compile", action="store_true", help="through torch.compile")
+    command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the numbers as .json")
+    add_json(command)
+
+
+def add_eval(commands) -> None:
+    """`langflash eval`."""
+    actions = new_actions(commands, "eval", "how good a checkpoint is on rooms it has never seen")
+    rooms = new_command(
+        actions, "rooms", "geometry, pictures, labels and phrases, with trivial answers beside"
+    )
+    rooms.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="also write the tables as .md (default: only print them)",
+    )
+    add_json(rooms)
+    calibrate = new_command(actions, "calibrate", "presence threshold, as JSON for train export --metadata")
+    _add_photo_sets(calibrate)
+    calibrate.add_argument(
+        "--plot", type=Path, metavar="IMG", help="also write the reliability diagram as .png"
+    )
+    for command in (rooms, calibrate):
+        command.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
+        command.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
+        command.add_argument("--weights", type=Path, metavar="PATH", help="(default: the shipped ones)")
+        command.add_argument("--limit", type=whole_count, metavar="N", help="only the first N scenes")
+    _add_labelled(actions)
+    _add_posed(actions)
+    _add_sides(actions)
+    _add_protocol(actions)
+    _add_report(actions)
+    photos = new_command(actions, "photos", "a sheet to judge by eye: pairs of photos, new views, heat-maps")
+    photos.add_argument("photos", nargs="+", type=Path, metavar="PHOTO", help="first and second in turn")
+    add_output(photos, "IMG", "the .png to write")
+    photos.add_argument("--weights", type=Path, metavar="PATH", help="(default: the shipped ones)")
+    photos.add_argument("--prompt", nargs="+", metavar="PHRASE", help="(default: ten things of a home)")
+
+
+def _add_labelled(actions) -> None:
+    command = new_command(
+        actions, "photos-labelled", "names, presence and depth on single real photos that somebody labelled"
+    )
+    _add_folder(command)
+    _add_choice(command, "photos, taken evenly (default: all)")
+    _add_judging(command)
+
+
+def _add_posed(actions) -> None:
+    command = new_command(actions, "posed", "poses, depth and new views on real photos of known poses")
+    _add_folder(command)
+    command.add_argument(
+        "--apart", type=whole_count, nargs="+", metavar="N", help="numbers between two (default: 6 12 18 24)"
+    )
+    command.add_argument("--limit", type=whole_count, metavar="N", help="so many pairs (default: 40)")
+    _add_judging(command)
+
+
+def _add_sides(actions) -> None:
+    command = new_command(actions, "sides", "scenes seen from aside: sheets, holes, layers, pictures")
+    command.add_argument(
+        "pack", type=Path, nargs="?", metavar="PACK", help="rooms, drawn with this furniture"
+    )
+    command.add_argument(
+        "--posed", type=Path, dest="folder", metavar="FOLDER", help="instead, real photos of known poses"
+    )
+    add_description(command)
+    command.add_argument(
+        "--set", choices=("held_out", "validation"), default="held_out", help="of rooms (default: held_out)"
+    )
+    command.add_argument("--first-seed", type=seed, metavar="N", help="(default: the set's own range)")
+    command.add_argument(
+        "--apart", type=whole_count, nargs="+", metavar="N", help="numbers between two (default: 6 12 18 24)"
+    )
+    command.add_argument("--limit", type=whole_count, metavar="N", help="rooms or pairs (default: 100 or 40)")
+    command.add_argument("--lpips", type=Path, metavar="FILE", help="LPIPS weights of VGG-16, .safetensors")
+    command.add_argument(
+        "--results", type=Path, metavar="DIR", help="also keep every scene's numbers, for sides-beside"
+    )
+    command.add_argument("--sheet", type=Path, metavar="IMG", help="also six scenes from aside, as .png")
+    _add_judging(command)
+    beside = new_command(
+        actions, "sides-beside", "two results of sides on the same scenes, beside each other"
+    )
+    beside.add_argument("before", type=Path, metavar="BEFORE", help="folder of --results")
+    beside.add_argument("after", type=Path, metavar="AFTER", help="folder of --results")
+    beside.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
+    beside.add_argument("--sheet", type=Path, metavar="IMG", help="also six scenes of both, as .png")
+    beside.set_defaults(json=False)
+
+
+def _add_protocol(actions) -> None:
+    command = new_command(
+        actions, "protocol", "a published data set where it lies, judged as papers judge it"
+    )
+    command.add_argument("name", choices=EVAL_PROTOCOLS, metavar="NAME", help=", ".join(EVAL_PROTOCOLS))
+    command.add_argument("folder", type=Path, metavar="FOLDER", help="as unpacked; nyu: also its .mat")
+    command.add_argument(
+        "--index", type=Path, metavar="FILE", help="re10k: which views, as pixelSplat's evaluation index"
+    )
+    command.add_argument("--limit", type=whole_count, metavar="N", help="only the first N cases")
+    command.add_argument("--lpips", type=Path, metavar="FILE", help="LPIPS weights of VGG-16, .safetensors")
+    command.add_argument(
+        "--work", type=Path, metavar="DIR", help="keep what is judged there, and go on from it"
+    )
+    _add_judging(command, ("mini", "full"))
+
+
+def _add_report(actions) -> None:
+    command = new_command(actions, "report", "one page of everything at hand, with intervals and pictures")
+    command.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="DIR",
+        help="folder for report.html, .md, .json, .csv; a run that was ended goes on from its work/",
+    )  # fmt: skip
+    command.add_argument("--rooms", type=Path, metavar="CACHE", help="made by train cache: its held_out")
+    command.add_argument("--posed", type=Path, metavar="FOLDER", help="real photos of known poses")
+    command.add_argument("--photos", type=Path, metavar="FOLDER", help="real photos with labels")
+    command.add_argument(
+        "--part", choices=("all", "train", "validation"), default="all", help="of --photos (default: all)"
+    )
+    command.add_argument("--limit", type=whole_count, metavar="N", help="only N scenes of each")
+    command.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
+    command.add_argument("--weights", type=Path, metavar="PATH", help="(default: the shipped ones)")
+    add_backend(command)
+
+
+def _add_folder(command: argparse.ArgumentParser) -> None:
+    command.add_argument("folder", type=Path, metavar="FOLDER", help="in the layout that train photos writes")
+    add_description(command)
+
+
+def _add_choice(command: argparse.ArgumentParser, limit: str) -> None:
+    """Which photos of a folder."""
+    command.add_argument(
+        "--part",
+        choices=("all", "train", "validation"),
+        default="all",
+        help="runs of numbers that training sees, or those kept from it (default: all)",
+    )
+    command.add_argument("--only", type=numbers, metavar="N-M,...", help="only photos of these numbers")
+    command.add_argument("--limit", type=whole_count, metavar="N", help=f"only N {limit}")
+
+
+def _add_judging(command: argparse.ArgumentParser, presets: tuple[str, ...] = ("mini",)) -> None:
+    command.add_argument("--preset", choices=presets, default="mini", help="(default: mini)")
+    command.add_argument("--weights", type=Path, metavar="PATH", help="(default: the shipped ones)")
+    command.add_argument(
+        "--size", type=pixel_side, metavar="PX", help="the network sees about PX x PX pixels (default: 224)"
+    )
+    add_backend(command)
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="also write the tables as .md (default: print them)"
+    )
+    add_json(command)
+
+
+def _add_photo_sets(command: argparse.ArgumentParser) -> None:
+    """Labelled photos beside rooms."""
+    command.add_argument(
+        "--photos",
+        type=Path,
+        dest="folder",
+        metavar="FOLDER",
+        help="also on the validation part of a folder of labelled photos",
+    )
+    add_description(command)
+    command.add_argument("--only", type=numbers, metavar="N-M,...", help="only photos of these numbers")
+    add_backend(command)

@@ -1,0 +1,300 @@
+"""The words of making, asking, drawing and exporting scenes, and of weights."""
+
+from pathlib import Path
+
+from ..values import (
+    above_zero,
+    film_seconds,
+    intrinsics,
+    kept_fraction,
+    open_fov,
+    pixel_side,
+    what,
+    whole_count,
+)
+from .shared import (
+    add_backend,
+    add_camera,
+    add_colours,
+    add_fade,
+    add_json,
+    add_network,
+    add_output,
+    new_actions,
+    new_command,
+)
+
+WHATS = (
+    "rgb", "heat", "mask", "soft", "cutout", "labels", "instances", "depth", "boxes", "surface",
+)  # fmt: skip
+
+
+def add_view(commands) -> None:
+    """`langflash view`."""
+    view = new_command(commands, "view", "open the window; photos and scenes can be dropped on it")
+    view.add_argument("paths", nargs="*", type=Path, metavar="PHOTO|SCENE", help="photos, or one scene")
+
+
+def add_reconstruct(commands) -> None:
+    """`langflash reconstruct`."""
+    command = new_command(commands, "reconstruct", "photos of one place to a scene file")
+    command.add_argument("photos", nargs="+", type=Path, metavar="PHOTO")
+    add_output(command, "SCENE", "the scene to write")
+    add_network(command)
+    command.add_argument(
+        "--aggregation",
+        choices=("lfa", "average", "crops"),
+        help="how a group gets its vector: trained, the average of dense features, or CLIP on a cut-out "
+        "(default: lfa where it has weights, else average)",
+    )
+    command.add_argument(
+        "--grouping",
+        choices=("queries", "sam2"),
+        help="where groups come from: trained queries, or masks of SAM 2 lifted to the scene (default: "
+        "queries where they have weights, else sam2 where it is installed, else the language features)",
+    )
+    command.add_argument(
+        "--precision",
+        choices=("auto", "float32", "bfloat16"),
+        default="auto",
+        help="auto: bfloat16 on graphics cards and, for full, on processors with instructions for it "
+        "(default: auto)",
+    )
+    command.add_argument(
+        "--refine",
+        type=above_zero,
+        metavar="SECONDS",
+        help="then fit poses and Gaussians to the photos, and keep that if a held-out view improves",
+    )
+    lens = command.add_mutually_exclusive_group()
+    lens.add_argument("--fov", type=open_fov, metavar="DEG", help="field of view of the photos' longer side")
+    lens.add_argument(
+        "--intrinsics",
+        type=intrinsics,
+        metavar="FX,FY,CX,CY",
+        help="in pixels of the photos as given, after EXIF orientation",
+    )
+    command.add_argument(
+        "--poses",
+        type=Path,
+        metavar="PATH",
+        help="a transforms.json or COLMAP text model with the photos' poses and lenses: they are not sought, "
+        "and the scene is in their world and unit",
+    )
+    add_json(command)
+
+
+def add_batch(commands) -> None:
+    """`langflash batch`."""
+    command = new_command(
+        commands,
+        "batch",
+        "many sets of photos to scenes; an interrupted run continues, and what is done is not done again",
+        epilog="The exit code is 0 when all sets are done, 1 when some failed (ledger.csv says why), "
+        "2 for bad input, 130 after Ctrl-C.",
+    )
+    command.add_argument(
+        "sets",
+        type=Path,
+        metavar="SETS",
+        help="a folder with a sub-folder of photos a place, or a .csv: per row a name and its photos, "
+        "relative to the table",
+    )
+    add_output(command, "OUT", "gets a folder a set, ledger.csv and summary.html")
+    command.add_argument(
+        "--prompt", nargs="+", metavar="PHRASE", help="answer these in each set's first view"
+    )
+    command.add_argument(
+        "--export",
+        nargs="+",
+        metavar="ENDING",
+        help="files to write besides the scene, as `langflash export` does: .ply, .spz, .glb, .png, "
+        "transforms.json and others of the whole scene; .json (masks) and .csv (boxes) of --prompt",
+    )
+    command.add_argument(
+        "--workers",
+        type=whole_count,
+        metavar="N",
+        help="processes side by side, which share the processors; each needs about 1 GB "
+        "(default: one a processor, as memory allows)",
+    )
+    command.add_argument(
+        "--address",
+        metavar="RAY",
+        help="a Ray cluster instead of processes: host:port, auto, or local to begin one here; all its "
+        "machines see photos and OUT under the same paths",
+    )
+    add_network(command)
+    command.add_argument(
+        "--fov", type=open_fov, metavar="DEG", help="field of view of the photos' longer side, of all sets"
+    )
+    add_backend(command)
+    add_json(command)
+
+
+def add_query(commands) -> None:
+    """`langflash query`."""
+    command = new_command(commands, "query", "where in a scene is each phrase? heat-maps, masks and numbers")
+    command.add_argument("scene", type=Path, metavar="SCENE")
+    command.add_argument("prompts", nargs="+", metavar="PROMPT", help='a phrase, e.g. "armchair"')
+    add_camera(command)
+    command.add_argument(
+        "--mode", choices=("relevancy", "cosine"), default="relevancy", help="(default: relevancy)"
+    )
+    command.add_argument(
+        "--negatives",
+        nargs="+",
+        metavar="PHRASE",
+        help="what relevancy compares with (default: the language space's own)",
+    )
+    add_backend(command)
+    add_output(command, "DIR", "folder for the pictures")
+    add_json(command)
+    command.add_argument(
+        "--npz", action="store_true", help="also write relevance, masks, depth and rgb as arrays"
+    )
+    add_colours(command)
+
+
+def add_render(commands) -> None:
+    """`langflash render`."""
+    command = new_command(commands, "render", "one picture of a scene")
+    command.add_argument("scene", type=Path, metavar="SCENE")
+    add_output(command, "IMG", "the .png to write")
+    add_camera(command)
+    command.add_argument(
+        "--what",
+        type=what,
+        default=("rgb", None),
+        metavar="rgb|depth|relevance|labels|atoms|weights:K",
+        help="(default: rgb)",
+    )
+    command.add_argument(
+        "--prompt", nargs="+", metavar="PHRASE", help="for relevance (one) and labels (any number)"
+    )
+    add_fade(command)
+    add_colours(command)
+    add_backend(command)
+    add_json(command)
+
+
+def add_export(commands) -> None:
+    """`langflash export`."""
+    command = new_command(
+        commands, "export", "a scene, or what answers a phrase, as a file for other programs"
+    )
+    command.add_argument("scene", type=Path, metavar="SCENE")
+    add_output(
+        command,
+        "FILE",
+        "with --segmented a folder; else .png: a picture, or a cut-out with --prompt; .langflash, .ply, "
+        ".compressed.ply, .splat, .spz, .sog, meta.json (a SOG in a folder), .glb, .usd, .usda, .usdc, "
+        ".usdz: Gaussians; transforms.json, cameras.txt (COLMAP): photos and their poses; "
+        ".json: COCO masks of --prompt; .csv, or .glb with --what boxes: their boxes; "
+        ".npz: a view as numbers; .exr: its depth; .mp4, .webp: a flight; "
+        ".html: a web page that shows the scene and answers phrases",
+    )
+    command.add_argument(
+        "--prompt",
+        nargs="+",
+        metavar="PHRASE",
+        help="keep only what answers one of these; of an .html: shown as asked",
+    )
+    command.add_argument(
+        "--threshold", type=kept_fraction, metavar="T", help="relevancy to keep, between 0 and 1"
+    )
+    command.add_argument(
+        "--what",
+        choices=WHATS,
+        help="of a .png: colours, a heat-map, a mask, a soft mask of 16 bits, a cut-out with transparency "
+        "(default with --prompt), numbers of phrases or of instances with a legend as .json, or depth in "
+        "steps of 16 bits; boxes: a .json, .csv or .glb of places and sizes; surface: a .glb; of a video: "
+        "heat",
+    )
+    command.add_argument(
+        "--segmented",
+        action="store_true",
+        help="a folder: of every photo's view masks, soft masks, cut-outs and instances of --prompt, and "
+        "depth; boxes, surfaces, a contact sheet and manifest.json",
+    )
+    add_colours(command)
+    command.add_argument(
+        "--all-views", action="store_true", help="from every photo: FILE_0, FILE_1 and so on"
+    )
+    command.add_argument(
+        "--with-text", action="store_true", help="an .html answers any phrase, and is 28 MB larger"
+    )
+    command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of a video (default: 6)")
+    command.add_argument(
+        "--path",
+        metavar="WAY",
+        help="of a video: photos, from one to the next and back (default); orbit, around what is shown; or a "
+        "JSON list of cameras as of --camera, each with its time in seconds, or evenly spread",
+    )
+    command.add_argument(
+        "--replace", action="store_true", help="also what is there by the name of a legend or a COCO picture"
+    )
+    add_camera(command)
+    add_fade(command)
+    add_backend(command)
+
+
+def add_lift(commands) -> None:
+    """`langflash lift`."""
+    command = new_command(
+        commands, "lift", "groups and a dictionary for plain splats, so that they answer phrases"
+    )
+    command.add_argument("scene", type=Path, metavar="SCENE", help="a splat file, or a scene to name anew")
+    add_output(command, "SCENE", "the .langflash, or .ply or .glb with its language, to write")
+    command.add_argument(
+        "--photos",
+        nargs="+",
+        type=Path,
+        metavar="PHOTO",
+        help="of the place, with --poses; else views of itself",
+    )
+    command.add_argument("--poses", type=Path, metavar="PATH", help="transforms.json, or a COLMAP text model")
+    command.add_argument(
+        "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped ones"
+    )
+    add_backend(command)
+    add_json(command)
+
+
+def add_info(commands) -> None:
+    """`langflash info`."""
+    command = new_command(commands, "info", "what a scene file holds, and what pruning saved")
+    command.add_argument("scene", type=Path, metavar="SCENE", help=".langflash or a splat file")
+    add_json(command)
+
+
+def add_weights(commands) -> None:
+    """`langflash weights`."""
+    actions = new_actions(commands, "weights", "the checkpoints this installation holds, and published ones")
+    listing = new_command(actions, "list", "name, size and origin of each checkpoint, and what can be had")
+    add_json(listing)
+    get = new_command(
+        actions, "get", "download a published checkpoint and convert it; continues where it stopped"
+    )
+    get.add_argument("name", metavar="NAME", help="as `langflash weights list` has it")
+    get.add_argument("--url", metavar="URL", help="fetch it from there instead")
+    get.add_argument("--keep", action="store_true", help="keep the file as it was downloaded")
+    add_json(get)
+    imported = new_command(actions, "import", "convert a published checkpoint that is already here")
+    imported.add_argument("path", type=Path, metavar="PATH", help=".ckpt, .pt or .safetensors")
+    imported.add_argument("--preset", choices=("full",), default="full", help="(default: full)")
+    imported.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="(default: in the cache folder, where it is found)"
+    )
+    imported.add_argument(
+        "--size",
+        type=pixel_side,
+        metavar="PX",
+        help="it was trained on photos of PX x PX (default: as its published name tells)",
+    )
+    add_json(imported)
+    verify = new_command(actions, "verify", "read every number and check that it fits its network")
+    verify.add_argument(
+        "paths", nargs="*", type=Path, metavar="PATH", help="checkpoints (default: the shipped ones)"
+    )
+    add_json(verify)

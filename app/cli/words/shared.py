@@ -1,0 +1,103 @@
+"""What several commands are told in the same words."""
+
+import argparse
+from pathlib import Path
+
+from langflash_core.formats import COLOUR_MAPS
+
+from ..values import above_zero, crop, intrinsics, pixel_side, size, span, view_index
+
+
+def new_command(commands, name: str, purpose: str, **more) -> argparse.ArgumentParser:
+    """A command of the table, with its purpose where help is asked for."""
+    return commands.add_parser(name, help=purpose, description=purpose, allow_abbrev=False, **more)
+
+
+def new_actions(commands, name: str, purpose: str):
+    """A command that has commands of its own."""
+    command = new_command(commands, name, purpose)
+    return command.add_subparsers(dest="action", metavar="ACTION", required=True)
+
+
+def add_output(command: argparse.ArgumentParser, metavar: str, purpose: str) -> None:
+    """-o, where the command writes."""
+    command.add_argument("-o", "--output", required=True, type=Path, metavar=metavar, help=purpose)
+
+
+def add_network(command: argparse.ArgumentParser) -> None:
+    """Which network sees the photos, how large, and where."""
+    command.add_argument(
+        "--preset", choices=("mini", "full"), default="mini", help="which network (default: mini)"
+    )
+    command.add_argument(
+        "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped or imported ones"
+    )
+    command.add_argument(
+        "--size",
+        type=pixel_side,
+        metavar="PX",
+        help="the network sees about PX x PX pixels (default: 224; full: 256)",
+    )
+    command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
+
+
+def add_colours(command: argparse.ArgumentParser) -> None:
+    """How heat-maps are coloured."""
+    command.add_argument(
+        "--colormap",
+        choices=COLOUR_MAPS,
+        default=COLOUR_MAPS[0],
+        help=f"of heat-maps (default: {COLOUR_MAPS[0]}, which colour-blind eyes read too)",
+    )
+    command.add_argument(
+        "--span", type=span, metavar="LOW,HIGH", help="relevance of its first and last colour"
+    )
+
+
+def add_camera(command: argparse.ArgumentParser) -> None:
+    """From where, and how large."""
+    camera = command.add_mutually_exclusive_group()
+    camera.add_argument("--view", type=view_index, metavar="N", help="that photo's pose, from 0 (default: 0)")
+    camera.add_argument(
+        "--camera", type=Path, metavar="FILE", help="JSON with viewmat (4 x 4), K (3 x 3), width and height"
+    )
+    command.add_argument(
+        "--size", type=size, metavar="WxH", help="pixels to draw (default: as the network saw it)"
+    )
+
+
+def add_fade(command: argparse.ArgumentParser) -> None:
+    """Whether what no photo looked at fades."""
+    command.add_argument(
+        "--fade", action="store_true", help="leave out what no photo looked at from about there, softly"
+    )
+
+
+def add_backend(command: argparse.ArgumentParser) -> None:
+    """Who draws."""
+    command.add_argument(
+        "--backend",
+        choices=("gl", "torch"),
+        help="gl: the window's renderer; torch: the slow reference (default: gl if there is OpenGL)",
+    )
+
+
+def add_json(command: argparse.ArgumentParser) -> None:
+    """One document for programs instead of lines for people."""
+    command.add_argument("--json", action="store_true", help="one JSON document on stdout, nothing else")
+
+
+def add_description(command: argparse.ArgumentParser) -> None:
+    """What a folder of photos may not say of itself."""
+    command.add_argument(
+        "--crop",
+        type=crop,
+        metavar="LEFT,TOP,RIGHT,BOTTOM",
+        help="part of every photo that counts, in pixels",
+    )
+    command.add_argument(
+        "--intrinsics", type=intrinsics, metavar="FX,FY,CX,CY", help="in pixels of the photos before the crop"
+    )
+    command.add_argument(
+        "--depth-unit", type=above_zero, metavar="METRES", help="a step of the depth maps (16 bits: 0.001)"
+    )

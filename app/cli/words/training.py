@@ -1,0 +1,172 @@
+"""The words of furnished rooms and of training on them and on photos."""
+
+import argparse
+from pathlib import Path
+
+from ..values import minutes, part, seed, size, whole_count
+from .shared import add_description, add_output, new_actions, new_command
+
+# langflash_core.lab.photos.layouts.LAYOUTS, which would bring torch along.
+LAYOUTS = ("nyu", "coco", "ade20k", "sunrgbd", "frames")
+
+
+def add_rooms(commands) -> None:
+    """`langflash rooms`."""
+    actions = new_actions(commands, "rooms", "furnished rooms for training and tests")
+    pack = new_command(actions, "pack", "furniture libraries (.sh3f) to one pack")
+    pack.add_argument("folder", type=Path, metavar="FOLDER")
+    add_output(pack, "PACK", "the pack to write")
+    preview = new_command(actions, "preview", "a contact sheet of rooms")
+    preview.add_argument("pack", type=Path, metavar="PACK")
+    add_output(preview, "IMG", "the .png to write")
+    _add_seeds(preview, count=9)
+    render = new_command(actions, "render", "rooms with depth, instances and names, one .npz each")
+    render.add_argument("pack", type=Path, metavar="PACK")
+    add_output(render, "DIR", "folder to fill; rooms that are there are kept")
+    _add_seeds(render, count=100)
+    render.add_argument("--views", type=whole_count, default=2, metavar="V", help="(default: 2)")
+    render.add_argument("--size", type=size, default=(224, 224), metavar="WxH", help="(default: 224x224)")
+
+
+def _add_seeds(command: argparse.ArgumentParser, *, count: int) -> None:
+    command.add_argument("--seed", type=seed, default=0, metavar="N", help="the first room (default: 0)")
+    command.add_argument(
+        "--count", type=whole_count, default=count, metavar="N", help=f"rooms (default: {count})"
+    )
+    command.add_argument("--held-out", action="store_true", help="furniture that training never sees")
+
+
+def add_train(commands) -> None:
+    """`langflash train`."""
+    actions = new_actions(commands, "train", "train the network on rendered rooms")
+    adopt = new_command(actions, "adopt", "published weights of the frozen parts to a file to start from")
+    adopt.add_argument("encoder", type=Path, metavar="ENCODER", help="timm state dict, .safetensors")
+    adopt.add_argument("local", type=Path, metavar="XFEAT", help="XFeat's state dict, .safetensors")
+    add_output(adopt, "FILE", "the .safetensors to write")
+    adopt.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
+    _add_cache(actions)
+    _add_convert(actions)
+    parts = new_command(actions, "parts", "find the parts of cached rooms, for the stage naming")
+    parts.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
+    parts.add_argument(
+        "--run", type=Path, metavar="RUN", help="folder of train run whose stages are used (default: none)"
+    )
+    parts.add_argument(
+        "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
+    )
+    _add_start(parts)
+    _add_late(actions)
+    _add_stages(actions)
+    export = new_command(actions, "export", "all stages of a run to one checkpoint")
+    export.add_argument("run", type=Path, metavar="RUN")
+    add_output(export, "FILE", "the .safetensors to write")
+    export.add_argument("--metadata", type=Path, metavar="JSON", help="an object to add to the model card")
+    _add_start(export, presets=("mini", "full"))
+
+
+def _add_cache(actions) -> None:
+    cache = new_command(
+        actions, "cache", "render and encode one set of rooms, or encode photos; an interrupted run continues"
+    )
+    cache.add_argument("pack", type=Path, nargs="?", metavar="PACK", help="made by rooms pack")
+    cache.add_argument(
+        "--photos",
+        type=Path,
+        dest="folder",
+        metavar="FOLDER",
+        help="instead of rooms, a folder of labelled photos as train photos makes it",
+    )
+    add_description(cache)
+    cache.add_argument(
+        "--copies",
+        type=whole_count,
+        default=1,
+        metavar="N",
+        help="views of each photo (default: 1, as it is)",
+    )
+    add_output(cache, "CACHE", "folder to fill")
+    cache.add_argument("--set", choices=("train", "validation", "held_out"), default="train")
+    cache.add_argument("--scenes", type=whole_count, default=4096, metavar="N", help="(default: 4096)")
+    cache.add_argument("--first-seed", type=seed, metavar="N", help="(default: the set's own range)")
+    cache.add_argument(
+        "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
+    )
+    _add_start(cache, presets=("mini", "full"))
+
+
+def _add_stages(actions) -> None:
+    run = new_command(actions, "run", "train stages, one after the other; continues where a run stopped")
+    run.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
+    add_output(run, "RUN", "folder of checkpoints and logs")
+    run.add_argument("--stages", nargs="+", metavar="STAGE", help="such as depth refine gaussians")
+    run.add_argument("--minutes", nargs="+", type=minutes, metavar="M", help="one per stage")
+    run.add_argument(
+        "--recipe", metavar="NAME", help="instead: stages with all their numbers, 'paper' or a .toml"
+    )
+    _add_loop(run)
+    run.add_argument(
+        "--from-scratch", action="store_true", help="draw the heads anew instead of going on with --start's"
+    )
+    _add_start(run, presets=("mini", "full"))
+
+
+def _add_late(actions) -> None:
+    late = new_command(
+        actions, "late", "train the late half of the encoder, names and depth on labelled photos and rooms"
+    )
+    late.add_argument("cache", type=Path, metavar="CACHE", help="rooms, made by train cache")
+    late.add_argument(
+        "--photos",
+        type=Path,
+        dest="folder",
+        metavar="FOLDER",
+        required=True,
+        help="labelled photos, as train photos makes them; every seventh run of numbers is kept to validate",
+    )
+    add_description(late)
+    add_output(late, "RUN", "folder of checkpoints and logs")
+    late.add_argument("--minutes", required=True, type=minutes, metavar="M", help="of training")
+    _add_loop(late)
+    _add_start(late)
+
+
+def _add_loop(command: argparse.ArgumentParser) -> None:
+    """What every training loop can be told."""
+    command.add_argument("--max-steps", type=whole_count, metavar="N", help="stop each stage earlier")
+    command.add_argument("--device", choices=("cpu", "cuda"), default="cpu")
+    command.add_argument("--seed", type=seed, default=0, metavar="N")
+    command.add_argument(
+        "--restart", action="store_true", help="forget what the run folder holds of these stages"
+    )
+    command.add_argument(
+        "--batches",
+        type=whole_count,
+        metavar="N",
+        help="that a step is made of, shared by the processes (default: one each)",
+    )
+    command.add_argument("--precision", choices=("auto", "float32", "bfloat16"), default="auto")
+    command.add_argument("--board", action="store_true", help="also write TensorBoard's logs, in RUN/board")
+
+
+def _add_convert(actions) -> None:
+    command = new_command(actions, "photos", "a published data set to a folder of labelled photos")
+    command.add_argument("layout", choices=LAYOUTS, metavar="LAYOUT", help=", ".join(LAYOUTS))
+    command.add_argument("source", type=Path, metavar="SOURCE", help="the folder or file as downloaded")
+    add_output(command, "FOLDER", "folder to fill; photos that are there are kept")
+    command.add_argument(
+        "--splits", type=Path, metavar="FILE", help="nyu: splits.mat, for its training split"
+    )
+    command.add_argument("--classes", type=Path, metavar="FILE", help="nyu: classMapping40.mat")
+    command.add_argument("--images", type=Path, metavar="FOLDER", help="coco: where the photos are")
+    command.add_argument("--camera", type=Path, metavar="FILE", help="frames: K, nine numbers")
+    command.add_argument("--limit", type=whole_count, metavar="N", help="only the first N photos")
+
+
+def _add_start(command: argparse.ArgumentParser, presets: tuple[str, ...] = ("mini",)) -> None:
+    command.add_argument("--preset", choices=presets, default="mini", help="(default: mini)")
+    command.add_argument(
+        "--start",
+        type=Path,
+        metavar="PATH",
+        help="weights to begin with; their encoder stays as it is (default: the shipped ones)",
+    )
