@@ -24,7 +24,10 @@ ROOT = Path(__file__).resolve().parent.parent
 OTHERS = "others_app-1.0"
 # What a package is imported as, where it may not be installed or does not tell.
 IMPORTED_AS = {"scikit-image": "skimage", "openexr": "OpenEXR"}
-USED_BY_OTHERS = {"pyopengl": "imgui-bundle's backend for glfw draws through it"}
+USED_BY_OTHERS = {
+    "pyopengl": "imgui-bundle's backend for glfw draws through it",
+    "tensorboard": "torch.utils.tensorboard writes through it",
+}
 pytestmark = pytest.mark.slow
 
 

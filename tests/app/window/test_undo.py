@@ -20,7 +20,7 @@ from app.window.editing import pointing as point
 from app.window.editing.state import Region
 from app.window.editing.work import ScoreFloaters, request_for
 from app.window.exporting import commands as export
-from app.window.poses import Pose
+from app.window.poses import Pose, Vector
 from app.window.recovery import commands as keep
 from app.window.scene import camera
 from app.window.scene import commands as show
@@ -113,6 +113,8 @@ def value(name: str, hint, chance: np.random.Generator, state: State):
         return state.info
     if hint is Pose:
         return state.pose
+    if hint is Vector:
+        return Vector(*chance.normal(size=3).tolist())
     if isinstance(hint, type) and issubclass(hint, Enum):
         return list(hint)[chance.integers(len(list(hint)))]
     if is_dataclass(hint) and isinstance(hint, type):
