@@ -132,7 +132,8 @@ class Fading:
         from langflash_core.scene.trust import faded
 
         frame, relevance = self.inner.answered(scene, camera, compiled)
-        return faded(frame, camera, scene), relevance
+        shown = faded(frame, camera, scene)
+        return shown, relevance * (shown.alphas > 0)
 
 
 @contextmanager

@@ -35,7 +35,7 @@ def contact_sheet(
     Args:
         columns: None: as many as make the sheet about as wide as high.
     """
-    cells = [captioned(_thumbnail(picture), caption) for caption, picture in tiles]
+    cells = [captioned(thumbnail(picture), caption) for caption, picture in tiles]
     wide = columns or math.ceil(math.sqrt(len(cells) * cells[0].shape[0] / cells[0].shape[1]))
     blank = np.zeros_like(cells[0])
     cells += [blank] * (-len(cells) % wide)
@@ -43,7 +43,8 @@ def contact_sheet(
     return np.concatenate(rows)
 
 
-def _thumbnail(picture: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "h w 3"]:
+def thumbnail(picture: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "h w 3"]:
+    """As large as a sheet shows it; one of that width stays as it is."""
     height, width = picture.shape[:2]
     size = (_WIDTH, max(1, round(height * _WIDTH / width)))
     return np.asarray(Image.fromarray(picture).resize(size, Image.Resampling.LANCZOS))

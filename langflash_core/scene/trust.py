@@ -35,8 +35,10 @@ def trust(
         points: on surfaces. eyes: places of the photos; all in one world.
     """
     way = torch.nn.functional.normalize(eye - points, dim=-1)
-    ways = torch.nn.functional.normalize(eyes - points[..., None, :], dim=-1)  # (..., V, 3)
-    nearest = (ways * way[..., None, :]).sum(-1).amax(-1)
+    nearest = way.new_full(way.shape[:-1], -1.0)
+    for photo in eyes:  # one after the other: all at once would be V pictures of vectors
+        ways = torch.nn.functional.normalize(photo - points, dim=-1)
+        nearest = torch.maximum(nearest, (ways * way).sum(-1))
     low, high = COSINES
     share = ((nearest - low) / (high - low)).clamp(0, 1)
     return share * share * (3 - 2 * share)

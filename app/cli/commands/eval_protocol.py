@@ -50,7 +50,14 @@ def protocol(args: Namespace, out: TextIO) -> None:
 
 
 def _nyu(args: Namespace, out: TextIO) -> None:
-    """Single photos, as `eval photos-labelled` judges them."""
+    """Single photos, as `eval photos-labelled` judges them.
+
+    Raises:
+        LangFlashError: an option that single photos have no use for, or what `protocol` says.
+    """
+    for name in ("work", "index", "lpips"):
+        if getattr(args, name) is not None:
+            raise InputError(f"nyu judges single photos in one go; leave --{name} away")
     folder = nyu_folder(args.folder)
     ids = folder.ids[: args.limit]
     from langflash_core.lab.evaluation.labelled import run_photos
@@ -96,10 +103,10 @@ def _shelf(args: Namespace, kind: type):
         return None
     key = {
         "protocol": args.name,
-        "folder": args.folder.resolve().name,
+        "folder": str(args.folder.resolve()),
         "weights": identity(args.weights, args.preset),
         "size": args.size,
-        "index": None if args.index is None else args.index.name,
+        "index": None if args.index is None else str(args.index.resolve()),
         "lpips": args.lpips is not None,
     }
     return Shelf(args.work / args.name, key, kind)

@@ -308,7 +308,7 @@ def _write_segmented(args: Namespace, scene: Scene, prompts: list[str], choice: 
 
     cameras = _photos_or(args, scene, choice)
     numbers = list(range(len(cameras))) if _of_photos(args) else [choice.view]
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+    with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade) as renderer:
         subject = taken_apart(scene, prompts, args.threshold, cameras, numbers, renderer)
         return write_folder(args.output, subject, args, progress)
 

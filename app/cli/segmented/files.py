@@ -27,7 +27,7 @@ def write_parts(
     Raises:
         LangFlashError: nothing answers, or a picture cannot be written.
     """
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+    with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade) as renderer:
         numbers = [None] * len(cameras)
         subject = taken_apart(scene, prompts, args.threshold, cameras, numbers, renderer)
         with staged_folder(args.output.parent) as staging:
@@ -60,7 +60,7 @@ def write_depth(args: Namespace, scene: Scene, cameras: Sequence[Camera], target
     """
     metres = scene.record.metric_scale
     unit, maps = depth.unit_name(metres), []
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+    with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade) as renderer:
         for index, camera in enumerate(cameras):
             progress("drawing", index / len(cameras))
             maps.append(depth.lengths(renderer(scene, camera, weight_maps=False), metres))
@@ -93,7 +93,7 @@ def write_surface(args: Namespace, scene: Scene, prompts: list[str]) -> str:
     Raises:
         LangFlashError: nothing answers, scikit-image is missing, or the file cannot be written.
     """
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+    with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade) as renderer:
         progress("drawing", 0.2)
         meshes = surfaces(taken_apart(scene, prompts, args.threshold, (), (), renderer))
     make_folder(args.output.parent)

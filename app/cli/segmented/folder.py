@@ -12,7 +12,7 @@ from langflash_core.errors import MissingPackageError
 from langflash_core.export import depth, glb
 from langflash_core.export.colours import label_colours
 from langflash_core.export.png import to_8bit, write_grey, write_labels, write_mask, write_rgb
-from langflash_core.export.sheet import contact_sheet
+from langflash_core.export.sheet import contact_sheet, thumbnail
 from langflash_core.running import Progress
 from langflash_core.types import SegmentedView
 
@@ -127,4 +127,4 @@ def _tiles(subject: Subject, view: SegmentedView, where: str) -> list[tuple[str,
         lit = matte * view.frame.rgb.cpu().clamp(0, 1) + (1 - matte) * _GREY
         count = subject.segments.counts[phrase]
         tiles.append((subject.segments.prompts[phrase] + (f" ({count})" if count > 1 else ""), to_8bit(lit)))
-    return tiles
+    return [(caption, thumbnail(picture)) for caption, picture in tiles]

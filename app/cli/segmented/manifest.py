@@ -28,7 +28,7 @@ def command(args: Namespace) -> str:
             value = "{}x{}".format(*value)
         if isinstance(value, str | int | float | Path):
             words += [f"--{name}", str(value)]
-    return shlex.join([*words, "--prompt", *args.prompt])
+    return shlex.join([*words, *["--fade"] * args.fade, "--prompt", *args.prompt])
 
 
 def document(

@@ -86,10 +86,8 @@ def scannet_rows(names: Mapping[int, Name]) -> dict[int, int]:
 
 def scannet_views(count: int) -> list[tuple[int, int, int]]:
     """Places of (source, target, source) among `count` sampled frames, as LSM takes them: the neighbours of
-    each target are the photos."""
-    return [
-        (max(i - 1, 0), i, min(i + 1, count - 1)) for i in range(count) if i % HELD in TESTED and count > 1
-    ]
+    each target are the photos; one without two neighbours is no target."""
+    return [(i - 1, i, i + 1) for i in range(1, count - 1) if i % HELD in TESTED]
 
 
 def _scannet(root: Path, index: Path | None) -> Plan:

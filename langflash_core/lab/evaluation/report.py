@@ -100,7 +100,7 @@ def sections(sources: Sources, place: Workplace) -> Iterator[Section]:
 def rooms_section(data: Path, place: Workplace, limit: int | None = None) -> Section:
     """Furnished rooms whose furniture no training saw, every rival in the same run."""
     setting, held_out = rooms.open_rooms(data, place.weights, preset=place.preset, limit=limit)
-    shelf = place.shelf("rooms", rooms.Tally, data=data.resolve().name, groups=len(setting.groups))
+    shelf = place.shelf("rooms", rooms.Tally, data=str(data.resolve()), groups=len(setting.groups))
     kept, gallery = _told(
         place, shelf, len(held_out), lambda look: rooms.room_tallies(setting, held_out, shelf, look)
     )
@@ -130,7 +130,7 @@ def rooms_section(data: Path, place: Workplace, limit: int | None = None) -> Sec
 def posed_section(folder: PhotoFolder, place: Workplace, limit: int | None = None) -> Section:
     """Pairs of real photos whose poses somebody measured."""
     triples = chosen_triples(folder.ids, limit or PAIRS, APART)
-    shelf = place.shelf("posed", posed.Tally, folder=folder.root.name)
+    shelf = place.shelf("posed", posed.Tally, folder=str(folder.root.resolve()))
     kept, gallery = _told(
         place,
         shelf,
@@ -159,7 +159,9 @@ def posed_section(folder: PhotoFolder, place: Workplace, limit: int | None = Non
 def photos_section(folder: PhotoFolder, ids: Sequence[str], place: Workplace) -> Section:
     """Single real photos that somebody labelled."""
     judged = labelled.judged_by(folder, place.render, place.weights, preset=place.preset)
-    shelf = place.shelf("photos", labelled.Tally, folder=folder.root.name, words=len(judged.words.phrases))
+    shelf = place.shelf(
+        "photos", labelled.Tally, folder=str(folder.root.resolve()), words=len(judged.words.phrases)
+    )
     kept, gallery = _told(
         place, shelf, len(ids), lambda look: labelled.photo_tallies(judged, folder, ids, shelf, look)
     )

@@ -414,8 +414,10 @@ def judge_views(
         _count_labels(setting, record, view, vectors, tally, counted)
     found = torch.einsum("khw,kc->hwc", prediction.weights[0], prediction.dictionary) @ setting.texts.T
     beside = torch.einsum("khw,kc->hwc", maps, prediction.dictionary) @ setting.texts.T
-    labels = torch.stack((found.argmax(-1), beside.argmax(-1).masked_fill(~shown, -1))).numpy()
-    judge_target(setting, record, prediction, maps, labels, tally)
+    drawn = maps.sum(0) > 0
+    named = beside.argmax(-1).masked_fill(~(shown & drawn), -1)
+    labels = torch.stack((found.argmax(-1), named)).numpy()
+    judge_target(setting, record, prediction, maps, labels, shown.numpy(), tally)
     tally.note(ssim_whole_picture=ssim(rgb, photo))
     if look is not None:
         look(_sight(setting, record, rgb, labels, tally))
@@ -427,6 +429,7 @@ def judge_target(
     prediction: Prediction,
     maps: Tensor,
     labels: np.ndarray,
+    shown: np.ndarray,
     tally: Tally,
 ) -> None:
     """Segments and borders of the target view where a photo sees it, and whether it is named as photo 0.
@@ -435,12 +438,13 @@ def judge_target(
 
     Args:
         maps: (K, H, W), drawn. labels: (2, H, W), rows of `setting.groups` in photo 0 and, where a photo
-            sees it, in the target view; -1 elsewhere.
+            sees it and the scene covers it, in the target view; -1 elsewhere. shown: (H, W), where a photo
+            sees the target view: there a hole is wrong.
     """
     truth = _class_rows(setting, record, 2)
-    truth[labels[1] < 0] = -1
+    truth[~shown] = -1
     instances = np.where(truth < 0, -1, record.instances[2].numpy().astype(np.int64))
-    atoms = maps.argmax(0).numpy()
+    atoms = np.where((maps.sum(0) > 0).numpy(), maps.argmax(0).numpy(), -1)
     kinds = (prediction.dictionary @ setting.texts.T).argmax(1).tolist()
     true_kinds = {i: setting.groups.index(label.group) for i, label in enumerate(record.labels)}
     stuff = {row for row, group in enumerate(setting.groups) if group in STUFF}

@@ -155,16 +155,23 @@ def border(mask: Bool[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
 
 
 def border_f(
-    found: Bool[np.ndarray, "H W"], truth: Bool[np.ndarray, "H W"], tolerance: float = 0.008
+    found: Bool[np.ndarray, "H W"],
+    truth: Bool[np.ndarray, "H W"],
+    tolerance: float = 0.008,
+    judged: Bool[np.ndarray, "H W"] | None = None,
 ) -> float:
     """F measure of two masks' borders; NaN where neither has one.
 
     A border pixel is right when the other border is within `tolerance` of the picture's diagonal,
-    rounded up, by a disk.
+    rounded up, by a disk. judged: where the truth is known; None: everywhere. Next to what is not known
+    no pixel is a border, since an edge of knowledge is no edge of a thing.
 
     Source: Perazzi et al., A Benchmark Dataset for Video Object Segmentation (DAVIS), CVPR 2016.
     """
     own, real = border(found), border(truth)
+    if judged is not None:
+        inside = ~binary_dilation(~judged, np.ones((3, 3), bool))
+        own, real = own & inside, real & inside
     if not own.any() and not real.any():
         return math.nan
     radius = math.ceil(tolerance * math.hypot(*found.shape))
@@ -178,11 +185,11 @@ def border_f(
 def label_border_f(
     found: Integer[np.ndarray, "H W"], truth: Integer[np.ndarray, "H W"], tolerance: float = 0.008
 ) -> float:
-    """`border_f` of label maps, mean over the labels of the truth; -1 is no label, and such pixels of the
-    truth belong to no mask of either."""
+    """`border_f` of label maps, mean over the labels of the truth; -1 is no label, and no border is
+    looked for next to such pixels of the truth."""
     judged = truth >= 0
     values = [
-        border_f((found == label) & judged, truth == label, tolerance)
+        border_f(found == label, truth == label, tolerance, judged)
         for label in np.unique(truth[judged]).tolist()
     ]
     known: Float[np.ndarray, " n"] = np.array([v for v in values if not math.isnan(v)], dtype=np.float64)

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 import torch
 from torch import Tensor
 
+from langflash_core import __version__
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.evaluation.intervals import bootstrap
 from langflash_core.lab.evaluation.metrics import PoseError, Presence
@@ -25,6 +26,8 @@ from langflash_core.network.checkpoints.store import part_folder
 from langflash_core.resources import asset_path
 
 Item = TypeVar("Item")
+MEASURES = 1
+"""Raised whenever a measure changes, so that what was kept before is judged anew."""
 _VALUES: dict[str, type] = {kind.__name__: kind for kind in (PoseError, Presence, ClassQuality, Panoptic)}
 _TYPES = {str(kind): kind for kind in (torch.int64, torch.float32, torch.float64, torch.bool)}
 
@@ -125,7 +128,7 @@ class Shelf:
         """The tally of a scene; None where there is none, or one that was made otherwise."""
         try:
             document = json.loads((self.folder / f"{name}.json").read_bytes())
-            if document["key"] != json.loads(json.dumps(self.key)):
+            if document["key"] != json.loads(json.dumps(self._stamped())):
                 return None
             return revived(document["tally"], {self.kind.__name__: self.kind})
         except (OSError, ValueError, KeyError, TypeError):
@@ -138,8 +141,11 @@ class Shelf:
             OutputError: it cannot be written.
         """
         make_folder(self.folder)
-        document = {"key": self.key, "tally": plain(tally)}
+        document = {"key": self._stamped(), "tally": plain(tally)}
         write_atomically(self.folder / f"{name}.json", json.dumps(document, allow_nan=False).encode())
+
+    def _stamped(self) -> dict[str, object]:
+        return {"langflash": __version__, "measures": MEASURES, **self.key}
 
 
 def identity(weights: Path | None, preset: str) -> str:

@@ -29,7 +29,7 @@ class SkippingBlock(Block):
     def _some(self, change: Tensor) -> Tensor:
         if not self.training:
             return change
-        kept = torch.rand(len(change), 1, 1, device=change.device) >= SKIPPED
+        kept = torch.rand(len(change), 1, 1) >= SKIPPED  # drawn where the run's generator is
         return change * (kept.to(change) / (1 - SKIPPED))
 
 

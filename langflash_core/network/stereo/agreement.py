@@ -22,7 +22,7 @@ _KNOTS = 5  # a side
 _STEP = 4  # every fourth pixel of a row and of a column is compared for the correction
 _ITERATIONS = 3
 _SCALE = 0.04  # relative difference from which a pixel speaks less and less (Geman-McClure)
-_INDEPENDENT = 400  # pixels go together: all compared ones count as this many
+_INDEPENDENT = 200  # pixels go together: all compared ones count as this many a view
 _EXPECTED = 0.075  # of a knot, where nothing is compared
 _BEND = 0.06  # of a knot against its neighbour
 _SAME = 0.06  # maps that differ by less, relatively, show one surface
@@ -124,7 +124,7 @@ def _comparisons(
             right[a] += weighted.T @ gap
             right[b] -= weighted_other.T @ gap
             count += len(gap)
-    share = min(1.0, _INDEPENDENT / max(count, 1))
+    share = min(1.0, _INDEPENDENT * num_views / max(count, 1))
     return normal.flatten(2).flatten(0, 1) * share, right.flatten() * share
 
 

@@ -76,6 +76,20 @@ def test_nothing_is_nan():
     assert math.isnan(segments.border_f(np.ones((5, 5), dtype=bool), np.ones((5, 5), dtype=bool)))
 
 
+def test_an_edge_of_knowledge_is_no_border():
+    """Half and half, wrong by 24 columns; with every twentieth pixel unknown it is as wrong as before."""
+    truth = np.zeros((96, 128), np.int64)
+    truth[:, 64:] = 1
+    found = np.zeros_like(truth)
+    found[:, 88:] = 1
+    assert segments.label_border_f(found, truth) == 0
+    truth[np.random.default_rng(0).random(truth.shape) < 0.05] = -1
+    assert segments.label_border_f(found, truth) == 0
+    full = np.zeros_like(truth)
+    full[:, 64:] = 1
+    assert segments.label_border_f(full, truth) == 1
+
+
 def test_pictures_add_up():
     one, other = quality(ROWS, ROWS), quality(np.zeros_like(ROWS), ROWS)
     both = one + other

@@ -154,6 +154,10 @@ def _optimising(table: dict[str, Any], path: Path) -> Optimising:
     betas = table["betas"]
     if len(betas) != 2 or not all(isinstance(beta, float) and 0 <= beta < 1 for beta in betas):
         raise InputError(f"{path}, optimising: betas are two numbers from 0 to 1")
+    if table["warm_up"] < 1 or table["clip"] <= 0 or table["weight_decay"] < 0:
+        raise InputError(f"{path}, optimising: warm_up and clip are above 0, weight_decay is not below 0")
+    if not 0 <= table["final_share"] <= 1:
+        raise InputError(f"{path}, optimising: final_share is a share, 0 to 1, of the rate")
     return Optimising(**{**table, "betas": (betas[0], betas[1]), "warm_up": int(table["warm_up"])})
 
 
