@@ -103,7 +103,7 @@ class GlRenderer:
     def _show(self, scene: Scene) -> None:
         if scene is not self._scene:
             self._splats.set_scene(scene)
-            self._scene = scene
+            self._scene, self._asked = scene, None
 
     def release(self) -> None:
         """Give the context back."""

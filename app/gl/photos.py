@@ -70,11 +70,12 @@ class PhotoDepths:
 
 
 def photo_places(scene: Scene, camera: Camera) -> dict[str, np.ndarray | int]:
-    """Values of show_faded.frag: where the photos of a scene stand as a picture's camera has them."""
+    """Values of show_faded.frag: where the nearest photos stand, in the axes of a picture's camera."""
+    places = (np.linalg.inv(_numbers(scene.viewmats))[:, :, 3] @ _numbers(camera.viewmat).T)[:, :3]
+    near = places[np.argsort(np.linalg.norm(places, axis=1), kind="stable")[:MOST_PHOTOS]]
     eyes = np.zeros((MOST_PHOTOS, 3))
-    places = np.linalg.inv(_numbers(scene.viewmats[:MOST_PHOTOS]))[:, :, 3]
-    eyes[: len(places)] = (places @ _numbers(camera.viewmat).T)[:, :3]
-    return {"num_photos": len(places), "pinhole": _pinhole(camera), "eyes": eyes}
+    eyes[: len(near)] = near
+    return {"num_photos": len(near), "pinhole": _pinhole(camera), "eyes": eyes}
 
 
 def _small(camera: Camera) -> Camera:

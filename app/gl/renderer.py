@@ -312,10 +312,11 @@ class SplatRenderer:
             self._picture = None
             self._scene.forget()
 
-    def carry(self) -> None:
-        """Make what Gaussians carry for the phrases in the fast mode now, not with the next picture."""
-        if self._scene is not None and self._question is not None:
-            self._question.numbers(self._scene.whole)
+    def carry(self, share: float = 1.0) -> None:
+        """Make what this share of the Gaussians carries for the phrases in the fast mode now, not with the
+        next picture."""
+        if self._scene is not None and self._question is not None and self._question.fits_fast:
+            self._question.numbers(self._scene.level(share))
 
     # --- numbers ------------------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import count
+from threading import Lock
 
 import numpy as np
 import torch
@@ -34,6 +35,7 @@ class StillMaps:
 
     weights: Tensor = field(repr=False)
     _made: dict[tuple, np.ndarray] = field(default_factory=dict, repr=False, compare=False)
+    _lock: Lock = field(default_factory=Lock, repr=False, compare=False)
 
     def pixel(self, x: int, y: int) -> np.ndarray:
         """(K,) float32 of one pixel."""
@@ -63,12 +65,15 @@ class StillMaps:
         return self._kept(("mixed", table.numpy().tobytes()), mix)
 
     def _kept(self, key: tuple, make: Callable[[], np.ndarray]) -> np.ndarray:
-        if key not in self._made:
+        made = self._made.get(key)
+        if made is None:
             made = make()
+        with self._lock:  # the artist makes, the window reads; what is asked for stays longest
+            self._made.pop(key, None)
             while len(self._made) >= _KEPT:
                 self._made.pop(next(iter(self._made)))
             self._made[key] = made
-        return self._made[key]
+        return made
 
 
 def _name(compiled: CompiledQuery) -> tuple:

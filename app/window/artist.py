@@ -77,10 +77,12 @@ class Artist:
             assert wanted is not None
             result = self._made(wanted)
             with self._changed:
-                if self._wanted is not wanted:
-                    continue
-                self._wanted, self._done = None, (wanted[0], result)
-            self._notify()
+                current = self._wanted is wanted
+                if current:
+                    self._wanted, self._done = None, (wanted[0], result)
+            del wanted, result  # a picture and its scene, while this thread waits
+            if current:
+                self._notify()
 
     def _made(self, wanted: tuple[Hashable, Work]) -> Any:
         try:

@@ -79,7 +79,7 @@ class State:
 
     now: float = 0.0
     photos: tuple[Photo, ...] = ()
-    aside: tuple[Photo, ...] = ()
+    aside: tuple[Photo, ...] | None = None
     choosing: bool = False
     info: SceneInfo | None = None
     rooms: tuple[Room, ...] = ()

@@ -4,6 +4,7 @@ Owns the `SplatRenderer`. Draws a new picture only when the pose, the panel, the
 is asked for has changed; a new phrase on a resting picture is a query pass and no splat pass.
 """
 
+import logging
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -14,6 +15,7 @@ import moderngl
 import numpy as np
 
 from langflash_core.colormaps import HeatColours
+from langflash_core.errors import GraphicsError
 from langflash_core.scene.edits import Marks, Mask
 
 from .artist import Artist, Asked
@@ -33,6 +35,8 @@ if TYPE_CHECKING:
     from ..gl import SplatRenderer
     from ..gl.still import Still
 
+
+log = logging.getLogger(__name__)
 
 BACKGROUND = (0.055, 0.06, 0.07)  # the theme's canvas
 STILLS = (0.5, 1.0)
@@ -133,11 +137,15 @@ class Viewport:
         """Compile shaders while there is no scene, a few a call; whether there is more to do."""
         if self._serial:
             return False
-        if self._warming is None:
-            from ..gl.warming import warm_up
+        try:
+            if self._warming is None:
+                from ..gl.warming import warm_up
 
-            self._warming = warm_up(self._made())
-        return next(self._warming, self) is not self
+                self._warming = warm_up(self._made())
+            return next(self._warming, self) is not self
+        except (GraphicsError, moderngl.Error):  # whoever needs that shader will say so
+            log.exception("a shader could not be compiled ahead")
+            return False
 
     def set_scene(self, serial: int, scene: "Scene") -> None:
         """Upload a scene; the first one builds the renderer.
@@ -253,8 +261,9 @@ class Viewport:
         elif not self._covers(wanted):
             if not self._carried and self._renderer is not None:
                 self._carried = True
-                self._renderer.carry()
-                return 0.0
+                if wanted.plan.kind is Kind.FAST:
+                    self._renderer.carry(wanted.plan.share)
+                    return 0.0
             self._draw(wanted, moving=True)
             self._unpainted = self.picture_seconds > LONG_SECONDS
             if self._unpainted:
@@ -274,7 +283,8 @@ class Viewport:
 
     def _order(self, artist: Artist, wanted: _Drawn, kind: Kind, state: State) -> None:
         """The next still picture, or what the one on show does not tell yet."""
-        scales = (scale for scale in STILLS if not self._covers(wanted.at(kind, scale)))
+        finer = (scale for scale in STILLS if scale >= wanted.plan.scale)  # a coarser one would be drawn over
+        scales = (scale for scale in finer if not self._covers(wanted.at(kind, scale)))
         scale = next(scales, None)
         if scale is None or self._finished is not None:
             still = self._still if self._finished is None else self._finished[1]
@@ -419,7 +429,8 @@ class Viewport:
         mode = state.mode if drawn.plan.covers(replace(drawn.plan, kind=_kind(state))) else Mode.RGB
         if (mode.answers and (not asked or len(asked) != len(self._keys))) or not mode.possible(state.info):
             mode = Mode.RGB
-        if self._still is not None and not self._tells(self._still, state):
+        answers = mode.answers or mode in (Mode.ATOMS, Mode.FEATURES)
+        if answers and self._still is not None and not self._tells(self._still, state):
             return  # what is on show stays until the answer is there
         active = next((i for i, p in enumerate(asked) if p.key == state.active), 0)
         colours = state.heat_colours
@@ -434,8 +445,11 @@ class Viewport:
         if colouring != self._colouring:
             self._colouring = colouring
             faded = state.preferences.near_photos and mode is Mode.RGB
-            picture = _picture(renderer, mode, asked, active, state.asking.atom, colours)
-            self._texture = renderer.faded_texture() if faded else picture
+            self._texture = (
+                renderer.faded_texture()
+                if faded
+                else _picture(renderer, mode, asked, active, state.asking.atom, colours)
+            )
 
 
 def torch_of(values: np.ndarray) -> "Tensor":

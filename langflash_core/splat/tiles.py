@@ -74,9 +74,13 @@ def rasterize_tiles(
 
     shares = lists.tiles.split(_TILES_AT_ONCE)
     # Each of our threads computes alone: those of torch's own pool would wait for each other at every call.
-    with ThreadPoolExecutor(max(1, threads), initializer=lambda: torch.set_num_threads(1)) as pool:
-        for _ in pool.map(fill, shares):
-            pass
+    before = torch.get_num_threads()
+    try:
+        with ThreadPoolExecutor(max(1, threads), initializer=lambda: torch.set_num_threads(1)) as pool:
+            for _ in pool.map(fill, shares):
+                pass
+    finally:
+        torch.set_num_threads(before)  # it is also what threads begin with that first compute after this
     *maps, alphas = (_untiled(image, lists.grid)[: camera.height, : camera.width] for image in images)
     return maps, alphas[..., 0]
 

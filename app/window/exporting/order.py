@@ -56,7 +56,7 @@ def order(state: State) -> Order | str:
         words += ["--what", form.what.word]
     if phrases:
         words += ["--prompt", *phrases, *_threshold(state)]
-    if form.what is What.HEAT:
+    if form.what in (What.HEAT, What.HEAT_VIDEO):
         words += _colours(state)
     seen_from, camera_file = _seen_from(state, target)
     words += seen_from

@@ -72,6 +72,8 @@ def _samples() -> list[do.Command]:
     if imgui.begin_menu(f"{fa.ICON_FA_IMAGES}   Sample photos", True):
         for label, photos in samples.pairs():
             if imgui.menu_item(label, "", False, True)[0]:
-                issued.append(show.Instead((show.ClearPhotos(), show.AddPhotos(photos), show.Reconstruct())))
+                issued.append(
+                    show.Instead((show.SetPhotosAside(), show.AddPhotos(photos), show.Reconstruct()))
+                )
         imgui.end_menu()
     return issued

@@ -11,7 +11,7 @@ from ..commands import NOTHING_TO_SAVE, Command, Notify, ShowDialog
 from ..editing.state import fresh
 from ..state import State
 from .drops import MAX_PHOTOS
-from .state import MOST_ROOMS, Job, Photo, Room, SceneInfo
+from .state import MOST_ROOMS, RECONSTRUCTING, Job, Photo, Room, SceneInfo
 
 # Photos
 
@@ -57,7 +57,7 @@ class SetPhotosAside:
     """Empty the tray for a new room; the photos come back where it cannot be made."""
 
     def apply(self, state: State) -> State:
-        return replace(state, photos=(), aside=state.photos)
+        return replace(state, photos=(), aside=scene_photos(state))
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ class Reconstruct:
     def apply(self, state: State) -> State:
         if not state.photos:
             return Notify("There is no photo to reconstruct; drop two photos on the window.").apply(state)
-        return replace(state, job=Job("Reconstructing", "starting", started=state.now))
+        return replace(state, job=Job(RECONSTRUCTING, "starting", started=state.now))
 
 
 @dataclass(frozen=True)
@@ -240,7 +240,7 @@ class SceneArrived:
             photos=() if self.alone else state.photos,
             prompts=prompts,
             job=None,
-            aside=(),
+            aside=None,
             flight=None,
             pose=self.info.views[0] if self.info.views else poses.START,
             view=0 if self.info.views else None,
@@ -251,9 +251,7 @@ def _rooms(state: State, coming: SceneInfo) -> tuple[Room, ...]:
     """Those to go back to once `coming` is on show; the same file twice only where there are edits."""
     info, editing = state.info, state.editing
     left = (
-        ()
-        if info is None
-        else (Room(info, state.aside or state.photos, editing.history, editing.saved, state.pose),)
+        () if info is None else (Room(info, scene_photos(state), editing.history, editing.saved, state.pose),)
     )
     rooms = (room for room in (*left, *state.rooms) if room.info.serial != coming.serial)
     kept = (room for room in rooms if room.edited or room.info.path is None or room.info.path != coming.path)
@@ -391,8 +389,15 @@ class JobCancelled:
 
 
 def _ended(state: State) -> State:
-    """Without its job: the tray is that of the scene on show."""
-    return replace(state, job=None, photos=state.aside or state.photos, aside=())
+    """Without its job; where that was to make a new room, the tray is that of the scene on show again."""
+    if state.job is not None and state.job.title != RECONSTRUCTING:
+        return replace(state, job=None)
+    return replace(state, job=None, photos=scene_photos(state), aside=None)
+
+
+def scene_photos(state: State) -> tuple[Photo, ...]:
+    """Those of the scene on show, while the tray may hold a new room's."""
+    return state.photos if state.aside is None else state.aside
 
 
 def _change_photo(state: State, path: Path, **changes: Any) -> State:

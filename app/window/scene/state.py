@@ -70,6 +70,10 @@ class Photo:
     notes: tuple[str, ...] = ()
 
 
+RECONSTRUCTING = "Reconstructing"
+"""Title of the job that makes a scene out of the tray."""
+
+
 @dataclass(frozen=True)
 class Job:
     """Work under way. done: finished stages with their seconds; started: when `stage` began."""

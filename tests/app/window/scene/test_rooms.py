@@ -181,3 +181,26 @@ def test_the_room_left_keeps_its_own_photos() -> None:
     state = after(state, show.SceneArrived(replace(state.info, serial=2, path=None)))
     assert [p.path.name for p in state.photos] == ["new.png"]
     assert [p.path.name for p in state.rooms[0].photos] == ["old.png"]
+
+
+def test_photos_set_aside_twice_are_not_lost() -> None:
+    state = replace(shown_scene(), photos=(Photo(Path("old.png")),))
+    state = after(state, show.SetPhotosAside(), show.AddPhotos((Path("new.png"),)))
+    state = after(state, show.SetPhotosAside(), show.AddPhotos((Path("newer.png"),)), show.Reconstruct())
+    state = after(state, show.JobFailed("nothing to see"))
+    assert [p.path.name for p in state.photos] == ["old.png"]
+
+
+def test_a_scene_that_has_no_photos_gets_nobody_elses() -> None:
+    state = after(
+        shown_scene(), show.SetPhotosAside(), show.AddPhotos((Path("new.png"),)), show.Reconstruct()
+    )
+    assert state.info is not None
+    state = after(state, show.SceneArrived(replace(state.info, serial=2, path=None)))
+    assert state.rooms[0].photos == ()
+
+
+def test_a_scene_that_cannot_be_opened_leaves_waiting_photos() -> None:
+    state = after(shown_scene(), show.SetPhotosAside(), show.AddPhotos((Path("new.png"),)))
+    state = after(state, show.OpenScene(Path("missing.langflash")), show.JobFailed("there is no such file"))
+    assert [p.path.name for p in state.photos] == ["new.png"]

@@ -1,0 +1,63 @@
+"""Where OpenGL runs on the processor a picture comes to rest, whatever size it moves at."""
+
+import time
+from dataclasses import replace
+
+import pytest
+
+from app.gl import offscreen_context
+from app.window.governor import Governor, Kind, Plan
+from app.window.scene.state import Mode
+from app.window.viewport import Viewport
+from langflash_core.errors import GraphicsError
+from langflash_core.language.relevance import compile_query
+from langflash_core.language.spaces import language_space
+from tests.app.window.scenes import PHRASES, room, shown_scene
+
+SIZE = (160, 120)
+
+
+class Stubborn(Governor):
+    """Moves at three quarters of the size, however quick this machine is."""
+
+    def moving(self, wanted: Kind) -> Plan:
+        return Plan(wanted, 0.75)
+
+
+@pytest.fixture
+def context():
+    try:
+        made = offscreen_context()
+    except GraphicsError as problem:
+        pytest.skip(str(problem))
+    yield made
+    made.release()
+
+
+def test_a_picture_comes_to_rest_in_full(context) -> None:
+    """A half-size picture that does not cover what moves would be drawn over, and ordered again, for ever."""
+    space = language_space("minilm")
+    shown = shown_scene()
+    assert shown.info is not None
+    scene = room(space.encode(list(PHRASES)))
+    state = replace(shown, mode=Mode.HEAT, info=replace(shown.info, scene=scene))
+    with context:
+        viewport = Viewport(context)
+        viewport.set_scene(1, scene)
+        if viewport._artist is None:
+            pytest.skip("OpenGL here has a graphics card, which draws all pictures itself")
+        viewport.ask((0,), compile_query(scene, space, list(PHRASES[:1])))
+        plans: list[Plan] = []
+        for _ in range(300):
+            viewport.governor = Stubborn(slow=True)
+            state = replace(state, now=state.now + 0.05)
+            viewport.update(state, SIZE, touched=0.0)
+            plan = getattr(viewport.drawn, "plan", None)
+            if plan is not None and (not plans or plans[-1] != plan):
+                plans.append(plan)
+            if plan == Plan(Kind.MAPS) and not viewport.settling:
+                break
+            time.sleep(0.01)
+        viewport.release()
+    assert plans[-1] == Plan(Kind.MAPS)
+    assert len(plans) <= 3, "the moving one, and what follows it at rest"
