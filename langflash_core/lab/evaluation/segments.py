@@ -170,7 +170,7 @@ def border_f(
     """
     own, real = border(found), border(truth)
     if judged is not None:
-        inside = ~binary_dilation(~judged, np.ones((3, 3), bool))
+        inside = np.logical_not(binary_dilation(~judged, np.ones((3, 3), bool)))
         own, real = own & inside, real & inside
     if not own.any() and not real.any():
         return math.nan
