@@ -12,7 +12,7 @@ import logging
 import math
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -228,7 +228,7 @@ class _Training:
         self.state.begun += 1
         told: list[dict[str, float]] = []
         seeds: list[Any] = []
-        for place, draws in enumerate(self.draws):
+        for draws in self.draws:
             with draws.drawing() as words:
                 with self._spending("reading"):
                     batch = self._draw(words.generator)
@@ -239,8 +239,7 @@ class _Training:
             if not everywhere(good, self.options.device):
                 self._skip(seeds[-1], good)
                 return
-            last = place + 1 == len(self.draws)
-            with self._spending("backward"), self._apart(last):
+            with self._spending("backward"):  # averages over processes each time, which adds up to the same
                 (total / len(self.draws)).backward()
             told.append({"loss": float(total.detach()), **self.inner.parts})
         with self._spending("update"):
@@ -254,11 +253,6 @@ class _Training:
         if seek is not None:  # of sets whose steps differ
             seek(self.state.begun)
         return self.rooms.draw(count, views, generator).to(self.options.device)
-
-    def _apart(self, last: bool) -> AbstractContextManager:
-        """A context in which gradients stay in this process, for all batches but the last of a step."""
-        alone = isinstance(self.loss, DistributedDataParallel) and not last
-        return self.loss.no_sync() if alone else nullcontext()  # type: ignore[union-attr]
 
     def _update(self, told: list[dict[str, float]], seeds: list[Any]) -> None:
         options, rule = self.options, self.options.optimising
