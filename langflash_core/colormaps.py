@@ -37,7 +37,7 @@ class HeatColours:
 
 @lru_cache
 def colour_stops(colormap: str = COLOUR_MAPS[0]) -> np.ndarray:
-    """(NUM_STOPS, 3) float32 in [0, 1], evenly spaced: a colour map, as shaders and `heat` draw it.
+    """(NUM_STOPS, 3) float32 in [0, 1], evenly spaced and read-only: a colour map, as shaders and `heat` draw it.
 
     Raises:
         ValueError: there is none of this name.
@@ -53,7 +53,9 @@ def colour_stops(colormap: str = COLOUR_MAPS[0]) -> np.ndarray:
         bgr = cv2.applyColorMap(np.arange(256, dtype=np.uint8), getattr(cv2, f"COLORMAP_{colormap.upper()}"))
         table = bgr.reshape(-1, 3)[:, ::-1] / 255
     known = np.linspace(0, 1, len(table))
-    return np.stack([np.interp(shares, known, table[:, c]) for c in range(3)], -1).astype(np.float32)
+    stops = np.stack([np.interp(shares, known, table[:, c]) for c in range(3)], -1).astype(np.float32)
+    stops.flags.writeable = False  # everyone who asks gets this one
+    return stops
 
 
 def colour_bar(colormap: str, width: int = 256) -> np.ndarray:

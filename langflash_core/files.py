@@ -36,7 +36,7 @@ def write_atomically(path: Path, content: bytes | Iterable[bytes]) -> None:
     if not os.path.isdir(folder):
         state = "is a file" if os.path.exists(folder) else "does not exist"
         raise OutputError(f"cannot write {path}: {folder} {state}; create that folder first")
-    temporary = _part(path)
+    temporary = part_beside(path)
     with _cleared(path, temporary):
         with temporary.open("xb") as stream:
             for part in (content,) if isinstance(content, bytes) else content:
@@ -54,7 +54,7 @@ def written_atomically(path: Path) -> Iterator[Path]:
         OutputError: the folder cannot be made or written, or the disk is full.
     """
     make_folder(path.parent)
-    temporary = _part(path)
+    temporary = part_beside(path)
     with _cleared(path, temporary):
         yield temporary
         os.replace(temporary, path)
@@ -68,7 +68,7 @@ def filled_atomically(folder: Path) -> Iterator[Path]:
         OutputError: the folder cannot be made or written, a file is in its place, or the disk is full.
     """
     make_folder(folder.parent)
-    temporary, old = _part(folder), _part(folder)
+    temporary, old = part_beside(folder), part_beside(folder)
     if os.path.isfile(folder):
         raise OutputError(f"cannot write {folder}: a file of that name is in the way; choose another place")
     with _cleared(folder, temporary, old):
@@ -87,7 +87,7 @@ def held_alone(folder: Path) -> Iterator[None]:
         OutputError: one has it, or the folder cannot be made or written.
     """
     make_folder(folder)
-    own = _part(folder / _HELD)
+    own = part_beside(folder / _HELD)
     try:
         own.touch()
         others = [name for name in os.listdir(folder) if name.startswith(f".{_HELD}.") and name != own.name]
@@ -133,8 +133,8 @@ def _cleared(path: Path, *temporaries: Path) -> Iterator[None]:
             _remove(temporary)
 
 
-def _part(path: Path) -> Path:
-    """The hidden file to write to beside `path`, after those of processes that are gone were swept up."""
+def part_beside(path: Path) -> Path:
+    """The hidden file or folder to write to beside `path`; those of processes that are gone are swept up."""
     with suppress(OSError):
         for name in os.listdir(path.parent):
             found = _PART.fullmatch(name)

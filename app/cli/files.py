@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from langflash_core.errors import InputError, OutputError, SceneFileError
+from langflash_core.files import part_beside
 from langflash_core.formats import kind_of
 
 
@@ -113,7 +114,8 @@ def staged_folder(folder: Path) -> Iterator[Path]:
     Raises:
         OutputError: a file cannot be moved, because a folder of its name is in the way.
     """
-    staging = Path(tempfile.mkdtemp(prefix=".langflash-", dir=_nearest(folder)))
+    staging = part_beside(_nearest(folder) / folder.name)
+    staging.mkdir(mode=0o700)
     try:
         yield staging
         files = (file for file in sorted(staging.rglob("*")) if file.is_file())

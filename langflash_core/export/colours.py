@@ -18,7 +18,7 @@ def heat(values: Tensor, colormap: str = COLOUR_MAPS[0]) -> Tensor:
     Raises:
         ValueError: there is no such colour map.
     """
-    stops = torch.from_numpy(colour_stops(colormap)).to(values.device)
+    stops = torch.tensor(colour_stops(colormap), device=values.device)
     position = torch.nan_to_num(values.float(), nan=0.0).clamp(0, 1) * (len(stops) - 1)
     lower = position.floor().clamp_max(len(stops) - 2).long()
     share = (position - lower)[..., None]

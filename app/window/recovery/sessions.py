@@ -9,6 +9,7 @@ import os
 import sys
 from contextlib import suppress
 from dataclasses import asdict, replace
+from math import isfinite
 from pathlib import Path
 from typing import BinaryIO
 
@@ -80,7 +81,7 @@ def _asked(content: dict, count: int) -> dict[str, tuple]:
     if any(len(bytes.fromhex(each)) % 4 for each in lists["likes"]):
         raise ValueError("expected whole numbers of a language vector")
     colours = tuple(tuple(min(max(float(part), 0.0), 1.0) for part in each) for each in lists["colours"])
-    if any(len(each) != 3 for each in colours):
+    if any(len(each) != 3 or not all(map(isfinite, each)) for each in colours):
         raise ValueError("expected three numbers of a colour")
     return {
         "likes": tuple(lists["likes"]),

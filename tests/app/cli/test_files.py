@@ -1,4 +1,6 @@
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -24,6 +26,23 @@ def test_files_beside_are_kept_and_old_ones_replaced(tmp_path):
         (staging / "x.txt").write_bytes(b"new")
     assert (tmp_path / "x.txt").read_bytes() == b"new"
     assert sorted(os.listdir(tmp_path)) == ["mine.txt", "x.txt"]
+
+
+def test_what_a_killed_process_leaves_goes_at_the_next_write(tmp_path):
+    code = """if True:
+        import os, sys
+        from pathlib import Path
+        from app.cli.files import staged_folder
+
+        with staged_folder(Path(sys.argv[1]) / "new") as staging:
+            (staging / "x.txt").write_bytes(b"x")
+            os._exit(9)
+    """
+    assert subprocess.run([sys.executable, "-c", code, str(tmp_path)]).returncode == 9
+    assert len(os.listdir(tmp_path)) == 1
+    with staged_folder(tmp_path / "new") as staging:
+        (staging / "x.txt").write_bytes(b"x")
+    assert os.listdir(tmp_path) == ["new"]
 
 
 @pytest.mark.parametrize("stop", [KeyboardInterrupt, ValueError])

@@ -96,3 +96,11 @@ def test_phrases_come_back_in_their_colours_shown_or_not(folders: Path) -> None:
     assert read is not None and (read.colours, read.visible) == (colours, (False, True))
     rows = restored_phrases(State(), read).prompts
     assert [(row.colour, row.visible) for row in rows] == [(colours[0], False), (colours[1], True)]
+
+
+def test_a_colour_that_is_no_number_is_damage(folders: Path) -> None:
+    keeper, colours = Keeper(), ((0.1, float("nan"), 0.3),)
+    keeper.keep(Kept(phrases=("door",), colours=colours, visible=(True,)))
+    read = sessions.read(next(state_folder().glob("*.json")))
+    keeper.close()
+    assert read is None
