@@ -37,7 +37,7 @@ class HeatColours:
 
 @lru_cache
 def colour_stops(colormap: str = COLOUR_MAPS[0]) -> np.ndarray:
-    """(NUM_STOPS, 3) float32 in [0, 1], evenly spaced, read-only: a colour map, as shaders and `heat` draw it.
+    """(NUM_STOPS, 3) float32 in [0, 1], evenly spaced, read-only: a colour map as shaders and `heat` draw it.
 
     Raises:
         ValueError: there is none of this name.
