@@ -25,9 +25,7 @@ _COLOUR_RANGE = 0.1  # and a colour by at most this
 CHANNELS = 1 + 3 + 3  # opacity, three scales, colour
 
 
-def footprints(
-    depths: Tensor, Ks: Tensor, edges: Tensor | None = None
-) -> tuple[Tensor, Tensor, Tensor]:
+def footprints(depths: Tensor, Ks: Tensor, edges: Tensor | None = None) -> tuple[Tensor, Tensor, Tensor]:
     """Surface elements that cover one pixel each.
 
     With tangents t_u, t_v (differences of neighbouring points, the nearer side of a depth jump)

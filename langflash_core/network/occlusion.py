@@ -3,8 +3,8 @@
 A photo ends a background at the edge of the thing before it. Seen from aside, a gap opens there as soon as
 edge or depth is a pixel off, and a dark crack catches the eye more than anything else. So the last pixel of
 the background before a jump of depth moves under the thing, at its own depth, and grows: the photo
-shows it as before, since the thing is in front. The thing ends there for good: its last elements are drawn back
-from the jump, or they would lie half over what is behind them, and depth would go down there by steps.
+shows it as before, since the thing is in front. The thing ends there for good: its last elements are drawn
+back from the jump, or they would lie half over what is behind them, and depth would go down there by steps.
 
 Sizes: V views, H W pixels.
 """
@@ -32,8 +32,8 @@ def under_edges(log_depths: Tensor) -> Tensor:
 
 
 def over_edges(log_depths: Tensor) -> Tensor:
-    """(V, H, W, 2) of -1, 0, 1 along columns and rows: where the farther side of a jump is from the last pixel of
-    the nearer one."""
+    """(V, H, W, 2) of -1, 0, 1 along columns and rows: where the farther side of a jump is from the last
+    pixel of the nearer one."""
     signs = []
     for dim in (-1, -2):
         steps = log_depths.diff(dim=dim)
@@ -48,8 +48,8 @@ def over_edges(log_depths: Tensor) -> Tensor:
 def drawn_back(
     pos_c: Tensor, tangent_u: Tensor, tangent_v: Tensor, edges: Tensor
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """Points and the tangents that span their elements (V, H, W, 3), those at `edges` (V, H, W, 2), as `over_edges`
-    has them, away from the jump and shorter across it."""
+    """Points and the tangents that span their elements (V, H, W, 3); those at `edges` (V, H, W, 2), as
+    `over_edges` has them, are away from the jump and shorter across it."""
     across, down = edges[..., :1], edges[..., 1:]
     pos_c = pos_c - _BACK * (across * tangent_u + down * tangent_v)
     shorter = 1 - (1 - _SHORT) * edges.abs()

@@ -33,7 +33,7 @@ def _errors(of: float) -> torch.Tensor:
 def test_ripples_of_a_slanted_wall_go(tilt):
     wall = _wall(tilt)
     flat = flattened(_rippled(wall, 0.01), _errors(0.08))
-    inner = (slice(None), slice(14, -14), slice(14, -14))  # a window that ends at the border holds half a wave
+    inner = (slice(None), slice(14, -14), slice(14, -14))  # at the border a window may hold half a wave
     assert (flat - wall)[inner].abs().mean() < 0.3 * 0.01 * (2 / math.pi) ** 2  # of a sine's mean
 
 
@@ -54,7 +54,7 @@ def test_what_is_more_than_a_ripple_stays():
     assert (kept - thing).abs().max() < 0.01
     waves = _rippled(_wall(), 0.03)
     changed = (flattened(waves, _errors(0.01)) - waves).abs()
-    # At the border a window may hold half a wave, which is a slope: never more than 2.5 of its ripples of .004.
+    # At the border a window may hold half a wave, which is a slope: at most 2.5 of its ripples of .004.
     assert changed[:, 14:-14, 14:-14].max() < 1e-3 and changed.max() < 0.01
 
 

@@ -1,10 +1,10 @@
 """Surfaces that are flat as far as anybody can tell are flat: ripples of depth go, things on a wall stay.
 
-A depth map of tokens ripples by a percent or two, at the tokens' distance. From the photo's own place nobody sees
-it; from aside floors and walls are waves. A plane is linear in inverse depth, 1 / z = m . (x, y, 1), so around
-every pixel planes are fitted to windows of several sizes, from box sums alone. A pixel takes the plane of
-the largest window that the plane explains to within what the map expects of its own errors. A window with
-a step, a bend or a thing in it does not: there a smaller one speaks, or the map as it was.
+A depth map of tokens ripples by a percent or two, at the tokens' distance. From the photo's own place nobody
+sees it; from aside floors and walls are waves. A plane is linear in inverse depth, 1 / z = m . (x, y, 1), so
+around every pixel planes are fitted to windows of several sizes, from box sums alone. A pixel takes the plane
+of the largest window that its plane explains to within a share of what the map expects of its errors. A
+window with a step, a bend or a thing in it has none: there a smaller one speaks, or the map as it was.
 
 Sizes: V views, H W pixels. Depths are log z.
 
@@ -17,7 +17,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 RADII = (2, 4, 8, 14)
-"""Of the windows, in pixels of maps of half the size, where a token has 7: the largest is four tokens wide."""
+"""Of the windows, in pixels of maps of half the size, where a token has 7: the largest is four tokens."""
 _SHARE = 0.25  # of the expected error, which is mostly of whole surfaces; as large are ripples
 _RANGE = (0.004, 0.03)  # of what is a ripple, relative depth
 _FARTHEST = 2.5  # ripples by which a pixel's own depth may differ from the plane
