@@ -15,7 +15,7 @@ from torch import Tensor
 _UNDER = 10.0  # pixels: what a gap measures where depth is a twentieth off and the camera 20 degrees aside
 _JUMP = 0.2  # log depth from one pixel to the next
 _END = 0.05  # log depth, where a thing ends: below it, and below twice the step before, it is a slope
-_BACK = 0.5  # pixels by which the last element is drawn back
+_BACK = 0.3  # pixels by which the last element is drawn back
 _SHORT = 0.5  # and how long it is, of its length
 
 

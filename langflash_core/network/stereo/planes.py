@@ -19,7 +19,7 @@ from torch.nn import functional as F
 RADII = (2, 4, 8, 14)
 """Of the windows, in pixels of maps of half the size, where a token has 7: the largest is four tokens."""
 _SHARE = 0.25  # of the expected error, which is mostly of whole surfaces; as large are ripples
-_RANGE = (0.004, 0.03)  # of what is a ripple, relative depth
+_RANGE = (0.004, 0.015)  # of what is a ripple, relative depth: more is a thing, or a bend
 _FARTHEST = 2.5  # ripples by which a pixel's own depth may differ from the plane
 
 
