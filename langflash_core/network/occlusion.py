@@ -24,10 +24,8 @@ def under_edges(log_depths: Tensor) -> Tensor:
     farther one; 0 where it is on both sides."""
     signs = []
     for dim in (-1, -2):
-        steps = log_depths.diff(dim=dim)
-        none = torch.zeros_like(log_depths.narrow(dim, 0, 1))
-        after, before = torch.cat((steps, none), dim) < -_JUMP, torch.cat((none, steps), dim) > _JUMP
-        signs.append(after.to(log_depths) - before.to(log_depths))
+        after, before = _steps(log_depths, dim)
+        signs.append((after < -_JUMP).to(log_depths) - (before < -_JUMP).to(log_depths))
     return torch.stack(signs, -1)
 
 
@@ -36,13 +34,18 @@ def over_edges(log_depths: Tensor) -> Tensor:
     pixel of the nearer one."""
     signs = []
     for dim in (-1, -2):
-        steps = log_depths.diff(dim=dim)
-        none = torch.zeros_like(log_depths.narrow(dim, 0, 1))
-        after, before = torch.cat((steps, none), dim), torch.cat((none, -steps), dim)  # away from the pixel
+        after, before = _steps(log_depths, dim)
         ends = after > (2 * before.abs()).clamp_min(_END)
         begins = before > (2 * after.abs()).clamp_min(_END)
         signs.append(ends.to(log_depths) - begins.to(log_depths))
     return torch.stack(signs, -1)
+
+
+def _steps(log_depths: Tensor, dim: int) -> tuple[Tensor, Tensor]:
+    """From a pixel to the next along an axis, and to the one before it; 0 at the border."""
+    steps = log_depths.diff(dim=dim)
+    none = torch.zeros_like(log_depths.narrow(dim, 0, 1))
+    return torch.cat((steps, none), dim), torch.cat((none, -steps), dim)
 
 
 def drawn_back(
