@@ -12,7 +12,7 @@ from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.geometry.quaternions import matrices_to_quats
 from langflash_core.network.layers.dpt import DPT
-from langflash_core.network.occlusion import extended
+from langflash_core.network.occlusion import drawn_back, extended, over_edges
 from langflash_core.network.presets import Preset
 from langflash_core.network.stereo.prior import DepthMaps, resize
 from langflash_core.types import Gaussians
@@ -25,7 +25,7 @@ _COLOUR_RANGE = 0.1  # and a colour by at most this
 CHANNELS = 1 + 3 + 3  # opacity, three scales, colour
 
 
-def footprints(depths: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+def footprints(depths: Tensor, Ks: Tensor, edges: Tensor | None = None) -> tuple[Tensor, Tensor, Tensor]:
     """Surface elements that cover one pixel each.
 
     With tangents t_u, t_v (differences of neighbouring points, the nearer side of a depth jump)
@@ -33,6 +33,7 @@ def footprints(depths: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor, Tensor]:
 
     Args:
         depths: (..., H, W), z > 0. Ks: (..., 3, 3) pixels.
+        edges: (..., H, W, 2) of `over_edges`, from which elements are drawn back.
 
     Returns:
         Points (..., H, W, 3) in the camera frame, rotations (..., H, W, 3, 3) whose columns are
@@ -44,6 +45,8 @@ def footprints(depths: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     footprint = depths / Ks[..., 0, 0, None, None]  # one pixel at this depth, scene units
     tangent_u = _difference(pos_c, -2, footprint)
     tangent_v = _difference(pos_c, -3, footprint)
+    if edges is not None:
+        pos_c, tangent_u, tangent_v = drawn_back(pos_c, tangent_u, tangent_v, edges)
     normal = F.normalize(torch.linalg.cross(tangent_u, tangent_v), dim=-1)
     first = F.normalize(tangent_u, dim=-1)
     second = torch.linalg.cross(normal, first)
@@ -97,13 +100,14 @@ def assemble_gaussians(
 ) -> Gaussians:
     """Gaussians of one scene, N = V*H*W in the order (v h w), world = view 0.
 
-    Each is on its pixel's ray, but for the last ones of a background (`occlusion`).
+    Each is on its pixel's ray, but for those on both sides of a jump of depth (`occlusion`).
 
     Args:
         raw: (V, 7, H, W) of the head. images: (V, 3, H, W) in [0, 1].
         depth_maps: (V, H, W). viewmats: (V, 4, 4). Ks: (V, 3, 3) pixels.
     """
-    pos_c, axes, scales = footprints(depth_maps.depths, Ks)
+    edges = over_edges(depth_maps.log_depths)
+    pos_c, axes, scales = footprints(depth_maps.depths, Ks, edges)
     pos_c, scales = extended(pos_c, scales, depth_maps.log_depths, Ks)
     poses = invert_rigid(viewmats)
     means = torch.einsum("vij,vhwj->vhwi", poses[:, :3, :3], pos_c) + poses[:, None, None, :3, 3]
@@ -112,8 +116,9 @@ def assemble_gaussians(
     # Starts at opacity 0.88; a pixel whose depth is not trusted starts fainter.
     opacities = torch.sigmoid(raw[..., 0] + 2.0) * depth_maps.confidences.clamp(0.2, 1).sqrt()
     # Never below the footprint that closes the surface: seen from nearer than the photo, where the
-    # renderer's dilation of 0.3 px no longer helps, smaller ones would leave gaps.
-    scales = scales * torch.exp(_SCALE_RANGE * torch.tanh(raw[..., 1:4]).clamp_min(0))
+    # renderer's dilation of 0.3 px no longer helps, smaller ones would leave gaps. Nor larger at a jump.
+    larger = torch.tanh(raw[..., 1:4]).clamp_min(0) * (edges == 0).all(-1, keepdim=True)
+    scales = scales * torch.exp(_SCALE_RANGE * larger)
     colours = images.movedim(1, -1) + _COLOUR_RANGE * torch.tanh(raw[..., 4:])
     return Gaussians(
         means=means.reshape(-1, 3),

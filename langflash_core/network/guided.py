@@ -26,6 +26,7 @@ from langflash_core.network.semantics.splitting import split_groups
 from langflash_core.network.stereo.agreement import agreed
 from langflash_core.network.stereo.alignment import Correction
 from langflash_core.network.stereo.keypoints import KeyPoints, match_photos, match_sources
+from langflash_core.network.stereo.planes import flattened
 from langflash_core.network.stereo.poses import PoseInput, Poses, estimate_poses
 from langflash_core.network.stereo.prior import DepthHead, DepthMaps
 from langflash_core.network.stereo.sharpening import sharpened
@@ -131,7 +132,7 @@ class GuidedDepthNet(LangFlashNet):
         return self.namer(atoms, describe(weights, seen.tokens), where)
 
     def reconstruct(self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: Run) -> Geometry:
-        """Depth, poses, refined depth with edges that agrees between photos, Gaussians."""
+        """Depth, poses, refined depth with edges and flat surfaces that agrees between photos, Gaussians."""
         with run.stage("depth"):
             levels = self.levels(tokens, Ks)
             prior = self.depth_head(levels, tokens)
@@ -142,7 +143,8 @@ class GuidedDepthNet(LangFlashNet):
             viewmats = torch.from_numpy(poses.viewmats).to(images)[None]
         with run.stage("refinement"):
             maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)
-            maps = replace(maps, log_depths=sharpened(maps.log_depths, images[0]))
+            sharp = sharpened(maps.log_depths, images[0])
+            maps = replace(maps, log_depths=flattened(sharp, maps.log_errors))
             maps = _agreed(maps, poses, viewmats[0], Ks[0])
         with run.stage("Gaussians"):
             raw = self.gaussian_head(levels, images)

@@ -3,7 +3,8 @@
 A photo ends a background at the edge of the thing before it. Seen from aside, a gap opens there as soon as
 edge or depth is a pixel off, and a dark crack catches the eye more than anything else. So the last pixel of
 the background before a jump of depth moves under the thing, at its own depth, and grows: the photo
-shows it as before, since the thing is in front.
+shows it as before, since the thing is in front. The thing ends there for good: its last elements are drawn
+back from the jump, or they would lie half over what is behind them, and depth would go down there by steps.
 
 Sizes: V views, H W pixels.
 """
@@ -13,6 +14,9 @@ from torch import Tensor
 
 _UNDER = 10.0  # pixels: what a gap measures where depth is a twentieth off and the camera 20 degrees aside
 _JUMP = 0.2  # log depth from one pixel to the next
+_END = 0.05  # log depth, where a thing ends: below it, and below twice the step before, it is a slope
+_BACK = 0.3  # pixels by which the last element is drawn back
+_SHORT = 0.5  # and how long it is, of its length
 
 
 def under_edges(log_depths: Tensor) -> Tensor:
@@ -20,11 +24,39 @@ def under_edges(log_depths: Tensor) -> Tensor:
     farther one; 0 where it is on both sides."""
     signs = []
     for dim in (-1, -2):
-        steps = log_depths.diff(dim=dim)
-        none = torch.zeros_like(log_depths.narrow(dim, 0, 1))
-        after, before = torch.cat((steps, none), dim) < -_JUMP, torch.cat((none, steps), dim) > _JUMP
-        signs.append(after.to(log_depths) - before.to(log_depths))
+        after, before = _steps(log_depths, dim)
+        signs.append((after < -_JUMP).to(log_depths) - (before < -_JUMP).to(log_depths))
     return torch.stack(signs, -1)
+
+
+def over_edges(log_depths: Tensor) -> Tensor:
+    """(V, H, W, 2) of -1, 0, 1 along columns and rows: where the farther side of a jump is from the last
+    pixel of the nearer one."""
+    signs = []
+    for dim in (-1, -2):
+        after, before = _steps(log_depths, dim)
+        ends = after > (2 * before.abs()).clamp_min(_END)
+        begins = before > (2 * after.abs()).clamp_min(_END)
+        signs.append(ends.to(log_depths) - begins.to(log_depths))
+    return torch.stack(signs, -1)
+
+
+def _steps(log_depths: Tensor, dim: int) -> tuple[Tensor, Tensor]:
+    """From a pixel to the next along an axis, and to the one before it; 0 at the border."""
+    steps = log_depths.diff(dim=dim)
+    none = torch.zeros_like(log_depths.narrow(dim, 0, 1))
+    return torch.cat((steps, none), dim), torch.cat((none, -steps), dim)
+
+
+def drawn_back(
+    pos_c: Tensor, tangent_u: Tensor, tangent_v: Tensor, edges: Tensor
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Points and the tangents that span their elements (V, H, W, 3); those at `edges` (V, H, W, 2), as
+    `over_edges` has them, are away from the jump and shorter across it."""
+    across, down = edges[..., :1], edges[..., 1:]
+    pos_c = pos_c - _BACK * (across * tangent_u + down * tangent_v)
+    shorter = 1 - (1 - _SHORT) * edges.abs()
+    return pos_c, tangent_u * shorter[..., :1], tangent_v * shorter[..., 1:]
 
 
 def extended(pos_c: Tensor, scales: Tensor, log_depths: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor]:

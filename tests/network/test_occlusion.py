@@ -1,8 +1,9 @@
-"""Backgrounds that go on under what hides them."""
+"""Backgrounds that go on under what hides them, and things that end at their edges."""
 
 import torch
 
-from langflash_core.network.occlusion import extended, under_edges
+from langflash_core.network.gaussians import footprints
+from langflash_core.network.occlusion import extended, over_edges, under_edges
 
 K = torch.tensor([[40.0, 0, 16], [0, 40.0, 12], [0, 0, 1]])[None]
 
@@ -38,3 +39,36 @@ def test_one_pixel_and_no_jump():
         pos, scales = torch.rand(*logs.shape, 3), torch.rand(*logs.shape, 3)
         moved, wider = extended(pos, scales, logs, K.expand(len(logs), 3, 3))
         assert torch.equal(moved, pos) and torch.equal(wider, scales)
+
+
+def test_the_last_element_of_a_thing_is_drawn_back_from_its_edge():
+    """By .3 of a pixel, and half as long across the edge; along it, and all others, stay."""
+    logs = _step()
+    edges = over_edges(logs)
+    assert (edges[0, :, 15, 0] == 1).all() and int(edges.abs().sum()) == 24
+    plain, back = footprints(logs.exp(), K), footprints(logs.exp(), K, edges)
+    moved = back[0] - plain[0]
+    torch.testing.assert_close(moved[0, 5, 15], torch.tensor([-0.3 * 2.0 / 40, 0.0, 0.0]))
+    assert int((moved != 0).any(-1).sum()) == 24
+    ratio = (back[2] / plain[2])[0, 5, 15].sort().values
+    torch.testing.assert_close(ratio, torch.tensor([0.5, 1.0, 1.0]))
+
+
+def test_edges_are_the_same_from_either_side_and_upside_down():
+    logs = _step()
+    assert torch.equal(over_edges(logs.flip(-1)).flip(2)[..., 0], -over_edges(logs)[..., 0])
+    assert torch.equal(over_edges(logs.mT).transpose(1, 2).flip(-1), over_edges(logs))
+
+
+def test_steep_slopes_and_their_feet_have_no_edge():
+    column = torch.arange(32.0)
+    slope = (0.09 * column).expand(1, 24, 32)  # 74 degrees at 40 pixels of focal length
+    assert not over_edges(slope)[:, :, 1:].any()
+    foot = (0.04 * (column - 16).clamp_min(0)).expand(1, 24, 32)
+    assert not over_edges(foot).any()
+
+
+def test_a_bar_one_pixel_wide_is_not_drawn_anywhere():
+    bar = torch.full((1, 24, 32), 4.0).log()
+    bar[:, :, 10] = 0.0
+    assert not over_edges(bar)[:, :, 10].any()
