@@ -9,7 +9,7 @@ from typing import TextIO
 
 from langflash_core.errors import ImageError, InputError, WeightsError
 from langflash_core.files import make_folder, write_atomically
-from langflash_core.lab.evaluation.rooms import run_eval
+from langflash_core.lab.evaluation.rooms.run import run_eval
 from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.lab.photos import chosen_ids
 from langflash_core.network import load_network

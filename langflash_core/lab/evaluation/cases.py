@@ -39,7 +39,8 @@ from langflash_core.lab.evaluation.posed import (
     scene_of,
 )
 from langflash_core.lab.evaluation.protocols import Case
-from langflash_core.lab.evaluation.rooms import MIN_SHARE, language_maps
+from langflash_core.lab.evaluation.rooms.tally import MIN_SHARE
+from langflash_core.lab.evaluation.rooms.target import language_maps
 from langflash_core.lab.evaluation.segments import label_border_f
 from langflash_core.lab.evaluation.sights import Look, Sight, error_picture, label_picture, photo_picture
 from langflash_core.lab.evaluation.tallies import Shelf, collected, intervals, merged

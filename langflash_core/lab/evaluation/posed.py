@@ -20,8 +20,9 @@ from torch import Tensor
 
 from langflash_core.errors import InputError
 from langflash_core.images.pictures import centre_box
-from langflash_core.lab.evaluation.labelled import Render, rounded
+from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.evaluation.metrics import POSE_LIMITS, PoseError, pose_auc, pose_error
+from langflash_core.lab.evaluation.numbers import rounded
 from langflash_core.lab.evaluation.pictures import ssim
 from langflash_core.lab.evaluation.sights import Look, Sight, error_picture, photo_picture
 from langflash_core.lab.evaluation.tallies import Shelf, collected, merged

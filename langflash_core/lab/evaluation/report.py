@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from langflash_core.errors import InputError
-from langflash_core.lab.evaluation import labelled, posed, rooms
+from langflash_core.lab.evaluation import labelled, posed
 from langflash_core.lab.evaluation.photo_tables import LABEL_LISTS, PHOTOS, POSED
 from langflash_core.lab.evaluation.photo_tables import METHODS as PHOTO_METHODS
 from langflash_core.lab.evaluation.posed import APART, PAIRS, chosen_triples, pair_tallies
@@ -25,6 +25,9 @@ from langflash_core.lab.evaluation.report_parts import (
     labels_table,
     measures_table,
 )
+from langflash_core.lab.evaluation.rooms import run as rooms
+from langflash_core.lab.evaluation.rooms.summary import summary as room_summary
+from langflash_core.lab.evaluation.rooms.tally import Tally as RoomTally
 from langflash_core.lab.evaluation.sights import Look
 from langflash_core.lab.evaluation.speed import PAPER_MS
 from langflash_core.lab.evaluation.tables import COLUMNS, MEASURES, METHODS
@@ -100,11 +103,11 @@ def sections(sources: Sources, place: Workplace) -> Iterator[Section]:
 def rooms_section(data: Path, place: Workplace, limit: int | None = None) -> Section:
     """Furnished rooms whose furniture no training saw, every rival in the same run."""
     setting, held_out = rooms.open_rooms(data, place.weights, preset=place.preset, limit=limit)
-    shelf = place.shelf("rooms", rooms.Tally, data=str(data.resolve()), groups=len(setting.groups))
+    shelf = place.shelf("rooms", RoomTally, data=str(data.resolve()), groups=len(setting.groups))
     kept, gallery = _told(
         place, shelf, len(held_out), lambda look: rooms.room_tallies(setting, held_out, shelf, look)
     )
-    result, bounds = _summed(kept, lambda tally: rooms.summary(tally, setting))
+    result, bounds = _summed(kept, lambda tally: room_summary(tally, setting))
     seeds = sorted(map(int, kept))
     about = (
         f"{len(kept)} rooms, seeds {seeds[0]} to {seeds[-1]}, furniture held out from training; two photos "

@@ -4,8 +4,8 @@ import math
 from collections.abc import Callable, Sequence
 from html import escape
 
+from langflash_core.export.colours import label_colours
 from langflash_core.lab.evaluation.report_parts import Plot, Point
-from langflash_core.lab.evaluation.sights import label_colour
 
 WIDTH, HEIGHT = 640, 340
 LEFT, RIGHT, TOP, BOTTOM = 62, 24, 18, 48
@@ -51,8 +51,9 @@ def svg(plot: Plot) -> str:
         f'text-anchor="middle">{escape(plot.up)}</text>'
     )
     levels = _apart([y(point.error) for point in points])
+    colours = [tuple(colour) for colour in label_colours(len(points)).tolist()]
     for row, (point, own, level) in enumerate(zip(points, seconds, levels, strict=True)):
-        parts += _mark(point, x(own), y, level, _dark(label_colour(row)))
+        parts += _mark(point, x(own), y, level, _dark(colours[row]))
     return "\n".join([*parts, "</svg>"])
 
 
