@@ -15,6 +15,7 @@ from pathlib import Path
 
 from torch import Tensor
 
+from langflash_core.lab.evaluation.lpips import Lpips
 from langflash_core.lab.evaluation.rooms.geometry import judge_geometry
 from langflash_core.lab.evaluation.rooms.phrases import ask_phrases
 from langflash_core.lab.evaluation.rooms.summary import summary
@@ -64,17 +65,23 @@ def run_eval(
 
 
 def open_rooms(
-    data: Path, weights: Path | None = None, *, preset: str = "mini", limit: int | None = None
+    data: Path,
+    weights: Path | None = None,
+    *,
+    preset: str = "mini",
+    limit: int | None = None,
+    lpips: Lpips | None = None,
+    kind: str = "held_out",
 ) -> tuple[Setting, RoomSet]:
     """What `run_eval` judges with, and the rooms that it judges.
 
     Raises:
         InputError: there is no such cache. WeightsError: the weights do not fit.
     """
-    held_out = opened(data / "held_out", limit)
+    rooms = opened(data / kind, limit)
     network = load_network(preset, weights)
-    groups = sorted({label.group for label in held_out.labels()})
-    return Setting.of(network, groups, median_depth(data)), held_out
+    groups = sorted({label.group for label in rooms.labels()})
+    return Setting.of(network, groups, median_depth(data), lpips), rooms
 
 
 def room_tallies(
@@ -114,13 +121,13 @@ def judge_scene(setting: Setting, record: RoomRecord, tally: Tally, look: Look |
     tally.note(seconds=time.perf_counter() - start)
     tally.note(**{f"stage_{name}_seconds": value for name, value in prediction.timings.items()})
     truth = record.depths.float()
-    scale = _scale(prediction.depths[0], truth[0])
+    scale = true_scale(prediction.depths[0], truth[0])
     judge_geometry(setting, record, prediction, scale, tally)
     ask_phrases(setting, record, prediction, tally)
     judge_views(setting, record, prediction, scale, tally, look)
 
 
-def _scale(depths: Tensor, truth: Tensor) -> float:
+def true_scale(depths: Tensor, truth: Tensor) -> float:
     """True lengths per predicted length: median of z* / z in view 0."""
     valid = (truth > 0) & (depths > 0)
     return float((truth[valid] / depths[valid]).median())

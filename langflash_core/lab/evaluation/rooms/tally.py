@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import torch
 from torch import Tensor
 
+from langflash_core.lab.evaluation.lpips import Lpips
 from langflash_core.lab.evaluation.metrics import (
     PoseError,
 )
@@ -57,9 +58,12 @@ class Setting:
     temperature: float
     threshold: float
     negatives: Tensor
+    lpips: Lpips | None = None
 
     @staticmethod
-    def of(network: LangFlashNet, groups: Sequence[str], median_depth: float) -> "Setting":
+    def of(
+        network: LangFlashNet, groups: Sequence[str], median_depth: float, lpips: Lpips | None = None
+    ) -> "Setting":
         space = language_space(network.preset.space)
         own = network.calibration
         with torch.no_grad():
@@ -73,4 +77,5 @@ class Setting:
                 temperature=float(own.get("temperature", space.temperature)),
                 threshold=float(own.get("threshold", space.threshold)),
                 negatives=space.encode(list(own.get("negatives", space.negatives))),
+                lpips=lpips,
             )

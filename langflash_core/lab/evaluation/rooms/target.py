@@ -1,14 +1,15 @@
 """The view that was kept back: its picture, what it is called, its segments. K atoms, H W pixels."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from langflash_core.lab.evaluation.alignment import aligned_camera
 from langflash_core.lab.evaluation.consistency import label_consistency
+from langflash_core.lab.evaluation.drawing import drawn_features, drawn_frame, placed_gaussians
 from langflash_core.lab.evaluation.pictures import ssim
 from langflash_core.lab.evaluation.rooms.phrases import note_paraphrases
 from langflash_core.lab.evaluation.rooms.tally import MIN_SHARE, STUFF, Setting, Tally
@@ -28,12 +29,12 @@ from langflash_core.lab.training.measures import (
     confusion,
     psnr,
 )
-from langflash_core.lab.training.shards import NOTHING, RoomRecord
+from langflash_core.lab.training.shards import RoomRecord
 from langflash_core.network import LangFlashNet
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.model import Seen
 from langflash_core.network.semantics.aggregation import average_atoms
-from langflash_core.splat import rasterize, view_colours
+from langflash_core.splat import view_colours
 from langflash_core.types import Camera, Prediction, Views
 
 
@@ -71,20 +72,13 @@ def judge_views(
     rgb, maps, true_maps = _rendered(record, prediction, masks, scale)
     photo = record.rgb[2].permute(1, 2, 0).float() / 255
     shown = seen_by_photos(record)
-    flat = photo[shown].mean(0).expand_as(photo)
-    if bool(shown.any()):
-        tally.note(
-            psnr=psnr(rgb[shown], photo[shown]),
-            ssim=float(ssim_map(rgb.clamp(0, 1), photo)[shown].mean()),
-            psnr_mean_colour=psnr(flat[shown], photo[shown]),
-        )
-    tally.note(psnr_whole_picture=psnr(rgb, photo), target_seen_share=float(shown.float().mean()))
+    _judge_picture(setting, record, prediction, scale, rgb, tally)
     for view, own, weights, exact in (
         (0, features[0, 0], prediction.weights[0], masks[0]),
         (2, alone, maps, true_maps),
     ):
         vectors = {
-            "features": _upsampled(own, (photo.shape[0], photo.shape[1])),
+            "features": upsampled(own, (photo.shape[0], photo.shape[1])),
             "averaged": torch.einsum("khw,kc->hwc", weights, averaged),
             "averaged_named": torch.einsum("khw,kc->hwc", weights, renamed),
             "lfa": torch.einsum("khw,kc->hwc", weights, prediction.dictionary),
@@ -98,7 +92,6 @@ def judge_views(
     named = beside.argmax(-1).masked_fill(~(shown & drawn), -1)
     labels = torch.stack((found.argmax(-1), named)).numpy()
     judge_target(setting, record, prediction, maps, labels, shown.numpy(), tally)
-    tally.note(ssim_whole_picture=ssim(rgb, photo))
     if look is not None:
         look(_sight(setting, record, rgb, labels, tally))
 
@@ -181,8 +174,46 @@ def _sight(setting: Setting, record: RoomRecord, rgb: Tensor, labels: np.ndarray
     return Sight(str(record.seed), f"room {record.seed}", pictures, numbers, right, legend)
 
 
-def _upsampled(features: Tensor, size: tuple[int, int]) -> Tensor:
+def upsampled(features: Tensor, size: tuple[int, int]) -> Tensor:
+    """Maps (C, h, w) at a size (H, W), (H, W, C)."""
     return F.interpolate(features[None], size=size, mode="bilinear", align_corners=False)[0].permute(1, 2, 0)
+
+
+def target_camera(record: RoomRecord, scale: float) -> Camera:
+    """The view that was kept back, in the scene's units; predicted lengths times `scale` are metres."""
+    viewmat = relative(record, 2)
+    viewmat[:3, 3] /= scale
+    return Camera(viewmat, record.Ks[2], record.rgb.shape[-1], record.rgb.shape[-2])
+
+
+def _judge_picture(
+    setting: Setting, record: RoomRecord, prediction: Prediction, scale: float, rgb: Tensor, tally: Tally
+) -> None:
+    """The target view against its photo where a photo of the scene sees it, as a whole, and from the pose
+    that fits the photo best."""
+    photo = record.rgb[2].permute(1, 2, 0).float() / 255
+    shown = seen_by_photos(record)
+    gaussians = placed_gaussians(prediction)
+    fitted = aligned_camera(lambda at: drawn_frame(gaussians, at), target_camera(record, scale), photo)
+    moved = drawn_frame(gaussians, fitted).rgb
+    if bool(shown.any()):
+        flat = photo[shown].mean(0).expand_as(photo)
+        tally.note(
+            psnr=psnr(rgb[shown], photo[shown]),
+            psnr_aligned=psnr(moved[shown], photo[shown]),
+            ssim=float(ssim_map(rgb.clamp(0, 1), photo)[shown].mean()),
+            psnr_mean_colour=psnr(flat[shown], photo[shown]),
+        )
+    if setting.lpips is not None:
+        pictures = torch.stack((rgb, moved))
+        own, fit = setting.lpips.whole(pictures, photo.expand_as(pictures))
+        tally.note(lpips_whole_picture=own, lpips_whole_picture_aligned=fit)
+    tally.note(
+        psnr_whole_picture=psnr(rgb, photo),
+        psnr_whole_picture_aligned=psnr(moved, photo),
+        ssim_whole_picture=ssim(rgb, photo),
+        target_seen_share=float(shown.float().mean()),
+    )
 
 
 def _rendered(
@@ -190,19 +221,13 @@ def _rendered(
 ) -> tuple[Tensor, Tensor, Tensor]:
     """The target view drawn from the Gaussians: rgb (H, W, 3), weight maps of the predicted
     (K, H, W) and of the true groups (G', H, W). Predicted lengths times `scale` are metres."""
-    viewmat = relative(record, 2)
-    viewmat[:3, 3] /= scale
-    height, width = record.rgb.shape[-2:]
-    camera = Camera(viewmat, record.Ks[2], width, height)
+    camera, gaussians = target_camera(record, scale), placed_gaussians(prediction)
     atoms = prediction.weights.shape[1]
     weights = prediction.weights.permute(0, 2, 3, 1).flatten(0, 2)
     exact = masks.permute(0, 2, 3, 1).flatten(0, 2)
-    opacities = prediction.gaussians.opacities.unflatten(0, (len(prediction.viewmats), -1)).clone()
-    opacities[list(prediction.unplaced)] = 0  # a scene leaves such photos out
-    gaussians = replace(prediction.gaussians, opacities=opacities.flatten())
     with torch.no_grad():
         colours = view_colours(gaussians, camera)
-        layers, _ = rasterize(gaussians, torch.cat((colours, weights, exact), 1), camera)
+        layers = drawn_features(gaussians, torch.cat((colours, weights, exact), 1), camera)
     layers = layers.permute(2, 0, 1)
     return layers[:3].permute(1, 2, 0), layers[3 : 3 + atoms], layers[3 + atoms :]
 
@@ -218,22 +243,22 @@ def _count_labels(
     """Confusion counts over class groups and over the paper's labels, of every method in one view;
     only pixels `counted` (H, W)."""
     name = "source" if view == 0 else "target"
-    ids = record.instances[view].long().masked_fill(~counted, NOTHING)
-    rows = {group: row for row, group in enumerate(setting.groups)}
-    groups = torch.full((256,), -1)
-    papers = torch.full((256,), -1)
-    for index, label in enumerate(record.labels):
-        groups[index] = rows[label.group]
-        papers[index] = paper_label(label.group)
-    truth, paper_truth = groups[ids].flatten(), papers[ids].flatten()
-    to_paper = torch.tensor([paper_label(group) for group in setting.groups])
-    for method, maps in vectors.items():
-        found = (maps @ setting.texts.T).argmax(-1).flatten()
-        tally.count((method, name, "groups"), confusion(found, truth, len(setting.groups)))
-        tally.count((method, name, "paper"), confusion(to_paper[found], paper_truth, len(PAPER_LABELS)))
-    if "wall" in rows:
-        wall = torch.full_like(truth, rows["wall"])
-        tally.count(("majority", name, "groups"), confusion(wall, truth, len(setting.groups)))
-        tally.count(("majority", name, "paper"), confusion(to_paper[wall], paper_truth, len(PAPER_LABELS)))
+    truth = torch.from_numpy(class_rows(setting, record, view)).masked_fill(~counted, -1).flatten()
+    found = {method: (maps @ setting.texts.T).argmax(-1).flatten() for method, maps in vectors.items()}
+    if "wall" in setting.groups:
+        found["majority"] = torch.full_like(truth, setting.groups.index("wall"))
+    for method, labels in found.items():
+        for kind, table in label_tables(setting, labels, truth).items():
+            tally.count((method, name, kind), table)
     if name == "source":
         note_paraphrases(setting, vectors["lfa"], truth, tally)
+
+
+def label_tables(setting: Setting, found: Tensor, truth: Tensor) -> dict[str, Tensor]:
+    """Confusion counts over class groups and over the paper's labels, of rows of `setting.groups` (P,);
+    -1 in `truth` is not judged."""
+    to_paper = torch.tensor([*(paper_label(group) for group in setting.groups), -1])
+    return {
+        "groups": confusion(found, truth, len(setting.groups)),
+        "paper": confusion(to_paper[found], to_paper[truth], len(PAPER_LABELS)),
+    }
