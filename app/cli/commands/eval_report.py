@@ -12,10 +12,11 @@ from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.photos import PhotoFolder, open_folder
 
 from ...bench.machine import host
-from ..files import check_folder
+from ..files import check_folder, readable_file
 from ..photos import chosen
 from ..renderers import open_renderer
 from ..report import ProgressBar
+from .eval_protocol import opened_lpips
 
 WORK = "work"
 """Inside the output: tallies and pictures, so that a run that was ended goes on where it stopped."""
@@ -28,8 +29,10 @@ def report(args: Namespace, out: TextIO) -> None:
         LangFlashError: there is nothing to judge, or a source, the checkpoint or the output cannot be used.
     """
     args.only = None
-    if (args.rooms, args.posed, args.photos) == (None, None, None):
-        raise InputError("there is nothing to judge; give --rooms, --posed or --photos")
+    if (args.rooms, args.pack, args.posed, args.photos) == (None, None, None, None):
+        raise InputError("there is nothing to judge; give --rooms, --pack, --posed or --photos")
+    if args.pack is not None:
+        readable_file(args.pack, "furniture pack", InputError)
     if args.rooms is not None and not args.rooms.is_dir():
         raise InputError(f"there is no folder {args.rooms}; make it with langflash train cache")
     posed, photos = _posed_folder(args.posed), _labelled_folder(args.photos)
@@ -39,9 +42,10 @@ def report(args: Namespace, out: TextIO) -> None:
     from langflash_core.lab.evaluation.tallies import identity
 
     ids = () if photos is None else chosen(args, photos)
-    sources = Sources(args.rooms, posed, photos, ids, args.limit)
+    sources = Sources(args.rooms, args.pack, posed, photos, ids, args.limit)
+    lpips = opened_lpips(args.lpips)
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
-        place = Workplace(renderer, args.output / WORK, args.weights, args.preset, progress)
+        place = Workplace(renderer, args.output / WORK, args.weights, args.preset, progress, lpips)
         found = list(sections(sources, place))
         drawn_by = renderer.backend
     name = args.weights.name if args.weights else args.preset

@@ -135,6 +135,7 @@ def run_photos(
     *,
     preset: str = "mini",
     size: int | None = None,
+    shelf: Shelf | None = None,
     progress: Progress = lambda stage, fraction: None,
 ) -> tuple[dict, Tally]:
     """Judge a checkpoint on photos of a labelled folder.
@@ -151,7 +152,7 @@ def run_photos(
     """
     judged = judged_by(folder, render, weights, preset=preset, size=size, progress=progress)
     tallies = []
-    for id, tally in photo_tallies(judged, folder, ids):
+    for id, tally in photo_tallies(judged, folder, ids, shelf):
         tallies.append(tally)
         progress(f"photo {id}, {len(tallies)} of {len(ids)}", 0.1 + 0.9 * len(tallies) / len(ids))
     tally = merged(tallies)

@@ -49,7 +49,7 @@ def program(folder: PhotoFolder, monkeypatch) -> list[list[str]]:
 
 def made(folder: PhotoFolder, work: Path) -> list:
     ids = folder.ids[:2]
-    return list(sections(Sources(None, folder, folder, ids, limit=2), Workplace(render, work)))
+    return list(sections(Sources(None, None, folder, folder, ids, limit=2), Workplace(render, work)))
 
 
 def test_a_report_holds_every_number_and_goes_on_where_it_stopped(folder, program, tmp_path):

@@ -53,12 +53,8 @@ class Decoder:
         normal += RIDGE * normal.diagonal().mean() * torch.eye(HIDDEN, dtype=torch.float64)
         return Decoder(basis, hidden, shift, torch.linalg.solve(normal, units.T @ missing).float())
 
-    def linear(self, coded: Float[Tensor, "*n d"]) -> Float[Tensor, "*n C"]:
-        """The basis alone."""
-        return coded @ self.basis
-
     def __call__(self, coded: Float[Tensor, "*n d"]) -> Float[Tensor, "*n C"]:
-        """Of any length of z: only its direction counts, so half covered pixels are decoded as covered ones."""
+        """Only the direction of z counts, so half covered pixels are decoded as covered ones."""
         return F.normalize(coded, dim=-1) @ self.basis + _lit(coded, self.hidden, self.shift) @ self.out
 
 

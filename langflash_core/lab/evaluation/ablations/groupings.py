@@ -4,6 +4,7 @@ Notation: V views, K groups, H W pixels, X = V H W of them, S directions of the 
 """
 
 import heapq
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,7 +46,9 @@ def point_groups(
     )
     known = torch.cat(parts, -1).double().nan_to_num()
     some = known[:, ::EVERY, ::EVERY].flatten(0, 2).numpy()
-    centres, _ = kmeans2(some, min(count, len(some)), iter=12, minit="++", seed=0)
+    start = some[np.linspace(0, len(some) - 1, min(count, len(some))).astype(int)]  # evenly over the photos
+    with warnings.catch_warnings(action="ignore", category=UserWarning):  # a cluster may end up empty
+        centres, _ = kmeans2(some, start, iter=12, minit="matrix")
     nearest = torch.cdist(known.flatten(0, 2).float(), torch.from_numpy(centres).float()).argmin(1)
     groups = F.one_hot(nearest, len(centres)).float()
     return groups.unflatten(0, points.shape[:3]).permute(0, 3, 1, 2).contiguous()
@@ -80,7 +83,7 @@ def regrouped(
     known = resize(condensed(features[0]), (weights.shape[-2], weights.shape[-1]))  # (V, S, H, W)
     pixels = known.permute(0, 2, 3, 1).flatten(0, 2)
     table = weights.permute(0, 2, 3, 1).flatten(0, 2)  # (X, K)
-    table = _merged(table, pixels, count) if table.shape[1] > count else _cut(table, pixels, count)
+    table = _merged(table, pixels, count) if table.shape[1] >= count else _cut(table, pixels, count)
     return table.unflatten(0, (weights.shape[0], *weights.shape[-2:])).permute(0, 3, 1, 2).contiguous()
 
 
