@@ -10,7 +10,8 @@ from .shared import add_backend, add_description, add_json, add_output, new_acti
 EVAL_PROTOCOLS = ("scannet", "3dovs", "re10k", "7scenes", "nyu")
 # The decisions that `bench` compares: app.bench.modes.AXES, which would bring torch along.
 BENCH_AXES = (
-    "precision", "relevance", "weights", "cut", "dictionary", "resolution", "detail", "rasteriser", "sort",
+    "precision", "relevance", "weights", "cut", "dictionary", "resolution", "detail", "rasteriser",
+    "language", "sort",
 )  # fmt: skip
 
 
@@ -208,6 +209,10 @@ def _add_report(actions) -> None:
     command.add_argument("--photos", type=Path, metavar="FOLDER", help="real photos with labels")
     command.add_argument(
         "--part", choices=("all", "train", "validation"), default="all", help="of --photos (default: all)"
+    )
+    add_description(command)
+    command.add_argument(
+        "--small", type=Path, metavar="DIR", help="also the numbers and plots alone, for keeping"
     )
     command.add_argument("--lpips", type=Path, metavar="FILE", help="LPIPS weights of VGG-16, .safetensors")
     command.add_argument("--limit", type=whole_count, metavar="N", help="only N scenes of each")

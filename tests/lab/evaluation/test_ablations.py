@@ -8,7 +8,6 @@ import torch
 from torch.nn import functional as F
 
 from langflash_core.lab.evaluation.ablations import study
-from langflash_core.lab.evaluation.ablations.channels import Decoder, gathered, principal
 from langflash_core.lab.evaluation.ablations.groupings import point_groups, regrouped, true_names
 from langflash_core.lab.evaluation.ablations.tables import ablation_markdown, ablation_plots, summary
 from langflash_core.lab.training.shards import write_shard
@@ -73,25 +72,9 @@ def test_true_names_are_those_of_the_most_weight():
     assert true_names(weights, torch.full((1, 1, 3), -1), 3).tolist() == [0, 0]
 
 
-def test_a_decoder_beats_its_basis_and_needs_no_length():
-    generator = torch.Generator().manual_seed(1)
-    angles = 6.28 * torch.rand(3000, generator=generator)
-    curve = torch.stack([torch.sin(k * angles + k) for k in range(1, 9)], -1)  # one number decides eight
-    features = F.normalize(curve, dim=-1)
-    decoder = Decoder.fitted(features, 3)
-    coded = features @ decoder.basis.T
-    linear = F.normalize(coded @ decoder.basis, dim=-1)
-    decoded = F.normalize(decoder(coded), dim=-1)
-    wrong, less = (1 - (found * features).sum(-1).mean() for found in (linear, decoded))
-    assert float(less) < 0.5 * float(wrong)
-    assert torch.allclose(decoder(0.3 * coded), decoder(coded), atol=1e-4)  # float32, ridge weights up to 30
-    basis = principal(features, 3)
-    assert torch.allclose(basis @ basis.T, torch.eye(3), atol=1e-5)
-
-
 def test_examples_are_taken_evenly():
     rows = torch.arange(1000.0)[:, None]
-    found = gathered(iter([(rows, -rows), (rows[:10], rows[:10])]))
+    found = study.gathered(iter([(rows, -rows), (rows[:10], rows[:10])]))
     assert len(found.features) == 410 and float(found.features[0]) == 0 and float(found.features[399]) == 999
     assert torch.equal(found.left[:400], -found.features[:400])
 

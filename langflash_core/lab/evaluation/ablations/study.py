@@ -16,13 +16,6 @@ from torch import Tensor
 
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.geometry.cameras import invert_rigid, transform, unproject
-from langflash_core.lab.evaluation.ablations.channels import (
-    Decoder,
-    Examples,
-    fitted_decoders,
-    gathered,
-    principal,
-)
 from langflash_core.lab.evaluation.ablations.groupings import point_groups, regrouped, true_names
 from langflash_core.lab.evaluation.drawing import drawn_features, placed_gaussians
 from langflash_core.lab.evaluation.rooms.run import open_rooms, true_scale
@@ -37,6 +30,7 @@ from langflash_core.lab.evaluation.rooms.target import (
 from langflash_core.lab.evaluation.rooms.truth import opened, records, seen_by_photos, true_masks, views_of
 from langflash_core.lab.evaluation.tallies import Shelf, collected
 from langflash_core.lab.training.shards import RoomRecord
+from langflash_core.language.channels import Decoder, principal
 from langflash_core.network.model import Seen, pooled_weights
 from langflash_core.network.semantics.aggregation import averaged_atoms
 from langflash_core.running import Progress
@@ -52,8 +46,8 @@ CHANNELS = (3, 16, 64)
 RESIDUAL = 8
 SHARE = 0.5
 """Of the residual that is added to the atoms' answer."""
-FITTED_ON = 64
-"""Training rooms that bases and decoders are fitted on."""
+FITTED_ON, PIXELS = 64, 400
+"""Training rooms that bases and decoders are fitted on, and pixels of each."""
 BYTES = {
     "atoms": 3 * KEPT,
     "splatted": 2 * 384,
@@ -74,6 +68,24 @@ class Tally:
     def note(self, **values: float) -> None:
         for name, value in values.items():
             self.numbers.setdefault(name, []).append(float(value))
+
+
+@dataclass(frozen=True)
+class Examples:
+    """Of training rooms: features (n, C) of pixels, and what atoms of theirs leave of them (n, C)."""
+
+    features: Tensor
+    left: Tensor
+
+
+def gathered(rooms: Iterator[tuple[Tensor, Tensor]]) -> Examples:
+    """Of pairs of features and what is left of them, (X, C) each, `PIXELS` evenly of each room."""
+    features, left = [], []
+    for own, rest in rooms:
+        places = torch.linspace(0, len(own) - 1, min(PIXELS, len(own))).long()
+        features.append(own[places])
+        left.append(rest[places])
+    return Examples(torch.cat(features), torch.cat(left))
 
 
 @dataclass(frozen=True)
@@ -99,7 +111,8 @@ def room_studies(
 
     Args:
         data: cache folder; `held_out` is judged, decoders are fitted on `train`. every: takes the first of
-            so many rooms. kept: a file in which what is fitted on is kept for the next run. kind: "validation" for choosing numbers.
+            so many rooms. kept: a file in which what is fitted on is kept for the next run.
+            kind: "validation" for choosing numbers.
 
     Raises:
         InputError: there is no such cache. WeightsError: the weights do not fit.
@@ -128,7 +141,8 @@ def _kept_fits(setting: Setting, data: Path, kept: Path | None, progress: Progre
             make_folder(kept.parent)
             content = {"features": examples.features.contiguous(), "left": examples.left.contiguous()}
             write_atomically(kept, save(content))
-    return Fits(fitted_decoders(examples.features, CHANNELS), principal(examples.left, RESIDUAL))
+    decoders = {count: Decoder.fitted(examples.features, count) for count in CHANNELS}
+    return Fits(decoders, principal(examples.left, RESIDUAL))
 
 
 @torch.no_grad()

@@ -1,12 +1,12 @@
-"""What is splatted instead of atoms, and what makes language vectors of it again. C channels, d of them kept.
+"""Language in few channels: what others splat instead of atoms, and how vectors are made of it again.
 
-Everything is fitted in closed form on rooms of the training set, once: a basis of d directions (principal
-components of L(x), not centred, since splatting is linear and empty space is 0), and a decoder of one hidden
-layer whose hidden units are drawn at random and whose output is a ridge regression. LSM splats few channels
-and decodes them by a trained network of this kind; here nothing is trained by gradient, for either side.
+A basis of d directions (principal components of feature vectors, not centred, since splatting is linear and
+empty space is 0), and a decoder of one hidden layer, whose units are drawn at random and whose output is a
+ridge regression: closed form. LSM splats few channels and decodes them by a trained network of this kind.
+Scenes here hold atoms; this is what they are measured against (`langflash bench`, `langflash eval
+ablations`). C channels, d of them kept, h hidden units.
 """
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -16,8 +16,6 @@ from torch.nn import functional as F
 
 HIDDEN = 512
 RIDGE = 1e-3
-PIXELS = 400
-"""Of each room, evenly: 64 rooms make 25,600 examples of C numbers."""
 
 
 def principal(features: Float[Tensor, "n C"], count: int) -> Float[Tensor, "d C"]:
@@ -60,26 +58,3 @@ class Decoder:
 
 def _lit(coded: Tensor, hidden: Tensor, shift: Tensor) -> Tensor:
     return F.relu(F.normalize(coded, dim=-1) @ hidden + shift)
-
-
-@dataclass(frozen=True)
-class Examples:
-    """Of training rooms: features (n, C) of pixels, and what atoms of theirs leave of them (n, C)."""
-
-    features: Tensor
-    left: Tensor
-
-
-def gathered(rooms: Iterator[tuple[Tensor, Tensor]]) -> Examples:
-    """Of pairs of features and what is left of them, (X, C) each, `PIXELS` evenly of each room."""
-    features, left = [], []
-    for own, rest in rooms:
-        places = torch.linspace(0, len(own) - 1, min(PIXELS, len(own))).long()
-        features.append(own[places])
-        left.append(rest[places])
-    return Examples(torch.cat(features), torch.cat(left))
-
-
-def fitted_decoders(features: Float[Tensor, "n C"], channels: Sequence[int]) -> dict[int, Decoder]:
-    """A decoder for each number of channels."""
-    return {count: Decoder.fitted(features, count) for count in channels}
