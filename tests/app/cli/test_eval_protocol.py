@@ -80,8 +80,8 @@ def test_the_shipped_network_goes_through_the_other_protocols(run, wall, tmp_pat
     posed = run("eval", "protocol", "re10k", tmp_path / "re10k", *options)
     assert posed.code == 0, posed.err
     measures = posed.json()["measures"]
-    # The fit is judged by differences, not by PSNR, so it may cost a little of that.
-    assert measures["psnr_whole_picture_aligned"] > measures["psnr_whole_picture"] - 0.5
+    # Of the poses tried the best is taken, the true one among them; four digits are kept.
+    assert measures["psnr_whole_picture_aligned"] >= measures["psnr_whole_picture"] - 1e-3
 
 
 def test_nyu_goes_on_from_what_it_kept_and_has_no_other_view(run, wall: PhotoFolder, tmp_path: Path):
