@@ -37,8 +37,7 @@ def aligned_camera(draw: Callable[[Camera], Frame], camera: Camera, photo: Float
         draw: gives colours, depths and alphas from a camera. photo: [0, 1], of the camera's size.
 
     Returns:
-        Of the cameras that were tried, with the one given, that of the least mean squared difference: by PSNR never
-        worse than the one given.
+        Of the cameras that were tried, the one given among them, that of the least mean squared difference.
 
     Source: Gauss-Newton on the intensity difference of a depth map, as Steinbruecker et al. 2011.
     """

@@ -44,8 +44,8 @@ from langflash_core.running import Progress
 WORST, BEST = 6, 2
 """Scenes shown of a section."""
 DRAWS = 300
-ABLATED, SIDES = 4, 24
-"""One room of so many is asked of every rival; so many rooms are walked around."""
+ABLATED, SIDES = 25, 24
+"""At most so many rooms are asked of every rival, and walked around."""
 PUBLISHED = Table(
     "",
     ("system", "data", "measure", "value"),
@@ -147,13 +147,13 @@ def rooms_section(data: Path, place: Workplace, limit: int | None = None) -> Sec
 
 
 def ablations_section(data: Path, place: Workplace, limit: int | None = None) -> Section:
-    """Which part of the method pays, on every so many-th room."""
+    """Which part of the method pays, on some of the rooms."""
     shelf = place.shelf("ablations", study.Tally, data=str(data.resolve()))
     setting, count, studies = study.room_studies(
         data,
         place.weights,
         limit=limit,
-        every=ABLATED,
+        most=ABLATED,
         kept=shelf.folder / f"fits_{identity(place.weights, place.preset)}.safetensors",
         shelf=shelf,
         progress=place.progress,
@@ -161,7 +161,7 @@ def ablations_section(data: Path, place: Workplace, limit: int | None = None) ->
     kept, _ = _told(place, shelf, count, lambda look: studies)
     result, bounds = _summed(kept, ablation_summary)
     about = (
-        f"{len(kept)} of the rooms, one of {ABLATED}; {len(setting.groups)} class groups. All rivals draw "
+        f"{len(kept)} of the rooms, taken evenly; {len(setting.groups)} class groups. All rivals draw "
         "the same Gaussians from the same camera by the same rasteriser; times are those of one process, and "
         '"x atoms" is the mean over rooms of the ratio to the atoms in the same room.'
     )

@@ -94,7 +94,7 @@ def test_a_study_measures_every_rival_and_goes_on_from_its_fits(tmp_path: Path, 
         write_shard(tmp_path / name / "a.safetensors", records)
     torch.manual_seed(0)
     save_network(GuidedDepthNet(MINI), tmp_path / "mini.safetensors")
-    options = {"limit": 2, "every": 2, "kept": tmp_path / "fits.safetensors"}
+    options = {"limit": 2, "most": 1, "kept": tmp_path / "fits.safetensors"}
     _, count, studies = study.room_studies(tmp_path, tmp_path / "mini.safetensors", **options)
     ((_, tally),) = studies
     assert count == 1 and (tmp_path / "fits.safetensors").is_file()

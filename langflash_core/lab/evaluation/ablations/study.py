@@ -101,7 +101,7 @@ def room_studies(
     weights: Path | None = None,
     *,
     limit: int | None = None,
-    every: int = 1,
+    most: int | None = None,
     kept: Path | None = None,
     shelf: Shelf | None = None,
     kind: str = "held_out",
@@ -110,8 +110,8 @@ def room_studies(
     """The setting, how many rooms there are, and seed and tally of each, in order.
 
     Args:
-        data: cache folder; `held_out` is judged, decoders are fitted on `train`. every: takes the first of
-            so many rooms. kept: a file in which what is fitted on is kept for the next run.
+        data: cache folder; `held_out` is judged, decoders are fitted on `train`. most: of the rooms,
+            taken evenly (None: all). kept: a file in which what is fitted on is kept for the next run.
             kind: "validation" for choosing numbers.
 
     Raises:
@@ -123,6 +123,7 @@ def room_studies(
     def judge(record: RoomRecord) -> Tally:
         return judge_room(setting, fits, record)
 
+    every = 1 if most is None else max(1, -(-len(rooms) // most))
     chosen = islice(records(rooms), 0, None, every)
     studies = collected(((str(record.seed), record) for record in chosen), judge, shelf)
     return setting, -(-len(rooms) // every), studies
