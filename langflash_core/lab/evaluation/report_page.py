@@ -156,6 +156,11 @@ def document(report: Report) -> str:
         section.name: {"title": section.title, **section.result, "intervals": section.intervals}
         for section in report.sections
     }
+    return document_of(report, sections)
+
+
+def document_of(report: Report, sections: Mapping[str, Any]) -> str:
+    """JSON of sections under what was judged, when, with which command and on which machine."""
     whole = {
         "weights": report.weights,
         "made": report.made,

@@ -10,12 +10,11 @@ A document marks where a table of the report stands:
 `filled` writes there what the report says; so its numbers come from the report and from nothing else.
 """
 
-import json
 import re
 from collections.abc import Mapping
 from typing import Any
 
-from langflash_core.lab.evaluation.report_page import Report
+from langflash_core.lab.evaluation.report_page import Report, document_of
 from langflash_core.lab.evaluation.report_parts import Table, table_lines
 from langflash_core.lab.evaluation.report_plot import svg
 
@@ -44,14 +43,7 @@ def small_document(report: Report) -> str:
         }
         for section in report.sections
     }
-    whole = {
-        "weights": report.weights,
-        "made": report.made,
-        "command": report.command,
-        "machine": report.machine,
-        "sections": sections,
-    }
-    return json.dumps(whole, indent=1, allow_nan=False) + "\n"
+    return document_of(report, sections)
 
 
 def small_plots(report: Report) -> dict[str, str]:
