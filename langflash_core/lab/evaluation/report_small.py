@@ -66,7 +66,9 @@ def filled(text: str, document: Mapping[str, Any]) -> str:
     def table(place: re.Match) -> str:
         opening, section, title, closing = place.groups()
         lines = table_lines(_table(document, section, title))
-        return "\n".join([opening.rstrip("\n"), *lines, closing])
+        scenes = document["sections"][section]["scenes"]
+        told = f"{scenes} scenes, weights {document['weights']}, {document['made']}:"
+        return "\n".join([opening.rstrip("\n"), told, "", *lines, closing])
 
     return _PLACE.sub(table, text)
 
