@@ -21,6 +21,11 @@ from langflash_core.lab.evaluation.report_plot import svg
 _PLACE = re.compile(r"(<!-- report (\w+): (.+?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
+_STYLE = """><style>text { font: 12px sans-serif; fill: #62626d } .grid { stroke: #dcdce2 }</style>
+<rect width="100%" height="100%" fill="white"/>"""
+"""What a plot has of its page, where it stands alone."""
+
+
 def small_document(report: Report) -> str:
     """JSON: means, labels and tables of every section, without intervals and scenes."""
     sections = {
@@ -49,7 +54,7 @@ def small_document(report: Report) -> str:
 def small_plots(report: Report) -> dict[str, str]:
     """SVG by file name: section and number."""
     return {
-        f"{section.name}_{number}.svg": svg(plot) + "\n"
+        f"{section.name}_{number}.svg": svg(plot).replace(">", _STYLE, 1) + "\n"
         for section in report.sections
         for number, plot in enumerate(section.plots)
         if plot.points

@@ -31,6 +31,17 @@ RIVALS = {
     "points/lfa": ("groups of points, LFA", "points"),
 }
 """Row: what it is, and whose time and bytes it has."""
+SHORT = {
+    "features": "2D features",
+    "splatted": "all channels splatted",
+    **{f"low_{d}": f"{d} channels, decoded" for d in CHANNELS},
+    "sg/average": "atoms, averaged",
+    "sg/lfa": "atoms, LFA",
+    "residual": "atoms and residual",
+    "true/lfa": "true masks",
+    "points/lfa": "groups of points",
+}
+"""The same rows, in plots."""
 COLUMNS = ("groups_accuracy", "groups_miou", "paper_accuracy", "paper_miou")
 HEADINGS = ("class groups: accuracy", "class groups: mIoU", "8 labels: accuracy", "8 labels: mIoU")
 PAPER_K = {128: "0.7144, 0.8547"}
@@ -74,7 +85,8 @@ def ablation_plots(
     """What a new view costs against what is called wrong in it: rivals, and numbers of groups."""
     measures = result["measures"]
     rivals = [
-        _point(row, name, measures.get(f"{cost}_ms"), result, bounds) for row, (name, cost) in RIVALS.items()
+        _point(row, SHORT[row], measures.get(f"{cost}_ms"), result, bounds)
+        for row, (_, cost) in RIVALS.items()
     ]
     studied = [_point(f"K{k}/lfa", f"K = {k}", measures.get(f"K{k}_ms"), result, bounds) for k in GROUPS]
     across, up = "seconds for a new view, one thread", "1 - mIoU over class groups"
@@ -95,7 +107,7 @@ def _point(
     if value is None or milliseconds is None:
         return None
     around = bounds.get(f"labels/{row}/groups_miou")
-    return Point(name.split(":")[0], milliseconds / 1e3, 1 - value, around and [1 - around[1], 1 - around[0]])
+    return Point(name, milliseconds / 1e3, 1 - value, around and [1 - around[1], 1 - around[0]])
 
 
 def ablation_markdown(result: Mapping[str, Any]) -> str:
