@@ -16,7 +16,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import PromptError
-from langflash_core.geometry.fusion import DepthView, Surface, fuse
+from langflash_core.geometry.fusion import ColouredView, Surface, fuse
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.language.answers import (
     BOX_QUANTILES,
@@ -147,15 +147,15 @@ def surface(scene: Scene, members: Tensor, cameras: Sequence[Camera], render: Re
         return None
     means = part.gaussians.means.detach().cpu().double().numpy()
     low, high = np.quantile(means, BOX_QUANTILES, axis=0)
-    views = [_depth_view(render(part, camera, weight_maps=False), camera) for camera in cameras]
+    views = [_coloured_view(render(part, camera, weight_maps=False), camera) for camera in cameras]
     return fuse(views, low, high, 2 * float(np.median(disc_radii(part.gaussians))))
 
 
-def _depth_view(frame: Frame, camera: Camera) -> DepthView:
+def _coloured_view(frame: Frame, camera: Camera) -> ColouredView:
     """Depths where at least half of a pixel is covered."""
     alphas = frame.alphas.cpu()
     depths = torch.where(alphas >= COVERED_ALPHA, frame.depths.cpu(), 0.0)
     straight = frame.rgb.cpu() / alphas.clamp_min(_LEAST)[..., None]
     colours = (straight.clamp(0, 1) * 255).round().byte()
     matrices = camera.viewmat.cpu().double().numpy(), camera.K.cpu().double().numpy()
-    return DepthView(depths.double().numpy(), colours.numpy(), *matrices)
+    return ColouredView(depths.double().numpy(), *matrices, colours.numpy())

@@ -24,6 +24,7 @@ from ..gl.canvas import Canvas
 from ..gl.splats import SplatBuffers
 from ..gl.still import draw_still
 from .cases import Case
+from .channels import Channels, channels_of, draw_channels
 from .errors import Errors, View, errors_of, true_view
 from .modes import DEFAULT, Mode
 from .twins import StaleOrder
@@ -108,6 +109,10 @@ class _Bench:
         self._late: dict[tuple, StaleOrder] = {}
         self._scenes: dict[tuple, Scene] = {_scene_key(mode): mode.scene(case.scene) for mode in modes}
 
+        self._channels: dict[int | None, Channels] = {
+            mode.channels: channels_of(case.scene, mode.channels) for mode in modes if mode.splatted
+        }
+
     def camera(self, mode: Mode, frame: int) -> Camera:
         """Frame -1 is where frame 0 comes from."""
         camera = self.case.path.cameras[frame + 1]
@@ -133,8 +138,11 @@ class _Bench:
     def draw(self, renderer: SplatRenderer, mode: Mode, camera: Camera) -> None:
         """One picture, its weight maps too unless the mode has none."""
         if mode.still:
-            threads = os.cpu_count() or 1
-            renderer.bring(draw_still(self._scenes[_scene_key(mode)], camera, threads=threads))
+            threads, scene = os.cpu_count() or 1, self._scenes[_scene_key(mode)]
+            if mode.splatted:
+                renderer.bring(draw_channels(scene, self._channels[mode.channels], camera, threads))
+            else:
+                renderer.bring(draw_still(scene, camera, threads=threads))
         else:
             renderer.draw(camera, fast=mode.fast)
 

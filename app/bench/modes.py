@@ -25,6 +25,7 @@ class Mode:
     splatted beside the colour. shrink: of the picture's sides. splats: what the scene is uploaded to.
     answers: who answers, None: the renderer's own choice. whole: asked in all C channels of D.
     still: drawn on the processor, as the window does where OpenGL runs there too (app/gl/still.py).
+    splatted: language as channels instead of weights (channels.py), so many `channels`, None: all.
     colours: whether the picture's colours may differ from the default's, not its answers alone.
     """
 
@@ -40,6 +41,8 @@ class Mode:
     whole: bool = False
     colours: bool = False
     still: bool = False
+    splatted: bool = False
+    channels: int | None = None
 
     def scene(self, scene: Scene) -> Scene:
         """The scene as this mode draws it: fewer Gaussians, or the largest weights of each, renormalised."""
@@ -71,6 +74,11 @@ MODES = (
     Mode("detail", "quarter of Gaussians", share=0.25, colours=True),
     Mode("rasteriser", "tiles on the processor", still=True, colours=True),
     Mode("rasteriser", "such tiles at half resolution", still=True, shrink=2, colours=True),
+    Mode("language", "all channels splatted", still=True, splatted=True, whole=True, colours=True),
+    Mode(
+        "language", "16 channels, decoded", still=True, splatted=True, channels=16, whole=True, colours=True
+    ),
+    Mode("language", "3 channels, decoded", still=True, splatted=True, channels=3, whole=True, colours=True),
     Mode("sort", "stale sort", splats=StaleOrder, colours=True),
 )
 AXES = tuple(dict.fromkeys(mode.axis for mode in MODES[1:]))

@@ -27,6 +27,7 @@ _COLOURS = {
     "detail": "#8a6d3b",
     "sort": "#15878f",
     "rasteriser": "#6b7f1f",
+    "language": "#4d7c8a",
 }
 _INK, _GRID = "#3a3a40", "#dcdce2"
 _DPI = 100

@@ -121,12 +121,14 @@ def draw_still(
     *,
     marks: tuple[np.ndarray, np.ndarray] | None = None,
     weight_maps: bool = True,
+    carried: Tensor | None = None,
     threads: int = 1,
     stopping: Callable[[], bool] = lambda: False,
 ) -> Still:
     """Draw a scene as `SplatRenderer.draw` does.
 
     Args:
+        carried: (N, F), composited in place of the weights.
         marks: shown (N,) bool and tints (N,) uint8, as `SplatRenderer.mark` takes them.
         threads, stopping: as `rasterize_tiles`.
 
@@ -144,7 +146,8 @@ def draw_still(
     depths = torch.zeros(len(gaussians)).index_copy(0, footprints.ids, footprints.depths.float())
     features = [torch.cat((colours, depths[:, None]), -1)]
     if weight_maps:
-        features.append(scene.semantics.dense_weights().detach()[kept].half())
+        weights = scene.semantics.dense_weights() if carried is None else carried
+        features.append(weights.detach()[kept].half())
     maps, alphas = rasterize_tiles(footprints, features, camera, threads=threads, stopping=stopping)
     colour = torch.cat((maps[0][..., :3], alphas[..., None]), -1).half().numpy()
     depth = torch.stack((maps[0][..., 3], alphas), -1).numpy()

@@ -26,10 +26,9 @@ _SLAB = 1 << 18  # voxels projected at once
 
 @dataclass(frozen=True)
 class DepthView:
-    """Depths (H, W), world units, 0 for nothing; colours (H, W, 3); seen by viewmat (4, 4), K (3, 3)."""
+    """Depths (H, W), world units, 0 for nothing; seen by viewmat (4, 4), K (3, 3)."""
 
     depths: Float[np.ndarray, "H W"]
-    colours: UInt8[np.ndarray, "H W 3"]
     viewmat: Float[np.ndarray, "4 4"]
     K: Float[np.ndarray, "3 3"]
 
@@ -48,6 +47,13 @@ class DepthView:
 
 
 @dataclass(frozen=True)
+class ColouredView(DepthView):
+    """A depth map with its colours (H, W, 3)."""
+
+    colours: UInt8[np.ndarray, "H W 3"]
+
+
+@dataclass(frozen=True)
 class Surface:
     """A mesh: vertices (V, 3) world, faces (F, 3) facing who looked, colours (V, 3)."""
 
@@ -57,7 +63,7 @@ class Surface:
 
 
 def fuse(
-    views: Sequence[DepthView], low: Float[np.ndarray, " 3"], high: Float[np.ndarray, " 3"], voxel: float
+    views: Sequence[ColouredView], low: Float[np.ndarray, " 3"], high: Float[np.ndarray, " 3"], voxel: float
 ) -> Surface | None:
     """The surface inside a box.
 
@@ -96,7 +102,10 @@ def _known(seen: Bool[np.ndarray, "X Y Z"]) -> Bool[np.ndarray, "x y z"]:
 
 
 def _field(
-    views: Sequence[DepthView], low: Float[np.ndarray, " 3"], voxel: float, shape: Integer[np.ndarray, " 3"]
+    views: Sequence[ColouredView],
+    low: Float[np.ndarray, " 3"],
+    voxel: float,
+    shape: Integer[np.ndarray, " 3"],
 ) -> tuple[Float[np.ndarray, "X Y Z"], Bool[np.ndarray, "X Y Z"]]:
     """Mean distance over the band, 1 where unseen, and which voxels were seen."""
     total, count = np.zeros(int(shape.prod()), np.float32), np.zeros(int(shape.prod()), np.int32)
@@ -115,7 +124,7 @@ def _field(
 
 
 def _coloured(
-    views: Sequence[DepthView], vertices: Float[np.ndarray, "V 3"], reach: float
+    views: Sequence[ColouredView], vertices: Float[np.ndarray, "V 3"], reach: float
 ) -> UInt8[np.ndarray, "V 3"]:
     """Mean colour of the pixels that show a vertex; grey where none does."""
     total, count = np.zeros((len(vertices), 3)), np.zeros(len(vertices))

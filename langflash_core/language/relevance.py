@@ -8,7 +8,7 @@ formed. With the thin factorisation D = R Q, the rows of Q orthonormal,
 both exact. A compiled query holds R, Q t and Q n: nothing of it is wider than K.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -167,7 +167,7 @@ def cosine_maps(weight_maps: Tensor, factor: Tensor, phrases: Tensor, eps: float
 
     Source: own derivation; twins `feature_cosine`, `gram_cosine`, tests/language/reference.py.
     """
-    return _cosines(weight_maps, factor, phrases, eps)[0].movedim(-1, 0)
+    return _cosines(_features(weight_maps, factor), phrases, eps)[0].movedim(-1, 0)
 
 
 def relevancy(positives: Tensor, negatives: Tensor, temperature: float) -> Tensor:
@@ -205,28 +205,46 @@ def relevance_maps(weight_maps: Tensor, compiled: CompiledQuery, eps: float = EM
     Raises:
         ValueError: K disagrees.
     """
-    pixels = weight_maps.flatten(0, -2)  # (H W, K)
-    maps = torch.cat([_relevance(part, compiled, eps) for part in pixels.split(_PIXELS_AT_ONCE)], -1)
-    return maps.unflatten(-1, weight_maps.shape[:-1])
+    return feature_relevance(weight_maps, compiled, lambda part: _features(part, compiled.factor), eps)
 
 
-def _relevance(weights: Tensor, compiled: CompiledQuery, eps: float) -> Tensor:
-    """`relevance_maps` of pixels (n, K): (P, n)."""
+def feature_relevance(
+    maps: Tensor, compiled: CompiledQuery, decode: Callable[[Tensor], Tensor], eps: float = EMPTY_NORM
+) -> Tensor:
+    """`relevance_maps` of whatever a decoder makes vectors F of, in the phrases' own numbers.
+
+    Args:
+        maps: (H, W, d). decode: (n, d) to F (n, r), a block of pixels at a time.
+
+    Raises:
+        ValueError: the vectors have other numbers than the phrases.
+    """
+    pixels = maps.flatten(0, -2)
+    found = [_relevance(decode(part), compiled, eps) for part in pixels.split(_PIXELS_AT_ONCE)]
+    return torch.cat(found, -1).unflatten(-1, maps.shape[:-1])
+
+
+def _relevance(features: Tensor, compiled: CompiledQuery, eps: float) -> Tensor:
+    """Relevance (P, n) of pixels F (n, r)."""
     phrases = torch.cat((compiled.prompts, compiled.negatives))
-    cosines, empty = _cosines(weights, compiled.factor, phrases, eps)
+    cosines, empty = _cosines(features, phrases, eps)
     if compiled.mode == "cosine":
         return cosines.T
     positives, negatives = cosines.T.split((compiled.prompts.shape[0], compiled.negatives.shape[0]))
     return torch.where(empty.T, 0.0, relevancy(positives, negatives, compiled.temperature))
 
 
-def _cosines(weights: Tensor, factor: Tensor, phrases: Tensor, eps: float) -> tuple[Tensor, Tensor]:
-    """Cosines (..., P) of pixels (..., K), 0 where empty, and the empty mask (..., 1)."""
+def _features(weights: Tensor, factor: Tensor) -> Tensor:
+    """F (..., r) of weights (..., K), in the factor's dtype."""
     if weights.shape[-1] != factor.shape[0]:
         raise ValueError(f"weight_maps: expected K = {factor.shape[0]}, received {weights.shape[-1]}")
-    if phrases.shape[-1] != factor.shape[1]:
-        raise ValueError(f"phrases: expected r = {factor.shape[1]}, received {phrases.shape[-1]}")
-    features = weights.to(factor) @ factor  # (..., r)
+    return weights.to(factor) @ factor
+
+
+def _cosines(features: Tensor, phrases: Tensor, eps: float) -> tuple[Tensor, Tensor]:
+    """Cosines (..., P) of pixels F (..., r), 0 where empty, and the empty mask (..., 1)."""
+    if phrases.shape[-1] != features.shape[-1]:
+        raise ValueError(f"phrases: expected r = {features.shape[-1]}, received {phrases.shape[-1]}")
     norms = features.norm(dim=-1, keepdim=True)
     empty = norms < eps
     # Dividing by 1 where empty keeps gradients finite, too; rounding may leave [-1, 1] by an ulp.

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from langflash_core.errors import MissingPackageError
-from langflash_core.geometry.fusion import DepthView, fuse
+from langflash_core.geometry.fusion import ColouredView, fuse
 
 CENTRE, RADIUS, VOXEL = np.array([0.0, 0.0, 2.0]), 0.5, 0.02
 LOW, HIGH = CENTRE - 0.5, CENTRE + 0.5
 
 
-def sphere_from(yaw: float, size: int = 160) -> DepthView:
+def sphere_from(yaw: float, size: int = 160) -> ColouredView:
     """A sphere seen by a camera that orbits it, exact depths."""
     turn = np.array([[np.cos(yaw), 0, np.sin(yaw)], [0, 1, 0], [-np.sin(yaw), 0, np.cos(yaw)]])
     viewmat = np.eye(4)
@@ -25,7 +25,7 @@ def sphere_from(yaw: float, size: int = 160) -> DepthView:
     under = along**2 - square * (4 - RADIUS**2)
     depths = np.where(under > 0, (along - np.sqrt(np.maximum(under, 0))) / square, 0.0)
     colours = np.broadcast_to(np.array([200, 100, 50], np.uint8), (size, size, 3))
-    return DepthView(depths, colours, viewmat, K)
+    return ColouredView(depths, viewmat, K, colours)
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +66,7 @@ def test_a_fine_voxel_in_a_large_box_becomes_coarser():
 def test_nothing_seen_is_nothing():
     pytest.importorskip("skimage")
     seen = sphere_from(0.0)
-    empty = DepthView(np.zeros_like(seen.depths), seen.colours, seen.viewmat, seen.K)
+    empty = ColouredView(np.zeros_like(seen.depths), seen.viewmat, seen.K, seen.colours)
     assert fuse([empty], LOW, HIGH, VOXEL) is None and fuse([], LOW, HIGH, VOXEL) is None
     assert fuse([seen], LOW + 10, HIGH + 10, VOXEL) is None
 

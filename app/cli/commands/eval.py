@@ -9,7 +9,7 @@ from typing import TextIO
 
 from langflash_core.errors import ImageError, InputError, WeightsError
 from langflash_core.files import make_folder, write_atomically
-from langflash_core.lab.evaluation.rooms import run_eval
+from langflash_core.lab.evaluation.rooms.run import run_eval
 from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.lab.photos import chosen_ids
 from langflash_core.network import load_network
@@ -18,7 +18,8 @@ from ..files import check_output_file, readable_file
 from ..photos import chosen, opened_folder
 from ..renderers import open_renderer
 from ..report import ProgressBar, say_warnings, write_json, write_tables
-from .eval_protocol import protocol
+from .eval_ablations import ablations
+from .eval_protocol import opened_lpips, protocol
 from .eval_report import report
 from .eval_sides import beside, sides
 from .query import spoken
@@ -34,6 +35,7 @@ def run(args: Namespace, out: TextIO) -> None:
     if getattr(args, "weights", None) is not None:
         readable_file(args.weights, "checkpoint", WeightsError)
     {
+        "ablations": ablations,
         "rooms": _rooms,
         "calibrate": _calibrate,
         "photos": _photos,
@@ -90,9 +92,18 @@ def _posed(args: Namespace, out: TextIO) -> None:
     from langflash_core.lab.evaluation.posed import APART, PAIRS, chosen_triples, run_posed
 
     triples = chosen_triples(folder.ids, args.limit or PAIRS, args.apart or APART)
+    lpips = opened_lpips(args.lpips)
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
         result = run_posed(
-            folder, triples, renderer, args.weights, preset=args.preset, size=args.size, progress=progress
+            folder,
+            triples,
+            renderer,
+            args.weights,
+            preset=args.preset,
+            size=args.size,
+            lpips=lpips,
+            align=args.align,
+            progress=progress,
         )
     write_tables(args, result, posed_markdown(result), out)
 

@@ -29,13 +29,14 @@ def protocol(args: Namespace, out: TextIO) -> None:
         return
     from langflash_core.lab.evaluation.case_tables import cases_markdown
     from langflash_core.lab.evaluation.cases import Judge, Tally, case_tallies, result_of
-    from langflash_core.lab.evaluation.lpips import Lpips
     from langflash_core.lab.evaluation.protocols import PROTOCOLS, Case, planned
 
     plan = planned(args.name, args.folder, args.index)
-    lpips = None if args.lpips is None else Lpips(readable_file(args.lpips, "LPIPS file", WeightsError))
+    lpips = opened_lpips(args.lpips)
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
-        judge = Judge.of(renderer, args.weights, preset=args.preset, size=args.size, lpips=lpips)
+        judge = Judge.of(
+            renderer, args.weights, preset=args.preset, size=args.size, lpips=lpips, align=args.align
+        )
         count = args.limit or plan.count
 
         def told() -> Iterator[Case]:
@@ -55,17 +56,24 @@ def _nyu(args: Namespace, out: TextIO) -> None:
     Raises:
         LangFlashError: an option that single photos have no use for, or what `protocol` says.
     """
-    for name in ("work", "index", "lpips"):
-        if getattr(args, name) is not None:
-            raise InputError(f"nyu judges single photos in one go; leave --{name} away")
+    for name in ("index", "lpips", "align"):
+        if getattr(args, name):
+            raise InputError(f"nyu judges photos one by one, without another view; leave --{name} away")
     folder = nyu_folder(args.folder)
     ids = folder.ids[: args.limit]
-    from langflash_core.lab.evaluation.labelled import run_photos
+    from langflash_core.lab.evaluation.labelled import Tally, run_photos
     from langflash_core.lab.evaluation.photo_tables import photos_markdown
 
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
         result, _ = run_photos(
-            folder, ids, renderer, args.weights, preset=args.preset, size=args.size, progress=progress
+            folder,
+            ids,
+            renderer,
+            args.weights,
+            preset=args.preset,
+            size=args.size,
+            shelf=_shelf(args, Tally),
+            progress=progress,
         )
     write_tables(args, result, photos_markdown(result), out)
 
@@ -91,6 +99,17 @@ def nyu_folder(path: Path) -> PhotoFolder:
     return folder
 
 
+def opened_lpips(path: Path | None):
+    """LPIPS as --lpips names it; None where it does not.
+
+    Raises:
+        WeightsError: it cannot be read, or holds something else.
+    """
+    from langflash_core.lab.evaluation.lpips import Lpips
+
+    return None if path is None else Lpips(readable_file(path, "LPIPS file", WeightsError))
+
+
 def _weights(args: Namespace) -> str:
     return str(args.weights) if args.weights else args.preset
 
@@ -108,5 +127,6 @@ def _shelf(args: Namespace, kind: type):
         "size": args.size,
         "index": None if args.index is None else str(args.index.resolve()),
         "lpips": args.lpips is not None,
+        "align": args.align,
     }
     return Shelf(args.work / args.name, key, kind)

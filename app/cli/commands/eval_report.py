@@ -5,17 +5,21 @@ import sys
 import time
 from argparse import Namespace
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from langflash_core.errors import InputError
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.photos import PhotoFolder, open_folder
 
 from ...bench.machine import host
-from ..files import check_folder
+from ..files import check_folder, readable_file
 from ..photos import chosen
 from ..renderers import open_renderer
 from ..report import ProgressBar
+from .eval_protocol import opened_lpips
+
+if TYPE_CHECKING:
+    from langflash_core.lab.evaluation.report_page import Report
 
 WORK = "work"
 """Inside the output: tallies and pictures, so that a run that was ended goes on where it stopped."""
@@ -28,27 +32,32 @@ def report(args: Namespace, out: TextIO) -> None:
         LangFlashError: there is nothing to judge, or a source, the checkpoint or the output cannot be used.
     """
     args.only = None
-    if (args.rooms, args.posed, args.photos) == (None, None, None):
-        raise InputError("there is nothing to judge; give --rooms, --posed or --photos")
+    if (args.rooms, args.pack, args.posed, args.photos) == (None, None, None, None):
+        raise InputError("there is nothing to judge; give --rooms, --pack, --posed or --photos")
+    if args.pack is not None:
+        readable_file(args.pack, "furniture pack", InputError)
     if args.rooms is not None and not args.rooms.is_dir():
         raise InputError(f"there is no folder {args.rooms}; make it with langflash train cache")
-    posed, photos = _posed_folder(args.posed), _labelled_folder(args.photos)
-    check_folder(args.output)
+    posed, photos = _posed_folder(args.posed), _labelled_folder(args)
+    for folder in (args.output, args.small):
+        if folder is not None:
+            check_folder(folder)
     from langflash_core.lab.evaluation import report_page
     from langflash_core.lab.evaluation.report import PUBLISHED, Sources, Workplace, sections
     from langflash_core.lab.evaluation.tallies import identity
 
     ids = () if photos is None else chosen(args, photos)
-    sources = Sources(args.rooms, posed, photos, ids, args.limit)
+    sources = Sources(args.rooms, args.pack, posed, photos, ids, args.limit)
+    lpips = opened_lpips(args.lpips)
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
-        place = Workplace(renderer, args.output / WORK, args.weights, args.preset, progress)
+        place = Workplace(renderer, args.output / WORK, args.weights, args.preset, progress, lpips)
         found = list(sections(sources, place))
         drawn_by = renderer.backend
     name = args.weights.name if args.weights else args.preset
     made = report_page.Report(
         found,
         PUBLISHED,
-        shlex.join(["langflash", *sys.argv[1:]]),
+        shlex.join(["langflash", *(_named(word) for word in sys.argv[1:])]),
         {**host(), "renderer": drawn_by},
         f"{name} ({identity(args.weights, args.preset)})",
         time.strftime("%Y-%m-%d"),
@@ -61,8 +70,25 @@ def report(args: Namespace, out: TextIO) -> None:
         ("csv", report_page.numbers_csv(made)),
     ):
         write_atomically(args.output / f"report.{suffix}", text.encode())
+    if args.small is not None:
+        _write_small(made, args.small)
     told = ", ".join(f"{section.title}: {section.result['scenes']}" for section in found)
     print(f"{args.output / 'report.html'}: {told}", file=out)
+
+
+def _write_small(made: "Report", folder: Path) -> None:
+    from langflash_core.lab.evaluation.report_page import markdown
+    from langflash_core.lab.evaluation.report_small import small_document, small_plots
+
+    make_folder(folder)
+    files = {"report.json": small_document(made), "report.md": markdown(made), **small_plots(made)}
+    for name, text in files.items():
+        write_atomically(folder / name, text.encode())
+
+
+def _named(word: str) -> str:
+    """A word of the command, paths by their last name: where something lies is nobody's business."""
+    return Path(word).name if word.startswith("/") else word
 
 
 def _posed_folder(path: Path | None) -> PhotoFolder | None:
@@ -74,10 +100,11 @@ def _posed_folder(path: Path | None) -> PhotoFolder | None:
     return folder
 
 
-def _labelled_folder(path: Path | None) -> PhotoFolder | None:
+def _labelled_folder(args: Namespace) -> PhotoFolder | None:
+    path = args.photos
     if path is None:
         return None
-    folder = open_folder(path)
+    folder = open_folder(path).described(args.crop, args.intrinsics, args.depth_unit)
     if not folder.labelled:
         raise InputError(f"{path} has no names.csv, so nothing in it is labelled; add one, and labels/")
     return folder

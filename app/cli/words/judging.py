@@ -10,7 +10,8 @@ from .shared import add_backend, add_description, add_json, add_output, new_acti
 EVAL_PROTOCOLS = ("scannet", "3dovs", "re10k", "7scenes", "nyu")
 # The decisions that `bench` compares: app.bench.modes.AXES, which would bring torch along.
 BENCH_AXES = (
-    "precision", "relevance", "weights", "cut", "dictionary", "resolution", "detail", "rasteriser", "sort",
+    "precision", "relevance", "weights", "cut", "dictionary", "resolution", "detail", "rasteriser",
+    "language", "sort",
 )  # fmt: skip
 
 
@@ -91,7 +92,15 @@ def add_eval(commands) -> None:
     calibrate.add_argument(
         "--plot", type=Path, metavar="IMG", help="also write the reliability diagram as .png"
     )
-    for command in (rooms, calibrate):
+    ablations = new_command(
+        actions, "ablations", "which part of the method pays: groupings, vectors, K, rivals, stage times"
+    )
+    ablations.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the tables as .md")
+    ablations.add_argument(
+        "--work", type=Path, metavar="DIR", help="keep what is judged there, and go on from it"
+    )
+    add_json(ablations)
+    for command in (rooms, calibrate, ablations):
         command.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
         command.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
         command.add_argument("--weights", type=Path, metavar="PATH", help="(default: the shipped ones)")
@@ -124,6 +133,7 @@ def _add_posed(actions) -> None:
         "--apart", type=whole_count, nargs="+", metavar="N", help="numbers between two (default: 6 12 18 24)"
     )
     command.add_argument("--limit", type=whole_count, metavar="N", help="so many pairs (default: 40)")
+    _add_fitting(command)
     _add_judging(command)
 
 
@@ -170,11 +180,19 @@ def _add_protocol(actions) -> None:
         "--index", type=Path, metavar="FILE", help="re10k: which views, as pixelSplat's evaluation index"
     )
     command.add_argument("--limit", type=whole_count, metavar="N", help="only the first N cases")
-    command.add_argument("--lpips", type=Path, metavar="FILE", help="LPIPS weights of VGG-16, .safetensors")
+    _add_fitting(command)
     command.add_argument(
         "--work", type=Path, metavar="DIR", help="keep what is judged there, and go on from it"
     )
     _add_judging(command, ("mini", "full"))
+
+
+def _add_fitting(command: argparse.ArgumentParser) -> None:
+    """How pictures of kept back views are judged."""
+    command.add_argument("--lpips", type=Path, metavar="FILE", help="LPIPS weights of VGG-16, .safetensors")
+    command.add_argument(
+        "--align", action="store_true", help="also from poses fitted to the photos, as NoPoSplat judges"
+    )
 
 
 def _add_report(actions) -> None:
@@ -184,11 +202,19 @@ def _add_report(actions) -> None:
         help="folder for report.html, .md, .json, .csv; a run that was ended goes on from its work/",
     )  # fmt: skip
     command.add_argument("--rooms", type=Path, metavar="CACHE", help="made by train cache: its held_out")
+    command.add_argument(
+        "--pack", type=Path, metavar="PACK", help="furniture: rooms are seen from aside, too"
+    )
     command.add_argument("--posed", type=Path, metavar="FOLDER", help="real photos of known poses")
     command.add_argument("--photos", type=Path, metavar="FOLDER", help="real photos with labels")
     command.add_argument(
         "--part", choices=("all", "train", "validation"), default="all", help="of --photos (default: all)"
     )
+    add_description(command)
+    command.add_argument(
+        "--small", type=Path, metavar="DIR", help="also the numbers and plots alone, for keeping"
+    )
+    command.add_argument("--lpips", type=Path, metavar="FILE", help="LPIPS weights of VGG-16, .safetensors")
     command.add_argument("--limit", type=whole_count, metavar="N", help="only N scenes of each")
     command.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
     command.add_argument("--weights", type=Path, metavar="PATH", help="(default: the shipped ones)")

@@ -19,7 +19,8 @@ from langflash_core.errors import InputError
 from langflash_core.lab.evaluation.labelled import Render, ask_photo, draw_photo, judged_by
 from langflash_core.lab.evaluation.labelled import Tally as PhotoTally
 from langflash_core.lab.evaluation.metrics import Presence, presence
-from langflash_core.lab.evaluation.rooms import MASK_THRESHOLDS, asked_rooms
+from langflash_core.lab.evaluation.rooms.phrases import MASK_THRESHOLDS
+from langflash_core.lab.evaluation.rooms.run import asked_rooms
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.language.spaces import language_space
 from langflash_core.network import LangFlashNet

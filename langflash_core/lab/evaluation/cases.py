@@ -32,6 +32,7 @@ from langflash_core.lab.evaluation.metrics import (
 from langflash_core.lab.evaluation.posed import (
     LEFT_OUT,
     as_seen,
+    judge_aligned,
     judge_depth,
     judge_picture,
     moved_camera,
@@ -39,7 +40,8 @@ from langflash_core.lab.evaluation.posed import (
     scene_of,
 )
 from langflash_core.lab.evaluation.protocols import Case
-from langflash_core.lab.evaluation.rooms import MIN_SHARE, language_maps
+from langflash_core.lab.evaluation.rooms.tally import MIN_SHARE
+from langflash_core.lab.evaluation.rooms.target import language_maps
 from langflash_core.lab.evaluation.segments import label_border_f
 from langflash_core.lab.evaluation.sights import Look, Sight, error_picture, label_picture, photo_picture
 from langflash_core.lab.evaluation.tallies import Shelf, collected, intervals, merged
@@ -61,7 +63,8 @@ from langflash_core.types import Frame, Scene, Views
 
 @dataclass(frozen=True)
 class Judge:
-    """What every case is judged with. network: a second copy, for features alone; None leaves them out."""
+    """What every case is judged with. network: a second copy, for features alone; None leaves them out.
+    align: targets also from poses fitted to them."""
 
     render: Render
     space: LanguageSpace
@@ -70,6 +73,7 @@ class Judge:
     weights: Path | None = None
     preset: str = "mini"
     size: int | None = None
+    align: bool = False
 
     @staticmethod
     def of(
@@ -80,6 +84,7 @@ class Judge:
         size: int | None = None,
         lpips: Lpips | None = None,
         features: bool = True,
+        align: bool = False,
     ) -> "Judge":
         """Ready to judge; `features`: also 2D features, for which the network is read a second time.
 
@@ -87,7 +92,9 @@ class Judge:
             WeightsError: the checkpoint does not fit.
         """
         network = load_network(preset, weights) if features else None
-        return Judge(render, language_space(PRESETS[preset].space), network, lpips, weights, preset, size)
+        return Judge(
+            render, language_space(PRESETS[preset].space), network, lpips, weights, preset, size, align
+        )
 
 
 @dataclass
@@ -192,11 +199,11 @@ def _target(
     photo = case.folder.photo(id)
     viewmat = relative(first, photo)
     fitted = as_seen(photo, scene.view_size)
-    frame = judge.render(scene, moved_camera(viewmat, scale, fitted, scene.view_size))
-    judge_picture(frame, fitted, tally, start)
-    if judge.lpips is not None:
-        truth = fitted.rgb.permute(1, 2, 0).float() / 255
-        tally.note(lpips_whole_picture=judge.lpips.whole(frame.rgb.cpu()[None], truth[None])[0])
+    camera = moved_camera(viewmat, scale, fitted, scene.view_size)
+    frame = judge.render(scene, camera)
+    judge_picture(frame, fitted, tally, start, judge.lpips)
+    if judge.align:
+        judge_aligned(scene, judge.render, camera, fitted, tally, judge.lpips)
     return Seen(fitted, frame, viewmat, "target")
 
 

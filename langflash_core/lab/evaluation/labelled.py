@@ -22,13 +22,16 @@ from torch.nn import functional as F
 from langflash_core.images.pictures import centre_box
 from langflash_core.images.views import load_views
 from langflash_core.lab.evaluation.metrics import Presence, calibration_error
+from langflash_core.lab.evaluation.numbers import mask_iou, rounded
 from langflash_core.lab.evaluation.photo_words import (
     PhotoWords,
     absent_rows,
     paper_row,
     photos_of_names,
 )
-from langflash_core.lab.evaluation.rooms import MASK_THRESHOLDS, MIN_SHARE, PHRASES, language_maps
+from langflash_core.lab.evaluation.rooms.phrases import MASK_THRESHOLDS, PHRASES
+from langflash_core.lab.evaluation.rooms.tally import MIN_SHARE
+from langflash_core.lab.evaluation.rooms.target import language_maps
 from langflash_core.lab.evaluation.segments import label_border_f
 from langflash_core.lab.evaluation.sights import (
     Look,
@@ -132,6 +135,7 @@ def run_photos(
     *,
     preset: str = "mini",
     size: int | None = None,
+    shelf: Shelf | None = None,
     progress: Progress = lambda stage, fraction: None,
 ) -> tuple[dict, Tally]:
     """Judge a checkpoint on photos of a labelled folder.
@@ -148,7 +152,7 @@ def run_photos(
     """
     judged = judged_by(folder, render, weights, preset=preset, size=size, progress=progress)
     tallies = []
-    for id, tally in photo_tallies(judged, folder, ids):
+    for id, tally in photo_tallies(judged, folder, ids, shelf):
         tallies.append(tally)
         progress(f"photo {id}, {len(tallies)} of {len(ids)}", 0.1 + 0.9 * len(tallies) / len(ids))
     tally = merged(tallies)
@@ -341,7 +345,7 @@ def ask_photo(judged: Judged, drawn: Drawn, seed: int, tally: Tally) -> None:
     tally.truths.append(truths)
     for place, row in enumerate(present):
         values, truth = found.relevance[place][labelled], rows[labelled] == row
-        tally.ious.append(torch.tensor([_iou(values >= limit, truth) for limit in MASK_THRESHOLDS]))
+        tally.ious.append(torch.tensor([mask_iou(values >= limit, truth) for limit in MASK_THRESHOLDS]))
 
 
 def overlap_fine(judged: Judged, drawn: Drawn, tally: Tally) -> None:
@@ -369,11 +373,6 @@ def _counts(found: Sequence[bool], there: Sequence[bool]) -> Presence:
         misses=pairs.count((False, True)),
         rejections=pairs.count((False, False)),
     )
-
-
-def _iou(found: Tensor, truth: Tensor) -> float:
-    union = float((found | truth).sum())
-    return float((found & truth).sum()) / union if union else 0.0
 
 
 def summary(tally: Tally, words: PhotoWords) -> dict:
@@ -427,8 +426,3 @@ def _fine_report(tally: Tally, words: PhotoWords) -> list[dict]:
             asked = both / either if either else math.nan
             rows.append({"name": name, "photos": photos, **rounded({"iou": iou, "asked_iou": asked})})
     return sorted(rows, key=lambda row: -(row["iou"] or 0))
-
-
-def rounded(values: dict[str, float]) -> dict[str, float | None]:
-    """Four digits; what could not be measured is null, because JSON has no NaN."""
-    return {k: None if math.isnan(v) else round(v, 4) for k, v in values.items()}

@@ -20,8 +20,11 @@ from torch import Tensor
 
 from langflash_core.errors import InputError
 from langflash_core.images.pictures import centre_box
-from langflash_core.lab.evaluation.labelled import Render, rounded
+from langflash_core.lab.evaluation.alignment import aligned_camera
+from langflash_core.lab.evaluation.labelled import Render
+from langflash_core.lab.evaluation.lpips import Lpips
 from langflash_core.lab.evaluation.metrics import POSE_LIMITS, PoseError, pose_auc, pose_error
+from langflash_core.lab.evaluation.numbers import rounded
 from langflash_core.lab.evaluation.pictures import ssim
 from langflash_core.lab.evaluation.sights import Look, Sight, error_picture, photo_picture
 from langflash_core.lab.evaluation.tallies import Shelf, collected, merged
@@ -32,6 +35,7 @@ from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, n
 from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.pipeline import reconstruct
 from langflash_core.running import Progress
+from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Camera, Frame, Scene
 
 APART = (6, 12, 18, 24)
@@ -95,12 +99,14 @@ def run_posed(
     *,
     preset: str = "mini",
     size: int | None = None,
+    lpips: Lpips | None = None,
+    align: bool = False,
     progress: Progress = lambda stage, fraction: None,
 ) -> dict:
     """Judge a checkpoint on pairs of a posed folder.
 
     Args:
-        render: draws a scene. size: as `reconstruct` has it.
+        render: draws a scene. size: as `reconstruct` has it. align: also from fitted poses.
 
     Returns:
         Plain JSON: "measures" over all pairs, "by_gap" the medians and means for each distance in number.
@@ -109,7 +115,9 @@ def run_posed(
         InputError: the folder lacks a pose. WeightsError: the checkpoint does not fit.
     """
     by_gap: dict[int, list[Tally]] = {}
-    tallies = pair_tallies(folder, triples, render, weights, preset=preset, size=size)
+    tallies = pair_tallies(
+        folder, triples, render, weights, preset=preset, size=size, lpips=lpips, align=align
+    )
     for done, (triple, (name, tally)) in enumerate(zip(triples, tallies, strict=True), start=1):
         progress(f"pair {name}", done / len(triples))
         by_gap.setdefault(triple.apart, []).append(tally)
@@ -130,6 +138,8 @@ def pair_tallies(
     *,
     preset: str = "mini",
     size: int | None = None,
+    lpips: Lpips | None = None,
+    align: bool = False,
     shelf: Shelf | None = None,
     look: Look | None = None,
 ) -> Iterator[tuple[str, Tally]]:
@@ -137,7 +147,8 @@ def pair_tallies(
 
     def judge(triple: Triple) -> Tally:
         tally = Tally()
-        judge_triple(folder, triple, render, tally, weights=weights, preset=preset, size=size, look=look)
+        options = {"weights": weights, "preset": preset, "size": size, "lpips": lpips, "align": align}
+        judge_triple(folder, triple, render, tally, **options, look=look)
         return tally
 
     return collected(((key_of(t), t) for t in triples), judge, shelf)
@@ -153,6 +164,8 @@ def judge_triple(
     weights: Path | None = None,
     preset: str = "mini",
     size: int | None = None,
+    lpips: Lpips | None = None,
+    align: bool = False,
     look: Look | None = None,
 ) -> None:
     """Pose, depth and the photo from between of one pair; adds to `tally`."""
@@ -178,8 +191,11 @@ def judge_triple(
     if math.isnan(scale):
         return
     target = as_seen(between, scene.view_size)
-    frame = render(scene, moved_camera(to_between, scale, target, scene.view_size))
-    judge_picture(frame, target, tally, truths[0])
+    camera = moved_camera(to_between, scale, target, scene.view_size)
+    frame = render(scene, camera)
+    judge_picture(frame, target, tally, truths[0], lpips)
+    if align:
+        judge_aligned(scene, render, camera, target, tally, lpips)
     if look is not None:
         look(_sight(triple, truths[0], target, frame, tally))
 
@@ -271,7 +287,25 @@ def moved_camera(viewmat: Tensor, scale: float, photo: FittedPhoto, size: tuple[
     return Camera(moved, photo.K, *size)
 
 
-def judge_picture(frame: Frame, photo: FittedPhoto, tally: Tally, first: FittedPhoto) -> None:
+def judge_aligned(
+    scene: Scene, render: Render, camera: Camera, photo: FittedPhoto, tally: Tally, lpips: Lpips | None = None
+) -> None:
+    """The same picture from the pose that fits the photo best, as papers without poses judge; the numbers
+    say "aligned"."""
+    truth = photo.rgb.permute(1, 2, 0).float() / 255
+    plain = bare_scene(scene.gaussians, "colours")  # no weight maps are drawn
+    frame = render(plain, aligned_camera(lambda at: render(plain, at), camera, truth))
+    shown = frame.alphas >= COVERED_ALPHA
+    tally.note(psnr_whole_picture_aligned=psnr(frame.rgb, truth))
+    if bool(shown.any()):
+        tally.note(psnr_aligned=psnr(frame.rgb[shown], truth[shown]))
+    if lpips is not None:
+        tally.note(lpips_whole_picture_aligned=lpips.whole(frame.rgb.cpu()[None], truth[None])[0])
+
+
+def judge_picture(
+    frame: Frame, photo: FittedPhoto, tally: Tally, first: FittedPhoto, lpips: Lpips | None = None
+) -> None:
     """The scene from where a photo was taken that it was not made of; pixels that the scene covers, and all
     of them."""
     truth, start = (p.rgb.permute(1, 2, 0).float() / 255 for p in (photo, first))
@@ -281,6 +315,8 @@ def judge_picture(frame: Frame, photo: FittedPhoto, tally: Tally, first: FittedP
         psnr_whole_picture=psnr(frame.rgb, truth),
         ssim_whole_picture=ssim(frame.rgb, truth),
     )
+    if lpips is not None:
+        tally.note(lpips_whole_picture=lpips.whole(frame.rgb.cpu()[None], truth[None])[0])
     if bool(shown.any()):
         flat = truth[shown].mean(0).expand_as(truth)
         tally.note(

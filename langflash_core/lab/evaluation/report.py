@@ -12,7 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from langflash_core.errors import InputError
-from langflash_core.lab.evaluation import labelled, posed, rooms
+from langflash_core.lab.evaluation import labelled, posed
+from langflash_core.lab.evaluation.ablations import study
+from langflash_core.lab.evaluation.ablations.tables import ablation_plots, ablation_tables
+from langflash_core.lab.evaluation.ablations.tables import summary as ablation_summary
+from langflash_core.lab.evaluation.lpips import Lpips
 from langflash_core.lab.evaluation.photo_tables import LABEL_LISTS, PHOTOS, POSED
 from langflash_core.lab.evaluation.photo_tables import METHODS as PHOTO_METHODS
 from langflash_core.lab.evaluation.posed import APART, PAIRS, chosen_triples, pair_tallies
@@ -25,6 +29,11 @@ from langflash_core.lab.evaluation.report_parts import (
     labels_table,
     measures_table,
 )
+from langflash_core.lab.evaluation.report_sides import Tally as Sides
+from langflash_core.lab.evaluation.report_sides import side_summary, side_tables, side_tallies
+from langflash_core.lab.evaluation.rooms import run as rooms
+from langflash_core.lab.evaluation.rooms.summary import summary as room_summary
+from langflash_core.lab.evaluation.rooms.tally import Tally as RoomTally
 from langflash_core.lab.evaluation.sights import Look
 from langflash_core.lab.evaluation.speed import PAPER_MS
 from langflash_core.lab.evaluation.tables import COLUMNS, MEASURES, METHODS
@@ -35,6 +44,8 @@ from langflash_core.running import Progress
 WORST, BEST = 6, 2
 """Scenes shown of a section."""
 DRAWS = 300
+ABLATED, SIDES = 25, 24
+"""At most so many rooms are asked of every rival, and walked around."""
 PUBLISHED = Table(
     "",
     ("system", "data", "measure", "value"),
@@ -55,10 +66,11 @@ PUBLISHED = Table(
 
 @dataclass(frozen=True)
 class Sources:
-    """What is at hand: a cache of rooms, posed and labelled photos (None: not there). photo_ids: none means
-    all; limit: rooms, and pairs of posed photos."""
+    """What is at hand: a cache of rooms, a furniture pack to walk around rooms, posed and labelled photos
+    (None: not there). photo_ids: none means all; limit: rooms, and pairs of posed photos."""
 
     rooms: Path | None = None
+    pack: Path | None = None
     posed: PhotoFolder | None = None
     photos: PhotoFolder | None = None
     photo_ids: Sequence[str] = ()
@@ -74,9 +86,10 @@ class Workplace:
     weights: Path | None = None
     preset: str = "mini"
     progress: Progress = lambda stage, fraction: None
+    lpips: Lpips | None = None
 
     def shelf(self, section: str, kind: type, **key: object) -> Shelf:
-        key = {"weights": identity(self.weights, self.preset), **key}
+        key = {"weights": identity(self.weights, self.preset), "lpips": self.lpips is not None, **key}
         return Shelf(self.folder / section, key, kind)
 
 
@@ -86,11 +99,15 @@ def sections(sources: Sources, place: Workplace) -> Iterator[Section]:
     Raises:
         InputError: there is no source, or one cannot be used. WeightsError: of the checkpoint.
     """
-    wanted = [s for s in (sources.rooms, sources.posed, sources.photos) if s is not None]
+    wanted = [s for s in (sources.rooms, sources.pack, sources.posed, sources.photos) if s is not None]
     if not wanted:
-        raise InputError("there is nothing to judge; give --rooms, --posed or --photos")
+        raise InputError("there is nothing to judge; give --rooms, --pack, --posed or --photos")
     if sources.rooms is not None:
         yield rooms_section(sources.rooms, place, sources.limit)
+        if (sources.rooms / "train").is_dir():
+            yield ablations_section(sources.rooms, place, sources.limit)
+    if sources.pack is not None:
+        yield sides_section(sources.pack, place, sources.limit)
     if sources.posed is not None:
         yield posed_section(sources.posed, place, sources.limit)
     if sources.photos is not None:
@@ -99,12 +116,14 @@ def sections(sources: Sources, place: Workplace) -> Iterator[Section]:
 
 def rooms_section(data: Path, place: Workplace, limit: int | None = None) -> Section:
     """Furnished rooms whose furniture no training saw, every rival in the same run."""
-    setting, held_out = rooms.open_rooms(data, place.weights, preset=place.preset, limit=limit)
-    shelf = place.shelf("rooms", rooms.Tally, data=str(data.resolve()), groups=len(setting.groups))
+    setting, held_out = rooms.open_rooms(
+        data, place.weights, preset=place.preset, limit=limit, lpips=place.lpips
+    )
+    shelf = place.shelf("rooms", RoomTally, data=str(data.resolve()), groups=len(setting.groups))
     kept, gallery = _told(
         place, shelf, len(held_out), lambda look: rooms.room_tallies(setting, held_out, shelf, look)
     )
-    result, bounds = _summed(kept, lambda tally: rooms.summary(tally, setting))
+    result, bounds = _summed(kept, lambda tally: room_summary(tally, setting))
     seeds = sorted(map(int, kept))
     about = (
         f"{len(kept)} rooms, seeds {seeds[0]} to {seeds[-1]}, furniture held out from training; two photos "
@@ -127,6 +146,59 @@ def rooms_section(data: Path, place: Workplace, limit: int | None = None) -> Sec
     )
 
 
+def ablations_section(data: Path, place: Workplace, limit: int | None = None) -> Section:
+    """Which part of the method pays, on some of the rooms."""
+    shelf = place.shelf("ablations", study.Tally, data=str(data.resolve()))
+    setting, count, studies = study.room_studies(
+        data,
+        place.weights,
+        limit=limit,
+        most=ABLATED,
+        kept=shelf.folder / f"fits_{identity(place.weights, place.preset)}.safetensors",
+        shelf=shelf,
+        progress=place.progress,
+    )
+    kept, _ = _told(place, shelf, count, lambda look: studies)
+    result, bounds = _summed(kept, ablation_summary)
+    about = (
+        f"{len(kept)} of the rooms, taken evenly; {len(setting.groups)} class groups. All rivals draw "
+        "the same Gaussians from the same camera by the same rasteriser; times are those of one process, and "
+        '"x atoms" is the mean over rooms of the ratio to the atoms in the same room.'
+    )
+    return Section(
+        "ablations",
+        "What pays: groups, vectors, K, and rivals",
+        about,
+        {"scenes": len(kept), **result},
+        bounds,
+        ablation_tables(result),
+        ablation_plots(result, bounds),
+    )
+
+
+def sides_section(pack: Path, place: Workplace, limit: int | None = None) -> Section:
+    """Rooms seen from aside."""
+    count = min(limit or SIDES, SIDES)
+    shelf = place.shelf("sides", Sides, pack=str(pack.resolve()))
+    kept, _ = _told(
+        place,
+        shelf,
+        count,
+        lambda look: side_tallies(
+            pack, count, place.render, place.weights, preset=place.preset, lpips=place.lpips, shelf=shelf
+        ),
+    )
+    result, bounds = _summed(kept, side_summary)
+    return Section(
+        "sides",
+        "Rooms seen from aside",
+        f"{len(kept)} rooms, drawn from 10 to 45 degrees aside and from over and under.",
+        {"scenes": len(kept), **result},
+        bounds,
+        side_tables(result),
+    )
+
+
 def posed_section(folder: PhotoFolder, place: Workplace, limit: int | None = None) -> Section:
     """Pairs of real photos whose poses somebody measured."""
     triples = chosen_triples(folder.ids, limit or PAIRS, APART)
@@ -136,7 +208,15 @@ def posed_section(folder: PhotoFolder, place: Workplace, limit: int | None = Non
         shelf,
         len(triples),
         lambda look: pair_tallies(
-            folder, triples, place.render, place.weights, preset=place.preset, shelf=shelf, look=look
+            folder,
+            triples,
+            place.render,
+            place.weights,
+            preset=place.preset,
+            lpips=place.lpips,
+            align=True,
+            shelf=shelf,
+            look=look,
         ),
     )
     result, bounds = _summed(kept, lambda tally: {"measures": posed.summary(tally)})

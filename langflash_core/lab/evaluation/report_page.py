@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import Any
 
-from langflash_core.lab.evaluation.report_parts import Section, Shown, Table
+from langflash_core.lab.evaluation.report_parts import Section, Shown, Table, table_lines
 from langflash_core.lab.evaluation.report_plot import svg
 from langflash_core.lab.evaluation.tallies import numbers_of
 
@@ -144,16 +144,10 @@ def markdown(report: Report) -> str:
     for section in report.sections:
         lines += [f"## {section.title}", "", section.about, ""]
         for table in section.tables:
-            lines += [*_markdown_table(table), ""]
-    lines += ["## Published elsewhere", "", *_markdown_table(report.published), ""]
-    lines += ["## Again", "", f"`{report.command}`", "", *_markdown_table(_machine(report.machine))]
+            lines += [*table_lines(table), ""]
+    lines += ["## Published elsewhere", "", *table_lines(report.published), ""]
+    lines += ["## Again", "", f"`{report.command}`", "", *table_lines(_machine(report.machine))]
     return "\n".join(lines) + "\n"
-
-
-def _markdown_table(table: Table) -> list[str]:
-    rows = [table.header, tuple("---" for _ in table.header), *table.rows]
-    lines = ["| " + " | ".join(text.replace("|", "/") for text in row) + " |" for row in rows]
-    return [f"**{table.title}**", "", *lines] if table.title else lines
 
 
 def document(report: Report) -> str:
@@ -162,6 +156,11 @@ def document(report: Report) -> str:
         section.name: {"title": section.title, **section.result, "intervals": section.intervals}
         for section in report.sections
     }
+    return document_of(report, sections)
+
+
+def document_of(report: Report, sections: Mapping[str, Any]) -> str:
+    """JSON of sections under what was judged, when, with which command and on which machine."""
     whole = {
         "weights": report.weights,
         "made": report.made,

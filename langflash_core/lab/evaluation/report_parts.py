@@ -29,6 +29,13 @@ class Table:
     rows: Sequence[tuple[str, ...]]
 
 
+def table_lines(table: Table) -> list[str]:
+    """Lines of Markdown."""
+    rows = [table.header, tuple("---" for _ in table.header), *table.rows]
+    lines = ["| " + " | ".join(text.replace("|", "/") for text in row) + " |" for row in rows]
+    return [f"**{table.title}**", "", *lines] if table.title else lines
+
+
 @dataclass(frozen=True)
 class Point:
     """One way of doing it: seconds, an error (less is better), its 95 % interval, and its name."""

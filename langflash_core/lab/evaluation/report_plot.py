@@ -4,11 +4,13 @@ import math
 from collections.abc import Callable, Sequence
 from html import escape
 
+from langflash_core.export.colours import label_colours
 from langflash_core.lab.evaluation.report_parts import Plot, Point
-from langflash_core.lab.evaluation.sights import label_colour
 
 WIDTH, HEIGHT = 640, 340
 LEFT, RIGHT, TOP, BOTTOM = 62, 24, 18, 48
+LETTER = 6.2
+"""Width of a letter, about."""
 
 
 def svg(plot: Plot) -> str:
@@ -50,16 +52,18 @@ def svg(plot: Plot) -> str:
         f'<text transform="translate(14 {(TOP + HEIGHT - BOTTOM) / 2}) rotate(-90)" '
         f'text-anchor="middle">{escape(plot.up)}</text>'
     )
-    levels = _apart([y(point.error) for point in points])
+    levels = _apart(
+        [(*_span(point, x(own)), y(point.error)) for point, own in zip(points, seconds, strict=True)]
+    )
+    colours = [tuple(colour) for colour in label_colours(len(points)).tolist()]
     for row, (point, own, level) in enumerate(zip(points, seconds, levels, strict=True)):
-        parts += _mark(point, x(own), y, level, _dark(label_colour(row)))
+        parts += _mark(point, x(own), y, level, _dark(colours[row]))
     return "\n".join([*parts, "</svg>"])
 
 
 def _mark(point: Point, x: float, y: Callable[[float], float], level: float, colour: str) -> list[str]:
     """Point, interval and name; the name stands at `level`, where there is room."""
-    after = x < WIDTH * 0.6
-    place, anchor = (x + 9, "start") if after else (x - 9, "end")
+    place, anchor = (x + 9, "start") if _after(point, x) else (x - 9, "end")
     parts = []
     if point.bounds is not None:
         low, high = y(point.bounds[0]), y(point.bounds[1])
@@ -69,18 +73,40 @@ def _mark(point: Point, x: float, y: Callable[[float], float], level: float, col
         )
     parts.append(f'<circle cx="{x:.1f}" cy="{y(point.error):.1f}" r="5" fill="{colour}"/>')
     parts.append(
-        f'<text class="name" x="{place:.1f}" y="{level + 4:.1f}" '
+        f'<text class="name" x="{place:.1f}" y="{level + 4:.1f}" style="fill: {colour}" '
         f'text-anchor="{anchor}">{escape(point.name)}</text>'
     )
     return parts
 
 
-def _apart(levels: Sequence[float], least: float = 15) -> list[float]:
-    """The same heights, moved down where two names would touch."""
-    moved = list(levels)
-    last = -math.inf
-    for place in sorted(range(len(moved)), key=lambda place: moved[place]):
-        moved[place] = last = max(moved[place], last + least)
+def _after(point: Point, x: float) -> bool:
+    """Whether a name fits behind its point."""
+    return x + 9 + LETTER * len(point.name) <= WIDTH
+
+
+def _span(point: Point, x: float) -> tuple[float, float]:
+    """Left and right of a name, about."""
+    wide = LETTER * len(point.name)
+    return (x + 9, x + 9 + wide) if _after(point, x) else (x - 9 - wide, x - 9)
+
+
+def _apart(names: Sequence[tuple[float, float, float]], least: float = 15) -> list[float]:
+    """Heights of names (left, right, height), each moved as little as it takes to touch none before it."""
+    placed: list[tuple[float, float, float]] = []
+    moved = [0.0] * len(names)
+    for place in sorted(range(len(names)), key=lambda place: names[place][2]):
+        left, right, wanted = names[place]
+        steps = (wanted + sign * least * step / 3 for step in range(90) for sign in (1, -1))
+        moved[place] = next(
+            (
+                level
+                for level in steps
+                if TOP <= level <= HEIGHT - BOTTOM
+                and all(right < a or left > b or abs(level - c) >= least for a, b, c in placed)
+            ),
+            wanted,
+        )
+        placed.append((left, right, moved[place]))
     return moved
 
 

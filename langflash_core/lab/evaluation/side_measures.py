@@ -13,6 +13,7 @@ import torch
 from jaxtyping import Bool, Float
 from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
 
+from langflash_core.geometry.fusion import DepthView
 from langflash_core.lab.rooms.cameras import reproject
 
 SAME = 0.04
@@ -34,15 +35,6 @@ INNER = 3
 """Pixels from a depth edge where layers are not measured: there the two photos may see different things."""
 JUMPS = (1.05, 1.10, 1.15, 1.20, 1.25)
 """Ratios of neighbouring depths that are edges; from Depth Pro (Bochkovskii et al. 2024)."""
-
-
-@dataclass(frozen=True)
-class DepthView:
-    """A depth map and where it was taken."""
-
-    depths: Float[np.ndarray, "H W"]
-    viewmat: Float[np.ndarray, "4 4"]
-    K: Float[np.ndarray, "3 3"]
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from langflash_core.geometry.fusion import DepthView
 from langflash_core.lab.evaluation.labelled import Render
-from langflash_core.lab.evaluation.side_measures import DepthView, as_array
+from langflash_core.lab.evaluation.side_measures import as_array
 from langflash_core.lab.evaluation.side_subjects import Case, carried
 from langflash_core.lab.evaluation.sides import aligned, camera_of, covered_depths
 from langflash_core.types import Camera, Frame, Scene

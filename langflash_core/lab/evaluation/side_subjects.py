@@ -12,9 +12,9 @@ from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.errors import InputError
+from langflash_core.geometry.fusion import DepthView
 from langflash_core.lab.evaluation.posed import Triple, as_seen, relative
 from langflash_core.lab.evaluation.side_measures import (
-    DepthView,
     angle_between,
     as_array,
     seen_by,

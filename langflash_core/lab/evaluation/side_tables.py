@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from langflash_core.lab.evaluation.sides import grouped, number
 from langflash_core.lab.training.measures import nan_mean
 
-_LOOK = (
+LOOKS = (
     ("PSNR, holes black (dB)", "psnr"),
     ("PSNR of what is covered (dB)", "psnr_covered"),
     ("SSIM", "ssim"),
@@ -16,7 +16,7 @@ _LOOK = (
     ("seen by a photo (%)", "seen"),
 )
 _SHARES = ("sheets", "holes", "seen")
-_ONCE = (
+ONCE = (
     ("Depth boundaries in the photos, F1", "boundary_f1"),
     ("Layers: distance of the two photos' surfaces, median (% of depth)", "layers_median"),
     ("Layers, 90th percentile (% of depth)", "layers_p90"),
@@ -33,13 +33,13 @@ def sides_markdown(result: dict) -> str:
     """The tables of a `run_sides` result: what a scene has once, and by where it is seen from."""
     measures, looks = result["measures"], result["by_look"]
     lines = [f"| measure | mean of {len(result['cases'])} |", "|---|---|"]
-    lines += [f"| {title} | {_told(key, measures[key])} |" for title, key in _ONCE]
-    columns = [(title, key) for title, key in _LOOK if any(key in row for row in looks.values())]
+    lines += [f"| {title} | {told(key, measures[key])} |" for title, key in ONCE]
+    columns = [(title, key) for title, key in LOOKS if any(key in row for row in looks.values())]
     lines += ["", "| seen from | scenes | " + " | ".join(title for title, _ in columns) + " |"]
     lines.append("|---" * (len(columns) + 2) + "|")
     for group, row in looks.items():
-        cells = [str(row["cases"]), *(_told(key, row.get(key)) for _, key in columns)]
-        lines.append(f"| {_place(group)} | " + " | ".join(cells) + " |")
+        cells = [str(row["cases"]), *(told(key, row.get(key)) for _, key in columns)]
+        lines.append(f"| {place_name(group)} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 
@@ -49,13 +49,13 @@ def beside_markdown(before: dict, after: dict) -> str:
     cases, others = ({row["name"]: row for row in result["cases"]} for result in (before, after))
     pairs = [(row, others[name]) for name, row in cases.items() if name in others]
     lines = [f"| measure ({len(pairs)} scenes) | before | after | difference |", "|---|---|---|---|"]
-    for title, key in _ONCE:
+    for title, key in ONCE:
         name = key.removesuffix("_median") if key.startswith(("rotation", "direction")) else key
         values = [(number(old[name]), number(new[name])) for old, new in pairs]
         lines += _row(title.replace(", median (degrees)", " (degrees)"), key, values)
     for group in [group for group in before["by_look"] if group in after["by_look"]]:
-        for title, key in _LOOK:
-            lines += _row(f"{_place(group)}: {title}", key, list(_looks(pairs, group, key)))
+        for title, key in LOOKS:
+            lines += _row(f"{place_name(group)}: {title}", key, list(_looks(pairs, group, key)))
     return "\n".join(lines) + "\n"
 
 
@@ -78,11 +78,12 @@ def _row(title: str, key: str, values: list[tuple[float, float]]) -> list[str]:
     mean = nan_mean(changes)
     spread = math.sqrt(sum((c - mean) ** 2 for c in changes) / max(len(changes) - 1, 1) / len(changes))
     old, new = (nan_mean(side) for side in zip(*kept, strict=True))
-    cells = (_told(key, old), _told(key, new), f"{_told(key, mean, '+')} ± {_told(key, spread)}")
+    cells = (told(key, old), told(key, new), f"{told(key, mean, '+')} ± {told(key, spread)}")
     return [f"| {title} | " + " | ".join(cells) + " |"]
 
 
-def _place(group: str) -> str:
+def place_name(group: str) -> str:
+    """Of a group of looks, for people."""
     if group == "0":
         return "the photos' own places"
     if group == "between":
@@ -90,7 +91,8 @@ def _place(group: str) -> str:
     return f"{group} degrees aside" if group.isdigit() else f"{group} degrees"
 
 
-def _told(key: str, value: float | None, sign: str = "") -> str:
+def told(key: str, value: float | None, sign: str = "") -> str:
+    """A number of a measure, shares in percent; "-" where there is none."""
     if value is None or math.isnan(value):
         return "-"
     return format(100 * value, f"{sign}.2f") if key in _PERCENT else format(value, f"{sign}.3f")

@@ -17,12 +17,13 @@ import numpy as np
 import torch
 
 from langflash_core.errors import InputError
-from langflash_core.lab.evaluation.labelled import Render, rounded
+from langflash_core.geometry.fusion import DepthView
+from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.evaluation.lpips import Lpips
 from langflash_core.lab.evaluation.metrics import pose_error
+from langflash_core.lab.evaluation.numbers import rounded
 from langflash_core.lab.evaluation.posed import scene_of
 from langflash_core.lab.evaluation.side_measures import (
-    DepthView,
     Similarity,
     as_array,
     boundary_f1,

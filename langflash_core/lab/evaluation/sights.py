@@ -3,13 +3,16 @@
 Pictures are (H, W, 3) uint8.
 """
 
-import colorsys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import torch
 from jaxtyping import Float, Integer, UInt8
 from torch import Tensor
+
+from langflash_core.export.colours import heat, label_colours
+from langflash_core.export.png import to_8bit
 
 Picture = UInt8[np.ndarray, "H W 3"]
 UNKNOWN = (38, 38, 42)
@@ -47,25 +50,14 @@ def error_picture(rgb: Tensor, photo: Tensor, seen: np.ndarray | None = None) ->
 
 
 def heat_picture(values: Float[np.ndarray, "H W"]) -> Picture:
-    """[0, 1] as black, purple, orange, pale yellow."""
-    stops = np.array([[0, 0, 4], [87, 16, 110], [188, 55, 84], [249, 142, 9], [252, 255, 164]], dtype=float)
-    places = np.clip(values, 0, 1) * (len(stops) - 1)
-    low = np.floor(places).astype(int).clip(0, len(stops) - 2)
-    share = (places - low)[..., None]
-    return ((1 - share) * stops[low] + share * stops[low + 1]).round().astype(np.uint8)
-
-
-def label_colour(row: int) -> tuple[int, int, int]:
-    """Of a label: far from those of its neighbours in the list."""
-    hue = (row * 0.61803398875) % 1.0
-    red, green, blue = colorsys.hsv_to_rgb(hue, 0.45 + 0.4 * ((row // 5) % 2), 0.95 - 0.25 * (row % 3) / 2)
-    return round(red * 255), round(green * 255), round(blue * 255)
+    """[0, 1] in the program's own scale, night blue to pale yellow."""
+    return to_8bit(heat(torch.from_numpy(values)))
 
 
 def label_picture(labels: Integer[np.ndarray, "H W"]) -> Picture:
     """Labels in their colours; -1 in `UNKNOWN`."""
     rows = int(labels.max(initial=0)) + 1
-    colours = np.array([*(label_colour(row) for row in range(rows)), UNKNOWN], dtype=np.uint8)
+    colours = np.array([*label_colours(rows), UNKNOWN], dtype=np.uint8)
     return colours[np.where(labels < 0, rows, labels)]
 
 
@@ -73,7 +65,8 @@ def legend_of(names: Sequence[str], *maps: Integer[np.ndarray, "H W"]) -> dict[s
     """Colours of the labels that cover at least a hundredth of one of the maps; `names`: by label."""
     shares = [np.bincount(labels[labels >= 0], minlength=len(names)) / labels.size for labels in maps]
     common = np.max(shares, axis=0) >= 0.01
-    return {names[row]: label_colour(row) for row in np.flatnonzero(common).tolist()}
+    colours = label_colours(len(names)).tolist()
+    return {names[row]: tuple(colours[row]) for row in np.flatnonzero(common).tolist()}
 
 
 def depth_picture(depths: Float[np.ndarray, "H W"], longest: float) -> Picture:

@@ -54,7 +54,7 @@ def split_groups(
     units = F.normalize(embeddings.float(), dim=1)
     seen = [units, rule.agreement * weights.float().sqrt()]
     if features is not None:
-        meant = _condensed(features)
+        meant = condensed(features)
         seen.append(rule.meaning * F.normalize(resize(meant, (units.shape[-2], units.shape[-1])), dim=1))
     joint = F.normalize(torch.cat(seen, 1), dim=1)
     coarse = F.avg_pool2d(joint, 2, ceil_mode=True).movedim(1, -1).flatten(0, 2)  # (X, S)
@@ -63,7 +63,7 @@ def split_groups(
     return resize(closeness.contiguous(), size).softmax(1)  # three times as fast as in einsum's own order
 
 
-def _condensed(features: Tensor) -> Tensor:
+def condensed(features: Tensor) -> Tensor:
     """Maps (V, C, h, w) in the few directions that a scene needs, (V, `_DIRECTIONS`, h, w): clustering then
     takes a fifth of the time, and cosines stay.
 

@@ -70,6 +70,30 @@ def test_the_papers_network_goes_from_end_to_end(run, wall, tiny_full, scannet: 
         assert outcome.json()["cases"] == 1
 
 
+def test_the_shipped_network_goes_through_the_other_protocols(run, wall, tmp_path: Path):
+    made.masked_scene(made.wall(tmp_path / "four", 4), tmp_path / "3dovs" / "bed")
+    made.re10k_split(made.wall(tmp_path / "five", 5), tmp_path / "re10k")
+    options = ("--size", 84, "--backend", "torch", "--json", "--limit", 1, "--align")
+    masked = run("eval", "protocol", "3dovs", tmp_path / "3dovs", *options)
+    assert masked.code == 0, masked.err
+    assert set(masked.json()["labels"]) == {"atoms", "features"} and masked.json()["cases"] == 1
+    posed = run("eval", "protocol", "re10k", tmp_path / "re10k", *options)
+    assert posed.code == 0, posed.err
+    measures = posed.json()["measures"]
+    # Of the poses tried the best is taken, the true one among them; four digits are kept.
+    assert measures["psnr_whole_picture_aligned"] >= measures["psnr_whole_picture"] - 1e-3
+
+
+def test_nyu_goes_on_from_what_it_kept_and_has_no_other_view(run, wall: PhotoFolder, tmp_path: Path):
+    words = ("eval", "protocol", "nyu", wall.root, "--size", 84, "--backend", "torch", "--json", "--limit", 1)
+    first = run(*words, "--work", tmp_path / "work")
+    assert first.code == 0, first.err
+    assert run(*words, "--work", tmp_path / "work").json() == first.json()  # seconds too
+    for option in (("--align",), ("--index", tmp_path / "any.json")):
+        refused = run(*words, *option)
+        assert refused.code == 2 and option[0] in refused.err and refused.err.count("\n") == 1
+
+
 def test_nyu_takes_a_folder_and_refuses_what_is_none(run, wall: PhotoFolder, tmp_path: Path):
     words = ("--size", 84, "--backend", "torch", "--json", "--limit", 1)
     outcome = run("eval", "protocol", "nyu", wall.root, *words)

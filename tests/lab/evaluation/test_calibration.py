@@ -15,7 +15,7 @@ from langflash_core.lab.evaluation.calibration import (
     reliability,
     trade_off,
 )
-from langflash_core.lab.evaluation.rooms import MASK_THRESHOLDS
+from langflash_core.lab.evaluation.rooms.phrases import MASK_THRESHOLDS
 from langflash_core.network import MINI, GuidedDepthNet
 
 

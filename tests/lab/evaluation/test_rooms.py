@@ -10,8 +10,9 @@ import torch
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.geometry.harmonics import colour_to_sh
-from langflash_core.lab.evaluation import rooms
 from langflash_core.lab.evaluation.calibration import calibration, rooms_asked
+from langflash_core.lab.evaluation.rooms import phrases, run, summary, truth
+from langflash_core.lab.evaluation.rooms.tally import Setting, Tally
 from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.lab.training.shards import Label, write_shard
 from langflash_core.language.spaces import language_space
@@ -43,7 +44,7 @@ def weights(tmp_path_factory) -> Path:
 
 @pytest.mark.slow
 def test_a_run_measures_everything(cache: Path, weights: Path):
-    result = rooms.run_eval(cache, weights)
+    result = run.run_eval(cache, weights)
     assert result["scenes"] == 2
     assert result["seeds"] == [0, 1]
     json.dumps(result, allow_nan=False)
@@ -76,16 +77,16 @@ def test_calibration_is_a_threshold_for_queries(cache: Path, weights: Path):
 
 def test_a_missing_cache_is_refused(tmp_path: Path):
     with pytest.raises(InputError, match="train cache"):
-        rooms.run_eval(tmp_path / "nothing")
+        run.run_eval(tmp_path / "nothing")
 
 
 def test_the_target_counts_where_a_photo_sees_it():
     record = toy_record(5)
-    seen = rooms.seen_by_photos(record)
+    seen = truth.seen_by_photos(record)
     assert 0.8 < float(seen.float().mean()) < 1
     blind = replace(record, depths=record.depths.clone())
     blind.depths[:2] = 0
-    assert not bool(rooms.seen_by_photos(blind).any())
+    assert not bool(truth.seen_by_photos(blind).any())
 
 
 def perfect(record) -> Prediction:
@@ -104,7 +105,7 @@ def perfect(record) -> Prediction:
     gaussians = Gaussians(
         means.reshape(-1, 3), quats, scales, torch.full((count,), 0.95), colour_to_sh(colours)
     )
-    weights = rooms.true_masks(record, (0, 1))
+    weights = truth.true_masks(record, (0, 1))
     dictionary = language_space("minilm").encode([label.group for label in record.labels])
     return Prediction(gaussians, weights, dictionary, "minilm", viewmats, depths, torch.ones_like(depths))
 
@@ -124,10 +125,10 @@ def test_the_truth_scores_as_the_truth():
     net = Knowing(MINI).eval()
     record = toy_record(5)
     net.answer = perfect(record)
-    setting = rooms.Setting.of(net, ["floor", "sofa", "table", "wall", "lamp", "bed"], 2.5)
-    tally = rooms.Tally()
-    rooms.judge_scene(setting, record, tally)
-    result = rooms.summary(tally, setting)
+    setting = Setting.of(net, ["floor", "sofa", "table", "wall", "lamp", "bed"], 2.5)
+    tally = Tally()
+    run.judge_scene(setting, record, tally)
+    result = summary.summary(tally, setting)
     measures, labels = result["measures"], result["labels"]["lfa"]
     assert measures["depth_abs_rel"] < 1e-3  # float16 depths
     assert measures["points_view_1"] < 1e-3
@@ -142,16 +143,16 @@ def test_the_truth_scores_as_the_truth():
 
 def test_other_words_are_judged_by_all_they_are_true_of():
     net = GuidedDepthNet(MINI).eval()
-    setting = rooms.Setting.of(net, ["chair", "lamp", "sofa", "wall"], 2.5)
+    setting = Setting.of(net, ["chair", "lamp", "sofa", "wall"], 2.5)
     truth = torch.arange(4).repeat_interleave(25)
     maps = setting.texts[truth].reshape(10, 10, -1)
-    tally = rooms.Tally()
-    rooms._note_paraphrases(setting, maps, truth, tally)
+    tally = Tally()
+    phrases.note_paraphrases(setting, maps, truth, tally)
     assert {"couch", "seat", "light source"} <= set(tally.paraphrases)
     assert "something to read" not in tally.paraphrases
     (_, seats_by_name), (couch, sofa) = tally.paraphrases["seat"][0], tally.paraphrases["couch"][0]
     assert seats_by_name == pytest.approx(1)  # "chair" or "sofa"
     assert sofa == pytest.approx(1)
     assert couch == pytest.approx(1)
-    report = rooms._paraphrase_report(tally)
+    report = phrases.paraphrase_report(tally)
     assert report["couch"] == {"asked": 1, "iou": 1.0, "name_iou": 1.0}

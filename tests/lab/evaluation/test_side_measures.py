@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from langflash_core.geometry.fusion import DepthView
 from langflash_core.lab.evaluation.side_measures import (
-    DepthView,
     Similarity,
     angle_between,
     boundary_f1,

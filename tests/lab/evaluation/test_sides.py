@@ -10,9 +10,11 @@ from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.lab.evaluation import posed
 from langflash_core.lab.evaluation.posed import Triple
+from langflash_core.lab.evaluation.report_sides import Tally as Sides
+from langflash_core.lab.evaluation.report_sides import side_summary, side_tables
 from langflash_core.lab.evaluation.side_subjects import posed_cases
 from langflash_core.lab.evaluation.side_tables import beside_markdown, sides_markdown
-from langflash_core.lab.evaluation.sides import aligned, camera_of, covered_depths, judge, run_sides
+from langflash_core.lab.evaluation.sides import aligned, camera_of, covered_depths, judge, run_sides, summary
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.splat import render
 from langflash_core.types import Scene
@@ -107,3 +109,20 @@ def test_two_runs_are_told_beside_each_other(folder: PhotoFolder, scene: Scene, 
     assert "+1.500 ± 0.000" in next(line for line in table.splitlines() if "between the photos: PSNR" in line)
     with pytest.raises(InputError, match="at least one room"):
         run_sides([], 0, render)
+
+
+def test_a_report_tells_the_same_of_sides(folder: PhotoFolder, scene: Scene):
+    row = {"name": "pair", "seconds": 1.0, **judged(scene, folder)}
+    tally = Sides([row, row])
+    result = side_summary(tally)
+    assert set(result) == {"measures", "by_look"}  # rooms one by one would fill the report's numbers
+    once, looks = side_tables(result)
+    assert ("Second photo found its place", "1.000") in once.rows
+    assert looks.rows[0][0] == "the photos' own places" and looks.rows[0][1] == "2"
+    (kept,) = [shown for shown in sides_markdown(run_like(row)).splitlines() if shown.startswith("| between")]
+    assert [cell.strip() for cell in kept.split("|")[3:-1]] == list(looks.rows[-1][2:])
+
+
+def run_like(row: dict) -> dict:
+    """What `run_sides` gives of two such rows."""
+    return summary([row, row])

@@ -1,0 +1,1 @@
+"""`langflash eval rooms`: the network on rooms with furniture it has never seen."""

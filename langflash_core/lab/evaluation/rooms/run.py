@@ -1,0 +1,133 @@
+"""`langflash eval rooms`: the network on rooms with furniture it has never seen, in one command.
+
+Every scene gives two photos to the network and keeps a third as the target view. Depth, pose and
+points are judged in the photos, pictures and labels in the photos and in the target view (there
+only where a photo sees the surface), phrases in the first photo. Trivial answers are measured in
+the same run on the same scenes.
+
+Sizes: V views, H W pixels, K atoms, G class groups, C channels, P phrases.
+"""
+
+import logging
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from torch import Tensor
+
+from langflash_core.lab.evaluation.lpips import Lpips
+from langflash_core.lab.evaluation.rooms.geometry import judge_geometry
+from langflash_core.lab.evaluation.rooms.phrases import ask_phrases
+from langflash_core.lab.evaluation.rooms.summary import summary
+from langflash_core.lab.evaluation.rooms.tally import Setting, Tally
+from langflash_core.lab.evaluation.rooms.target import judge_views
+from langflash_core.lab.evaluation.rooms.truth import median_depth, opened, records, views_of
+from langflash_core.lab.evaluation.sights import (
+    Look,
+)
+from langflash_core.lab.evaluation.tallies import Shelf, collected, merged
+from langflash_core.lab.training.batches import RoomSet
+from langflash_core.lab.training.shards import RoomRecord
+from langflash_core.network import LangFlashNet, load_network
+
+log = logging.getLogger(__name__)
+
+
+def run_eval(
+    data: Path, weights: Path | None = None, *, preset: str = "mini", limit: int | None = None
+) -> dict:
+    """Judge a checkpoint on `data/held_out` (made by `langflash train cache --set held_out`).
+
+    Args:
+        data: cache folder; `held_out` is judged, `validation` calibrates the presence threshold
+            where the checkpoint brings none, `train` gives the constant-depth baseline.
+        limit: only the first so many scenes.
+
+    Returns:
+        Plain JSON: "rows" (name -> numbers), "scenes", "seeds", "threshold".
+
+    Raises:
+        InputError: there is no such cache. WeightsError: the weights do not fit.
+    """
+    setting, held_out = open_rooms(data, weights, preset=preset, limit=limit)
+    tallies: dict[str, Tally] = {}
+    for name, tally in room_tallies(setting, held_out):
+        tallies[name] = tally
+        log.info("scene %s (%d of %d)", name, len(tallies), len(held_out))
+    return {
+        "weights": str(weights) if weights else preset,
+        "scenes": len(tallies),
+        "seeds": [min(map(int, tallies)), max(map(int, tallies))],
+        "threshold": setting.threshold,
+        "temperature": setting.temperature,
+        **summary(merged(list(tallies.values())), setting),
+    }
+
+
+def open_rooms(
+    data: Path,
+    weights: Path | None = None,
+    *,
+    preset: str = "mini",
+    limit: int | None = None,
+    lpips: Lpips | None = None,
+    kind: str = "held_out",
+) -> tuple[Setting, RoomSet]:
+    """What `run_eval` judges with, and the rooms that it judges.
+
+    Raises:
+        InputError: there is no such cache. WeightsError: the weights do not fit.
+    """
+    rooms = opened(data / kind, limit)
+    network = load_network(preset, weights)
+    groups = sorted({label.group for label in rooms.labels()})
+    return Setting.of(network, groups, median_depth(data), lpips), rooms
+
+
+def room_tallies(
+    setting: Setting, rooms: RoomSet, shelf: Shelf | None = None, look: Look | None = None
+) -> Iterator[tuple[str, Tally]]:
+    """Seed and tally of every room, in order; those on the shelf are not judged again."""
+
+    def judge(record: RoomRecord) -> Tally:
+        tally = Tally()
+        judge_scene(setting, record, tally, look)
+        return tally
+
+    return collected(((str(record.seed), record) for record in records(rooms)), judge, shelf)
+
+
+def asked_rooms(network: LangFlashNet, data: Path, *, limit: int | None = None) -> Tally:
+    """Scores, truths and mask overlaps of phrases in `data/validation`, whose furniture no training saw.
+
+    The sets "there" and "not there" are those of `judge_scene`. Every second question uses another word
+    of the vocabulary instead of the plain name, because people do.
+    """
+    rooms = opened(data / "validation", limit)
+    groups = sorted({label.group for label in rooms.labels()})
+    plain = Setting.of(network, groups, median_depth=1.0)
+    tally = Tally()
+    for record in records(rooms):
+        views = views_of(record, (0, 1))
+        ask_phrases(plain, record, network.predict(views), tally, varied=True)
+    return tally
+
+
+def judge_scene(setting: Setting, record: RoomRecord, tally: Tally, look: Look | None = None) -> None:
+    """Everything about one scene of at least three views; adds to `tally`."""
+    views = views_of(record, (0, 1))
+    start = time.perf_counter()
+    prediction = setting.network.predict(views)
+    tally.note(seconds=time.perf_counter() - start)
+    tally.note(**{f"stage_{name}_seconds": value for name, value in prediction.timings.items()})
+    truth = record.depths.float()
+    scale = true_scale(prediction.depths[0], truth[0])
+    judge_geometry(setting, record, prediction, scale, tally)
+    ask_phrases(setting, record, prediction, tally)
+    judge_views(setting, record, prediction, scale, tally, look)
+
+
+def true_scale(depths: Tensor, truth: Tensor) -> float:
+    """True lengths per predicted length: median of z* / z in view 0."""
+    valid = (truth > 0) & (depths > 0)
+    return float((truth[valid] / depths[valid]).median())

@@ -1,0 +1,60 @@
+"""Language in few channels: what others splat instead of atoms, and how vectors are made of it again.
+
+A basis of d directions (principal components of feature vectors, not centred, since splatting is linear and
+empty space is 0), and a decoder of one hidden layer, whose units are drawn at random and whose output is a
+ridge regression: closed form. LSM splats few channels and decodes them by a trained network of this kind.
+Scenes here hold atoms; this is what they are measured against (`langflash bench`, `langflash eval
+ablations`). C channels, d of them kept, h hidden units.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+from torch.nn import functional as F
+
+HIDDEN = 512
+RIDGE = 1e-3
+
+
+def principal(features: Float[Tensor, "n C"], count: int) -> Float[Tensor, "d C"]:
+    """Orthonormal directions of the largest second moments, the largest first."""
+    moments = features.double().T @ features.double()
+    _, directions = torch.linalg.eigh(moments)
+    return directions.flip(1)[:, :count].T.float().contiguous()
+
+
+@dataclass(frozen=True)
+class Decoder:
+    """z -> L: the basis' own answer, and what a hidden layer of relu(z / |z| A + b) adds to it.
+
+    basis: (d, C). hidden: A (d, h); shift: b (h); out: (h, C), all None where the decoder is linear.
+    """
+
+    basis: Tensor
+    hidden: Tensor
+    shift: Tensor
+    out: Tensor
+
+    @staticmethod
+    def fitted(features: Float[Tensor, "n C"], channels: int) -> "Decoder":
+        """Least squares over unit vectors, with `RIDGE` of their mean square on the output."""
+        basis = principal(features, channels)
+        generator = torch.Generator().manual_seed(channels)
+        hidden = torch.randn(channels, HIDDEN, generator=generator)
+        shift = 0.5 * torch.randn(HIDDEN, generator=generator)
+        coded = features @ basis.T
+        units = _lit(coded, hidden, shift).double()
+        missing = (F.normalize(features, dim=-1) - F.normalize(coded, dim=-1) @ basis).double()
+        normal = units.T @ units
+        normal += RIDGE * normal.diagonal().mean() * torch.eye(HIDDEN, dtype=torch.float64)
+        return Decoder(basis, hidden, shift, torch.linalg.solve(normal, units.T @ missing).float())
+
+    def __call__(self, coded: Float[Tensor, "*n d"]) -> Float[Tensor, "*n C"]:
+        """Only the direction of z counts, so half covered pixels are decoded as covered ones."""
+        return F.normalize(coded, dim=-1) @ self.basis + _lit(coded, self.hidden, self.shift) @ self.out
+
+
+def _lit(coded: Tensor, hidden: Tensor, shift: Tensor) -> Tensor:
+    return F.relu(F.normalize(coded, dim=-1) @ hidden + shift)
