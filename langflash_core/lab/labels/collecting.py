@@ -28,8 +28,8 @@ class Rules:
     same: IoU from which two proposals are one. least: share of the frame below which nothing is an object.
     look_every: frames between two looks for what is new; look_at: share of the frame that newly belongs to
     nobody, at which one looks at once. new: share of a proposal that belongs to nobody, from which it is
-    something new; grown: the same for a known thing that goes on there. whole: share of a known thing that a
-    proposal must hold to be it.
+    something new. whole: share of a known thing that a proposal must hold to be it, and so to carry it on to
+    where nobody is; core: share of the proposal that the thing must be by then.
     embed_every: frames between two embeddings. least_frames: of an object that is kept.
     """
 
@@ -38,8 +38,8 @@ class Rules:
     look_every: int = 4
     look_at: float = 0.05
     new: float = 0.6
-    grown: float = 0.1
     whole: float = 0.6
+    core: float = 0.1
     embed_every: int = 6
     least_frames: int = 2
 
@@ -82,10 +82,12 @@ class _Collection:
     def _placed(self, frame: int, mask: np.ndarray, score: float, ids: np.ndarray, new: np.ndarray) -> None:
         """Write into `new` where a proposal is nobody's yet: as part of a known thing, or as a new one."""
         free = cleaned(mask & (ids == 0))
-        share, known = free.sum() / max(int(mask.sum()), 1), _holds(mask, ids, self.rules)
-        if known is not None and share >= self.rules.grown:
+        if free.mean() < self.rules.least:
+            return
+        known = _holds(mask, ids, self.rules)
+        if known is not None:
             new[free] = known
-        elif share >= self.rules.new and free.mean() >= self.rules.least and len(self.seen) < _MOST:
+        elif free.sum() >= self.rules.new * mask.sum() and len(self.seen) < _MOST:
             number = len(self.seen) + 1
             self.seen[number] = _Seen(frame, score)
             new[free] = number
@@ -151,7 +153,7 @@ def _holds(mask: Bool[np.ndarray, "H W"], ids: UInt16[np.ndarray, "H W"], rules:
     inside = np.bincount(ids[mask], minlength=2)
     inside[0] = 0
     best = int(inside.argmax())
-    if inside[best] < rules.grown * mask.sum() or best == 0:
+    if inside[best] < rules.core * mask.sum() or best == 0:
         return None
     return best if inside[best] >= rules.whole * (ids == best).sum() else None
 

@@ -19,6 +19,7 @@ from langflash_core.network import LangFlashNet
 from langflash_core.types import Prediction
 
 _LEAST = 0.002  # of the frame's pixels in one piece of a group
+_SHOWS = 0.1  # of a piece, where something is wanted: it may be the rest of what is known already
 
 
 class NetworkGroups:
@@ -30,7 +31,7 @@ class NetworkGroups:
     def propose(
         self, image: UInt8[np.ndarray, "H W 3"], where: Bool[np.ndarray, "H W"] | None = None
     ) -> Proposals:
-        """Pieces of the frame, which overlap nowhere; with `where`, those mostly inside it."""
+        """Pieces of the frame, which overlap nowhere; with `where`, those that reach into it."""
         predicted = self._network.predict(views_of(_still(image), (0,), (image,)))
         weights = predicted.weights[0].float().cpu().numpy()  # (K, h, w)
         masks, scores = [np.zeros((0, *image.shape[:2]), bool)], []
@@ -39,7 +40,7 @@ class NetworkGroups:
             group = large.argmax(0)
             for k in range(len(large)):
                 for piece in _pieces(group == k):
-                    if where is None or where[piece].mean() > 0.5:
+                    if where is None or where[piece].mean() > _SHOWS:
                         masks.append(piece[None])
                         scores.append(float(large[k][piece].mean()))
         return Proposals(np.concatenate(masks), np.array(scores, dtype=np.float64))

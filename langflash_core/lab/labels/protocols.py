@@ -6,7 +6,7 @@ Sizes: N masks, M objects of a clip, H W pixels of a frame, C channels of a lang
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, UInt8, UInt16
@@ -30,6 +30,7 @@ class Proposals:
         return Proposals(self.masks[keep], self.scores[keep])
 
 
+@runtime_checkable
 class MaskProposer(Protocol):
     """Masks of what could be an object in a frame."""
 
@@ -44,6 +45,7 @@ class MaskProposer(Protocol):
         ...
 
 
+@runtime_checkable
 class MaskRefiner(Protocol):
     """Makes rough masks good."""
 
@@ -61,6 +63,7 @@ class MaskRefiner(Protocol):
         ...
 
 
+@runtime_checkable
 class Following(Protocol):
     """Objects on their way through one clip, frame after frame."""
 
@@ -73,6 +76,7 @@ class Following(Protocol):
         ...
 
 
+@runtime_checkable
 class MaskPropagator(Protocol):
     """Carries masks from frame to frame."""
 
@@ -81,6 +85,7 @@ class MaskPropagator(Protocol):
         ...
 
 
+@runtime_checkable
 class ImageTextEncoder(Protocol):
     """Cut-outs and phrases to one space. space: its name, as scenes name it; dimension: C."""
 

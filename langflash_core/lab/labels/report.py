@@ -118,7 +118,7 @@ def _sentence(labels: ClipLabels, measured: Quality) -> str:
 
 def _curves(measured: Quality) -> str:
     """Coverage and steadiness as lines from 0 to 1 over the frames, masks as their count."""
-    width, height, left = 1000, 150, 40
+    width, height, left = 1000, 150, 52
     count = max(len(measured.masks) - 1, 1)
     most = max(float(measured.masks.max(initial=1)), 1)
     lines = []
