@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TextIO
 
 from langflash_core.__main__ import in_program
-from langflash_core.batch.dispatch import Ended, Job, Made, Workers
+from langflash_core.batch.dispatch import Job, Made, Workers
 from langflash_core.batch.ledger import DONE, FAILED, Ledger
 from langflash_core.batch.run import finish, run_jobs
 from langflash_core.batch.sets import LEDGER, SUMMARY

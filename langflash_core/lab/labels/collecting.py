@@ -5,7 +5,6 @@ collection); which frames are looked at for new objects, and every number in `Ru
 """
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -108,7 +107,9 @@ class _Collection:
             self.seconds["embed"] += time.perf_counter() - start
 
     def _remember(self, numbers: np.ndarray, areas: np.ndarray, vectors: Tensor) -> None:
-        for number, area, vector in zip(numbers.tolist(), areas.tolist(), vectors.double().numpy(), strict=True):
+        for number, area, vector in zip(
+            numbers.tolist(), areas.tolist(), vectors.double().numpy(), strict=True
+        ):
             if np.isfinite(vector).all() and np.linalg.norm(vector) > 1e-6:
                 self.seen[number].vectors.append(vector * np.sqrt(area))
 
@@ -165,7 +166,9 @@ def _finished(clip: Clip, maps: np.ndarray, work: _Collection, seconds: float) -
         kept = {n: own for n, own in work.seen.items() if own.frames}
     table = np.zeros(len(work.seen) + 1, np.uint16)
     rows, vectors = [], np.zeros((len(kept), work.encoder.dimension), np.float32)
-    for row, (number, own) in enumerate(sorted(kept.items(), key=lambda item: (item[1].first, -item[1].area))):
+    for row, (number, own) in enumerate(
+        sorted(kept.items(), key=lambda item: (item[1].first, -item[1].area))
+    ):
         table[number] = row + 1
         total = np.sum(own.vectors, 0) if own.vectors else np.zeros(work.encoder.dimension)
         vectors[row] = total / max(float(np.linalg.norm(total)), 1e-12)

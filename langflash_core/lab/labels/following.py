@@ -13,7 +13,9 @@ from langflash_core.lab.labels.motion import Motion, moved
 from langflash_core.lab.labels.protocols import Following, MaskRefiner
 
 _BELIEVED = 0.6  # IoU with what was carried from which a refined mask takes its place
-_WIDE = 0.1  # share of the frame from which a thing is a background: what comes into sight is not taken for more
+_WIDE = (
+    0.1  # share of the frame from which a thing is a background: what comes into sight is not taken for more
+)
 # of it until it has been looked at
 _GONE = 16  # pixels below which a thing is out of sight
 
@@ -59,4 +61,6 @@ class _MotionFollowing:
         wide = masks.mean((1, 2)) >= _WIDE
         refined = found.masks & (known | ~wide[:, None, None])
         best = np.where(good[:, None, None], refined, masks)
-        return painted(np.array([cleaned(mask) for mask in best]).reshape(masks.shape), numbers, carried.shape)
+        return painted(
+            np.array([cleaned(mask) for mask in best]).reshape(masks.shape), numbers, carried.shape
+        )

@@ -1,7 +1,7 @@
 """Where the pixels of a frame were in the frame before: optical flow, or our own network's matches and depth.
 
-A *step* is a map (H, W, 2) float32: what to add to a pixel's place (x, y) to be at the same thing in the frame
-before; NaN where that frame did not show it.
+A *step* is a map (H, W, 2) float32: what to add to a pixel's place (x, y) to be at the same thing in the
+frame before; NaN where that frame did not show it.
 """
 
 from collections.abc import Callable
@@ -31,8 +31,8 @@ _NEARER = 0.1  # of depth: what lay so much behind something in the frame before
 
 
 def by_flow(clip: Clip, frame: int, image: Image, before: Image) -> Step:
-    """Dense inverse search (Kroeger et al. 2016), as OpenCV has it, there and back: what does not come back
-    was hidden or out of the frame."""
+    """Dense inverse search (Kroeger et al. 2016), as OpenCV has it, there and back: what does not come
+    back was hidden or out of the frame."""
     search = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     now, then = (cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY) for picture in (image, before))
     there, back = (
@@ -45,7 +45,7 @@ def by_flow(clip: Clip, frame: int, image: Image, before: Image) -> Step:
 
 
 class NetworkMotion:
-    """The network's depth of a frame, carried by its pose from matches (or the clip's own) to the frame before.
+    """The network's depth of a frame, carried by its pose from matches (or the clip's own) to the one before.
 
     For what does not move but the camera.
     """
@@ -104,28 +104,27 @@ def _carried(depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Step:
 def _sampled(values: np.ndarray, step: Step) -> np.ndarray:
     """Values (H, W, ...) where a step leads to, bilinear; the edge's outside."""
     places = _places(np.nan_to_num(step, nan=0.0))
-    return cv2.remap(values, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return cv2.remap(values, *places, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
-def _places(step: Step) -> np.ndarray:
-    """Where a step leads to, (H, W, 2) float32, in cv2's pixels (the first one's middle is 0)."""
+def _places(step: Step) -> tuple[np.ndarray, np.ndarray]:
+    """Where a step leads to, x and y (H, W) float32, in cv2's pixels (the first one's middle is 0)."""
     height, width = step.shape[:2]
-    grid = np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1)
-    return (grid + step).astype(np.float32)
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+    return (x + step[..., 0]).astype(np.float32), (y + step[..., 1]).astype(np.float32)
 
 
 def _inside(step: Step) -> Step:
     """NaN where a step leaves the frame."""
     height, width = step.shape[:2]
-    places = _places(step)
-    out = (places < -0.5).any(-1) | (places[..., 0] > width - 0.5) | (places[..., 1] > height - 0.5)
-    step[out] = np.nan
+    x, y = _places(step)
+    step[(x < -0.5) | (x > width - 0.5) | (y < -0.5) | (y > height - 0.5)] = np.nan
     return step
 
 
 def moved(ids: np.ndarray, step: Step) -> tuple[np.ndarray, np.ndarray]:
     """Ids (H, W) carried along a step, 0 where nothing is known, and where something is known (H, W) bool."""
-    known = np.isfinite(step).all(-1)
+    known = np.asarray(np.isfinite(step).all(-1))
     places = _places(np.nan_to_num(step, nan=0.0))
-    carried = cv2.remap(ids, places, None, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+    carried = cv2.remap(ids, *places, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
     return np.where(known, carried, 0).astype(ids.dtype), known

@@ -1,16 +1,17 @@
-"""MobileSAM as proposer and refiner: a grid of points, or a rough mask as a prompt.
+"""MobileSAM or SAM 2 as proposer and refiner: a grid of points, or a rough mask as a prompt.
 
 Sizes: N masks, H W pixels of a frame, P points.
 """
 
 import math
+from typing import Any, Protocol, runtime_checkable
 
 import cv2
 import numpy as np
 import torch
-from jaxtyping import Bool, UInt8
+from jaxtyping import Bool, Float, UInt8
+from torch import Tensor
 
-from langflash_core.lab.labels.mobile_sam.model import Looked, MobileSam
 from langflash_core.lab.labels.protocols import Proposals
 
 _AT_ONCE = 16  # prompts; more need more memory and are no quicker on a processor
@@ -19,11 +20,31 @@ _BORDER = 0.06  # of the frame: nearer to its edge, a thing may go on there
 _LOOKS_KEPT = 2
 
 
+@runtime_checkable
+class Prompted(Protocol):
+    """A network of the SAM family, as `mobile_sam.model.MobileSam` says it: what `look` gives is handed back
+    with every question; q is the side of its masks, k how many it gives a prompt."""
+
+    def look(self, image: UInt8[np.ndarray, "H W 3"]) -> Any: ...
+
+    def by_points(self, looked: Any, points: Float[Tensor, "N 2"]) -> tuple[Tensor, Tensor]: ...
+
+    def by_masks(
+        self,
+        looked: Any,
+        masks: Float[Tensor, "N H W"],
+        points: Float[Tensor, "N P 2"],
+        boxes: Float[Tensor, "N 4"],
+    ) -> tuple[Tensor, Tensor]: ...
+
+    def on_photo(self, logits: Float[Tensor, "*N q q"], looked: Any) -> Float[Tensor, "*N H W"]: ...
+
+
 class PromptedSam:
     """Both roles with one encoder: a frame is looked at once, whoever asks."""
 
     def __init__(
-        self, model: MobileSam, grid: int = 16, least_score: float = 0.8, least_stability: float = 0.9
+        self, model: Prompted, grid: int = 16, least_score: float = 0.8, least_stability: float = 0.9
     ) -> None:
         """Wraps a network.
 
@@ -33,7 +54,7 @@ class PromptedSam:
         """
         self.model = model
         self._grid, self._least_score, self._least_stability = grid, least_score, least_stability
-        self._looks: list[tuple[np.ndarray, Looked]] = []
+        self._looks: list[tuple[np.ndarray, Any]] = []
 
     def propose(
         self, image: UInt8[np.ndarray, "H W 3"], where: Bool[np.ndarray, "H W"] | None = None
@@ -75,7 +96,7 @@ class PromptedSam:
             scores.append(agree[rows, best])
         return Proposals(np.concatenate(refined), np.concatenate(scores))
 
-    def _looked(self, image: np.ndarray) -> Looked:
+    def _looked(self, image: np.ndarray) -> Any:
         """Of this very array, encoded once."""
         for seen, looked in self._looks:
             if seen is image:
@@ -107,7 +128,7 @@ def grid_points(size: tuple[int, int], grid: int, where: Bool[np.ndarray, "H W"]
     return np.array(points, dtype=np.float64).reshape(-1, 2)
 
 
-def stability(logits: torch.Tensor) -> torch.Tensor:
+def stability(logits: Tensor) -> Tensor:
     """IoU (N,) of each mask of logits (N, h, w) cut a little higher and a little lower."""
     inner = (logits > _WOBBLE).flatten(1).sum(1)
     outer = (logits > -_WOBBLE).flatten(1).sum(1)

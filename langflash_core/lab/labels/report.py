@@ -47,8 +47,9 @@ svg {{ width: 100%; height: auto; display: block; }}
 
 @dataclass(frozen=True)
 class Quality:
-    """Of every frame: masks (T,), how many objects; coverage (T,), share of pixels that are somebody's; steady
-    (T,), share of pixels that keep their id along the optical flow from the frame before (1 for the first)."""
+    """Of every frame: masks (T,), how many objects; coverage (T,), share of pixels that are somebody's;
+    steady (T,), share of pixels that keep their id along the optical flow from the frame before (1 for
+    the first)."""
 
     masks: Float[np.ndarray, " T"]
     coverage: Float[np.ndarray, " T"]

@@ -64,9 +64,7 @@ class Sam2Pictures:
         corners = self._places(boxes.unflatten(1, (2, 2)), looked).flatten(1)
         inside = self._places(points, looked)[None]
         says = torch.ones(inside.shape[:3], dtype=torch.int64)
-        return self._ask(
-            looked, False, input_points=inside, input_labels=says, input_boxes=corners[None]
-        )
+        return self._ask(looked, False, input_points=inside, input_labels=says, input_boxes=corners[None])
 
     def on_photo(self, logits: Float[Tensor, "*N q q"], looked: Embedded) -> Float[Tensor, "*N H W"]:
         """At the photo's pixels."""

@@ -21,9 +21,7 @@ def found():
 def fits(labels, true: np.ndarray, id: int) -> tuple[int, np.ndarray]:
     """The one number that fits a true thing best over the clip, and its IoU where the thing is in sight."""
     numbers = [row.id for row in labels.objects]
-    ious = np.array(
-        [[_iou(labels.ids[t] == n, true[t] == id) for t in range(len(true))] for n in numbers]
-    )
+    ious = np.array([[_iou(labels.ids[t] == n, true[t] == id) for t in range(len(true))] for n in numbers])
     best = int(ious.mean(1).argmax())
     return numbers[best], ious[best][(true == id).sum((1, 2)) > 300]
 
@@ -51,7 +49,9 @@ def test_what_comes_late_is_caught_within_a_look_and_grows_as_it_comes(found):
 def test_no_two_things_share_a_number_and_repetitions_and_parts_get_none(found):
     labels, true = found
     assert len({fits(labels, true, id)[0] for id in (1, 2, 3, 4)}) == 4
-    assert len(labels.objects) <= 5  # four, and at most one piece of the wall that came in with the last thing
+    assert (
+        len(labels.objects) <= 5
+    )  # four, and at most one piece of the wall that came in with the last thing
 
 
 def test_vectors_are_unit_and_objects_in_order_of_appearance(found):

@@ -17,7 +17,7 @@ SIDE = 128
 def sam() -> MobileSam:
     torch.manual_seed(0)
     model = MobileSam(SIDE).eval().requires_grad_(False)
-    model.prompt_encoder.pe_layer.positional_encoding_gaussian_matrix.normal_()
+    model.prompt_encoder.pe_layer.get_buffer("positional_encoding_gaussian_matrix").normal_()
     return model
 
 
@@ -64,7 +64,9 @@ def test_a_photo_is_asked_by_points_and_by_rough_masks(sam):
     assert torch.allclose(again[0], logits[1], atol=1e-4)  # prompts do not see each other
     rough = torch.full((1, 60, 90), -1.0)
     rough[:, 10:30, 10:40] = 1
-    refined, _ = sam.by_masks(looked, rough, torch.tensor([[[25.0, 20.0]]]), torch.tensor([[10.0, 10, 40, 30]]))
+    refined, _ = sam.by_masks(
+        looked, rough, torch.tensor([[[25.0, 20.0]]]), torch.tensor([[10.0, 10, 40, 30]])
+    )
     assert refined.shape == (1, 4, SIDE // 4, SIDE // 4)
 
 

@@ -48,7 +48,9 @@ def test_everything_else_in_the_chunk_stays_and_other_readers_find_it(split, tmp
     path = split / "000000.torch"
     before = torch.load(path, weights_only=True)
     enrich(split, labelled(tmp_path / "out", "bbbb"))
-    after = torch.load(path, weights_only=True)  # as pixelSplat's loader reads it: keys by name, the rest unread
+    after = torch.load(
+        path, weights_only=True
+    )  # as pixelSplat's loader reads it: keys by name, the rest unread
     for old, new in zip(before, after, strict=True):
         assert set(new) - set(old) == ({ENTRY} if old["key"] == "bbbb" else set())
         for name, value in old.items():

@@ -150,4 +150,3 @@ def load_mobile_sam(path: Path, side: int = SIDE, device: str = "cpu") -> Mobile
             f"{path} does not hold MobileSAM ({reason}); give mobile_sam.pt or a .safetensors of it"
         ) from None
     return model.requires_grad_(False).eval().to(device)
-

@@ -50,7 +50,9 @@ class PromptEncoder(nn.Module):
         """Tokens of points (N, P, 2) and what each says (N, P)."""
         tokens = self.pe_layer((positions + 0.5) / side)
         tokens = tokens * (says != NO_POINT)[..., None]
-        table = torch.cat([e.weight for e in (*self.point_embeddings, self.not_a_point_embed)])
+        table = torch.cat(
+            [e.get_parameter("weight") for e in (*self.point_embeddings, self.not_a_point_embed)]
+        )
         return tokens + table[says]  # -1 is the last row
 
     def rough(self, logits: Tensor | None) -> Tensor:

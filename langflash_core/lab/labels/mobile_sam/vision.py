@@ -133,7 +133,10 @@ class Stage(nn.Module):
         super().__init__()
         width, heads, side = _WIDTHS[stage], _HEADS[stage], _WINDOWS[stage]
         self.blocks = nn.Sequential(
-            *(Inverted(width) if stage == 0 else WindowBlock(width, heads, side) for _ in range(_DEPTHS[stage]))
+            *(
+                Inverted(width) if stage == 0 else WindowBlock(width, heads, side)
+                for _ in range(_DEPTHS[stage])
+            )
         )
         last = stage == len(_STRIDES)
         self.downsample = nn.Identity() if last else Merging(width, _WIDTHS[stage + 1], _STRIDES[stage])
