@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from jaxtyping import Float, UInt8, UInt16
+from jaxtyping import Float, UInt16
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
@@ -143,11 +143,6 @@ def _score(truth: TrueClip, id: int, shows: np.ndarray, ious: np.ndarray, best: 
         name=truth.names[id],
         iou=float(ious[best, shows].mean()),
         constant=float((ious[:, shows].argmax(0) == best).mean()),
-        delay=int(caught[0] - np.flatnonzero(shows)[0]) if len(caught) else None,
+        delay=max(0, int(caught[0] - np.flatnonzero(shows)[0])) if len(caught) else None,
         late=id in truth.late,
     )
-
-
-def photographed(images: UInt8[np.ndarray, "T H W 3"], name: str = "clip") -> Clip:
-    """Pictures in memory as a clip."""
-    return Clip(name, tuple(f"{t:04d}" for t in range(len(images))), lambda t: images[t])

@@ -109,10 +109,11 @@ def over(
 def _sentence(labels: ClipLabels, measured: Quality) -> str:
     seconds = labels.seconds.get("total", 0.0)
     pace = f", {len(labels.frames) / seconds:.2f} frames a second" if seconds else ""
+    steady = measured.steady[1:].mean() if len(measured.steady) > 1 else 1.0
     return (
-        f"{len(labels.objects)} objects in {len(labels.frames)} frames: {measured.masks.mean():.1f} masks a "
-        f"frame, {measured.coverage.mean():.0%} of the pixels covered, "
-        f"{measured.steady[1:].mean() if len(measured.steady) > 1 else 1:.1%} of them steady along the motion "
+        f"{len(labels.objects)} objects in {len(labels.frames)} frames: {measured.masks.mean():.1f} masks "
+        f"a frame, {measured.coverage.mean():.0%} of the pixels covered, "
+        f"{steady:.1%} of them steady along the motion "
         f"from frame to frame{pace}."
     )
 
@@ -164,8 +165,8 @@ def _table(clip: Clip, labels: ClipLabels, colours: np.ndarray, names: Sequence[
         )
     return (
         f"<table><thead><tr>{heading}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
-        '<p class="soft">Agreement: mean cosine of an object\'s vectors with their sum, over the frames where '
-        "it was embedded. Called: the phrase of the vocabulary that is nearest to the sum.</p>"
+        '<p class="soft">Agreement: mean cosine of an object\'s vectors with their sum, over the frames '
+        "where it was embedded. Called: the phrase of the vocabulary that is nearest to the sum.</p>"
     )
 
 

@@ -29,9 +29,9 @@ LABELS = "labels.safetensors"
 
 @dataclass(frozen=True)
 class ObjectRow:
-    """One object. id: its number, from 1; first: the frame where it first shows; frames: in how many it does;
-    area: pixels of all of them; score: the proposer's, in [0, 1]; embedded: how many of its frames; agreement:
-    of those vectors with their mean, a cosine."""
+    """One object. id: its number, from 1; first: the frame where it first shows; frames: in how many it
+    does; area: pixels of all of them; score: the proposer's, in [0, 1]; embedded: how many of its frames;
+    agreement: of those vectors with their mean, a cosine."""
 
     id: int
     first: int

@@ -1,5 +1,5 @@
-"""A painted clip whose truth is known: a textured wall that moves along, two things on it, and a third one that
-comes in late; and proposers and encoders that know the truth.
+"""A painted clip whose truth is known: a textured wall that moves along, two things on it, and a third one
+that comes in late; and proposers and encoders that know the truth.
 """
 
 from collections.abc import Sequence
@@ -13,8 +13,8 @@ from langflash_core.lab.labels.clips import Clip
 from langflash_core.lab.labels.protocols import Proposals
 
 HEIGHT, WIDTH, FRAMES, STEP = 96, 128, 12, 5
-_THINGS = {2: (20, 20, 30, 34), 3: (50, 66, 26, 40), 4: (24, 138, 40, 30)}  # top, left, height, width
-ENTERS = 5
+_THINGS = {2: (20, 20, 30, 34), 3: (50, 66, 26, 40), 4: (24, 150, 40, 30)}  # top, left, height, width
+ENTERS = 8
 """The frame in which half of thing 4 is in sight for the first time."""
 
 
