@@ -3,6 +3,7 @@
 import os
 from argparse import Namespace
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TextIO
@@ -38,7 +39,7 @@ def run(args: Namespace, out: TextIO) -> int:
         raise InputError(f"{args.source} has no {INDEX}, so there are no chunks in it; give a split of them")
     if args.extract:
         return _extracted(args, out)
-    order = _order(args)
+    order = replace(ordered(args), start=args.start, count=args.count, step=args.step, device=args.device)
     places = find_clips(args.source)
     if args.output.resolve() in {args.source.resolve(), *(place.path.resolve() for place in places)} and (
         not keyed
@@ -53,21 +54,17 @@ def run(args: Namespace, out: TextIO) -> int:
     return _told(args, ledger, jobs, len(jobs) - len(to_do), enriched, stopped, out)
 
 
-def _order(args: Namespace) -> LabelOrder:
+def ordered(args: Namespace) -> LabelOrder:
+    """The options of the models, checked.
+
+    Raises:
+        LangFlashError: they do not fit, or weights are missing.
+    """
     if args.masks == "mobile-sam" and args.weights:
         readable_file(Path(args.weights), "checkpoint of MobileSAM", WeightsError)
     local = args.weights and Path(args.weights).exists()
-    return LabelOrder(
-        masks=args.masks,
-        weights=str(Path(args.weights).absolute()) if local else args.weights or "",
-        side=args.side,
-        follow=args.follow,
-        vectors=args.vectors,
-        start=args.start,
-        count=args.count,
-        step=args.step,
-        device=args.device,
-    )
+    weights = str(Path(args.weights).absolute()) if local else args.weights or ""
+    return LabelOrder(args.masks, weights, args.side, args.follow, args.vectors)
 
 
 def _jobs(places: Sequence[ClipPlace], output: Path, order: LabelOrder) -> list[Job]:

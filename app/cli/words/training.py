@@ -53,6 +53,31 @@ def add_labels(commands) -> None:
         "such folders, or a split of RealEstate10K in chunks (index.json)",
     )
     add_output(command, "OUT", "gets a folder a clip (labels and report.html), ledger.csv and summary.html")
+    add_label_models(command)
+    command.add_argument("--start", type=seed, default=0, metavar="N", help="the first frame (default: 0)")
+    command.add_argument("--count", type=whole_count, metavar="N", help="at most so many frames of each clip")
+    command.add_argument(
+        "--step", type=whole_count, default=1, metavar="N", help="every so manyth frame (default: 1)"
+    )
+    command.add_argument(
+        "--workers", type=whole_count, metavar="N", help="processes side by side (default: this one alone)"
+    )
+    command.add_argument(
+        "--address", metavar="RAY", help="a Ray cluster instead of processes: host:port, auto, or local"
+    )
+    inside = command.add_mutually_exclusive_group()
+    inside.add_argument(
+        "--enrich", action="store_true", help="put labels into the split's chunks afterwards, in place"
+    )
+    inside.add_argument(
+        "--extract", action="store_true", help="make no labels: take those in the split's chunks out to OUT"
+    )
+    command.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(default: cpu)")
+    add_json(command)
+
+
+def add_label_models(command: argparse.ArgumentParser) -> None:
+    """What `langflash labels` makes labels with."""
     command.add_argument(
         "--masks",
         choices=("network", "mobile-sam", "sam2"),
@@ -85,26 +110,6 @@ def add_labels(commands) -> None:
         default="minilm",
         help="the space of the objects' vectors: our network's names, or CLIP of cut-outs (default: minilm)",
     )
-    command.add_argument("--start", type=seed, default=0, metavar="N", help="the first frame (default: 0)")
-    command.add_argument("--count", type=whole_count, metavar="N", help="at most so many frames of each clip")
-    command.add_argument(
-        "--step", type=whole_count, default=1, metavar="N", help="every so manyth frame (default: 1)"
-    )
-    command.add_argument(
-        "--workers", type=whole_count, metavar="N", help="processes side by side (default: this one alone)"
-    )
-    command.add_argument(
-        "--address", metavar="RAY", help="a Ray cluster instead of processes: host:port, auto, or local"
-    )
-    inside = command.add_mutually_exclusive_group()
-    inside.add_argument(
-        "--enrich", action="store_true", help="put labels into the split's chunks afterwards, in place"
-    )
-    inside.add_argument(
-        "--extract", action="store_true", help="make no labels: take those in the split's chunks out to OUT"
-    )
-    command.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(default: cpu)")
-    add_json(command)
 
 
 def add_train(commands) -> None:

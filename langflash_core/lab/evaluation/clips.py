@@ -4,8 +4,8 @@ T frames, H W pixels. *Things* are what stands in a room; walls, floor and ceili
 proposer may rightly take every wall for itself.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 import torch
@@ -14,6 +14,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from langflash_core.lab.labels.clips import Clip
+from langflash_core.lab.labels.storage import ClipLabels
 from langflash_core.lab.rooms import Pack, RoomRenderer, StagedRoom, staged_room
 from langflash_core.lab.rooms.cameras import stands_free
 from langflash_core.lab.rooms.catalogue import HELD_OUT_LIBRARIES
@@ -146,3 +147,54 @@ def _score(truth: TrueClip, id: int, shows: np.ndarray, ious: np.ndarray, best: 
         delay=max(0, int(caught[0] - np.flatnonzero(shows)[0])) if len(caught) else None,
         late=id in truth.late,
     )
+
+
+def clips_result(judgements: Sequence[tuple[ClipLabels, Sequence[ThingScore]]]) -> dict:
+    """Numbers of clips, as plain JSON values; `iou` of a clip is the mean over its things."""
+    clips = []
+    for labels, scores in judgements:
+        clips.append(
+            {
+                "clip": labels.name,
+                "things": len(scores),
+                "found": sum(score.found for score in scores),
+                "late": sum(score.late for score in scores),
+                "late_found": sum(score.late and score.found for score in scores),
+                "iou": _mean([score.iou for score in scores]),
+                "constant": _mean([score.constant for score in scores if score.found]),
+                "objects": len(labels.objects),
+                "coverage": float(labels.coverage.mean()),
+                "frames_per_second": len(labels.frames) / max(labels.seconds["total"], 1e-9),
+                "seconds": labels.seconds,
+                "scores": [asdict(score) for score in scores],
+            }
+        )
+    return {"clips": clips, "iou": _mean([clip["iou"] for clip in clips])}
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values)) if len(values) else 0.0
+
+
+def clips_markdown(result: dict) -> str:
+    """A row a clip, then a row a thing."""
+    lines = [
+        "| clip | things found | of those late | mean IoU | ids constant | objects | covered | frames/s |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for clip in result["clips"]:
+        lines.append(
+            f"| {clip['clip']} | {clip['found']} of {clip['things']} | "
+            f"{clip['late_found']} of {clip['late']} | {clip['iou']:.3f} | {clip['constant']:.0%} | {clip['objects']} | {clip['coverage']:.0%} | "
+            f"{clip['frames_per_second']:.2f} |"
+        )
+    lines += ["", "| clip | thing | IoU | id constant | caught after |", "|---|---|---|---|---|"]
+    for clip in result["clips"]:
+        for score in clip["scores"]:
+            caught = "never" if score["delay"] is None else f"{score['delay']} frames"
+            late = ", comes in late" if score["late"] else ""
+            lines.append(
+                f"| {clip['clip']} | {score['name']}{late} | {score['iou']:.2f} | {score['constant']:.0%} | "
+                f"{caught} |"
+            )
+    return "\n".join(lines) + "\n"

@@ -5,7 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from langflash_core.lab.evaluation.clips import LATE, SHOWS, STRUCTURE, TrueClip, judged, rendered_clip
+from langflash_core.lab.evaluation.clips import (
+    LATE,
+    SHOWS,
+    STRUCTURE,
+    TrueClip,
+    clips_markdown,
+    clips_result,
+    judged,
+    rendered_clip,
+)
+from langflash_core.lab.labels.storage import ClipLabels, ObjectRow
 from langflash_core.lab.rooms import RoomRenderer, load_pack
 from langflash_core.lab.rooms.catalogue import HELD_OUT_LIBRARIES
 from tests.lab.labels.painted import painted_clip
@@ -59,3 +69,14 @@ def test_a_rendered_clip_knows_what_each_pixel_shows():
     assert float(turned.trace()) < 3 - 1e-4 or not np.allclose(*truth.clip.viewmats[[0, -1], :3, 3])
     assert all(truth.shares(id).max() >= SHOWS for id in truth.things) and LATE < 8
     assert all(truth.names[id] for id in truth.things)
+
+
+def test_tables_say_what_was_found(painted):
+    rows = tuple(ObjectRow(n, 0, 12, 9, 0.9, 1, 1.0) for n in range(1, STRUCTURE + 4))
+    vectors = np.zeros((len(rows), 3), np.float32)
+    labels = ClipLabels("painted", painted.clip.ids, painted.ids, rows, vectors, "minilm", {"total": 6.0})
+    result = clips_result([(labels, judged(painted, painted.ids))])
+    (clip,) = result["clips"]
+    assert (clip["found"], clip["late_found"], clip["iou"], clip["frames_per_second"]) == (3, 1, 1.0, 2.0)
+    table = clips_markdown(result)
+    assert "| painted | 3 of 3 | 1 of 1 | 1.000 | 100% |" in table and "late box, comes in late" in table
