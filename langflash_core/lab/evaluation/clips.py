@@ -185,8 +185,8 @@ def clips_markdown(result: dict) -> str:
     for clip in result["clips"]:
         lines.append(
             f"| {clip['clip']} | {clip['found']} of {clip['things']} | "
-            f"{clip['late_found']} of {clip['late']} | {clip['iou']:.3f} | {clip['constant']:.0%} | {clip['objects']} | {clip['coverage']:.0%} | "
-            f"{clip['frames_per_second']:.2f} |"
+            f"{clip['late_found']} of {clip['late']} | {clip['iou']:.3f} | {clip['constant']:.0%} | "
+            f"{clip['objects']} | {clip['coverage']:.0%} | {clip['frames_per_second']:.2f} |"
         )
     lines += ["", "| clip | thing | IoU | id constant | caught after |", "|---|---|---|---|---|"]
     for clip in result["clips"]:
