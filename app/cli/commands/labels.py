@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TextIO
 
 from langflash_core.__main__ import in_program
-from langflash_core.batch.dispatch import Job, Made, Workers
+from langflash_core.batch.dispatch import Job, Lost, Made, Workers
 from langflash_core.batch.ledger import DONE, FAILED, Ledger
 from langflash_core.batch.run import finish, run_jobs
 from langflash_core.batch.sets import LEDGER, SUMMARY
@@ -142,7 +142,7 @@ class Here:
         """Take a job."""
         self._jobs.append(job)
 
-    def wait(self, seconds: float) -> list[tuple[Job, Made]]:
+    def wait(self, seconds: float) -> list[tuple[Job, Made | Lost]]:
         """Do it."""
         return [(job, self._make(job)) for job in [self._jobs.pop() for _ in self._jobs[:]]]
 

@@ -66,7 +66,7 @@ def test_a_rendered_clip_knows_what_each_pixel_shows():
     assert truth.ids.shape == (8, 72, 96) and truth.clip.read(7).shape == (72, 96, 3)
     assert truth.clip.viewmats is not None and truth.clip.Ks is not None
     turned = truth.clip.viewmats[0, :3, :3] @ truth.clip.viewmats[-1, :3, :3].T
-    assert float(turned.trace()) < 3 - 1e-4 or not np.allclose(*truth.clip.viewmats[[0, -1], :3, 3])
+    assert float(turned.trace()) < 3 - 1e-6  # radians squared: the camera turned
     assert all(truth.shares(id).max() >= SHOWS for id in truth.things) and LATE < 8
     assert all(truth.names[id] for id in truth.things)
 
