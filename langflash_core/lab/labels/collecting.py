@@ -99,7 +99,7 @@ class _Collection:
             own = self.seen[number]
             own.frames, own.area = own.frames + 1, own.area + area
         due = frame % self.rules.embed_every == 0
-        fresh = any(not self.seen[number].vectors for number in numbers.tolist())
+        fresh = any(self.seen[number].frames == 1 for number in numbers.tolist())
         if len(numbers) and (due or fresh):
             start = time.perf_counter()
             vectors = self.encoder.embed(self.clip.read(frame), masks)

@@ -68,7 +68,7 @@ class Following(Protocol):
     """Objects on their way through one clip, frame after frame."""
 
     def add(self, frame: int, ids: UInt16[np.ndarray, "H W"]) -> None:
-        """Follow these from the current frame on: numbers that are new."""
+        """Follow these from the current frame on: new numbers, or more of known ones; where nobody is yet."""
         ...
 
     def to(self, frame: int) -> UInt16[np.ndarray, "H W"]:

@@ -18,7 +18,7 @@ from torch.nn import functional as F
 from langflash_core.errors import WeightsError
 from langflash_core.extras import optional_packages
 from langflash_core.lab.labels.clips import Clip
-from langflash_core.lab.labels.masks import painted, split_ids
+from langflash_core.lab.labels.masks import painted
 from langflash_core.lab.labels.protocols import Following
 from langflash_core.torchvision_fix import ensure_torchvision
 
@@ -106,6 +106,7 @@ class _Sam2Following:
         self._model, self._clip = model, clip
         self._side = int(model.config.prompt_encoder_config.image_size)
         self._size = clip.read(0).shape[:2]
+        self._ids = np.zeros(self._size, np.uint16)
         self._session = Sam2VideoInferenceSession(
             video_height=self._size[0],
             video_width=self._size[1],
@@ -114,8 +115,11 @@ class _Sam2Following:
         )
 
     def add(self, frame: int, ids: UInt16[np.ndarray, "H W"]) -> None:
-        """Each becomes an object of the model's, whose memory begins with its mask here."""
-        numbers, masks = split_ids(ids)
+        """Each becomes an object of the model's, whose memory begins with its mask here; of a known one the
+        memory is put right by all of it."""
+        self._ids = np.where(self._ids > 0, self._ids, ids)
+        numbers = np.unique(ids[ids > 0])
+        masks = self._ids[None] == numbers[:, None, None]
         for number, mask in zip(numbers.tolist(), masks, strict=True):
             square = torch.from_numpy(mask)[None, None].float()
             large = F.interpolate(square, (self._side, self._side), mode="bilinear", antialias=True)
@@ -131,11 +135,12 @@ class _Sam2Following:
         self._session.add_new_frame(pixels, frame)
         self._session.processed_frames.pop(frame - 2, None)  # frames are read again from the clip, never here
         if self._session.get_obj_num() == 0:
-            return np.zeros(self._size, np.uint16)
+            return self._ids
         found = self._model(self._session, frame_idx=frame)
         logits = F.interpolate(found.pred_masks.float(), self._size, mode="bilinear", align_corners=False)
-        numbers = np.array(found.object_ids)
-        return painted((logits[:, 0] > 0).cpu().numpy(), numbers, self._size)
+        masks = (logits[:, 0] > 0).cpu().numpy()
+        self._ids = painted(masks, np.array(found.object_ids), self._size)
+        return self._ids
 
 
 def normalised(image: UInt8[np.ndarray, "H W 3"], side: int) -> Float[Tensor, "1 3 S S"]:

@@ -126,6 +126,19 @@ def test_objects_may_join_later(checkpoint, clip):
     assert set(np.unique(following.to(2))) <= {0, 1, 2}
 
 
+def test_more_of_a_known_object_puts_its_memory_right_by_all_of_it(checkpoint, clip):
+    _, video, _ = checkpoint
+    following = Sam2Propagator(video).follow(clip)
+    following.to(0)
+    first, more = np.zeros(SIZE, np.uint16), np.zeros(SIZE, np.uint16)
+    first[:30, :40], more[30:, :40] = 3, 3
+    following.add(0, first)
+    following.add(0, more)
+    (told,) = following._session.mask_inputs_per_obj[0].values()
+    assert abs(float(told.mean()) - 0.5) < 0.02  # the left half of the frame, to a row of the square
+    assert set(np.unique(following.to(1))) <= {0, 3}
+
+
 def test_it_proposes_and_refines_like_the_other_one(checkpoint, clip):
     pictures, _, _ = checkpoint
     sam = PromptedSam(Sam2Pictures(pictures), grid=3, least_score=-9, least_stability=-1)
