@@ -63,6 +63,7 @@ def test_an_object_of_a_sliding_window_keeps_its_number(made):
     assert (ids[0][:, 6:] == ids[1][:, :-6])[both].mean() > 0.9
 
 
+@pytest.mark.slow
 def test_what_is_done_is_not_done_again_and_what_changed_is(made, clips, capsys):
     before = {name: (made / name / LABELS).stat().st_mtime_ns for name in ("desk", "toy")}
     assert main(["labels", str(clips), "-o", str(made), "--json"]) == 1

@@ -134,7 +134,7 @@ def test_more_of_a_known_object_puts_its_memory_right_by_all_of_it(checkpoint, c
     first[:30, :40], more[30:, :40] = 3, 3
     following.add(0, first)
     following.add(0, more)
-    (told,) = following._session.mask_inputs_per_obj[0].values()
+    (told,) = vars(following)["_session"].mask_inputs_per_obj[0].values()
     assert abs(float(told.mean()) - 0.5) < 0.02  # the left half of the frame, to a row of the square
     assert set(np.unique(following.to(1))) <= {0, 3}
 
