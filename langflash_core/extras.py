@@ -19,6 +19,7 @@ EXTRAS = {
     "OpenEXR": "views",
     "ray": "cluster",
     "tensorboard": "board",
+    "transformers": "sam2",
 }
 """Top-level import name -> extra in pyproject.toml."""
 

@@ -19,7 +19,7 @@ from .words.scenes import (
     add_view,
     add_weights,
 )
-from .words.training import add_rooms, add_train
+from .words.training import add_labels, add_rooms, add_train
 
 
 class UsageError(InputError):
@@ -59,6 +59,7 @@ def build_parser() -> Parser:
         add_bench,
         add_bench_network,
         add_rooms,
+        add_labels,
         add_train,
         add_eval,
         add_weights,

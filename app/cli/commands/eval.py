@@ -19,6 +19,7 @@ from ..photos import chosen, opened_folder
 from ..renderers import open_renderer
 from ..report import ProgressBar, say_warnings, write_json, write_tables
 from .eval_ablations import ablations
+from .eval_labels import labels
 from .eval_protocol import opened_lpips, protocol
 from .eval_report import report
 from .eval_sides import beside, sides
@@ -32,7 +33,7 @@ def run(args: Namespace, out: TextIO) -> None:
         LangFlashError: the cache, the checkpoint or the output cannot be used.
     """
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(message)s", stream=sys.stderr)
-    if getattr(args, "weights", None) is not None:
+    if getattr(args, "weights", None) is not None and args.action != "labels":
         readable_file(args.weights, "checkpoint", WeightsError)
     {
         "ablations": ablations,
@@ -41,6 +42,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "photos": _photos,
         "photos-labelled": _photos_labelled,
         "posed": _posed,
+        "labels": labels,
         "protocol": protocol,
         "report": report,
         "sides": sides,

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from ..values import above_zero, atom_count, numbers, pixel_side, seed, size, whole_count
 from .shared import add_backend, add_description, add_json, add_output, new_actions, new_command
+from .training import add_label_models
 
 # langflash_core.lab.evaluation.protocols.PROTOCOLS, and photos one by one.
 EVAL_PROTOCOLS = ("scannet", "3dovs", "re10k", "7scenes", "nyu")
@@ -108,6 +109,7 @@ def add_eval(commands) -> None:
     _add_labelled(actions)
     _add_posed(actions)
     _add_sides(actions)
+    _add_labels(actions)
     _add_protocol(actions)
     _add_report(actions)
     photos = new_command(actions, "photos", "a sheet to judge by eye: pairs of photos, new views, heat-maps")
@@ -135,6 +137,22 @@ def _add_posed(actions) -> None:
     command.add_argument("--limit", type=whole_count, metavar="N", help="so many pairs (default: 40)")
     _add_fitting(command)
     _add_judging(command)
+
+
+def _add_labels(actions) -> None:
+    command = new_command(
+        actions, "labels", "labels as `langflash labels` makes them, of clips through rendered rooms"
+    )
+    command.add_argument("pack", type=Path, metavar="PACK", help="furniture, made by rooms pack")
+    command.add_argument(
+        "--seed", type=seed, nargs="+", default=[19], metavar="N", help="rooms (default: 19)"
+    )
+    command.add_argument(
+        "--results", type=Path, metavar="DIR", help="also keep labels and report.html of every clip"
+    )
+    add_label_models(command)
+    command.add_argument("-o", dest="output", type=Path, metavar="FILE", help="also write the table as .md")
+    add_json(command)
 
 
 def _add_sides(actions) -> None:

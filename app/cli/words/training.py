@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from ..values import minutes, part, seed, size, whole_count
-from .shared import add_description, add_output, new_actions, new_command
+from .shared import add_description, add_json, add_output, new_actions, new_command
 
 # langflash_core.lab.photos.layouts.LAYOUTS, which would bring torch along.
 LAYOUTS = ("nyu", "coco", "ade20k", "sunrgbd", "frames")
@@ -34,6 +34,82 @@ def _add_seeds(command: argparse.ArgumentParser, *, count: int) -> None:
         "--count", type=whole_count, default=count, metavar="N", help=f"rooms (default: {count})"
     )
     command.add_argument("--held-out", action="store_true", help="furniture that training never sees")
+
+
+def add_labels(commands) -> None:
+    """`langflash labels`."""
+    command = new_command(
+        commands,
+        "labels",
+        "what is where in every frame of a clip, and what it is, to train on; what is done is not done again",
+        epilog="The exit code is 0 when all clips are done, 1 when some failed (ledger.csv says why), "
+        "2 for bad input, 130 after Ctrl-C.",
+    )
+    command.add_argument(
+        "source",
+        type=Path,
+        metavar="CLIP|FOLDER",
+        help="a folder of frames in order of their names (or images/ with K.txt and poses.txt), a folder of "
+        "such folders, or a split of RealEstate10K in chunks (index.json)",
+    )
+    add_output(command, "OUT", "gets a folder a clip (labels and report.html), ledger.csv and summary.html")
+    add_label_models(command)
+    command.add_argument("--start", type=seed, default=0, metavar="N", help="the first frame (default: 0)")
+    command.add_argument("--count", type=whole_count, metavar="N", help="at most so many frames of each clip")
+    command.add_argument(
+        "--step", type=whole_count, default=1, metavar="N", help="every so manyth frame (default: 1)"
+    )
+    command.add_argument(
+        "--workers", type=whole_count, metavar="N", help="processes side by side (default: this one alone)"
+    )
+    command.add_argument(
+        "--address", metavar="RAY", help="a Ray cluster instead of processes: host:port, auto, or local"
+    )
+    inside = command.add_mutually_exclusive_group()
+    inside.add_argument(
+        "--enrich", action="store_true", help="put labels into the split's chunks afterwards, in place"
+    )
+    inside.add_argument(
+        "--extract", action="store_true", help="make no labels: take those in the split's chunks out to OUT"
+    )
+    command.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(default: cpu)")
+    add_json(command)
+
+
+def add_label_models(command: argparse.ArgumentParser) -> None:
+    """What `langflash labels` makes labels with."""
+    command.add_argument(
+        "--masks",
+        choices=("network", "mobile-sam", "sam2"),
+        default="network",
+        help="who proposes and corrects masks (default: network, our own, which needs no weights)",
+    )
+    command.add_argument(
+        "--weights",
+        metavar="PATH",
+        help="of --masks: mobile_sam.pt or a .safetensors of it; for sam2 a folder that transformers saved, "
+        "or a name that it fetches",
+    )
+    command.add_argument(
+        "--side",
+        type=whole_count,
+        default=1024,
+        metavar="PX",
+        help="the square that MobileSAM sees; 512 is four times as quick (default: 1024)",
+    )
+    command.add_argument(
+        "--follow",
+        choices=("flow", "network", "sam2"),
+        default="flow",
+        help="what carries objects from frame to frame: optical flow, our network's matches and depth, or "
+        "SAM 2's memory (default: flow)",
+    )
+    command.add_argument(
+        "--vectors",
+        choices=("minilm", "clip"),
+        default="minilm",
+        help="the space of the objects' vectors: our network's names, or CLIP of cut-outs (default: minilm)",
+    )
 
 
 def add_train(commands) -> None:

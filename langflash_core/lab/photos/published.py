@@ -231,7 +231,7 @@ def re10k_scenes(root: Path, keys: Mapping[str, object] | None = None) -> Iterat
     index = read_table(root / "index.json")
     wanted = {key: chunk for key, chunk in index.items() if keys is None or key in keys}
     for chunk in sorted(set(wanted.values())):
-        for entry in _chunk(root / str(chunk)):
+        for entry in read_chunk(root / str(chunk)):
             key = str(entry["key"])
             if key in wanted:
                 yield key, _re10k(root / key, entry["cameras"], entry["images"])
@@ -334,7 +334,12 @@ def open_masked(root: Path) -> MaskedScene:
     )
 
 
-def _chunk(path: Path) -> list[dict]:
+def read_chunk(path: Path) -> list[dict]:
+    """The videos of one chunk as they are stored: each a table with key, cameras, images and more.
+
+    Raises:
+        InputError: it cannot be read without running code, or is something else.
+    """
     entries = _tensors(path)
     whole = isinstance(entries, list) and all(
         isinstance(e, dict) and {"key", "cameras", "images"} <= e.keys() for e in entries
