@@ -1,6 +1,6 @@
 """Any number of small photo sets: windows of the shipped stereo photos, the same in both pictures of a pair.
 
-    python -m tests.batch.photo_sets FOLDER 1000
+python -m tests.batch.photo_sets FOLDER 1000
 """
 
 import sys
@@ -48,5 +48,4 @@ def _window(size: tuple[int, int], draw: np.random.Generator) -> tuple[float, fl
 
 
 if __name__ == "__main__":
-    made = make_sets(Path(sys.argv[1]), int(sys.argv[2]))
-    print(f"{sys.argv[1]}: {len(made)} sets")
+    make_sets(Path(sys.argv[1]), int(sys.argv[2]))

@@ -77,7 +77,7 @@ def main() -> None:
         "memory_mb": {str(k): memory[k] for k in (0, 9, 99, 199, 499, args.sets - 1) if k < len(memory)},
     }
     (args.folder / "throughput.json").write_text(json.dumps(document, indent=2))
-    print(json.dumps(document, indent=2))
+    sys.stdout.write(json.dumps(document, indent=2) + "\n")
 
 
 if __name__ == "__main__":
