@@ -14,7 +14,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from langflash_core.errors import WeightsError
+from langflash_core.errors import InputError, WeightsError
 from langflash_core.network.checkpoints.importing import read_checkpoint
 from langflash_core.torchvision_fix import ensure_torchvision
 
@@ -42,7 +42,12 @@ class MobileSamEncoder(nn.Module):
 
         Args:
             side: pixels to which a photo's longer side is brought; less is quicker and sees less.
+
+        Raises:
+            InputError: the side is no multiple of 16.
         """
+        if side < STRIDE or side % STRIDE:
+            raise InputError(f"SAM sees sides that are multiples of {STRIDE}, not {side}; choose another")
         super().__init__()
         ensure_torchvision()
         from timm.models.tiny_vit import TinyVit
@@ -64,6 +69,11 @@ class MobileSamEncoder(nn.Module):
             nn.Conv2d(CHANNELS, CHANNELS, 3, padding=1, bias=False),
             _ChannelNorm(),
         )
+
+    @property
+    def device(self) -> torch.device:
+        """Where its numbers lie."""
+        return next(self.parameters()).device
 
     def forward(self, squares: Tensor) -> Tensor:
         """Embedding (n, 256, h, w) of normalised pictures (n, 3, H, W), sides multiples of 16."""
@@ -99,7 +109,7 @@ def load_mobile_sam_encoder(path: Path, side: int = SIDE, device: str = "cpu") -
     """The encoder with the weights of a file of MobileSAM: .safetensors, or the published .pt.
 
     Raises:
-        WeightsError: the file cannot be read, or holds another network.
+        WeightsError: the file cannot be read, or holds another network. InputError: not such a side.
     """
     stored = {
         name.removeprefix(_PREFIX): value.float() if value.is_floating_point() else value
