@@ -134,7 +134,8 @@ def test_forty_sets_by_two_of_whom_one_is_killed_are_what_one_makes(place, tmp_p
     assert sum(row.retried for row in place.ledger()) <= 1
     again = {name: len(tries(photo)) for name, photo in photos.items()}  # one alone, one by two
     assert sum(again.values()) <= 2 * 40 + 1
-    place.run(), alone.run()
+    place.run()
+    alone.run()
     assert {name for name, photo in photos.items() if len(tries(photo)) > again[name]} == {"s20"}
 
 

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import pytest
 import torch
@@ -43,7 +44,7 @@ def sam() -> MobileSamEncoder:
     return MobileSamEncoder(64).eval().requires_grad_(False)
 
 
-def _draw(rooms, seed=0, count=2):
+def _draw(rooms, seed=0, count=2) -> Any:
     return rooms.draw(count, 2, torch.Generator().manual_seed(seed))
 
 
