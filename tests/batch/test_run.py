@@ -13,6 +13,7 @@ from langflash_core.batch.order import Order
 from langflash_core.batch.processes import LocalWorkers
 from langflash_core.batch.run import SCENE, fingerprint
 from langflash_core.batch.sets import SUMMARY
+from tests.batch.conftest import Place
 from tests.batch.doings import open_copier, tries
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
@@ -110,6 +111,32 @@ def test_a_killed_worker_loses_its_set_only(place):
     }
     # What the killed ones had begun to write is swept up.
     assert sorted(os.listdir(place.output)) == ["a", "b", "c", "e", "ledger.csv", SUMMARY]
+
+
+def test_forty_sets_by_two_of_whom_one_is_killed_are_what_one_makes(place, tmp_path):
+    photos = {f"s{k:02}": place.add(f"s{k:02}", f"photo {k}") for k in range(40)}
+    photos["s20"].write_text("bad")
+    alone = Place(place.source, tmp_path / "alone")
+    alone.run(count=1)
+    killed = []
+
+    def tick(workers):
+        if len(place.ledger()) >= 10 and not killed:
+            number = next(iter(workers._processes.values())).pid
+            os.kill(number, signal.SIGKILL)
+            killed.append(number)
+
+    place.run(tick=tick)
+    assert killed and _statuses(place.ledger()) == _statuses(alone.ledger())
+    assert [row.name for row in place.ledger() if row.status == "failed"] == ["s20"]
+    done = [name for name in photos if name != "s20"]
+    assert all((place.output / n / SCENE).read_text() == (alone.output / n / SCENE).read_text() for n in done)
+    assert sum(row.retried for row in place.ledger()) <= 1
+    again = {name: len(tries(photo)) for name, photo in photos.items()}  # one alone, one by two
+    assert sum(again.values()) <= 2 * 40 + 1
+    place.run()
+    alone.run()
+    assert {name for name, photo in photos.items() if len(tries(photo)) > again[name]} == {"s20"}
 
 
 def test_a_worker_that_was_killed_while_idle_is_replaced(place):

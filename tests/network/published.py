@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from langflash_core.network.encoders.mobile_sam import MobileSamEncoder
 from langflash_core.network.presets import PointMaps
 
 State = dict[str, Tensor]
@@ -444,3 +445,33 @@ def _packed(s: State, name: str, q: Tensor, k: Tensor, v: Tensor, heads: int) ->
     """torch's MultiheadAttention layout without biases."""
     wq, wk, wv = s[f"{name}.in_proj_weight"].chunk(3)
     return _attend(q @ wq.T, k @ wk.T, v @ wv.T, heads) @ s[f"{name}.out_proj.weight"].T
+
+
+def _by_name(name: str, shape: torch.Size) -> torch.Tensor:
+    """Numbers that follow from a published name alone."""
+    if name.endswith("num_batches_tracked"):
+        return torch.zeros((), dtype=torch.int64)
+    count = torch.arange(shape.numel(), dtype=torch.float64)
+    waves = torch.cos(0.37 * count + sum(map(ord, name))).reshape(shape)
+    if name.endswith("running_var"):
+        return 1.5 + waves
+    gain = len(shape) == 1 and name.endswith("weight")
+    return 1 + 0.1 * waves if gain else waves * (2 / max(1, shape[1:].numel())) ** 0.5
+
+
+def draw_mobile_sam() -> dict[str, torch.Tensor]:
+    """MobileSAM's encoder under its published names, and two tensors of what is not read of that file.
+
+    What leads to a stage lies at the end of the one before there.
+    """
+    state = {"image_encoder.head.bias": torch.ones(3), "mask_decoder.iou_token.weight": torch.ones(1, 4)}
+    for own, value in MobileSamEncoder().state_dict().items():
+        name = own.removeprefix("body.").replace(".conv.weight", ".c.weight")
+        name = name.replace("patch_embed.conv1", "patch_embed.seq.0").replace(
+            "patch_embed.conv2", "patch_embed.seq.2"
+        )
+        for stage in (1, 2, 3):
+            name = name.replace(f"stages.{stage}.downsample", f"layers.{stage - 1}.downsample")
+        name = name.replace("stages.", "layers.")
+        state[f"image_encoder.{name}"] = _by_name(name, value.shape).contiguous()
+    return state

@@ -22,6 +22,7 @@ from langflash_core.lab.training.loop import LoopOptions
 from langflash_core.lab.training.photos import run_photo_cache
 from langflash_core.lab.training.ranks import joined, leads
 from langflash_core.lab.training.recipes import Recipe, named_recipe, read_recipe
+from langflash_core.lab.training.scenes import SceneSource, source_at
 from langflash_core.lab.training.trained import run_export
 from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS
@@ -153,16 +154,37 @@ def _options(args: Namespace, minutes: float) -> LoopOptions:
 
 
 def _run(args: Namespace, out: TextIO) -> None:
-    if not args.cache.is_dir():
+    if args.scenes is None and not args.cache.is_dir():
         raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
+    scenes = None if args.scenes is None else _source(args)
+    if args.sam_teacher is not None:
+        readable_file(args.sam_teacher, "checkpoint of MobileSAM", WeightsError)
     check_folder(args.output)
     with joined(args.device) as device:
         recipe = _recipe(args, replace(_options(args, 0), device=device))
         encode = language_space(PRESETS[recipe.preset].space).encode
         start = _start_of(args, recipe.preset)
-        run_recipe(recipe, args.cache, args.output, start, encode, from_scratch=args.from_scratch)
+        run_recipe(
+            recipe,
+            args.cache,
+            args.output,
+            start,
+            encode,
+            from_scratch=args.from_scratch,
+            scenes=scenes,
+            sam=args.sam_teacher,
+            sam_side=args.sam_side,
+        )
         if leads():
             print(f"{args.output}: trained {', '.join(p.stage.name for p in recipe.plans)}", file=out)
+
+
+def _source(args: Namespace) -> SceneSource:
+    if not args.scenes.is_dir():
+        raise InputError(f"there is no folder {args.scenes}; give a data set as it was unpacked")
+    check_folder(args.cache)
+    args.cache.mkdir(parents=True, exist_ok=True)
+    return source_at(args.scenes)
 
 
 _OF_RECIPES = {"seed": 0, "batches": None, "precision": "auto"}
@@ -177,7 +199,9 @@ def _recipe(args: Namespace, options: LoopOptions) -> Recipe:
             raise InputError(f"a recipe says itself what --{given[0]} is; leave that out, or write a recipe")
         return read_recipe(args.recipe, options)
     if args.recipe is None and args.stages is not None and args.minutes is not None:
-        return named_recipe(args.stages, args.minutes, args.preset, options)
+        return named_recipe(
+            args.stages, args.minutes, args.preset, options, sam_teacher=args.sam_teacher is not None
+        )
     raise InputError("give either --stages with --minutes, or a --recipe; not both, not none")
 
 

@@ -179,7 +179,27 @@ def _add_stages(actions) -> None:
     run.add_argument(
         "--recipe", metavar="NAME", help="instead: stages with all their numbers, 'paper' or a .toml"
     )
+    run.add_argument(
+        "--scenes",
+        type=Path,
+        metavar="FOLDER",
+        help="grouping and aggregation learn from this data set as it was unpacked, ScanNet or labelled "
+        "chunks of RealEstate10K, instead of cached rooms",
+    )
     _add_loop(run)
+    run.add_argument(
+        "--sam-teacher",
+        type=Path,
+        metavar="FILE",
+        help="weights of MobileSAM (mobile_sam.pt), whose embedding grouping regresses besides",
+    )
+    run.add_argument(
+        "--sam-side",
+        type=whole_count,
+        default=1024,
+        metavar="PX",
+        help="longer side of a view as SAM sees it (default: 1024, as it was trained; 384 takes a sixth)",
+    )
     run.add_argument(
         "--from-scratch", action="store_true", help="draw the heads anew instead of going on with --start's"
     )

@@ -7,7 +7,7 @@ executed. A labelled id is one of `names`; 0 is not labelled.
 import csv
 import io
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -203,9 +203,32 @@ def open_scannet(root: Path, names: Mapping[int, Name]) -> ScanNetScene:
 
 @dataclass(frozen=True)
 class Re10kScene(PhotoFolder):
-    """Frames of one video of RealEstate10K, held as the JPEG bytes of their chunk."""
+    """Frames of one video of RealEstate10K, held as the JPEG bytes of their chunk.
+
+    maps: of videos whose things were collected, PNG bytes of each frame's numbers, 0 = nobody; vectors: of
+    the things, (M, C), row n of thing n + 1.
+    """
 
     frames: Mapping[str, bytes] = field(default_factory=dict)
+    maps: Mapping[str, bytes] = field(default_factory=dict)
+    vectors: Tensor | None = None
+
+    @property
+    def labelled(self) -> bool:
+        return bool(self.maps)
+
+    def labels(self, id: str) -> np.ndarray:
+        """Numbers (H, W) of the things in a frame, as it was labelled: at the frame's size."""
+        ids, image = (
+            _decoded_map(self.maps[id], f"labels of frame {id} of {self.root.name}"),
+            self.stored_image(id),
+        )
+        if ids.shape == image.shape[:2]:
+            return ids
+        size = (image.shape[1], image.shape[0])
+        return np.asarray(
+            Image.fromarray(ids.astype(np.int32)).resize(size, Image.Resampling.NEAREST)
+        ).astype(int)
 
     def stored_image(self, id: str) -> np.ndarray:
         return _decoded(self.frames[id], f"frame {id} of {self.root.name}")
@@ -234,7 +257,22 @@ def re10k_scenes(root: Path, keys: Mapping[str, object] | None = None) -> Iterat
         for entry in read_chunk(root / str(chunk)):
             key = str(entry["key"])
             if key in wanted:
-                yield key, _re10k(root / key, entry["cameras"], entry["images"])
+                scene = _re10k(root / key, entry["cameras"], entry["images"])
+                yield key, _collected(scene, entry["labels"]) if "labels" in entry else scene
+
+
+def _collected(scene: Re10kScene, entry: Mapping) -> Re10kScene:
+    """A video with what was collected of it: {"ids": PNG bytes as uint8 tensors, "vectors": (M, C)}."""
+    try:
+        maps = [stream.numpy().tobytes() for stream in entry["ids"]]
+        vectors = entry["vectors"].float()
+        if len(maps) != len(scene.ids) or vectors.ndim != 2:
+            raise ValueError(f"{len(maps)} maps of {len(scene.ids)} frames")
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(
+            f"the labels of {scene.root.name} cannot be read ({error!r}); collect them again"
+        ) from None
+    return replace(scene, maps=dict(zip(scene.ids, maps, strict=True)), vectors=vectors)
 
 
 def _re10k(root: Path, cameras: Tensor, images: list[Tensor]) -> Re10kScene:
@@ -376,6 +414,15 @@ def _decoded(content: bytes, what: str) -> np.ndarray:
             return np.asarray(opened.convert("RGB"))
     except (UnidentifiedImageError, OSError) as error:
         raise InputError(f"{what} is no picture ({error}); get the chunk again") from None
+
+
+def _decoded_map(content: bytes, what: str) -> np.ndarray:
+    """(H, W) int64 of a PNG of one channel."""
+    try:
+        with Image.open(io.BytesIO(content)) as opened:
+            return np.asarray(opened).astype(np.int64)
+    except (OSError, ValueError) as error:
+        raise InputError(f"the {what} cannot be read ({error}); collect them again") from None
 
 
 def _matrix(path: Path) -> Tensor:

@@ -4,6 +4,7 @@ Sizes as in `shards`: B scenes, V views, H W pixels.
 """
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.geometry.cameras import invert_rigid
-from langflash_core.lab.training.shards import Label, RoomRecord, dequantise_tokens, open_shards
+from langflash_core.lab.training.shards import Label, RoomRecord, Shard, dequantise_tokens, open_shards
 from langflash_core.network.encoders.shared import Tokens
 
 PATCH = 14
@@ -20,11 +21,31 @@ HOOKS = 4
 
 
 @dataclass(frozen=True)
+class Frozen:
+    """What networks that do not learn say of B scenes: tokens, and language features L(x) (B, V, C, h, w), or
+    None where a stage does not read these."""
+
+    tokens: Tokens
+    features: Tensor | None = None
+
+    def to(self, device: str | torch.device) -> "Frozen":
+        features = None if self.features is None else self.features.to(device)
+        return Frozen(self.tokens.each(lambda hook: hook.to(device)), features)
+
+    def scene(self, index: int) -> "Frozen":
+        """Of one scene, B = 1."""
+        features = None if self.features is None else self.features[index : index + 1]
+        return Frozen(self.tokens.scene(index), features)
+
+
+@dataclass(frozen=True)
 class SceneBatch:
     """images (B, V, 3, H, W) in [0, 1]; depths (B, V, H, W) metres, 0 = nothing; instances
     (B, V, H, W) int64, 255 = nothing; viewmats (B, V, 4, 4), world = view 0; Ks (B, V, 3, 3)
     pixels; tokens of the frozen encoder, or None; labels per scene; seeds (B); partly: what no instance
-    claims is something that nobody has named, not nothing."""
+    claims is something that nobody has named, not nothing; dense (B, V, 256, h, w): SAM's embedding, or
+    None; vectors: per scene those of its instances (M, C), where they were collected, else None; frozen: what
+    networks that do not learn say of the scenes, where it is kept."""
 
     images: Tensor
     depths: Tensor
@@ -35,6 +56,9 @@ class SceneBatch:
     labels: tuple[tuple[Label, ...], ...]
     seeds: tuple[int, ...]
     partly: bool = False
+    dense: Tensor | None = None
+    vectors: tuple[Tensor | None, ...] = ()
+    frozen: Frozen | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -53,6 +77,8 @@ class SceneBatch:
             viewmats=self.viewmats.to(device),
             Ks=self.Ks.to(device),
             tokens=tokens,
+            dense=None if self.dense is None else self.dense.to(device),
+            frozen=None if self.frozen is None else self.frozen.to(device),
         )
 
 
@@ -99,10 +125,7 @@ class RoomSet:
         """
         self.folder, self.partly, self.tokens = folder, partly, tokens
         self.shards = open_shards(folder)
-        self.entries = [(shard, i) for shard in self.shards for i in range(len(shard))][:limit]
-        self._by_shape: dict[tuple[int, int, int], list[int]] = {}
-        for row, (shard, _) in enumerate(self.entries):
-            self._by_shape.setdefault((shard.views, shard.height, shard.width), []).append(row)
+        self._keep([(shard, i) for shard in self.shards for i in range(len(shard))][:limit])
 
     def __len__(self) -> int:
         return len(self.entries)
@@ -114,6 +137,21 @@ class RoomSet:
             for shard, i in self.entries
             for name, group, words in shard.scenes[i]["labels"]
         ]
+
+    def part(self, number: int, count: int) -> "RoomSet":
+        """Every `count`-th scene from `number` on: those of one of so many batches of a step. Where there are
+        fewer scenes than batches, all."""
+        if len(self) < count:
+            return self
+        mine = copy(self)
+        mine._keep(self.entries[number::count])
+        return mine
+
+    def _keep(self, entries: list[tuple[Shard, int]]) -> None:
+        self.entries = entries
+        self._by_shape: dict[tuple[int, int, int], list[int]] = {}
+        for row, (shard, _) in enumerate(entries):
+            self._by_shape.setdefault((shard.views, shard.height, shard.width), []).append(row)
 
     def draw(self, count: int, views: int, generator: torch.Generator) -> SceneBatch:
         """`count` random scenes of one random shape, `views` random views of each in random order.

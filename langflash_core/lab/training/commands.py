@@ -24,6 +24,8 @@ from langflash_core.lab.training.cache import (
     fill_cache,
     rooms_renderer,
 )
+from langflash_core.lab.training.dense import DenseSet
+from langflash_core.lab.training.frozen import FrozenSet
 from langflash_core.lab.training.live import LivePhotos
 from langflash_core.lab.training.loop import LoopOptions, Validate, train_stage
 from langflash_core.lab.training.mixing import MixedSet
@@ -31,12 +33,15 @@ from langflash_core.lab.training.naming import NAMING
 from langflash_core.lab.training.parts import PartSet, run_parts
 from langflash_core.lab.training.real import JointSet, KeptPhotos, PhotoTargets, train_late
 from langflash_core.lab.training.recipes import Recipe, named_recipe, stages_of
-from langflash_core.lab.training.stages import Stage, Words, guided
+from langflash_core.lab.training.scenes import SceneSet, SceneSource
+from langflash_core.lab.training.shards import Label
+from langflash_core.lab.training.stages import Stage, Words, guided, taught, untaught
 from langflash_core.lab.training.states import LoopState
 from langflash_core.lab.training.trained import begin, load_trained, prepared
 from langflash_core.lab.training.validation import MEASURES, Validator
 from langflash_core.lab.training.words import PhraseSampler, PhraseTable, build_table
 from langflash_core.network.checkpoints.files import adopt_frozen, initial_network
+from langflash_core.network.encoders.mobile_sam import SIDE, MobileSamEncoder, load_mobile_sam_encoder
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.precision import has_bfloat16
 from langflash_core.network.presets import PRESETS
@@ -158,14 +163,24 @@ def run_recipe(
     encode: Encode,
     *,
     from_scratch: bool = False,
+    scenes: SceneSource | None = None,
+    sam: Path | None = None,
+    sam_side: int = SIDE,
 ) -> LangFlashNet:
-    """Train the stages of a recipe; everything else as `run_train`."""
-    _open(folder / "train")
-    table = phrase_table(folder, encode)
+    """Train the stages of a recipe; everything else as `run_train`.
+
+    Args:
+        scenes: what grouping and aggregation learn from instead of rooms; `folder` then keeps phrases and
+            what frozen networks say. sam: weights of MobileSAM, for stages that regress its embedding; these
+            see views whose longer side is `sam_side` pixels.
+    """
+    if scenes is None:
+        _open(folder / "train")
+    table = phrase_table(folder, encode) if scenes is None else _table(folder, scenes.labels, encode)
     network, done = prepared(recipe, run_dir, start, from_scratch=from_scratch)
     known = stages_of(recipe.preset)
     for plan in recipe.plans:
-        stage, options = plan.stage, plan.options
+        stage, options = taught(plan.stage, network), plan.options
         missing = [need for need in stage.needs if need not in done]
         if missing:
             raise InputError(
@@ -173,12 +188,18 @@ def run_recipe(
             )
         seed = options.seed + 1000 * list(known).index(stage.name) + done.get(stage.name, 0)
         words = Words(PhraseSampler(table), torch.Generator().manual_seed(seed))
-        learned = _learned(stage, folder)
+        learned = _learned(stage, folder) if scenes is None else _drawn(stage, scenes, network)
+        if not network.caches_tokens and not {"encoder", "decoder"} & set(stage.modules):
+            reads_features = stage.name == "aggregation"
+            learned = FrozenSet.of(learned, network, folder / "frozen", features=reads_features)
+        if stage.dense:
+            learned = DenseSet(learned, _sam(sam, sam_side, options), folder / "sam")
         if isinstance(learned, PartSet) and stage.name not in done:
             namer = guided(network).namer
             namer.mean, namer.std = learned.statistics()
-        check = _validator(stage, folder, table, options)
+        check = _validator(stage, folder, table, options) if scenes is None else None
         state = train_stage(network, stage, learned, words, run_dir, options, check)
+        untaught(network)
         done[stage.name] = state.step
     return network.eval()
 
@@ -235,6 +256,26 @@ def _learned(stage: Stage, folder: Path) -> RoomSet | MixedSet | PartSet:
     if stage.photos == 0 or photos is None:
         return rooms
     return MixedSet(rooms, _open(photos, photos=True), stage.photos)
+
+
+def _sam(weights: Path | None, side: int, options: LoopOptions) -> MobileSamEncoder:
+    if weights is None:
+        raise InputError(
+            "this stage regresses SAM's embedding; name weights of MobileSAM with --sam-teacher, or give the "
+            "recipe a teacher of 0"
+        )
+    return load_mobile_sam_encoder(weights, side, options.device)
+
+
+def _drawn(stage: Stage, scenes: SceneSource, network: LangFlashNet) -> SceneSet:
+    """Posed scenes, for a stage that can learn from them.
+
+    Raises:
+        InputError: it cannot.
+    """
+    if stage.name not in ("grouping", "aggregation"):
+        raise InputError(f"stage '{stage.name}' does not learn from --scenes; name grouping and aggregation")
+    return SceneSet(scenes, network.preset)
 
 
 def _validator(stage: Stage, folder: Path, table: PhraseTable, options: LoopOptions) -> Validate | None:
@@ -315,6 +356,11 @@ def phrase_table(folder: Path, encode: Encode) -> PhraseTable:
     extra = [
         label for place in others if place is not None and place.is_dir() for label in _open(place).labels()
     ]
+    return _table(folder, [*labels, *extra], encode)
+
+
+def _table(folder: Path, labels: Sequence[Label], encode: Encode) -> PhraseTable:
+    """Every phrase of the labels, with embeddings that are kept in the folder."""
     path = folder / "phrases.pt"
     known: dict[str, Tensor] = {}
     if path.exists():
@@ -327,7 +373,7 @@ def phrase_table(folder: Path, encode: Encode) -> PhraseTable:
             known.update(zip(fresh, encode(fresh), strict=True))
         return torch.stack([known[phrase] for phrase in phrases])
 
-    table = build_table([*labels, *extra], remembered)
+    table = build_table(labels, remembered)
     temporary = path.with_suffix(f".{time.time_ns()}.part")
     torch.save({"phrases": list(table.phrases), "embeddings": table.embeddings}, temporary)
     temporary.replace(path)

@@ -1,7 +1,8 @@
 """What is drawn at random in a step, so that it does not depend on how many processes there are.
 
 A step is made of batches. Each has draws of its own, for itself alone: a generator that picks scenes and
-phrases, and the state of torch's common one, which a few layers use. Processes share the batches, so two
+phrases, and the states of torch's common ones, which a few layers use: the processor's, and the card's where
+the network lies on one. Processes share the batches, so two
 processes with one batch each learn what one process with two learns, and a run goes on exactly where it
 stopped, whoever goes on with it.
 """
@@ -21,38 +22,66 @@ _APART = 1_000_003
 """Between the seeds of two batches of a step."""
 
 
+@dataclass(frozen=True)
+class Common:
+    """States of torch's own generators. card: None where none is in use."""
+
+    processor: Tensor
+    card: Tensor | None = None
+
+    @staticmethod
+    def now() -> "Common":
+        card = torch.cuda.get_rng_state() if torch.cuda.is_initialized() else None
+        return Common(torch.get_rng_state(), card)
+
+    @staticmethod
+    def seeded(seed: int) -> "Common":
+        """Those of generators that nothing has drawn from."""
+        card = torch.Generator("cuda").manual_seed(seed).get_state() if torch.cuda.is_initialized() else None
+        return Common(torch.Generator().manual_seed(seed).get_state(), card)
+
+    def set(self) -> None:
+        """Draw on from here; a run that comes from a machine without a card leaves the card's as it is."""
+        torch.set_rng_state(self.processor)
+        if self.card is not None and torch.cuda.is_initialized():
+            torch.cuda.set_rng_state(self.card)
+
+
 @dataclass
 class Draws:
-    """The draws of one batch of every step. words: with its generator. common: state of torch's own
-    generator, None where this is the only batch and the process keeps it anyway."""
+    """The draws of one batch of every step. words: with its generator. common: of torch's own generators,
+    None where this is the only batch and the process keeps them anyway. number: of the batch in a step."""
 
     words: Words
-    common: Tensor | None = None
+    common: Common | None = None
+    number: int = 0
 
     @contextmanager
     def drawing(self) -> Iterator[Words]:
-        """Inside, torch's common generator is this batch's."""
+        """Inside, torch's common generators are this batch's."""
         if self.common is None:
             yield self.words
             return
-        outside = torch.get_rng_state()
-        torch.set_rng_state(self.common)
+        outside = Common.now()
+        self.common.set()
         try:
             yield self.words
         finally:
-            self.common = torch.get_rng_state()
-            torch.set_rng_state(outside)
+            self.common = Common.now()
+            outside.set()
 
     def state(self) -> dict[str, Tensor]:
-        common = torch.get_rng_state() if self.common is None else self.common
-        return {"own": self.words.generator.get_state(), "common": common}
+        common = self.common or Common.now()
+        card = {} if common.card is None else {"card": common.card}
+        return {"own": self.words.generator.get_state(), "common": common.processor, **card}
 
     def restore(self, state: dict[str, Tensor]) -> None:
         self.words.generator.set_state(state["own"])
+        common = Common(state["common"], state.get("card"))
         if self.common is None:
-            torch.set_rng_state(state["common"])
+            common.set()
         else:
-            self.common = state["common"]
+            self.common = common
 
 
 def begin_draws(words: Words, batches: int | None, seed: int) -> list[Draws]:
@@ -73,11 +102,10 @@ def begin_draws(words: Words, batches: int | None, seed: int) -> list[Draws]:
 
 
 def _draws(words: Words, number: int, batches: int, seed: int) -> Draws:
-    common = torch.Generator().manual_seed(seed + _APART * number).get_state()
     if number > 0:
         fresh = torch.Generator().manual_seed(words.generator.initial_seed() + _APART * number)
         words = replace(words, generator=fresh)
-    return Draws(words, common if batches > 1 else None)
+    return Draws(words, Common.seeded(seed + _APART * number) if batches > 1 else None, number)
 
 
 def all_states(draws: list[Draws]) -> list[dict[str, Tensor]]:

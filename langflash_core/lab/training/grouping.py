@@ -17,13 +17,18 @@ from langflash_core.lab.training.losses import cosine_distance, dice_pairs, foca
 
 @dataclass(frozen=True)
 class GroupingWeights:
-    """lambda_foc, lambda_dice, lambda_exist, lambda_mse, and the weight of "no object"."""
+    """lambda_foc, lambda_dice, lambda_exist, lambda_mse, and the weight of "no object".
+
+    mse: of `instance_contrast`, which stands in for the regression of SAM's embedding. teacher: of that
+    regression itself; 0: it is not asked for.
+    """
 
     focal: float = 20.0
     dice: float = 1.0
     existence: float = 2.0
     mse: float = 1.0
     no_object: float = 0.1
+    teacher: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -179,6 +179,8 @@ class _Training:
     def __post_init__(self) -> None:
         self.inner = _StageLoss(self.network, self.stage)
         self.loss: nn.Module = self.inner
+        batches = len(self.draws) * world()
+        self.sets = {draws.number: _part(self.rooms, draws.number, batches) for draws in self.draws}
         if world() > 1:
             self.loss = DistributedDataParallel(
                 self.inner, find_unused_parameters=True, forward_sync_buffers=False
@@ -231,7 +233,7 @@ class _Training:
         for draws in self.draws:
             with draws.drawing() as words:
                 with self._spending("reading"):
-                    batch = self._draw(words.generator)
+                    batch = self._draw(draws, words.generator)
                 seeds.append(batch.seeds)
                 with self._spending("forward"), self.options.computing():
                     total = self.loss(batch, words)
@@ -245,14 +247,15 @@ class _Training:
         with self._spending("update"):
             self._update(told, seeds)
 
-    def _draw(self, generator: torch.Generator) -> Any:
+    def _draw(self, draws: Draws, generator: torch.Generator) -> Any:
         sizes, chances = list(self.stage.views), torch.tensor(list(self.stage.views.values()))
         views = sizes[int(torch.multinomial(chances, 1, generator=generator))]
         count = max(1, (self.options.pictures or self.stage.pictures) // views)
-        seek = getattr(self.rooms, "seek", None)
+        rooms = self.sets[draws.number]
+        seek = getattr(rooms, "seek", None)
         if seek is not None:  # of sets whose steps differ
             seek(self.state.begun)
-        return self.rooms.draw(count, views, generator).to(self.options.device)
+        return rooms.draw(count, views, generator).to(self.options.device)
 
     def _update(self, told: list[dict[str, float]], seeds: list[Any]) -> None:
         options, rule = self.options, self.options.optimising
@@ -347,6 +350,13 @@ class _Training:
             yield
         finally:
             self.spent[what] = self.spent.get(what, 0.0) + time.perf_counter() - start
+
+
+def _part(rooms: Drawn, number: int, batches: int) -> Drawn:
+    """What one batch of a step reads, so that processes read different parts of a set; all of it where there
+    is one batch, or where the set knows no parts."""
+    part = getattr(rooms, "part", None)
+    return rooms if part is None or batches == 1 else part(number, batches)
 
 
 def learning_rate(step: int, progress: float, peak: float, rule: Optimising | None = None) -> float:

@@ -4,6 +4,7 @@ Photos have one view, other sizes and holes in their labels, so a step takes a b
 their losses by their shares of the pictures.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,6 +47,10 @@ class MixedSet:
     def __len__(self) -> int:
         return len(self.rooms) + len(self.photos)
 
+    def part(self, number: int, count: int) -> "MixedSet":
+        """That of one of so many batches of a step, of both."""
+        return MixedSet(self.rooms.part(number, count), self.photos.part(number, count), self.share)
+
     def draw(self, count: int, views: int, generator: torch.Generator) -> Mixed:
         """About `count` times `views` pictures; at least one photo, and one room unless the share is 1."""
         pictures = count * views
@@ -54,6 +59,14 @@ class MixedSet:
             return Mixed(photos, None, 1.0)
         rooms = self.rooms.draw(max(1, round((1 - self.share) * count)), views, generator)
         return Mixed(photos, rooms, self.share)
+
+
+def each_of(batch: SceneBatch | Mixed, change: Callable[[SceneBatch], SceneBatch]) -> SceneBatch | Mixed:
+    """The batch, or both of a mixed one, changed alike."""
+    if not isinstance(batch, Mixed):
+        return change(batch)
+    rooms = None if batch.rooms is None else change(batch.rooms)
+    return Mixed(change(batch.photos), rooms, batch.share)
 
 
 def loss_of(loss: StageLoss, network: LangFlashNet, batch: Any, words: Words) -> Loss:

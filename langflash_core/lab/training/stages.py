@@ -7,7 +7,7 @@ grouping, aggregation: the two chains do not read each other and can run side by
 Sizes: B scenes, V views, H W pixels, h w the head's own size, N queries, G groups, C channels.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -36,7 +36,8 @@ from langflash_core.lab.training.losses import (
     photometric_loss,
     point_loss,
 )
-from langflash_core.lab.training.shards import NOTHING
+from langflash_core.lab.training.shards import NOTHING, Label
+from langflash_core.lab.training.student import Student
 from langflash_core.lab.training.words import PhraseSampler
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.gaussians import assemble_gaussians
@@ -56,6 +57,8 @@ TOKEN_DROPOUT = 0.15
 """Share of token channels that the language stage hides in a picture."""
 MIN_GROUP_PIXELS = 12
 """Instances with fewer pixels over all views (at the mask map's sampled size) are not groups."""
+STUDENT = "student"
+"""What the network calls the module that regresses SAM's embedding, while there is one."""
 GAUSSIAN_STRIDE = 2
 """The Gaussian stage renders every second pixel; footprints are relative, so sizes carry over."""
 
@@ -85,7 +88,7 @@ class Stage:
     """modules: attributes of the network that learn; needs: stages whose modules are read frozen;
     views: how many views a scene gives, with their chances; learning_rate: AdamW's peak; photos: share
     of the pictures that come from labelled photos, where some are cached; rates: what a module's rate is of
-    the stage's, 1 where it is not named."""
+    the stage's, 1 where it is not named; dense: SAM's embedding of rooms is drawn with them."""
 
     name: str
     modules: tuple[str, ...]
@@ -96,6 +99,7 @@ class Stage:
     loss: StageLoss
     photos: float = 0.0
     rates: Mapping[str, float] = field(default_factory=dict)
+    dense: bool = False
 
 
 def depth_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:
@@ -304,7 +308,8 @@ def grouping_stage(
     """L_SG after every scale of the decoder, on every second pixel of the mask map; of photos that are
     labelled in part, on the pixels that are.
 
-    Without a dense teacher its term is `instance_contrast` on the map that masks are read from.
+    On the map that masks are read from come `instance_contrast` and, where the weights ask for it and the
+    batch holds it, the regression of SAM's embedding.
     """
     weights = weights or GroupingWeights()
     memories, finest = network.semantic_maps(frozen_tokens(network, batch), batch.images)
@@ -328,7 +333,33 @@ def grouping_stage(
             if answer is answers[-1] and len(chosen.queries):
                 quality.append(float(mask_quality(logits[chosen.queries], truth[chosen.groups]).mean()))
     total = torch.stack(losses).mean() + weights.mse * contrast
-    return Loss(total, {"soft_iou": sum(quality) / max(len(quality), 1), **_numbers(contrast=contrast)})
+    told = {"soft_iou": sum(quality) / max(len(quality), 1), **_numbers(contrast=contrast)}
+    if weights.teacher and batch.dense is not None:
+        regressed = student_of(network).loss(finest, batch.dense)
+        total, told = total + weights.teacher * regressed, told | _numbers(teacher=regressed)
+    return Loss(total, told)
+
+
+def student_of(network: LangFlashNet) -> Student:
+    """What turns the network's finest map into SAM's embedding while it trains."""
+    student = getattr(network, STUDENT, None)
+    assert isinstance(student, Student), "training attaches it where a stage wants it"
+    return student
+
+
+def taught(stage: Stage, network: LangFlashNet) -> Stage:
+    """The stage with a student of SAM's embedding, which the network has from here on, where it wants one."""
+    if not stage.dense:
+        return stage
+    if not hasattr(network, STUDENT):
+        setattr(network, STUDENT, Student(network.preset.dpt_feature))
+    return replace(stage, modules=(*stage.modules, STUDENT))
+
+
+def untaught(network: LangFlashNet) -> None:
+    """Take the student away: nobody reads it after training."""
+    if hasattr(network, STUDENT):
+        delattr(network, STUDENT)
 
 
 def _contrast(maps: Tensor, ids: Tensor, words: Words) -> Tensor:
@@ -359,20 +390,30 @@ def aggregation_stage(
         found = named_parts(network, one_scene(batch, i))
         if found is None:
             continue
-        instances = found.instances.cpu()
-        phrases = words.sampler.draw(batch.labels[i], words.generator)[instances]
-        bank, embeddings = phrase_bank(phrases, words), words.sampler.table.embeddings
-        texts = GroupTexts(
-            embeddings[phrases].to(found.atoms),
-            embeddings[bank].to(found.atoms),
-            words.sampler.true(batch.labels[i])[instances][:, bank].to(found.atoms.device),
-        )
+        collected = batch.vectors[i] if batch.vectors else None
+        if collected is None:
+            texts = _named_texts(found, batch.labels[i], words)
+        else:  # of things without a name: all others of the scene are what they are not
+            vectors = collected.to(found.atoms)
+            texts = GroupTexts(vectors[found.instances], vectors)
         chosen = weights or AggregationWeights()
         losses.append(aggregation_loss(found.atoms, found.pooled, found.quality, texts, chosen))
         cosines.append(float(F.cosine_similarity(found.atoms.detach(), texts.truth, dim=-1).mean()))
     if not losses:
         return Loss(sum(p.sum() for p in network.aggregation.parameters()) * torch.zeros(()), {"cosine": 0.0})
     return Loss(torch.stack(losses).mean(), {"cosine": sum(cosines) / len(cosines)})
+
+
+def _named_texts(found: "NamedParts", labels: Sequence[Label], words: Words) -> GroupTexts:
+    """A phrase of each part's label, and a bank of which some are true of it, too."""
+    instances = found.instances.cpu()
+    phrases = words.sampler.draw(labels, words.generator)[instances]
+    bank, embeddings = phrase_bank(phrases, words), words.sampler.table.embeddings
+    return GroupTexts(
+        embeddings[phrases].to(found.atoms),
+        embeddings[bank].to(found.atoms),
+        words.sampler.true(labels)[instances][:, bank].to(found.atoms.device),
+    )
 
 
 @dataclass(frozen=True)
@@ -390,7 +431,9 @@ def named_parts(network: LangFlashNet, batch: SceneBatch) -> NamedParts | None:
     """The atoms of one scene (B = 1) made as at run time, and the instance each mostly covers."""
     with torch.no_grad():
         tokens = tokens_of(network, batch)
-        features = network.language(tokens, batch.images).float()
+        features = None if batch.frozen is None else batch.frozen.features
+        if features is None:
+            features = network.language(tokens, batch.images).float()
         size = (features.shape[-2], features.shape[-1])
         weights = network.parts(tokens, batch.images, size, features)[None]
         masks, instances = group_masks(nearest(batch.instances[0], size))  # (G, V*h*w), (G,)
@@ -417,8 +460,8 @@ def mostly(weights: Tensor, masks: Tensor, eps: float) -> tuple[Tensor, Tensor]:
 
 def tokens_of(network: LangFlashNet, batch: SceneBatch) -> Tokens:
     """Tokens of a batch, also what the late half says, which no cache holds: it learns."""
-    if not network.caches_tokens:
-        return network.encode(batch.images, batch.Ks)
+    if not network.caches_tokens:  # but `frozen` keeps them while nothing before them learns
+        return network.encode(batch.images, batch.Ks) if batch.frozen is None else batch.frozen.tokens
     if batch.tokens is not None and batch.tokens.named:
         return batch.tokens
     with torch.no_grad():
@@ -502,6 +545,8 @@ def one_scene(batch: SceneBatch, index: int) -> SceneBatch:
     return SceneBatch(
         batch.images[one], batch.depths[one], batch.instances[one], batch.viewmats[one], batch.Ks[one],
         tokens, batch.labels[one], batch.seeds[one], batch.partly,
+        None if batch.dense is None else batch.dense[one], batch.vectors[one],
+        None if batch.frozen is None else batch.frozen.scene(index),
     )  # fmt: skip
 
 

@@ -87,7 +87,9 @@ def restore_state(
     optimiser.load_state_dict(saved["optimiser"])
     log.info("%s: continues at step %d, %.0f s", stage.name, saved["step"], saved["seconds"])
     begun = saved.get("begun", saved["step"])
-    return LoopState(saved["step"], saved["seconds"], saved["ema"], begun), saved.get("draws", [])
+    own = stage_parameters(network, stage)
+    ema = {name: value.to(own[name].device) for name, value in saved["ema"].items()}
+    return LoopState(saved["step"], saved["seconds"], ema, begun), saved.get("draws", [])
 
 
 def forget_later_rows(path: Path, step: int) -> None:

@@ -132,12 +132,17 @@ def fingerprint(tensors: Mapping[str, Tensor], prefix: str = "") -> str:
     own = {k.removeprefix(prefix): k for k in tensors if _module(k) in {prefix + name for name in TRUNK}}
     if {_module(name) for name in own} != set(TRUNK):
         return ""
-    digest = hashlib.sha256()
-    for name in sorted(own):
-        digest.update(name.encode())
-        numbers = tensors[own[name]].detach().cpu().to(torch.float32).contiguous()
-        digest.update(numbers.flatten().view(torch.uint8).numpy().data)
-    return digest.hexdigest()[:32]
+    return digest({name: tensors[key] for name, key in own.items()})
+
+
+def digest(tensors: Mapping[str, Tensor]) -> str:
+    """Of names and float32 values, 32 hexadecimal digits."""
+    whole = hashlib.sha256()
+    for name in sorted(tensors):
+        whole.update(name.encode())
+        numbers = tensors[name].detach().cpu().to(torch.float32).contiguous()
+        whole.update(numbers.flatten().view(torch.uint8).numpy().data)
+    return whole.hexdigest()[:32]
 
 
 def read_tensors(part: Part, modules: Iterable[str]) -> dict[str, Tensor]:

@@ -140,3 +140,24 @@ def frames(folder: PhotoFolder, root: Path) -> None:
         Image.fromarray(steps).save(root / f"{stem}.depth.png")
         last = place == len(folder.ids) - 1
         np.savetxt(root / f"{stem}.pose.txt", np.full((4, 4), np.nan) if last else pose_of(folder, id))
+
+
+VECTOR = 512  # channels of a collected thing's vector
+
+
+def collect(folder: PhotoFolder, chunk: Path, keys: tuple[str, ...], offset: int = 0) -> None:
+    """Put labels into videos of a chunk, as `langflash labels` does: an id map a frame, a vector a thing."""
+    entries = torch.load(chunk, weights_only=True)
+    maps = []
+    for id in folder.ids:
+        labels = folder.labels(id)
+        stream = io.BytesIO()
+        Image.fromarray(np.where(labels > 0, labels + offset, 0).astype(np.uint16)).save(stream, "PNG")
+        maps.append(torch.frombuffer(bytearray(stream.getvalue()), dtype=torch.uint8))
+    draw = torch.Generator().manual_seed(0)
+    vectors = torch.randn(max(NAMES) + offset, VECTOR, generator=draw)
+    vectors = (vectors / vectors.norm(dim=1, keepdim=True)).half()
+    for entry in entries:
+        if entry["key"] in keys:
+            entry["labels"] = {"format": "langflash-labels-1", "ids": maps, "vectors": vectors}
+    torch.save(entries, chunk)

@@ -1,11 +1,14 @@
 """Recipes: the paper's, what a file must say, and the paper's network in small trained by one."""
 
+import json
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import torch
+from safetensors.torch import save_file
 from torch.nn import functional as F
 
 from langflash_core.errors import InputError, WeightsError
@@ -14,12 +17,14 @@ from langflash_core.lab.training.commands import cache_plan, run_recipe
 from langflash_core.lab.training.grouping import AggregationWeights, GroupingWeights
 from langflash_core.lab.training.loop import LoopOptions
 from langflash_core.lab.training.recipes import read_recipe
+from langflash_core.lab.training.scenes import source_at
 from langflash_core.lab.training.shards import write_shard
 from langflash_core.lab.training.trained import run_export
 from langflash_core.network import PRESETS, PointMapNet
 from langflash_core.network.checkpoints.parts import part_folder, read_part
 from langflash_core.network.checkpoints.store import assemble_network, install
 from langflash_core.types import Views
+from tests.lab.photos import layouts_made
 from tests.lab.training.conftest import toy_record
 from tests.network import published
 from tests.network.sizes import TINY
@@ -38,7 +43,9 @@ def test_the_papers_recipe_says_what_the_paper_says():
         assert plan.stage.learning_rate == 2e-4 and plan.stage.views == {2: 1.0}
     assert "siamese" not in aggregation.stage.modules and aggregation.stage.modules == ("aggregation",)
     # What the paper leaves open is what the design chose.
-    assert grouping.stage.loss.keywords == {"weights": GroupingWeights()}  # type: ignore[attr-defined]
+    own = GroupingWeights(mse=0.0, teacher=1.0)  # SAM's embedding, not what stands in for it
+    assert grouping.stage.loss.keywords == {"weights": own}  # type: ignore[attr-defined]
+    assert grouping.stage.dense and not aggregation.stage.dense
     assert aggregation.stage.loss.keywords == {"weights": AggregationWeights()}  # type: ignore[attr-defined]
 
 
@@ -113,8 +120,9 @@ def imported(tmp_path, monkeypatch) -> Path:
 
 @pytest.fixture
 def short(tmp_path) -> Path:
-    """The paper's recipe, but for its length."""
+    """The paper's recipe, but for its length and SAM."""
     text = re.sub(r"iterations = \d+", "iterations = 3", PAPER)
+    text = re.sub(r"teacher = 1.0", "teacher = 0.0", text)
     path = tmp_path / "short.toml"
     path.write_text(re.sub(r"batches = \d+", "batches = 2", text), encoding="utf-8")
     return path
@@ -142,6 +150,54 @@ def test_the_papers_recipe_trains_grouping_and_aggregation_on_a_frozen_geometry(
     K = torch.tensor([[60.0, 0, 32], [0, 60.0, 32], [0, 0, 1]]).expand(2, 3, 3)
     prediction = trained.predict(Views(torch.rand(2, 3, 64, 64), K, ("a", "b")))
     assert torch.isfinite(prediction.dictionary).all() and prediction.dictionary.shape[1] == 512
+
+
+@pytest.fixture
+def scenes(tmp_path) -> dict[str, Path]:
+    """ScanNet in LSM's layout and labelled chunks of RealEstate10K, two scenes each."""
+    wall = layouts_made.wall(tmp_path / "wall", 5)
+    layouts_made.scannet_table(tmp_path / "scannet")
+    for name in ("scene0000_00", "scene0001_00"):
+        layouts_made.lsm_scene(wall, tmp_path / "scannet" / name)
+    layouts_made.re10k_split(wall, tmp_path / "re10k")
+    layouts_made.collect(wall, tmp_path / "re10k" / "test" / "000000.torch", keys=("aaaa", "bbbb"))
+    return {"scannet": tmp_path / "scannet", "re10k": tmp_path / "re10k" / "test"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["scannet", "re10k"])
+def test_the_papers_recipe_runs_on_published_layouts_with_sam(name, imported, scenes, tmp_path, monkeypatch):
+    monkeypatch.setitem(PRESETS, "full", replace(TINY, native_area=64 * 64))
+    save_file(published.draw_mobile_sam(), tmp_path / "sam.safetensors")
+    text = re.sub(r"batches = \d+", "batches = 2", re.sub(r"iterations = \d+", "iterations = 3", PAPER))
+    (tmp_path / "long.toml").write_text(text, encoding="utf-8")
+    kept, run = tmp_path / "kept", tmp_path / "run"
+    kept.mkdir()
+
+    def go() -> None:
+        recipe = read_recipe(str(tmp_path / "long.toml"), MACHINE)
+        sam = tmp_path / "sam.safetensors"
+        source = source_at(scenes[name])
+        run_recipe(recipe, kept, run, None, _encode, scenes=source, sam=sam, sam_side=64)
+
+    go()
+    rows = [json.loads(line) for line in (run / "grouping.jsonl").read_text().splitlines()]
+    told = [row for row in rows if row["kind"] == "train"]
+    assert len(told) == 3 and all(row["teacher"] > 0 for row in told)
+    state = torch.load(run / "aggregation.pt", weights_only=True)
+    assert state["step"] == 3 and all(torch.isfinite(value).all() for value in state["ema"].values())
+    files = {path: path.stat().st_mtime_ns for path in kept.rglob("*.safetensors")}
+    assert len(files) > 4
+    shutil.rmtree(run)
+    go()  # from the start, on what is kept: the same curve, and nothing is computed again
+    again = [json.loads(line) for line in (run / "grouping.jsonl").read_text().splitlines()]
+    assert [row["loss"] for row in again if row["kind"] == "train"] == [row["loss"] for row in told]
+    assert {path: path.stat().st_mtime_ns for path in kept.rglob("*.safetensors")} == files
+
+
+def test_a_stage_with_a_teacher_needs_its_weights(imported, tmp_path):
+    with pytest.raises(InputError, match="name weights of MobileSAM with --sam-teacher"):
+        run_recipe(read_recipe("paper", MACHINE), imported, tmp_path / "run", None, _encode)
 
 
 def test_the_papers_recipe_needs_a_geometry(imported, short, tmp_path):

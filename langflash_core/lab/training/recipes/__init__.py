@@ -19,7 +19,6 @@ from langflash_core.lab.training.stages import (
     POINT_STAGES,
     STAGES,
     Stage,
-    StageLoss,
     aggregation_stage,
     grouping_stage,
 )
@@ -61,9 +60,17 @@ def stages_of(preset: str) -> dict[str, Stage]:
 
 
 def named_recipe(
-    stages: Sequence[str], minutes: Sequence[float], preset: str, options: LoopOptions
+    stages: Sequence[str],
+    minutes: Sequence[float],
+    preset: str,
+    options: LoopOptions,
+    *,
+    sam_teacher: bool = False,
 ) -> Recipe:
     """Stages as they are, each for its minutes.
+
+    Args:
+        sam_teacher: the grouping also regresses SAM's dense embedding.
 
     Raises:
         InputError: an unknown stage, or not as many minutes as stages.
@@ -73,6 +80,8 @@ def named_recipe(
             f"{len(stages)} stages need as many minutes, received {len(minutes)}; give one number per stage"
         )
     known = stages_of(preset)
+    if sam_teacher:
+        known["grouping"] = weighted(known["grouping"], GroupingWeights(teacher=1.0))
     for name in stages:
         if name not in known:
             raise InputError(f"there is no stage '{name}'; choose among {', '.join(known)}")
@@ -133,7 +142,7 @@ def _plan(entry: Any, preset: str, common: LoopOptions, path: Path) -> StagePlan
     stage = known[entry["name"]]
     if weights is not None:
         _check(entry["weights"], {field.name: float for field in fields(weights)}, f"{where}, weights")
-        stage = replace(stage, loss=_weighted(weights(**entry["weights"])))
+        stage = weighted(stage, weights(**entry["weights"]))
     stage = replace(
         stage, views=views, learning_rate=float(entry["learning_rate"]), photos=float(entry["photos"])
     )
@@ -142,10 +151,11 @@ def _plan(entry: Any, preset: str, common: LoopOptions, path: Path) -> StagePlan
     return StagePlan(stage, own)
 
 
-def _weighted(weights: GroupingWeights | AggregationWeights) -> StageLoss:
+def weighted(stage: Stage, weights: GroupingWeights | AggregationWeights) -> Stage:
+    """A stage whose loss has these weights."""
     if isinstance(weights, GroupingWeights):
-        return partial(grouping_stage, weights=weights)
-    return partial(aggregation_stage, weights=weights)
+        return replace(stage, loss=partial(grouping_stage, weights=weights), dense=weights.teacher > 0)
+    return replace(stage, loss=partial(aggregation_stage, weights=weights))
 
 
 def _optimising(table: dict[str, Any], path: Path) -> Optimising:

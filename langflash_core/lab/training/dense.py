@@ -1,0 +1,60 @@
+"""SAM's dense embedding, which the map that masks are read from regresses (L_SG), kept on disk.
+
+The teacher is frozen and sees each view alone, so what it says of a picture is computed once and kept on disk
+by the picture's pixels, 8 bits a number with a scale a cell: a relative error of about 0.7 %, and 1 MB a view
+where the longer side is brought to 1024 pixels.
+
+Sizes: B scenes, V views, h w the teacher's grid.
+"""
+
+import hashlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors.torch import load_file, save
+from torch import Tensor
+
+from langflash_core.files import make_folder, write_atomically
+from langflash_core.lab.training.batches import SceneBatch
+from langflash_core.lab.training.mixing import Mixed, each_of
+from langflash_core.lab.training.shards import dequantise_tokens, quantise_tokens
+from langflash_core.network.encoders.mobile_sam import MobileSamEncoder
+
+
+@dataclass(frozen=True)
+class DenseSet:
+    """A set whose batches bring SAM's embedding of their views. folder: where it is kept."""
+
+    inner: Any
+    teacher: MobileSamEncoder
+    folder: Path
+
+    def part(self, number: int, count: int) -> "DenseSet":
+        """That of one of so many batches of a step."""
+        return replace(self, inner=self.inner.part(number, count))
+
+    def draw(self, count: int, views: int, generator: torch.Generator) -> SceneBatch | Mixed:
+        """As the set draws, with `dense`.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        return each_of(self.inner.draw(count, views, generator), self._told)
+
+    def _told(self, batch: SceneBatch) -> SceneBatch:
+        dense = [self._of(image) for image in batch.images.flatten(0, 1)]
+        return replace(batch, dense=torch.stack(dense).unflatten(0, batch.images.shape[:2]))
+
+    def _of(self, image: Tensor) -> Tensor:
+        """(256, h, w) of a picture (3, H, W) in [0, 1]."""
+        key = hashlib.blake2b(image.contiguous().numpy().data, digest_size=16).hexdigest()
+        path = self.folder / str(self.teacher.side) / key[:2] / f"{key}.safetensors"
+        if not path.is_file():
+            said = self.teacher.dense(image[None].to(self.teacher.device))[0].cpu()
+            steps, scales = quantise_tokens(said.movedim(0, -1))
+            make_folder(path.parent)
+            write_atomically(path, save({"dense": steps.contiguous(), "scales": scales.contiguous()}))
+        kept = load_file(path)
+        return dequantise_tokens(kept["dense"], kept["scales"]).movedim(-1, 0)
