@@ -165,9 +165,9 @@ def test_mutual_pairs_are_first_in_their_row_and_in_their_column():
 
 def test_views_chain_through_the_best_connected_tree():
     """Poses 0-2 and 2-1 exist, 0-1 is weak and wrong: the tree goes round it; scales multiply."""
-    step = RelativePose(np.eye(3), np.array([0.0, 0, 1]), np.log(2.0), _agree(100), 0)
-    back = RelativePose(np.eye(3), np.array([1.0, 0, 0]), np.log(0.5), _agree(80), 0)  # i = 1, j = 2
-    wrong = RelativePose(np.eye(3), np.array([9.0, 9, 9]), 0.0, _agree(20), 0)
+    step = RelativePose(np.eye(3), np.array([0.0, 0, 1]), np.log(2.0), _agree(100), 0, np.eye(7))
+    back = RelativePose(np.eye(3), np.array([1.0, 0, 0]), np.log(0.5), _agree(80), 0, np.eye(7))  # i = 1, j = 2
+    wrong = RelativePose(np.eye(3), np.array([9.0, 9, 9]), 0.0, _agree(20), 0, np.eye(7))
     viewmats, scales, guessed = _chain(4, {(0, 2): step, (1, 2): back, (0, 1): wrong})
     assert scales == pytest.approx([1, 4, 2, 1])
     assert viewmats[2, :3, 3] == pytest.approx([0, 0, 1])
