@@ -41,9 +41,7 @@ class Carried:
     inside: Tensor
 
 
-def agreed(
-    maps: DepthMaps, viewmats: Tensor, Ks: Tensor, neighbours: Neighbours | None = None
-) -> DepthMaps:
+def agreed(maps: DepthMaps, viewmats: Tensor, Ks: Tensor, neighbours: Neighbours | None = None) -> DepthMaps:
     """Maps (V, H, W) that agree where they show one surface; the expected errors stay.
 
     One view, or views that share nothing, come back as they are.

@@ -57,14 +57,14 @@ def closest(
     """Of each view so many others that share most with it, the first of equal ones first."""
     found = []
     for view in range(num_views):
-        shared = sorted((-count, sum(edge) - view) for edge, count in counts.items() if view in edge and count)
+        shared = sorted(
+            (-count, sum(edge) - view) for edge, count in counts.items() if view in edge and count
+        )
         found.append(tuple(other for _, other in shared[:partners]))
     return tuple(found)
 
 
-def unconnected(
-    num_views: int, pairs: Pairs, counts: Mapping[tuple[int, int], int]
-) -> list[tuple[int, int]]:
+def unconnected(num_views: int, pairs: Pairs, counts: Mapping[tuple[int, int], int]) -> list[tuple[int, int]]:
     """Edges without a pose that could connect what `pairs` leave apart: a tree of those that share most."""
     most = 1 + max(counts.values(), default=0)
     whole = _tree(num_views, {edge: count + most * (edge in pairs) for edge, count in counts.items()})
