@@ -16,7 +16,8 @@ _MIN_SHARE = 0.25  # of the matches must agree with a pose
 _MAX_DEPTH_SIGMA = 0.2  # log-depth error beyond which a triangulated match says too little
 _MIN_POINTS = 10  # matches needed to correct a map
 _FEW = 40  # inliers among key points, below which dense matches are asked as well
-_FEW_DENSE = 800  # inliers among dense matches, below which they say nothing
+_DENSE_COST = 2.75
+"""Cost from which dense matches are not believed: on validation rooms the wrong ones began at 2.8."""
 _DENSE_SIGMA = 3.0  # pixels at the working size: a third of a cell
 
 
@@ -105,7 +106,7 @@ def _pair_poses(
         check()
         more = _joined(edges[i, j], _dense_matches(views[i], views[j]))
         better = _pair_pose(views[i], views[j], more)
-        if better is not None and better.num_inliers >= _FEW_DENSE:
+        if better is not None and better.cost < _DENSE_COST:
             pairs[i, j], agreed[i, j] = better, more.subset(better.inliers)
         elif (i, j) in weak:
             pairs[i, j] = weak[i, j]
