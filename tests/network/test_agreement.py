@@ -116,6 +116,17 @@ def test_the_least_squares_step_is_that_of_scipy():
     assert solved == pytest.approx(best, abs=1e-5)  # BFGS with differences for a gradient
 
 
+def test_maps_without_a_common_neighbour_stay_apart():
+    logs, viewmats = _wall()
+    three, places = logs[[0, 1, 1]] + 0.03 * torch.arange(3)[:, None, None], viewmats[[0, 1, 1]]
+    errors, Ks = torch.full_like(three, -3.0), K.expand(3, 3, 3)
+    kept = agreed(DepthMaps(three, errors), places, Ks, [[1], [0], []]).log_depths
+    torch.testing.assert_close(kept[2], three[2])
+    pair = agreed(DepthMaps(three[:2], errors[:2]), places[:2], Ks[:2]).log_depths
+    # As many pixels are compared, but they count as 200 a view of three instead of two.
+    assert (kept[:2] - pair).abs().max() < 2e-3
+
+
 def test_hard_cases_stay_finite():
     """One photo, the same photo twice, nothing in common, sky, NaN-free everywhere."""
     logs, viewmats = _wall(torch.float32)
