@@ -166,7 +166,10 @@ class GuidedDepthNet(LangFlashNet):
             return maps
         chosen = tokens.views(keep)
         part = DepthMaps(scaled.log_depths[:, keep], scaled.log_errors[:, keep])
-        refined = self.refiner(images[:, keep], chosen, local[keep], part, viewmats[:, keep], Ks[:, keep])[-1]
+        near = _neighbours(poses, keep)
+        refined = self.refiner(
+            images[:, keep], chosen, local[keep], part, viewmats[:, keep], Ks[:, keep], near
+        )[-1]
         log_depths, log_errors = maps.log_depths.clone(), maps.log_errors.clone()
         log_depths[keep], log_errors[keep] = refined.log_depths[0], refined.log_errors[0]
         return DepthMaps(log_depths, log_errors)
@@ -189,8 +192,13 @@ def _agreed(maps: DepthMaps, poses: Poses, viewmats: Tensor, Ks: Tensor) -> Dept
     placed = [v for v in range(len(viewmats)) if v not in poses.guessed]
     part = DepthMaps(maps.log_depths[placed], maps.log_errors[placed])
     log_depths = maps.log_depths.clone()
-    log_depths[placed] = agreed(part, viewmats[placed], Ks[placed]).log_depths
+    log_depths[placed] = agreed(part, viewmats[placed], Ks[placed], _neighbours(poses, placed)).log_depths
     return replace(maps, log_depths=log_depths)
+
+
+def _neighbours(poses: Poses, kept: list[int]) -> list[list[int]]:
+    """Of each kept view its neighbours, counted among those that are kept."""
+    return [[kept.index(other) for other in poses.neighbours[view] if other in kept] for view in kept]
 
 
 def _known(views: Views) -> np.ndarray | None:

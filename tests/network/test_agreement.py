@@ -9,6 +9,7 @@ from langflash_core.geometry.cameras import rays, unproject
 from langflash_core.network.stereo import agreement
 from langflash_core.network.stereo.agreement import agreed, blended, carried, knot_weights, straightened
 from langflash_core.network.stereo.prior import DepthMaps
+from langflash_core.network.stereo.sweep import everyone
 
 HEIGHT, WIDTH = 48, 64
 K = torch.tensor([[60.0, 0, 32], [0, 60.0, 24], [0, 0, 1]], dtype=torch.float64)
@@ -46,7 +47,7 @@ def test_a_slow_difference_goes():
     x = torch.linspace(-1, 1, WIDTH, dtype=torch.float64)
     bent = torch.stack((logs[0] + 0.02 * x, logs[1] - 0.02 - 0.015 * x))
     before = _gap(bent, viewmats).abs().median()
-    straight = straightened(bent, viewmats, KS)
+    straight = straightened(bent, viewmats, KS, everyone(2))
     assert _gap(straight, viewmats).abs().median() < 0.35 * before
     both = agreed(DepthMaps(bent, torch.full_like(logs, -3.0)), viewmats, KS)
     assert _gap(both.log_depths, viewmats).abs().median() < 0.05 * before
@@ -56,7 +57,7 @@ def test_the_surer_photo_counts_more():
     logs, viewmats = _wall()
     moved = torch.stack((logs[0], logs[1] + 0.03))
     errors = torch.stack((torch.full_like(logs[0], -4.0), torch.full_like(logs[1], -2.0)))
-    mean = blended(moved, errors, viewmats, KS)
+    mean = blended(moved, errors, viewmats, KS, everyone(2))
     inside = (slice(8, -8), slice(24, -8))
     assert (mean[0] - logs[0])[inside].abs().max() < 0.002  # 1 / (1 + e^4) of .03
     assert (mean[1] - logs[1])[8:-8, 8:-24].abs().max() < 0.002
@@ -91,7 +92,7 @@ def test_the_least_squares_step_is_that_of_scipy():
     grid = torch.stack(torch.meshgrid(torch.arange(WIDTH), torch.arange(HEIGHT), indexing="xy"), -1) + 0.5
     places = (grid.double() / torch.tensor([WIDTH, HEIGHT]) * 2 - 1)[sparse].flatten(0, 1)
     own_hats = knot_weights(places)
-    normal, right = agreement._comparisons(bent, points, own_hats, viewmats, KS)
+    normal, right = agreement._comparisons(bent, points, own_hats, viewmats, KS, everyone(2))
     prior = agreement._expectation(bent.device)
     solved = torch.linalg.solve(normal + torch.block_diag(prior, prior), right).numpy()
 
@@ -113,6 +114,17 @@ def test_the_least_squares_step_is_that_of_scipy():
 
     best = minimize(cost, np.zeros(50), method="BFGS", options={"gtol": 1e-9}).x
     assert solved == pytest.approx(best, abs=1e-5)  # BFGS with differences for a gradient
+
+
+def test_maps_without_a_common_neighbour_stay_apart():
+    logs, viewmats = _wall()
+    three, places = logs[[0, 1, 1]] + 0.03 * torch.arange(3)[:, None, None], viewmats[[0, 1, 1]]
+    errors, Ks = torch.full_like(three, -3.0), K.expand(3, 3, 3)
+    kept = agreed(DepthMaps(three, errors), places, Ks, [[1], [0], []]).log_depths
+    torch.testing.assert_close(kept[2], three[2])
+    pair = agreed(DepthMaps(three[:2], errors[:2]), places[:2], Ks[:2]).log_depths
+    # As many pixels are compared, but they count as 200 a view of three instead of two.
+    assert (kept[:2] - pair).abs().max() < 2e-3
 
 
 def test_hard_cases_stay_finite():

@@ -69,6 +69,30 @@ def test_sweep_peaks_at_the_true_depth():
     assert (best - 0.2).abs().max() < 1e-9
 
 
+def test_a_view_is_compared_with_its_neighbours_alone():
+    torch.manual_seed(0)
+    features = F.normalize(torch.randn(3, 6, 12, 16, dtype=torch.float64), dim=1)
+    log_depths = torch.rand(3, 12, 16, dtype=torch.float64) * 0.5 + 0.5
+    offsets = torch.linspace(-0.4, 0.4, 5, dtype=torch.float64)
+    viewmats = torch.eye(4, dtype=torch.float64).repeat(3, 1, 1)
+    viewmats[1, 0, 3], viewmats[2, 1, 3] = -0.3, 0.2
+    Ks = K.expand(3, 3, 3)
+
+    def swept(keep: list[int], neighbours):
+        compared = [Compared.of(features[keep], (12, 16))]
+        (volume,), seen = sweep_correlation(
+            compared, log_depths[keep], offsets, viewmats[keep], Ks[keep], neighbours
+        )
+        return volume, seen
+
+    near = swept([0, 1, 2], [[1], [0], [0, 1]])
+    pair, everyone = swept([0, 1], None), swept([0, 1, 2], None)
+    for found, two, three in zip(near, pair, everyone, strict=True):
+        torch.testing.assert_close(found[:2], two)
+        torch.testing.assert_close(found[2], three[2])
+        assert not torch.equal(found[0], three[0])
+
+
 def test_sweep_of_a_lonely_or_blind_view_is_zero():
     features = F.normalize(torch.randn(2, 4, 6, 8), dim=1)
     behind = torch.eye(4).repeat(2, 1, 1)

@@ -14,7 +14,6 @@ from langflash_core.network.stereo.matching import (
     refine_pose,
     relative_pose,
 )
-from langflash_core.network.stereo.poses import _chain
 
 SIGMA = 1 / 600  # one pixel at a focal length of 600
 
@@ -146,10 +145,6 @@ def test_descriptors_match_mutually_and_uniquely():
     assert len(match_descriptors(left, np.repeat(left, 2, 0))) == 0  # repeated texture is ambiguous
 
 
-def _agree(count: int) -> np.ndarray:
-    return np.ones(count, bool)
-
-
 def test_mutual_pairs_are_first_in_their_row_and_in_their_column():
     rng = np.random.default_rng(0)
     similarity = rng.normal(size=(60, 80)).round(1)  # many ties
@@ -161,15 +156,3 @@ def test_mutual_pairs_are_first_in_their_row_and_in_their_column():
             expected.setdefault(int(best[row]), row)
     assert dict(zip(columns.tolist(), rows.tolist(), strict=True)) == expected
     assert len(rows) > 10 and np.all(np.diff(rows) > 0)
-
-
-def test_views_chain_through_the_best_connected_tree():
-    """Poses 0-2 and 2-1 exist, 0-1 is weak and wrong: the tree goes round it; scales multiply."""
-    step = RelativePose(np.eye(3), np.array([0.0, 0, 1]), np.log(2.0), _agree(100), 0)
-    back = RelativePose(np.eye(3), np.array([1.0, 0, 0]), np.log(0.5), _agree(80), 0)  # i = 1, j = 2
-    wrong = RelativePose(np.eye(3), np.array([9.0, 9, 9]), 0.0, _agree(20), 0)
-    viewmats, scales, guessed = _chain(4, {(0, 2): step, (1, 2): back, (0, 1): wrong})
-    assert scales == pytest.approx([1, 4, 2, 1])
-    assert viewmats[2, :3, 3] == pytest.approx([0, 0, 1])
-    assert viewmats[1, :3, 3] == pytest.approx([-4, 0, 1])  # -1 in view 1's unit, which is 4
-    assert guessed == (3,)

@@ -11,7 +11,7 @@ from langflash_core.errors import ImageError, InputError, WeightsError
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.evaluation.rooms.run import run_eval
 from langflash_core.lab.evaluation.tables import markdown
-from langflash_core.lab.photos import chosen_ids
+from langflash_core.lab.photos import PhotoFolder, chosen_ids
 from langflash_core.network import load_network
 
 from ..files import check_output_file, readable_file
@@ -90,6 +90,9 @@ def _posed(args: Namespace, out: TextIO) -> None:
         raise InputError(
             f"{args.folder} has no poses.txt; add it, or judge single photos with photos-labelled"
         )
+    if args.photos:
+        _stretches(args, folder, out)
+        return
     from langflash_core.lab.evaluation.photo_tables import posed_markdown
     from langflash_core.lab.evaluation.posed import APART, PAIRS, chosen_triples, run_posed
 
@@ -108,6 +111,18 @@ def _posed(args: Namespace, out: TextIO) -> None:
             progress=progress,
         )
     write_tables(args, result, posed_markdown(result), out)
+
+
+def _stretches(args: Namespace, folder: PhotoFolder, out: TextIO) -> None:
+    from langflash_core.lab.evaluation.photo_tables import stretches_markdown
+    from langflash_core.lab.evaluation.stretches import STRETCHES, chosen_stretches, run_stretches
+
+    stretches = chosen_stretches(folder, args.photos, args.limit or STRETCHES)
+    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+        result = run_stretches(
+            folder, stretches, renderer, args.weights, preset=args.preset, size=args.size, progress=progress
+        )
+    write_tables(args, result, stretches_markdown(result), out)
 
 
 def _calibrate(args: Namespace, out: TextIO) -> None:

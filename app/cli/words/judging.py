@@ -134,7 +134,16 @@ def _add_posed(actions) -> None:
     command.add_argument(
         "--apart", type=whole_count, nargs="+", metavar="N", help="numbers between two (default: 6 12 18 24)"
     )
-    command.add_argument("--limit", type=whole_count, metavar="N", help="so many pairs (default: 40)")
+    command.add_argument(
+        "--photos",
+        type=whole_count,
+        nargs="+",
+        metavar="N",
+        help="instead of pairs, scenes of 2 4 8 ... photos of the same place",
+    )
+    command.add_argument(
+        "--limit", type=whole_count, metavar="N", help="so many pairs (default: 40), or stretches (6)"
+    )
     _add_fitting(command)
     _add_judging(command)
 

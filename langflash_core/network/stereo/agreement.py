@@ -1,7 +1,7 @@
 """One surface where several photos see one: depth maps are bent and blended until they agree.
 
 What a sweep leaves is a slow difference between the maps of two photos, some percent of depth: two
-sheets, a halftone where their Gaussians interleave. Every map is carried into every other one. A
+sheets, a halftone where their Gaussians interleave. Every map is carried into those of its neighbours. A
 smooth correction of log depth for each, bilinear between a few knots, takes out what differs slowly
 (one robust least squares over all maps at once), and where they then agree to within `_SAME`
 both take the mean, weighted by what each expects of its errors.
@@ -17,6 +17,7 @@ from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import invert_rigid, pixel_grid, project, transform, unproject
 from langflash_core.network.stereo.prior import DepthMaps
+from langflash_core.network.stereo.sweep import Neighbours, everyone
 
 _KNOTS = 5  # a side
 _STEP = 4  # every fourth pixel of a row and of a column is compared for the correction
@@ -40,20 +41,22 @@ class Carried:
     inside: Tensor
 
 
-def agreed(maps: DepthMaps, viewmats: Tensor, Ks: Tensor) -> DepthMaps:
+def agreed(maps: DepthMaps, viewmats: Tensor, Ks: Tensor, neighbours: Neighbours | None = None) -> DepthMaps:
     """Maps (V, H, W) that agree where they show one surface; the expected errors stay.
 
     One view, or views that share nothing, come back as they are.
 
     Args:
         viewmats: (V, 4, 4) of the maps' unit. Ks: (V, 3, 3), pixels of the maps.
+        neighbours: of each view those that it is compared with; None: all others.
 
     Source: own derivation; the blend is that of depth-map fusion (Merrell et al. 2007).
     """
     logs = maps.log_depths
     if len(logs) < 2:
         return maps
-    logs = blended(straightened(logs, viewmats, Ks), maps.log_errors, viewmats, Ks)
+    near = neighbours or everyone(len(logs))
+    logs = blended(straightened(logs, viewmats, Ks, near), maps.log_errors, viewmats, Ks, near)
     return DepthMaps(logs, maps.log_errors)
 
 
@@ -75,7 +78,7 @@ def sampled(maps: Tensor, places: Tensor) -> Tensor:
     ]
 
 
-def straightened(log_depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
+def straightened(log_depths: Tensor, viewmats: Tensor, Ks: Tensor, neighbours: Neighbours) -> Tensor:
     """Log depths (V, H, W) plus the smooth corrections under which they differ least.
 
     With r the log depth that the other map has less the one that is carried there, and hat functions
@@ -94,23 +97,26 @@ def straightened(log_depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
         points = [unproject(own.exp(), K)[sparse].flatten(0, 1) for own, K in zip(logs, Ks, strict=True)]
         normal = torch.block_diag(*[prior] * num_views)
         right = -(knots @ prior).flatten()
-        sums = _comparisons(logs, points, own_hats, viewmats, Ks)
+        sums = _comparisons(logs, points, own_hats, viewmats, Ks, neighbours)
         knots = knots + torch.linalg.solve(normal + sums[0], right + sums[1]).view_as(knots)
         logs = log_depths + (knots.to(hats) @ hats.T).view_as(log_depths)
     return logs
 
 
 def _comparisons(
-    logs: Tensor, points: list[Tensor], own_hats: Tensor, viewmats: Tensor, Ks: Tensor
+    logs: Tensor,
+    points: list[Tensor],
+    own_hats: Tensor,
+    viewmats: Tensor,
+    Ks: Tensor,
+    neighbours: Neighbours,
 ) -> tuple[Tensor, Tensor]:
-    """Normal matrix (V S^2, V S^2) and right side (V S^2,) of all pairs of maps, float64."""
+    """Normal matrix (V S^2, V S^2) and right side (V S^2,) of all maps and their neighbours', float64."""
     num_views, size, width = len(logs), (logs.shape[1], logs.shape[2]), _KNOTS**2
     normal = own_hats.new_zeros(num_views, width, num_views, width)
     right, count = own_hats.new_zeros(num_views, width), 0
-    for a in range(num_views):
-        for b in range(num_views):
-            if a == b:
-                continue
+    for a, others in enumerate(neighbours):
+        for b in others:
             there = carried(points[a], viewmats, Ks, a, b, size)
             left = own_hats[there.inside]
             other = knot_weights(there.places[there.inside]).double()
@@ -143,18 +149,18 @@ def _expectation(device: torch.device) -> Tensor:
     return torch.eye(_KNOTS**2, dtype=torch.float64, device=device) / _EXPECTED**2 + rough / _BEND**2
 
 
-def blended(log_depths: Tensor, log_errors: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
+def blended(
+    log_depths: Tensor, log_errors: Tensor, viewmats: Tensor, Ks: Tensor, neighbours: Neighbours
+) -> Tensor:
     """Log depths (V, H, W): where others show the same surface, the mean of all, weighted by 1 / b^2."""
-    num_views, height, width = log_depths.shape
+    height, width = log_depths.shape[1:]
     blended_logs = []
-    for a in range(num_views):
+    for a, others in enumerate(neighbours):
         points = unproject(log_depths[a].exp(), Ks[a]).flatten(0, 1)
         own = log_depths[a].flatten()
         total = (-2 * log_errors[a]).exp().flatten()
         change = torch.zeros_like(own)
-        for b in range(num_views):
-            if a == b:
-                continue
+        for b in others:
             there = carried(points, viewmats, Ks, a, b, (height, width))
             gap = sampled(log_depths[b], there.places) - there.log_depths
             same = there.inside & (gap.abs() < _SAME)

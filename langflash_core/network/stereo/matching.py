@@ -6,12 +6,10 @@ maps, which fix the scale and decide where parallax alone cannot (pure rotation,
 identical photos).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-
-from langflash_core.network.stereo.alignment import INDEPENDENT
 
 _MAX_FEATURES = 4000
 _CONTRAST = 0.01  # walls have little: the default of 0.04 finds nothing on them
@@ -19,6 +17,11 @@ _RATIO = 0.8  # Lowe's test
 _MIN_INLIERS = 15
 _DEPTH_SIGMA = 0.25  # log-depth error expected of a monocular map
 _SCALE_SIGMA = 0.3  # log ratio expected between the scales of two monocular maps
+_INDEPENDENT = 20
+"""Errors of one map go together: at all matches of a pair they count as this many. On 48 validation rooms
+the mean errors were .53 and 2.4 degrees with 50, .48 and 2.1 with 20, .57 and 2.0 with 10; without the
+rounds below .63 and 3.0 with 50. On 32 held-out rooms the medians went from .68 and 2.2 to .31 and 1.7."""
+_ROUNDS = 2  # times that the matches which agree are chosen anew and the pose is refined on them
 _INLIER = 3.0  # sigmas of reprojection
 _CAUCHY = 2.0  # residuals beyond this many sigma lose weight
 _ITERATIONS = 40
@@ -48,6 +51,7 @@ class RelativePose:
 
     log_scale: view j's depths must be multiplied by exp(log_scale) to be in that unit.
     inliers: (n,) bool, matches that agree to 3 sigma. cost: mean robust cost, for choosing.
+    information: (7, 7) inverse covariance of a turn before R (radians), of t and of log_scale.
     """
 
     rotation: np.ndarray
@@ -55,6 +59,7 @@ class RelativePose:
     log_scale: float
     inliers: np.ndarray
     cost: float
+    information: np.ndarray
 
     @property
     def num_inliers(self) -> int:
@@ -126,7 +131,17 @@ def relative_pose(matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray) ->
         pose = _score(matches, depth_i, depth_j, pose)
         if best is None or pose.cost < best.cost:
             best = pose
+    for _ in range(_ROUNDS):
+        if best is None or best.num_inliers < _MIN_INLIERS:
+            return None
+        best = _score(matches, depth_i, depth_j, _refined(matches, depth_i, depth_j, best))
     return best if best is not None and best.num_inliers >= _MIN_INLIERS else None
+
+
+def _refined(matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray, pose: RelativePose) -> RelativePose:
+    """The pose that all matches which agree with it say, not only those it was found with."""
+    keep = pose.inliers
+    return refine_pose(matches.subset(keep), depth_i[keep], depth_j[keep], pose.rotation, pose.translation)
 
 
 def _five_point(matches: Matches, depth_i: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
@@ -189,7 +204,7 @@ class DepthPriors:
     @staticmethod
     def of(depth_i: np.ndarray, depth_j: np.ndarray) -> "DepthPriors":
         """From depths (n,) > 0."""
-        return DepthPriors(np.log(depth_i), np.log(depth_j), min(1.0, INDEPENDENT / len(depth_i)))
+        return DepthPriors(np.log(depth_i), np.log(depth_j), min(1.0, _INDEPENDENT / len(depth_i)))
 
     def weigh(self, terms: np.ndarray) -> np.ndarray:
         """Terms (n, 4) of the residuals, those of depth times `share`."""
@@ -222,8 +237,11 @@ def refine_pose(
             damping *= 8
         if np.abs(step[0]).max() < 1e-8 or damping > 1e8 or 0 < gain < _CONVERGED * cost:
             break
-    agrees = np.linalg.norm(_residuals(state, matches, priors)[:, :2], axis=1) < _INLIER
-    return RelativePose(state.rotation, state.translation, state.log_scale, agrees, cost)
+    residuals, jac_pose, jac_depth = _linearise(state, matches, priors)
+    agrees = np.linalg.norm(residuals[:, :2], axis=1) < _INLIER
+    weights = priors.weigh(1 / (1 + (residuals / _CAUCHY) ** 2))
+    information, _, _ = _reduced(weights, jac_pose, jac_depth, 0.0)
+    return RelativePose(state.rotation, state.translation, state.log_scale, agrees, cost, information)
 
 
 def _score(matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray, pose: RelativePose) -> RelativePose:
@@ -239,7 +257,7 @@ def _score(matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray, pose: Rel
     residuals = _residuals(state, matches, priors)
     agrees = (np.linalg.norm(residuals[:, :2], axis=1) < _INLIER) & (np.abs(residuals[:, 2:]) < 4).all(1)
     costs = np.minimum(np.log1p((residuals / _CAUCHY) ** 2).sum(1), 6.0)
-    return RelativePose(pose.rotation, pose.translation, pose.log_scale, agrees, float(costs.mean()))
+    return replace(pose, inliers=agrees, cost=float(costs.mean()))
 
 
 @dataclass(frozen=True)
@@ -292,18 +310,23 @@ def _linearise(
 
 def _solve(residuals, weights, jac_pose, jac_depth, log_scale, damping) -> tuple[np.ndarray, np.ndarray]:
     """One damped Gauss-Newton step: pose and scale (7,), depths (n,)."""
+    reduced, cross, own = _reduced(weights, jac_pose, jac_depth, damping)
+    gradient = residuals.ravel() @ (jac_pose * weights[..., None]).reshape(-1, 7)
+    own_gradient = (weights * jac_depth * residuals).sum(1)
+    gradient[6] += log_scale / _SCALE_SIGMA**2
+    pose_step = -np.linalg.solve(reduced, gradient - cross.T @ (own_gradient / own))
+    return pose_step, -(own_gradient + cross @ pose_step) / own
+
+
+def _reduced(weights, jac_pose, jac_depth, damping: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Hessian (7, 7) of pose and scale without the depths; of both together (n, 7), and of depths (n,)."""
     weighted = jac_pose * weights[..., None]
     hessian = weighted.reshape(-1, 7).T @ jac_pose.reshape(-1, 7)
     cross = (weighted * jac_depth[..., None]).sum(1)
     own = (weights * jac_depth**2).sum(1) * (1 + damping)
-    gradient = residuals.ravel() @ weighted.reshape(-1, 7)
-    own_gradient = (weights * jac_depth * residuals).sum(1)
     hessian[6, 6] += 1 / _SCALE_SIGMA**2
-    gradient[6] += log_scale / _SCALE_SIGMA**2
     hessian[np.diag_indices(7)] += damping * np.diag(hessian) + 1e-9
-    reduced = hessian - (cross / own[:, None]).T @ cross
-    pose_step = -np.linalg.solve(reduced, gradient - cross.T @ (own_gradient / own))
-    return pose_step, -(own_gradient + cross @ pose_step) / own
+    return hessian - (cross / own[:, None]).T @ cross, cross, own
 
 
 def _robust_cost(residuals: np.ndarray, priors: DepthPriors) -> float:

@@ -1,4 +1,4 @@
-"""Poses of V views: pairwise relative poses, chained along the best-connected tree from view 0."""
+"""Poses of V views: relative poses of the pairs that share most, brought together in one adjustment."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ import numpy as np
 
 from langflash_core.network.stereo.alignment import NO_CORRECTION, Correction, fit_correction
 from langflash_core.network.stereo.dense import match_cells
+from langflash_core.network.stereo.graph import chosen_pairs, closest, placed, unconnected
 from langflash_core.network.stereo.keypoints import WORKING_SIDE, KeyPoints
 from langflash_core.network.stereo.known import agreeing, depth_scales, log_scales
 from langflash_core.network.stereo.matching import Matches, RelativePose, relative_pose, triangulate
@@ -15,6 +16,8 @@ _MIN_SHARE = 0.25  # of the matches must agree with a pose
 _MAX_DEPTH_SIGMA = 0.2  # log-depth error beyond which a triangulated match says too little
 _MIN_POINTS = 10  # matches needed to correct a map
 _FEW = 40  # inliers among key points, below which dense matches are asked as well
+_DENSE_COST = 2.75
+"""Cost from which dense matches are not believed: on validation rooms the wrong ones began at 2.8."""
 _DENSE_SIGMA = 3.0  # pixels at the working size: a third of a cell
 
 
@@ -36,12 +39,14 @@ class PoseInput:
 class Poses:
     """viewmats (V, 4, 4), world = view 0; depth_scales (V,) that bring each view's depth map to
     view 0's unit; corrections: what matches say of each map beyond its scale, on the log depths
-    before scaling; guessed: views that no match supports."""
+    before scaling; guessed: views that no match supports. neighbours: of each view those that share most
+    with it."""
 
     viewmats: np.ndarray
     depth_scales: np.ndarray
     corrections: tuple[Correction, ...]
     guessed: tuple[int, ...]
+    neighbours: tuple[tuple[int, ...], ...]
 
 
 def estimate_poses(
@@ -63,28 +68,49 @@ def estimate_poses(
         InputError: the photos do not fit the poses that are given.
     """
     num_views = len(views)
-    pairs: dict[tuple[int, int], RelativePose] = {}
-    agreed: dict[tuple[int, int], Matches] = {}
-    for i in range(num_views):
-        for j in range(i + 1, num_views):
-            check()
-            matches = _key_point_matches(views, points, i, j)
-            if known is not None:
-                agreed[i, j] = _agreed(views[i], views[j], matches, known[j] @ np.linalg.inv(known[i]))
-                continue
-            pose = _pair_pose(views[i], views[j], matches)
-            if pose is None or pose.num_inliers < _FEW:
-                more = _joined(matches, _dense_matches(views[i], views[j]))
-                better = _pair_pose(views[i], views[j], more)
-                pose, matches = (better, more) if better is not None else (pose, matches)
-            if pose is not None:
-                pairs[i, j], agreed[i, j] = pose, matches.subset(pose.inliers)
+    edges = {edge: _key_point_matches(views, points, *edge) for edge in chosen_pairs(num_views, points.pairs)}
     if known is None:
-        viewmats, scales, guessed = _chain(num_views, pairs)
+        pairs, agreed = _pair_poses(views, edges, check)
+        found = placed(num_views, pairs)
+        viewmats, scales, guessed = found.viewmats, found.scales, found.missing
+        agreed = {edge: agreed[edge] for edge in found.kept}
     else:
+        agreed = {}
+        for (i, j), matches in edges.items():
+            check()
+            agreed[i, j] = _agreed(views[i], views[j], matches, known[j] @ np.linalg.inv(known[i]))
         viewmats, scales, guessed = known, _known_scales(views, known, agreed), ()
     corrections = [_correction(v, views[v], viewmats, scales[v], agreed) for v in range(num_views)]
-    return Poses(viewmats, scales, tuple(corrections), guessed)
+    shared = {edge: len(matches) for edge, matches in agreed.items()}
+    return Poses(viewmats, scales, tuple(corrections), guessed, closest(num_views, shared))
+
+
+def _pair_poses(
+    views: list[PoseInput], edges: dict[tuple[int, int], Matches], check: Callable[[], None]
+) -> tuple[dict[tuple[int, int], RelativePose], dict[tuple[int, int], Matches]]:
+    """Relative poses of pairs and the matches that agree with them.
+
+    Few agreeing key points are often wrong, and dense matches as well: both are asked only for photos that
+    nothing better connects.
+    """
+    weak: dict[tuple[int, int], RelativePose] = {}
+    pairs: dict[tuple[int, int], RelativePose] = {}
+    agreed: dict[tuple[int, int], Matches] = {}
+    for (i, j), matches in edges.items():
+        check()
+        pose = _pair_pose(views[i], views[j], matches)
+        if pose is not None:
+            (pairs if pose.num_inliers >= _FEW else weak)[i, j] = pose
+            agreed[i, j] = matches.subset(pose.inliers)
+    for i, j in unconnected(len(views), pairs, {edge: len(matches) for edge, matches in edges.items()}):
+        check()
+        more = _joined(edges[i, j], _dense_matches(views[i], views[j]))
+        better = _pair_pose(views[i], views[j], more)
+        if better is not None and better.cost < _DENSE_COST:
+            pairs[i, j], agreed[i, j] = better, more.subset(better.inliers)
+        elif (i, j) in weak:
+            pairs[i, j] = weak[i, j]
+    return pairs, {edge: agreed[edge] for edge in pairs}
 
 
 def _agreed(view_i: PoseInput, view_j: PoseInput, matches: Matches, relative: np.ndarray) -> Matches:
@@ -171,32 +197,3 @@ def _correction(
         return NO_CORRECTION
     x = np.concatenate(points)
     return fit_correction(x, np.log(_depths_at(own, x)), np.concatenate(targets), np.concatenate(sigmas))
-
-
-def _chain(
-    num_views: int, pairs: dict[tuple[int, int], RelativePose]
-) -> tuple[np.ndarray, np.ndarray, tuple[int, ...]]:
-    """Prim's maximum spanning tree on inlier counts; scales and poses multiply along it."""
-    viewmats = np.repeat(np.eye(4)[None], num_views, 0)
-    scales = np.ones(num_views)
-    placed = {0}
-    while True:
-        reachable = [
-            (pose.num_inliers, -i, -j) for (i, j), pose in pairs.items() if (i in placed) != (j in placed)
-        ]
-        if not reachable:
-            break
-        _, i, j = max(reachable)
-        i, j = -i, -j
-        relative = pairs[i, j].matrix()
-        growth = np.exp(pairs[i, j].log_scale)  # view j's depths times this are in view i's unit
-        if i in placed:
-            relative[:3, 3] *= scales[i]
-            viewmats[j], scales[j] = relative @ viewmats[i], scales[i] * growth
-            placed.add(j)
-        else:
-            scales[i] = scales[j] / growth
-            relative[:3, 3] *= scales[i]
-            viewmats[i] = np.linalg.inv(relative) @ viewmats[j]
-            placed.add(i)
-    return viewmats, scales, tuple(v for v in range(num_views) if v not in placed)

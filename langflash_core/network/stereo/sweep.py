@@ -21,7 +21,14 @@ from langflash_core.network.layers.dpt import ResidualUnit
 from langflash_core.network.presets import GuidedDepth
 from langflash_core.network.stereo.prior import LOG_ERROR_RANGE, DepthMaps, resize
 
+Neighbours = Sequence[Sequence[int]]
+"""Of each view the others that it is compared with."""
 _TYPICAL_LOG_ERROR = -1.5  # centres the error channel that the network reads
+
+
+def everyone(num_views: int) -> Neighbours:
+    """All other views."""
+    return [[other for other in range(num_views) if other != view] for view in range(num_views)]
 
 
 @dataclass(frozen=True)
@@ -45,9 +52,14 @@ class Compared:
 
 
 def sweep_correlation(
-    compared: Sequence[Compared], log_depths: Tensor, offsets: Tensor, viewmats: Tensor, Ks: Tensor
+    compared: Sequence[Compared],
+    log_depths: Tensor,
+    offsets: Tensor,
+    viewmats: Tensor,
+    Ks: Tensor,
+    neighbours: Neighbours | None = None,
 ) -> tuple[list[Tensor], Tensor]:
-    """Correlation of every view with the others over depth hypotheses.
+    """Correlation of every view with its neighbours (None: all others) over depth hypotheses.
 
     Args:
         compared: vectors to correlate, one answer each.
@@ -56,8 +68,8 @@ def sweep_correlation(
             the maps of depth.
 
     Returns:
-        Of each, correlations (V, G, P, h, w), the mean over the other views that see the point,
-        their sum over G is the cosine; and which share of the other views sees it (V, P, h, w).
+        Of each, correlations (V, G, P, h, w), the mean over the neighbours that see the point,
+        their sum over G is the cosine; and which share of the neighbours sees it (V, P, h, w).
 
     Source: plane sweep (Collins 1996) around a prior, as MVSplat does with given poses; groups as
     in Guo et al. 2019 (group-wise correlation).
@@ -66,13 +78,11 @@ def sweep_correlation(
     directions = rays(Ks, width, height)  # (V, h, w, 3)
     correlations: list[list[Tensor]] = [[] for _ in compared]
     visibilities = []
-    for view in range(num_views):
+    for view, others in enumerate(neighbours or everyone(num_views)):
         depths = (log_depths[view] + offsets[:, None, None]).exp()  # (P, h, w)
         totals = [depths.new_zeros(c.groups, *depths.shape) for c in compared]
         count = torch.zeros_like(depths)
-        for other in range(num_views):
-            if other == view:
-                continue
+        for other in others:
             relative = viewmats[other] @ invert_rigid(viewmats[view])
             pos_o = directions[view] @ relative[:3, :3].T * depths[..., None] + relative[:3, 3]
             ndc, seen = _projected(pos_o, Ks[other])
@@ -83,7 +93,7 @@ def sweep_correlation(
             count = count + seen
         for found, total in zip(correlations, totals, strict=True):
             found.append(total / count.clamp_min(1))
-        visibilities.append(count / max(num_views - 1, 1))
+        visibilities.append(count / max(len(others), 1))
     return [torch.stack(found) for found in correlations], torch.stack(visibilities)
 
 
@@ -162,7 +172,14 @@ class DepthRefiner(nn.Module):
         self.sharpness = nn.Parameter(torch.tensor([10.0, 5.0]))
 
     def forward(
-        self, images: Tensor, tokens: Tokens, local: Tensor, prior: DepthMaps, viewmats: Tensor, Ks: Tensor
+        self,
+        images: Tensor,
+        tokens: Tokens,
+        local: Tensor,
+        prior: DepthMaps,
+        viewmats: Tensor,
+        Ks: Tensor,
+        neighbours: Neighbours | None = None,
     ) -> tuple[DepthMaps, ...]:
         """Refined maps of the prior's size after each pass; the last are the answer.
 
@@ -170,6 +187,7 @@ class DepthRefiner(nn.Module):
             images: (B, V, 3, H, W). local: `LocalFeatures` of them, (n, C, h', w').
             prior: (B, V, H, W), of the viewmats' length unit.
             viewmats: (B, V, 4, 4). Ks: (B, V, 3, 3), pixels of the images.
+            neighbours: as `sweep_correlation` has them, of every scene.
         """
         grid, pictures = tokens.grid, images.flatten(0, 1)
         size = (4 * grid[0], 4 * grid[1])
@@ -179,7 +197,7 @@ class DepthRefiner(nn.Module):
         read = (resize(pictures, size) - 0.5, tokens.maps(self.match_hook), tokens.maps(-1))
         passes = []
         for _ in range(self.num_passes):
-            prior = self._once(compared, read, prior, viewmats, Ks * scale[:, None])
+            prior = self._once(compared, read, prior, viewmats, Ks * scale[:, None], neighbours)
             passes.append(prior)
         return tuple(passes)
 
@@ -190,13 +208,15 @@ class DepthRefiner(nn.Module):
         prior: DepthMaps,
         viewmats: Tensor,
         Ks: Tensor,
+        neighbours: Neighbours | None,
     ) -> DepthMaps:
         """One pass; read: small pictures, shallow and deep tokens. Ks: pixels of the small pictures."""
         colours, shallow, deep = read
         shape = prior.log_depths.shape[:2]
         start = resize(torch.stack((prior.log_depths, prior.log_errors), 2).flatten(0, 1), _size(colours))
         with torch.no_grad():
-            (described, plain), seen = self._sweep(compared, start[:, 0].unflatten(0, shape), viewmats, Ks)
+            logs = start[:, 0].unflatten(0, shape)
+            (described, plain), seen = self._sweep(compared, logs, viewmats, Ks, neighbours)
         likely = self.sharpness[0] * described.sum(1) + self.sharpness[1] * plain[:, 0]
         evidence = (described.flatten(1, 2), plain[:, 0], seen.mean(1, keepdim=True))
         hidden = self.regularise(torch.cat((*evidence, _centred(start), colours), 1), shallow, deep)
@@ -209,13 +229,23 @@ class DepthRefiner(nn.Module):
         )
 
     def _sweep(
-        self, compared: list[Compared], log_depths: Tensor, viewmats: Tensor, Ks: Tensor
+        self,
+        compared: list[Compared],
+        log_depths: Tensor,
+        viewmats: Tensor,
+        Ks: Tensor,
+        neighbours: Neighbours | None,
     ) -> tuple[list[Tensor], Tensor]:
         """`sweep_correlation` of every scene: (n, G, P, h, w) each, and (n, P, h, w)."""
         count = log_depths.shape[1]
         scenes = [
             sweep_correlation(
-                [c.views(b * count, count) for c in compared], logs, self.offsets, viewmats[b], Ks[b]
+                [c.views(b * count, count) for c in compared],
+                logs,
+                self.offsets,
+                viewmats[b],
+                Ks[b],
+                neighbours,
             )
             for b, logs in enumerate(log_depths)
         ]
