@@ -180,6 +180,21 @@ class RenameAtom:
 
 
 @dataclass(frozen=True)
+class DenyAtom:
+    """An atom is not what `text` means, and neither are those that look like it."""
+
+    atom: int
+    text: str
+
+    def apply(self, state: State) -> State:
+        marks = state.editing.marks
+        if marks is None or not 0 <= self.atom < len(marks.atoms):
+            return state
+        marks = edits.deny_atom(marks, self.atom, self.text)
+        return _edit(state, f"Atom {self.atom} is not {self.text.strip()!r}", marks)
+
+
+@dataclass(frozen=True)
 class MergeAtoms:
     """Make one of several atoms; the first keeps its number."""
 
@@ -312,5 +327,5 @@ def _with_history(state: State, history: History) -> State:
 
 
 def _spoken_of(marks: Marks | None) -> tuple | None:
-    """What of the marks a score rests on; names do not count."""
-    return None if marks is None else (marks.visible, [(atom.into, atom.on) for atom in marks.atoms])
+    """What of the marks a score rests on."""
+    return None if marks is None else (marks.visible, marks.atoms)

@@ -69,7 +69,7 @@ class EditingEffects(Effects):
         content = b"" if weights is None else weights.astype(np.float32).tobytes()
         scene = (info.serial, info.scene, state.editing.marks)
         place = (reading, state.pose, self._viewport.size)
-        self._hands.submit(NamePlace(*scene, *place, content, extra))
+        self._hands.submit(NamePlace(*scene, *place, content, extra, state.negatives))
 
     # Commands
 
@@ -92,9 +92,11 @@ class EditingEffects(Effects):
             self._atoms_changed(before, state)
 
     def _atoms_changed(self, before: State, state: State) -> None:
-        """Merged atoms have other words."""
+        """Merged and corrected atoms have other words."""
         old, new = before.editing.marks, state.editing.marks
         if old is None or new is None or state.info is None:
             return
-        if [atom.into for atom in old.atoms] != [atom.into for atom in new.atoms]:
+        if [(atom.into, atom.denied) for atom in old.atoms] != [
+            (atom.into, atom.denied) for atom in new.atoms
+        ]:
             self._hands.submit(NameAtoms(state.info.serial, state.info.scene, new))

@@ -130,7 +130,7 @@ class CardOpened:
 
 @dataclass(frozen=True)
 class Named:
-    """Nearest words (word, cosine) and language vector of the place that was asked about."""
+    """Nearest words (word, score) and language vector of the place that was asked about."""
 
     asked: Reading
     reading: Reading

@@ -78,7 +78,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class Card:
-    """The answer to "what is this?". words: (word, cosine), None while they are looked up.
+    """The answer to "what is this?". words: (word, score as of a phrase), None while they are looked up.
 
     vector: F(p) as float32 bytes, for "find similar".
     """

@@ -22,6 +22,8 @@ from .pointing import AtomsNamed, Named, ReadingTaken
 from .state import Reading, Region, strongest
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from langflash_core.types import Scene
 
 MOST_PIXELS = 120_000  # of a region; a larger one is looked at coarser, which takes seconds less
@@ -40,6 +42,13 @@ class EditErrand(SceneErrand):
         from langflash_core.scene.edited import spoken_scene
 
         return spoken_scene(self.scene, self.marks)
+
+    def dictionary(self) -> "Tensor":
+        """Of that scene, as its person taught it."""
+        from langflash_core.language.relevance import spoken_dictionary
+        from langflash_core.language.spaces import language_space
+
+        return spoken_dictionary(self.spoken(), language_space(self.scene.semantics.space))
 
 
 # Selections
@@ -95,7 +104,7 @@ class FindByPhrase(Selection):
         import torch
 
         from langflash_core.language.gaussians import gaussian_relevance
-        from langflash_core.language.relevance import compile_query
+        from langflash_core.language.relevance import compile_query, spoken_dictionary
         from langflash_core.language.spaces import language_space
         from langflash_core.language.words import with_vectors
 
@@ -104,7 +113,7 @@ class FindByPhrase(Selection):
         query = compile_query(scene, space, [self.text], negatives=list(self.negatives) or None)
         if self.like:
             vector = torch.from_numpy(np.frombuffer(self.like, np.float32).copy())
-            query = with_vectors(query, scene.semantics.dictionary, {0: vector})
+            query = with_vectors(query, spoken_dictionary(scene, space), {0: vector})
         return (gaussian_relevance(scene.semantics, query)[0] >= self.threshold).numpy()
 
 
@@ -226,27 +235,42 @@ def _projected(scene: "Scene", visible: Mask, pose: Pose, size: tuple[int, int])
 
 @dataclass(frozen=True)
 class NamePlace(Weigh):
-    """The nearest words of F(p) = W D, of the household's and of `extra`, the person's own.
+    """The nearest words of F(p) = W D, of the household's and of `extra`, the person's own; with the scores
+    that they would have as phrases.
 
     weights: (K,) of the pixel as float32 bytes; none: not drawn, to be composed.
     """
 
     weights: bytes
     extra: tuple[str, ...]
+    negatives: tuple[str, ...] = ()
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         import torch
 
         from langflash_core.language.words import feature_at, nearest_words
 
-        semantics = self.spoken().semantics
         weights = np.frombuffer(self.weights, np.float32).copy() if self.weights else self.weigh()
-        vector = feature_at(torch.from_numpy(weights), semantics.dictionary)
-        words, embeddings = _vocabulary(semantics.space, self.extra)
-        near = nearest_words(vector, words, embeddings, WORDS_ASKED)
-        pairs = tuple((each.word, each.cosine) for each in near)
+        pixel = torch.from_numpy(weights)
+        vector = feature_at(pixel, self.dictionary())
+        own = (*self.extra, *(atom.name for atom in self.marks.atoms))
+        words, embeddings = _vocabulary(self.scene.semantics.space, own)
+        near = [each.word for each in nearest_words(vector, words, embeddings, WORDS_ASKED)]
         content = vector.float().numpy().tobytes() if near else b""
-        yield Named(self.reading, self.weighed(weights), pairs, content)
+        yield Named(self.reading, self.weighed(weights), self._scored(pixel, near), content)
+
+    def _scored(self, pixel: "Tensor", words: list[str]) -> tuple[tuple[str, float], ...]:
+        """Words with their relevancy at the pixel, whose weights are (K,), best first."""
+        from langflash_core.language.relevance import compile_query, relevance_maps
+        from langflash_core.language.spaces import language_space
+
+        if not words:
+            return ()
+        scene = self.spoken()
+        space = language_space(scene.semantics.space)
+        query = compile_query(scene, space, words, negatives=list(self.negatives) or None)
+        scores = relevance_maps(pixel[None], query)[:, 0].tolist()
+        return tuple(zip(words, scores, strict=True))
 
 
 @dataclass(frozen=True)
@@ -256,9 +280,8 @@ class NameAtoms(EditErrand):
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.language.words import nearest_words
 
-        semantics = self.spoken().semantics
-        words, embeddings = _vocabulary(semantics.space, ())
-        rows = (nearest_words(d, words, embeddings, WORDS_OF_ATOM) for d in semantics.dictionary)
+        words, embeddings = _vocabulary(self.scene.semantics.space, ())
+        rows = (nearest_words(d, words, embeddings, WORDS_OF_ATOM) for d in self.dictionary())
         yield AtomsNamed(tuple(tuple(each.word for each in row) for row in rows))
 
 
@@ -276,6 +299,18 @@ def _household(space: str):
     return language_space(space).encode(list(household_words()))
 
 
+def _readable(space: str, text: str) -> bool:
+    """Whether a name that a person gave can be compared with."""
+    from langflash_core.errors import PromptError
+    from langflash_core.language.algebra import encode_prompts
+    from langflash_core.language.spaces import language_space
+
+    try:
+        return len(encode_prompts(language_space(space), [text])) == 1
+    except PromptError:
+        return False
+
+
 def _vocabulary(space: str, extra: tuple[str, ...]):
     """Words and unit embeddings (A, C): the household's, and the person's own."""
     import torch
@@ -284,7 +319,8 @@ def _vocabulary(space: str, extra: tuple[str, ...]):
     from langflash_core.language.spaces import language_space
 
     known = household_words()
-    own = tuple(dict.fromkeys(text for text in extra if text and text not in known))
+    asked = dict.fromkeys(text for text in extra if text and text not in known)
+    own = tuple(text for text in asked if _readable(space, text))
     if not own:
         return known, _household(space)
     return known + own, torch.cat((_household(space), encode_prompts(language_space(space), own)))

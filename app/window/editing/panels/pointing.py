@@ -164,16 +164,20 @@ def _answer(state: State, card: Card, look: Look) -> list[do.Command]:
     imgui.same_line(look.px(_CARD - 44))
     if widgets.quiet_button(f"{fa.ICON_FA_XMARK}##card", "Close  (Esc)"):
         issued.append(point.CloseCard())
-    for word, cosine in (card.words or ())[:_SHOWN_WORDS]:
-        _bar(cosine, theme.ACCENT, look)
+    group = card.reading.atoms[0][0] if card.reading.atoms else None
+    for word, score in (card.words or ())[:_SHOWN_WORDS]:
+        imgui.align_text_to_frame_padding()
+        _bar(score, theme.ACCENT, look)
         imgui.same_line()
-        imgui.text(f"{cosine:.2f}")
+        imgui.text(f"{score:.2f}")
         imgui.same_line(look.px(134))
-        imgui.text_unformatted(word)
+        imgui.text_unformatted(widgets.shortened(word, look.px(_CARD - 134 - 84)))
+        if group is not None:
+            issued += _lessons(card, group, word, look)
     if card.reading.point is not None:
         imgui.text_colored(theme.MUTED, _coordinates(card.reading))
-    if card.reading.atoms:
-        issued += _group(state, card.reading.atoms[0][0], look)
+    if group is not None:
+        issued += _group(state, group, look)
     if card.vector:
         if widgets.primary_button(
             f"{fa.ICON_FA_MAGNIFYING_GLASS}  Find similar", ImVec2(look.px(_CARD - 32), 0)
@@ -181,6 +185,18 @@ def _answer(state: State, card: Card, look: Look) -> list[do.Command]:
             issued.append(point.FindSimilar())
         widgets.tooltip("Ask for everything that says the same as this place")
     return issued
+
+
+def _lessons(card: Card, k: int, word: str, look: Look) -> list[do.Command]:
+    """At the end of a word's line: the place is that, or is not; asks again what it is then."""
+    issued: list[do.Command] = []
+    imgui.same_line(look.px(_CARD - 78))
+    if widgets.quiet_button(f"{fa.ICON_FA_CHECK}##is {word}", f"This is: {word}"):
+        issued.append(edit.RenameAtom(k, word))
+    imgui.same_line(0, 0)
+    if widgets.quiet_button(f"{fa.ICON_FA_BAN}##not {word}", f"This is not: {word}"):
+        issued.append(edit.DenyAtom(k, word))
+    return [*issued, point.Ask(card.reading.at)] if issued else []
 
 
 def _group(state: State, k: int, look: Look) -> list[do.Command]:
@@ -197,7 +213,7 @@ def _group(state: State, k: int, look: Look) -> list[do.Command]:
     entered, name = imgui.input_text_with_hint(
         "##name", hint, atom.name, imgui.InputTextFlags_.enter_returns_true
     )
-    widgets.tooltip("Give this group a name of your own, and press Enter")
+    widgets.tooltip("Give this group a name of your own, which it answers to, and press Enter")
     if entered or (imgui.is_item_deactivated_after_edit() and name != atom.name):
         issued.append(edit.RenameAtom(k, name))
     imgui.same_line(0, look.px(4))

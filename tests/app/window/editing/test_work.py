@@ -12,8 +12,10 @@ from app.window.editing.state import Reading, Region
 from app.window.poses import to_camera
 from app.window.requests import SceneErrand
 from app.window.scene.work import describe_scene
+from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import language_space
-from langflash_core.scene.edits import Mask, hide, merge_atoms, select
+from langflash_core.scene.edited import spoken_scene
+from langflash_core.scene.edits import Mask, deny_atom, hide, merge_atoms, rename_atom, select
 from langflash_core.splat import render
 from langflash_core.splat.picking import SEEN
 from langflash_core.splat.reference import rasterize
@@ -129,6 +131,22 @@ def test_a_place_has_words_also_the_persons_own(info) -> None:
     assert vector @ info.scene.semantics.dictionary[0].numpy() > 0.9
     drawn = np.array([0.0, 0.7, 0.0], np.float32).tobytes()
     assert result(work.NamePlace(*scene_of(info), *place, drawn, ())).words[0][0] == "wall"
+
+
+def test_a_place_answers_to_its_new_name_with_the_score_of_a_phrase(info) -> None:
+    serial, scene, marks = scene_of(info)
+    marks = deny_atom(rename_atom(marks, 1, "fresco"), 1, "wall")
+    drawn = np.array([0.0, 0.7, 0.0], np.float32)
+    place = (Reading((1.0, 2.0), (0, 0, 1), 1.0), info.views[0], (64, 48))
+    named = result(work.NamePlace(serial, scene, marks, *place, drawn.tobytes(), ()))
+    word, score = named.words[0]
+    assert word == "fresco"
+    query = compile_query(spoken_scene(scene, marks), language_space("minilm"), ["fresco", "wall"])
+    relevance = relevance_maps(torch.from_numpy(drawn)[None], query)[:, 0].tolist()
+    assert score == pytest.approx(relevance[0], abs=1e-6) and relevance[0] > query.threshold
+    assert relevance[1] < 0.5 and "wall" not in dict(named.words)
+    strange = rename_atom(marks, 0, "\U0001f6cb")  # a name without a word that the tower knows breaks nothing
+    assert result(work.NamePlace(serial, scene, strange, *place, drawn.tobytes(), ())).words
 
 
 def test_atoms_are_named(info) -> None:
