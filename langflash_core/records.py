@@ -26,8 +26,9 @@ class Record:
     warnings: a sentence each. metric_scale: metres per scene unit. network_unit: the network's
     length units per scene unit. counts: Gaussians predicted and left out. pruning: as `prune` left
     it. refinement: what a fit to the photos brought. calibration: what the network's checkpoint
-    says about scores, instead of its language space. atom_names: a person's own, by atom, which it answers
-    to. atom_denials: what a person said that an atom is not. silent_atoms: those that answer no phrase. num_deleted: Gaussians that edits took away.
+    says about scores, instead of its language space. atom_names: a person's own, by atom, which it
+    answers to. atom_denials: what a person said that an atom is not. silent_atoms: those that answer
+    no phrase. num_deleted: Gaussians that edits took away.
     others: what a file says under keys that this version does not know.
     """
 

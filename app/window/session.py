@@ -264,6 +264,7 @@ class Session:
             self._viewport.depth_range,
             self._viewport.passes,
             self._viewport.settling,
+            self._viewport.failing,
         )
         self._perform(Measured(stats))
         return drawing

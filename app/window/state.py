@@ -40,7 +40,7 @@ class Line:
 @dataclass(frozen=True)
 class Stats:
     """Figures of the status bar; the session refreshes them every frame. settling: a finer picture than the
-    one on show is being drawn."""
+    one on show is being drawn. failing: it could not be, and is tried again."""
 
     frame_seconds: float = 0.0
     picture_seconds: float = 0.0
@@ -49,6 +49,7 @@ class Stats:
     depth_range: tuple[float, float] = (0.0, 1.0)
     passes: tuple[tuple[str, int], ...] = ()
     settling: bool = False
+    failing: bool = False
 
 
 NO_STATS = Stats()

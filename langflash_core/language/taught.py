@@ -4,7 +4,8 @@ A lesson moves its atom: towards a name t, d' = normalise(d + t); out of a denie
 whose cosine with u is 0, below any negative. Atoms that look alike are moved along, all the way where they
 are the same and not at all from a cosine of `ALIKE` down:
 
-    d_j' = normalise(d_j + sum_k s_jk (d_k' - d_k)),  s_jk = clamp((cos(d_j, d_k) - ALIKE) / (1 - ALIKE), 0, 1).
+    d_j' = normalise(d_j + sum_k s_jk (d_k' - d_k)),
+    s_jk = clamp((cos(d_j, d_k) - ALIKE) / (1 - ALIKE), 0, 1).
 
 Source: own.
 """

@@ -225,7 +225,7 @@ def show_all(marks: Marks) -> Marks:
 
 
 def rename_atom(marks: Marks, k: int, name: str) -> Marks:
-    """Give an atom, with those merged with it, a name; an empty one takes it back. Saying so ends a denial."""
+    """Give an atom, with those merged with it, a name; an empty one takes it back. It ends a denial."""
     name = name.strip()
     denied = tuple(text for text in marks.atoms[k].denied if text.lower() != name.lower())
     return _with_atoms(marks, _merged_with(marks, k), name=name, denied=denied)

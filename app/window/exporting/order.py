@@ -56,6 +56,8 @@ def order(state: State) -> Order | str:
         words += ["--what", form.what.word]
     if phrases:
         words += ["--prompt", *phrases, *_threshold(state)]
+    if fades(state):
+        words.append("--fade")
     if form.what in (What.HEAT, What.HEAT_VIDEO):
         words += _colours(state)
     seen_from, camera_file = _seen_from(state, target)
@@ -66,6 +68,12 @@ def order(state: State) -> Order | str:
         words += ["--seconds", f"{form.seconds:g}"]
     files = (*_written(form, target, len(info.views)), *((camera_file,) if camera_file else ()))
     return Order(tuple(words), target, camera_file, files)
+
+
+def fades(state: State) -> bool:
+    """Whether the export leaves out, softly, what no photo looked at: as on show, unless said otherwise."""
+    form = state.exporting.form
+    return form.what.fades and (state.preferences.near_photos if form.fade is None else form.fade)
 
 
 def _colours(state: State) -> list[str]:

@@ -97,6 +97,10 @@ def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
         )
         if changed:
             form = replace(form, seconds=float(round(seconds)))
+    if what.fades:
+        changed, fade = widgets.checkbox("Fade what no photo looked at", written.fades(state))
+        if changed:
+            form = replace(form, fade=fade)
     return _narrowed(state, form, look)
 
 
