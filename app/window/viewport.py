@@ -240,6 +240,7 @@ class Viewport:
             return float("inf")
         if (state.pose, size) != (self._pose, self._size):
             self._pose, self._size, self._moved = state.pose, size, state.now
+            self._failed = None
         if self._fresh:  # to take a scene took a frame's time
             self._fresh = False
             return 0.0
@@ -297,6 +298,8 @@ class Viewport:
                 asked, name = self._questions(state), (still.key, self._question, state.mode)
                 if not self._waits(name, state.now):
                     artist.order(name, lambda stopping: asked(still) or True)
+            else:
+                self._failed = None  # there is all that is wanted
             return
         name = wanted.at(kind, scale)
         if self._waits(name, state.now):

@@ -78,6 +78,7 @@ def test_a_picture_that_could_not_be_drawn_is_told_and_tried_again(context, monk
             for _ in range(300):
                 if until():
                     return
+                viewport.governor = Stubborn(slow=True)
                 state = replace(state, now=state.now + seconds)
                 viewport.update(state, SIZE, touched=0.0)
                 time.sleep(0.01)
