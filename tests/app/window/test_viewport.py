@@ -89,6 +89,6 @@ def test_a_picture_that_could_not_be_drawn_is_told_and_tried_again(context, monk
         wait = viewport.update(state, SIZE, touched=0.0)
         assert 0 < wait <= RETRY_SECONDS and not viewport.settling, "not at once, and not never"
         broken[0] = False
-        live(RETRY_SECONDS, lambda: getattr(viewport.drawn, "plan", None) == Plan(Kind.COLOUR))
+        live(RETRY_SECONDS, lambda: getattr(viewport.drawn, "plan", Plan(Kind.FAST, 0.5)).scale == 1.0)
         assert not viewport.failing
         viewport.release()
