@@ -1,5 +1,5 @@
-"""What renderers draw with and on: the programs of a context, and targets of the last two sizes, weight maps of
-the last one alone."""
+"""What renderers draw with and on: the programs of a context, and targets of the last two sizes,
+weight maps of the last one alone."""
 
 from typing import Literal
 

@@ -134,6 +134,7 @@ def draw_still(
     Raises:
         Cancelled: `stopping` said so.
     """
+
     def go_on() -> None:
         if stopping():
             raise Cancelled("the picture is no longer wanted")

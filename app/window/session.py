@@ -29,6 +29,7 @@ from .kit import theme
 from .kit.look import Look
 from .kit.textures import Thumbnails
 from .log import LogEffects
+from .opening.effects import OpeningEffects
 from .recovery import preferences
 from .recovery.commands import Prefer
 from .recovery.effects import RecoveryEffects
@@ -96,6 +97,7 @@ class Session:
         recovery = RecoveryEffects(hands, keeper)
         self._effects = (
             SceneEffects(hands, self._viewport, self._thumbnails, self._entitle),
+            OpeningEffects(hands, self._thumbnails, lambda: desktop.clipboard(self._window)),
             AskingEffects(hands, self._viewport),
             EditingEffects(hands, self._viewport),
             recovery,

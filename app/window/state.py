@@ -9,6 +9,7 @@ from langflash_core.colormaps import HeatColours
 from .asking.state import FIRST_PROMPT, NO_ASKING, Asking, Prompt, usable
 from .editing.state import NO_EDITING, Editing
 from .exporting.state import NO_EXPORTING, Exporting
+from .opening.state import NO_OPENING, Opening
 from .poses import START, Pose
 from .recovery.preferences import DEFAULTS, Preferences
 from .recovery.state import NO_RECOVERY, Recovery
@@ -104,6 +105,7 @@ class State:
     editing: Editing = NO_EDITING
     asking: Asking = NO_ASKING
     exporting: Exporting = NO_EXPORTING
+    opening: Opening = NO_OPENING
     recovery: Recovery = NO_RECOVERY
     preferences: Preferences = DEFAULTS
     lines: tuple[Line, ...] = ()

@@ -236,7 +236,7 @@ def _cosines(weights: Tensor, factor: Tensor, phrases: Tensor, eps: float) -> tu
 
 
 def spoken_dictionary(scene: Scene | Semantics, space: LanguageSpace) -> Tensor:
-    """The dictionary (K, C) as people taught the scene (`taught`); silent atoms, which answer nothing, at 0."""
+    """The dictionary (K, C) as people taught the scene (`taught`); silent atoms are 0."""
     if isinstance(scene, Semantics):
         return scene.dictionary
     silent = scene.record.silent_atoms

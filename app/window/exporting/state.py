@@ -104,8 +104,8 @@ class What(Enum):
 class ExportForm:
     """all_views: from every photo instead of the view on show. only_found: just what answers the
     phrases. only_selected: just the selection, where Gaussians are written. side: the longer one in
-    pixels. fade: leave out what no photo looked at; None: as the window does. path: as typed; an ending is added. proposed: the path that nobody has typed. serial: of the
-    scene that `path` is for."""
+    pixels. fade: leave out what no photo looked at; None: as the window does. path: as typed; an ending is
+    added. proposed: the path that nobody has typed. serial: of the scene that `path` is for."""
 
     what: What = What.RGB
     all_views: bool = False

@@ -13,6 +13,7 @@ from ..editing import commands as edit
 from ..editing import pointing as point
 from ..editing.state import Tool
 from ..exporting import commands as export
+from ..opening import commands as opening
 from ..recovery import commands as keep
 from ..scene import camera
 from ..scene import commands as show
@@ -99,8 +100,9 @@ def _selected(command: do.Command) -> Callable[[State], do.Command | None]:
 
 def _files() -> Iterable[Entry]:
     group, dialog = "File", do.ShowDialog
-    opening = fa.ICON_FA_FOLDER_OPEN
-    yield Entry("Open ...", group, _always(dialog("open")), _ctrl("o"), opening, in_fields=True)
+    looking = _always(opening.OpenFiles())
+    yield Entry("Open ...", group, looking, _ctrl("o"), fa.ICON_FA_FOLDER_OPEN, in_fields=True)
+    yield Entry("Paste photos", group, _always(opening.Paste()), _ctrl("v"), fa.ICON_FA_PASTE)
     yield Entry("Save ...", group, _shown(dialog("save")), _ctrl("s"), fa.ICON_FA_FLOPPY_DISK, in_fields=True)
     exporting = fa.ICON_FA_FILE_EXPORT
     yield Entry("Export ...", group, _shown(export.ShowExport()), _ctrl("e"), exporting, in_fields=True)
