@@ -135,7 +135,7 @@ class DescribeAtoms(SceneErrand):
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.export.colours import atom_colours
-        from langflash_core.scene.atoms import atom_pictures, describe_atoms
+        from langflash_core.scene.atoms import atom_pictures, atom_places, describe_atoms
 
         report = describe_atoms(self.scene)
         shares = _shares(self.scene, self.marks)
@@ -149,6 +149,7 @@ class DescribeAtoms(SceneErrand):
                 colours=tuple((float(r), float(g), float(b)) for r, g, b in colours),
                 order=report.order,
                 similarity=report.similarity,
+                places=tuple(place and Vector(*place) for place in atom_places(self.scene)),
             )
         )
 

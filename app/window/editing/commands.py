@@ -8,7 +8,7 @@ from langflash_core.scene.edits import Combine, History, Marks, Mask
 from ..asking.commands import lapsed
 from ..scene.state import Mode
 from ..state import State
-from .state import STRICTNESS_RANGE, Floaters, Region
+from .state import STRICTNESS_RANGE, Floaters, Point, Region
 
 
 def change(state: State, **changes) -> State:
@@ -29,6 +29,29 @@ class SelectRegion:
     """Find the Gaussians that a region of the picture shows."""
 
     region: Region
+    combine: Combine = "replace"
+
+    def apply(self, state: State) -> State:
+        return change(state, drag=(), waiting="" if state.info is None else "Selecting")
+
+
+@dataclass(frozen=True)
+class SelectThing:
+    """Find the thing that a pixel of the picture's place shows: what is of its group and touches it."""
+
+    at: Point
+    combine: Combine = "replace"
+
+    def apply(self, state: State) -> State:
+        return change(state, drag=(), waiting="" if state.info is None else "Selecting")
+
+
+@dataclass(frozen=True)
+class SelectSphere:
+    """Find what lies in a ball around what a pixel shows. radius: pixels there."""
+
+    at: Point
+    radius: float
     combine: Combine = "replace"
 
     def apply(self, state: State) -> State:

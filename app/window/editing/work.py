@@ -17,9 +17,19 @@ from ..poses import Pose, to_camera
 from ..requests import Asked, SceneErrand
 from ..scene.state import SceneInfo
 from ..state import State
-from .commands import FloatersFound, Found, Grow, SelectAtom, SelectByPhrase, SelectRegion, StopWaiting
+from .commands import (
+    FloatersFound,
+    Found,
+    Grow,
+    SelectAtom,
+    SelectByPhrase,
+    SelectRegion,
+    SelectSphere,
+    SelectThing,
+    StopWaiting,
+)  # fmt: skip
 from .pointing import AtomsNamed, Named, ReadingTaken
-from .state import Reading, Region, strongest
+from .state import PICK_RADIUS, Point, Reading, Region, strongest
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -84,6 +94,63 @@ class FindInRegion(Selection):
         visible = self.marks.visible.rows()
         found = seen_in(self.scene.gaussians, visible, camera, pixels, through=self.through)
         yield Found(Mask.of(found), self.combine, self.region.what)
+
+
+@dataclass(frozen=True)
+class AtPixel(Selection):
+    """Something about what a pixel shows. at: framebuffer pixels of the picture's place, which has `size`."""
+
+    at: Point
+    pose: Pose
+    size: tuple[int, int]
+    combine: Combine
+
+    def seen(self) -> np.ndarray:
+        """(N,) bool: the Gaussians that a small disc around the pixel shows."""
+        from langflash_core.splat.picking import seen_in
+
+        pixels = Region((self.at,), PICK_RADIUS).pixels(*self.size)
+        camera = to_camera(self.pose, *self.size)
+        return seen_in(self.scene.gaussians, self.marks.visible.rows(), camera, pixels)
+
+
+@dataclass(frozen=True)
+class FindThing(AtPixel):
+    """What is of the group that the pixel shows and hangs together with it in space."""
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.scene.instances import instances
+        from langflash_core.scene.selection import strongest_atoms
+
+        seen = self.seen()
+        heads = np.array([atom.into for atom in self.marks.atoms] + [-1])  # the last for "none"
+        groups = heads[strongest_atoms(self.scene.semantics)]
+        of_one = groups[seen] if seen.any() else groups[:0]
+        if len(of_one) and of_one.max() >= 0:
+            group = np.bincount(of_one[of_one >= 0]).argmax()
+            things = instances(self.scene.gaussians, (groups == group) & self.marks.visible.rows())
+            here = things[seen & (things > 0)]
+            if len(here):
+                seen = things == np.bincount(here).argmax()
+        yield Found(Mask.of(seen), self.combine, "of a thing")
+
+
+@dataclass(frozen=True)
+class FindInSphere(AtPixel):
+    """What lies within `radius` pixels, at its depth, of what the pixel shows."""
+
+    radius: float
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        found, means = self.seen(), self.scene.gaussians.means.double().numpy()
+        if found.any():
+            centre = np.median(means[found], axis=0)
+            camera = to_camera(self.pose, *self.size)
+            viewmat = camera.viewmat.double().numpy()
+            depth = float(viewmat[2, :3] @ centre + viewmat[2, 3])
+            ball = np.linalg.norm(means - centre, axis=1) <= self.radius * depth / float(camera.K[0, 0])
+            found = ball & self.marks.visible.rows()
+        yield Found(Mask.of(found), self.combine, "in a ball")
 
 
 @dataclass(frozen=True)
@@ -170,6 +237,10 @@ def request_for(
     match command:
         case SelectRegion(region, combine) if min(size) > 0:
             return FindInRegion(*scene, region, state.pose, size, state.editing.through, combine)
+        case SelectThing(at, combine) if min(size) > 0:
+            return FindThing(*scene, at, state.pose, size, combine)
+        case SelectSphere(at, radius, combine) if min(size) > 0:
+            return FindInSphere(*scene, at, state.pose, size, combine, radius)
         case SelectByPhrase(key, combine):
             return _phrase(state, info, marks, key, combine)
         case SelectAtom(atom, combine) if 0 <= atom < len(marks.atoms):

@@ -76,4 +76,6 @@ def _escape(state: State) -> list[do.Command]:
         return [point.CloseCard()]
     if editing.floaters is not None:
         return [edit.EndFloaters()]
+    if editing.drag:
+        return [point.Drag(())]
     return [] if editing.tool is Tool.MOVE else [point.SetTool(Tool.MOVE)]

@@ -161,6 +161,7 @@ def _looking() -> Iterable[Entry]:
     yield Entry("Fly to the selection", group, _shown(point.FrameSelection()), _plain("f"))
     yield Entry("Compare with the photo", group, _compare, _plain("p"))
     yield Entry("Show the photos' cameras", group, _cameras, _plain("k"))
+    yield Entry("Names of things in the picture", group, _names, _plain("n"))
     yield Entry("Keep to what the photos saw", group, _near_photos)
     for mode in Mode:
         keys = _plain(f"_{_DIGITS[KEYED.index(mode)]}") if mode in KEYED else ()
@@ -175,6 +176,10 @@ def _compare(state: State) -> do.Command | None:
     if state.info is None or state.view is None:
         return None
     return camera.Compare(None if in_space.comparing(state) else 0.5)
+
+
+def _names(state: State) -> do.Command | None:
+    return ask.NameThings(not state.asking.named) if state.info is not None else None
 
 
 def _cameras(state: State) -> do.Command | None:
@@ -193,8 +198,9 @@ def _tools() -> Iterable[Entry]:
     group = "Tools"
     for name, key, tool in (
         ("Move around", "v", Tool.MOVE), ("What is this?", "x", Tool.POINT),
-        ("Select with a box", "r", Tool.BOX), ("Select with a brush", "b", Tool.BRUSH),
-        ("Select by a click", "c", Tool.PICK),
+        ("Select with a box", "r", Tool.BOX), ("Select with a lasso", "l", Tool.LASSO),
+        ("Select with a brush", "b", Tool.BRUSH), ("Select with a ball", "o", Tool.SPHERE),
+        ("Select the thing under a click", "c", Tool.PICK),
     ):  # fmt: skip
         yield Entry(name, group, _shown(point.SetTool(tool)), _plain(key))
     yield Entry("A smaller brush", group, _brush(1 / BRUSH_STEP), _plain("left_bracket"), repeats=True)

@@ -231,11 +231,12 @@ class SceneArrived:
         prompts = tuple(replace(p, score=None) for p in state.prompts)
         history = self.info.history
         saved = None if history is None else history.moved_to(0).marks
+        made = state.job is not None and state.job.title == RECONSTRUCTING
         return replace(
             state,
             editing=fresh(state.editing, history, saved),
             recovery=replace(state.recovery, edits=None, kept=None),
-            asking=state.asking.without_scene(),
+            asking=replace(state.asking.without_scene(), named=made and not state.asked),
             info=self.info,
             photos=() if self.alone else state.photos,
             prompts=prompts,

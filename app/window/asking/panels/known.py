@@ -42,14 +42,21 @@ def draw(state: State, look: Look) -> list[do.Command]:
 
 def things(state: State) -> tuple[str, ...]:
     """Names of the groups that speak, the largest first, each once."""
+    return tuple(told(state))
+
+
+def told(state: State) -> dict[str, int]:
+    """The same with the largest group of each name."""
     insight, history = state.asking.insight, state.editing.history
     if insight is None or history is None:
-        return ()
+        return {}
     atoms = history.marks.atoms
-    told = [k for k, atom in enumerate(atoms) if atom.on and k < len(insight.shares)]
-    told = [k for k in told if insight.shares[k] >= LEAST_SHARE and (atoms[k].name or _named(state, k))]
-    told.sort(key=lambda k: -insight.shares[k])
-    return tuple(dict.fromkeys(state.editing.atom_name(k).lower() for k in told))[:MOST]
+    speak = [k for k, atom in enumerate(atoms) if atom.on and k < len(insight.shares)]
+    speak = [k for k in speak if insight.shares[k] >= LEAST_SHARE and (atoms[k].name or _named(state, k))]
+    found: dict[str, int] = {}
+    for k in sorted(speak, key=lambda k: -insight.shares[k]):
+        found.setdefault(state.editing.atom_name(k).lower(), k)
+    return dict(list(found.items())[:MOST])
 
 
 def _named(state: State, k: int) -> bool:

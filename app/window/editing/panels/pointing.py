@@ -1,5 +1,7 @@
 """At the pointer: the region being drawn, what lies under it, and the answer to "what is this?"."""
 
+import math
+
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
@@ -53,13 +55,20 @@ def _region(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
         high = ImVec2(max(path[0].x, path[-1].x), max(path[0].y, path[-1].y))
         canvas.add_rect_filled(low, high, fill)
         canvas.add_rect(low, high, line, 0.0, look.px(1.5))
+    elif editing.tool is Tool.LASSO and path:
+        canvas.add_polyline([*path, imgui.get_mouse_pos()], col=line, thickness=look.px(1.5), flags=0)
+        canvas.add_circle_filled(path[0], look.px(4), line)
+    elif editing.tool is Tool.SPHERE and len(path) > 1:
+        way = math.hypot(path[-1].x - path[0].x, path[-1].y - path[0].y)
+        canvas.add_circle_filled(path[0], way, fill)
+        canvas.add_circle(path[0], way, line, 0, look.px(1.5))
     elif editing.tool is Tool.BRUSH and path:
         if len(path) > 1:
             canvas.add_polyline([*path], col=fill, thickness=2 * radius, flags=0)
         canvas.add_circle_filled(path[0], radius, fill)
         canvas.add_circle_filled(path[-1], radius, fill)
         canvas.add_circle(path[-1], radius, line, 0, look.px(1.5))
-    elif editing.hover is not None and editing.tool is not Tool.BOX:
+    elif editing.hover is not None and editing.tool in (Tool.BRUSH, Tool.PICK):
         canvas.add_circle(imgui.get_mouse_pos(), radius, line, 0, look.px(1.5))
     if editing.hover is not None and combine != "replace":
         sign = fa.ICON_FA_PLUS if combine == "add" else fa.ICON_FA_MINUS

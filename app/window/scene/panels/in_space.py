@@ -7,11 +7,13 @@ from imgui_bundle import icons_fontawesome_6 as fa
 
 from ... import commands as do
 from ... import poses
+from ...asking.panels import known
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...poses import Pose
 from ...state import State
 from .. import camera
+from ..state import Mode
 
 FRUSTUM = 0.10  # length of a frustum in distances to the pivot of its view
 NEAREST = 0.02  # scene units in front of the camera from which a frustum is drawn
@@ -26,6 +28,8 @@ def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Comm
     if comparing(state):
         return _compare(state, look, corner, size)
     _candidates(state, look, corner, size)
+    if state.asking.named and state.mode is Mode.RGB:
+        _names(state, look, corner, size)
     if state.preferences.photos_in_space and state.flight is None:
         return _frusta(state, look, corner, size)
     return []
@@ -46,6 +50,30 @@ def _candidates(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
         imgui.get_window_draw_list().add_circle(at, look.px(26), colour, 0, look.px(2))
         below = ImVec2(at.x + look.px(30), at.y - look.px(10))
         _caption(look, below, f"{prompt.text.strip()}?", 0.0)
+
+
+def _names(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
+    """What the scene knows, at its place; the largest first, and none over another."""
+    insight = state.asking.insight
+    taken: list[tuple[float, float, float, float]] = []
+    for name, k in known.told(state).items():
+        place = insight.places[k] if insight is not None and k < len(insight.places) else None
+        found = None if place is None else project(np.array([place]), state.pose, size)
+        if found is None:
+            continue
+        (x, y), extent = found[1][0], imgui.calc_text_size(name)
+        left, top = x - extent.x / 2 - look.px(7), y - extent.y / 2 - look.px(3)
+        box = (left, top, left + extent.x + look.px(14), top + extent.y + look.px(6))
+        inside = box[0] >= 0 and box[1] >= 0 and box[2] <= size.x and box[3] <= size.y
+        if not inside or any(_overlap(box, other) for other in taken):
+            continue
+        taken.append(box)
+        _caption(look, ImVec2(corner.x + left, corner.y + top), name, 0.0)
+
+
+def _overlap(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
+    """Of two boxes: left, top, right, bottom."""
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
 def comparing(state: State) -> bool:
