@@ -191,6 +191,19 @@ def zoom(pose: Pose, factor: float) -> Pose:
     return replace(pose, centre=Vector(*centre.tolist()), reach=reach)
 
 
+def facing(pose: Pose, forward: Vector) -> Pose:
+    """The pose that looks along a world direction at the same pivot, upright; straight up or down, with the
+    picture's right side where it was."""
+    ahead = np.array(forward) / np.linalg.norm(forward)
+    right = np.cross(-UP, ahead)
+    if np.linalg.norm(right) < 1e-6:
+        right = pose.axes[:, 0] - (pose.axes[:, 0] @ ahead) * ahead
+    right /= np.linalg.norm(right)
+    axes = np.stack((right, np.cross(ahead, right), ahead), axis=1)
+    centre = pose.pivot - pose.reach * ahead
+    return replace(pose, centre=Vector(*centre.tolist()), rotation=_quaternion(axes))
+
+
 def with_fov(pose: Pose, degrees: float) -> Pose:
     """Another field of view, clamped to `FOV_RANGE`."""
     return replace(pose, fov=float(np.clip(degrees, *FOV_RANGE)))

@@ -10,7 +10,7 @@ from ..scene.state import SceneInfo
 from ..state import State
 from ..viewport import Viewport
 from .commands import FindFloaters, StopWaiting
-from .pointing import CardOpened, Named, ReadingTaken
+from .pointing import CardOpened, Named, ReadingTaken, RulerPlaced
 from .state import Reading, Tool
 from .work import NameAtoms, NamePlace, ScoreFloaters, Weigh, request_for
 
@@ -61,6 +61,9 @@ class EditingEffects(Effects):
         if found is None:
             return
         reading, weights = found
+        if state.editing.tool is Tool.RULER:
+            self._hands.perform(RulerPlaced(reading))
+            return
         self._hands.perform(CardOpened(reading))
         if reading.point is None or not info.num_atoms:
             self._hands.perform(Named(reading, reading, (), b""))

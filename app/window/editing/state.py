@@ -24,6 +24,7 @@ class Tool(Enum):
     BRUSH = "Brush"
     SPHERE = "Sphere"
     PICK = "Thing"
+    RULER = "Ruler"
 
     @property
     def selects(self) -> bool:
@@ -31,6 +32,7 @@ class Tool(Enum):
 
 
 Point = tuple[float, float]
+Spot = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,7 @@ class Editing:
     radius: of the brush, design pixels. reach: of growing, in spacings of the Gaussians.
     drag: the region being drawn, framebuffer pixels. waiting: what the worker is looking for.
     hover: what is under the pointer. asked: where a click waits for the picture to rest.
-    names: nearest words of each atom, best first.
+    names: nearest words of each atom, best first. ruler: the ends of what is measured, world.
     """
 
     history: History | None = None
@@ -134,6 +136,7 @@ class Editing:
     card: Card | None = None
     names: tuple[tuple[str, ...], ...] = ()
     floaters: Floaters | None = None
+    ruler: tuple[Spot, ...] = ()
 
     @property
     def marks(self) -> Marks | None:

@@ -65,6 +65,11 @@ def order(state: State) -> Order | str:
     if form.what.sized:
         words += ["--size", "{}x{}".format(*pixels(form.side, state.pose.aspect))]
     if form.what.film:
+        if form.way == "keys":
+            if len(state.keys) < 2:
+                return "A film along key frames needs two of them; fly somewhere and add one (M)."
+            camera_file = target.with_name(f"{target.stem}.keys.json")
+        words += ["--path", str(camera_file) if form.way == "keys" else form.way]
         words += ["--seconds", f"{form.seconds:g}"]
     files = (*_written(form, target, len(info.views)), *((camera_file,) if camera_file else ()))
     return Order(tuple(words), target, camera_file, files)

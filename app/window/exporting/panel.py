@@ -6,6 +6,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from .. import commands as do
+from ..filming.state import WAYS
 from ..kit import theme, widgets
 from ..kit.look import Look
 from ..state import State
@@ -90,6 +91,8 @@ def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.MUTED, "px")
     if what.film:
+        _label("Goes", look)
+        form = replace(form, way=widgets.choice(WAYS, form.way))
         _label("Length", look)
         width = imgui.get_content_region_avail().x
         changed, seconds = widgets.slider(

@@ -104,7 +104,8 @@ class What(Enum):
 class ExportForm:
     """all_views: from every photo instead of the view on show. only_found: just what answers the
     phrases. only_selected: just the selection, where Gaussians are written. side: the longer one in
-    pixels. fade: leave out what no photo looked at; None: as the window does. path: as typed; an ending is
+    pixels. fade: leave out what no photo looked at; None: as the window does. way: of a film, of
+    `filming.state.WAYS`. path: as typed; an ending is
     added. proposed: the path that nobody has typed. serial: of the scene that `path` is for."""
 
     what: What = What.RGB
@@ -114,6 +115,7 @@ class ExportForm:
     side: int = 1024
     seconds: float = 6.0
     fade: bool | None = None
+    way: str = "orbit"
     path: str = ""
     proposed: str = ""
     serial: int = 0

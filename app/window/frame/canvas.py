@@ -40,7 +40,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     issued = over + hands.hover(state, corner)
     if state.editing.tool.selects and not imgui.get_io().key_alt:
         issued += hands.region(state, look, corner)
-    elif state.editing.tool is Tool.POINT:
+    elif state.editing.tool in (Tool.POINT, Tool.RULER):
         issued += hands.ask(look, corner)
     pose = moving.pointed(state, look, size)
     pose = moving.flown(pose, state.preferences.speed)

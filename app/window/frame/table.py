@@ -13,6 +13,7 @@ from ..editing import commands as edit
 from ..editing import pointing as point
 from ..editing.state import Tool
 from ..exporting import commands as export
+from ..filming import commands as film
 from ..opening import commands as opening
 from ..recovery import commands as keep
 from ..scene import camera
@@ -163,6 +164,11 @@ def _looking() -> Iterable[Entry]:
     yield Entry("Show the photos' cameras", group, _cameras, _plain("k"))
     yield Entry("Names of things in the picture", group, _names, _plain("n"))
     yield Entry("Keep to what the photos saw", group, _near_photos)
+    for side, forward in camera.SIDES:
+        yield Entry(f"Look from {side}", group, _shown(camera.Face(forward)))
+    yield Entry("Add a key frame", group, _shown(film.AddKey()), _plain("m"))
+    yield Entry("Remove the last key frame", group, lambda s: film.RemoveKey() if s.keys else None)
+    yield Entry("Fly along the key frames", group, _shown(film.Preview()), _plain("j"))
     for mode in Mode:
         keys = _plain(f"_{_DIGITS[KEYED.index(mode)]}") if mode in KEYED else ()
         yield Entry(f"Show: {mode.value}", group, _mode(mode), keys)
@@ -200,7 +206,7 @@ def _tools() -> Iterable[Entry]:
         ("Move around", "v", Tool.MOVE), ("What is this?", "x", Tool.POINT),
         ("Select with a box", "r", Tool.BOX), ("Select with a lasso", "l", Tool.LASSO),
         ("Select with a brush", "b", Tool.BRUSH), ("Select with a ball", "o", Tool.SPHERE),
-        ("Select the thing under a click", "c", Tool.PICK),
+        ("Select the thing under a click", "c", Tool.PICK), ("Measure", "t", Tool.RULER),
     ):  # fmt: skip
         yield Entry(name, group, _shown(point.SetTool(tool)), _plain(key))
     yield Entry("A smaller brush", group, _brush(1 / BRUSH_STEP), _plain("left_bracket"), repeats=True)

@@ -225,7 +225,15 @@ class SceneArrived:
         if self.room is None:
             return state
         editing = replace(state.editing, saved=self.room.saved)
-        return replace(state, photos=self.room.photos, editing=editing, pose=self.room.pose, view=None)
+        return replace(
+            state,
+            photos=self.room.photos,
+            editing=editing,
+            pose=self.room.pose,
+            keys=self.room.keys,
+            metric=self.room.metric,
+            view=None,
+        )
 
     def _shown(self, state: State) -> State:
         prompts = tuple(replace(p, score=None) for p in state.prompts)
@@ -243,6 +251,9 @@ class SceneArrived:
             job=None,
             aside=None,
             flight=None,
+            tour=None,
+            keys=self.info.keys,
+            metric=self.info.scene.record.metric_scale,
             pose=self.info.views[0] if self.info.views else poses.START,
             view=0 if self.info.views else None,
         )
@@ -250,10 +261,10 @@ class SceneArrived:
 
 def _rooms(state: State, coming: SceneInfo) -> tuple[Room, ...]:
     """Those to go back to once `coming` is on show; the same file twice only where there are edits."""
-    info, editing = state.info, state.editing
-    left = (
-        () if info is None else (Room(info, scene_photos(state), editing.history, editing.saved, state.pose),)
-    )
+    info, editing, left = state.info, state.editing, ()
+    if info is not None:
+        told = (scene_photos(state), editing.history, editing.saved, state.pose, state.keys, state.metric)
+        left = (Room(info, *told),)
     rooms = (room for room in (*left, *state.rooms) if room.info.serial != coming.serial)
     kept = (room for room in rooms if room.edited or room.info.path is None or room.info.path != coming.path)
     return tuple(kept)[:MOST_ROOMS]

@@ -21,6 +21,7 @@ _TOOLS = (
     (Tool.BRUSH, fa.ICON_FA_PAINTBRUSH, "Select with a brush  (B)\n[ and ] change its size"),
     (Tool.SPHERE, fa.ICON_FA_CIRCLE_DOT, "Select with a ball: press on its middle and pull  (O)"),
     (Tool.PICK, fa.ICON_FA_ARROW_POINTER, "Select the thing under a click  (C)"),
+    (Tool.RULER, fa.ICON_FA_RULER, "Measure, and tell how large things are: click on both ends  (T)"),
 )
 _COMBINES: tuple[tuple[Combine, str, str], ...] = (
     ("replace", fa.ICON_FA_SQUARE, "A new selection each time"),

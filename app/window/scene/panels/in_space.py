@@ -30,6 +30,8 @@ def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Comm
     _candidates(state, look, corner, size)
     if state.asking.named and state.mode is Mode.RGB:
         _names(state, look, corner, size)
+    if state.keys and state.tour is None:
+        _keys(state, look, corner, size)
     if state.preferences.photos_in_space and state.flight is None:
         return _frusta(state, look, corner, size)
     return []
@@ -50,6 +52,23 @@ def _candidates(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
         imgui.get_window_draw_list().add_circle(at, look.px(26), colour, 0, look.px(2))
         below = ImVec2(at.x + look.px(30), at.y - look.px(10))
         _caption(look, below, f"{prompt.text.strip()}?", 0.0)
+
+
+def _keys(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
+    """The camera's key frames, numbered, joined in their order."""
+    canvas, before = imgui.get_window_draw_list(), None
+    for number, key in enumerate(state.keys, start=1):
+        found = project(np.array([key.centre]), state.pose, size)
+        if found is None:
+            before = None
+            continue
+        x, y = found[1][0]
+        at = ImVec2(corner.x + float(x), corner.y + float(y))
+        if before is not None:
+            canvas.add_line(before, at, widgets.u32(theme.DARK.ACCENT), look.px(1.5))
+        canvas.add_circle_filled(at, look.px(5), widgets.u32(theme.DARK.ACCENT))
+        _caption(look, ImVec2(at.x + look.px(7), at.y - look.px(10)), str(number), 0.0)
+        before = at
 
 
 def _names(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
