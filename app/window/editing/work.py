@@ -116,7 +116,8 @@ class AtPixel(Selection):
 
 @dataclass(frozen=True)
 class FindThing(AtPixel):
-    """What is of the group that the pixel shows and hangs together with it in space."""
+    """What is of the group that the pixel shows, or of one that means the same, and hangs together with it in
+    space."""
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.scene.instances import instances
@@ -128,11 +129,22 @@ class FindThing(AtPixel):
         of_one = groups[seen] if seen.any() else groups[:0]
         if len(of_one) and of_one.max() >= 0:
             group = np.bincount(of_one[of_one >= 0]).argmax()
-            things = instances(self.scene.gaussians, (groups == group) & self.marks.visible.rows())
+            members = np.isin(groups, self._alike(int(group))) & self.marks.visible.rows()
+            things = instances(self.scene.gaussians, members)
             here = things[seen & (things > 0)]
             if len(here):
                 seen = things == np.bincount(here).argmax()
         yield Found(Mask.of(seen), self.combine, "of a thing")
+
+    def _alike(self, group: int) -> np.ndarray:
+        """The atoms that mean what this one means: a plant is often several groups."""
+        from torch.nn.functional import normalize
+
+        from langflash_core.language.taught import ALIKE
+
+        unit = normalize(self.dictionary().float(), dim=-1)
+        alike = np.flatnonzero((unit @ unit[group]).numpy() >= ALIKE)
+        return np.union1d(alike, group)  # itself also where it is silent
 
 
 @dataclass(frozen=True)
