@@ -33,7 +33,7 @@ HINTS = {
     What.BOXES_CSV: "The same as a table",
     What.BOXES_GLB: "The same as bodies, for Blender and other 3D programs",
     What.SURFACE: "A coloured mesh of what each phrase finds, fused from depth",
-    What.VIDEO: "A round through all views, H.264",
+    What.VIDEO: "A film around it, past the photos or along key frames, H.264",
     What.WEBP: "The same for pages and messages, without a player",
     What.HEAT_VIDEO: "The round with the active phrase's heat-map, H.264",
     What.PLY: "3D Gaussians as other viewers read them",

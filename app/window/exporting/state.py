@@ -115,7 +115,7 @@ class ExportForm:
     side: int = 1024
     seconds: float = 6.0
     fade: bool | None = None
-    way: str = "orbit"
+    way: str = "photos"
     path: str = ""
     proposed: str = ""
     serial: int = 0

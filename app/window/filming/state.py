@@ -7,7 +7,7 @@ from typing import Any
 from ..poses import Pose, Rotation, Vector
 
 MOST_KEYS = 50
-WAYS = (("around it", "orbit"), ("past the photos", "photos"), ("along the key frames", "keys"))
+WAYS = (("past the photos", "photos"), ("around it", "orbit"), ("along the key frames", "keys"))
 """How a film goes: for people, and for `--path`."""
 
 
