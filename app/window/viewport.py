@@ -21,7 +21,7 @@ from langflash_core.scene.edits import Marks, Mask
 from .artist import Artist, Asked
 from .asking.state import Prompt, margin_span
 from .editing.state import Point, Reading, strongest
-from .governor import SETTLE_AFTER, Governor, Kind, Plan
+from .governor import SETTLE_AFTER, Governor, Kind, Plan, thinned_shares
 from .poses import START, Pose, to_camera
 from .scene.state import Mode
 from .state import State
@@ -170,6 +170,17 @@ class Viewport:
         elif renderer.in_software:
             self._artist = Artist(self._notify)
         self.governor = Governor(len(scene.gaussians), slow=self._artist is not None)
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Of the scene's Gaussians, that moving through it wants; `thin` takes them."""
+        return thinned_shares(self.governor.num_gaussians, self.governor.slow)
+
+    def thin(self, scene: "Scene", share: float, thinned: "Scene", rows: np.ndarray) -> None:
+        """A share of the scene's Gaussians is made."""
+        if self._renderer is not None:
+            self._renderer.give_level(scene, share, thinned, rows)
+            self.governor = self.governor.with_share(share)
 
     def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", lapses: int = 0) -> None:
         """Ask the prompts `keys`, in the order of `query`, compiled when `Asking.lapses` was `lapses`;

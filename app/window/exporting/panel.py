@@ -35,7 +35,7 @@ HINTS = {
     What.SURFACE: "A coloured mesh of what each phrase finds, fused from depth",
     What.VIDEO: "A film around it, past the photos or along key frames, H.264",
     What.WEBP: "The same for pages and messages, without a player",
-    What.HEAT_VIDEO: "The round with the active phrase's heat-map, H.264",
+    What.HEAT_VIDEO: "The film with the active phrase's heat-map, H.264",
     What.PLY: "3D Gaussians as other viewers read them",
     What.SPZ: "Compressed, for phones and the web",
     What.SOG: "Compressed as pictures, for SuperSplat and PlayCanvas",

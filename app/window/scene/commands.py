@@ -1,8 +1,10 @@
 """What can happen to the tray and to the scene: photos, files, the jobs that make scenes."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from langflash_core.scene.edits import Marks
 
@@ -12,6 +14,9 @@ from ..editing.state import fresh
 from ..state import State
 from .drops import MAX_PHOTOS
 from .state import MOST_ROOMS, RECONSTRUCTING, Job, Photo, Room, SceneInfo
+
+if TYPE_CHECKING:
+    from langflash_core.types import Scene
 
 # Photos
 
@@ -268,6 +273,19 @@ def _rooms(state: State, coming: SceneInfo) -> tuple[Room, ...]:
     rooms = (room for room in (*left, *state.rooms) if room.info.serial != coming.serial)
     kept = (room for room in rooms if room.edited or room.info.path is None or room.info.path != coming.path)
     return tuple(kept)[:MOST_ROOMS]
+
+
+@dataclass(frozen=True)
+class Thinned:
+    """A share of the scene's Gaussians for a moving camera is made (scene/thin.py)."""
+
+    scene: "Scene" = field(compare=False, repr=False)
+    share: float
+    thinned: "Scene" = field(compare=False, repr=False)
+    rows: np.ndarray = field(compare=False, repr=False)
+
+    def apply(self, state: State) -> State:
+        return state
 
 
 @dataclass(frozen=True)

@@ -29,11 +29,12 @@ from .commands import (
     SaveScene,
     SceneArrived,
     SceneSaved,
+    Thinned,
     dropped,
 )
 from .drops import sort_drop
 from .state import SceneInfo
-from .work import FindPair, LoadScene, MakeThumbnails, ReconstructPhotos, WriteScene
+from .work import FindPair, LoadScene, MakeThumbnails, ReconstructPhotos, Thin, WriteScene
 
 
 class SceneEffects(Effects):
@@ -68,6 +69,10 @@ class SceneEffects(Effects):
                 submit(FindPair(tuple(photo.path for photo in state.photos)))
             case SceneArrived(info):
                 self._show(info)
+                for share in self._viewport.shares:
+                    submit(Thin(info.serial, info.scene, share))
+            case Thinned(scene, share, thinned, rows):
+                self._viewport.thin(scene, share, thinned, rows)
             case Loaded() if state.info is None and self._viewport.warm():
                 self._hands.dispatch(Loaded())
             case _:

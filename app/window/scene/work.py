@@ -17,8 +17,8 @@ from langflash_core.scene.edits import History, Marks
 from ..commands import Command, ShowPicture
 from ..filming.state import read, stored
 from ..poses import Pose, Vector, from_view, median_reach
-from ..requests import Asked, Errand, Job
-from .commands import ChoosingFailed, PairChosen, PhotoFailed, PhotoRead, SceneArrived, SceneSaved
+from ..requests import Asked, Errand, Job, SceneErrand
+from .commands import ChoosingFailed, PairChosen, PhotoFailed, PhotoRead, SceneArrived, SceneSaved, Thinned
 from .state import SceneInfo
 
 if TYPE_CHECKING:
@@ -139,6 +139,19 @@ class WriteScene(Errand):
         scene = self.scene if self.marks is None else edited_scene(self.scene, self.marks)
         export(scene.with_record(camera_path=stored(self.keys), metric_scale=self.metric), self.path)
         yield SceneSaved(self.path, self.marks)
+
+
+@dataclass(frozen=True)
+class Thin(SceneErrand):
+    """Fewer, wider Gaussians for a moving camera."""
+
+    scene: "Scene" = field(repr=False)
+    share: float
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.scene.thin import thin_with_rows
+
+        yield Thinned(self.scene, self.share, *thin_with_rows(self.scene, self.share))
 
 
 @dataclass(frozen=True)
