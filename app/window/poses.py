@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 UP = np.array([0.0, -1.0, 0.0])
 MIN_REACH = 0.02  # scene units; nearer than this the pivot is inside the lens
+NEAREST = 0.02  # scene units in front of the camera from which something is marked in the picture
 MIN_POLE_DEGREES = 4.0  # how near to straight up or down an orbit may come
 FOV_RANGE = (15.0, 120.0)
 FRAME_MARGIN = 1.08  # around what is framed
@@ -122,6 +123,19 @@ def to_camera(pose: Pose, width: int, height: int) -> "Camera":
         width,
         height,
     )
+
+
+def project(
+    points: np.ndarray, pose: Pose, size: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Camera coordinates (n, 3) and pixels (n, 2) of world points in a picture of `size`; None where one is
+    not in front."""
+    matrix = viewmat(pose)
+    pos_c = points @ matrix[:3, :3].T + matrix[:3, 3]
+    if pos_c[:, 2].min() < NEAREST:
+        return None
+    pos_px = pos_c @ intrinsics(pose, max(round(size[0]), 1), max(round(size[1]), 1)).T
+    return pos_c, pos_px[:, :2] / pos_px[:, 2:]
 
 
 def orbit(pose: Pose, yaw: float, pitch: float) -> Pose:

@@ -28,7 +28,7 @@ class PlanTour(Errand):
 
 def way(keys: Sequence[Pose], seconds: float) -> tuple[Pose, ...]:
     """Poses of a film of so many seconds along two or more key frames."""
-    from ...cli.video import along
+    from ..tours import along  # loads torch; the worker has by now
 
     width, height = _SIDE, max(2, round(_SIDE / keys[0].aspect))
     cameras = along(

@@ -4,9 +4,9 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from ... import commands as do
+from ... import poses
 from ...kit import theme, widgets
 from ...kit.look import Look
-from ...scene.panels.in_space import project
 from ...state import State
 from .. import pointing as point
 from ..state import Tool
@@ -19,7 +19,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     """The line between both ends with its length; with the ruler in hand, a field for it."""
     if state.editing.tool is not Tool.RULER or not state.editing.ruler:
         return []
-    found = project(np.array(state.editing.ruler), state.pose, size)
+    found = poses.project(np.array(state.editing.ruler), state.pose, (size.x, size.y))
     if found is None:
         return []
     ends = [ImVec2(place.x + float(x), place.y + float(y)) for x, y in found[1]]

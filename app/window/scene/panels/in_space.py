@@ -7,7 +7,7 @@ from imgui_bundle import icons_fontawesome_6 as fa
 
 from ... import commands as do
 from ... import poses
-from ...asking.panels import known
+from ...asking.things import told
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...poses import Pose
@@ -16,7 +16,6 @@ from .. import camera
 from ..state import Mode
 
 FRUSTUM = 0.10  # length of a frustum in distances to the pivot of its view
-NEAREST = 0.02  # scene units in front of the camera from which a frustum is drawn
 _HANDLE = 13.0  # design pixels
 
 
@@ -42,7 +41,7 @@ def _candidates(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
     for prompt in state.asked:
         if not prompt.maybe or prompt.place is None:
             continue
-        found = project(np.array([prompt.place]), state.pose, size)
+        found = poses.project(np.array([prompt.place]), state.pose, (size.x, size.y))
         if found is None:
             continue
         x, y = found[1][0]
@@ -58,7 +57,7 @@ def _keys(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
     """The camera's key frames, numbered, joined in their order."""
     canvas, before = imgui.get_window_draw_list(), None
     for number, key in enumerate(state.keys, start=1):
-        found = project(np.array([key.centre]), state.pose, size)
+        found = poses.project(np.array([key.centre]), state.pose, (size.x, size.y))
         if found is None:
             before = None
             continue
@@ -75,9 +74,9 @@ def _names(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
     """What the scene knows, at its place; the largest first, and none over another."""
     insight = state.asking.insight
     taken: list[tuple[float, float, float, float]] = []
-    for name, k in known.told(state).items():
+    for name, k in told(state).items():
         place = insight.places[k] if insight is not None and k < len(insight.places) else None
-        found = None if place is None else project(np.array([place]), state.pose, size)
+        found = None if place is None else poses.project(np.array([place]), state.pose, (size.x, size.y))
         if found is None:
             continue
         (x, y), extent = found[1][0], imgui.calc_text_size(name)
@@ -110,7 +109,8 @@ def _frusta(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.C
     shown = [
         (float(pos_c[:, 2].mean()), view, points)
         for view, pose in enumerate(state.info.views)
-        if (projected := project(frustum(pose), state.pose, size)) is not None and state.view != view
+        if (projected := poses.project(frustum(pose), state.pose, (size.x, size.y))) is not None
+        and state.view != view
         for pos_c, points in [projected]
     ]
     for _, view, points in sorted(shown, key=lambda each: -each[0]):  # far ones first
@@ -153,17 +153,6 @@ def frustum(pose: Pose) -> np.ndarray:
     rays = pixels @ np.linalg.inv(K).T
     corners = rays * FRUSTUM * pose.reach
     return np.concatenate((np.zeros((1, 3)), corners)) @ pose.axes.T + np.array(pose.centre)
-
-
-def project(points: np.ndarray, pose: Pose, size: ImVec2) -> tuple[np.ndarray, np.ndarray] | None:
-    """Camera coordinates (n, 3) and pixels (n, 2) of world points; None where one is not in front."""
-    matrix = poses.viewmat(pose)
-    pos_c = points @ matrix[:3, :3].T + matrix[:3, 3]
-    if pos_c[:, 2].min() < NEAREST:
-        return None
-    K = poses.intrinsics(pose, max(round(size.x), 1), max(round(size.y), 1))
-    pos_px = pos_c @ K.T
-    return pos_c, pos_px[:, :2] / pos_px[:, 2:]
 
 
 # Comparison

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.cli.video import along, camera_of
+from app.cli.cameras import camera_of
 from app.window import commands as do
 from app.window.exporting.order import Order, order
 from app.window.exporting.process import keys_json
@@ -18,6 +18,7 @@ from app.window.poses import Vector, facing, orbit
 from app.window.scene import camera
 from app.window.scene.state import FLIGHT_SECONDS
 from app.window.state import State
+from app.window.tours import along
 from langflash_core.types import Record
 from tests.app.window.scenes import after, shown_scene
 
