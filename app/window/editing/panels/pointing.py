@@ -15,7 +15,7 @@ from .. import commands as edit
 from .. import pointing as point
 from ..state import PICK_RADIUS, Card, Point, Reading, Tool
 
-_CARD = 268.0  # design pixels wide
+_CARD = 312.0  # design pixels wide
 _SHOWN_WORDS = 5
 
 
