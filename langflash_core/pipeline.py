@@ -255,7 +255,7 @@ def web_page(
             gram=atoms @ atoms.T,
             temperature=compiled.temperature,
             threshold=limit,
-            dictionary=finite_dictionary(scene) if with_text else None,
+            dictionary=finite_dictionary(scene, language_space("minilm")) if with_text else None,
         )
     text_model = _text_model() if with_text else None
     write_html(scene, path, phrases=phrases, text_model=text_model, title=title)

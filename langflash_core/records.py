@@ -26,8 +26,9 @@ class Record:
     warnings: a sentence each. metric_scale: metres per scene unit. network_unit: the network's
     length units per scene unit. counts: Gaussians predicted and left out. pruning: as `prune` left
     it. refinement: what a fit to the photos brought. calibration: what the network's checkpoint
-    says about scores, instead of its language space. atom_names: a person's own, by atom.
-    silent_atoms: those that answer no phrase. num_deleted: Gaussians that edits took away.
+    says about scores, instead of its language space. atom_names: a person's own, by atom, which it
+    answers to. atom_denials: what a person said that an atom is not. silent_atoms: those that answer
+    no phrase. num_deleted: Gaussians that edits took away. camera_path: the window's key frames.
     others: what a file says under keys that this version does not know.
     """
 
@@ -42,7 +43,9 @@ class Record:
     refinement: Mapping[str, Any] = field(default_factory=dict)
     calibration: Mapping[str, Any] = field(default_factory=dict)
     atom_names: Mapping[int, str] = field(default_factory=dict)
+    atom_denials: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
     silent_atoms: tuple[int, ...] = ()
     num_deleted: int = 0
+    camera_path: tuple[Mapping[str, Any], ...] = ()
     cost: Cost = Cost()
     others: Mapping[str, Any] = field(default_factory=dict)

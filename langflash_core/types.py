@@ -212,7 +212,7 @@ class Scene:
         if self.view_ids is not None:
             _shape("view_ids", self.view_ids, (count,))
             _names("view_ids", self.view_ids, num_views)
-        for name in ("atom_names", "silent_atoms"):
+        for name in ("atom_names", "atom_denials", "silent_atoms"):
             atoms = torch.tensor(list(getattr(self.record, name)), dtype=torch.int64)
             _names(name, atoms, self.semantics.num_atoms)
 

@@ -9,8 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from scipy.interpolate import CubicSpline, PchipInterpolator
-from scipy.spatial.transform import Rotation, RotationSpline
 
 from langflash_core.colormaps import HeatColours
 from langflash_core.errors import InputError, LangFlashError, ViewError
@@ -21,11 +19,11 @@ from langflash_core.running import Progress
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
 
 from ..window.poses import Pose, Vector, blend, framing, from_view, median_reach, orbit, to_camera
+from ..window.tours import RATE, along, even
 from .cameras import camera_of
 from .files import readable_file
 from .renderers import Renderer
 
-RATE = 30  # pictures a second
 SECONDS = 6.0
 LONGEST = 600.0  # seconds
 _SWAY = (math.radians(12), math.radians(4))  # yaw and pitch around a single photo: further out are holes
@@ -69,7 +67,7 @@ def way(
         ViewError: the key frames cannot be used.
     """
     if path in (None, "photos", "orbit"):
-        width, height = _even(size or scene.view_size)
+        width, height = even(size or scene.view_size)
         views = _poses(scene)
         around = _turn(views[0], shown) if path == "orbit" else None
         count = max(1, round(RATE * (seconds or SECONDS)))
@@ -135,11 +133,6 @@ def _encoder(path: Path, size: tuple[int, int]) -> Generator[None, bytes | None,
     return imageio_ffmpeg.write_frames(str(path), size, fps=RATE, macro_block_size=2, **own)
 
 
-def _even(size: tuple[int, int]) -> tuple[int, int]:
-    width, height = (max(2, side // 2 * 2) for side in size)
-    return width, height
-
-
 def _poses(scene: Scene) -> list[Pose]:
     means = scene.gaussians.means.double().cpu().numpy()
     pairs = zip(scene.viewmats.double().cpu().numpy(), scene.Ks.double().cpu().numpy(), strict=True)
@@ -196,24 +189,3 @@ def read_key_frames(path: Path, seconds: float | None) -> tuple[list[Camera], li
     if seconds is not None:
         raise ViewError(f"{path} says its times; leave --seconds away")
     return cameras, [number - numbers[0] for number in numbers]
-
-
-def along(cameras: list[Camera], times: list[float], size: tuple[int, int] | None = None) -> list[Camera]:
-    """Smoothly through all key frames: splines of place and rotation, lenses in between without overshoot.
-
-    Speeds are continuous. Source: of the rotations, scipy's RotationSpline.
-    """
-    width, height = _even(size or (cameras[0].width, cameras[0].height))
-    sized = [camera.resized(width, height) for camera in cameras]
-    turns = np.stack([camera.viewmat[:3, :3].double().numpy() for camera in sized])
-    centres = np.stack([-R.T @ c.viewmat[:3, 3].double().numpy() for R, c in zip(turns, sized, strict=True)])
-    lenses = PchipInterpolator(times, np.stack([camera.K.double().numpy() for camera in sized]))
-    moments = np.arange(max(1, round(RATE * times[-1])) + 1) / RATE
-    moments = np.minimum(moments, times[-1])
-    rotations = RotationSpline(times, Rotation.from_matrix(turns))(moments).as_matrix()
-    places = CubicSpline(times, centres)(moments)
-    viewmats = np.tile(np.eye(4), (len(moments), 1, 1))
-    viewmats[:, :3, :3] = rotations
-    viewmats[:, :3, 3] = -(rotations @ places[..., None])[..., 0]
-    found = zip(torch.from_numpy(viewmats).float(), torch.from_numpy(lenses(moments)).float(), strict=True)
-    return [Camera(viewmat, K, width, height) for viewmat, K in found]

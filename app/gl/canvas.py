@@ -1,4 +1,5 @@
-"""What renderers draw with and on: the programs of a context, and targets of the last two sizes."""
+"""What renderers draw with and on: the programs of a context, and targets of the last two sizes,
+weight maps of the last one alone."""
 
 from typing import Literal
 
@@ -41,8 +42,8 @@ class Canvas:
     def view(self, size: tuple[int, int]) -> ViewTargets:
         """The targets of (width, height) pixels.
 
-        Those of the size before are kept, so that what they show can stay until the new ones are painted;
-        older ones are given back.
+        Those of the size before are kept, so that what they show can stay until the new ones are painted,
+        without their weight maps, which take the most; older ones are given back.
 
         Raises:
             ValueError: the size has no pixels.
@@ -56,6 +57,8 @@ class Canvas:
             found = ViewTargets(self.painter, size, _DTYPES[self.precision])
         else:
             self._views.remove(found)
+        for other in self._views:
+            other.forget_maps()
         self._views.append(found)
         return found
 

@@ -116,6 +116,7 @@ class PackedMaps:
     def forget(self) -> None:
         """Pack anew for the next question."""
         self._version = 0
+        self._layers.release()
 
     def release(self) -> None:
         self._layers.release()

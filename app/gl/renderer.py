@@ -194,6 +194,11 @@ class SplatRenderer:
         if asked is not None and asked.compiled.factor.shape[0] == scene.semantics.num_atoms:
             self._question = Question(asked.compiled, asked.answers)
 
+    def give_level(self, scene: Scene, share: float, thinned: Scene, rows: np.ndarray) -> None:
+        """A level of `scene` that was thinned elsewhere (scene/thin.py), if that is on show."""
+        if self._scene is not None and self._scene.scene is scene:
+            self._scene.give(share, thinned, rows)
+
     def mark(self, shown: np.ndarray, tints: np.ndarray) -> None:
         """Draw only some Gaussians, and some in a tint (`splats.TINTS`); holds until `set_scene`.
 

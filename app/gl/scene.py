@@ -113,6 +113,11 @@ class LiveScene:
             self._made(share, *thin_with_rows(self.scene, share))
         return self._levels[share]
 
+    def give(self, share: float, thinned: Scene, rows: np.ndarray) -> None:
+        """The level of so many Gaussians as `thin_with_rows` made it, on whatever thread."""
+        if share not in self._levels:
+            self._made(share, thinned, rows)
+
     def photo_depths(self, own: bool) -> PhotoDepths:
         """What the photos see, of all Gaussians or each of its own alone; drawn once."""
         if own not in self._photos:

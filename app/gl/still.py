@@ -7,7 +7,7 @@ result (`SplatRenderer.bring`) and shows it like its own.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import count
 from threading import Lock
@@ -16,10 +16,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from langflash_core.errors import Cancelled
 from langflash_core.language.relevance import CompiledQuery, relevance_maps
 from langflash_core.splat.projection import ALPHA_MIN, NEAR, drawable_rows, project, view_colours
 from langflash_core.splat.tiles import rasterize_tiles
-from langflash_core.types import LUMA, Camera, Frame, Scene
+from langflash_core.types import LUMA, Camera, Frame, Scene, Semantics
 
 from .splats import TINTED, TINTS
 
@@ -135,24 +136,40 @@ def draw_still(
     Raises:
         Cancelled: `stopping` said so.
     """
+
+    def go_on() -> None:
+        if stopping():
+            raise Cancelled("the picture is no longer wanted")
+
     kept = drawable_rows(scene)
     if marks is not None:
         kept &= torch.from_numpy(marks[0])
     gaussians = scene.gaussians.map(lambda v: v.detach()[kept])
+    go_on()
     footprints = project(gaussians.map(lambda v: v.double()), camera)
+    go_on()
     colours = view_colours(gaussians, camera).float().clamp_max(_HALF_MAX)
     if marks is not None:
         colours = _tinted(colours, torch.from_numpy(marks[1])[kept])
     depths = torch.zeros(len(gaussians)).index_copy(0, footprints.ids, footprints.depths.float())
     features = [torch.cat((colours, depths[:, None]), -1)]
     if weight_maps:
-        weights = scene.semantics.dense_weights() if carried is None else carried
-        features.append(weights.detach()[kept].half())
+        if carried is None:
+            features.append(_sparse_in_half(scene.semantics.rows(kept)))
+        else:
+            features.append(carried.detach()[kept].half())
+        go_on()
     maps, alphas = rasterize_tiles(footprints, features, camera, threads=threads, stopping=stopping)
     colour = torch.cat((maps[0][..., :3], alphas[..., None]), -1).half().numpy()
     depth = torch.stack((maps[0][..., 3], alphas), -1).numpy()
     still = StillMaps(maps[1]) if weight_maps else None
     return Still(camera, colour, depth, _middle(footprints.depths), still)
+
+
+def _sparse_in_half(semantics: Semantics) -> Tensor:
+    """`dense_weights` in half precision, made without a copy in full."""
+    values = semantics.weight_values.detach().half()
+    return replace(semantics, weight_values=values).dense_weights()
 
 
 def _middle(depths: Tensor) -> tuple[float, float]:

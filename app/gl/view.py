@@ -93,6 +93,11 @@ class ViewTargets:
         for answers in self._answers.values():
             answers.forget()
 
+    def forget_maps(self) -> None:
+        """Give the weight maps back; whoever asks for them draws them anew."""
+        self.maps.release()
+        self.packed.forget()
+
     def _fast_passes(self, num_phrases: int) -> FastPasses:
         if self._fast is None or self._fast.num_phrases != num_phrases:
             self._release_fast()

@@ -1,7 +1,7 @@
 """A thread that works for the picture beside the window: one order at a time, the newest alone counts.
 
 Still pictures and their answers take a machine without a graphics card a second or two. Here no frame waits
-for them, and what is no longer wanted stops within milliseconds.
+for them, and what is no longer wanted stops at the next of its steps.
 """
 
 import logging

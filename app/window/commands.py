@@ -59,7 +59,11 @@ class Tick:
             fraction = (self.now - flight.began) / FLIGHT_SECONDS
             pose = poses.blend(flight.start, flight.end, fraction)
             flight = flight if fraction < 1.0 else None
-        return replace(state, now=self.now, toasts=toasts, pose=pose, flight=flight)
+        tour = state.tour
+        if tour is not None:
+            there = tour.at(self.now)
+            pose, tour = (tour.poses[-1], None) if there is None else (there, tour)
+        return replace(state, now=self.now, toasts=toasts, pose=pose, flight=flight, tour=tour)
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,11 @@
 """How much to draw, so that a slow machine stays fluent: what the last pictures cost decides.
 
 While the camera moves, a picture should take `MOVING_SECONDS`: one that takes longer sends the next
-ones down a ladder of smaller pictures, for large scenes also of fewer Gaussians; ones that take less
-than half send them up again, a rung at a time. Colour, colour with the fast mode's relevance, and
-exact maps are paced apart, because they cost so differently. At rest the picture settles: at once at
-full size where that is quick, else smaller first and full after a longer pause, so that neither the
-next drag nor the next keystroke is met by a frozen window.
+ones down a ladder of smaller pictures, for large scenes also of fewer Gaussians once those are made;
+ones that take less than half send them up again, a rung at a time. Colour, colour with the fast mode's
+relevance, and exact maps are paced apart, because they cost so differently. At rest the picture settles:
+at once at full size where that is quick, else smaller first and full after a longer pause, so that neither
+the next drag nor the next keystroke is met by a frozen window.
 """
 
 import math
@@ -17,6 +17,7 @@ QUICK_SECONDS = 0.15  # a full picture this quick is drawn as soon as the hands 
 SETTLE_AFTER = 0.12  # seconds since the last motion, key or pointer event
 FULL_AFTER = 0.70
 LARGE_SCENE = 200_000  # Gaussians, from which drawing fewer of them pays
+MIDDLING_SCENE = 30_000  # the same where OpenGL runs on the processor
 _RUNG_FACTOR = 1.8  # about what a rung saves
 
 
@@ -53,23 +54,43 @@ SIZES_OF_LARGE_SCENES = (
     (0.35, 0.0625),
     (0.25, 0.0625),
 )
+SIZES_OF_MIDDLING_SCENES = ((1.0, 1.0), (0.75, 1.0), (0.5, 1.0), (0.5, 0.25), (0.35, 0.25), (0.25, 0.25))
 _START = 2  # rung of an unknown machine
+
+
+def _ladder(num_gaussians: int, slow: bool) -> tuple[tuple[float, float], ...]:
+    if num_gaussians >= LARGE_SCENE:
+        return SIZES_OF_LARGE_SCENES
+    return SIZES_OF_MIDDLING_SCENES if slow and num_gaussians >= MIDDLING_SCENE else SIZES
+
+
+def thinned_shares(num_gaussians: int, slow: bool) -> tuple[float, ...]:
+    """Shares of a scene's Gaussians that moving through it wants, the larger first."""
+    return tuple(sorted({share for _, share in _ladder(num_gaussians, slow)} - {1.0}, reverse=True))
 
 
 @dataclass(frozen=True)
 class Governor:
-    """For one scene. slow: where OpenGL runs on the processor. full_seconds: what a full picture of a kind
+    """For one scene. slow: where OpenGL runs on the processor. shares: of the Gaussians, that are made; 1
+    always is. full_seconds: what a full picture of a kind
     cost last, smoothed; rungs: where on the ladder a kind moves."""
 
     num_gaussians: int = 0
     slow: bool = False
+    shares: tuple[float, ...] = ()
     full_seconds: dict[Kind, float] = field(default_factory=dict)
     rungs: dict[Kind, int] = field(default_factory=dict)
 
     @property
     def ladder(self) -> tuple[tuple[float, float], ...]:
         """(scale, share) from dear to cheap."""
-        return SIZES if self.num_gaussians < LARGE_SCENE else SIZES_OF_LARGE_SCENES
+        ladder = _ladder(self.num_gaussians, self.slow)
+        return ladder if {1.0, *self.shares} >= {share for _, share in ladder} else SIZES
+
+    def with_share(self, share: float) -> "Governor":
+        """Once that share of the Gaussians is made; with other rungs one begins anew."""
+        made = replace(self, shares=tuple({*self.shares, share}))
+        return made if made.ladder == self.ladder else replace(made, rungs={})
 
     def learn(self, plan: Plan, seconds: float, moving: bool = True) -> "Governor":
         """Account for a picture just drawn, while the camera moved or at rest."""

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 UP = np.array([0.0, -1.0, 0.0])
 MIN_REACH = 0.02  # scene units; nearer than this the pivot is inside the lens
+NEAREST = 0.02  # scene units in front of the camera from which something is marked in the picture
 MIN_POLE_DEGREES = 4.0  # how near to straight up or down an orbit may come
 FOV_RANGE = (15.0, 120.0)
 FRAME_MARGIN = 1.08  # around what is framed
@@ -124,6 +125,19 @@ def to_camera(pose: Pose, width: int, height: int) -> "Camera":
     )
 
 
+def project(
+    points: np.ndarray, pose: Pose, size: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Camera coordinates (n, 3) and pixels (n, 2) of world points in a picture of `size`; None where one is
+    not in front."""
+    matrix = viewmat(pose)
+    pos_c = points @ matrix[:3, :3].T + matrix[:3, 3]
+    if pos_c[:, 2].min() < NEAREST:
+        return None
+    pos_px = pos_c @ intrinsics(pose, max(round(size[0]), 1), max(round(size[1]), 1)).T
+    return pos_c, pos_px[:, :2] / pos_px[:, 2:]
+
+
 def orbit(pose: Pose, yaw: float, pitch: float) -> Pose:
     """Turn around the pivot, radians: yaw about world up, pitch about the camera's x axis."""
     turned = look(pose, yaw, pitch)
@@ -189,6 +203,19 @@ def zoom(pose: Pose, factor: float) -> Pose:
     reach = max(pose.reach * factor, MIN_REACH)
     centre = pose.pivot - reach * pose.axes[:, 2]
     return replace(pose, centre=Vector(*centre.tolist()), reach=reach)
+
+
+def facing(pose: Pose, forward: Vector) -> Pose:
+    """The pose that looks along a world direction at the same pivot, upright; straight up or down, with the
+    picture's right side where it was."""
+    ahead = np.array(forward) / np.linalg.norm(forward)
+    right = np.cross(-UP, ahead)
+    if np.linalg.norm(right) < 1e-6:
+        right = pose.axes[:, 0] - (pose.axes[:, 0] @ ahead) * ahead
+    right /= np.linalg.norm(right)
+    axes = np.stack((right, np.cross(ahead, right), ahead), axis=1)
+    centre = pose.pivot - pose.reach * ahead
+    return replace(pose, centre=Vector(*centre.tolist()), rotation=_quaternion(axes))
 
 
 def with_fov(pose: Pose, degrees: float) -> Pose:

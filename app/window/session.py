@@ -24,11 +24,13 @@ from .editing.effects import EditingEffects
 from .effects import Effects, Hands
 from .events import Events
 from .exporting.effects import ExportingEffects
+from .filming.effects import FilmingEffects
 from .frame.layout import draw_all
 from .kit import theme
 from .kit.look import Look
 from .kit.textures import Thumbnails
 from .log import LogEffects
+from .opening.effects import OpeningEffects
 from .recovery import preferences
 from .recovery.commands import Prefer
 from .recovery.effects import RecoveryEffects
@@ -96,10 +98,12 @@ class Session:
         recovery = RecoveryEffects(hands, keeper)
         self._effects = (
             SceneEffects(hands, self._viewport, self._thumbnails, self._entitle),
+            OpeningEffects(hands, self._thumbnails, lambda: desktop.clipboard(self._window)),
             AskingEffects(hands, self._viewport),
             EditingEffects(hands, self._viewport),
             recovery,
             ExportingEffects(hands, keeper),
+            FilmingEffects(hands),
             LogEffects(hands),
         )
         recovery.begin(remembered, complaint, empty=not paths)
@@ -196,17 +200,22 @@ class Session:
         """Whether ImGui is still settling, or has events that it left for another frame."""
         return self._awake > 0 or not imgui.get_current_context().input_events_queue.empty()
 
+    @property
+    def _flying(self) -> bool:
+        """Whether the camera moves by itself."""
+        return self.state.flight is not None or self.state.tour is not None
+
     def _due(self, now: float) -> bool:
         """Whether the next frame would show something new."""
         blink = imgui.get_io().want_text_input and now - self.state.now >= BLINK_SECONDS
         expired = any(t.until <= now for t in self.state.toasts)
         working = self.state.job is not None and now - self.state.now >= 0.1
         settle = now >= self._viewport_wants
-        return self._busy or self.state.flight is not None or blink or expired or working or settle
+        return self._busy or self._flying or blink or expired or working or settle
 
     def _nap(self) -> float:
         """Seconds to sleep unless an event comes."""
-        if self._busy or self._inbox or self.state.flight is not None:
+        if self._busy or self._inbox or self._flying:
             return 0.0
         now = self._now()
         moments = [self._viewport_wants, *(effects.due for effects in self._effects)]
@@ -264,6 +273,7 @@ class Session:
             self._viewport.depth_range,
             self._viewport.passes,
             self._viewport.settling,
+            self._viewport.failing,
         )
         self._perform(Measured(stats))
         return drawing

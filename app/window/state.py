@@ -9,6 +9,8 @@ from langflash_core.colormaps import HeatColours
 from .asking.state import FIRST_PROMPT, NO_ASKING, Asking, Prompt, usable
 from .editing.state import NO_EDITING, Editing
 from .exporting.state import NO_EXPORTING, Exporting
+from .filming.state import Tour
+from .opening.state import NO_OPENING, Opening
 from .poses import START, Pose
 from .recovery.preferences import DEFAULTS, Preferences
 from .recovery.state import NO_RECOVERY, Recovery
@@ -40,7 +42,7 @@ class Line:
 @dataclass(frozen=True)
 class Stats:
     """Figures of the status bar; the session refreshes them every frame. settling: a finer picture than the
-    one on show is being drawn."""
+    one on show is being drawn. failing: it could not be, and is tried again."""
 
     frame_seconds: float = 0.0
     picture_seconds: float = 0.0
@@ -49,6 +51,7 @@ class Stats:
     depth_range: tuple[float, float] = (0.0, 1.0)
     passes: tuple[tuple[str, int], ...] = ()
     settling: bool = False
+    failing: bool = False
 
 
 NO_STATS = Stats()
@@ -71,10 +74,11 @@ class State:
 
     now: seconds of the session's clock, set at the start of a frame. aside: photos of the scene on show while
     those of a new room are in the tray. choosing: the best pair is being
-    looked for. view: of the photo stood at, if any. compare: where the photo begins, 0 to 1 across the
-    picture; None: not compared. negatives: the person's own; none: those of the scene. lines: the log,
-    oldest first. rooms: scenes that were on show before, the last one first. dropped: photos while it is
-    asked where they belong. pending: commands that wait for an answer about unsaved edits.
+    looked for. keys: key frames of the camera's path. tour: a flight along them. metric: metres per scene
+    unit, where that is known. view: of the photo stood at, if any. compare: where the photo begins, 0 to 1
+    across the picture; None: not compared. negatives: the person's own; none: those of the scene. lines:
+    the log, oldest first. rooms: scenes that were on show before, the last one first. dropped: photos while
+    it is asked where they belong. pending: commands that wait for an answer about unsaved edits.
     """
 
     now: float = 0.0
@@ -91,6 +95,9 @@ class State:
     mode: Mode = Mode.RGB
     pose: Pose = START
     flight: Flight | None = None
+    keys: tuple[Pose, ...] = ()
+    tour: Tour | None = None
+    metric: float | None = None
     view: int | None = None
     compare: float | None = None
     job: Job | None = None
@@ -103,6 +110,7 @@ class State:
     editing: Editing = NO_EDITING
     asking: Asking = NO_ASKING
     exporting: Exporting = NO_EXPORTING
+    opening: Opening = NO_OPENING
     recovery: Recovery = NO_RECOVERY
     preferences: Preferences = DEFAULTS
     lines: tuple[Line, ...] = ()

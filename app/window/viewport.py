@@ -21,7 +21,7 @@ from langflash_core.scene.edits import Marks, Mask
 from .artist import Artist, Asked
 from .asking.state import Prompt, margin_span
 from .editing.state import Point, Reading, strongest
-from .governor import SETTLE_AFTER, Governor, Kind, Plan
+from .governor import SETTLE_AFTER, Governor, Kind, Plan, thinned_shares
 from .poses import START, Pose, to_camera
 from .scene.state import Mode
 from .state import State
@@ -43,6 +43,7 @@ STILLS = (0.5, 1.0)
 """Scales of the still pictures that follow each other where OpenGL runs on the processor."""
 LONG_SECONDS = 0.1  # a picture that took as long is painted in the next frame
 MOST_THREADS = 8  # of a still picture
+RETRY_SECONDS = 5.0  # until a still picture that could not be drawn is tried again
 SHOWN_ALPHA = 0.5  # as in the answers: from here on a pixel shows the scene
 MASKS = {Mode.MASKS: "flat", Mode.ISOLATE: "isolate", Mode.HIDE: "hide", Mode.DIM: "dim"}
 
@@ -83,7 +84,7 @@ class Viewport:
         self._ctx = ctx
         self._notify = notify
         self._artist: Artist | None = None  # where OpenGL runs on the processor
-        self._failed: object = None  # the order that came to nothing, which is not repeated
+        self._failed: tuple[object, float] | None = None  # the order that came to nothing, and when
         self._fresh = False  # a scene has just been taken
         self._unpainted = False  # a picture was drawn that the next frame paints
         self._carried = True  # whether Gaussians have their numbers for the query
@@ -93,6 +94,7 @@ class Viewport:
         self._renderer: SplatRenderer | None = None
         self._serial = 0
         self._query: CompiledQuery | None = None
+        self._question = 0  # how many were asked so far; names the query
         self._keys: tuple[int, ...] = ()
         self._lapses = 0  # when the query was compiled
         self._drawn: _Drawn | None = None
@@ -161,7 +163,7 @@ class Viewport:
         self._drawn = self._texture = self._colouring = self._answered = None
         self._marks = (None, None)
         self._shown: tuple[np.ndarray, np.ndarray] | None = None
-        self._still = self._finished = None
+        self._still = self._finished = self._failed = None
         self._fresh, self._unpainted = True, False
         if self._artist is not None:
             self._artist.drop()
@@ -169,10 +171,22 @@ class Viewport:
             self._artist = Artist(self._notify)
         self.governor = Governor(len(scene.gaussians), slow=self._artist is not None)
 
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Of the scene's Gaussians, that moving through it wants; `thin` takes them."""
+        return thinned_shares(self.governor.num_gaussians, self.governor.slow)
+
+    def thin(self, scene: "Scene", share: float, thinned: "Scene", rows: np.ndarray) -> None:
+        """A share of the scene's Gaussians is made."""
+        if self._renderer is not None:
+            self._renderer.give_level(scene, share, thinned, rows)
+            self.governor = self.governor.with_share(share)
+
     def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", lapses: int = 0) -> None:
         """Ask the prompts `keys`, in the order of `query`, compiled when `Asking.lapses` was `lapses`;
         None asks nothing."""
         self._keys, self._query, self._lapses = keys, query, lapses
+        self._question += 1
         self._colouring = self._answered = None
         self._carried = query is None
         if self._renderer is not None:
@@ -237,6 +251,7 @@ class Viewport:
             return float("inf")
         if (state.pose, size) != (self._pose, self._size):
             self._pose, self._size, self._moved = state.pose, size, state.now
+            self._failed = None
         if self._fresh:  # to take a scene took a frame's time
             self._fresh = False
             return 0.0
@@ -269,9 +284,9 @@ class Viewport:
             if self._unpainted:
                 return 0.0
         done = artist.take()
-        if done is not None and done[1] is None:
-            self._failed = done[0]
-        elif done is not None and isinstance(done[0], _Drawn):
+        if done is not None:
+            self._failed = (done[0], state.now) if done[1] is None else None
+        if done is not None and done[1] is not None and isinstance(done[0], _Drawn):
             self._finished = done[0], *done[1]
         self._bring(wanted, state)
         if still >= SETTLE_AFTER:
@@ -279,7 +294,9 @@ class Viewport:
         else:
             artist.drop()
         self._colour(state)
-        return max(SETTLE_AFTER - still, 0.0) if still < SETTLE_AFTER else float("inf")
+        if still < SETTLE_AFTER:
+            return max(SETTLE_AFTER - still, 0.0)
+        return float("inf") if self._failed is None else max(self._failed[1] + RETRY_SECONDS - state.now, 0.0)
 
     def _order(self, artist: Artist, wanted: _Drawn, kind: Kind, state: State) -> None:
         """The next still picture, or what the one on show does not tell yet."""
@@ -289,12 +306,14 @@ class Viewport:
         if scale is None or self._finished is not None:
             still = self._still if self._finished is None else self._finished[1]
             if still is not None and not self._tells(still, state):
-                asked, name = self._questions(state), (still.key, id(self._query), state.mode)
-                if name != self._failed:
+                asked, name = self._questions(state), (still.key, self._question, state.mode)
+                if not self._waits(name, state.now):
                     artist.order(name, lambda stopping: asked(still) or True)
+            else:
+                self._failed = None  # there is all that is wanted
             return
         name = wanted.at(kind, scale)
-        if name == self._failed:
+        if self._waits(name, state.now):
             return
         width, height = (max(8, round(side * scale)) for side in wanted.size)
         camera, info, shown = to_camera(wanted.pose, width, height), state.info, self._shown
@@ -313,6 +332,15 @@ class Viewport:
             return drawn, time.perf_counter() - start
 
         artist.order(name, work)
+
+    def _waits(self, name: object, now: float) -> bool:
+        """Whether an order came to nothing a moment ago, in whatever plan, and is not tried again yet."""
+        if self._failed is None or now >= self._failed[1] + RETRY_SECONDS:
+            return False
+        failed = self._failed[0]
+        if isinstance(name, _Drawn) and isinstance(failed, _Drawn):
+            return name == replace(failed, plan=name.plan)
+        return name == failed
 
     def _questions(self, state: State) -> "Callable[[Still], None]":
         """What is to be made of a still picture on the artist's thread, so that showing it is quick."""
@@ -371,7 +399,7 @@ class Viewport:
             return None  # the query that holds now is on its way
         if (drawn.pose, drawn.size, drawn.marked) != (state.pose, self._size, self._marked):
             return None  # and so is the picture
-        key = (drawn, id(self._query))
+        key = (drawn, self._question)
         if key == self._answered:
             return None
         if self._still is not None and not self._tells(self._still, state):
@@ -382,6 +410,11 @@ class Viewport:
         else:
             frame, relevance = self._renderer.frame(), self._renderer.relevance()
         return View(drawn.serial, self._keys, frame, relevance, self._camera, self._query, self._lapses)
+
+    @property
+    def failing(self) -> bool:
+        """Whether the finer picture could not be drawn; it is tried again."""
+        return self._failed is not None
 
     def release(self) -> None:
         """Free what the renderer holds."""

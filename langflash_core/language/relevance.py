@@ -18,6 +18,7 @@ from torch import Tensor
 from langflash_core.errors import PromptError, SceneFileError
 from langflash_core.language.algebra import encode_prompts
 from langflash_core.language.spaces import LanguageSpace, encode_cached
+from langflash_core.language.taught import taught_dictionary
 from langflash_core.types import Scene, Semantics
 
 Mode = Literal["relevancy", "cosine"]
@@ -82,9 +83,9 @@ def reduce_dictionary(dictionary: Tensor) -> tuple[Tensor, Tensor]:
     return r.T.contiguous().to(dictionary), q.T.contiguous().to(dictionary)
 
 
-def finite_dictionary(scene: Scene | Semantics) -> Tensor:
-    """The dictionary (K, C) as queries see it: silent atoms, and those that are not finite, are 0."""
-    dictionary = _spoken_dictionary(scene)
+def finite_dictionary(scene: Scene | Semantics, space: LanguageSpace) -> Tensor:
+    """The dictionary (K, C) as queries see it: as `spoken_dictionary`, atoms that are not finite are 0."""
+    dictionary = spoken_dictionary(scene, space)
     return torch.where(finite_atoms(dictionary)[:, None], dictionary, 0.0)
 
 
@@ -137,7 +138,7 @@ def compile_query(
     against = tuple(calibration.negatives if negatives is None else negatives) if mode == "relevancy" else ()
     if mode == "relevancy" and not against:
         raise PromptError("relevancy needs a negative phrase to compare with; name one, or use 'cosine'")
-    factor, basis = reduce_dictionary(_spoken_dictionary(scene))
+    factor, basis = reduce_dictionary(spoken_dictionary(scene, space))
     return CompiledQuery(
         factor=factor,
         prompts=encode_prompts(space, texts).to(basis) @ basis.T,
@@ -252,11 +253,12 @@ def _cosines(features: Tensor, phrases: Tensor, eps: float) -> tuple[Tensor, Ten
     return torch.where(empty, 0.0, cosines).clamp(-1, 1), empty
 
 
-def _spoken_dictionary(scene: Scene | Semantics) -> Tensor:
-    """The dictionary (K, C) with a scene's silent atoms, which answer nothing, at 0."""
+def spoken_dictionary(scene: Scene | Semantics, space: LanguageSpace) -> Tensor:
+    """The dictionary (K, C) as people taught the scene (`taught`); silent atoms are 0."""
     if isinstance(scene, Semantics):
         return scene.dictionary
-    silent, dictionary = scene.record.silent_atoms, scene.semantics.dictionary
+    silent = scene.record.silent_atoms
+    dictionary = taught_dictionary(scene.semantics.dictionary, scene.record, space)
     rows = torch.tensor(silent, dtype=torch.int64, device=dictionary.device)
     return dictionary.index_fill(0, rows, 0.0) if silent else dictionary
 

@@ -56,7 +56,7 @@ def with_vectors(compiled: CompiledQuery, dictionary: Tensor, vectors: Mapping[i
     """The query with language vectors (C,) instead of some of its phrases, by their place.
 
     Args:
-        dictionary: (K, C), the one that `compiled` was made for.
+        dictionary: (K, C), the one that `compiled` was made for (`spoken_dictionary` of a scene).
 
     Raises:
         ValueError: a vector says nothing, or there is no such place.

@@ -9,6 +9,7 @@ import torch
 from PIL import Image
 from torch.nn.functional import normalize
 
+from langflash_core.scene.selection import strongest_atoms
 from langflash_core.types import Scene
 
 CELL = 4  # pixels of a photo as the network saw it, along a side
@@ -39,6 +40,24 @@ def atom_shares(scene: Scene) -> np.ndarray:
     """(K,) of the scene's opacity, sum 1; zeros where there is none."""
     masses = _carried(scene)
     return masses / max(masses.sum(), 1e-12)
+
+
+def atom_places(scene: Scene) -> tuple[tuple[float, float, float] | None, ...]:
+    """For each atom a Gaussian in the middle of those that carry it most, world; None where none does.
+
+    The middle is the one nearest to their median, so that it lies on the thing and not between two.
+    """
+    strongest, means = strongest_atoms(scene.semantics), scene.gaussians.means.double().numpy()
+    found: list[tuple[float, float, float] | None] = []
+    for k in range(scene.semantics.num_atoms):
+        own = means[strongest == k]
+        own = own[np.isfinite(own).all(1)]
+        if not len(own):
+            found.append(None)
+            continue
+        x, y, z = own[np.linalg.norm(own - np.median(own, axis=0), axis=1).argmin()].tolist()
+        found.append((x, y, z))
+    return tuple(found)
 
 
 def alike_order(similarity: np.ndarray) -> tuple[int, ...]:

@@ -36,7 +36,12 @@ def spoken_scene(scene: Scene, marks: Marks) -> Scene:
     if marks.atoms == atoms_of(scene):
         return scene
     semantics = replace(scene.semantics, dictionary=edited_dictionary(scene, marks.atoms))
-    return replace(scene, semantics=semantics).with_record(silent_atoms=())
+    spoken = replace(scene, semantics=semantics)
+    return spoken.with_record(
+        atom_names={k: atom.name for k, atom in enumerate(marks.atoms) if atom.name},
+        atom_denials={k: atom.denied for k, atom in enumerate(marks.atoms) if atom.denied},
+        silent_atoms=tuple(k for k, atom in enumerate(marks.atoms) if not atom.on),
+    )
 
 
 def edited_scene(scene: Scene, marks: Marks) -> Scene:
@@ -58,8 +63,10 @@ def left(scene: Scene, marks: Marks) -> Scene:
 
 def atoms_of(scene: Scene) -> tuple[Atom, ...]:
     """The atoms as a saved scene names and silences them."""
-    names, silent = scene.record.atom_names, set(scene.record.silent_atoms)
-    return tuple(Atom(k, names.get(k, ""), k not in silent) for k in range(scene.semantics.num_atoms))
+    record, silent = scene.record, set(scene.record.silent_atoms)
+    names, denials = record.atom_names, record.atom_denials
+    every = range(scene.semantics.num_atoms)
+    return tuple(Atom(k, names.get(k, ""), k not in silent, denials.get(k, ())) for k in every)
 
 
 def first_marks(scene: Scene) -> Marks:
@@ -90,6 +97,7 @@ def _joined(scene: Scene, atoms: Sequence[Atom]) -> Scene:
     record = replace(
         scene.record,
         atom_names={places[k]: atoms[k].name for k in heads if atoms[k].name},
+        atom_denials={places[k]: atoms[k].denied for k in heads if atoms[k].denied},
         silent_atoms=tuple(places[k] for k in heads if not atoms[k].on),
     )
     return replace(scene, semantics=replace(semantics, weight_ids=ids, dictionary=dictionary), record=record)

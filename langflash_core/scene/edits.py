@@ -70,12 +70,14 @@ class Mask:
 class Atom:
     """What edits made of one atom. into: the atom that it was merged into, or itself.
 
-    name: the person's own, or none. on: whether it answers phrases.
+    name: the person's own, or none; it answers to that, too. on: whether it answers phrases. denied: words
+    that it is not.
     """
 
     into: int
     name: str = ""
     on: bool = True
+    denied: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -223,8 +225,19 @@ def show_all(marks: Marks) -> Marks:
 
 
 def rename_atom(marks: Marks, k: int, name: str) -> Marks:
-    """Give an atom, with those merged with it, a name; an empty one takes it back."""
-    return _with_atoms(marks, _merged_with(marks, k), name=name.strip())
+    """Give an atom, with those merged with it, a name; an empty one takes it back. It ends a denial."""
+    name = name.strip()
+    denied = tuple(text for text in marks.atoms[k].denied if text.lower() != name.lower())
+    return _with_atoms(marks, _merged_with(marks, k), name=name, denied=denied)
+
+
+def deny_atom(marks: Marks, k: int, text: str) -> Marks:
+    """Say that an atom, with those merged with it, is not what `text` means; a name of that text goes."""
+    text, atom = text.strip(), marks.atoms[k]
+    if not text or text in atom.denied:
+        return marks
+    name = "" if atom.name.lower() == text.lower() else atom.name
+    return _with_atoms(marks, _merged_with(marks, k), name=name, denied=(*atom.denied, text))
 
 
 def toggle_atom(marks: Marks, k: int) -> Marks:
@@ -237,7 +250,7 @@ def merge_atoms(marks: Marks, ks: Iterable[int]) -> Marks:
     first, *others = ks
     head = marks.atoms[first]
     joined = [j for k in others for j in _merged_with(marks, k)]
-    return _with_atoms(marks, joined, into=head.into, name=head.name, on=head.on)
+    return _with_atoms(marks, joined, into=head.into, name=head.name, on=head.on, denied=head.denied)
 
 
 def _merged_with(marks: Marks, k: int) -> list[int]:

@@ -3,7 +3,7 @@
     {"format": "langflash-edits", "version": 1, "digest": of the scene, "gaussians": N, "atoms": K,
      "about": {...}, "done": [...], "undone": [...]}
 
-An edit is {"label", "flips": {mask: base64 of zlib}, "swaps": [[atom, [into, name, on], [...]]]}.
+An edit is {"label", "flips": {mask: base64 of zlib}, "swaps": [[atom, [into, name, on, denied...], [...]]]}.
 """
 
 import base64
@@ -82,7 +82,7 @@ def _encoded(edit: Edit) -> dict:
     return {
         "label": edit.label,
         "flips": {name: base64.b64encode(packed).decode() for name, packed in edit.flips},
-        "swaps": [[k, *([atom.into, atom.name, atom.on] for atom in pair)] for k, *pair in edit.swaps],
+        "swaps": [[k, *([a.into, a.name, a.on, *a.denied] for a in pair)] for k, *pair in edit.swaps],
     }
 
 
@@ -94,8 +94,8 @@ def _decoded(entry: dict) -> Edit:
     return Edit(str(entry["label"]), flips, swaps)
 
 
-def _atom(into: int, name: str, on: bool) -> Atom:
-    return Atom(int(into), str(name), bool(on))
+def _atom(into: int, name: str, on: bool, *denied: str) -> Atom:
+    return Atom(int(into), str(name), bool(on), tuple(map(str, denied)))
 
 
 def _read(path: Path) -> dict:

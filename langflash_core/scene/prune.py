@@ -225,6 +225,7 @@ def _sparser(scene: Scene) -> Scene:
     record = replace(
         record,
         atom_names={int(renumbered[k]): name for k, name in record.atom_names.items() if used[k]},
+        atom_denials={int(renumbered[k]): said for k, said in record.atom_denials.items() if used[k]},
         silent_atoms=tuple(int(renumbered[k]) for k in record.silent_atoms if used[k]),
     )
     sparse = Semantics(ids, values, semantics.dictionary[used], semantics.space)

@@ -24,7 +24,9 @@ def to_json(record: Record) -> dict:
     """What a file holds: every known thing that is known, in the order of `Record`, then the others."""
     known = {name: getattr(record, name) for name in (*_PLAIN, *_TEXTS)}
     known["atom_names"] = {str(k): name for k, name in record.atom_names.items()}
+    known["atom_denials"] = {str(k): list(said) for k, said in record.atom_denials.items()}
     known["silent_atoms"] = record.silent_atoms
+    known["camera_path"] = record.camera_path
     known["edits"] = {"deleted": record.num_deleted} if record.num_deleted else None
     written = {
         name: list(value) if isinstance(value, tuple) else value
@@ -43,12 +45,15 @@ def from_json(values: dict) -> Record:
     known = {name: _of_type(values, name, *types) for name, types in _PLAIN.items()}
     known |= {name: tuple(_list(values, name, str)) for name in _TEXTS}
     names = _of_type(values, "atom_names", dict) or {}
+    denials = _of_type(values, "atom_denials", dict) or {}
     edits = _of_type(values, "edits", dict) or {}
-    ours = {*known, "atom_names", "silent_atoms", "edits", _VERSION_1, *_COST}
+    ours = {*known, "atom_names", "atom_denials", "silent_atoms", "edits", "camera_path", _VERSION_1, *_COST}
     return Record(
         **{name: value for name, value in known.items() if value is not None},
         atom_names={_number(k): str(name) for k, name in names.items()},
+        atom_denials={_number(k): tuple(_list(denials, k, str)) for k in denials},
         silent_atoms=tuple(_list(values, "silent_atoms", int)),
+        camera_path=tuple(_list(values, "camera_path", dict)),
         num_deleted=int(_of_type(edits, "deleted", int) or 0),
         cost=Cost(
             timings=_of_type(values, "timings", dict) or {},

@@ -61,7 +61,7 @@ def rasterize_tiles(
         raise ValueError(f"features: expected as many rows of each, received {sorted(counts)}")
     with torch.no_grad():
         lists = _tile_lists(footprints, camera.width, camera.height)
-        table = _Table.of(footprints, [some.detach().cpu().float() for some in features])
+        table = _Table.of(footprints, [some.detach().cpu() for some in features])
         columns, rows = lists.grid
         shapes = [(some.shape[1], some.dtype) for some in features] + [(1, torch.float32)]
         images = [torch.zeros(rows * columns, _PIXELS, wide, dtype=dtype) for wide, dtype in shapes]
@@ -144,9 +144,14 @@ class _Table:
         l11, l21, l22 = footprints.roots.unbind(-1)
         parts = (footprints.centres, (1 / l11)[:, None], l21[:, None], (1 / l22)[:, None])
         shapes = torch.cat((*parts, footprints.opacities[:, None]), -1).float()
-        ids = footprints.ids
-        carried = torch.cat((*(some[ids] for some in features), torch.ones(len(ids), 1)), -1)
-        return _Table(*(torch.cat((v, v.new_zeros(1, v.shape[1]))) for v in (shapes, carried)))
+        shapes = torch.cat((shapes, shapes.new_zeros(1, shapes.shape[1])))
+        carried = torch.zeros(len(shapes), sum(some.shape[1] for some in features) + 1)
+        first = 0
+        for some in features:  # one table in all, whatever their dtype
+            carried[:-1, first : first + some.shape[1]] = some[footprints.ids]
+            first += some.shape[1]
+        carried[:-1, -1] = 1.0
+        return _Table(shapes, carried)
 
 
 def _composite(table: _Table, lists: _Lists, tiles: Tensor, images: list[Tensor]) -> None:

@@ -19,6 +19,7 @@ from langflash_core.scene.edits import (
     Marks,
     Mask,
     delete,
+    deny_atom,
     hide,
     invert,
     isolate,
@@ -181,8 +182,21 @@ def test_a_silent_atom_answers_nothing_and_comes_back(scene):
     )
     again = first_marks(saved)
     assert again.atoms == marks.atoms
-    loud = spoken_scene(saved, toggle_atom(again, 2))
+    loud = spoken_scene(saved, rename_atom(toggle_atom(again, 2), 2, ""))
     torch.testing.assert_close(relevance(loud, saved), relevance(scene, scene), rtol=0, atol=1e-12)
+
+
+def test_names_and_denials_are_kept_by_the_scene_and_taken_back(scene):
+    marks = deny_atom(rename_atom(first_marks(scene), 2, "chair"), 2, " door ")
+    assert (marks.atoms[2].name, marks.atoms[2].denied) == ("chair", ("door",))
+    assert deny_atom(marks, 2, "door") is marks and not deny_atom(marks, 2, "chair").atoms[2].name
+    assert rename_atom(marks, 2, "door").atoms[2].denied == ()
+    spoken, saved = spoken_scene(scene, marks), edited_scene(scene, marks)
+    torch.testing.assert_close(relevance(saved, saved), relevance(spoken, scene), rtol=0, atol=1e-9)
+    assert abs(relevance(spoken, scene) - relevance(scene, scene)).max() > 0.01
+    assert first_marks(saved).atoms == marks.atoms
+    history = History(first_marks(scene)).edited("deny", marks)
+    assert history.undo().marks == first_marks(scene)
 
 
 def test_edits_cost_no_torch():

@@ -100,7 +100,7 @@ class EditPrompt:
         )
         first = not state.asked and bool(after.asked)
         mode = Mode.HEAT if first and state.mode is Mode.RGB else after.mode
-        return replace(after, mode=mode, active=self.key)
+        return change(replace(after, mode=mode, active=self.key), named=False)
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,7 @@ class AskAgain:
             prompts = tuple(asked if p.key == key else p for p in prompts)
         mode = Mode.HEAT if state.mode is Mode.RGB and not state.asked else state.mode
         after = replace(state, prompts=prompts, active=key, mode=mode, next_key=state.next_key + 1)
-        return Remember(self.text).apply(after)
+        return Remember(self.text).apply(change(after, named=False))
 
 
 @dataclass(frozen=True)
@@ -315,6 +315,16 @@ class Binned:
         if self.lapses != state.asking.lapses:
             return state
         return change(state, histograms=self.histograms)
+
+
+@dataclass(frozen=True)
+class NameThings:
+    """Names of the things that the scene knows stand in the picture, or no longer."""
+
+    named: bool
+
+    def apply(self, state: State) -> State:
+        return change(state, named=self.named and state.info is not None)
 
 
 # The dictionary

@@ -86,13 +86,14 @@ class Insight:
     """What the worker says about the K atoms of the scene on show.
 
     shares: of the opacity that is left, sum 1. colours: as in the atoms picture. order: alike atoms side
-    by side. similarity: (K, K) cosines.
+    by side. similarity: (K, K) cosines. places: of each in the scene, world.
     """
 
     shares: tuple[float, ...]
     colours: tuple[tuple[float, float, float], ...]
     order: tuple[int, ...]
     similarity: np.ndarray = field(compare=False, repr=False)
+    places: tuple[Vector | None, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,7 @@ class Asking:
     merge. prompts_path: where the last set was. usual: what the scene compares phrases with, by its
     own calibration, once it has said so. lapses: how often what scores rest on has changed. caret: the
     prompt whose field takes the keys next. span: relevance of the first and the last colour of a heat-map,
-    the person's own; None: by the threshold.
+    the person's own; None: by the threshold. named: names of things stand in the picture.
     """
 
     recent: tuple[str, ...] = ()
@@ -125,6 +126,7 @@ class Asking:
     lapses: int = 0
     caret: int | None = None
     span: tuple[float, float] | None = None
+    named: bool = False
 
     def histogram(self, key: int, text: str) -> Histogram | None:
         """Of a prompt as it reads now; None until it is answered."""
@@ -132,7 +134,7 @@ class Asking:
 
     def without_scene(self) -> "Asking":
         """For another scene: what belongs to the old one goes."""
-        return replace(self, histograms=(), insight=None, atom=0, chosen=(), usual=())
+        return replace(self, histograms=(), insight=None, atom=0, chosen=(), usual=(), named=False)
 
 
 NO_ASKING = Asking()

@@ -45,7 +45,7 @@ class Encode(SceneErrand):
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.language.minilm import reads_foreign
-        from langflash_core.language.relevance import compile_query
+        from langflash_core.language.relevance import compile_query, spoken_dictionary
         from langflash_core.language.spaces import language_space
         from langflash_core.language.words import with_vectors
         from langflash_core.scene.edited import spoken_scene
@@ -54,7 +54,7 @@ class Encode(SceneErrand):
         space = language_space(scene.semantics.space)
         query = compile_query(scene, space, list(self.texts), negatives=list(self.negatives) or None)
         likes = {row: _vector(like) for row, like in enumerate(self.likes) if like}
-        query = with_vectors(query, scene.semantics.dictionary, likes)
+        query = with_vectors(query, spoken_dictionary(scene, space), likes)
         spoken = zip(self.keys, self.texts, self.likes or repeat(b""), strict=False)
         words = [(key, text) for key, text, like in spoken if not like] if space.name == "minilm" else []
         foreign = tuple(key for key, text in words if reads_foreign(text))
@@ -135,7 +135,7 @@ class DescribeAtoms(SceneErrand):
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.export.colours import atom_colours
-        from langflash_core.scene.atoms import atom_pictures, describe_atoms
+        from langflash_core.scene.atoms import atom_pictures, atom_places, describe_atoms
 
         report = describe_atoms(self.scene)
         shares = _shares(self.scene, self.marks)
@@ -149,6 +149,7 @@ class DescribeAtoms(SceneErrand):
                 colours=tuple((float(r), float(g), float(b)) for r, g, b in colours),
                 order=report.order,
                 similarity=report.similarity,
+                places=tuple(place and Vector(*place) for place in atom_places(self.scene)),
             )
         )
 

@@ -8,7 +8,7 @@ from langflash_core.scene.edits import Combine, History, Marks, Mask
 from ..asking.commands import lapsed
 from ..scene.state import Mode
 from ..state import State
-from .state import STRICTNESS_RANGE, Floaters, Region
+from .state import STRICTNESS_RANGE, Floaters, Point, Region
 
 
 def change(state: State, **changes) -> State:
@@ -29,6 +29,29 @@ class SelectRegion:
     """Find the Gaussians that a region of the picture shows."""
 
     region: Region
+    combine: Combine = "replace"
+
+    def apply(self, state: State) -> State:
+        return change(state, drag=(), waiting="" if state.info is None else "Selecting")
+
+
+@dataclass(frozen=True)
+class SelectThing:
+    """Find the thing that a pixel of the picture's place shows: what is of its group and touches it."""
+
+    at: Point
+    combine: Combine = "replace"
+
+    def apply(self, state: State) -> State:
+        return change(state, drag=(), waiting="" if state.info is None else "Selecting")
+
+
+@dataclass(frozen=True)
+class SelectSphere:
+    """Find what lies in a ball around what a pixel shows. radius: pixels there."""
+
+    at: Point
+    radius: float
     combine: Combine = "replace"
 
     def apply(self, state: State) -> State:
@@ -180,6 +203,21 @@ class RenameAtom:
 
 
 @dataclass(frozen=True)
+class DenyAtom:
+    """An atom is not what `text` means, and neither are those that look like it."""
+
+    atom: int
+    text: str
+
+    def apply(self, state: State) -> State:
+        marks = state.editing.marks
+        if marks is None or not 0 <= self.atom < len(marks.atoms):
+            return state
+        marks = edits.deny_atom(marks, self.atom, self.text)
+        return _edit(state, f"Atom {self.atom} is not {self.text.strip()!r}", marks)
+
+
+@dataclass(frozen=True)
 class MergeAtoms:
     """Make one of several atoms; the first keeps its number."""
 
@@ -312,5 +350,5 @@ def _with_history(state: State, history: History) -> State:
 
 
 def _spoken_of(marks: Marks | None) -> tuple | None:
-    """What of the marks a score rests on; names do not count."""
-    return None if marks is None else (marks.visible, [(atom.into, atom.on) for atom in marks.atoms])
+    """What of the marks a score rests on."""
+    return None if marks is None else (marks.visible, marks.atoms)

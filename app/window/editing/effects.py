@@ -10,7 +10,7 @@ from ..scene.state import SceneInfo
 from ..state import State
 from ..viewport import Viewport
 from .commands import FindFloaters, StopWaiting
-from .pointing import CardOpened, Named, ReadingTaken
+from .pointing import CardOpened, Named, ReadingTaken, RulerPlaced
 from .state import Reading, Tool
 from .work import NameAtoms, NamePlace, ScoreFloaters, Weigh, request_for
 
@@ -61,6 +61,9 @@ class EditingEffects(Effects):
         if found is None:
             return
         reading, weights = found
+        if state.editing.tool is Tool.RULER:
+            self._hands.perform(RulerPlaced(reading))
+            return
         self._hands.perform(CardOpened(reading))
         if reading.point is None or not info.num_atoms:
             self._hands.perform(Named(reading, reading, (), b""))
@@ -69,7 +72,7 @@ class EditingEffects(Effects):
         content = b"" if weights is None else weights.astype(np.float32).tobytes()
         scene = (info.serial, info.scene, state.editing.marks)
         place = (reading, state.pose, self._viewport.size)
-        self._hands.submit(NamePlace(*scene, *place, content, extra))
+        self._hands.submit(NamePlace(*scene, *place, content, extra, state.negatives))
 
     # Commands
 
@@ -92,9 +95,11 @@ class EditingEffects(Effects):
             self._atoms_changed(before, state)
 
     def _atoms_changed(self, before: State, state: State) -> None:
-        """Merged atoms have other words."""
+        """Merged and corrected atoms have other words."""
         old, new = before.editing.marks, state.editing.marks
         if old is None or new is None or state.info is None:
             return
-        if [atom.into for atom in old.atoms] != [atom.into for atom in new.atoms]:
+        if [(atom.into, atom.denied) for atom in old.atoms] != [
+            (atom.into, atom.denied) for atom in new.atoms
+        ]:
             self._hands.submit(NameAtoms(state.info.serial, state.info.scene, new))

@@ -12,7 +12,7 @@ from ..poses import Vector
 from ..scene.state import Flight, Mode
 from ..state import State
 from .commands import change
-from .state import RADIUS_RANGE, REACH_RANGE, Card, Point, Reading, Tool
+from .state import RADIUS_RANGE, REACH_RANGE, Card, Point, Reading, Spot, Tool
 
 LIKE_THIS = "like this"
 LIKE_THRESHOLD = 0.97  # relevancy; a look at one spot is sharper than a word, see the README
@@ -28,7 +28,7 @@ class SetTool:
     tool: Tool
 
     def apply(self, state: State) -> State:
-        return change(state, tool=self.tool, drag=(), hover=None, asked=None, card=None)
+        return change(state, tool=self.tool, drag=(), hover=None, asked=None, card=None, ruler=())
 
 
 @dataclass(frozen=True)
@@ -129,8 +129,50 @@ class CardOpened:
 
 
 @dataclass(frozen=True)
+class RulerPlaced:
+    """One end of what is measured; after both a new one begins."""
+
+    reading: Reading
+
+    def apply(self, state: State) -> State:
+        ends, place = state.editing.ruler, self.reading.point
+        if place is None:
+            return change(state, asked=None)
+        return change(state, asked=None, ruler=(place,) if len(ends) != 1 else (*ends, place))
+
+
+@dataclass(frozen=True)
+class ClearRuler:
+    """Measure nothing."""
+
+    def apply(self, state: State) -> State:
+        return change(state, ruler=(), asked=None)
+
+
+@dataclass(frozen=True)
+class SetLength:
+    """What is measured is so many metres long: the scene has a scale."""
+
+    metres: float
+
+    def apply(self, state: State) -> State:
+        length = measured(state.editing.ruler)
+        if length is None or length <= 0 or not LENGTHS[0] <= self.metres <= LENGTHS[1]:
+            return state
+        return replace(state, metric=self.metres / length)
+
+
+LENGTHS = (0.001, 1000.0)  # metres
+
+
+def measured(ends: tuple[Spot, ...]) -> float | None:
+    """Scene units between both ends; None before there are two."""
+    return float(np.linalg.norm(np.subtract(*ends))) if len(ends) == 2 else None
+
+
+@dataclass(frozen=True)
 class Named:
-    """Nearest words (word, cosine) and language vector of the place that was asked about."""
+    """Nearest words (word, score) and language vector of the place that was asked about."""
 
     asked: Reading
     reading: Reading

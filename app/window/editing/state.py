@@ -20,31 +20,40 @@ class Tool(Enum):
     MOVE = "Move"
     POINT = "What is this?"
     BOX = "Box"
+    LASSO = "Lasso"
     BRUSH = "Brush"
-    PICK = "Pick"
+    SPHERE = "Sphere"
+    PICK = "Thing"
+    RULER = "Ruler"
 
     @property
     def selects(self) -> bool:
-        return self in (Tool.BOX, Tool.BRUSH, Tool.PICK)
+        return self in (Tool.BOX, Tool.LASSO, Tool.BRUSH, Tool.SPHERE, Tool.PICK)
 
 
 Point = tuple[float, float]
+Spot = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Region:
-    """Pixels of the picture's place: a box between its first and last point, or a brushed line.
+    """Pixels of the picture's place: a box between its first and last point, a brushed line, or what a line
+    goes around.
 
-    points: x, y in framebuffer pixels. radius: of the brush, None for a box.
+    points: x, y in framebuffer pixels. radius: of the brush, None for the others. around: the points are
+    corners, and the last is joined with the first.
     """
 
     points: tuple[Point, ...]
     radius: float | None = None
+    around: bool = False
 
     def pixels(self, width: int, height: int, scale: float = 1.0) -> np.ndarray:
         """(height, width) bool: pixels whose centre lies inside, points and radius times `scale`."""
         path = np.array(self.points, float) * scale
         inside = np.zeros((height, width), bool)
+        if self.around:
+            return _inside_of(path, width, height)
         if self.radius is None:
             (x0, y0), (x1, y1) = path[[0, -1]].min(0), path[[0, -1]].max(0)
             columns, rows = np.arange(width) + 0.5, np.arange(height) + 0.5
@@ -58,8 +67,8 @@ class Region:
     def what(self) -> str:
         """For the list of edits."""
         if self.radius is None:
-            return "in a box"
-        return "with the brush" if len(self.points) > 1 or self.radius > PICK_RADIUS * 4 else "by a click"
+            return "in a lasso" if self.around else "in a box"
+        return "with the brush"
 
 
 @dataclass(frozen=True)
@@ -78,7 +87,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class Card:
-    """The answer to "what is this?". words: (word, cosine), None while they are looked up.
+    """The answer to "what is this?". words: (word, score as of a phrase), None while they are looked up.
 
     vector: F(p) as float32 bytes, for "find similar".
     """
@@ -110,7 +119,7 @@ class Editing:
     radius: of the brush, design pixels. reach: of growing, in spacings of the Gaussians.
     drag: the region being drawn, framebuffer pixels. waiting: what the worker is looking for.
     hover: what is under the pointer. asked: where a click waits for the picture to rest.
-    names: nearest words of each atom, best first.
+    names: nearest words of each atom, best first. ruler: the ends of what is measured, world.
     """
 
     history: History | None = None
@@ -127,6 +136,7 @@ class Editing:
     card: Card | None = None
     names: tuple[tuple[str, ...], ...] = ()
     floaters: Floaters | None = None
+    ruler: tuple[Spot, ...] = ()
 
     @property
     def marks(self) -> Marks | None:
@@ -173,6 +183,19 @@ def _stroke(inside: np.ndarray, start: np.ndarray, end: np.ndarray, radius: floa
     share = (((x - start[0]) * along[0] + (y - start[1]) * along[1]) / length).clip(0, 1)
     apart = np.hypot(x - start[0] - share * along[0], y - start[1] - share * along[1])
     inside[low[1] : high[1], low[0] : high[0]] |= apart <= radius
+
+
+def _inside_of(path: np.ndarray, width: int, height: int) -> np.ndarray:
+    """(height, width) bool: pixels whose centre the closed path (n, 2) goes around, by the even-odd rule."""
+    inside = np.zeros((height, width), bool)
+    columns = np.arange(width) + 0.5
+    for (x0, y0), (x1, y1) in zip(path, np.roll(path, -1, 0), strict=True):
+        low, high = sorted((y0, y1))
+        rows = np.arange(max(0, int(np.ceil(low - 0.5))), min(height, int(np.ceil(high - 0.5))))
+        if len(rows):
+            crossed = x0 + (rows + 0.5 - y0) / (y1 - y0) * (x1 - x0)
+            inside[rows] ^= columns >= crossed[:, None]
+    return inside
 
 
 def strongest(weights: np.ndarray) -> tuple[tuple[int, float], ...]:

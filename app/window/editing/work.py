@@ -17,11 +17,23 @@ from ..poses import Pose, to_camera
 from ..requests import Asked, SceneErrand
 from ..scene.state import SceneInfo
 from ..state import State
-from .commands import FloatersFound, Found, Grow, SelectAtom, SelectByPhrase, SelectRegion, StopWaiting
+from .commands import (
+    FloatersFound,
+    Found,
+    Grow,
+    SelectAtom,
+    SelectByPhrase,
+    SelectRegion,
+    SelectSphere,
+    SelectThing,
+    StopWaiting,
+)  # fmt: skip
 from .pointing import AtomsNamed, Named, ReadingTaken
-from .state import Reading, Region, strongest
+from .state import PICK_RADIUS, Point, Reading, Region, strongest
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from langflash_core.types import Scene
 
 MOST_PIXELS = 120_000  # of a region; a larger one is looked at coarser, which takes seconds less
@@ -40,6 +52,13 @@ class EditErrand(SceneErrand):
         from langflash_core.scene.edited import spoken_scene
 
         return spoken_scene(self.scene, self.marks)
+
+    def dictionary(self) -> "Tensor":
+        """Of that scene, as its person taught it."""
+        from langflash_core.language.relevance import spoken_dictionary
+        from langflash_core.language.spaces import language_space
+
+        return spoken_dictionary(self.spoken(), language_space(self.scene.semantics.space))
 
 
 # Selections
@@ -78,6 +97,75 @@ class FindInRegion(Selection):
 
 
 @dataclass(frozen=True)
+class AtPixel(Selection):
+    """Something about what a pixel shows. at: framebuffer pixels of the picture's place, which has `size`."""
+
+    at: Point
+    pose: Pose
+    size: tuple[int, int]
+    combine: Combine
+
+    def seen(self) -> np.ndarray:
+        """(N,) bool: the Gaussians that a small disc around the pixel shows."""
+        from langflash_core.splat.picking import seen_in
+
+        pixels = Region((self.at,), PICK_RADIUS).pixels(*self.size)
+        camera = to_camera(self.pose, *self.size)
+        return seen_in(self.scene.gaussians, self.marks.visible.rows(), camera, pixels)
+
+
+@dataclass(frozen=True)
+class FindThing(AtPixel):
+    """What is of the group that the pixel shows, or of one that means the same, and hangs together with it in
+    space."""
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.scene.instances import instances
+        from langflash_core.scene.selection import strongest_atoms
+
+        seen = self.seen()
+        heads = np.array([atom.into for atom in self.marks.atoms] + [-1])  # the last for "none"
+        groups = heads[strongest_atoms(self.scene.semantics)]
+        of_one = groups[seen] if seen.any() else groups[:0]
+        if len(of_one) and of_one.max() >= 0:
+            group = np.bincount(of_one[of_one >= 0]).argmax()
+            members = np.isin(groups, self._alike(int(group))) & self.marks.visible.rows()
+            things = instances(self.scene.gaussians, members)
+            here = things[seen & (things > 0)]
+            if len(here):
+                seen = things == np.bincount(here).argmax()
+        yield Found(Mask.of(seen), self.combine, "of a thing")
+
+    def _alike(self, group: int) -> np.ndarray:
+        """The atoms that mean what this one means: a plant is often several groups."""
+        from torch.nn.functional import normalize
+
+        from langflash_core.language.taught import ALIKE
+
+        unit = normalize(self.dictionary().float(), dim=-1)
+        alike = np.flatnonzero((unit @ unit[group]).numpy() >= ALIKE)
+        return np.union1d(alike, group)  # itself also where it is silent
+
+
+@dataclass(frozen=True)
+class FindInSphere(AtPixel):
+    """What lies within `radius` pixels, at its depth, of what the pixel shows."""
+
+    radius: float
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        found, means = self.seen(), self.scene.gaussians.means.double().numpy()
+        if found.any():
+            centre = np.median(means[found], axis=0)
+            camera = to_camera(self.pose, *self.size)
+            viewmat = camera.viewmat.double().numpy()
+            depth = float(viewmat[2, :3] @ centre + viewmat[2, 3])
+            ball = np.linalg.norm(means - centre, axis=1) <= self.radius * depth / float(camera.K[0, 0])
+            found = ball & self.marks.visible.rows()
+        yield Found(Mask.of(found), self.combine, "in a ball")
+
+
+@dataclass(frozen=True)
 class FindByPhrase(Selection):
     """Gaussians that a phrase, or a language vector `like`, means from `threshold` on."""
 
@@ -95,7 +183,7 @@ class FindByPhrase(Selection):
         import torch
 
         from langflash_core.language.gaussians import gaussian_relevance
-        from langflash_core.language.relevance import compile_query
+        from langflash_core.language.relevance import compile_query, spoken_dictionary
         from langflash_core.language.spaces import language_space
         from langflash_core.language.words import with_vectors
 
@@ -104,7 +192,7 @@ class FindByPhrase(Selection):
         query = compile_query(scene, space, [self.text], negatives=list(self.negatives) or None)
         if self.like:
             vector = torch.from_numpy(np.frombuffer(self.like, np.float32).copy())
-            query = with_vectors(query, scene.semantics.dictionary, {0: vector})
+            query = with_vectors(query, spoken_dictionary(scene, space), {0: vector})
         return (gaussian_relevance(scene.semantics, query)[0] >= self.threshold).numpy()
 
 
@@ -161,6 +249,10 @@ def request_for(
     match command:
         case SelectRegion(region, combine) if min(size) > 0:
             return FindInRegion(*scene, region, state.pose, size, state.editing.through, combine)
+        case SelectThing(at, combine) if min(size) > 0:
+            return FindThing(*scene, at, state.pose, size, combine)
+        case SelectSphere(at, radius, combine) if min(size) > 0:
+            return FindInSphere(*scene, at, state.pose, size, combine, radius)
         case SelectByPhrase(key, combine):
             return _phrase(state, info, marks, key, combine)
         case SelectAtom(atom, combine) if 0 <= atom < len(marks.atoms):
@@ -226,27 +318,42 @@ def _projected(scene: "Scene", visible: Mask, pose: Pose, size: tuple[int, int])
 
 @dataclass(frozen=True)
 class NamePlace(Weigh):
-    """The nearest words of F(p) = W D, of the household's and of `extra`, the person's own.
+    """The nearest words of F(p) = W D, of the household's and of `extra`, the person's own; with the scores
+    that they would have as phrases.
 
     weights: (K,) of the pixel as float32 bytes; none: not drawn, to be composed.
     """
 
     weights: bytes
     extra: tuple[str, ...]
+    negatives: tuple[str, ...] = ()
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         import torch
 
         from langflash_core.language.words import feature_at, nearest_words
 
-        semantics = self.spoken().semantics
         weights = np.frombuffer(self.weights, np.float32).copy() if self.weights else self.weigh()
-        vector = feature_at(torch.from_numpy(weights), semantics.dictionary)
-        words, embeddings = _vocabulary(semantics.space, self.extra)
-        near = nearest_words(vector, words, embeddings, WORDS_ASKED)
-        pairs = tuple((each.word, each.cosine) for each in near)
+        pixel = torch.from_numpy(weights)
+        vector = feature_at(pixel, self.dictionary())
+        own = (*self.extra, *(atom.name for atom in self.marks.atoms))
+        words, embeddings = _vocabulary(self.scene.semantics.space, own)
+        near = [each.word for each in nearest_words(vector, words, embeddings, WORDS_ASKED)]
         content = vector.float().numpy().tobytes() if near else b""
-        yield Named(self.reading, self.weighed(weights), pairs, content)
+        yield Named(self.reading, self.weighed(weights), self._scored(pixel, near), content)
+
+    def _scored(self, pixel: "Tensor", words: list[str]) -> tuple[tuple[str, float], ...]:
+        """Words with their relevancy at the pixel, whose weights are (K,), best first."""
+        from langflash_core.language.relevance import compile_query, relevance_maps
+        from langflash_core.language.spaces import language_space
+
+        if not words:
+            return ()
+        scene = self.spoken()
+        space = language_space(scene.semantics.space)
+        query = compile_query(scene, space, words, negatives=list(self.negatives) or None)
+        scores = relevance_maps(pixel[None], query)[:, 0].tolist()
+        return tuple(zip(words, scores, strict=True))
 
 
 @dataclass(frozen=True)
@@ -256,9 +363,8 @@ class NameAtoms(EditErrand):
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.language.words import nearest_words
 
-        semantics = self.spoken().semantics
-        words, embeddings = _vocabulary(semantics.space, ())
-        rows = (nearest_words(d, words, embeddings, WORDS_OF_ATOM) for d in semantics.dictionary)
+        words, embeddings = _vocabulary(self.scene.semantics.space, ())
+        rows = (nearest_words(d, words, embeddings, WORDS_OF_ATOM) for d in self.dictionary())
         yield AtomsNamed(tuple(tuple(each.word for each in row) for row in rows))
 
 
@@ -276,6 +382,18 @@ def _household(space: str):
     return language_space(space).encode(list(household_words()))
 
 
+def _readable(space: str, text: str) -> bool:
+    """Whether a name that a person gave can be compared with."""
+    from langflash_core.errors import PromptError
+    from langflash_core.language.algebra import encode_prompts
+    from langflash_core.language.spaces import language_space
+
+    try:
+        return len(encode_prompts(language_space(space), [text])) == 1
+    except PromptError:
+        return False
+
+
 def _vocabulary(space: str, extra: tuple[str, ...]):
     """Words and unit embeddings (A, C): the household's, and the person's own."""
     import torch
@@ -284,7 +402,8 @@ def _vocabulary(space: str, extra: tuple[str, ...]):
     from langflash_core.language.spaces import language_space
 
     known = household_words()
-    own = tuple(dict.fromkeys(text for text in extra if text and text not in known))
+    asked = dict.fromkeys(text for text in extra if text and text not in known)
+    own = tuple(text for text in asked if _readable(space, text))
     if not own:
         return known, _household(space)
     return known + own, torch.cat((_household(space), encode_prompts(language_space(space), own)))

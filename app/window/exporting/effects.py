@@ -25,7 +25,7 @@ from .commands import (
     ShowExport,
 )
 from .order import Order, order, pixels, source, there
-from .process import Exporter, camera_json
+from .process import Exporter, camera_json, keys_json
 
 
 class ExportingEffects(Effects):
@@ -114,7 +114,9 @@ class ExportingEffects(Effects):
         make_folder(wanted.target.parent)
         if wanted.camera_file is not None:
             size = pixels(state.exporting.form.side, state.pose.aspect)
-            write_atomically(wanted.camera_file, camera_json(state.pose, *size))
+            keys = state.keys if state.exporting.form.what.film else ()
+            content = keys_json(keys, *size) if keys else camera_json(state.pose, *size)
+            write_atomically(wanted.camera_file, content)
         self._exporter.start((*wanted.words, *(("--replace",) if replaces else ())))
 
     def _progressed(self, stage: str, fraction: float) -> None:

@@ -56,6 +56,8 @@ def order(state: State) -> Order | str:
         words += ["--what", form.what.word]
     if phrases:
         words += ["--prompt", *phrases, *_threshold(state)]
+    if fades(state):
+        words.append("--fade")
     if form.what in (What.HEAT, What.HEAT_VIDEO):
         words += _colours(state)
     seen_from, camera_file = _seen_from(state, target)
@@ -63,9 +65,20 @@ def order(state: State) -> Order | str:
     if form.what.sized:
         words += ["--size", "{}x{}".format(*pixels(form.side, state.pose.aspect))]
     if form.what.film:
+        if form.way == "keys":
+            if len(state.keys) < 2:
+                return "A film along key frames needs two of them; fly somewhere and add one (M)."
+            camera_file = target.with_name(f"{target.stem}.keys.json")
+        words += ["--path", str(camera_file) if form.way == "keys" else form.way]
         words += ["--seconds", f"{form.seconds:g}"]
     files = (*_written(form, target, len(info.views)), *((camera_file,) if camera_file else ()))
     return Order(tuple(words), target, camera_file, files)
+
+
+def fades(state: State) -> bool:
+    """Whether the export leaves out, softly, what no photo looked at: as on show, unless said otherwise."""
+    form = state.exporting.form
+    return form.what.fades and (state.preferences.near_photos if form.fade is None else form.fade)
 
 
 def _colours(state: State) -> list[str]:

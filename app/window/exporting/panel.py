@@ -6,6 +6,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from .. import commands as do
+from ..filming.state import WAYS
 from ..kit import theme, widgets
 from ..kit.look import Look
 from ..state import State
@@ -32,9 +33,9 @@ HINTS = {
     What.BOXES_CSV: "The same as a table",
     What.BOXES_GLB: "The same as bodies, for Blender and other 3D programs",
     What.SURFACE: "A coloured mesh of what each phrase finds, fused from depth",
-    What.VIDEO: "A round through all views, H.264",
+    What.VIDEO: "A film around it, past the photos or along key frames, H.264",
     What.WEBP: "The same for pages and messages, without a player",
-    What.HEAT_VIDEO: "The round with the active phrase's heat-map, H.264",
+    What.HEAT_VIDEO: "The film with the active phrase's heat-map, H.264",
     What.PLY: "3D Gaussians as other viewers read them",
     What.SPZ: "Compressed, for phones and the web",
     What.SOG: "Compressed as pictures, for SuperSplat and PlayCanvas",
@@ -90,6 +91,8 @@ def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.MUTED, "px")
     if what.film:
+        _label("Goes", look)
+        form = replace(form, way=widgets.choice(WAYS, form.way))
         _label("Length", look)
         width = imgui.get_content_region_avail().x
         changed, seconds = widgets.slider(
@@ -97,6 +100,10 @@ def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
         )
         if changed:
             form = replace(form, seconds=float(round(seconds)))
+    if what.fades:
+        changed, fade = widgets.checkbox("Fade what no photo looked at", written.fades(state))
+        if changed:
+            form = replace(form, fade=fade)
     return _narrowed(state, form, look)
 
 

@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -95,10 +95,18 @@ class Exporter:
 
 def camera_json(pose: Pose, width: int, height: int) -> bytes:
     """The camera file of `--camera` for a picture of width x height pixels."""
-    fields = {
+    return json.dumps(_camera(pose, width, height), indent=2).encode()
+
+
+def keys_json(keys: Sequence[Pose], width: int, height: int) -> bytes:
+    """The file of key frames of `--path`."""
+    return json.dumps([_camera(key, width, height) for key in keys], indent=2).encode()
+
+
+def _camera(pose: Pose, width: int, height: int) -> dict:
+    return {
         "viewmat": viewmat(pose).tolist(),
         "K": intrinsics(pose, width, height).tolist(),
         "width": width,
         "height": height,
     }
-    return json.dumps(fields, indent=2).encode()

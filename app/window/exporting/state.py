@@ -90,6 +90,11 @@ class What(Enum):
         return not self.word and self.suffix in (*SCENES_OUT, PAGE_OUT)
 
     @property
+    def fades(self) -> bool:
+        """Whether it shows colours, which may fade where no photo looked."""
+        return self.film or self is What.RGB
+
+    @property
     def sized(self) -> bool:
         """Whether it has a size in pixels."""
         return self.looks or self.film
@@ -99,8 +104,9 @@ class What(Enum):
 class ExportForm:
     """all_views: from every photo instead of the view on show. only_found: just what answers the
     phrases. only_selected: just the selection, where Gaussians are written. side: the longer one in
-    pixels. path: as typed; an ending is added. proposed: the path that nobody has typed. serial: of the
-    scene that `path` is for."""
+    pixels. fade: leave out what no photo looked at; None: as the window does. way: of a film, of
+    `filming.state.WAYS`. path: as typed; an ending is
+    added. proposed: the path that nobody has typed. serial: of the scene that `path` is for."""
 
     what: What = What.RGB
     all_views: bool = False
@@ -108,6 +114,8 @@ class ExportForm:
     only_selected: bool = False
     side: int = 1024
     seconds: float = 6.0
+    fade: bool | None = None
+    way: str = "photos"
     path: str = ""
     proposed: str = ""
     serial: int = 0

@@ -12,6 +12,7 @@ from ..exporting import commands as export
 from ..exporting import panel as export_panel
 from ..kit import theme, widgets
 from ..kit.look import Look
+from ..opening.panels import browser
 from ..recovery import panels as recovery_panels
 from ..scene import commands as show
 from ..scene.drops import typed_path, typed_scene
@@ -41,6 +42,7 @@ WIDTHS = {  # design pixels; others 520
     "log": 640.0,
     "help": _HELP,
     "palette": palette.WIDTH,
+    "open": browser.WIDTH,
 }
 GESTURES = (
     ("Left drag", "orbit"),
@@ -96,7 +98,7 @@ def _body(dialog: str) -> Callable[[State, Look], list[do.Command]]:
     """What draws the inside of a dialog."""
     return {
         "save": _save,
-        "open": _open,
+        "open": browser.draw,
         "help": _help,
         "leave": _leave,
         "drop": rooms.draw_drop,
@@ -122,17 +124,6 @@ def _save(state: State, look: Look) -> list[do.Command]:
     imgui.end_disabled()
     if path is not None and (pressed or confirmed):
         issued.append(show.SaveScene(path))
-    return issued
-
-
-def _open(state: State, look: Look) -> list[do.Command]:
-    issued, confirmed = _path_field(state, "A scene, a photo, or a folder of photos")
-    text = state.dialog_path.strip()
-    imgui.begin_disabled(not text)
-    pressed = widgets.primary_button("Open", look.vec(120, 0))
-    imgui.end_disabled()
-    if text and (pressed or confirmed):
-        issued.append(show.OpenPaths((str(typed_path(text)),)))
     return issued
 
 

@@ -6,6 +6,7 @@ from .. import commands as do
 from ..editing import commands as edit
 from ..editing import pointing as point
 from ..editing.state import Tool
+from ..filming import commands as film
 from ..scene import commands as show
 from ..state import State
 from . import table
@@ -70,10 +71,16 @@ def _escape(state: State) -> list[do.Command]:
     if imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
         imgui.internal.close_popups_except_modals()
         return []
+    if state.tour is not None:
+        return [film.StopTour()]
     if state.job is not None and not state.job.cancelling:
         return [show.CancelJob()]
     if editing.card is not None or editing.asked is not None:
         return [point.CloseCard()]
     if editing.floaters is not None:
         return [edit.EndFloaters()]
+    if editing.ruler:
+        return [point.ClearRuler()]
+    if editing.drag:
+        return [point.Drag(())]
     return [] if editing.tool is Tool.MOVE else [point.SetTool(Tool.MOVE)]

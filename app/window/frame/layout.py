@@ -4,12 +4,13 @@ from imgui_bundle import ImVec2, imgui
 
 from .. import commands as do
 from ..asking.panels import dictionary, prompts
-from ..editing.panels import history, pointing, tools
+from ..editing.panels import history, pointing, ruler, tools
 from ..exporting import panel as export_panel
+from ..filming import panel as film_panel
 from ..kit import theme, widgets
 from ..kit.look import Look
 from ..recovery import panels as recovery_panels
-from ..scene.panels import legend, tray, views
+from ..scene.panels import axes, legend, tray, views
 from ..state import State
 from . import canvas, dialogs, keys, splitter, status, toasts, toolbar
 
@@ -42,6 +43,9 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
     if state.info is not None:
         issued += tools.draw(state, look, place, size)
         issued += pointing.draw(state, look, place, size)
+        issued += ruler.draw(state, look, place, size)
+        issued += axes.draw(state, look, place, size)
+        issued += film_panel.draw(state, look, place, size)
         issued += dictionary.draw(state, look, place, size)
     issued += recovery_panels.draw_offer(state, look, place, size)
     issued += recovery_panels.draw_edits_offer(state, look, place, size)

@@ -40,7 +40,9 @@ def figures(state: State) -> list[str]:
         said.append(f"{aside:.0f} degrees aside of the photos: less is known here")
     if state.info is not None:
         width, height = stats.picture_size
-        if stats.settling:
+        if stats.failing:
+            said.append("a finer picture could not be drawn (F2: why); it is tried again")
+        elif stats.settling:
             said.append("a finer picture is being drawn")
         said += [
             f"picture {1000 * stats.picture_seconds:.0f} ms at {width} x {height}",

@@ -13,6 +13,8 @@ from ..editing import commands as edit
 from ..editing import pointing as point
 from ..editing.state import Tool
 from ..exporting import commands as export
+from ..filming import commands as film
+from ..opening import commands as opening
 from ..recovery import commands as keep
 from ..scene import camera
 from ..scene import commands as show
@@ -99,8 +101,9 @@ def _selected(command: do.Command) -> Callable[[State], do.Command | None]:
 
 def _files() -> Iterable[Entry]:
     group, dialog = "File", do.ShowDialog
-    opening = fa.ICON_FA_FOLDER_OPEN
-    yield Entry("Open ...", group, _always(dialog("open")), _ctrl("o"), opening, in_fields=True)
+    looking = _always(opening.OpenFiles())
+    yield Entry("Open ...", group, looking, _ctrl("o"), fa.ICON_FA_FOLDER_OPEN, in_fields=True)
+    yield Entry("Paste photos", group, _always(opening.Paste()), _ctrl("v"), fa.ICON_FA_PASTE)
     yield Entry("Save ...", group, _shown(dialog("save")), _ctrl("s"), fa.ICON_FA_FLOPPY_DISK, in_fields=True)
     exporting = fa.ICON_FA_FILE_EXPORT
     yield Entry("Export ...", group, _shown(export.ShowExport()), _ctrl("e"), exporting, in_fields=True)
@@ -159,7 +162,13 @@ def _looking() -> Iterable[Entry]:
     yield Entry("Fly to the selection", group, _shown(point.FrameSelection()), _plain("f"))
     yield Entry("Compare with the photo", group, _compare, _plain("p"))
     yield Entry("Show the photos' cameras", group, _cameras, _plain("k"))
+    yield Entry("Names of things in the picture", group, _names, _plain("n"))
     yield Entry("Keep to what the photos saw", group, _near_photos)
+    for side, forward in camera.SIDES:
+        yield Entry(f"Look from {side}", group, _shown(camera.Face(forward)))
+    yield Entry("Add a key frame", group, _shown(film.AddKey()), _plain("m"))
+    yield Entry("Remove the last key frame", group, lambda s: film.RemoveKey() if s.keys else None)
+    yield Entry("Fly along the key frames", group, _shown(film.Preview()), _plain("j"))
     for mode in Mode:
         keys = _plain(f"_{_DIGITS[KEYED.index(mode)]}") if mode in KEYED else ()
         yield Entry(f"Show: {mode.value}", group, _mode(mode), keys)
@@ -173,6 +182,10 @@ def _compare(state: State) -> do.Command | None:
     if state.info is None or state.view is None:
         return None
     return camera.Compare(None if in_space.comparing(state) else 0.5)
+
+
+def _names(state: State) -> do.Command | None:
+    return ask.NameThings(not state.asking.named) if state.info is not None else None
 
 
 def _cameras(state: State) -> do.Command | None:
@@ -191,8 +204,9 @@ def _tools() -> Iterable[Entry]:
     group = "Tools"
     for name, key, tool in (
         ("Move around", "v", Tool.MOVE), ("What is this?", "x", Tool.POINT),
-        ("Select with a box", "r", Tool.BOX), ("Select with a brush", "b", Tool.BRUSH),
-        ("Select by a click", "c", Tool.PICK),
+        ("Select with a box", "r", Tool.BOX), ("Select with a lasso", "l", Tool.LASSO),
+        ("Select with a brush", "b", Tool.BRUSH), ("Select with a ball", "o", Tool.SPHERE),
+        ("Select the thing under a click", "c", Tool.PICK), ("Measure", "t", Tool.RULER),
     ):  # fmt: skip
         yield Entry(name, group, _shown(point.SetTool(tool)), _plain(key))
     yield Entry("A smaller brush", group, _brush(1 / BRUSH_STEP), _plain("left_bracket"), repeats=True)

@@ -17,9 +17,7 @@ class Thumbnails:
 
     def put(self, key: str, rgb: np.ndarray) -> None:
         """Upload rgb (h, w, 3) uint8 under `key`, replacing what was there."""
-        old = self._textures.pop(key, None)
-        if old is not None:
-            old.release()
+        self.drop(key)
         height, width = rgb.shape[:2]
         texture = self._ctx.texture((width, height), 3, np.ascontiguousarray(rgb).tobytes(), alignment=1)
         texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
@@ -41,6 +39,12 @@ class Thumbnails:
         if texture is None:
             return None
         return imgui.ImTextureRef(texture.glo), texture.width / texture.height
+
+    def drop(self, key: str) -> None:
+        """Free one picture, if it is there."""
+        texture = self._textures.pop(key, None)
+        if texture is not None:
+            texture.release()
 
     def release(self) -> None:
         """Free every picture."""

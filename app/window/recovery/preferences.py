@@ -30,7 +30,8 @@ class Preferences:
     are drawn. near_photos: the picture fades, and orbits slow down, where no photo looked from about
     there. start_at_once: dropped photos are reconstructed without asking. panel_width: design
     pixels. window: x, y, width, height in screen pixels, or none. dictionary: the same of the
-    dictionary's window inside it, design pixels, and whether it is open. recent: newest first."""
+    dictionary's window inside it, design pixels, and whether it is open. recent: newest first.
+    folder: where files were last looked for."""
 
     theme: str = "dark"
     colormap: str = COLOUR_MAPS[0]
@@ -46,6 +47,7 @@ class Preferences:
     dictionary: tuple[int, ...] = ()
     dictionary_open: bool = False
     recent: tuple[str, ...] = ()
+    folder: str = ""
 
     def opened(self, path: Path) -> "Preferences":
         """With `path` as the newest of the recent files."""
@@ -109,6 +111,8 @@ def _fitting(name: str, value: Any) -> Any:
         return value if value in THEMES else None
     if name == "colormap":
         return value if value in COLOUR_MAPS else None
+    if name == "folder":
+        return value if isinstance(value, str) else None
     if isinstance(default, float):
         low, high = {"scale": SCALES, "speed": SPEEDS, "panel_width": PANEL_WIDTHS}[name]
         number = isinstance(value, int | float) and not isinstance(value, bool)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from .. import poses
-from ..poses import Pose
+from ..poses import Pose, Vector
 from ..state import State
 from .state import Flight, Mode
 
@@ -28,7 +28,7 @@ class JumpTo:
         if state.info is None or not 0 <= self.view < len(state.info.views):
             return state
         flight = Flight(state.pose, state.info.views[self.view], state.now)
-        return replace(state, flight=flight, view=self.view)
+        return replace(state, flight=flight, tour=None, view=self.view)
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,28 @@ class FlyTo:
     pose: Pose
 
     def apply(self, state: State) -> State:
-        return replace(state, flight=Flight(state.pose, self.pose, state.now), view=None)
+        return replace(state, flight=Flight(state.pose, self.pose, state.now), tour=None, view=None)
+
+
+@dataclass(frozen=True)
+class Face:
+    """Fly around the pivot until the picture looks along a world axis."""
+
+    forward: Vector
+
+    def apply(self, state: State) -> State:
+        return FlyTo(poses.facing(state.pose, self.forward)).apply(state)
+
+
+SIDES = (
+    ("the front", Vector(0.0, 0.0, 1.0)),
+    ("the back", Vector(0.0, 0.0, -1.0)),
+    ("the left", Vector(1.0, 0.0, 0.0)),
+    ("the right", Vector(-1.0, 0.0, 0.0)),
+    ("above", Vector(0.0, 1.0, 0.0)),
+    ("below", Vector(0.0, -1.0, 0.0)),
+)
+"""Where one may look from, with the direction in which; the front is the first photo's side."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +77,7 @@ class MoveTo:
     pose: Pose
 
     def apply(self, state: State) -> State:
-        return replace(state, pose=self.pose, flight=None, view=None)
+        return replace(state, pose=self.pose, flight=None, tour=None, view=None)
 
 
 @dataclass(frozen=True)

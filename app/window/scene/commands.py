@@ -1,8 +1,10 @@
 """What can happen to the tray and to the scene: photos, files, the jobs that make scenes."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from langflash_core.scene.edits import Marks
 
@@ -12,6 +14,9 @@ from ..editing.state import fresh
 from ..state import State
 from .drops import MAX_PHOTOS
 from .state import MOST_ROOMS, RECONSTRUCTING, Job, Photo, Room, SceneInfo
+
+if TYPE_CHECKING:
+    from langflash_core.types import Scene
 
 # Photos
 
@@ -225,23 +230,35 @@ class SceneArrived:
         if self.room is None:
             return state
         editing = replace(state.editing, saved=self.room.saved)
-        return replace(state, photos=self.room.photos, editing=editing, pose=self.room.pose, view=None)
+        return replace(
+            state,
+            photos=self.room.photos,
+            editing=editing,
+            pose=self.room.pose,
+            keys=self.room.keys,
+            metric=self.room.metric,
+            view=None,
+        )
 
     def _shown(self, state: State) -> State:
         prompts = tuple(replace(p, score=None) for p in state.prompts)
         history = self.info.history
         saved = None if history is None else history.moved_to(0).marks
+        made = state.job is not None and state.job.title == RECONSTRUCTING
         return replace(
             state,
             editing=fresh(state.editing, history, saved),
             recovery=replace(state.recovery, edits=None, kept=None),
-            asking=state.asking.without_scene(),
+            asking=replace(state.asking.without_scene(), named=made and not state.asked),
             info=self.info,
             photos=() if self.alone else state.photos,
             prompts=prompts,
             job=None,
             aside=None,
             flight=None,
+            tour=None,
+            keys=self.info.keys,
+            metric=self.info.scene.record.metric_scale,
             pose=self.info.views[0] if self.info.views else poses.START,
             view=0 if self.info.views else None,
         )
@@ -249,13 +266,26 @@ class SceneArrived:
 
 def _rooms(state: State, coming: SceneInfo) -> tuple[Room, ...]:
     """Those to go back to once `coming` is on show; the same file twice only where there are edits."""
-    info, editing = state.info, state.editing
-    left = (
-        () if info is None else (Room(info, scene_photos(state), editing.history, editing.saved, state.pose),)
-    )
+    info, editing, left = state.info, state.editing, ()
+    if info is not None:
+        told = (scene_photos(state), editing.history, editing.saved, state.pose, state.keys, state.metric)
+        left = (Room(info, *told),)
     rooms = (room for room in (*left, *state.rooms) if room.info.serial != coming.serial)
     kept = (room for room in rooms if room.edited or room.info.path is None or room.info.path != coming.path)
     return tuple(kept)[:MOST_ROOMS]
+
+
+@dataclass(frozen=True)
+class Thinned:
+    """A share of the scene's Gaussians for a moving camera is made (scene/thin.py)."""
+
+    scene: "Scene" = field(compare=False, repr=False)
+    share: float
+    thinned: "Scene" = field(compare=False, repr=False)
+    rows: np.ndarray = field(compare=False, repr=False)
+
+    def apply(self, state: State) -> State:
+        return state
 
 
 @dataclass(frozen=True)

@@ -29,11 +29,12 @@ from .commands import (
     SaveScene,
     SceneArrived,
     SceneSaved,
+    Thinned,
     dropped,
 )
 from .drops import sort_drop
 from .state import SceneInfo
-from .work import FindPair, LoadScene, MakeThumbnails, ReconstructPhotos, WriteScene
+from .work import FindPair, LoadScene, MakeThumbnails, ReconstructPhotos, Thin, WriteScene
 
 
 class SceneEffects(Effects):
@@ -61,13 +62,17 @@ class SceneEffects(Effects):
             case OpenScene(path, edits, alone):
                 submit(LoadScene(path, edits, alone))
             case SaveScene(path) if state.info is not None:
-                submit(WriteScene(state.info.scene, path, state.editing.marks))
+                submit(WriteScene(state.info.scene, path, state.editing.marks, state.keys, state.metric))
             case CancelJob():
                 self._hands.cancel()
             case ChoosePair() if state.choosing and not before.choosing:
                 submit(FindPair(tuple(photo.path for photo in state.photos)))
             case SceneArrived(info):
                 self._show(info)
+                for share in self._viewport.shares:
+                    submit(Thin(info.serial, info.scene, share))
+            case Thinned(scene, share, thinned, rows):
+                self._viewport.thin(scene, share, thinned, rows)
             case Loaded() if state.info is None and self._viewport.warm():
                 self._hands.dispatch(Loaded())
             case _:

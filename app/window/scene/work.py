@@ -15,9 +15,10 @@ from langflash_core.errors import ImageError, LangFlashError
 from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command, ShowPicture
-from ..poses import Vector, from_view, median_reach
-from ..requests import Asked, Errand, Job
-from .commands import ChoosingFailed, PairChosen, PhotoFailed, PhotoRead, SceneArrived, SceneSaved
+from ..filming.state import read, stored
+from ..poses import Pose, Vector, from_view, median_reach
+from ..requests import Asked, Errand, Job, SceneErrand
+from .commands import ChoosingFailed, PairChosen, PhotoFailed, PhotoRead, SceneArrived, SceneSaved, Thinned
 from .state import SceneInfo
 
 if TYPE_CHECKING:
@@ -57,9 +58,9 @@ class LoadScene(Job):
     alone: bool = False
 
     def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> SceneArrived:
-        from langflash_core.export import read
+        from langflash_core.export import read as read_scene
 
-        scene = read(self.path)
+        scene = read_scene(self.path)
         if self.edits is not None:
             return SceneArrived(_restored(describe_scene(scene, serial, ""), self.edits), self.alone)
         return SceneArrived(describe_scene(scene, serial, self.path.name, self.path), self.alone)
@@ -104,6 +105,7 @@ def describe_scene(scene: "Scene", serial: int, name: str, path: Path | None = N
         history=History(first_marks(scene)),
         own_views=scene.num_views > 1 and scene.view_ids is not None,
         extent=_extent(means),
+        keys=read(scene.record.camera_path),
     )
 
 
@@ -127,13 +129,29 @@ class WriteScene(Errand):
     scene: "Scene" = field(repr=False)
     path: Path
     marks: Marks | None = None
+    keys: tuple[Pose, ...] = ()
+    metric: float | None = None
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.export import export
         from langflash_core.scene.edited import edited_scene
 
-        export(self.scene if self.marks is None else edited_scene(self.scene, self.marks), self.path)
+        scene = self.scene if self.marks is None else edited_scene(self.scene, self.marks)
+        export(scene.with_record(camera_path=stored(self.keys), metric_scale=self.metric), self.path)
         yield SceneSaved(self.path, self.marks)
+
+
+@dataclass(frozen=True)
+class Thin(SceneErrand):
+    """Fewer, wider Gaussians for a moving camera."""
+
+    scene: "Scene" = field(repr=False)
+    share: float
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.scene.thin import thin_with_rows
+
+        yield Thinned(self.scene, self.share, *thin_with_rows(self.scene, self.share))
 
 
 @dataclass(frozen=True)

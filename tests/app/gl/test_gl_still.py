@@ -113,6 +113,24 @@ def test_shaders_are_compiled_ahead(gl, scene) -> None:
     renderer.release()
 
 
+def test_weight_maps_of_one_size_are_kept(gl, scene) -> None:
+    renderer = SplatRenderer(gl)
+    renderer.set_scene(scene)
+    first, second = (scene.camera(0, *size) for size in ((64, 48), (48, 36)))
+    before = renderer_maps(renderer, first)
+    renderer.draw(second)
+    assert [view.maps._layers._made is None for view in renderer._canvas._views] == [True, False]
+    assert np.array_equal(renderer_maps(renderer, first), before)
+    renderer.release()
+
+
+def renderer_maps(renderer: SplatRenderer, camera) -> np.ndarray:
+    renderer.draw(camera)
+    maps = renderer.frame(weight_maps=True).weight_maps
+    assert maps is not None
+    return maps.numpy()
+
+
 def test_what_is_on_show_stays_while_another_size_is_drawn(gl, scene) -> None:
     """A window shows the picture before until the next one is painted."""
     renderer = SplatRenderer(gl)

@@ -127,6 +127,9 @@ def walk(someone: Watched, phrase: str) -> Iterator[tuple[str, float]]:
     someone.quiet(2.5)
     full = someone.state["picture"]
     scored = lambda line: line["prompts"][0][0] == phrase and line["prompts"][0][1] is not None  # noqa: E731
+    score = someone.since(typed, scored)
+    half = someone.since(typed, lambda s: scored(s) and 2 * s["picture"][0] >= full[0] - 1)
+    yield "half-resolution picture with the phrase, after its score", max(half - score, 0.0)
     yield (
         f"full picture {full} with its score",
         someone.since(typed, lambda s: scored(s) and s["picture"] == full),
@@ -172,8 +175,9 @@ def measure(code: Path, size: tuple[int, int], photos: list[Path], phrase: str) 
             record = someone.end()
     found = gaps(record["steps"], someone.phases)
     say = sys.stdout.write
-    say(f"\n{code} at {size[0]} x {size[1]}: {len(found)} frames, "
-        f"{sum(gap.seconds > LATE for gap in found)} later than {1000 * LATE:.0f} ms\n")  # fmt: skip
+    say(f"\n{code} at {size[0]} x {size[1]}: {len(found)} frames\n")
+    late = sum(gap.seconds > LATE for gap in found)
+    say(f"  {late or 'no'} frame{'s' * (late > 1)} later than {1000 * LATE:.0f} ms\n")
     for what, seconds in told:
         say(f"  {what}: {seconds:.2f} s\n")
     for phase, _ in someone.phases:

@@ -35,9 +35,10 @@ PATIENCE = 120.0  # seconds without any sign of life that count as a hang, also 
 STEPS_AT_ONCE = 12
 SLOPE_MB = 8.0  # a minute; a scene that leaked at each opening would be 20, a reconstruction hundreds
 KEYS = (
-    *"wasdqehzfpkvxrbcg1234567890", "bracketleft", "bracketright", "Delete", "BackSpace", "Escape", "Return",
-    "Tab", "shift+Tab", "Up", "Down", "Left", "Right", "Home", "End", "space", "F1", "F2", "minus", "plus",
-    *(f"ctrl+{letter}" for letter in "zyadisoepqvcf"), "ctrl+comma", "ctrl+shift+z", "F6", "F11",
+    *"wasdqehzfpkvxrbcglonmjt1234567890", "bracketleft", "bracketright", "Delete", "BackSpace", "Escape",
+    "Return", "Tab", "shift+Tab", "Up", "Down", "Left", "Right", "Home", "End", "space", "F1", "F2",
+    "minus", "plus", *(f"ctrl+{letter}" for letter in "zyadisoepqvcf"),
+    "ctrl+comma", "ctrl+shift+z", "F6", "F11",
 )  # fmt: skip
 WORDS = (
     "armchair",
@@ -101,6 +102,8 @@ def inside(width: int, height: int) -> None:
                 "scene": state.info.name if state.info and state.job is None else None,
                 "unexpected": [t.text for t in state.toasts if "unexpected" in t.text],
                 "gl_errors": session.gl_errors,
+                "dialog": state.dialog,
+                "job": None if state.job is None else state.job.stage,
                 "discard": items.now().get("Discard", [None])[0],
             }
             sys.stdout.write(json.dumps(line) + "\n")
@@ -322,7 +325,7 @@ def run(
                 now = time.monotonic() - start
                 if now >= checkpoint or now >= seconds:
                     if not opened(hands, watched, scene.name):
-                        outcome.problems.append("the scene did not open")
+                        outcome.problems.append(f"the scene did not open: {watched.last}")
                     outcome.checkpoints.append((now / 60, watched.last.get("rss", 0.0)))
                     say(f"{now / 60:5.1f} min  {watched.last.get('rss', 0):6.0f} MB  {outcome.steps} steps")
                     checkpoint = now + every

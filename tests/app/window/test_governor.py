@@ -7,12 +7,15 @@ import pytest
 from app.window.governor import (
     FULL_AFTER,
     LARGE_SCENE,
+    MIDDLING_SCENE,
     MOVING_SECONDS,
     SETTLE_AFTER,
     SIZES,
+    SIZES_OF_MIDDLING_SCENES,
     Governor,
     Kind,
     Plan,
+    thinned_shares,
 )
 
 
@@ -46,7 +49,7 @@ def test_a_slow_machine_moves_within_the_budget_and_stays_there(kind) -> None:
 
 def test_large_scenes_that_cost_by_the_gaussian_are_thinned() -> None:
     """A second for the Gaussians alone: smaller pictures do not help, fewer Gaussians do."""
-    _, plans = settled(Governor(5 * LARGE_SCENE), Kind.COLOUR, 1.2, fixed=1.0)
+    _, plans = settled(Governor(5 * LARGE_SCENE, shares=(0.25, 0.0625)), Kind.COLOUR, 1.2, fixed=1.0)
     assert plans[-1].share < 1 and 0.2 * plans[-1].scale ** 2 + plans[-1].share <= 1.8 * MOVING_SECONDS
     _, plans = settled(Governor(LARGE_SCENE - 1), Kind.COLOUR, 1.2, fixed=1.0)
     assert plans[-1].share == 1.0  # small ones never
@@ -105,3 +108,14 @@ def test_rest_ends() -> None:
 
 def test_an_unknown_machine_starts_in_the_middle() -> None:
     assert Governor().moving(Kind.COLOUR) == Plan(Kind.COLOUR, SIZES[2][0])
+
+
+def test_thinner_levels_count_once_they_are_made() -> None:
+    assert thinned_shares(LARGE_SCENE, False) == (0.25, 0.0625)
+    assert thinned_shares(MIDDLING_SCENE, True) == (0.25,) and thinned_shares(MIDDLING_SCENE, False) == ()
+    slow = Governor(MIDDLING_SCENE, slow=True)
+    assert slow.ladder == SIZES and slow.with_share(0.25).ladder == SIZES_OF_MIDDLING_SCENES
+    moved = slow.learn(slow.moving(Kind.COLOUR), 0.2).with_share(0.25)
+    assert moved.moving(Kind.COLOUR).share == 0.25
+    half = Governor(LARGE_SCENE).with_share(0.25)
+    assert half.ladder == SIZES and half.with_share(0.0625).ladder != SIZES

@@ -5,11 +5,10 @@ from dataclasses import replace
 
 import pytest
 
-from app.gl import offscreen_context
+from app.gl import still
 from app.window.governor import Governor, Kind, Plan
 from app.window.scene.state import Mode
-from app.window.viewport import Viewport
-from langflash_core.errors import GraphicsError
+from app.window.viewport import RETRY_SECONDS, Viewport
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
 from tests.app.window.scenes import PHRASES, room, shown_scene
@@ -22,16 +21,6 @@ class Stubborn(Governor):
 
     def moving(self, wanted: Kind) -> Plan:
         return Plan(wanted, 0.75)
-
-
-@pytest.fixture
-def context():
-    try:
-        made = offscreen_context()
-    except GraphicsError as problem:
-        pytest.skip(str(problem))
-    yield made
-    made.release()
 
 
 def test_a_picture_comes_to_rest_in_full(context) -> None:
@@ -61,3 +50,45 @@ def test_a_picture_comes_to_rest_in_full(context) -> None:
         viewport.release()
     assert plans[-1] == Plan(Kind.MAPS)
     assert len(plans) <= 3, "the moving one, and what follows it at rest"
+
+
+def test_a_picture_that_could_not_be_drawn_is_told_and_tried_again(context, monkeypatch) -> None:
+    broken, tried = [True], []
+    real = still.draw_still
+
+    def draw_still(*args, **named):
+        tried.append(named["weight_maps"])
+        if broken[0]:
+            raise MemoryError("a picture too many")
+        return real(*args, **named)
+
+    monkeypatch.setattr(still, "draw_still", draw_still)
+    scene = room(language_space("minilm").encode(list(PHRASES)))
+    shown = shown_scene()
+    assert shown.info is not None
+    state = replace(shown, info=replace(shown.info, scene=scene))
+    with context:
+        viewport = Viewport(context)
+        viewport.set_scene(1, scene)
+        if viewport._artist is None:
+            pytest.skip("OpenGL here has a graphics card, which draws all pictures itself")
+
+        def live(seconds: float, until) -> None:
+            nonlocal state
+            for _ in range(300):
+                if until():
+                    return
+                viewport.governor = Stubborn(slow=True)
+                state = replace(state, now=state.now + seconds)
+                viewport.update(state, SIZE, touched=0.0)
+                time.sleep(0.01)
+            raise AssertionError("nothing came of it")
+
+        live(0.05, lambda: viewport.failing)
+        assert len(tried) == 1
+        wait = viewport.update(state, SIZE, touched=0.0)
+        assert 0 < wait <= RETRY_SECONDS and not viewport.settling, "not at once, and not never"
+        broken[0] = False
+        live(RETRY_SECONDS, lambda: getattr(viewport.drawn, "plan", Plan(Kind.FAST, 0.5)).scale == 1.0)
+        assert not viewport.failing
+        viewport.release()

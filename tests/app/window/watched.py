@@ -26,12 +26,11 @@ from tests.app.window.items import Items
 TICK = 0.05  # seconds: the loop is never asleep for longer, so that a held interpreter is seen
 WATCHED = {
     "app.window.session": (
-        "Session._update_picture", "Session._present", "Session._perform", "draw_all", "Session._work",
+        "Session._update_picture", "Session._present", "Session._perform", "draw_all",
     ),
     "app.window.worker": ("Worker.poll",),
     "app.window.viewport": (
         "Viewport._draw", "Viewport._colour", "Viewport.view", "Viewport.set_scene", "Viewport.read",
-        "Viewport.work",
     ),
     "app.gl.scene": ("Level.prepare", "LiveScene._made"),
     "app.gl.view": ("ViewTargets.draw_colour", "ViewTargets.fast"),

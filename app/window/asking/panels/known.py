@@ -7,9 +7,8 @@ from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State
 from .. import commands as ask
+from ..things import things
 
-MOST = 10
-LEAST_SHARE = 0.004  # of what is left of the scene; smaller groups are seldom what they are called
 KNOWS = "Names 68 % of a real room right among 37 kinds of things; understands English."
 """assets/weights/mini_card.md, "Real photos": atoms drawn, by area."""
 
@@ -38,19 +37,3 @@ def draw(state: State, look: Look) -> list[do.Command]:
     if state.info.scene.record.preset == "mini":
         widgets.muted(KNOWS)
     return issued
-
-
-def things(state: State) -> tuple[str, ...]:
-    """Names of the groups that speak, the largest first, each once."""
-    insight, history = state.asking.insight, state.editing.history
-    if insight is None or history is None:
-        return ()
-    atoms = history.marks.atoms
-    told = [k for k, atom in enumerate(atoms) if atom.on and k < len(insight.shares)]
-    told = [k for k in told if insight.shares[k] >= LEAST_SHARE and (atoms[k].name or _named(state, k))]
-    told.sort(key=lambda k: -insight.shares[k])
-    return tuple(dict.fromkeys(state.editing.atom_name(k).lower() for k in told))[:MOST]
-
-
-def _named(state: State, k: int) -> bool:
-    return k < len(state.editing.names) and bool(state.editing.names[k])

@@ -68,7 +68,7 @@ def _phrase(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
         widgets.tooltip("Asks for what the place you clicked says; type to ask for words instead")
     if imgui.is_item_activated() and state.active != prompt.key:
         issued.append(ask.SelectPrompt(prompt.key))
-    if changed:
+    if changed and not imgui.is_key_pressed(imgui.Key.escape):  # ImGui would take back what was typed
         issued.append(ask.EditPrompt(prompt.key, text))
     return issued
 

@@ -9,6 +9,7 @@ from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State
 from .. import commands as ask
+from ..reliability import Reliability, reliability
 from ..state import BINS, Prompt
 
 _HEIGHT = 78.0  # design pixels
@@ -32,7 +33,12 @@ def draw(state: State, look: Look) -> list[do.Command]:
         opened = imgui.tree_node_ex(f"{title}###scores", shape | imgui.TreeNodeFlags_.default_open)
     if not opened:
         return []
-    return _plot(prompt, np.array(found.counts, float), look) + _span(state, prompt, look)
+    known = None if state.info is None else reliability(state.info.scene.record.calibration)
+    issued = _plot(prompt, np.array(found.counts, float), known, look)
+    if known is not None and prompt.score is not None:
+        share = 100 * known.at(prompt.score)
+        widgets.muted(f"On {known.on} {share:.0f} % of phrases that score {prompt.score:.2f} are there.")
+    return issued + _span(state, prompt, look)
 
 
 def _span(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
@@ -54,8 +60,9 @@ def _span(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     return [ask.SetSpan((first, last))] if changed else []
 
 
-def _plot(prompt: Prompt, counts: np.ndarray, look: Look) -> list[do.Command]:
-    """Bars as high as the logarithm of their pixels, so that small things show beside a large rest."""
+def _plot(prompt: Prompt, counts: np.ndarray, known: Reliability | None, look: Look) -> list[do.Command]:
+    """Bars as high as the logarithm of their pixels, so that small things show beside a large rest; the
+    reliability diagram as a line, from nobody at the bottom to all at the top."""
     issued: list[do.Command] = []
     heights = np.log1p(counts)
     top = max(float(heights.max()), 1.0) * 1.08
@@ -72,22 +79,27 @@ def _plot(prompt: Prompt, counts: np.ndarray, look: Look) -> list[do.Command]:
             spec.line_color = ImVec4Clear
             if passing.any():
                 implot.plot_bars("##bars", MIDDLES[passing], heights[passing], 0.9 / BINS, spec)
+        if known is not None:
+            spec = implot.Spec()
+            spec.line_color, spec.line_weight = theme.MUTED, look.px(1.5)
+            implot.plot_line("##reliability", np.array(known.scores), top * np.array(known.present), spec)
         moved, cut, *_ = implot.drag_line_x(1, prompt.cut, theme.TEXT, look.px(2))
         if moved:
             issued.append(ask.SetThreshold(prompt.key, min(max(cut, 0.0), 1.0)))
         if implot.is_plot_hovered():
-            _tip(prompt, counts)
+            _tip(prompt, counts, known)
         implot.end_plot()
     implot.pop_style_color(2)
     implot.pop_style_var()
     return issued
 
 
-def _tip(prompt: Prompt, counts: np.ndarray) -> None:
+def _tip(prompt: Prompt, counts: np.ndarray, known: Reliability | None) -> None:
+    line = f"\nThe line: how many phrases with such a score are there, on {known.on}." if known else ""
     passing = counts[prompt.cut <= MIDDLES].sum() / max(counts.sum(), 1.0)
     imgui.set_tooltip(
         f"{100 * passing:.1f} % of what is in view scores {prompt.cut:.2f} or more.\n"
-        "Drag the line to move the threshold; heights are logarithmic."
+        f"Drag the threshold to move it; heights are logarithmic.{line}"
     )
 
 

@@ -1,5 +1,7 @@
 """Hands on the picture with a tool: pointing, asking, drawing a region."""
 
+import math
+
 from imgui_bundle import ImVec2, imgui
 
 from ... import commands as do
@@ -7,9 +9,10 @@ from ...kit.look import Look
 from ...state import State
 from .. import commands as edit
 from .. import pointing as point
-from ..state import PICK_RADIUS, Point, Region, Tool
+from ..state import Point, Region, Tool
 
 CLICK = 4.0  # design pixels that a click may slip
+CLOSE = 10.0  # around a polygon's first corner, in which a click closes it
 
 
 def _pointer(corner: ImVec2) -> Point:
@@ -34,25 +37,47 @@ def ask(look: Look, corner: ImVec2) -> list[do.Command]:
 
 
 def region(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
-    """The box or stroke being drawn, and at its end the request to select what it shows."""
+    """What is being drawn with a selecting tool, and at its end the request to select what it shows."""
     editing, io = state.editing, imgui.get_io()
     held = imgui.is_item_active() and imgui.is_mouse_down(0)
     let_go = imgui.is_item_deactivated() and imgui.is_mouse_released(0)
     if not (held or let_go):
-        return [point.Drag(())] if editing.drag else []
+        lasting = editing.tool is Tool.LASSO  # a polygon waits for its next corner
+        return [point.Drag(())] if editing.drag and not lasting else []
     way, here = imgui.get_mouse_drag_delta(0, 0.0), _pointer(corner)
     pixels = io.display_framebuffer_scale
     start = (here[0] - way.x * pixels.x, here[1] - way.y * pixels.y)
-    path = editing.drag or (start,)
-    if editing.tool is Tool.BRUSH:
-        path = path if path[-1] == here else (*path, here)
-    else:
-        path = (start,) if editing.tool is Tool.PICK or start == here else (start, here)
+    path = _path(editing.tool, editing.drag, start, here)
     if held:
         return [] if path == editing.drag else [point.Drag(path)]
-    radius = {Tool.BOX: None, Tool.PICK: PICK_RADIUS, Tool.BRUSH: editing.radius}[editing.tool]
-    scaled = None if radius is None else radius * look.scale * pixels.x
-    if radius is None and len(path) < 2:
-        return [point.Drag(())]  # a click with the box marks nothing
     combine = "add" if io.key_shift else "remove" if io.key_ctrl else editing.combine
-    return [edit.SelectRegion(Region(path, scaled), combine)]
+    clicked = math.hypot(way.x, way.y) < look.px(CLICK)
+    unit = look.scale * pixels.x
+    match editing.tool:
+        case Tool.PICK:
+            return [edit.SelectThing(here, combine)]
+        case Tool.SPHERE if not clicked:
+            return [edit.SelectSphere(start, math.dist(start, here), combine)]
+        case Tool.BRUSH:
+            return [edit.SelectRegion(Region(path, editing.radius * unit), combine)]
+        case Tool.BOX if len(path) > 1:
+            return [edit.SelectRegion(Region(path), combine)]
+        case Tool.LASSO if not clicked or _closed(path, CLOSE * unit):
+            return [edit.SelectRegion(Region(path, around=True), combine)] if len(path) > 2 else []
+        case Tool.LASSO:
+            return [point.Drag(path)]  # a corner; a click on the first one, or a double click, ends it
+    return [point.Drag(())]
+
+
+def _path(tool: Tool, before: tuple[Point, ...], start: Point, here: Point) -> tuple[Point, ...]:
+    """What is drawn so far, with the pointer at `here`, pressed at `start`."""
+    if tool in (Tool.BRUSH, Tool.LASSO):
+        path = before or (start,)
+        return path if path[-1] == here else (*path, here)
+    return (start,) if tool is Tool.PICK or start == here else (start, here)
+
+
+def _closed(path: tuple[Point, ...], near: float) -> bool:
+    """Whether the corners of a polygon are all there: the last is at the first, or was clicked twice."""
+    twice = imgui.get_io().mouse_clicked_last_count[0] > 1
+    return twice or (len(path) > 3 and math.dist(path[0], path[-1]) < near)

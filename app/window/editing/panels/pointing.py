@@ -1,5 +1,7 @@
 """At the pointer: the region being drawn, what lies under it, and the answer to "what is this?"."""
 
+import math
+
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
@@ -13,7 +15,7 @@ from .. import commands as edit
 from .. import pointing as point
 from ..state import PICK_RADIUS, Card, Point, Reading, Tool
 
-_CARD = 268.0  # design pixels wide
+_CARD = 312.0  # design pixels wide
 _SHOWN_WORDS = 5
 
 
@@ -53,13 +55,20 @@ def _region(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
         high = ImVec2(max(path[0].x, path[-1].x), max(path[0].y, path[-1].y))
         canvas.add_rect_filled(low, high, fill)
         canvas.add_rect(low, high, line, 0.0, look.px(1.5))
+    elif editing.tool is Tool.LASSO and path:
+        canvas.add_polyline([*path, imgui.get_mouse_pos()], col=line, thickness=look.px(1.5), flags=0)
+        canvas.add_circle_filled(path[0], look.px(4), line)
+    elif editing.tool is Tool.SPHERE and len(path) > 1:
+        way = math.hypot(path[-1].x - path[0].x, path[-1].y - path[0].y)
+        canvas.add_circle_filled(path[0], way, fill)
+        canvas.add_circle(path[0], way, line, 0, look.px(1.5))
     elif editing.tool is Tool.BRUSH and path:
         if len(path) > 1:
             canvas.add_polyline([*path], col=fill, thickness=2 * radius, flags=0)
         canvas.add_circle_filled(path[0], radius, fill)
         canvas.add_circle_filled(path[-1], radius, fill)
         canvas.add_circle(path[-1], radius, line, 0, look.px(1.5))
-    elif editing.hover is not None and editing.tool is not Tool.BOX:
+    elif editing.hover is not None and editing.tool in (Tool.BRUSH, Tool.PICK):
         canvas.add_circle(imgui.get_mouse_pos(), radius, line, 0, look.px(1.5))
     if editing.hover is not None and combine != "replace":
         sign = fa.ICON_FA_PLUS if combine == "add" else fa.ICON_FA_MINUS
@@ -164,16 +173,20 @@ def _answer(state: State, card: Card, look: Look) -> list[do.Command]:
     imgui.same_line(look.px(_CARD - 44))
     if widgets.quiet_button(f"{fa.ICON_FA_XMARK}##card", "Close  (Esc)"):
         issued.append(point.CloseCard())
-    for word, cosine in (card.words or ())[:_SHOWN_WORDS]:
-        _bar(cosine, theme.ACCENT, look)
+    group = card.reading.atoms[0][0] if card.reading.atoms else None
+    for word, score in (card.words or ())[:_SHOWN_WORDS]:
+        imgui.align_text_to_frame_padding()
+        _bar(score, theme.ACCENT, look)
         imgui.same_line()
-        imgui.text(f"{cosine:.2f}")
+        imgui.text(f"{score:.2f}")
         imgui.same_line(look.px(134))
-        imgui.text_unformatted(word)
+        imgui.text_unformatted(widgets.shortened(word, look.px(_CARD - 134 - 84)))
+        if group is not None:
+            issued += _lessons(card, group, word, look)
     if card.reading.point is not None:
         imgui.text_colored(theme.MUTED, _coordinates(card.reading))
-    if card.reading.atoms:
-        issued += _group(state, card.reading.atoms[0][0], look)
+    if group is not None:
+        issued += _group(state, group, look)
     if card.vector:
         if widgets.primary_button(
             f"{fa.ICON_FA_MAGNIFYING_GLASS}  Find similar", ImVec2(look.px(_CARD - 32), 0)
@@ -181,6 +194,18 @@ def _answer(state: State, card: Card, look: Look) -> list[do.Command]:
             issued.append(point.FindSimilar())
         widgets.tooltip("Ask for everything that says the same as this place")
     return issued
+
+
+def _lessons(card: Card, k: int, word: str, look: Look) -> list[do.Command]:
+    """At the end of a word's line: the place is that, or is not; asks again what it is then."""
+    issued: list[do.Command] = []
+    imgui.same_line(look.px(_CARD - 78))
+    if widgets.quiet_button(f"{fa.ICON_FA_CHECK}##is {word}", f"This is: {word}"):
+        issued.append(edit.RenameAtom(k, word))
+    imgui.same_line(0, 0)
+    if widgets.quiet_button(f"{fa.ICON_FA_BAN}##not {word}", f"This is not: {word}"):
+        issued.append(edit.DenyAtom(k, word))
+    return [*issued, point.Ask(card.reading.at)] if issued else []
 
 
 def _group(state: State, k: int, look: Look) -> list[do.Command]:
@@ -197,7 +222,7 @@ def _group(state: State, k: int, look: Look) -> list[do.Command]:
     entered, name = imgui.input_text_with_hint(
         "##name", hint, atom.name, imgui.InputTextFlags_.enter_returns_true
     )
-    widgets.tooltip("Give this group a name of your own, and press Enter")
+    widgets.tooltip("Give this group a name of your own, which it answers to, and press Enter")
     if entered or (imgui.is_item_deactivated_after_edit() and name != atom.name):
         issued.append(edit.RenameAtom(k, name))
     imgui.same_line(0, look.px(4))

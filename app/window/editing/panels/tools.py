@@ -17,8 +17,11 @@ _TOOLS = (
     (Tool.MOVE, fa.ICON_FA_ARROWS_UP_DOWN_LEFT_RIGHT, "Move around  (V)"),
     (Tool.POINT, fa.ICON_FA_CIRCLE_QUESTION, "What is this? Click on anything  (X)"),
     (Tool.BOX, fa.ICON_FA_VECTOR_SQUARE, "Select with a box  (R)\nShift adds, Ctrl removes, Alt orbits"),
+    (Tool.LASSO, fa.ICON_FA_DRAW_POLYGON, "Select with a lasso: draw around it, or click its corners  (L)"),
     (Tool.BRUSH, fa.ICON_FA_PAINTBRUSH, "Select with a brush  (B)\n[ and ] change its size"),
-    (Tool.PICK, fa.ICON_FA_ARROW_POINTER, "Select what is under a click  (C)"),
+    (Tool.SPHERE, fa.ICON_FA_CIRCLE_DOT, "Select with a ball: press on its middle and pull  (O)"),
+    (Tool.PICK, fa.ICON_FA_ARROW_POINTER, "Select the thing under a click  (C)"),
+    (Tool.RULER, fa.ICON_FA_RULER, "Measure, and tell how large things are: click on both ends  (T)"),
 )
 _COMBINES: tuple[tuple[Combine, str, str], ...] = (
     ("replace", fa.ICON_FA_SQUARE, "A new selection each time"),

@@ -7,14 +7,15 @@ from imgui_bundle import icons_fontawesome_6 as fa
 
 from ... import commands as do
 from ... import poses
+from ...asking.things import told
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...poses import Pose
 from ...state import State
 from .. import camera
+from ..state import Mode
 
 FRUSTUM = 0.10  # length of a frustum in distances to the pivot of its view
-NEAREST = 0.02  # scene units in front of the camera from which a frustum is drawn
 _HANDLE = 13.0  # design pixels
 
 
@@ -26,6 +27,10 @@ def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Comm
     if comparing(state):
         return _compare(state, look, corner, size)
     _candidates(state, look, corner, size)
+    if state.asking.named and state.mode is Mode.RGB:
+        _names(state, look, corner, size)
+    if state.keys and state.tour is None:
+        _keys(state, look, corner, size)
     if state.preferences.photos_in_space and state.flight is None:
         return _frusta(state, look, corner, size)
     return []
@@ -36,7 +41,7 @@ def _candidates(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
     for prompt in state.asked:
         if not prompt.maybe or prompt.place is None:
             continue
-        found = project(np.array([prompt.place]), state.pose, size)
+        found = poses.project(np.array([prompt.place]), state.pose, (size.x, size.y))
         if found is None:
             continue
         x, y = found[1][0]
@@ -46,6 +51,47 @@ def _candidates(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
         imgui.get_window_draw_list().add_circle(at, look.px(26), colour, 0, look.px(2))
         below = ImVec2(at.x + look.px(30), at.y - look.px(10))
         _caption(look, below, f"{prompt.text.strip()}?", 0.0)
+
+
+def _keys(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
+    """The camera's key frames, numbered, joined in their order."""
+    canvas, before = imgui.get_window_draw_list(), None
+    for number, key in enumerate(state.keys, start=1):
+        found = poses.project(np.array([key.centre]), state.pose, (size.x, size.y))
+        if found is None:
+            before = None
+            continue
+        x, y = found[1][0]
+        at = ImVec2(corner.x + float(x), corner.y + float(y))
+        if before is not None:
+            canvas.add_line(before, at, widgets.u32(theme.DARK.ACCENT), look.px(1.5))
+        canvas.add_circle_filled(at, look.px(5), widgets.u32(theme.DARK.ACCENT))
+        _caption(look, ImVec2(at.x + look.px(7), at.y - look.px(10)), str(number), 0.0)
+        before = at
+
+
+def _names(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
+    """What the scene knows, at its place; the largest first, and none over another."""
+    insight = state.asking.insight
+    taken: list[tuple[float, float, float, float]] = []
+    for name, k in told(state).items():
+        place = insight.places[k] if insight is not None and k < len(insight.places) else None
+        found = None if place is None else poses.project(np.array([place]), state.pose, (size.x, size.y))
+        if found is None:
+            continue
+        (x, y), extent = found[1][0], imgui.calc_text_size(name)
+        left, top = x - extent.x / 2 - look.px(7), y - extent.y / 2 - look.px(3)
+        box = (left, top, left + extent.x + look.px(14), top + extent.y + look.px(6))
+        inside = box[0] >= 0 and box[1] >= 0 and box[2] <= size.x and box[3] <= size.y
+        if not inside or any(_overlap(box, other) for other in taken):
+            continue
+        taken.append(box)
+        _caption(look, ImVec2(corner.x + left, corner.y + top), name, 0.0)
+
+
+def _overlap(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
+    """Of two boxes: left, top, right, bottom."""
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
 def comparing(state: State) -> bool:
@@ -63,7 +109,8 @@ def _frusta(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.C
     shown = [
         (float(pos_c[:, 2].mean()), view, points)
         for view, pose in enumerate(state.info.views)
-        if (projected := project(frustum(pose), state.pose, size)) is not None and state.view != view
+        if (projected := poses.project(frustum(pose), state.pose, (size.x, size.y))) is not None
+        and state.view != view
         for pos_c, points in [projected]
     ]
     for _, view, points in sorted(shown, key=lambda each: -each[0]):  # far ones first
@@ -106,17 +153,6 @@ def frustum(pose: Pose) -> np.ndarray:
     rays = pixels @ np.linalg.inv(K).T
     corners = rays * FRUSTUM * pose.reach
     return np.concatenate((np.zeros((1, 3)), corners)) @ pose.axes.T + np.array(pose.centre)
-
-
-def project(points: np.ndarray, pose: Pose, size: ImVec2) -> tuple[np.ndarray, np.ndarray] | None:
-    """Camera coordinates (n, 3) and pixels (n, 2) of world points; None where one is not in front."""
-    matrix = poses.viewmat(pose)
-    pos_c = points @ matrix[:3, :3].T + matrix[:3, 3]
-    if pos_c[:, 2].min() < NEAREST:
-        return None
-    K = poses.intrinsics(pose, max(round(size.x), 1), max(round(size.y), 1))
-    pos_px = pos_c @ K.T
-    return pos_c, pos_px[:, :2] / pos_px[:, 2:]
 
 
 # Comparison

@@ -8,53 +8,41 @@ from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State
 from .. import commands as show
+from ..state import Room
 
 _NAMED = 4  # dropped photos that the question names
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
-    """In the heading's line at its right: back to the room before, and a list where there are more."""
+    """Rooms to go back to, a button each: the one before in the heading's line at its right, others below."""
     if not state.rooms:
         return []
+    first, *others = state.rooms
     imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(6, 0))  # no higher than the heading
     imgui.begin_disabled(state.job is not None)
-    issued = _back(state, look)
+    text = f"{fa.ICON_FA_ARROW_LEFT}  {_name(first, look.px(150))}"
+    width = imgui.calc_text_size(text).x + 2 * imgui.get_style().frame_padding.x
+    imgui.same_line(imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - width)
+    issued = _back(first, text, "###back")
+    space = imgui.get_content_region_avail().x / max(len(others), 1) - look.px(44)
+    for place, room in enumerate(others):
+        if place:
+            imgui.same_line(0, 0)
+        text = f"{fa.ICON_FA_CUBE}  {_name(room, space)}"
+        issued += _back(room, text, f"###room {place}")
     imgui.end_disabled()
     imgui.pop_style_var()
-    return issued + _list(state, look)
-
-
-def _back(state: State, look: Look) -> list[do.Command]:
-    """The button of the room before, and the one that opens the list."""
-    issued: list[do.Command] = []
-    before, several = state.rooms[0].info, len(state.rooms) > 1
-    text = f"{fa.ICON_FA_ARROW_LEFT}  {widgets.shortened(before.name, look.px(150))}"
-    padding = 2 * imgui.get_style().frame_padding.x
-    width = imgui.calc_text_size(text).x + padding
-    if several:
-        width += imgui.calc_text_size(fa.ICON_FA_CARET_DOWN).x + padding
-    imgui.same_line(imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - width)
-    if widgets.quiet_button(f"{text}###back", f"Back to {before.name}, as it was left"):
-        issued.append(show.GoToRoom(before.serial))
-    if several:
-        imgui.same_line(0, 0)
-        if widgets.quiet_button(f"{fa.ICON_FA_CARET_DOWN}##rooms", "The rooms before it"):
-            imgui.open_popup("rooms")
     return issued
 
 
-def _list(state: State, look: Look) -> list[do.Command]:
-    issued: list[do.Command] = []
-    imgui.push_style_var(imgui.StyleVar_.window_padding, look.vec(12, 10))
-    if imgui.begin_popup("rooms"):
-        for room in state.rooms:
-            mark = "  (edited)" if room.edited else ""
-            name = widgets.shortened(room.info.name, look.px(260))
-            if imgui.selectable(f"{name}{mark}##{room.info.serial}", False)[0]:
-                issued.append(show.GoToRoom(room.info.serial))
-        imgui.end_popup()
-    imgui.pop_style_var()
-    return issued
+def _back(room: Room, text: str, label: str) -> list[do.Command]:
+    edited = ", with its edits" if room.edited else ""
+    pressed = widgets.quiet_button(f"{text}{label}", f"Back to {room.info.name}, as it was left{edited}")
+    return [show.GoToRoom(room.info.serial)] if pressed else []
+
+
+def _name(room: Room, width: float) -> str:
+    return widgets.shortened(room.info.name, width)
 
 
 def draw_drop(state: State, look: Look) -> list[do.Command]:

@@ -9,6 +9,7 @@ from imgui_bundle import icons_fontawesome_6 as fa
 from ... import commands as do
 from ...kit import theme, widgets
 from ...kit.look import Look
+from ...opening import commands as opening
 from ...poses import FOV_RANGE
 from ...state import State
 from .. import commands as show
@@ -243,7 +244,7 @@ def _crop(aspect: float, target: float) -> tuple[ImVec2, ImVec2]:
 def _open_button() -> list[do.Command]:
     """In the place of the others while there is no photo."""
     pressed = imgui.button(f"{fa.ICON_FA_FOLDER_OPEN}  Open ...", ImVec2(-1, 0))
-    return [do.ShowDialog("open")] if pressed else []
+    return [opening.OpenFiles()] if pressed else []
 
 
 def _buttons(state: State, look: Look) -> list[do.Command]:

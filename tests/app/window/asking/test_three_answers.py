@@ -7,7 +7,8 @@ import pytest
 import torch
 
 from app.window.asking import commands as ask
-from app.window.asking.panels import known
+from app.window.asking import things
+from app.window.asking.panels.known import KNOWS
 from app.window.asking.state import EVEN, Insight, Prompt
 from app.window.asking.work import Encode
 from app.window.editing.pointing import AtomsNamed
@@ -86,7 +87,7 @@ def test_a_foreign_phrase_is_marked_with_its_compiled_question() -> None:
 
 def test_chips_are_what_the_scene_shows_most_of_each_once() -> None:
     state = shown_scene()
-    assert known.things(state) == ()
+    assert things.things(state) == ()
     black = (0.0, 0.0, 0.0)
     insight = Insight((0.2, 0.5, 0.001), (black, black, black), (0, 1, 2), np.eye(3))
     names = AtomsNamed((("wall", "side"), ("Floor",), ("crumb",)))
@@ -94,11 +95,11 @@ def test_chips_are_what_the_scene_shows_most_of_each_once() -> None:
     history = History(first_marks(state.info.scene))
     state = replace(state, editing=replace(state.editing, history=history))
     state = after(state, ask.AtomsDescribed(insight), names)
-    assert known.things(state) == ("floor", "wall")
+    assert things.things(state) == ("floor", "wall")
     silent = tuple(replace(atom, on=k != 1) for k, atom in enumerate(history.marks.atoms))
     marks = replace(history.marks, atoms=silent)
     muted = replace(state, editing=replace(state.editing, history=History(marks)))
-    assert known.things(muted) == ("wall",)
+    assert things.things(muted) == ("wall",)
 
 
 def test_a_chip_asks_its_word() -> None:
@@ -108,7 +109,7 @@ def test_a_chip_asks_its_word() -> None:
 
 def test_what_the_model_knows_is_what_its_card_says() -> None:
     card = asset_path("weights/mini_card.md").read_text()
-    assert "37 classes, atoms drawn" in card and ".307 / .676" in card and "68 %" in known.KNOWS
+    assert "37 classes, atoms drawn" in card and ".307 / .676" in card and "68 %" in KNOWS
 
 
 def test_one_photo_is_told_to_leave_depth_a_guess() -> None:

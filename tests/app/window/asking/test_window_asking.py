@@ -54,6 +54,15 @@ def type_into(program: Program, row: int, text: str, delay: int = 30) -> None:
     raise AssertionError(f"could not type {text!r}; last state {program.state}")
 
 
+def test_escape_leaves_the_field_and_keeps_what_was_typed(program: Program) -> None:
+    type_into(program, 0, "floor")
+    program.xdotool("key", "Escape", "sleep", "0.5", "key", "4")  # no letter of the phrase: a mode
+    state = program.until(lambda s: s["mode"] == "ATOMS", "the key of a mode")
+    assert state["prompts"][0][0] == "floor"
+    program.xdotool("key", "2")
+    program.until(lambda s: s["mode"] == "HEAT", "the heat-map")
+
+
 def test_two_phrases_are_asked_at_once(program: Program) -> None:
     type_into(program, 0, "armchair")
     program.until(lambda s: s["prompts"][0][2] is True, "the armchair")

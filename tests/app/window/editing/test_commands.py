@@ -186,6 +186,15 @@ def test_atoms_are_named_by_the_person_or_by_words(shown: State) -> None:
     assert after(state, edit.Undo()).editing.atom_name(0) == "armchair"
 
 
+def test_names_and_denials_make_scores_lapse_and_can_be_undone(shown: State) -> None:
+    scored = after(shown, ask.EditPrompt(0, "wall"), ask.Answered(((0, "wall", 0.9),)))
+    for lesson in (edit.RenameAtom(0, "wall"), edit.DenyAtom(0, "wall")):
+        taught = after(scored, lesson)
+        assert taught.prompts[0].score is None and taught.asking.lapses > scored.asking.lapses
+        assert after(taught, edit.Undo()).editing.marks == shown.editing.marks
+    assert after(scored, edit.DenyAtom(9, "wall"), edit.DenyAtom(0, " ")).editing == scored.editing
+
+
 def test_framing_the_selection_flies_to_it(shown: State) -> None:
     state = after(shown, found(0, CHAIRS), point.FrameSelection(), do.Tick(shown.now + FLIGHT_SECONDS))
     # Its front is a square of 0.4 around (x, y), at the block's z - 0.2.
@@ -243,8 +252,8 @@ def test_a_score_goes_with_what_it_rests_on(shown: State, change: do.Command) ->
     assert after(again, edit.Undo()).prompts[0].score is None
 
 
-def test_selecting_and_naming_keep_the_scores(shown: State) -> None:
-    state = after(answered(shown), found(0, CHAIRS), edit.RenameAtom(0, "throne"), edit.Undo())
+def test_selecting_keeps_the_scores(shown: State) -> None:
+    state = after(answered(shown), found(0, CHAIRS), edit.Undo())
     assert state.prompts[0].score == 0.99 and state.asking.histograms
 
 

@@ -1,5 +1,6 @@
 """The worker's side of editing on a room whose answers are known."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,14 @@ from app.window.editing.state import Reading, Region
 from app.window.poses import to_camera
 from app.window.requests import SceneErrand
 from app.window.scene.work import describe_scene
+from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import language_space
-from langflash_core.scene.edits import Mask, hide, merge_atoms, select
+from langflash_core.scene.edited import spoken_scene
+from langflash_core.scene.edits import Mask, deny_atom, hide, merge_atoms, rename_atom, select
 from langflash_core.splat import render
 from langflash_core.splat.picking import SEEN
 from langflash_core.splat.reference import rasterize
-from tests.app.window.scenes import PHRASES, room
+from tests.app.window.scenes import CHAIR, PHRASES, room
 
 SIZE = (224, 168)
 CHAIRS = 2500
@@ -129,6 +132,64 @@ def test_a_place_has_words_also_the_persons_own(info) -> None:
     assert vector @ info.scene.semantics.dictionary[0].numpy() > 0.9
     drawn = np.array([0.0, 0.7, 0.0], np.float32).tobytes()
     assert result(work.NamePlace(*scene_of(info), *place, drawn, ())).words[0][0] == "wall"
+
+
+def test_a_place_answers_to_its_new_name_with_the_score_of_a_phrase(info) -> None:
+    serial, scene, marks = scene_of(info)
+    marks = deny_atom(rename_atom(marks, 1, "fresco"), 1, "wall")
+    drawn = np.array([0.0, 0.7, 0.0], np.float32)
+    place = (Reading((1.0, 2.0), (0, 0, 1), 1.0), info.views[0], (64, 48))
+    named = result(work.NamePlace(serial, scene, marks, *place, drawn.tobytes(), ()))
+    word, score = named.words[0]
+    assert word == "fresco"
+    query = compile_query(spoken_scene(scene, marks), language_space("minilm"), ["fresco", "wall"])
+    relevance = relevance_maps(torch.from_numpy(drawn)[None], query)[:, 0].tolist()
+    assert score == pytest.approx(relevance[0], abs=1e-6) and relevance[0] > query.threshold
+    assert relevance[1] < 0.5 and "wall" not in dict(named.words)
+    strange = rename_atom(marks, 0, "\U0001f6cb")  # a name without a word that the tower knows breaks nothing
+    assert result(work.NamePlace(serial, scene, strange, *place, drawn.tobytes(), ())).words
+
+
+def thing_at(info, at: tuple[float, float], marks=None) -> np.ndarray:
+    return result(work.FindThing(*scene_of(info, marks), at, info.views[0], SIZE, "replace")).mask.rows()
+
+
+def test_a_click_takes_the_whole_thing(info) -> None:
+    found = thing_at(info, MIDDLE_OF_CHAIR)
+    assert found[:CHAIRS].all() and not found[CHAIRS:].any()
+    assert not thing_at(info, (-50.0, -50.0)).any(), "nothing is there"
+
+
+def test_a_click_takes_one_of_two_things_of_a_group(info) -> None:
+    apart = info.scene.gaussians.means.clone()
+    right = apart[:CHAIRS, 0] > CHAIR[0]
+    apart[:CHAIRS][right] += torch.tensor([0.5, 0.0, 0.0])
+    moved = replace(info.scene, gaussians=replace(info.scene.gaussians, means=apart))
+    found = thing_at(replace(info, scene=moved), (MIDDLE_OF_CHAIR[0] - 20, MIDDLE_OF_CHAIR[1]))
+    assert found.sum() == int((~right).sum()) and not found[:CHAIRS][right.numpy()].any()
+
+
+def test_a_ball_takes_what_is_near_in_space(info) -> None:
+    place = (MIDDLE_OF_CHAIR, info.views[0], SIZE, "replace")
+    found = result(work.FindInSphere(*scene_of(info), *place, 12.0)).mask.rows()
+    means = info.scene.gaussians.means.numpy()
+    K = to_camera(info.views[0], *SIZE).K
+    assert found[:CHAIRS].any() and not found[CHAIRS:].any(), "the wall behind is too far away"
+    across = np.ptp(means[found], axis=0)[:2]
+    expected = 2 * 12.0 * (CHAIR[2] - 0.2) / float(K[0, 0])
+    assert across == pytest.approx(expected, rel=0.1)  # rows of 0.008 in a ball of 0.08
+
+
+def test_a_lasso_goes_around_pixel_centres() -> None:
+    triangle = Region(((0.0, 0.0), (8.0, 0.0), (0.0, 8.0)), around=True)
+    y, x = np.mgrid[:10, :10] + 0.5
+    inside = triangle.pixels(10, 10)
+    off_edge = abs(x + y - 8.0) > 1e-9
+    assert (inside == (x + y < 8.0))[off_edge].all() and inside.sum() > 20
+    turned = Region(triangle.points[::-1], around=True).pixels(10, 10)
+    assert (turned == inside)[off_edge].all()
+    assert not Region(((1.0, 1.0), (5.0, 5.0)), around=True).pixels(10, 10).any()
+    assert Region(((-9.0, -9.0), (30.0, -9.0), (30.0, 30.0), (-9.0, 30.0)), around=True).pixels(10, 10).all()
 
 
 def test_atoms_are_named(info) -> None:

@@ -49,6 +49,19 @@ def test_every_kind_says_the_command_that_does_it(what: What) -> None:
     assert ("--segmented" in words) == (what is What.SEGMENTED)
 
 
+def test_what_fades_on_show_fades_in_files_unless_said_otherwise() -> None:
+    def fades(near: bool, **changes) -> bool:
+        state = scene()
+        state = replace(state, preferences=replace(state.preferences, near_photos=near))
+        order = export_form.order(form(state, path="/out/a picture", **changes))
+        assert not isinstance(order, str)
+        return "--fade" in order.words
+
+    assert fades(True, what=What.RGB) and fades(True, what=What.VIDEO) and not fades(False, what=What.RGB)
+    assert fades(False, what=What.RGB, fade=True) and not fades(True, what=What.RGB, fade=False)
+    assert not fades(True, what=What.PLY) and not fades(True, what=What.MASK)
+
+
 def wrong(state: State) -> str:
     """What the form lacks."""
     order = export_form.order(state)

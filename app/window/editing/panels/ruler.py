@@ -1,0 +1,66 @@
+"""Over the picture: what is measured, how long it is, and the field that tells how long it is in truth."""
+
+import numpy as np
+from imgui_bundle import ImVec2, imgui
+
+from ... import commands as do
+from ... import poses
+from ...kit import theme, widgets
+from ...kit.look import Look
+from ...state import State
+from .. import pointing as point
+from ..state import Tool
+
+_ENTER = imgui.InputTextFlags_.enter_returns_true
+_BAR = widgets.PLAIN | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
+
+
+def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
+    """The line between both ends with its length; with the ruler in hand, a field for it."""
+    if state.editing.tool is not Tool.RULER or not state.editing.ruler:
+        return []
+    found = poses.project(np.array(state.editing.ruler), state.pose, (size.x, size.y))
+    if found is None:
+        return []
+    ends = [ImVec2(place.x + float(x), place.y + float(y)) for x, y in found[1]]
+    canvas, colour = imgui.get_foreground_draw_list(), widgets.u32(theme.DARK.ACCENT)
+    canvas.push_clip_rect(place, ImVec2(place.x + size.x, place.y + size.y), True)
+    for end in ends:
+        canvas.add_circle_filled(end, look.px(4), colour)
+    if len(ends) == 2:
+        canvas.add_line(ends[0], ends[1], colour, look.px(2))
+    canvas.pop_clip_rect()
+    return _field(state, look, ends) if len(ends) == 2 else []
+
+
+def _field(state: State, look: Look, ends: list[ImVec2]) -> list[do.Command]:
+    issued: list[do.Command] = []
+    length = point.measured(state.editing.ruler) or 0.0
+    middle = ImVec2((ends[0].x + ends[1].x) / 2, (ends[0].y + ends[1].y) / 2 + look.px(12))
+    imgui.set_next_window_pos(middle, 0, ImVec2(0.5, 0))
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, look.vec(10, 7))
+    with widgets.colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
+        imgui.begin("##ruler", None, _BAR)
+        imgui.align_text_to_frame_padding()
+        imgui.text(said(length, state.metric))
+        imgui.same_line()
+        imgui.text_colored(theme.MUTED, "this is")
+        imgui.same_line()
+        imgui.set_next_item_width(look.px(76))
+        known = 100 * length * state.metric if state.metric else 0.0
+        entered, centimetres = imgui.input_float("cm", known, 0, 0, "%.1f", _ENTER)
+        if entered:
+            issued.append(point.SetLength(centimetres / 100))
+        widgets.tooltip("How long it is in truth, and Enter: the scene and its exports are in metres then")
+        imgui.end()
+    imgui.pop_style_var(2)
+    return issued
+
+
+def said(length: float, metric: float | None) -> str:
+    """A length for people: in metres where the scene has a scale."""
+    if metric is None:
+        return f"{length:.3f} units"
+    metres = length * metric
+    return f"{100 * metres:.1f} cm" if metres < 1 else f"{metres:.2f} m"

@@ -1,0 +1,1 @@
+"""The camera's path: key frames, a preview, and what an export makes of them."""

@@ -1,0 +1,73 @@
+"""What can happen to the camera's path."""
+
+from dataclasses import dataclass, replace
+
+from ..commands import Notify
+from ..poses import Pose
+from ..state import State
+from .state import MOST_KEYS, Tour
+
+
+@dataclass(frozen=True)
+class AddKey:
+    """The present view is the next key frame."""
+
+    def apply(self, state: State) -> State:
+        if state.info is None or len(state.keys) >= MOST_KEYS:
+            return state
+        return replace(state, keys=(*state.keys, state.pose))
+
+
+@dataclass(frozen=True)
+class RemoveKey:
+    """One key frame less; the last one unless told otherwise."""
+
+    place: int = -1
+
+    def apply(self, state: State) -> State:
+        keys = list(state.keys)
+        if not -len(keys) <= self.place < len(keys):
+            return state
+        del keys[self.place]
+        return replace(state, keys=tuple(keys), tour=None)
+
+
+@dataclass(frozen=True)
+class ClearKeys:
+    """No key frames."""
+
+    def apply(self, state: State) -> State:
+        return replace(state, keys=(), tour=None)
+
+
+@dataclass(frozen=True)
+class Preview:
+    """Fly along the key frames, as a film would."""
+
+    def apply(self, state: State) -> State:
+        if len(state.keys) < 2:
+            text = "A camera path needs two key frames or more; fly somewhere and add one (M)."
+            return Notify(text, "info").apply(state)
+        return state
+
+
+@dataclass(frozen=True)
+class TourReady:
+    """The way along these key frames."""
+
+    keys: tuple[Pose, ...]
+    poses: tuple[Pose, ...]
+    seconds: float
+
+    def apply(self, state: State) -> State:
+        if self.keys != state.keys:
+            return state
+        return replace(state, tour=Tour(self.poses, self.seconds, state.now), flight=None, view=None)
+
+
+@dataclass(frozen=True)
+class StopTour:
+    """Stay where the flight is."""
+
+    def apply(self, state: State) -> State:
+        return replace(state, tour=None)

@@ -1,0 +1,64 @@
+"""Over the picture's upper right: the key frames that there are; in the picture their places and the way."""
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
+
+from .. import commands as do
+from ..kit import theme, widgets
+from ..kit.look import Look
+from ..scene import camera
+from ..state import State
+from . import commands as film
+
+_MARGIN = 12.0  # design pixels
+_BELOW = 96.0  # of the axes, which are above
+_MOST_SHOWN = 8
+
+
+def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
+    """A small bar; nothing without key frames."""
+    if not state.keys:
+        return []
+    issued: list[do.Command] = []
+    corner = ImVec2(place.x + size.x - look.px(_MARGIN), place.y + look.px(_BELOW + _MARGIN))
+    imgui.set_next_window_pos(corner, 0, ImVec2(1, 0))
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, look.vec(8, 6))
+    flags = widgets.PLAIN | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
+    with widgets.colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
+        imgui.begin("##keys", None, flags)
+        issued += _bar(state, look)
+        imgui.end()
+    imgui.pop_style_var(2)
+    return issued
+
+
+def _bar(state: State, look: Look) -> list[do.Command]:
+    issued: list[do.Command] = []
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
+    count = len(state.keys)
+    imgui.begin_disabled(count < 2 and state.tour is None)
+    playing = state.tour is not None
+    if imgui.button(f"{fa.ICON_FA_STOP if playing else fa.ICON_FA_PLAY}##tour"):
+        issued.append(film.StopTour() if playing else film.Preview())
+    imgui.end_disabled()
+    widgets.tooltip("Fly along the key frames, as a film does  (J)")
+    for place in range(min(count, _MOST_SHOWN)):
+        imgui.same_line()
+        if imgui.button(f"{place + 1}##key"):
+            issued.append(camera.FlyTo(state.keys[place]))
+        widgets.tooltip("Fly there; with the right button remove it")
+        if imgui.is_item_clicked(imgui.MouseButton_.right):
+            issued.append(film.RemoveKey(place))
+    if count > _MOST_SHOWN:
+        imgui.same_line()
+        imgui.text_colored(theme.MUTED, f"+{count - _MOST_SHOWN}")
+    imgui.same_line()
+    if imgui.button(f"{fa.ICON_FA_PLUS}##key"):
+        issued.append(film.AddKey())
+    widgets.tooltip("The present view as a key frame  (M)")
+    imgui.same_line()
+    if widgets.quiet_button(f"{fa.ICON_FA_TRASH}##keys", "Forget the key frames"):
+        issued.append(film.ClearKeys())
+    imgui.pop_style_var()
+    return issued

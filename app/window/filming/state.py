@@ -1,0 +1,46 @@
+"""Key frames as the state and a scene file have them."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ..poses import Pose, Rotation, Vector
+
+MOST_KEYS = 50
+WAYS = (("past the photos", "photos"), ("around it", "orbit"), ("along the key frames", "keys"))
+"""How a film goes: for people, and for `--path`."""
+
+
+@dataclass(frozen=True)
+class Tour:
+    """A flight along the key frames. poses: evenly spread over `seconds`. began: on the session's clock."""
+
+    poses: tuple[Pose, ...]
+    seconds: float
+    began: float
+
+    def at(self, now: float) -> Pose | None:
+        """Where it is; None at its end."""
+        fraction = (now - self.began) / max(self.seconds, 1e-6)
+        return self.poses[int(fraction * (len(self.poses) - 1))] if 0 <= fraction < 1 else None
+
+
+def stored(keys: Iterable[Pose]) -> tuple[dict[str, Any], ...]:
+    """Key frames as plain values for a scene's record."""
+    return tuple(asdict(key) | {"centre": list(key.centre), "rotation": list(key.rotation)} for key in keys)
+
+
+def read(entries: Iterable[Mapping[str, Any]]) -> tuple[Pose, ...]:
+    """Key frames of a scene's record; none where one is damaged."""
+    try:
+        return tuple(
+            Pose(
+                Vector(*map(float, entry["centre"])),
+                Rotation(*map(float, entry["rotation"])),
+                *(float(entry[name]) for name in ("reach", "fov", "aspect")),
+                shift=(float(entry["shift"][0]), float(entry["shift"][1])),
+            )
+            for entry in entries
+        )[:MOST_KEYS]
+    except (KeyError, TypeError, ValueError, IndexError):
+        return ()

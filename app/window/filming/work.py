@@ -1,0 +1,41 @@
+"""The worker's side of filming: the way of a film along key frames."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..commands import Command
+from ..poses import Pose, from_view, to_camera
+from ..requests import Asked, Errand
+from .commands import TourReady
+
+_SIDE = 900  # pixels of the cameras that are computed with
+
+
+@dataclass(frozen=True)
+class PlanTour(Errand):
+    """The same splines that `langflash export --path` follows."""
+
+    keys: tuple[Pose, ...]
+    seconds: float
+
+    newest_counts = True
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        yield TourReady(self.keys, way(self.keys, self.seconds), self.seconds)
+
+
+def way(keys: Sequence[Pose], seconds: float) -> tuple[Pose, ...]:
+    """Poses of a film of so many seconds along two or more key frames."""
+    from ..tours import along  # loads torch; the worker has by now
+
+    width, height = _SIDE, max(2, round(_SIDE / keys[0].aspect))
+    cameras = along(
+        [to_camera(key, width, height) for key in keys], np.linspace(0, seconds, len(keys)).tolist()
+    )
+    size = (cameras[0].width, cameras[0].height)
+    return tuple(
+        from_view(camera.viewmat.double().numpy(), camera.K.double().numpy(), size, keys[0].reach)
+        for camera in cameras
+    )

@@ -1,0 +1,102 @@
+"""What opening asks of the world: the desktop's dialog, folders, the clipboard."""
+
+from collections.abc import Callable
+from pathlib import Path
+from urllib.parse import unquote, urlparse
+
+from ..commands import Command
+from ..effects import Effects, Hands
+from ..kit.textures import Thumbnails
+from ..scene.commands import Loaded, OpenPaths
+from ..state import State
+from . import native
+from .commands import FolderRead, LookInto, MorePictures, OpenFiles, Paste
+from .state import small
+from .work import PastePicture, ReadFolder, SampleTiles, SmallPictures
+
+POLL_SECONDS = 0.1  # of the desktop's dialog
+_LONGEST = 20_000  # letters of pasted paths
+
+
+class OpeningEffects(Effects):
+    """clipboard: gives its text."""
+
+    def __init__(self, hands: Hands, thumbnails: Thumbnails, clipboard: Callable[[], str]) -> None:
+        self._hands = hands
+        self._thumbnails = thumbnails
+        self._clipboard = clipboard
+        self._dialog: native.NativeDialog | None = None
+        self._polled = 0.0
+
+    @property
+    def due(self) -> float:
+        """When the desktop's dialog is asked again."""
+        return float("inf") if self._dialog is None else self._polled + POLL_SECONDS
+
+    def tick(self, state: State, now: float) -> None:
+        """Open what was chosen in the desktop's dialog."""
+        if self._dialog is None or now < self.due:
+            return
+        self._polled = now
+        chosen = self._dialog.chosen()
+        if chosen is not None:
+            self._dialog = None
+            if chosen:
+                self._hands.dispatch(OpenPaths(chosen))
+
+    def follow(self, command: Command, before: State, state: State) -> None:
+        """Folders are read by the worker; small pictures of one go with its dialog."""
+        match command:
+            case OpenFiles() if self._dialog is None:
+                if native.is_there():
+                    self._dialog = native.NativeDialog(state.preferences.folder)
+                else:
+                    self._hands.perform(LookInto())
+            case LookInto(folder):
+                self._forget(before)
+                self._hands.submit(ReadFolder(folder or _start(state)))
+            case FolderRead(folder):
+                self._hands.submit(SmallPictures(folder.path, folder.photos))
+            case MorePictures(folder, paths) if state.dialog == "open" and _is_at(state, folder):
+                self._hands.submit(SmallPictures(folder, paths))
+            case Paste():
+                self._paste()
+            case Loaded() if state.info is None:
+                self._hands.submit(SampleTiles())
+            case _:
+                if before.dialog == "open" and state.dialog != "open":
+                    self._forget(before)
+
+    def _paste(self) -> None:
+        paths = pasted_paths(self._clipboard())
+        if paths:
+            self._hands.dispatch(OpenPaths(paths))
+        else:
+            self._hands.submit(PastePicture())
+
+    def _forget(self, before: State) -> None:
+        for path in before.opening.folder.photos if before.opening.folder else ():
+            self._thumbnails.drop(small(path))
+
+
+def _is_at(state: State, folder: Path) -> bool:
+    return state.opening.folder is not None and state.opening.folder.path == folder
+
+
+def _start(state: State) -> Path:
+    """Where to begin: the last folder, beside the photos at hand, or at home."""
+    last = Path(state.preferences.folder)
+    if state.preferences.folder and last.is_dir():
+        return last
+    return state.photos[0].path.parent if state.photos else Path.home()
+
+
+def pasted_paths(text: str) -> tuple[str, ...]:
+    """Paths and file addresses in copied text, a line each; none where a line is something else."""
+    lines = [line.strip().strip("'\"") for line in text[:_LONGEST].splitlines() if line.strip()]
+    named = [unquote(urlparse(line).path) if line.startswith("file://") else line for line in lines]
+    try:
+        there = [Path(name).expanduser() for name in named]
+        return tuple(map(str, there)) if there and all(path.exists() for path in there) else ()
+    except (OSError, ValueError, RuntimeError):
+        return ()

@@ -1,0 +1,31 @@
+"""The desktop's own dialog for files, where it has one."""
+
+import shutil
+import sys
+from pathlib import Path
+
+from imgui_bundle import portable_file_dialogs
+
+from ..scene.drops import PHOTO_SUFFIXES, SCENE_SUFFIXES
+
+_HELPERS = ("zenity", "matedialog", "qarma", "kdialog")  # what portable-file-dialogs calls on Linux
+
+
+def is_there() -> bool:
+    """Whether this desktop has a dialog of its own."""
+    return sys.platform in ("darwin", "win32") or any(map(shutil.which, _HELPERS))
+
+
+class NativeDialog:
+    """One dialog; it is open until `chosen` says something. Main thread only."""
+
+    def __init__(self, folder: str) -> None:
+        endings = " ".join(f"*{suffix}" for suffix in sorted({*PHOTO_SUFFIXES, *SCENE_SUFFIXES}))
+        start = folder if Path(folder).is_dir() else str(Path.home())
+        filters = ["Photos and scenes", endings, "All files", "*"]
+        several = portable_file_dialogs.opt.multiselect
+        self._dialog = portable_file_dialogs.open_file("Open photos or a scene", start, filters, several)
+
+    def chosen(self) -> tuple[str, ...] | None:
+        """The files; none where it was closed, None while it is open."""
+        return tuple(self._dialog.result()) if self._dialog.ready(0) else None

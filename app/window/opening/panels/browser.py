@@ -1,0 +1,130 @@
+"""Our own dialog for files: folders to walk through, photos as small pictures, several at once."""
+
+import os
+from pathlib import Path
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
+
+from ... import commands as do
+from ...kit import theme, widgets
+from ...kit.look import Look
+from ...scene import commands as show
+from ...scene.drops import typed_path
+from ...state import State
+from .. import commands as opening
+from ..state import Folder, small
+
+WIDTH = 760.0  # design pixels
+_HEIGHT, _CELL = 330.0, 132.0
+
+
+def draw(state: State, look: Look) -> list[do.Command]:
+    """The dialog's body."""
+    issued, confirmed = _path(state)
+    folder = state.opening.folder
+    if folder is None:
+        widgets.muted("Reading the folder ...")
+    else:
+        issued += _way(folder, look)
+    imgui.begin_child("##files", ImVec2(0, look.px(_HEIGHT)), imgui.ChildFlags_.borders)
+    if folder is not None:
+        issued += _inside(state, folder, look)
+    imgui.end_child()
+    return issued + _buttons(state, confirmed, look)
+
+
+def _path(state: State) -> tuple[list[do.Command], bool]:
+    """A path to type; the second value tells whether Enter was pressed."""
+    imgui.set_next_item_width(-1)
+    if imgui.is_window_appearing():
+        imgui.set_keyboard_focus_here()
+    hint = "a scene, a photo or a folder; or choose below"
+    changed, path = imgui.input_text_with_hint("##path", hint, state.dialog_path)
+    confirmed = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
+    return ([do.EditDialogPath(path)] if changed else []), confirmed
+
+
+def _way(folder: Folder, look: Look) -> list[do.Command]:
+    """Up, home, and the folders on the way here, a button each."""
+    issued: list[do.Command] = []
+    if imgui.button(f"{fa.ICON_FA_ARROW_UP}##up"):
+        issued.append(opening.LookInto(folder.path.parent))
+    widgets.tooltip("The folder around this one")
+    imgui.same_line(0, look.px(4))
+    if imgui.button(f"{fa.ICON_FA_HOUSE}##home"):
+        issued.append(opening.LookInto(Path.home()))
+    for parent in (*reversed(folder.path.parents[:3]), folder.path):
+        imgui.same_line(0, look.px(2))
+        name = widgets.shortened(parent.name or str(parent), look.px(150))
+        if widgets.quiet_button(f"{name}##{parent}"):
+            issued.append(opening.LookInto(parent))
+    return issued
+
+
+def _inside(state: State, folder: Folder, look: Look) -> list[do.Command]:
+    """Folders, scenes, then photos as a grid."""
+    issued: list[do.Command] = []
+    if folder.problem:
+        widgets.muted(folder.problem)
+    for path in folder.folders:
+        if imgui.selectable(f"{fa.ICON_FA_FOLDER}  {path.name}##{path}", False)[0]:
+            issued.append(opening.LookInto(path))
+    for path in folder.scenes:
+        chosen = path in state.opening.chosen
+        if imgui.selectable(f"{fa.ICON_FA_CUBES}  {path.name}##{path}", chosen)[0]:
+            issued.append(opening.Choose(path))
+    columns = max(int(imgui.get_content_region_avail().x / look.px(_CELL + 8)), 1)
+    for place, path in enumerate(folder.photos):
+        if place % columns:
+            imgui.same_line(0, look.px(8))
+        issued += _photo(state, path, look)
+    if folder.left_out:
+        widgets.muted(f"and {folder.left_out} more; type the path of one of those")
+    if not (folder.folders or folder.photos or folder.scenes or folder.problem):
+        widgets.muted("Nothing to open lies here.")
+    return issued
+
+
+def _photo(state: State, path: Path, look: Look) -> list[do.Command]:
+    """A card with the photo and its name; a click takes it with the others."""
+    chosen = path in state.opening.chosen
+    corner, size = imgui.get_cursor_screen_pos(), look.vec(_CELL, _CELL)
+    line = imgui.get_text_line_height()
+    pressed = imgui.selectable(f"##{path}", chosen, imgui.SelectableFlags_.no_auto_close_popups, size)[0]
+    if not imgui.is_item_visible():
+        return []
+    canvas, picture = imgui.get_window_draw_list(), look.thumbnails.get(small(path))
+    room = ImVec2(size.x - look.px(12), size.y - line - look.px(14))
+    if picture is not None:
+        width = min(room.x, room.y * picture[1])
+        height = width / picture[1]
+        at = ImVec2(corner.x + (size.x - width) / 2, corner.y + look.px(6) + (room.y - height) / 2)
+        canvas.add_image(picture[0], at, ImVec2(at.x + width, at.y + height))
+    name = widgets.shortened(path.name, room.x)
+    at = ImVec2(corner.x + look.px(6), corner.y + size.y - line - look.px(4))
+    canvas.add_text(at, widgets.u32(theme.TEXT if chosen else theme.MUTED), name)
+    if chosen:
+        end = ImVec2(corner.x + size.x, corner.y + size.y)
+        canvas.add_rect(corner, end, widgets.u32(theme.ACCENT), look.px(4), look.px(2))
+    return [opening.Choose(path)] if pressed else []
+
+
+def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
+    issued: list[do.Command] = []
+    typed, chosen = state.dialog_path.strip(), state.opening.chosen
+    count = len(chosen)
+    label = "Open" if typed or count < 2 else f"Open {count} files"
+    imgui.begin_disabled(not typed and not chosen)
+    pressed = widgets.primary_button(f"{label}###open", look.vec(140, 0))
+    imgui.end_disabled()
+    imgui.same_line()
+    if imgui.button("Cancel", look.vec(110, 0)):
+        issued.append(do.ShowDialog(None))
+    if typed and (pressed or confirmed):
+        path = typed_path(typed)
+        walks = confirmed and not pressed and os.path.isdir(path) and typed.endswith(os.sep)
+        issued.append(opening.LookInto(path) if walks else show.OpenPaths((str(path),)))
+    elif chosen and pressed:
+        issued.append(show.OpenPaths(tuple(map(str, chosen))))
+    return issued

@@ -1,0 +1,74 @@
+"""Over the picture's upper right corner: the world's axes, and the way to look along one."""
+
+import numpy as np
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from ... import commands as do
+from ...kit import theme, widgets
+from ...kit.look import Look
+from ...state import State
+from .. import camera
+
+SIZE = 84.0  # design pixels
+_ARM, _BALL = 30.0, 8.0
+_COLOURS = (ImVec4(0.93, 0.36, 0.36, 1), ImVec4(0.55, 0.82, 0.35, 1), ImVec4(0.35, 0.60, 0.96, 1))
+_LETTERS = "XYZ"
+
+
+def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
+    """A ball at each end of an axis; the near ones last, on top."""
+    if state.info is None or size.x < look.px(3 * SIZE) or size.y < look.px(4 * SIZE):
+        return []
+    issued: list[do.Command] = []
+    middle = ImVec2(place.x + size.x - look.px(SIZE / 2 + 8), place.y + look.px(SIZE / 2 + 8))
+    half = look.px(SIZE / 2)
+    imgui.set_next_window_pos(ImVec2(middle.x - half, middle.y - half))
+    imgui.set_next_window_size(ImVec2(2 * half, 2 * half))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
+    flags = widgets.PLAIN | imgui.WindowFlags_.no_background | imgui.WindowFlags_.no_focus_on_appearing
+    imgui.begin("##axes", None, flags)
+    canvas, pointer = imgui.get_window_draw_list(), imgui.get_mouse_pos()
+    canvas.add_circle_filled(middle, half, imgui.IM_COL32(14, 16, 20, 110))
+    nearest = None
+    for name, forward, at, depth in ends(state):
+        ball = ImVec2(middle.x + look.px(_ARM) * at[0], middle.y + look.px(_ARM) * at[1])
+        axis = int(np.argmax(np.abs(forward)))
+        positive = -sum(forward) > 0  # this end of the axis, seen from which one looks backwards along it
+        colour = _COLOURS[axis]
+        faint = ImVec4(colour.x, colour.y, colour.z, 1.0 if depth <= 0 else 0.55)
+        radius = look.px(_BALL)
+        if positive:
+            canvas.add_line(middle, ball, widgets.u32(faint), look.px(2))
+            canvas.add_circle_filled(ball, radius, widgets.u32(faint))
+            extent = imgui.calc_text_size(_LETTERS[axis])
+            corner = ImVec2(ball.x - extent.x / 2, ball.y - extent.y / 2)
+            canvas.add_text(corner, widgets.u32(theme.DARK.CANVAS), _LETTERS[axis])
+        else:
+            canvas.add_circle_filled(ball, radius, imgui.IM_COL32(14, 16, 20, 200))
+            canvas.add_circle(ball, radius, widgets.u32(faint), 0, look.px(1.5))
+        if (pointer.x - ball.x) ** 2 + (pointer.y - ball.y) ** 2 <= (1.3 * radius) ** 2:
+            nearest = (name, forward, ball, radius)
+    imgui.set_cursor_pos(ImVec2(0, 0))
+    pressed = imgui.invisible_button("axes", ImVec2(2 * half, 2 * half))
+    if nearest is not None and imgui.is_item_hovered():
+        name, forward, ball, radius = nearest
+        canvas.add_circle(ball, radius, widgets.u32(theme.DARK.TEXT), 0, look.px(2))
+        imgui.set_tooltip(f"Look from {name}")
+        if pressed:
+            issued.append(camera.Face(forward))
+    imgui.end()
+    imgui.pop_style_var()
+    return issued
+
+
+def ends(state: State) -> list[tuple[str, camera.Vector, tuple[float, float], float]]:
+    """Name, direction of looking, place in the picture plane (right, down) and depth of each end, far first.
+
+    The end that one looks from is opposite to the direction.
+    """
+    axes = state.pose.axes
+    found = []
+    for name, forward in camera.SIDES:
+        x, y, z = (-np.array(forward)) @ axes
+        found.append((name, forward, (float(x), float(y)), float(z)))
+    return sorted(found, key=lambda end: -end[3])

@@ -1,0 +1,71 @@
+"""What people teach a scene: names that groups answer to as well, and words that they no longer answer to.
+
+A lesson moves its atom: towards a name t, d' = normalise(d + t); out of a denied word u, d' = d - (d . u) u,
+whose cosine with u is 0, below any negative. Atoms that look alike are moved along, all the way where they
+are the same and not at all from a cosine of `ALIKE` down:
+
+    d_j' = normalise(d_j + sum_k s_jk (d_k' - d_k)),
+    s_jk = clamp((cos(d_j, d_k) - ALIKE) / (1 - ALIKE), 0, 1).
+
+Source: own.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import torch
+from torch import Tensor
+from torch.nn.functional import normalize
+
+from langflash_core.errors import PromptError
+from langflash_core.language.spaces import LanguageSpace, encode_cached
+from langflash_core.types import Record
+
+ALIKE = 0.9
+"""Cosine of atoms from which a lesson about one is one about the other. In scenes of photos the groups of one
+thing lie above .95, a chair and a sofa below .8."""
+
+
+def taught_dictionary(dictionary: Tensor, record: Record, space: LanguageSpace) -> Tensor:
+    """The dictionary (K, C) as a scene's names and denials have made it; the same without any.
+
+    Raises:
+        WeightsError: the space has no text weights.
+    """
+    lessons = {k: (record.atom_names.get(k, ""), record.atom_denials.get(k, ())) for k in _taught(record)}
+    texts = dict.fromkeys(text for name, denied in lessons.values() for text in (name, *denied))
+    known = {text: row.to(dictionary) for text in texts if (row := _encoded(space, text)) is not None}
+    lessons = {k: (name, denied) for k, (name, denied) in lessons.items() if {name, *denied} & known.keys()}
+    if not lessons:
+        return dictionary
+    rows = torch.tensor(list(lessons))
+    before = dictionary[rows]
+    after = torch.stack([_moved(dictionary[k], *lesson, known) for k, lesson in lessons.items()])
+    unit = normalize(dictionary, dim=-1)
+    shares = ((unit @ unit[rows].T - ALIKE) / (1 - ALIKE)).clamp(0, 1)
+    spread = normalize(dictionary + shares @ (after - before), dim=-1)
+    moved = shares.amax(-1, keepdim=True) > 0
+    return torch.where(moved, spread, dictionary).index_copy(0, rows, after)
+
+
+def _taught(record: Record) -> list[int]:
+    return sorted({*record.atom_names, *record.atom_denials})
+
+
+def _encoded(space: LanguageSpace, text: str) -> Tensor | None:
+    """A plain phrase (C,), also where it reads like a sum of others (`algebra`); None for one without a word
+    that the tower knows, as people name things."""
+    try:
+        return encode_cached(space, (text,))[0] if text else None
+    except PromptError:
+        return None
+
+
+def _moved(atom: Tensor, name: str, denied: Sequence[str], known: Mapping[str, Tensor]) -> Tensor:
+    """An atom (C,) after its own lesson; 0 where nothing of it is left."""
+    if name in known:
+        atom = normalize(normalize(atom, dim=0) + known[name], dim=0)
+    against = [known[text] for text in denied if text in known]
+    if against:
+        span = torch.linalg.qr(torch.stack(against, 1))[0]  # (C, n)
+        atom = atom - span @ (span.T @ atom)
+    return normalize(atom, dim=0) if float(atom.norm()) > 1e-3 else torch.zeros_like(atom)

@@ -1,0 +1,109 @@
+"""The camera's path: key frames, a flight along them, and what is saved and exported."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.cli.cameras import camera_of
+from app.window import commands as do
+from app.window.exporting.order import Order, order
+from app.window.exporting.process import keys_json
+from app.window.exporting.state import What
+from app.window.filming import commands as film
+from app.window.filming.state import MOST_KEYS, read, stored
+from app.window.filming.work import PlanTour, way
+from app.window.poses import Vector, facing, orbit
+from app.window.scene import camera
+from app.window.scene.state import FLIGHT_SECONDS
+from app.window.state import State
+from app.window.tours import along
+from langflash_core.types import Record
+from tests.app.window.scenes import after, shown_scene
+
+
+@pytest.fixture
+def shown() -> State:
+    return replace(shown_scene(), preferences=replace(State().preferences, near_photos=False))
+
+
+def with_keys(state: State, count: int = 3) -> State:
+    for step in range(count):
+        state = after(state, camera.MoveTo(orbit(state.pose, 0.1 * step, 0.02)), film.AddKey())
+    return state
+
+
+def test_key_frames_are_added_and_removed(shown: State) -> None:
+    state = with_keys(shown)
+    assert len(state.keys) == 3 and state.keys[-1] == state.pose
+    assert after(state, film.RemoveKey(0)).keys == state.keys[1:]
+    assert after(state, film.RemoveKey()).keys == state.keys[:-1]
+    assert after(state, film.RemoveKey(7)).keys == state.keys
+    assert after(state, film.ClearKeys(), film.RemoveKey()).keys == ()
+    assert len(with_keys(shown, MOST_KEYS + 3).keys) == MOST_KEYS
+    assert with_keys(State(), 2).keys == (), "without a scene there is nothing to film"
+
+
+def test_a_preview_passes_every_key_frame_and_ends_at_the_last(shown: State) -> None:
+    state = with_keys(shown)
+    (ready,) = PlanTour(state.keys, 2.0).run(lambda: False)
+    assert isinstance(ready, film.TourReady)
+    for key, pose in zip(state.keys, (ready.poses[0], ready.poses[30], ready.poses[-1]), strict=True):
+        assert pose.centre == pytest.approx(key.centre, abs=1e-5)  # float32 matrices
+        assert pose.rotation == pytest.approx(key.rotation, abs=1e-5)
+        assert pose.fov == pytest.approx(key.fov, abs=0.3)  # sides of the film are even
+    flown = after(state, ready)
+    assert flown.tour is not None and after(flown, do.Tick(flown.now + 1.0)).tour is not None
+    there = after(flown, do.Tick(flown.now + 2.5))
+    assert there.tour is None and there.pose == ready.poses[-1]
+    assert after(flown, camera.MoveTo(state.pose)).tour is None, "hands on the picture end it"
+    assert after(flown, film.StopTour()).tour is None
+    assert after(with_keys(state, 1), ready).tour is None, "the key frames are others by now"
+
+
+def test_one_key_frame_is_no_way(shown: State) -> None:
+    assert "two key frames" in after(with_keys(shown, 1), film.Preview()).toasts[-1].text
+
+
+def test_key_frames_survive_a_file_and_damaged_ones_are_none(shown: State) -> None:
+    keys = with_keys(shown).keys
+    assert read(json.loads(json.dumps(stored(keys)))) == keys
+    assert read(({"centre": [0, 0]},)) == () and read(()) == ()
+    assert Record(camera_path=stored(keys)).camera_path
+
+
+def test_an_export_takes_the_way_that_was_chosen(shown: State) -> None:
+    def ordered(state: State, way: str) -> Order | str:
+        form = replace(state.exporting.form, what=What.VIDEO, way=way, path="/out/film")
+        return order(replace(state, exporting=replace(state.exporting, form=form)))
+
+    orbits, keyed = ordered(shown, "orbit"), ordered(with_keys(shown), "keys")
+    assert isinstance(orbits, Order) and isinstance(keyed, Order)
+    assert orbits.words[orbits.words.index("--path") + 1] == "orbit" and orbits.camera_file is None
+    assert keyed.words[keyed.words.index("--path") + 1] == "/out/film.keys.json"
+    assert keyed.camera_file in keyed.files
+    assert "needs two" in str(ordered(shown, "keys"))
+
+
+def test_the_preview_is_the_way_of_the_exported_film(shown: State) -> None:
+    keys = with_keys(shown).keys
+    entries = json.loads(keys_json(keys, 640, 480))
+    cameras = along([camera_of(entry, "key") for entry in entries], [0.0, 1.0, 2.0])
+    previewed = way(keys, 2.0)
+    assert len(cameras) == len(previewed)
+    for seen, pose in zip(cameras[::10], previewed[::10], strict=True):
+        R, t = seen.viewmat[:3, :3].double().numpy(), seen.viewmat[:3, 3].double().numpy()
+        assert -R.T @ t == pytest.approx(np.array(pose.centre), abs=1e-4)  # float32 in the file's way
+
+
+def test_one_can_look_along_every_axis(shown: State) -> None:
+    for _, forward in camera.SIDES:
+        pose = facing(orbit(shown.pose, 0.3, 0.2), forward)
+        assert pose.axes[:, 2] == pytest.approx(np.array(forward), abs=1e-6)
+        assert np.linalg.det(pose.axes) == pytest.approx(1, abs=1e-6)
+        assert pose.pivot == pytest.approx(orbit(shown.pose, 0.3, 0.2).pivot, abs=1e-6)
+        if not forward.y:
+            assert pose.axes[1, 1] > 0.999, "upright"
+    state = after(shown, camera.Face(Vector(0.0, 1.0, 0.0)), do.Tick(shown.now + FLIGHT_SECONDS))
+    assert state.pose.axes[:, 2] == pytest.approx((0, 1, 0), abs=1e-6)

@@ -1,0 +1,168 @@
+"""Finding photos: folders, the clipboard, the desktop's dialog, and the empty window's commands."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image, ImageGrab
+
+from app.window.commands import Command, ShowDialog, ShowPicture, apply
+from app.window.effects import Hands
+from app.window.opening import commands as opening
+from app.window.opening import effects, native, work
+from app.window.opening.panels.welcome import working
+from app.window.opening.state import MOST_FILES, Folder
+from app.window.scene import commands as show
+from app.window.state import State
+from langflash_core.errors import LangFlashError
+from tests.app.window.scenes import after, shown_scene
+
+
+def photo(path: Path, colour=(90, 60, 30)) -> Path:
+    Image.new("RGB", (400, 300), colour).save(path)
+    return path
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for name in ("b.jpg", "A.png"):
+        photo(tmp_path / name)
+    (tmp_path / "inside").mkdir()
+    (tmp_path / ".hidden").mkdir()
+    (tmp_path / "notes.txt").write_text("no photo")
+    (tmp_path / "room.langflash").write_bytes(b"")
+    return tmp_path
+
+
+class Desk:
+    """Effects with hands that note what was asked, and a state that follows."""
+
+    def __init__(self, clipboard: str = "") -> None:
+        self.state, self.asked, self.dropped = State(), [], []
+        hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: 0.0)
+        self.effects = effects.OpeningEffects(hands, self, lambda: clipboard)  # type: ignore[arg-type]
+        self.performed: list[Command] = []
+
+    def drop(self, key: str) -> None:
+        self.dropped.append(key)
+
+    def perform(self, command: Command) -> None:
+        before, self.state = self.state, apply(self.state, command)
+        self.performed.append(command)
+        self.effects.follow(command, before, self.state)
+
+    def work(self) -> None:
+        while self.asked:
+            for command in self.asked.pop(0).run(lambda: False):
+                self.perform(command)
+
+
+def test_a_folder_shows_folders_photos_and_scenes(folder: Path) -> None:
+    found = work.listed(folder)
+    assert [path.name for path in found.folders] == ["inside"]
+    assert [path.name for path in found.photos] == ["A.png", "b.jpg"]
+    assert [path.name for path in found.scenes] == ["room.langflash"]
+    assert "cannot be read" in work.listed(folder / "gone").problem
+
+
+def test_a_large_folder_says_how_much_is_left_out(tmp_path: Path) -> None:
+    for place in range(MOST_FILES + 5):
+        (tmp_path / f"{place}.jpg").touch()
+    found = work.listed(tmp_path)
+    assert len(found.photos) == MOST_FILES and found.left_out == 5
+
+
+def test_small_pictures_come_a_few_at_a_time_and_go_with_the_dialog(folder: Path, monkeypatch) -> None:
+    monkeypatch.setattr(native, "is_there", lambda: False)
+    for place in range(5):
+        photo(folder / f"{place}.jpg")
+    (folder / "broken.jpg").write_bytes(b"no photo")
+    desk = Desk()
+    desk.perform(show.AddPhotos((folder / "b.jpg",)))
+    desk.perform(opening.OpenFiles())
+    assert desk.state.dialog == "open" and desk.state.opening.folder is None
+    desk.work()
+    assert sum(isinstance(c, ShowPicture) for c in desk.performed) == 7, "the broken one is left out"
+    assert sum(isinstance(c, opening.MorePictures) for c in desk.performed) == 2
+    assert desk.state.preferences.folder == str(folder)
+    desk.perform(opening.Choose(folder / "b.jpg"))
+    desk.perform(opening.Choose(folder / "A.png"))
+    desk.perform(opening.Choose(folder / "b.jpg"))
+    assert desk.state.opening.chosen == (folder / "A.png",)
+    desk.perform(ShowDialog(None))
+    assert len(desk.dropped) == 8
+
+
+def test_pictures_of_a_folder_that_was_left_are_not_made(folder: Path) -> None:
+    desk = Desk()
+    desk.perform(opening.LookInto(folder))
+    desk.work()
+    desk.perform(opening.MorePictures(folder / "inside", (folder / "b.jpg",)))
+    assert desk.asked == []
+
+
+def test_paths_are_pasted(folder: Path) -> None:
+    left, right = photo(folder / "a b.jpg"), folder / "b.jpg"
+    assert effects.pasted_paths(f"'{left}'\n{right}\n") == (str(left), str(right))
+    assert effects.pasted_paths(left.as_uri()) == (str(left),)
+    assert effects.pasted_paths(f"{left}\nsomething else") == () and effects.pasted_paths("") == ()
+    desk = Desk(clipboard=str(left))
+    desk.perform(opening.Paste())
+    assert show.OpenPaths((str(left),)) in desk.performed and not desk.asked
+
+
+def test_a_picture_is_pasted_as_a_file_that_stays(folders: Path, monkeypatch) -> None:
+    picture: list[Any] = [Image.new("RGBA", (40, 30), (1, 2, 3, 255))]
+    monkeypatch.setattr(ImageGrab, "grabclipboard", lambda: picture[0])
+    (command,) = work.PastePicture().run(lambda: False)
+    assert isinstance(command, show.OpenPaths)
+    with Image.open(command.paths[0]) as kept:
+        assert kept.size == (40, 30) and Path(command.paths[0]).is_relative_to(folders)
+    picture[0] = None
+    with pytest.raises(LangFlashError, match="copy a picture"):
+        list(work.PastePicture().run(lambda: False))
+
+
+def test_without_a_clipboard_program_one_sentence_names_one(monkeypatch) -> None:
+    def broken():
+        raise NotImplementedError("wl-paste or xclip is required")
+
+    monkeypatch.setattr(ImageGrab, "grabclipboard", broken)
+    with pytest.raises(LangFlashError, match="xclip"):
+        list(work.PastePicture().run(lambda: False))
+
+
+def test_the_desktops_own_dialog_is_asked_where_there_is_one(monkeypatch) -> None:
+    answers: list[Any] = [None, ("/p/a.jpg", "/p/b.jpg")]
+
+    class Dialog:
+        def __init__(self, folder: str) -> None: ...
+
+        def chosen(self):
+            return answers.pop(0)
+
+    monkeypatch.setattr(native, "is_there", lambda: True)
+    monkeypatch.setattr(native, "NativeDialog", Dialog)
+    desk = Desk()
+    desk.perform(opening.OpenFiles())
+    assert desk.state.dialog is None and desk.effects.due < 1
+    desk.effects.tick(desk.state, 1.0)
+    desk.effects.tick(desk.state, 2.0)
+    assert desk.performed[-1] == show.OpenPaths(("/p/a.jpg", "/p/b.jpg"))
+    assert desk.effects.due == float("inf")
+
+
+def test_photos_stay_on_show_while_they_are_worked_on() -> None:
+    tray = after(State(), show.AddPhotos((Path("/p/a.jpg"),)))
+    assert not working(tray) and working(after(tray, show.Reconstruct()))
+    scene = after(shown_scene(), show.AddPhotos((Path("/p/a.jpg"),)), show.Reconstruct())
+    assert not working(scene), "a scene that gains a photo stays on show"
+    other = after(
+        shown_scene(), show.SetPhotosAside(), show.AddPhotos((Path("/p/a.jpg"),)), show.Reconstruct()
+    )
+    assert working(other)
+
+
+def test_a_folder_with_a_problem_is_not_remembered() -> None:
+    state = after(State(), opening.LookInto(), opening.FolderRead(Folder(Path("/gone"), problem="gone")))
+    assert state.preferences.folder == ""
