@@ -17,14 +17,7 @@ from .layout import ATOMS_A_LAYER, PHRASES_A_LAYER
 from .targets import NUMPY_TYPES, LayerTarget
 from .weights import Maps
 
-_SOFTWARE = ("llvmpipe", "softpipe", "swr", "software rasterizer", "apple software renderer")
 _LARGEST_EXPONENT = np.float32(80)  # exp of it is finite in float32, and 1 / (1 + exp) is 0 to all digits
-
-
-def draws_in_software(ctx: moderngl.Context) -> bool:
-    """Whether this OpenGL runs on the processor."""
-    name = ctx.info["GL_RENDERER"].lower()
-    return any(known in name for known in _SOFTWARE)
 
 
 class HostAnswers(Answers):
