@@ -7,7 +7,6 @@ vector-matrix product and a handful of element-wise operations. On a graphics ca
 answers.py do the same without the maps leaving it.
 """
 
-import moderngl
 import numpy as np
 
 from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery

@@ -178,7 +178,6 @@ def test_nothing_fades_where_nobody_knows_the_photos(asked):
     assert asked.faded_texture() is asked.rgb_texture
 
 
-
 def test_the_colours_alone_are_those_of_the_picture(asked):
     camera_ = camera()
     asked.draw(camera_)
