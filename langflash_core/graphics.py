@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 OPENGL = 330  # the version needed, 100 times
 _INCLUDE = re.compile(r'^#include "([\w.]+)"$', re.MULTILINE)
 _MATRIX = 0x8B5C  # GL_FLOAT_MAT4
+_SOFTWARE = ("llvmpipe", "softpipe", "swr", "software rasterizer", "apple software renderer")
 
 
 # --- a context ----------------------------------------------------------------------------------
@@ -64,6 +65,12 @@ def _explain(error: Exception) -> str:
             "libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri"
         )
     return f"OpenGL 3.3 could not start ({error}); update the graphics driver"
+
+
+def draws_in_software(ctx: "moderngl.Context") -> bool:
+    """Whether this OpenGL runs on the processor."""
+    name = ctx.info["GL_RENDERER"].lower()
+    return any(known in name for known in _SOFTWARE)
 
 
 # --- programs -----------------------------------------------------------------------------------

@@ -6,12 +6,12 @@ from typing import Literal
 
 import moderngl
 
+from langflash_core.graphics import draws_in_software
 from langflash_core.scene.assemble import renormalised
 from langflash_core.scene.thin import thin
 from langflash_core.types import Scene
 
 from ..gl.answers import MakeAnswers, ShaderAnswers
-from ..gl.host import draws_in_software
 from ..gl.splats import SplatBuffers
 from .twins import FullAnswers, StaleOrder, ThreeSigma, gram_answers
 

@@ -96,6 +96,26 @@ def check_beside(path: Path, document: Path, picture: Path) -> None:
         raise OutputError(f"{what}; choose another -o, or add --replace")
 
 
+def check_same_kind(path: Path, keys: Iterable[str]) -> None:
+    """Prove that what is at `path` is of the kind that will replace it, since .json says little about it.
+
+    Args:
+        keys: that its object has, or every entry of its list.
+
+    Raises:
+        OutputError: it is something else.
+    """
+    if not path.exists():
+        return
+    try:
+        content = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        content = None
+    entries = content if isinstance(content, list) else [content]
+    if not all(isinstance(entry, dict) and entry.keys() >= set(keys) for entry in entries):
+        raise OutputError(f"{path.name} is there as something else; choose another -o, or add --replace")
+
+
 def _names(document: Path, name: str) -> bool:
     """Whether a JSON file has a name in it as a text."""
     try:

@@ -83,13 +83,9 @@ class GlRenderer:
             return self._splats.frame(weight_maps=weight_maps)
 
     def colours(self, scene: Scene, camera: Camera) -> "np.ndarray":
-        import numpy as np
-
         with self._context:
             self._show(scene)
-            self._splats.draw(camera, weight_maps=False)
-            texels = np.frombuffer(self._splats.rgb_texture.read(), np.uint8)
-        return np.ascontiguousarray(texels.reshape(camera.height, camera.width, 4)[..., :3])
+            return self._splats.colours(camera)
 
     def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
         with self._context:

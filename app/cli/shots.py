@@ -47,7 +47,7 @@ def write_answered(what: str, path: Path, result: QueryResult, colours: HeatColo
 
 
 def box_rows(
-    results: Sequence[QueryResult], views: Iterable[int | None], scene: Scene
+    results: Iterable[QueryResult], views: Iterable[int | None], scene: Scene
 ) -> list[dict[str, Any]]:
     """A row per view and phrase; lengths in metres where the scene's scale is known."""
     metres = scene.record.metric_scale

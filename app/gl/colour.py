@@ -15,14 +15,18 @@ def draw_colour(
     splats: SplatBuffers,
     into: moderngl.Framebuffer,
     numbers: np.ndarray | None = None,
+    depth: bool = True,
 ) -> None:
     """Splat the Gaussians, ordered and projected, into a framebuffer whose size the projection was for.
 
     Args:
         numbers: (N, 3 L) that the Gaussians carry into L layers behind colour and depth.
+        depth: whether the framebuffer has it beside the colour; without, there are no numbers.
     """
     defines: dict[str, float] = {"COLOUR": 1}
     num_layers = 0 if numbers is None else numbers.shape[1] // ATOMS_A_LAYER
+    if not depth:
+        defines["ALONE"] = 1
     if num_layers:
         defines["LAYERS"] = num_layers
     program = programs.get("quad.vert", "colour.frag", defines)

@@ -7,7 +7,6 @@ vector-matrix product and a handful of element-wise operations. On a graphics ca
 answers.py do the same without the maps leaving it.
 """
 
-import moderngl
 import numpy as np
 
 from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
@@ -17,14 +16,7 @@ from .layout import ATOMS_A_LAYER, PHRASES_A_LAYER
 from .targets import NUMPY_TYPES, LayerTarget
 from .weights import Maps
 
-_SOFTWARE = ("llvmpipe", "softpipe", "swr", "software rasterizer", "apple software renderer")
 _LARGEST_EXPONENT = np.float32(80)  # exp of it is finite in float32, and 1 / (1 + exp) is 0 to all digits
-
-
-def draws_in_software(ctx: moderngl.Context) -> bool:
-    """Whether this OpenGL runs on the processor."""
-    name = ctx.info["GL_RENDERER"].lower()
-    return any(known in name for known in _SOFTWARE)
 
 
 class HostAnswers(Answers):

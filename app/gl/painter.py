@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import moderngl
 import numpy as np
 
-from langflash_core.graphics import Programs, set_uniforms
+from langflash_core.graphics import Programs, draws_in_software, set_uniforms
 
 from .layout import DEFINES
 from .targets import SUM, drawing
@@ -20,7 +20,8 @@ class Painter:
 
     def __init__(self, ctx: moderngl.Context):
         self.ctx = ctx
-        self.programs = Programs(ctx, "splat", DEFINES)
+        place = {"SOFTWARE": 1} if draws_in_software(ctx) else {}
+        self.programs = Programs(ctx, "splat", {**DEFINES, **place})
         self.passes: Counter[str] = Counter()
         self._screens: dict[int, moderngl.VertexArray] = {}
 

@@ -21,6 +21,7 @@ from torch import Tensor
 from langflash_core.errors import GraphicsError
 from langflash_core.export.colours import heat
 from langflash_core.formats import COLOUR_MAPS
+from langflash_core.graphics import draws_in_software
 from langflash_core.language.relevance import CompiledQuery
 from langflash_core.splat.projection import ALPHA_MIN, NEAR
 from langflash_core.types import Camera, Frame, Scene
@@ -29,7 +30,7 @@ from .answers import MakeAnswers, ShaderAnswers
 from .canvas import Canvas, Precision
 from .colours import hues
 from .display import MASK_STYLES, Answer, Background, Drawn
-from .host import HostAnswers, draws_in_software
+from .host import HostAnswers
 from .layout import PHRASES_A_LAYER
 from .question import Question
 from .scene import Level, LiveScene, MakeSplats
@@ -256,21 +257,27 @@ class SplatRenderer:
             ValueError: there is no scene, or the image has no pixels.
             GraphicsError: the image is larger than the driver's textures, or the context is gone.
         """
-        if not context_lives(self._ctx):
-            raise GraphicsError("the OpenGL context of this view is gone; open the scene again")
-        if self._scene is None:
-            raise ValueError("draw: expected set_scene before, received no scene")
-        view = self._canvas.view((camera.width, camera.height))
-        level = self._scene.level(share)
-        level.prepare(camera)
+        scene, level, view = self._prepared(camera, share)
         drawn = Drawn(view.colour, camera, background, level.places_key)
-        picture = _Picture(self._scene, level, view, drawn, fast, level.splats.depth_range)
+        picture = _Picture(scene, level, view, drawn, fast, level.splats.depth_range)
         if self._question is not None and fast and self._question.fits_fast:
             picture.answer(self._question)
         view.draw_colour(level)
         if weight_maps and not fast:
             view.maps.of(level)
         self._picture = picture
+
+    def colours(self, camera: Camera) -> np.ndarray:
+        """(H, W, 3) uint8, the scene's colours over black and nothing else: for pictures one after the other.
+
+        What `draw` showed before is gone.
+
+        Raises:
+            as `draw`.
+        """
+        self._picture = None
+        _, level, view = self._prepared(camera, 1.0)
+        return view.colours(level)
 
     def bring(self, still: Still, background: Background = (0.0, 0.0, 0.0)) -> None:
         """Take a picture of the scene that was drawn elsewhere (still.py) instead of drawing one.
@@ -509,6 +516,21 @@ class SplatRenderer:
         return (NEAR, 1.0) if self._scene is None else self._scene.whole.splats.depth_range
 
     # --- inside -------------------------------------------------------------------------------
+
+    def _prepared(self, camera: Camera, share: float) -> tuple[LiveScene, Level, ViewTargets]:
+        """What to draw, sorted and projected, and where.
+
+        Raises:
+            as `draw`.
+        """
+        if not context_lives(self._ctx):
+            raise GraphicsError("the OpenGL context of this view is gone; open the scene again")
+        if self._scene is None:
+            raise ValueError("draw: expected set_scene before, received no scene")
+        view = self._canvas.view((camera.width, camera.height))
+        level = self._scene.level(share)
+        level.prepare(camera)
+        return self._scene, level, view
 
     def _drawn(self) -> "_Picture | _StillPicture":
         """The picture asked for last; drawn again where another renderer of this canvas drew since."""

@@ -76,11 +76,12 @@ class ColourTarget:
         self.colour = ctx.texture(size, 4, dtype=dtype)
         self.depth = ctx.texture(size, 2, dtype="f4")
         self.framebuffer = ctx.framebuffer([self.colour, self.depth])
+        self.alone = ctx.framebuffer([self.colour])
         for texture in (self.colour, self.depth):
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
 
     def release(self) -> None:
-        for owned in (self.framebuffer, self.depth, self.colour):
+        for owned in (self.alone, self.framebuffer, self.depth, self.colour):
             owned.release()
 
 

@@ -44,6 +44,15 @@ class ViewTargets:
         self._painter.passes["colour"] += 1
         self._shown = level.places_key
 
+    def colours(self, level: Level) -> np.ndarray:
+        """(H, W, 3) uint8, the colour alone over black; what was drawn here before is gone."""
+        self._shown = 0
+        draw_colour(self._painter.programs, level.splats, self.colour.alone, depth=False)
+        self._painter.passes["colour"] += 1
+        width, height = self.size
+        texels = self.colour.alone.read(components=3, alignment=1, dtype="f1")
+        return np.frombuffer(texels, np.uint8).reshape(height, width, 3)
+
     def take(self, still: Still) -> None:
         """Colour and depth of a picture drawn elsewhere, unless they are there."""
         if self._shown == still.key:

@@ -5,7 +5,7 @@ Source: the data format of cocodataset.org.
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +20,11 @@ def write_answer(result: QueryResult, path: Path) -> None:
     write_coco([result], [path.with_suffix(".png").name], path)
 
 
-def write_coco(results: Sequence[QueryResult], pictures: Sequence[str], path: Path) -> None:
+def write_coco(results: Iterable[QueryResult], pictures: Sequence[str], path: Path) -> None:
     """Several views of the same phrases.
 
     Args:
-        results: one per view. pictures: their file names, relative to `path`.
+        results: one per view, taken one after the other. pictures: their file names, relative to `path`.
 
     Raises:
         OutputError: the path cannot be written.
@@ -32,21 +32,22 @@ def write_coco(results: Sequence[QueryResult], pictures: Sequence[str], path: Pa
     write_atomically(path, json.dumps(coco(results, pictures), ensure_ascii=False).encode())
 
 
-def coco(results: Sequence[QueryResult], pictures: Sequence[str]) -> dict[str, Any]:
+def coco(results: Iterable[QueryResult], pictures: Sequence[str]) -> dict[str, Any]:
     """The document: `info, licenses, images, categories, annotations`; ids count from 1.
 
     An annotation is the whole mask of a phrase in a view, with `score` beside COCO's own fields.
     """
-    images, annotations = [], []
-    for image, (result, name) in enumerate(zip(results, pictures, strict=True), start=1):
+    images, annotations, prompts = [], [], []
+    for result, name in zip(results, pictures, strict=True):
+        image = len(images) + 1
         height, width = result.frame.alphas.shape
         images.append({"id": image, "file_name": name, "width": width, "height": height})
+        prompts = [answer.prompt for answer in result.answers]
         masks = result.masks.cpu().numpy()
         for category, (mask, answer) in enumerate(zip(masks, result.answers, strict=True), start=1):
             if mask.any():
                 own = {"id": len(annotations) + 1, "image_id": image, "category_id": category}
                 annotations.append({**own, **_region(mask), "score": float(answer.score)})
-    prompts = [answer.prompt for answer in results[0].answers] if results else []
     categories = [
         {"id": index, "name": prompt, "supercategory": "prompt"}
         for index, prompt in enumerate(prompts, start=1)

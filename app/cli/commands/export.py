@@ -1,7 +1,7 @@
 """`langflash export`: a scene, or what answers a phrase, as a file other programs read."""
 
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TextIO
 
@@ -15,20 +15,35 @@ from langflash_core.formats import (
     FILMS_OUT,
     PAGE_OUT,
     SCENES_OUT,
+    SOG_FOLDER,
     kind_of,
 )
-from langflash_core.types import Camera, QueryResult, Scene
+from langflash_core.types import Camera, PromptAnswer, QueryResult, Scene
 
 from .. import shots
 from ..cameras import CameraChoice, chosen_camera
-from ..files import check_beside, check_folder, check_output_file, readable_file, staged_folder
+from ..files import (
+    check_beside,
+    check_folder,
+    check_output_file,
+    check_same_kind,
+    readable_file,
+    staged_folder,
+)
 from ..renderers import Renderer, open_renderer
 from ..report import ProgressBar
 from ..scenes import open_scene
 from .query import spoken
 
+Answers = tuple[PromptAnswer, ...]  # of one view
 OF_GAUSSIANS = ("cutout", "soft", "instances")  # decided in 3D, the same in all views
 TABLES = {".json": ".json of masks", ".csv": ".csv of boxes", ".glb": ".glb of boxes"}
+JSON_KEYS = {
+    ".json": ("images", "annotations"),
+    "boxes": ("prompt", "box"),
+    SOG_FOLDER: ("means",),
+    "transforms.json": ("frames",),
+}  # what tells one kind of .json from another
 NEED_A_PHRASE = ("heat", "mask", "soft", "cutout", "labels", "instances", "boxes", "surface")
 KINDS = {
     "boxes": tuple(TABLES),
@@ -48,6 +63,9 @@ def run(args: Namespace, out: TextIO) -> None:
     prompts = spoken(args.prompt or [])
     suffix = _checked_output(args)
     _check_words(args, suffix, prompts)
+    json_kind = "boxes" if args.what == "boxes" and suffix == ".json" else suffix
+    if json_kind in JSON_KEYS and not args.replace:
+        check_same_kind(args.output, JSON_KEYS[json_kind])
     choice = chosen_camera(args)
     readable_file(args.scene, "scene", SceneFileError)
     if suffix in FILMS_OUT:
@@ -211,18 +229,18 @@ def _write_pictures(args: Namespace, scene: Scene, prompts: list[str], choice: C
         open_renderer(args.backend, fade=args.fade) as renderer,
         staged_folder(args.output.parent) as staging,
     ):
-        results = []
-        for index, (camera, target) in enumerate(zip(cameras, targets, strict=True)):
-            progress("drawing", index / len(cameras))
-            place = staging / target.name
-            if prompts:
-                results.append(_answer(args, scene, prompts, camera, renderer))
-                shots.write_answered(args.what, place, results[-1], colours)
-            else:
-                shots.write_plain(place, renderer(scene, camera, weight_maps=False))
+        answers = []
         if prompts:
-            _check_found(results)
-    return _told(args, prompts, results, cameras, targets)
+            views = _answered(args, scene, prompts, cameras, renderer, progress)
+            for target, result in zip(targets, views, strict=True):
+                shots.write_answered(args.what, staging / target.name, result, colours)
+                answers.append(result.answers)
+            _check_found(answers)
+        else:
+            for index, (camera, target) in enumerate(zip(cameras, targets, strict=True)):
+                progress("drawing", index / len(cameras))
+                shots.write_plain(staging / target.name, renderer(scene, camera, weight_maps=False))
+    return _told(args, prompts, answers, cameras, targets)
 
 
 def _write_numbers(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
@@ -235,7 +253,8 @@ def _write_numbers(args: Namespace, scene: Scene, prompts: list[str], choice: Ca
         progress("drawing", 0.2)
         make_folder(args.output.parent)
         if prompts:
-            write_npz(_answer(args, scene, prompts, camera, renderer), args.output)
+            (result,) = _answered(args, scene, prompts, [camera], renderer, progress)
+            write_npz(result, args.output)
             return f"{len(prompts)} phrases over {camera.width} x {camera.height}"
         write_view(renderer(scene, camera), scene.semantics, camera, args.output)
     return f"{camera.width} x {camera.height} with {scene.semantics.num_atoms} weight maps"
@@ -263,13 +282,13 @@ def _shots(args: Namespace, scene: Scene, choice: CameraChoice) -> tuple[list[Ca
     return cameras, targets
 
 
-def _told(args: Namespace, prompts: list[str], results: list[QueryResult], cameras, targets) -> str:
+def _told(args: Namespace, prompts: list[str], answers: list[Answers], cameras, targets) -> str:
     size = f"{cameras[0].width} x {cameras[0].height}"
     if args.all_views:
         size += f", {', '.join(target.name for target in targets)}"
     if args.what != "labels":
         return size
-    found = len({a.prompt for result in results for a in result.answers if a.found})
+    found = len({a.prompt for view in answers for a in view if a.found})
     legends = ", ".join(target.with_suffix(".json").name for target in targets)
     return f"{found} of {len(prompts)} phrases, legend in {legends}"
 
@@ -277,13 +296,10 @@ def _told(args: Namespace, prompts: list[str], results: list[QueryResult], camer
 def _write_boxes(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
     """Where each phrase is and how large, as JSON, CSV or glTF; a row or a box per phrase and view."""
     cameras = _shots(args, scene, choice)[0] if args.all_views else [choice.of(scene)]
-    with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade) as renderer:
-        results = []
-        for index, camera in enumerate(cameras):
-            progress("drawing", index / len(cameras))
-            results.append(_answer(args, scene, prompts, camera, renderer))
     views = [None] if args.camera is not None else [args.view or 0]
-    rows = shots.box_rows(results, range(scene.num_views) if args.all_views else views, scene)
+    with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade) as renderer:
+        results = _answered(args, scene, prompts, cameras, renderer, progress)
+        rows = shots.box_rows(results, range(scene.num_views) if args.all_views else views, scene)
     shots.write_boxes(args.output, rows)
     found = sum(row["found"] for row in rows)
     return f"{found} of {len(rows)} found"
@@ -335,17 +351,23 @@ def _write_masks(args: Namespace, scene: Scene, prompts: list[str], choice: Came
         check_output_file(picture, inputs=[args.scene])
         if not args.replace:
             check_beside(picture, args.output, picture)
-    with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade) as renderer:
-        results = []
-        for index, camera in enumerate(cameras):
-            progress("drawing", index / len(cameras))
-            results.append(_answer(args, scene, prompts, camera, renderer))
-        _check_found(results)
-        with staged_folder(args.output.parent) as staging:
-            for name, result in zip(names, results, strict=True):
-                write_rgb(staging / name, result.frame.rgb)
-            write_coco(results, names, staging / args.output.name)
-    masks = sum(answer.found for result in results for answer in result.answers)
+    answers: list[Answers] = []
+
+    def pictured(results: Iterator[QueryResult]) -> Iterator[QueryResult]:
+        for name, result in zip(names, results, strict=True):
+            write_rgb(staging / name, result.frame.rgb)
+            answers.append(result.answers)
+            yield result
+
+    with (
+        ProgressBar() as progress,
+        open_renderer(args.backend, fade=args.fade) as renderer,
+        staged_folder(args.output.parent) as staging,
+    ):
+        results = _answered(args, scene, prompts, cameras, renderer, progress)
+        write_coco(pictured(results), names, staging / args.output.name)
+        _check_found(answers)
+    masks = sum(answer.found for view in answers for answer in view)
     return f"{masks} mask{'s' * (masks > 1)}, pictures in {', '.join(names)}"
 
 
@@ -366,21 +388,28 @@ def _write_video(args: Namespace, scene: Scene, prompts: list[str], choice: Came
     return f"{len(cameras) / video.RATE:.1f} s, {cameras[0].width} x {cameras[0].height}"
 
 
-def _answer(
-    args: Namespace, scene: Scene, prompts: list[str], camera: Camera, renderer: Renderer
-) -> QueryResult:
+def _answered(
+    args: Namespace,
+    scene: Scene,
+    prompts: list[str],
+    cameras: Sequence[Camera],
+    renderer: Renderer,
+    progress: Callable[[str, float], None],
+) -> Iterator[QueryResult]:
+    """View after view; each holds the weight maps of all atoms, so keep only what is needed of it."""
     from langflash_core import pipeline
 
-    return pipeline.query(scene, prompts, camera=camera, threshold=args.threshold, render=renderer)
+    for index, camera in enumerate(cameras):
+        progress("drawing", index / len(cameras))
+        yield pipeline.query(scene, prompts, camera=camera, threshold=args.threshold, render=renderer)
 
 
-def _check_found(results: list[QueryResult]) -> None:
+def _check_found(answers: list[Answers]) -> None:
     """Raises:
     PromptError: no view answers any phrase.
     """
-    answers = [answer for result in results for answer in result.answers]
-    if not any(answer.found for answer in answers):
-        asked = ", ".join(answer.prompt for answer in results[0].answers)
-        where = "this view" if len(results) == 1 else "any view"
-        best = max(answer.score for answer in answers)
+    if not any(answer.found for view in answers for answer in view):
+        asked = ", ".join(answer.prompt for answer in answers[0])
+        where = "this view" if len(answers) == 1 else "any view"
+        best = max(answer.score for view in answers for answer in view)
         raise PromptError(f"not found in {where}: {asked} (best score {best:.3f}); lower --threshold")

@@ -232,7 +232,9 @@ def add_export(commands) -> None:
         "JSON list of cameras as of --camera, each with its time in seconds, or evenly spread",
     )
     command.add_argument(
-        "--replace", action="store_true", help="also what is there by the name of a legend or a COCO picture"
+        "--replace",
+        action="store_true",
+        help="also a .json of another kind, and what has the name of a legend or a COCO picture",
     )
     add_camera(command)
     add_fade(command)

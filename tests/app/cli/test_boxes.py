@@ -2,11 +2,15 @@
 
 import csv
 import json
+import weakref
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
 
+import langflash_core
+from langflash_core import pipeline
 from tests.app.cli.test_bad_input import refused  # noqa: F401
 
 ASKED = ("--what", "boxes", "--prompt", "armchair", "submarine", "--backend", "torch")
@@ -51,3 +55,38 @@ def test_every_photo_has_its_boxes(run, scene_file, tmp_path):
 )
 def test_what_cannot_be(refused, scene_file, tmp_path, name, words, hint):  # noqa: F811
     assert hint in refused("export", scene_file, *words, "-o", tmp_path / name)
+
+
+@pytest.mark.parametrize("words", [("--prompt", "armchair"), ("--what", "boxes", "--prompt", "armchair")])
+def test_a_json_of_another_kind_is_not_replaced(run, scene_file, tmp_path, words):
+    camera = tmp_path / "camera.json"
+    command = ("export", scene_file, "-o", camera, *words, "--backend", "torch")
+    for other in ('{"viewmat": []}', '["a"]', "no JSON"):
+        camera.write_text(other)
+        outcome = run(*command)
+        assert outcome.code == 2 and "--replace" in outcome.err, outcome
+        assert outcome.err.count("\n") == 1 and camera.read_text() == other
+    assert run(*command, "--replace").code == 0
+    assert run(*command).code == 0  # its own kind
+
+
+def test_one_view_after_the_other_is_in_memory(run, scene_file, tmp_path, monkeypatch):
+    query, alive = pipeline.query, []
+
+    def watched(*args, **options):
+        result = query(*args, **options)
+        alive.append(weakref.ref(result.frame.weight_maps))
+        # The one that the loop lets go of with the next is still there.
+        assert sum(one() is not None for one in alive) <= 2
+        return result
+
+    scene = langflash_core.load(scene_file)
+    views = [0, 1, 0, 1]
+    many = tmp_path / "many.langflash"
+    langflash_core.save(replace(scene, viewmats=scene.viewmats[views], Ks=scene.Ks[views]), many)
+    monkeypatch.setattr(pipeline, "query", watched)
+    asked = ("--prompt", "armchair", "--backend", "torch")
+    for words in (("a.json",), ("b.csv", "--all-views"), ("c.png", "--what", "labels", "--all-views")):
+        alive.clear()
+        outcome = run("export", many, "-o", tmp_path / words[0], *words[1:], *asked)
+        assert outcome.code == 0 and len(alive) == 4, outcome

@@ -213,7 +213,7 @@ def test_what_lies_beside_is_replaced_only_by_its_own_kind(run, scene_file, tmp_
     assert run(*masks).code == 0  # its own picture of the time before
     assert run(*label, "--replace").code == 0 and run(*label).code == 0
     outcome = run(*masks)
-    assert outcome.code == 2 and "v_0.png" in outcome.err
+    assert outcome.code == 2 and "v.json" in outcome.err  # a legend now
     assert run(*masks, "--replace").code == 0
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from app.gl import SplatRenderer
 from langflash_core.scene.trust import faded
 from tests.app.gl.questions import question
 from tests.splat.scenes import camera, cloud, maps_of, scene_of, splats
@@ -175,3 +176,28 @@ def test_faded_is_the_frame_fading_over_the_background(asked, aside):
 
 def test_nothing_fades_where_nobody_knows_the_photos(asked):
     assert asked.faded_texture() is asked.rgb_texture
+
+
+def test_the_colours_alone_are_those_of_the_picture(asked):
+    camera_ = camera()
+    asked.draw(camera_)
+    shown = (255 * pixels(asked.rgb_texture)[..., :3]).round().astype(int)
+    # Eight bits: the driver and the shader may round a value halfway between two steps apart.
+    assert np.abs(asked.colours(camera_) - shown).max() <= 1
+    with pytest.raises(ValueError, match="expected draw"):
+        asked.frame()
+
+
+def test_what_adds_nothing_is_discarded_or_drawn_to_the_same_bits(gl, monkeypatch):
+    scene = cloud(1500, 12, dtype=torch.float32)
+    frames = []
+    for software in (False, True):
+        monkeypatch.setattr("app.gl.painter.draws_in_software", lambda ctx, said=software: said)
+        drawn = SplatRenderer(gl)
+        drawn.set_scene(scene)
+        drawn.draw(camera())
+        frames.append(drawn.frame(weight_maps=True))
+        drawn.release()
+    discarded, added = frames
+    for name in ("rgb", "alphas", "depths", "weight_maps"):
+        assert torch.equal(getattr(discarded, name), getattr(added, name)), name
