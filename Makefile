@@ -53,7 +53,7 @@ test: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 
 # Results must not hang on the processor's vector units (ATEN_CPU_CAPABILITY: what torch uses of them,
 # all that is there where it is unset), on the number of threads, or on which test ran before. Three

@@ -46,6 +46,11 @@ class Kept:
     along_a_curve: bool = False
 
 
+# Three entries within e = 1 / 1022 / sqrt(2) of themselves and, at worst, of four equal ones, the fourth
+# within 3 e: |dq| = sqrt(12) e = .0024, twice that as an angle.
+SMALLEST_THREE = 0.005
+
+
 def spz_kept(furthest: float, angle: float) -> Kept:
     """A step of the fraction that the scene leaves room for; 5 and 4 bits of harmonics in [-1, 1]."""
     bits = next(b for b in range(16, -1, -1) if round(furthest * 2**b) < 2**23 or not b)
@@ -70,11 +75,11 @@ def bounds(kind: str, gaussians: Gaussians) -> Kept:
     logs = gaussians.scales.double().log()
     colours = 0.5 + SH_C0 * gaussians.sh[:, 0].double()
     if kind == ".spz":
-        return spz_kept(furthest, 0.004)  # three entries within 1 / 1022 / sqrt(2) of themselves
+        return spz_kept(furthest, SMALLEST_THREE)
     if kind == ".compressed.ply":
         return Kept(
             means=extent / 1023 / 2 + furthest * 1e-6,
-            angle=0.004,
+            angle=SMALLEST_THREE,
             scales=float((logs.amax(0) - logs.amin(0)).max()) / 1023 / 2 + 1e-5,
             opacities=HALF,
             colours=float((colours.amax(0) - colours.amin(0)).max()) / 255 / 2 + 1e-5,

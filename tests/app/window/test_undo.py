@@ -20,6 +20,8 @@ from app.window.editing import pointing as point
 from app.window.editing.state import Region
 from app.window.editing.work import ScoreFloaters, request_for
 from app.window.exporting import commands as export
+from app.window.filming import commands as film
+from app.window.opening import commands as opening
 from app.window.poses import Pose, Vector
 from app.window.recovery import commands as keep
 from app.window.scene import camera
@@ -31,9 +33,10 @@ from langflash_core.language.relevance import CompiledQuery, compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.edited import edited_scene
 from langflash_core.scene.edits import Marks, Mask
+from langflash_core.types import Scene
 from tests.app.window.scenes import PHRASES, room
 
-MODULES = (do, show, camera, ask, edit, point, export, keep)
+MODULES = (do, show, camera, ask, edit, point, export, keep, film, opening)
 ARRIVES = show.SceneArrived  # another scene; the edits of the one before are kept on the disk
 SAYS_WHICH = {
     "combine": ("replace", "add", "remove"),
@@ -41,6 +44,7 @@ SAYS_WHICH = {
     "then": ("", "delete", "select"),
 }
 GIVEN = {("mode", str): "RGB", ("pair", tuple[int, int] | None): None}  # what else would be no answer
+LAZY = {each.__name__: each for each in (CompiledQuery, Scene)}  # known to the type checker alone
 SIZE = (64, 48)  # pixels of the picture that regions are drawn on
 
 
@@ -81,7 +85,7 @@ def edited(shown: State) -> State:
 
 
 def arguments(cls: type, chance: np.random.Generator, state: State) -> dict:
-    hints = typing.get_type_hints(cls, {**vars(sys.modules[cls.__module__]), "CompiledQuery": CompiledQuery})
+    hints = typing.get_type_hints(cls, {**vars(sys.modules[cls.__module__]), **LAZY})
     return {f.name: value(f.name, hints[f.name], chance, state) for f in fields(cls)}
 
 
@@ -107,6 +111,9 @@ def value(name: str, hint, chance: np.random.Generator, state: State):
     if hint is CompiledQuery:
         assert state.info is not None
         return compile_query(state.info.scene, language_space("minilm"), ["wall"])
+    if hint is Scene:
+        assert state.info is not None
+        return state.info.scene
     if hint is do.Command:
         return show.ClearPhotos()
     if hint is SceneInfo:
