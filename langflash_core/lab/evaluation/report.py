@@ -119,7 +119,7 @@ def rooms_section(data: Path, place: Workplace, limit: int | None = None) -> Sec
     setting, held_out = rooms.open_rooms(
         data, place.weights, preset=place.preset, limit=limit, lpips=place.lpips
     )
-    shelf = place.shelf("rooms", RoomTally, data=str(data.resolve()), groups=len(setting.groups))
+    shelf = place.shelf("rooms", RoomTally, data=str(data.resolve()), groups=setting.groups)
     kept, gallery = _told(
         place, shelf, len(held_out), lambda look: rooms.room_tallies(setting, held_out, shelf, look)
     )
@@ -154,7 +154,6 @@ def ablations_section(data: Path, place: Workplace, limit: int | None = None) ->
         place.weights,
         limit=limit,
         most=ABLATED,
-        kept=shelf.folder / f"fits_{identity(place.weights, place.preset)}.safetensors",
         shelf=shelf,
         progress=place.progress,
     )
