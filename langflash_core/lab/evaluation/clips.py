@@ -124,16 +124,15 @@ def judged(truth: TrueClip, ids: UInt16[np.ndarray, "T H W"]) -> list[ThingScore
     ids = np.where(truth.ids > 0, ids, 0)  # what shows through a window is no part of the room
     things, numbers = truth.things, np.unique(ids[ids > 0])
     shows = [truth.shares(id) >= SHOWS for id in things]
-    ious = np.zeros((len(things), max(len(numbers), 1), len(ids)))
+    ious = np.zeros((len(things), max(len(numbers), len(things)), len(ids)))  # where ids lack, none: 0
     for n, number in enumerate(numbers):
         own = ids == number
         for t, id in enumerate(things):
             true = truth.ids == id
             ious[t, n] = (own & true).sum((1, 2)) / np.maximum((own | true).sum((1, 2)), 1)
     means = np.stack([ious[t][:, s].mean(1) for t, s in enumerate(shows)]) if things else np.zeros((0, 1))
-    rows, columns = linear_sum_assignment(-means)
-    chosen = dict(zip(rows.tolist(), columns.tolist(), strict=True))
-    return [_score(truth, id, shows[t], ious[t], chosen.get(t, 0)) for t, id in enumerate(things)]
+    _, chosen = linear_sum_assignment(-means)  # one for every thing, in their order
+    return [_score(truth, id, shows[t], ious[t], int(chosen[t])) for t, id in enumerate(things)]
 
 
 def _score(truth: TrueClip, id: int, shows: np.ndarray, ious: np.ndarray, best: int) -> ThingScore:

@@ -52,6 +52,11 @@ def test_one_id_stands_for_one_thing_only(painted):
     assert sum(score.iou > 0 for score in judged(painted, ids)) <= 2  # its own, and the wall's for another
 
 
+def test_an_id_that_another_thing_has_is_not_counted_twice(painted):
+    ids = np.where(painted.ids > STRUCTURE, 5, 0).astype(np.uint16)  # no other id is left over
+    assert sum(score.iou > 0 for score in judged(painted, ids)) == 1
+
+
 def test_nothing_collected_is_nothing_found(painted):
     assert all(s.iou == 0 and s.delay is None for s in judged(painted, np.zeros_like(painted.ids)))
 
