@@ -56,9 +56,7 @@ def enrich(split: Path, labelled: Path, keys: Collection[str] | None = None) -> 
     with held_alone(split):
         for path, known in _chunks(split):
             ready = {
-                key
-                for key in known
-                if (keys is None or key in keys) and (labelled / key / LABELS).is_file()
+                key for key in known if (keys is None or key in keys) and (labelled / key / LABELS).is_file()
             }
             count += _enriched(path, labelled, ready) if ready else 0
     return count

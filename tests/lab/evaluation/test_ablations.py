@@ -121,7 +121,8 @@ def test_a_study_measures_every_rival_and_goes_on_from_its_fits(tmp_path: Path, 
     ((_, second),) = study.room_studies(tmp_path, tmp_path / "mini.safetensors", **options)[2]
     for key, table in tally.counts.items():
         assert torch.equal(table, second.counts[key])
-    write_shard(tmp_path / "held_out" / "a.safetensors", [replace(record, labels=LAMPS) for record in held_out])
+    lamps = [replace(record, labels=LAMPS) for record in held_out]
+    write_shard(tmp_path / "held_out" / "a.safetensors", lamps)
     ((_, third),) = study.room_studies(tmp_path, tmp_path / "mini.safetensors", **options)[2]
     assert not third.counts  # other groups, other tables
 
