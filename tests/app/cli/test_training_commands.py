@@ -207,7 +207,8 @@ def test_labelled_photos_are_judged(run, checkpoint, photos, tmp_path):
 
 
 def test_posed_photos_are_judged(run, checkpoint, tmp_path):
-    """Three equal photos of nothing: no motion is true, and there is no depth to judge."""
+    """Three equal photos of nothing: no motion is true, none matches and one is left out, whose direction is
+    then the worst; and there is no depth to judge."""
     writer = FolderWriter(tmp_path / "posed")
     for id in ("0", "3", "6"):
         writer.photo(id, np.full((42, 56, 3), 128, np.uint8))
@@ -216,7 +217,7 @@ def test_posed_photos_are_judged(run, checkpoint, tmp_path):
     words = ("--weights", checkpoint, "--size", "56", "--backend", "torch", "--apart", "6")
     outcome = run("eval", "posed", tmp_path / "posed", *words)
     assert outcome.code == 0, outcome.err
-    assert "(no motion)" in outcome.out and "| 6 | 1.000 | 1.000 | 0.000 |" in outcome.out
+    assert "(no motion)" in outcome.out and "| 6 | 1.000 | 0.000 | 0.000 | 0.000 | 180.000 |" in outcome.out
     assert "Depth" not in outcome.out
 
 
