@@ -149,7 +149,8 @@ def _score(truth: TrueClip, id: int, shows: np.ndarray, ious: np.ndarray, best: 
 
 
 def clips_result(judgements: Sequence[tuple[ClipLabels, Sequence[ThingScore]]]) -> dict:
-    """Numbers of clips, as plain JSON values; `iou` of a clip is the mean over its things."""
+    """Numbers of clips, as plain JSON values; `iou` of a clip is the mean over its things, null where it has
+    none; `constant` the mean over those that were found."""
     clips = []
     for labels, scores in judgements:
         clips.append(
@@ -168,11 +169,16 @@ def clips_result(judgements: Sequence[tuple[ClipLabels, Sequence[ThingScore]]]) 
                 "scores": [asdict(score) for score in scores],
             }
         )
-    return {"clips": clips, "iou": _mean([clip["iou"] for clip in clips])}
+    return {"clips": clips, "iou": _mean([clip["iou"] for clip in clips if clip["iou"] is not None])}
 
 
-def _mean(values: Sequence[float]) -> float:
-    return float(np.mean(values)) if len(values) else 0.0
+def _mean(values: Sequence[float]) -> float | None:
+    """None: there is nothing to take it of."""
+    return float(np.mean(values)) if len(values) else None
+
+
+def _told(value: float | None, form: str) -> str:
+    return "-" if value is None else format(value, form)
 
 
 def clips_markdown(result: dict) -> str:
@@ -184,7 +190,7 @@ def clips_markdown(result: dict) -> str:
     for clip in result["clips"]:
         lines.append(
             f"| {clip['clip']} | {clip['found']} of {clip['things']} | "
-            f"{clip['late_found']} of {clip['late']} | {clip['iou']:.3f} | {clip['constant']:.0%} | "
+            f"{clip['late_found']} of {clip['late']} | {_told(clip['iou'], '.3f')} | {_told(clip['constant'], '.0%')} | "
             f"{clip['objects']} | {clip['coverage']:.0%} | {clip['frames_per_second']:.2f} |"
         )
     lines += ["", "| clip | thing | IoU | id constant | caught after |", "|---|---|---|---|---|"]

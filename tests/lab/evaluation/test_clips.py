@@ -85,3 +85,7 @@ def test_tables_say_what_was_found(painted):
     assert (clip["found"], clip["late_found"], clip["iou"], clip["frames_per_second"]) == (3, 1, 1.0, 2.0)
     table = clips_markdown(result)
     assert "| painted | 3 of 3 | 1 of 1 | 1.000 | 100% |" in table and "late box, comes in late" in table
+    nothing = clips_result([(labels, judged(painted, np.zeros_like(painted.ids))), (labels, [])])
+    assert [clip["constant"] for clip in nothing["clips"]] == [None, None]  # of nothing found
+    assert [clip["iou"] for clip in nothing["clips"]] == [0, None] and nothing["iou"] == 0
+    assert "| painted | 0 of 0 | 0 of 0 | - | - |" in clips_markdown(nothing)
