@@ -188,11 +188,17 @@ def clips_markdown(result: dict) -> str:
         "|---|---|---|---|---|---|---|---|",
     ]
     for clip in result["clips"]:
-        lines.append(
-            f"| {clip['clip']} | {clip['found']} of {clip['things']} | "
-            f"{clip['late_found']} of {clip['late']} | {_told(clip['iou'], '.3f')} | {_told(clip['constant'], '.0%')} | "
-            f"{clip['objects']} | {clip['coverage']:.0%} | {clip['frames_per_second']:.2f} |"
+        cells = (
+            clip["clip"],
+            f"{clip['found']} of {clip['things']}",
+            f"{clip['late_found']} of {clip['late']}",
+            _told(clip["iou"], ".3f"),
+            _told(clip["constant"], ".0%"),
+            str(clip["objects"]),
+            f"{clip['coverage']:.0%}",
+            f"{clip['frames_per_second']:.2f}",
         )
+        lines.append(f"| {' | '.join(cells)} |")
     lines += ["", "| clip | thing | IoU | id constant | caught after |", "|---|---|---|---|---|"]
     for clip in result["clips"]:
         for score in clip["scores"]:
