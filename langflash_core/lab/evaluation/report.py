@@ -162,8 +162,8 @@ def ablations_section(data: Path, place: Workplace, limit: int | None = None) ->
     result, bounds = _summed(kept, ablation_summary)
     about = (
         f"{len(kept)} of the rooms, taken evenly; {len(setting.groups)} class groups. All rivals draw "
-        "the same Gaussians from the same camera by the same rasteriser; times are those of one process, and "
-        '"x atoms" is the mean over rooms of the ratio to the atoms in the same room.'
+        "the same Gaussians from the same camera by the same rasteriser; times are of drawing and decoding, "
+        'in one process, and "x atoms" is the mean over rooms of the ratio to the atoms in the same room.'
     )
     return Section(
         "ablations",
