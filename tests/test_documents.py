@@ -1,10 +1,13 @@
 """What the documents at the top say of the tree is true, and the code cites no document that is not there."""
 
+import argparse
 import re
 from pathlib import Path
 
 import pytest
 import yaml
+
+from app.cli.parser import build_parser
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md")
@@ -64,6 +67,30 @@ def test_headings_that_are_cited_exist():
             for path in (ROOT / top).rglob(pattern):
                 for cited in re.findall(r'ARCHITECTURE\.md, "([^"]+)"', path.read_text(encoding="utf-8")):
                     assert cited in headings, f"{path.relative_to(ROOT)} cites {cited}"
+
+
+def _commands(parser: argparse.ArgumentParser, name: str = "") -> dict[str, set[str]]:
+    """Options of a command and of all below it, by the words that lead there."""
+    found = {name: {option for action in parser._actions for option in action.option_strings}}
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for word, below in action.choices.items():
+                found |= _commands(below, f"{name} {word}".strip())
+    return found
+
+
+@pytest.mark.parametrize("document", ["README.md", "CHANGELOG.md"])
+def test_every_command_and_option_exists(document):
+    text = (ROOT / document).read_text(encoding="utf-8")
+    known = _commands(build_parser())
+    words = {name.split()[0] for name in known if name}
+    groups = {name.split()[0] for name in known if " " in name}
+    for first, second in re.findall(r"`langflash ([a-z-]+)(?: ([a-z][a-z-]+))?", text):
+        assert first in words, f"there is no langflash {first}"
+        if second and first in groups:
+            assert f"{first} {second}" in known, f"there is no langflash {first} {second}"
+    told = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", text))
+    assert told - set().union(*known.values()) <= {"--help"} and len(told) > 5
 
 
 def test_hosted_checks_run_what_everybody_runs():

@@ -6,7 +6,6 @@ Basis and decoder are fitted on the scene itself: more than a network for many s
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 import torch
@@ -49,11 +48,7 @@ def channels_of(scene: Scene, count: int | None) -> Channels:
         return Channels(vectors, torch.Tensor.float)
     some = vectors[:: -(-len(vectors) // _EXAMPLES)]
     decoder = Decoder.fitted(some, count)
-    return Channels(vectors @ decoder.basis.T, partial(_decoded, decoder))
-
-
-def _decoded(decoder: Decoder, coded: Tensor) -> Tensor:
-    return torch.where((coded != 0).any(-1, keepdim=True), decoder(coded.float()), 0.0)
+    return Channels(vectors @ decoder.basis.T, lambda coded: decoder(coded.float()))
 
 
 def draw_channels(scene: Scene, channels: Channels, camera: Camera, threads: int) -> Still:

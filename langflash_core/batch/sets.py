@@ -65,7 +65,7 @@ def _table(source: Path) -> Iterator[PhotoSet]:
         name, photos = cells[0], [cell for cell in cells[1:] if cell]
         if line == 1 and name.casefold() == "name":
             continue
-        _check_name(name, f"{source}, line {line}")
+        check_name(name, f"{source}, line {line}")
         if not photos:
             raise InputError(f"{source}, line {line}: '{name}' has no photos; name them after it")
         before = seen.setdefault(name.casefold(), line)
@@ -96,7 +96,12 @@ def _rows(source: Path) -> Iterator[tuple[int, list[str]]]:
         ) from None
 
 
-def _check_name(name: str, where: str) -> None:
+def check_name(name: str, where: str) -> None:
+    """That a folder may be called so, on every system, and that it lies where it is put.
+
+    Raises:
+        InputError: it may not.
+    """
     taken = name.casefold() in (LEDGER, SUMMARY)
     too_long = len(name.encode()) > _LONGEST_NAME
     if not name or name.startswith(".") or name.endswith(".") or taken or too_long or _UNFIT.search(name):

@@ -29,7 +29,7 @@ def principal(features: Float[Tensor, "n C"], count: int) -> Float[Tensor, "d C"
 class Decoder:
     """z -> L: the basis' own answer, and what a hidden layer of relu(z / |z| A + b) adds to it.
 
-    basis: (d, C). hidden: A (d, h); shift: b (h); out: (h, C), all None where the decoder is linear.
+    basis: (d, C). hidden: A (d, h); shift: b (h); out: (h, C).
     """
 
     basis: Tensor
@@ -52,8 +52,10 @@ class Decoder:
         return Decoder(basis, hidden, shift, torch.linalg.solve(normal, units.T @ missing).float())
 
     def __call__(self, coded: Float[Tensor, "*n d"]) -> Float[Tensor, "*n C"]:
-        """Only the direction of z counts, so half covered pixels are decoded as covered ones."""
-        return F.normalize(coded, dim=-1) @ self.basis + _lit(coded, self.hidden, self.shift) @ self.out
+        """Only the direction of z counts, so half covered pixels are decoded as covered ones; where z is 0
+        nothing is drawn, and nothing said."""
+        said = F.normalize(coded, dim=-1) @ self.basis + _lit(coded, self.hidden, self.shift) @ self.out
+        return torch.where((coded != 0).any(-1, keepdim=True), said, 0.0)
 
 
 def _lit(coded: Tensor, hidden: Tensor, shift: Tensor) -> Tensor:

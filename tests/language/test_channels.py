@@ -18,5 +18,6 @@ def test_a_decoder_beats_its_basis_and_needs_no_length():
     wrong, less = (1 - (found * features).sum(-1).mean() for found in (linear, decoded))
     assert float(less) < 0.5 * float(wrong)
     assert torch.allclose(decoder(0.3 * coded), decoder(coded), atol=1e-4)  # float32, ridge weights up to 30
+    assert not decoder(torch.zeros(2, 3)).any()  # empty space says nothing
     basis = principal(features, 3)
     assert torch.allclose(basis @ basis.T, torch.eye(3), atol=1e-5)

@@ -8,8 +8,6 @@ from langflash_core.errors import InputError
 from ..files import check_folder, check_output_file
 from ..report import ProgressBar, write_tables
 
-FITS = "fits.safetensors"
-
 
 def ablations(args: Namespace, out: TextIO) -> None:
     """Judge every rival on the same rooms.
@@ -34,7 +32,6 @@ def ablations(args: Namespace, out: TextIO) -> None:
             args.cache,
             args.weights,
             limit=args.limit,
-            kept=None if args.work is None else args.work / FITS,
             shelf=shelf,
             progress=progress,
         )

@@ -57,7 +57,7 @@ def report(args: Namespace, out: TextIO) -> None:
     made = report_page.Report(
         found,
         PUBLISHED,
-        shlex.join(["langflash", *(_named(word) for word in sys.argv[1:])]),
+        shlex.join(["langflash", *(named(word) for word in sys.argv[1:])]),
         {**host(), "renderer": drawn_by},
         f"{name} ({identity(args.weights, args.preset)})",
         time.strftime("%Y-%m-%d"),
@@ -86,9 +86,10 @@ def _write_small(made: "Report", folder: Path) -> None:
         write_atomically(folder / name, text.encode())
 
 
-def _named(word: str) -> str:
+def named(word: str) -> str:
     """A word of the command, paths by their last name: where something lies is nobody's business."""
-    return Path(word).name if word.startswith("/") else word
+    option, sign, value = word.rpartition("=")
+    return f"{option}{sign}{Path(value).name}" if Path(value).is_absolute() else word
 
 
 def _posed_folder(path: Path | None) -> PhotoFolder | None:

@@ -50,7 +50,7 @@ def run(args: Namespace, out: TextIO) -> int:
         ledger = Ledger(args.output / LEDGER)
         to_do = [job for job in jobs if not _is_done(job, ledger)]
         stopped = not _worked_off(args, order, to_do, ledger, [job.name for job in jobs], keyed)
-        enriched = 0 if stopped or not args.enrich else enrich(args.source, args.output)
+        enriched = 0 if stopped or not args.enrich else _enriched(args, places, order, ledger)
     return _told(args, ledger, jobs, len(jobs) - len(to_do), enriched, stopped, out)
 
 
@@ -108,6 +108,19 @@ def _worked_off(
     except KeyboardInterrupt:
         return False
     return True
+
+
+def _enriched(args: Namespace, places: Sequence[ClipPlace], order: LabelOrder, ledger: Ledger) -> int:
+    """Put what was labelled so into the chunks; rows know these as they are afterwards, so that it is not
+    done again."""
+    done = {job.name for job in _jobs(places, args.output, order) if _is_done(job, ledger)}
+    count = enrich(args.source, args.output, done)
+    jobs = _jobs(places, args.output, order)
+    for job in jobs:
+        if job.name in done:
+            ledger.rows[job.name] = replace(ledger.rows[job.name], fingerprint=job.fingerprint)
+    ledger.settle([job.name for job in jobs])
+    return count
 
 
 def _workers(args: Namespace, opening: Callable, jobs: int) -> Workers:

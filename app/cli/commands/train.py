@@ -162,6 +162,10 @@ def _run(args: Namespace, out: TextIO) -> None:
     check_folder(args.output)
     with joined(args.device) as device:
         recipe = _recipe(args, replace(_options(args, 0), device=device))
+        if args.sam_teacher is not None and not any(plan.stage.dense for plan in recipe.plans):
+            raise InputError(
+                "no stage here regresses SAM's embedding; name grouping, or leave --sam-teacher away"
+            )
         encode = language_space(PRESETS[recipe.preset].space).encode
         start = _start_of(args, recipe.preset)
         run_recipe(

@@ -124,16 +124,15 @@ def judged(truth: TrueClip, ids: UInt16[np.ndarray, "T H W"]) -> list[ThingScore
     ids = np.where(truth.ids > 0, ids, 0)  # what shows through a window is no part of the room
     things, numbers = truth.things, np.unique(ids[ids > 0])
     shows = [truth.shares(id) >= SHOWS for id in things]
-    ious = np.zeros((len(things), max(len(numbers), 1), len(ids)))
+    ious = np.zeros((len(things), max(len(numbers), len(things)), len(ids)))  # where ids lack, none: 0
     for n, number in enumerate(numbers):
         own = ids == number
         for t, id in enumerate(things):
             true = truth.ids == id
             ious[t, n] = (own & true).sum((1, 2)) / np.maximum((own | true).sum((1, 2)), 1)
     means = np.stack([ious[t][:, s].mean(1) for t, s in enumerate(shows)]) if things else np.zeros((0, 1))
-    rows, columns = linear_sum_assignment(-means)
-    chosen = dict(zip(rows.tolist(), columns.tolist(), strict=True))
-    return [_score(truth, id, shows[t], ious[t], chosen.get(t, 0)) for t, id in enumerate(things)]
+    _, chosen = linear_sum_assignment(-means)  # one for every thing, in their order
+    return [_score(truth, id, shows[t], ious[t], int(chosen[t])) for t, id in enumerate(things)]
 
 
 def _score(truth: TrueClip, id: int, shows: np.ndarray, ious: np.ndarray, best: int) -> ThingScore:
@@ -150,7 +149,8 @@ def _score(truth: TrueClip, id: int, shows: np.ndarray, ious: np.ndarray, best: 
 
 
 def clips_result(judgements: Sequence[tuple[ClipLabels, Sequence[ThingScore]]]) -> dict:
-    """Numbers of clips, as plain JSON values; `iou` of a clip is the mean over its things."""
+    """Numbers of clips, as plain JSON values; `iou` of a clip is the mean over its things, null where it has
+    none; `constant` the mean over those that were found."""
     clips = []
     for labels, scores in judgements:
         clips.append(
@@ -169,11 +169,16 @@ def clips_result(judgements: Sequence[tuple[ClipLabels, Sequence[ThingScore]]]) 
                 "scores": [asdict(score) for score in scores],
             }
         )
-    return {"clips": clips, "iou": _mean([clip["iou"] for clip in clips])}
+    return {"clips": clips, "iou": _mean([clip["iou"] for clip in clips if clip["iou"] is not None])}
 
 
-def _mean(values: Sequence[float]) -> float:
-    return float(np.mean(values)) if len(values) else 0.0
+def _mean(values: Sequence[float]) -> float | None:
+    """None: there is nothing to take it of."""
+    return float(np.mean(values)) if len(values) else None
+
+
+def _told(value: float | None, form: str) -> str:
+    return "-" if value is None else format(value, form)
 
 
 def clips_markdown(result: dict) -> str:
@@ -183,11 +188,17 @@ def clips_markdown(result: dict) -> str:
         "|---|---|---|---|---|---|---|---|",
     ]
     for clip in result["clips"]:
-        lines.append(
-            f"| {clip['clip']} | {clip['found']} of {clip['things']} | "
-            f"{clip['late_found']} of {clip['late']} | {clip['iou']:.3f} | {clip['constant']:.0%} | "
-            f"{clip['objects']} | {clip['coverage']:.0%} | {clip['frames_per_second']:.2f} |"
+        cells = (
+            clip["clip"],
+            f"{clip['found']} of {clip['things']}",
+            f"{clip['late_found']} of {clip['late']}",
+            _told(clip["iou"], ".3f"),
+            _told(clip["constant"], ".0%"),
+            str(clip["objects"]),
+            f"{clip['coverage']:.0%}",
+            f"{clip['frames_per_second']:.2f}",
         )
+        lines.append(f"| {' | '.join(cells)} |")
     lines += ["", "| clip | thing | IoU | id constant | caught after |", "|---|---|---|---|---|"]
     for clip in result["clips"]:
         for score in clip["scores"]:

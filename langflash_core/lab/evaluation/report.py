@@ -5,6 +5,7 @@ interval of every number, pictures, and a plot of speed against error. What is k
 not judged again, unless weights or options changed.
 """
 
+import hashlib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -119,7 +120,7 @@ def rooms_section(data: Path, place: Workplace, limit: int | None = None) -> Sec
     setting, held_out = rooms.open_rooms(
         data, place.weights, preset=place.preset, limit=limit, lpips=place.lpips
     )
-    shelf = place.shelf("rooms", RoomTally, data=str(data.resolve()), groups=len(setting.groups))
+    shelf = place.shelf("rooms", RoomTally, data=str(data.resolve()), groups=setting.groups)
     kept, gallery = _told(
         place, shelf, len(held_out), lambda look: rooms.room_tallies(setting, held_out, shelf, look)
     )
@@ -154,7 +155,6 @@ def ablations_section(data: Path, place: Workplace, limit: int | None = None) ->
         place.weights,
         limit=limit,
         most=ABLATED,
-        kept=shelf.folder / f"fits_{identity(place.weights, place.preset)}.safetensors",
         shelf=shelf,
         progress=place.progress,
     )
@@ -162,8 +162,8 @@ def ablations_section(data: Path, place: Workplace, limit: int | None = None) ->
     result, bounds = _summed(kept, ablation_summary)
     about = (
         f"{len(kept)} of the rooms, taken evenly; {len(setting.groups)} class groups. All rivals draw "
-        "the same Gaussians from the same camera by the same rasteriser; times are those of one process, and "
-        '"x atoms" is the mean over rooms of the ratio to the atoms in the same room.'
+        "the same Gaussians from the same camera by the same rasteriser; times are of drawing and decoding, "
+        'in one process, and "x atoms" is the mean over rooms of the ratio to the atoms in the same room.'
     )
     return Section(
         "ablations",
@@ -202,7 +202,7 @@ def sides_section(pack: Path, place: Workplace, limit: int | None = None) -> Sec
 def posed_section(folder: PhotoFolder, place: Workplace, limit: int | None = None) -> Section:
     """Pairs of real photos whose poses somebody measured."""
     triples = chosen_triples(folder.ids, limit or PAIRS, APART)
-    shelf = place.shelf("posed", posed.Tally, folder=str(folder.root.resolve()))
+    shelf = place.shelf("posed", posed.Tally, **_described(folder))
     kept, gallery = _told(
         place,
         shelf,
@@ -239,9 +239,7 @@ def posed_section(folder: PhotoFolder, place: Workplace, limit: int | None = Non
 def photos_section(folder: PhotoFolder, ids: Sequence[str], place: Workplace) -> Section:
     """Single real photos that somebody labelled."""
     judged = labelled.judged_by(folder, place.render, place.weights, preset=place.preset)
-    shelf = place.shelf(
-        "photos", labelled.Tally, folder=str(folder.root.resolve()), words=len(judged.words.phrases)
-    )
+    shelf = place.shelf("photos", labelled.Tally, **_described(folder), words=len(judged.words.phrases))
     kept, gallery = _told(
         place, shelf, len(ids), lambda look: labelled.photo_tallies(judged, folder, ids, shelf, look)
     )
@@ -264,6 +262,19 @@ def photos_section(folder: PhotoFolder, ids: Sequence[str], place: Workplace) ->
         (),
         gallery.shown(list(kept), WORST, BEST),
     )
+
+
+def _described(folder: PhotoFolder) -> dict[str, object]:
+    """What photos are judged by besides their pixels: with another crop or lens they are judged anew."""
+    Ks, poses = (
+        None if known is None else {id: matrix.tolist() for id, matrix in known.items()}
+        for known in (folder.Ks, folder.poses)
+    )
+    said = repr((folder.crop, folder.depth_unit, folder.names, Ks, poses))
+    return {
+        "folder": str(folder.root.resolve()),
+        "described": hashlib.sha256(said.encode()).hexdigest()[:16],
+    }
 
 
 def _told(

@@ -14,6 +14,7 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
+from langflash_core.batch.sets import check_name
 from langflash_core.errors import InputError
 from langflash_core.images.decode import read_photo
 from langflash_core.lab.photos import PhotoFolder, open_folder
@@ -73,12 +74,14 @@ def find_clips(source: Path) -> list[ClipPlace]:
     """The clips at a path: one folder of frames, a folder of such folders, or a split of RealEstate10K.
 
     Raises:
-        InputError: there is none.
+        InputError: there is none, or the name of one cannot be that of its output.
     """
     if not source.is_dir():
         raise InputError(f"there is no folder {source}; give a clip's folder of frames, or one of clips")
     if (source / INDEX).is_file():
         chunks = read_table(source / INDEX)
+        for key in chunks:
+            check_name(key, str(source / INDEX))
         return [ClipPlace(key, source, (source / str(chunk),), key) for key, chunk in chunks.items()]
     if _frames(source):
         return [_place(source)]

@@ -133,7 +133,7 @@ def collect(
     rules, clip = rules or Rules(), clip.held()
     work = _Collection(clip, proposer, encoder, rules)
     following = propagator.follow(clip)
-    maps: list[np.ndarray] = []
+    maps = np.zeros((len(clip), *clip.read(0).shape[:2]), np.uint16)  # once: a long clip takes gigabytes
     begin = time.perf_counter()
     for frame in range(len(clip)):
         progress(f"frame {frame + 1} of {len(clip)}", frame / len(clip))
@@ -145,8 +145,8 @@ def collect(
             following.add(frame, new)
             ids = np.where(ids > 0, ids, new).astype(np.uint16)
         work.note(frame, ids)
-        maps.append(without_gaps(ids))
-    return _finished(clip, np.stack(maps), work, time.perf_counter() - begin)
+        maps[frame] = without_gaps(ids)
+    return _finished(clip, maps, work, time.perf_counter() - begin)
 
 
 def _holds(mask: Bool[np.ndarray, "H W"], ids: UInt16[np.ndarray, "H W"], rules: Rules) -> int | None:
@@ -160,7 +160,7 @@ def _holds(mask: Bool[np.ndarray, "H W"], ids: UInt16[np.ndarray, "H W"], rules:
 
 
 def _finished(clip: Clip, maps: np.ndarray, work: _Collection, seconds: float) -> ClipLabels:
-    """Without objects that hardly showed; numbers in order, from 1."""
+    """Without objects that hardly showed; numbers in order, from 1, written over those in the maps."""
     kept = {n: own for n, own in work.seen.items() if own.frames >= work.rules.least_frames}
     if len(clip) < work.rules.least_frames:
         kept = {n: own for n, own in work.seen.items() if own.frames}
@@ -176,7 +176,9 @@ def _finished(clip: Clip, maps: np.ndarray, work: _Collection, seconds: float) -
             ObjectRow(row + 1, own.first, own.frames, own.area, own.score, len(own.vectors), _agreement(own))
         )
     times = {**{name: round(value, 3) for name, value in work.seconds.items()}, "total": round(seconds, 3)}
-    return ClipLabels(clip.name, clip.ids, table[maps], tuple(rows), vectors, work.encoder.space, times)
+    for ids in maps:
+        ids[:] = table[ids]
+    return ClipLabels(clip.name, clip.ids, maps, tuple(rows), vectors, work.encoder.space, times)
 
 
 def _agreement(own: _Seen) -> float:

@@ -11,14 +11,16 @@ is written is read so as well. Source of the layout: Charatan et al., pixelSplat
 """
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import torch
 
+from langflash_core.batch.sets import check_name
 from langflash_core.errors import InputError
-from langflash_core.files import written_atomically
+from langflash_core.files import held_alone, written_atomically
 from langflash_core.lab.labels.clips import INDEX
 from langflash_core.lab.labels.storage import (
     FORMAT,
@@ -35,48 +37,69 @@ from langflash_core.lab.photos.published import read_chunk
 ENTRY = "labels"
 
 
-def enrich(split: Path, labelled: Path, told: Callable[[str], None] = lambda key: None) -> int:
+def enrich(split: Path, labelled: Path, keys: Collection[str] | None = None) -> int:
     """Put labels into the chunks of a split, in place, a chunk at a time; videos without labels stay as they
-    are, and everything else a video holds does, too.
+    are, everything else a video holds does, too, and a chunk that has them all is not written again.
 
     Args:
         split: folder with index.json and chunks. labelled: folder with a folder a video, as
-            `langflash labels` fills it. told: called with the key of each video that was enriched.
+            `langflash labels` fills it. keys: only these videos.
 
     Returns:
-        How many videos were enriched.
+        How many videos hold those labels now.
 
     Raises:
         InputError: index, a chunk or labels cannot be used, or labels are not of their video's frames.
-        OutputError: a chunk cannot be written; the old one is then whole.
+        OutputError: a chunk cannot be written (the old one is then whole), or another run writes to them.
     """
     count = 0
-    for path, keys in _chunks(split):
-        ready = {key for key in keys if (labelled / key / LABELS).is_file()}
-        if not ready:
-            continue
-        entries = read_chunk(path)
-        for entry in entries:
-            if entry["key"] in ready:
-                labels = read_labels(labelled / entry["key"] / LABELS)
-                entry[ENTRY] = _as_entry(labels, len(entry["images"]))
-                count += 1
-                told(entry["key"])
+    with held_alone(split):
+        for path, known in _chunks(split):
+            ready = {
+                key for key in known if (keys is None or key in keys) and (labelled / key / LABELS).is_file()
+            }
+            count += _enriched(path, labelled, ready) if ready else 0
+    return count
+
+
+def _enriched(path: Path, labelled: Path, keys: Collection[str]) -> int:
+    """One chunk; how many of the videos are in it."""
+    entries, count, changed = read_chunk(path), 0, False
+    for entry in entries:
+        if entry["key"] in keys:
+            labels = as_entry(read_labels(labelled / entry["key"] / LABELS), len(entry["images"]))
+            changed |= not _same(entry.get(ENTRY), labels)
+            entry[ENTRY] = labels
+            count += 1
+    if changed:
         with written_atomically(path) as temporary:
             torch.save(entries, temporary)
     return count
 
 
+def _same(old: object, new: Mapping) -> bool:
+    """Whether a video has these labels already; what is there may be anything."""
+    if not isinstance(old, dict) or old.get("document") != new["document"]:
+        return False
+    before, now = ([*entry.get("ids", ()), entry.get("vectors")] for entry in (old, new))
+    return len(before) == len(now) and all(
+        isinstance(a, torch.Tensor) and a.dtype == b.dtype and torch.equal(a, b)
+        for a, b in zip(before, now, strict=True)
+    )
+
+
 def labels_inside(split: Path) -> Iterator[ClipLabels]:
-    """The labels that the chunks of a split hold, video by video.
+    """The labels that the chunks of a split hold, video by video, by the videos' keys.
 
     Raises:
-        InputError: index or a chunk cannot be used.
+        InputError: index or a chunk cannot be used, or a key cannot be the name of a folder.
     """
     for path, _ in _chunks(split):
         for entry in read_chunk(path):
             if ENTRY in entry:
-                yield of_entry(entry[ENTRY], str(entry["key"]))
+                key = str(entry["key"])
+                check_name(key, str(path))
+                yield replace(of_entry(entry[ENTRY], key), name=key)
 
 
 def _chunks(split: Path) -> list[tuple[Path, list[str]]]:
@@ -86,8 +109,8 @@ def _chunks(split: Path) -> list[tuple[Path, list[str]]]:
     return [(split / chunk, [key for _, key in rows]) for chunk, rows in grouped]
 
 
-def _as_entry(labels: ClipLabels, frames: int) -> dict:
-    """Plain tensors and texts.
+def as_entry(labels: ClipLabels, frames: int) -> dict:
+    """What a video's entry gets: plain tensors and texts.
 
     Raises:
         InputError: there are not as many id maps as frames.

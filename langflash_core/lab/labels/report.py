@@ -149,6 +149,8 @@ def _table(clip: Clip, labels: ClipLabels, colours: np.ndarray, names: Sequence[
     )
     rows = []
     size = labels.ids[0].size if len(labels.ids) else 1
+    areas = np.stack([np.bincount(ids.ravel(), minlength=len(labels.objects) + 1) for ids in labels.ids])
+    largest = areas.argmax(0).tolist()
     for row, name in zip(labels.objects, names, strict=True):
         rgb = ",".join(str(value) for value in colours[row.id].tolist())
         numbers = (
@@ -160,7 +162,7 @@ def _table(clip: Clip, labels: ClipLabels, colours: np.ndarray, names: Sequence[
         cells = "".join(f'<td class="number">{escape(str(value))}</td>' for value in numbers)
         rows.append(
             f'<tr><td><span class="swatch" style="background:rgb({rgb})"></span> {row.id}</td>'
-            f'<td><img alt="" loading="lazy" src="{_cut_out(clip, labels, row.id)}"></td>'
+            f'<td><img alt="" loading="lazy" src="{_cut_out(clip, labels, row.id, largest[row.id])}"></td>'
             f"<td>{escape(name)}</td>{cells}</tr>"
         )
     return (
@@ -170,10 +172,8 @@ def _table(clip: Clip, labels: ClipLabels, colours: np.ndarray, names: Sequence[
     )
 
 
-def _cut_out(clip: Clip, labels: ClipLabels, id: int) -> str:
-    """The object where it is largest, on a dimmed photo."""
-    areas = (labels.ids == id).sum((1, 2))
-    frame = int(areas.argmax())
+def _cut_out(clip: Clip, labels: ClipLabels, id: int, frame: int) -> str:
+    """The object in a frame, on a dimmed photo."""
     own = labels.ids[frame] == id
     rows, columns = np.flatnonzero(own.any(1)), np.flatnonzero(own.any(0))
     image = np.where(own[..., None], clip.read(frame), clip.read(frame) // 3)

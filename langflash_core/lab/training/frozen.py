@@ -100,7 +100,8 @@ def _joined(scenes: Sequence[Mapping[str, Tensor]], grid: tuple[int, int]) -> Fr
         if not name.endswith("_scales")
     }
     hooks, grouped = (
-        tuple(said[name] for name in sorted(said) if name.startswith(kind)) for kind in ("hook", "grouped")
+        tuple(said[f"{kind}{n}"] for n in range(sum(name.startswith(kind) for name in said)))
+        for kind in ("hook", "grouped")
     )
     features = said["features"].movedim(-1, 2) if "features" in said else None
     return Frozen(Tokens(hooks, grid, grouped=grouped), features)

@@ -13,6 +13,7 @@ from langflash_core.batch.summary import THUMBNAIL
 from langflash_core.lab.labels.making import REPORT
 from langflash_core.lab.labels.storage import LABELS, read_labels
 from langflash_core.resources import asset_path
+from tests.lab.photos import layouts_made
 
 
 def write_clip(folder: Path, name: str, frames: int = 3) -> None:
@@ -75,6 +76,24 @@ def test_what_is_done_is_not_done_again_and_what_changed_is(made, clips, capsys)
     assert json.loads(capsys.readouterr().out)["done"] == 3
     after = {name: (made / name / LABELS).stat().st_mtime_ns for name in before}
     assert after["desk"] == before["desk"] and after["toy"] > before["toy"]
+
+
+@pytest.mark.slow
+def test_chunks_that_were_enriched_are_not_labelled_again(tmp_path, capsys):
+    layouts_made.re10k_split(layouts_made.wall(tmp_path / "photos", 2), tmp_path / "re10k")
+    split, out = tmp_path / "re10k" / "test", tmp_path / "out"
+    command = ["labels", str(split), "-o", str(out), "--enrich", "--json"]
+    assert main(command) == 0
+    first = json.loads(capsys.readouterr().out)
+    assert (first["done_before"], first["enriched"]) == (0, 2)
+    written = (split / "000000.torch").stat().st_mtime_ns
+    assert main(command) == 0
+    assert json.loads(capsys.readouterr().out)["done_before"] == 2
+    assert (split / "000000.torch").stat().st_mtime_ns == written
+    assert main(["labels", str(split), "-o", str(tmp_path / "back"), "--extract"]) == 0
+    for key in ("aaaa", "bbbb"):
+        old, new = (read_labels(folder / key / LABELS).ids for folder in (out, tmp_path / "back"))
+        assert np.array_equal(old, new)
 
 
 @pytest.mark.parametrize(

@@ -84,6 +84,22 @@ def test_weights_verify_notices_damage(run, checkpoint, tmp_path):
         (["train", "run", ".", "-o", "out", "--recipe", "gone"], "there is no recipe 'gone'; choose paper"),
         (["train", "run", ".", "-o", "out", "--recipe", "paper", "--batches", "2"], "says itself"),
         (["train", "run", ".", "-o", "out", "--stages", "taste", "--minutes", "1"], "no stage 'taste'"),
+        (
+            [
+                "train",
+                "run",
+                ".",
+                "-o",
+                "out",
+                "--stages",
+                "depth",
+                "--minutes",
+                "1",
+                "--sam-teacher",
+                TINY_PACK,
+            ],
+            "no stage here regresses SAM's embedding; name grouping",
+        ),
         (["train", "parts", "gone"], "there is no folder gone"),
         (["train", "parts", ".", "--run", "gone"], "there is no folder gone"),
         (["train", "export", "gone", "-o", "w.safetensors"], "there is no folder gone"),
@@ -191,7 +207,8 @@ def test_labelled_photos_are_judged(run, checkpoint, photos, tmp_path):
 
 
 def test_posed_photos_are_judged(run, checkpoint, tmp_path):
-    """Three equal photos of nothing: no motion is true, nothing tells it, and there is no depth to judge."""
+    """Three equal photos of nothing: no motion is true, none matches and one is left out, whose direction is
+    then the worst; and there is no depth to judge."""
     writer = FolderWriter(tmp_path / "posed")
     for id in ("0", "3", "6"):
         writer.photo(id, np.full((42, 56, 3), 128, np.uint8))
@@ -200,7 +217,7 @@ def test_posed_photos_are_judged(run, checkpoint, tmp_path):
     words = ("--weights", checkpoint, "--size", "56", "--backend", "torch", "--apart", "6")
     outcome = run("eval", "posed", tmp_path / "posed", *words)
     assert outcome.code == 0, outcome.err
-    assert "(no motion)" in outcome.out and "| 6 | 1.000 | 0.000 |" in outcome.out
+    assert "(no motion)" in outcome.out and "| 6 | 1.000 | 0.000 | 0.000 | 0.000 | 180.000 |" in outcome.out
     assert "Depth" not in outcome.out
 
 

@@ -10,9 +10,16 @@ from torch.nn import functional as F
 from langflash_core.lab.evaluation.ablations import study
 from langflash_core.lab.evaluation.ablations.groupings import point_groups, regrouped, true_names
 from langflash_core.lab.evaluation.ablations.tables import ablation_markdown, ablation_plots, summary
-from langflash_core.lab.training.shards import write_shard
+from langflash_core.lab.evaluation.tallies import Shelf
+from langflash_core.lab.training.shards import Label, RoomRecord, write_shard
 from langflash_core.network import MINI, GuidedDepthNet, save_network
 from tests.lab.training.conftest import toy_record
+
+LAMPS = (Label("lamp", "lamp"),) * 4
+
+
+def toy_room(seed: int) -> RoomRecord:
+    return replace(toy_record(seed), tokens=None, token_scales=None)
 
 
 def patches(colours: int = 4, side: int = 16) -> tuple[torch.Tensor, torch.Tensor]:
@@ -89,15 +96,16 @@ def test_what_is_stored_are_the_largest_weights():
 @pytest.mark.slow
 def test_a_study_measures_every_rival_and_goes_on_from_its_fits(tmp_path: Path, monkeypatch):
     monkeypatch.setattr(study, "GROUPS", (4, 16))
-    for name, seeds in (("held_out", (0, 1)), ("train", (2, 3))):
-        records = [replace(toy_record(seed), tokens=None, token_scales=None) for seed in seeds]
-        write_shard(tmp_path / name / "a.safetensors", records)
+    held_out, train = ([toy_room(seed) for seed in seeds] for seeds in ((0, 1), (2, 3)))
+    write_shard(tmp_path / "held_out" / "a.safetensors", held_out)
+    write_shard(tmp_path / "train" / "a.safetensors", train)
     torch.manual_seed(0)
     save_network(GuidedDepthNet(MINI), tmp_path / "mini.safetensors")
-    options = {"limit": 2, "most": 1, "kept": tmp_path / "fits.safetensors"}
+    shelf = Shelf(tmp_path / "work", {}, study.Tally)
+    options = {"limit": 2, "most": 1, "shelf": shelf}
     _, count, studies = study.room_studies(tmp_path, tmp_path / "mini.safetensors", **options)
     ((_, tally),) = studies
-    assert count == 1 and (tmp_path / "fits.safetensors").is_file()
+    assert count == 1 and (tmp_path / "work" / study.FITS).is_file()
     result = {"scenes": 1, "weights": "random", **summary(tally)}
     rows = set(result["labels"])
     assert {"features", "splatted", "low_3", "low_64", "residual", "K4/lfa", "K16/average"} <= rows
@@ -109,7 +117,23 @@ def test_a_study_measures_every_rival_and_goes_on_from_its_fits(tmp_path: Path, 
     text = ablation_markdown(result)
     assert "residual channels" in text and "0.7144, 0.8547" not in text  # K = 128 was not asked for
     assert all(plot.points for plot in ablation_plots(result, {}))
-    again = study.room_studies(tmp_path, tmp_path / "mini.safetensors", **options)[2]
-    ((_, second),) = again
+    monkeypatch.setattr(study, "judge_room", lambda setting, fits, record: study.Tally())
+    ((_, second),) = study.room_studies(tmp_path, tmp_path / "mini.safetensors", **options)[2]
     for key, table in tally.counts.items():
         assert torch.equal(table, second.counts[key])
+    lamps = [replace(record, labels=LAMPS) for record in held_out]
+    write_shard(tmp_path / "held_out" / "a.safetensors", lamps)
+    ((_, third),) = study.room_studies(tmp_path, tmp_path / "mini.safetensors", **options)[2]
+    assert not third.counts  # other groups, other tables
+
+
+def test_what_was_fitted_on_is_read_again_for_the_same_source_alone(tmp_path: Path):
+    rows = torch.arange(12.0).reshape(3, 4)
+    path = tmp_path / study.FITS
+    assert study.kept_examples(path, "these weights") is None
+    study.keep_examples(path, "these weights", study.Examples(rows, -rows))
+    found = study.kept_examples(path, "these weights")
+    assert found is not None and torch.equal(found.features, rows) and torch.equal(found.left, -rows)
+    assert study.kept_examples(path, "other weights") is None
+    path.write_bytes(b"no tensors")
+    assert study.kept_examples(path, "these weights") is None

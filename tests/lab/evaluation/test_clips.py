@@ -52,6 +52,11 @@ def test_one_id_stands_for_one_thing_only(painted):
     assert sum(score.iou > 0 for score in judged(painted, ids)) <= 2  # its own, and the wall's for another
 
 
+def test_an_id_that_another_thing_has_is_not_counted_twice(painted):
+    ids = np.where(painted.ids > STRUCTURE, 5, 0).astype(np.uint16)  # no other id is left over
+    assert sum(score.iou > 0 for score in judged(painted, ids)) == 1
+
+
 def test_nothing_collected_is_nothing_found(painted):
     assert all(s.iou == 0 and s.delay is None for s in judged(painted, np.zeros_like(painted.ids)))
 
@@ -80,3 +85,7 @@ def test_tables_say_what_was_found(painted):
     assert (clip["found"], clip["late_found"], clip["iou"], clip["frames_per_second"]) == (3, 1, 1.0, 2.0)
     table = clips_markdown(result)
     assert "| painted | 3 of 3 | 1 of 1 | 1.000 | 100% |" in table and "late box, comes in late" in table
+    nothing = clips_result([(labels, judged(painted, np.zeros_like(painted.ids))), (labels, [])])
+    assert [clip["constant"] for clip in nothing["clips"]] == [None, None]  # of nothing found
+    assert [clip["iou"] for clip in nothing["clips"]] == [0, None] and nothing["iou"] == 0
+    assert "| painted | 0 of 0 | 0 of 0 | - | - |" in clips_markdown(nothing)

@@ -66,6 +66,8 @@ def test_a_report_holds_every_number_and_goes_on_where_it_stopped(folder, progra
     again = made(folder, tmp_path)
     assert len(program) == before  # nothing was reconstructed again
     assert again[0].result == pairs.result and again[0].scenes == pairs.scenes
+    made(replace(folder, depth_unit=0.0011), tmp_path)
+    assert len(program) > before  # by other depths
 
 
 def test_the_page_needs_nothing_from_elsewhere_and_escapes_what_it_says(folder, program, tmp_path):

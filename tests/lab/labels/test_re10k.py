@@ -1,6 +1,8 @@
 """RealEstate10K's chunks with labels inside: everything else stays, nothing in them is executed."""
 
+import json
 import pickle
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +11,7 @@ import torch
 
 from langflash_core.errors import InputError
 from langflash_core.lab.labels.clips import find_clips, open_clip
-from langflash_core.lab.labels.re10k import ENTRY, enrich, labels_inside
+from langflash_core.lab.labels.re10k import ENTRY, as_entry, enrich, labels_inside
 from langflash_core.lab.labels.storage import LABELS, write_labels
 from langflash_core.lab.photos.published import re10k_scenes
 from tests.lab.labels.test_storage import some_labels
@@ -63,12 +65,43 @@ def test_everything_else_in_the_chunk_stays_and_other_readers_find_it(split, tmp
     assert [key for key, _ in re10k_scenes(split)] == ["aaaa", "bbbb"]
 
 
-def test_enriching_again_replaces(split, tmp_path):
+def test_enriching_again_replaces_what_changed_alone(split, tmp_path):
     out = labelled(tmp_path / "out", "bbbb")
     enrich(split, out)
-    size = (split / "000000.torch").stat().st_size
+    first = (split / "000000.torch").stat()
     assert enrich(split, out) == 1
-    assert (split / "000000.torch").stat().st_size == size and len(list(labels_inside(split))) == 1
+    again = (split / "000000.torch").stat()
+    assert again.st_mtime_ns == first.st_mtime_ns  # they are there already
+    write_labels(replace(some_labels(name="bbbb"), seconds={"total": 9.0}), out / "bbbb")
+    assert enrich(split, out) == 1 and (split / "000000.torch").stat().st_mtime_ns > first.st_mtime_ns
+    (back,) = labels_inside(split)
+    assert back.seconds == {"total": 9.0}
+
+
+def test_only_the_videos_that_are_asked_for_are_enriched(split, tmp_path):
+    out = labelled(labelled(tmp_path / "out", "aaaa"), "bbbb")
+    assert enrich(split, out, {"aaaa", "cccc"}) == 1
+    assert [labels.name for labels in labels_inside(split)] == ["aaaa"]
+
+
+@pytest.mark.parametrize("key", ["../outside", "/outside", ".."])
+def test_a_key_that_leads_out_of_the_output_is_refused(split, key):
+    chunk, index = split / "000000.torch", split / "index.json"
+    entries = torch.load(chunk, weights_only=True)
+    entries[0] |= {"key": key, ENTRY: as_entry(some_labels(name="aaaa"), 5)}
+    torch.save(entries, chunk)
+    with pytest.raises(InputError, match="cannot be the name of a folder"):
+        list(labels_inside(split))
+    index.write_text(json.dumps({key: "000000.torch"}))
+    with pytest.raises(InputError, match="cannot be the name of a folder"):
+        find_clips(split)
+
+
+def test_labels_that_give_themselves_another_name_go_by_their_video(split, tmp_path):
+    out = labelled(tmp_path / "out", "bbbb")
+    write_labels(some_labels(name="../outside"), out / "bbbb")
+    enrich(split, out)
+    assert [labels.name for labels in labels_inside(split)] == ["bbbb"]
 
 
 def test_labels_of_other_frames_are_refused_and_the_chunk_stays(split, tmp_path):

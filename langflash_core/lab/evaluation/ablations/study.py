@@ -5,13 +5,13 @@ Sizes: V views, H W pixels, N = V H W Gaussians, K groups, C channels, G class g
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 
 import torch
-from safetensors import SafetensorError
-from safetensors.torch import load_file, save
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
 from torch import Tensor
 
 from langflash_core.files import make_folder, write_atomically
@@ -28,7 +28,7 @@ from langflash_core.lab.evaluation.rooms.target import (
     upsampled,
 )
 from langflash_core.lab.evaluation.rooms.truth import opened, records, seen_by_photos, true_masks, views_of
-from langflash_core.lab.evaluation.tallies import Shelf, collected
+from langflash_core.lab.evaluation.tallies import MEASURES, Shelf, collected, identity
 from langflash_core.lab.training.shards import RoomRecord
 from langflash_core.language.channels import Decoder, principal
 from langflash_core.network.model import Seen, pooled_weights
@@ -48,6 +48,8 @@ SHARE = 0.5
 """Of the residual that is added to the atoms' answer."""
 FITTED_ON, PIXELS = 64, 400
 """Training rooms that bases and decoders are fitted on, and pixels of each."""
+FITS = "fits.safetensors"
+"""Keeps what they are fitted on, beside the tallies."""
 BYTES = {
     "atoms": 3 * KEPT,
     "splatted": 2 * 384,
@@ -102,7 +104,6 @@ def room_studies(
     *,
     limit: int | None = None,
     most: int | None = None,
-    kept: Path | None = None,
     shelf: Shelf | None = None,
     kind: str = "held_out",
     progress: Progress = lambda stage, fraction: None,
@@ -111,14 +112,17 @@ def room_studies(
 
     Args:
         data: cache folder; `held_out` is judged, decoders are fitted on `train`. most: of the rooms,
-            taken evenly (None: all). kept: a file in which what is fitted on is kept for the next run.
+            taken evenly (None: all). shelf: keeps tallies, and what is fitted on, for the next run.
             kind: "validation" for choosing numbers.
 
     Raises:
         InputError: there is no such cache. WeightsError: the weights do not fit.
     """
     setting, rooms = open_rooms(data, weights, limit=limit, kind=kind)
-    fits = _kept_fits(setting, data, kept, progress)
+    source = f"{MEASURES}, {identity(weights, 'mini')}, {data.resolve()}"
+    fits = _fits(setting, data, None if shelf is None else shelf.folder / FITS, source, progress)
+    if shelf is not None:  # rows of a confusion table are the groups of the rooms at hand
+        shelf = replace(shelf, key={**shelf.key, "groups": setting.groups})
 
     def judge(record: RoomRecord) -> Tally:
         return judge_room(setting, fits, record)
@@ -129,21 +133,36 @@ def room_studies(
     return setting, -(-len(rooms) // every), studies
 
 
-def _kept_fits(setting: Setting, data: Path, kept: Path | None, progress: Progress) -> Fits:
-    examples = None
-    if kept is not None and kept.is_file():
-        try:
-            examples = Examples(**load_file(kept))
-        except (OSError, TypeError, SafetensorError):
-            examples = None
+def _fits(setting: Setting, data: Path, kept: Path | None, source: str, progress: Progress) -> Fits:
+    examples = None if kept is None else kept_examples(kept, source)
     if examples is None:
         examples = gathered(_train_features(setting, data, progress))
         if kept is not None:
-            make_folder(kept.parent)
-            content = {"features": examples.features.contiguous(), "left": examples.left.contiguous()}
-            write_atomically(kept, save(content))
+            keep_examples(kept, source, examples)
     decoders = {count: Decoder.fitted(examples.features, count) for count in CHANNELS}
     return Fits(decoders, principal(examples.left, RESIDUAL))
+
+
+def keep_examples(path: Path, source: str, examples: Examples) -> None:
+    """Write them, with what they come from.
+
+    Raises:
+        OutputError: they cannot be written.
+    """
+    make_folder(path.parent)
+    content = {"features": examples.features.contiguous(), "left": examples.left.contiguous()}
+    write_atomically(path, save(content, {"source": source}))
+
+
+def kept_examples(path: Path, source: str) -> Examples | None:
+    """What was kept before; None where there is nothing, or what is there is of another source."""
+    try:
+        with safe_open(path, "pt") as stored:
+            if (stored.metadata() or {}).get("source") != source:
+                return None
+            return Examples(stored.get_tensor("features"), stored.get_tensor("left"))
+    except (OSError, SafetensorError):
+        return None
 
 
 @torch.no_grad()
