@@ -4,21 +4,27 @@ import shlex
 import sys
 import time
 from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import get_context
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
-from langflash_core.errors import InputError
+from langflash_core.errors import InputError, LangFlashError
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.photos import PhotoFolder, open_folder
+from langflash_core.running import Progress
 
 from ...bench.machine import host
 from ..files import check_folder, readable_file
 from ..photos import chosen
-from ..renderers import open_renderer
+from ..renderers import Renderer, open_renderer
 from ..report import ProgressBar
 from .eval_protocol import opened_lpips
 
 if TYPE_CHECKING:
+    from langflash_core.lab.evaluation.report import Sources, Workplace
     from langflash_core.lab.evaluation.report_page import Report
 
 WORK = "work"
@@ -38,20 +44,20 @@ def report(args: Namespace, out: TextIO) -> None:
         readable_file(args.pack, "furniture pack", InputError)
     if args.rooms is not None and not args.rooms.is_dir():
         raise InputError(f"there is no folder {args.rooms}; make it with langflash train cache")
-    posed, photos = _posed_folder(args.posed), _labelled_folder(args)
+    sources = _sources(args)
     for folder in (args.output, args.small):
         if folder is not None:
             check_folder(folder)
     from langflash_core.lab.evaluation import report_page
-    from langflash_core.lab.evaluation.report import PUBLISHED, Sources, Workplace, sections
+    from langflash_core.lab.evaluation.report import PUBLISHED, sections
     from langflash_core.lab.evaluation.tallies import identity
 
-    ids = () if photos is None else chosen(args, photos)
-    sources = Sources(args.rooms, args.pack, posed, photos, ids, args.limit)
-    lpips = opened_lpips(args.lpips)
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
-        place = Workplace(renderer, args.output / WORK, args.weights, args.preset, progress, lpips)
-        found = list(sections(sources, place))
+    found = []
+    with ProgressBar() as progress, open_renderer(args.backend) as renderer, _neighbour(args) as neighbour:
+        judged = sections(sources, _workplace(args, renderer, progress))
+        found.append(next(judged))
+        neighbour.join()  # what it kept is read; where it failed, this process meets the reason itself
+        found.extend(judged)
         drawn_by = renderer.backend
     name = args.weights.name if args.weights else args.preset
     made = report_page.Report(
@@ -74,6 +80,55 @@ def report(args: Namespace, out: TextIO) -> None:
         _write_small(made, args.small)
     told = ", ".join(f"{section.title}: {section.result['scenes']}" for section in found)
     print(f"{args.output / 'report.html'}: {told}", file=out)
+
+
+@contextmanager
+def _neighbour(args: Namespace) -> Iterator[BaseProcess]:
+    """A process beside this one, which judges all sections but the first into the same work folder; it ends
+    with this one, however that ends."""
+    process = get_context("spawn").Process(target=_judge_the_rest, args=(args,), daemon=True)
+    process.start()
+    _share_cores()
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.join()
+
+
+def _judge_the_rest(args: Namespace) -> None:
+    from langflash_core.lab.evaluation.report import sections
+
+    _share_cores()
+    with suppress(LangFlashError, KeyboardInterrupt), open_renderer(args.backend) as renderer:
+        for _ in sections(_sources(args), _workplace(args, renderer, _silent), after=1):
+            pass
+
+
+def _silent(stage: str, share: float) -> None:
+    """The process in front tells how far it is."""
+
+
+def _share_cores() -> None:
+    """Two processes have half of the threads each."""
+    import torch
+
+    torch.set_num_threads(max(1, torch.get_num_threads() // 2))
+
+
+def _sources(args: Namespace) -> "Sources":
+    from langflash_core.lab.evaluation.report import Sources
+
+    posed, photos = _posed_folder(args.posed), _labelled_folder(args)
+    ids = () if photos is None else chosen(args, photos)
+    return Sources(args.rooms, args.pack, posed, photos, ids, args.limit)
+
+
+def _workplace(args: Namespace, renderer: Renderer, progress: Progress) -> "Workplace":
+    from langflash_core.lab.evaluation.report import Workplace
+
+    lpips = opened_lpips(args.lpips)
+    return Workplace(renderer, args.output / WORK, args.weights, args.preset, progress, lpips)
 
 
 def _write_small(made: "Report", folder: Path) -> None:

@@ -94,25 +94,34 @@ class Workplace:
         return Shelf(self.folder / section, key, kind)
 
 
-def sections(sources: Sources, place: Workplace) -> Iterator[Section]:
-    """A section of each source, as soon as it is judged.
+def sections(sources: Sources, place: Workplace, *, after: int = 0) -> Iterator[Section]:
+    """A section of each source, as soon as it is judged; `after` so many that somebody else judges.
 
     Raises:
         InputError: there is no source, or one cannot be used. WeightsError: of the checkpoint.
     """
-    wanted = [s for s in (sources.rooms, sources.pack, sources.posed, sources.photos) if s is not None]
-    if not wanted:
+    plans = _plans(sources, place)
+    if not plans:
         raise InputError("there is nothing to judge; give --rooms, --pack, --posed or --photos")
-    if sources.rooms is not None:
-        yield rooms_section(sources.rooms, place, sources.limit)
-        if (sources.rooms / "train").is_dir():
-            yield ablations_section(sources.rooms, place, sources.limit)
-    if sources.pack is not None:
-        yield sides_section(sources.pack, place, sources.limit)
-    if sources.posed is not None:
-        yield posed_section(sources.posed, place, sources.limit)
-    if sources.photos is not None:
-        yield photos_section(sources.photos, sources.photo_ids or sources.photos.ids, place)
+    for judge in plans[after:]:
+        yield judge()
+
+
+def _plans(sources: Sources, place: Workplace) -> list[Callable[[], Section]]:
+    cache, pack, pairs, photos = sources.rooms, sources.pack, sources.posed, sources.photos
+    limit = sources.limit
+    plans: list[Callable[[], Section]] = []
+    if cache is not None:
+        plans.append(lambda: rooms_section(cache, place, limit))
+        if (cache / "train").is_dir():
+            plans.append(lambda: ablations_section(cache, place, limit))
+    if pack is not None:
+        plans.append(lambda: sides_section(pack, place, limit))
+    if pairs is not None:
+        plans.append(lambda: posed_section(pairs, place, limit))
+    if photos is not None:
+        plans.append(lambda: photos_section(photos, sources.photo_ids or photos.ids, place))
+    return plans
 
 
 def rooms_section(data: Path, place: Workplace, limit: int | None = None) -> Section:
