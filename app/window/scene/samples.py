@@ -1,8 +1,11 @@
 """The pairs of photos that come with the program."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from langflash_core.resources import asset_path
+
+from .state import Photo
 
 _NAMES = ("living_room", "desk", "toy", "aloe", "books")
 
@@ -16,3 +19,12 @@ def pairs() -> list[tuple[str, tuple[Path, Path]]]:
         if all(sides):
             found.append((name.replace("_", " ").capitalize(), (sides[0][0], sides[1][0])))
     return found
+
+
+def beside(photos: Sequence[Photo]) -> Path:
+    """The path whose folder and stem files about these photos take: the first photo's; at home where there is
+    none, or where it came with the program, whose own folder is not the person's."""
+    if not photos:
+        return Path.home() / "scene"
+    first = photos[0].path
+    return Path.home() / first.name if first.parent == asset_path("photos") else first
