@@ -62,6 +62,13 @@ def test_a_preview_passes_every_key_frame_and_ends_at_the_last(shown: State) -> 
     assert after(with_keys(state, 1), ready).tour is None, "the key frames are others by now"
 
 
+def test_after_a_preview_one_orbits_around_what_the_last_key_frame_looked_at(shown: State) -> None:
+    near = replace(shown.pose, reach=shown.pose.reach / 4)
+    poses = way((shown.pose, near), 1.0)
+    assert poses[0].reach == pytest.approx(shown.pose.reach)
+    assert poses[-1].reach == pytest.approx(near.reach)
+
+
 def test_one_key_frame_is_no_way(shown: State) -> None:
     assert "two key frames" in after(with_keys(shown, 1), film.Preview()).toasts[-1].text
 
