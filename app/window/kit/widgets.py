@@ -82,8 +82,7 @@ def quiet_button(label: str, tip: str = "") -> bool:
     clear = ImVec4(0, 0, 0, 0)
     with colours(button=clear, text=theme.MUTED):
         pressed = imgui.button(label)
-    if tip:
-        tooltip(tip)
+    tooltip(tip)
     return pressed
 
 
@@ -102,8 +101,10 @@ def slider(
 
 
 def tooltip(text: str) -> None:
-    """Explain the last item when the pointer rests on it."""
-    if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled):
+    """Explain the last item when the pointer rests on it; without words there is nothing."""
+    if text and imgui.is_item_hovered(
+        imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled
+    ):
         imgui.set_tooltip(text)
 
 
