@@ -128,6 +128,15 @@ def sentence(text: str) -> str:
     return (text if named else text[:1].upper() + text[1:]).rstrip(".") + "."
 
 
+def middle(aspect: float, target: float) -> tuple[ImVec2, ImVec2]:
+    """Texture corners that fill a card of aspect `target` with the middle of a picture."""
+    if aspect > target:
+        margin = (1 - target / aspect) / 2
+        return ImVec2(margin, 0), ImVec2(1 - margin, 1)
+    margin = (1 - aspect / target) / 2
+    return ImVec2(0, margin), ImVec2(1, 1 - margin)
+
+
 def rgba(colour: tuple[float, float, float], alpha: float = 1.0) -> ImVec4:
     """An ImGui colour of an RGB triple."""
     return ImVec4(*colour, alpha)

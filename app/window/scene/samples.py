@@ -1,6 +1,7 @@
 """The pairs of photos that come with the program."""
 
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 from langflash_core.resources import asset_path
@@ -10,15 +11,16 @@ from .state import Photo
 _NAMES = ("living_room", "desk", "toy", "aloe", "books")
 
 
-def pairs() -> list[tuple[str, tuple[Path, Path]]]:
-    """(what it shows, left and right photo) of each."""
+@cache
+def pairs() -> tuple[tuple[str, tuple[Path, Path]], ...]:
+    """(what it shows, left and right photo) of each; looked for once, since the empty window draws them."""
     folder = asset_path("photos")
     found = []
     for name in _NAMES:
         sides = [sorted(folder.glob(f"{name}_{side}.*")) for side in ("left", "right")]
         if all(sides):
             found.append((name.replace("_", " ").capitalize(), (sides[0][0], sides[1][0])))
-    return found
+    return tuple(found)
 
 
 def beside(photos: Sequence[Photo]) -> Path:

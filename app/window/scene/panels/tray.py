@@ -137,7 +137,7 @@ def _card(look: Look, photo: Photo, size: ImVec2, open_for_change: bool) -> bool
     picture = look.thumbnails.get(str(photo.path))
     canvas.add_rect_filled(corner, end, widgets.u32(theme.RAISED), look.px(6))
     if picture is not None:
-        low, high = _crop(picture[1], size.x / size.y)
+        low, high = widgets.middle(picture[1], size.x / size.y)
         canvas.add_image_rounded(picture[0], corner, end, low, high, 0xFFFFFFFF, look.px(6))
     else:
         icon = fa.ICON_FA_TRIANGLE_EXCLAMATION if photo.problem else fa.ICON_FA_IMAGE
@@ -230,15 +230,6 @@ def _order(state: State, index: int) -> list[do.Command]:
         imgui.end_disabled()
         widgets.tooltip(tip)
     return issued
-
-
-def _crop(aspect: float, target: float) -> tuple[ImVec2, ImVec2]:
-    """Texture corners that fill a card of aspect `target` with the middle of a picture."""
-    if aspect > target:
-        margin = (1 - target / aspect) / 2
-        return ImVec2(margin, 0), ImVec2(1 - margin, 1)
-    margin = (1 - aspect / target) / 2
-    return ImVec2(0, margin), ImVec2(1, 1 - margin)
 
 
 def _open_button() -> list[do.Command]:
