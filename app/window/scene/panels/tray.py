@@ -21,6 +21,7 @@ _CANCEL = 104.0  # design pixels
 NOTABLE_SECONDS = 0.05  # of a finished stage; a shorter one is only a heading of others
 ASSUMED_FOV = 65.0  # degrees, as the core assumes where neither file nor person says
 HOW_TO_TELL = "click a photo to tell it"
+WITHOUT_PHOTOS = "open the photos to tell it"
 _DRAGGED = "photo"  # what a card is called while it is dragged
 
 ONE_PHOTO = "depth is a guess from one photo; a second one from a step aside measures it"
@@ -54,17 +55,17 @@ def _sentences(state: State) -> list[str]:
     said += state.info.warnings if state.info else ()
     if state.info is not None and len(state.info.views) == 1 and state.info.scene.photos:
         said.append(ONE_PHOTO)
-    return sentences(said)
+    return sentences(said, HOW_TO_TELL if state.photos else WITHOUT_PHOTOS)
 
 
-def sentences(said: Iterable[str]) -> list[str]:
-    """Warnings as sentences, each once."""
-    return list(dict.fromkeys(said_here(each) for each in said))
+def sentences(said: Iterable[str], how: str = HOW_TO_TELL) -> list[str]:
+    """Warnings as sentences, each once. how: the lens is told."""
+    return list(dict.fromkeys(said_here(each, how) for each in said))
 
 
-def said_here(text: str) -> str:
+def said_here(text: str, how: str = HOW_TO_TELL) -> str:
     """A warning as a sentence; what the core says of its command line in the window's words."""
-    return widgets.sentence(text.replace("on the command line, --fov tells it", HOW_TO_TELL))
+    return widgets.sentence(text.replace("on the command line, --fov tells it", how))
 
 
 def _hint(look: Look) -> None:

@@ -77,6 +77,13 @@ def test_key_frames_survive_a_file_and_damaged_ones_are_none(shown: State) -> No
     keys = with_keys(shown).keys
     assert read(json.loads(json.dumps(stored(keys)))) == keys
     assert read(({"centre": [0, 0]},)) == () and read(()) == ()
+    for name, wrong in (
+        ("centre", [0.0, float("nan"), 0.0]),
+        ("reach", 0.0),
+        ("fov", 180.0),
+        ("rotation", [0.0] * 4),
+    ):
+        assert read((*stored(keys[:1]), stored(keys[1:2])[0] | {name: wrong})) == (), name
     assert Record(camera_path=stored(keys)).camera_path
 
 
