@@ -13,6 +13,7 @@ import numpy as np
 
 from . import poses
 from .asking.state import PROMPT_DIALOGS, PROMPTS_SUFFIX
+from .scene import samples
 from .scene.drops import SCENE_SUFFIX
 from .scene.state import FLIGHT_SECONDS
 from .state import MOST_LINES, NO_PALETTE, TOAST_SECONDS, Line, Palette, State, Stats, Toast
@@ -189,9 +190,7 @@ class Measured:
 
 
 def _place_to_save(state: State) -> Path:
-    """The scene's own file, or one beside its first photo."""
+    """The scene's own file, or one beside its photos."""
     if state.info is not None and state.info.path is not None:
         return state.info.path
-    if state.photos:
-        return state.photos[0].path.with_suffix(SCENE_SUFFIX)
-    return Path.home() / f"scene{SCENE_SUFFIX}"
+    return samples.beside(state.photos).with_suffix(SCENE_SUFFIX)

@@ -54,7 +54,17 @@ SIZES_OF_LARGE_SCENES = (
     (0.35, 0.0625),
     (0.25, 0.0625),
 )
-SIZES_OF_MIDDLING_SCENES = ((1.0, 1.0), (0.75, 1.0), (0.5, 1.0), (0.5, 0.25), (0.35, 0.25), (0.25, 0.25))
+SIZES_OF_MIDDLING_SCENES = (
+    (1.0, 1.0),
+    (0.75, 1.0),
+    (0.5, 1.0),
+    (0.5, 0.5),
+    (0.35, 0.5),
+    (0.35, 0.25),
+    (0.25, 0.25),
+)
+"""No half size with a quarter of the Gaussians, which speckles walls with holes: 25 dB of the full picture
+for 38 ms of processor time, where 0.35 with a half is at 28 dB for 40 (two photos of a room, llvmpipe)."""
 _START = 2  # rung of an unknown machine
 
 

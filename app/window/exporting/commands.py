@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..commands import Notify
+from ..scene import samples
 from ..state import State
 from .state import ExportForm, Running, What
 
@@ -135,11 +136,9 @@ class CopiesAt:
 
 
 def _place(state: State, what: What) -> Path:
-    """Beside the scene, or beside its first photo, by a name of its own for each kind."""
+    """Beside the scene, or beside its photos, by a name of its own for each kind."""
     assert state.info is not None
-    beside = state.info.path
-    if beside is None:
-        beside = state.photos[0].path if state.photos else Path.home() / "scene"
+    beside = state.info.path or samples.beside(state.photos)
     return beside.with_name(f"{beside.stem}{what.ends}{what.suffix}")
 
 

@@ -204,8 +204,9 @@ def draw_progress(state: State, look: Look) -> list[do.Command]:
     now = state.exporting.running
     if now is None:
         return []
-    imgui.text(f"Exporting {now.target.name}")
     stage = "stopping" if now.cancelling else now.stage
+    room = imgui.get_content_region_avail().x - imgui.calc_text_size(f"{stage}   ").x
+    imgui.text_unformatted(widgets.shortened(f"Exporting {now.target.name}", room))
     with widgets.colours(text=theme.MUTED):
         widgets.at_right_edge(stage)
     fraction = now.fraction if now.fraction >= 0 else -0.6 * state.now

@@ -28,9 +28,9 @@ class What(Enum):
     BOXES_CSV = ("Boxes, CSV", ".csv", "boxes", "boxes_table")
     BOXES_GLB = ("Boxes, .glb", ".glb", "boxes", "boxes_bodies")
     SURFACE = ("Surfaces, .glb", ".glb", "surface", "surfaces")
-    VIDEO = ("Turntable", ".mp4", "", "turntable")
-    WEBP = ("Turntable, .webp", ".webp", "", "turntable")
-    HEAT_VIDEO = ("Heat-map, .mp4", ".mp4", "heat", "heat_turntable")
+    VIDEO = ("Film, .mp4", ".mp4", "", "film")
+    WEBP = ("Film, .webp", ".webp", "", "film")
+    HEAT_VIDEO = ("Film, heat-map", ".mp4", "heat", "heat_film")
     PLY = ("Splats, .ply", ".ply", "", "splats")
     SPZ = ("Splats, .spz", ".spz", "", "splats")
     SOG = ("Splats, .sog", ".sog", "", "splats")
@@ -105,8 +105,8 @@ class ExportForm:
     """all_views: from every photo instead of the view on show. only_found: just what answers the
     phrases. only_selected: just the selection, where Gaussians are written. side: the longer one in
     pixels. fade: leave out what no photo looked at; None: as the window does. way: of a film, of
-    `filming.state.WAYS`. path: as typed; an ending is
-    added. proposed: the path that nobody has typed. serial: of the scene that `path` is for."""
+    `filming.state.WAYS`. path: as typed; an ending is added. proposed: the path that nobody has typed.
+    serial: of the scene that `path` is for."""
 
     what: What = What.RGB
     all_views: bool = False

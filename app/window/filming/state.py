@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
+from math import isfinite
 from typing import Any
 
 from ..poses import Pose, Rotation, Vector
@@ -33,7 +34,7 @@ def stored(keys: Iterable[Pose]) -> tuple[dict[str, Any], ...]:
 def read(entries: Iterable[Mapping[str, Any]]) -> tuple[Pose, ...]:
     """Key frames of a scene's record; none where one is damaged."""
     try:
-        return tuple(
+        found = [
             Pose(
                 Vector(*map(float, entry["centre"])),
                 Rotation(*map(float, entry["rotation"])),
@@ -41,6 +42,20 @@ def read(entries: Iterable[Mapping[str, Any]]) -> tuple[Pose, ...]:
                 shift=(float(entry["shift"][0]), float(entry["shift"][1])),
             )
             for entry in entries
-        )[:MOST_KEYS]
+        ]
     except (KeyError, TypeError, ValueError, IndexError):
         return ()
+    return tuple(found[:MOST_KEYS]) if all(map(_can_look, found)) else ()
+
+
+def _can_look(pose: Pose) -> bool:
+    """Whether a picture can be drawn from there."""
+    numbers = (*pose.centre, *pose.rotation, pose.reach, pose.fov, pose.aspect, *pose.shift)
+    turned = sum(part * part for part in pose.rotation)
+    return (
+        all(map(isfinite, numbers))
+        and turned > 0
+        and pose.reach > 0
+        and 0 < pose.fov < 180
+        and pose.aspect > 0
+    )

@@ -35,7 +35,10 @@ def way(keys: Sequence[Pose], seconds: float) -> tuple[Pose, ...]:
         [to_camera(key, width, height) for key in keys], np.linspace(0, seconds, len(keys)).tolist()
     )
     size = (cameras[0].width, cameras[0].height)
+    reaches = np.interp(
+        np.linspace(0, len(keys) - 1, len(cameras)), range(len(keys)), [k.reach for k in keys]
+    )
     return tuple(
-        from_view(camera.viewmat.double().numpy(), camera.K.double().numpy(), size, keys[0].reach)
-        for camera in cameras
+        from_view(camera.viewmat.double().numpy(), camera.K.double().numpy(), size, float(reach))
+        for camera, reach in zip(cameras, reaches, strict=True)
     )

@@ -82,8 +82,7 @@ def quiet_button(label: str, tip: str = "") -> bool:
     clear = ImVec4(0, 0, 0, 0)
     with colours(button=clear, text=theme.MUTED):
         pressed = imgui.button(label)
-    if tip:
-        tooltip(tip)
+    tooltip(tip)
     return pressed
 
 
@@ -102,8 +101,10 @@ def slider(
 
 
 def tooltip(text: str) -> None:
-    """Explain the last item when the pointer rests on it."""
-    if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled):
+    """Explain the last item when the pointer rests on it; without words there is nothing."""
+    if text and imgui.is_item_hovered(
+        imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled
+    ):
         imgui.set_tooltip(text)
 
 
@@ -125,6 +126,15 @@ def sentence(text: str) -> str:
     """`text` with a full stop and a capital, unless it begins with the name of a file."""
     named = any(mark in text.partition(" ")[0].rstrip(".") for mark in "./\\")
     return (text if named else text[:1].upper() + text[1:]).rstrip(".") + "."
+
+
+def middle(aspect: float, target: float) -> tuple[ImVec2, ImVec2]:
+    """Texture corners that fill a card of aspect `target` with the middle of a picture."""
+    if aspect > target:
+        margin = (1 - target / aspect) / 2
+        return ImVec2(margin, 0), ImVec2(1 - margin, 1)
+    margin = (1 - aspect / target) / 2
+    return ImVec2(0, margin), ImVec2(1, 1 - margin)
 
 
 def rgba(colour: tuple[float, float, float], alpha: float = 1.0) -> ImVec4:

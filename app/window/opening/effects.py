@@ -7,6 +7,7 @@ from urllib.parse import unquote, urlparse
 from ..commands import Command
 from ..effects import Effects, Hands
 from ..kit.textures import Thumbnails
+from ..scene import samples
 from ..scene.commands import Loaded, OpenPaths
 from ..state import State
 from . import native
@@ -88,7 +89,7 @@ def _start(state: State) -> Path:
     last = Path(state.preferences.folder)
     if state.preferences.folder and last.is_dir():
         return last
-    return state.photos[0].path.parent if state.photos else Path.home()
+    return samples.beside(state.photos).parent
 
 
 def pasted_paths(text: str) -> tuple[str, ...]:

@@ -112,10 +112,12 @@ def test_an_unknown_machine_starts_in_the_middle() -> None:
 
 def test_thinner_levels_count_once_they_are_made() -> None:
     assert thinned_shares(LARGE_SCENE, False) == (0.25, 0.0625)
-    assert thinned_shares(MIDDLING_SCENE, True) == (0.25,) and thinned_shares(MIDDLING_SCENE, False) == ()
+    assert thinned_shares(MIDDLING_SCENE, True) == (0.5, 0.25) and thinned_shares(MIDDLING_SCENE, False) == ()
     slow = Governor(MIDDLING_SCENE, slow=True)
-    assert slow.ladder == SIZES and slow.with_share(0.25).ladder == SIZES_OF_MIDDLING_SCENES
-    moved = slow.learn(slow.moving(Kind.COLOUR), 0.2).with_share(0.25)
-    assert moved.moving(Kind.COLOUR).share == 0.25
+    assert slow.ladder == SIZES == slow.with_share(0.5).ladder
+    moved = slow.learn(Plan(Kind.COLOUR, 0.5), 0.06).with_share(0.5).with_share(0.25)
+    assert moved.ladder == SIZES_OF_MIDDLING_SCENES and moved.moving(Kind.COLOUR).share == 1
+    slower = moved.learn(moved.moving(Kind.COLOUR), 0.1).moving(Kind.COLOUR)
+    assert (slower.scale, slower.share) == (0.5, 0.5), "fewer Gaussians come before still fewer pixels"
     half = Governor(LARGE_SCENE).with_share(0.25)
     assert half.ladder == SIZES and half.with_share(0.0625).ladder != SIZES

@@ -114,15 +114,19 @@ def _verdict(prompt: Prompt, look: Look) -> list[do.Command]:
         imgui.same_line()
         imgui.text_colored(theme.MUTED, f"{prompt.score:.2f}")
     imgui.same_line(look.px(182))
-    width = imgui.get_content_region_avail().x
+    reset = look.px(30)
+    width = imgui.get_content_region_avail().x - reset
     tip = "Found from this score on"
     changed, cut = widgets.slider("##threshold", prompt.cut, (0.0, 1.0), f"{prompt.cut:.2f}", tip, width)
     if changed:
         issued.append(ask.SetThreshold(prompt.key, cut))
+    imgui.same_line(0, look.px(2))
+    imgui.begin_disabled(prompt.threshold is None)
+    if widgets.quiet_button(f"{fa.ICON_FA_ROTATE_LEFT}##calibrated", "Back to the calibrated threshold"):
+        issued.append(ask.SetThreshold(prompt.key, None))
+    imgui.end_disabled()
     if prompt.foreign:
         widgets.muted("This reads like another language, or a rare word; phrases are understood in English.")
-    if prompt.threshold is not None and imgui.button(f"{fa.ICON_FA_ROTATE_LEFT}  Calibrated threshold"):
-        issued.append(ask.SetThreshold(prompt.key, None))
     imgui.unindent(look.px(36))
     return issued
 

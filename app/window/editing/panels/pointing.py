@@ -104,12 +104,13 @@ def _coordinates(reading: Reading) -> str:
     return f"x {x:.2f}   y {y:.2f}   z {z:.2f}   depth {reading.depth:.2f}"
 
 
-def _bar(share: float, colour: ImVec4, look: Look) -> None:
-    """A horizontal bar, full at 1."""
-    height, width = imgui.get_text_line_height(), look.px(64)
+def _bar(share: float, colour: ImVec4, look: Look, line: float | None = None) -> None:
+    """A horizontal bar, full at 1, in the middle of a line so high; None: of a line of text."""
+    text, width = imgui.get_text_line_height(), look.px(64)
+    height = line or text
     corner, canvas = imgui.get_cursor_screen_pos(), imgui.get_window_draw_list()
-    top = corner.y + 0.3 * height
-    bottom = corner.y + 0.75 * height
+    top = corner.y + height / 2 - 0.2 * text
+    bottom = corner.y + height / 2 + 0.25 * text
     canvas.add_rect_filled(
         ImVec2(corner.x, top), ImVec2(corner.x + width, bottom), widgets.u32(theme.LINE), 3
     )
@@ -175,9 +176,9 @@ def _answer(state: State, card: Card, look: Look) -> list[do.Command]:
         issued.append(point.CloseCard())
     group = card.reading.atoms[0][0] if card.reading.atoms else None
     for word, score in (card.words or ())[:_SHOWN_WORDS]:
-        imgui.align_text_to_frame_padding()
-        _bar(score, theme.ACCENT, look)
+        _bar(score, theme.ACCENT, look, imgui.get_frame_height())
         imgui.same_line()
+        imgui.align_text_to_frame_padding()
         imgui.text(f"{score:.2f}")
         imgui.same_line(look.px(134))
         imgui.text_unformatted(widgets.shortened(word, look.px(_CARD - 134 - 84)))

@@ -1,5 +1,7 @@
 """Over the picture: what is measured, how long it is, and the field that tells how long it is in truth."""
 
+from contextlib import suppress
+
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
@@ -11,7 +13,7 @@ from ...state import State
 from .. import pointing as point
 from ..state import Tool
 
-_ENTER = imgui.InputTextFlags_.enter_returns_true
+_ENTER = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
 _BAR = widgets.PLAIN | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
 
 
@@ -48,10 +50,11 @@ def _field(state: State, look: Look, ends: list[ImVec2]) -> list[do.Command]:
         imgui.text_colored(theme.MUTED, "this is")
         imgui.same_line()
         imgui.set_next_item_width(look.px(76))
-        known = 100 * length * state.metric if state.metric else 0.0
-        entered, centimetres = imgui.input_float("cm", known, 0, 0, "%.1f", _ENTER)
-        if entered:
-            issued.append(point.SetLength(centimetres / 100))
+        known = f"{100 * length * state.metric:.1f}" if state.metric else ""
+        entered, text = imgui.input_text_with_hint("cm", "?", known, _ENTER)
+        with suppress(ValueError):
+            if entered:
+                issued.append(point.SetLength(float(text.replace(",", ".")) / 100))
         widgets.tooltip("How long it is in truth, and Enter: the scene and its exports are in metres then")
         imgui.end()
     imgui.pop_style_var(2)

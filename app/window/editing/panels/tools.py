@@ -17,7 +17,7 @@ _TOOLS = (
     (Tool.MOVE, fa.ICON_FA_ARROWS_UP_DOWN_LEFT_RIGHT, "Move around  (V)"),
     (Tool.POINT, fa.ICON_FA_CIRCLE_QUESTION, "What is this? Click on anything  (X)"),
     (Tool.BOX, fa.ICON_FA_VECTOR_SQUARE, "Select with a box  (R)\nShift adds, Ctrl removes, Alt orbits"),
-    (Tool.LASSO, fa.ICON_FA_DRAW_POLYGON, "Select with a lasso: draw around it, or click its corners  (L)"),
+    (Tool.LASSO, fa.ICON_FA_SIGNATURE, "Select with a lasso: draw around it, or click its corners  (L)"),
     (Tool.BRUSH, fa.ICON_FA_PAINTBRUSH, "Select with a brush  (B)\n[ and ] change its size"),
     (Tool.SPHERE, fa.ICON_FA_CIRCLE_DOT, "Select with a ball: press on its middle and pull  (O)"),
     (Tool.PICK, fa.ICON_FA_ARROW_POINTER, "Select the thing under a click  (C)"),

@@ -74,11 +74,12 @@ def _inside(state: State, folder: Folder, look: Look) -> list[do.Command]:
         chosen = path in state.opening.chosen
         if imgui.selectable(f"{fa.ICON_FA_CUBES}  {path.name}##{path}", chosen)[0]:
             issued.append(opening.Choose(path))
-    columns = max(int(imgui.get_content_region_avail().x / look.px(_CELL + 8)), 1)
+    gap, room = look.px(8), imgui.get_content_region_avail().x + look.px(8)
+    columns = max(int(room / (look.px(_CELL) + gap)), 1)
     for place, path in enumerate(folder.photos):
         if place % columns:
-            imgui.same_line(0, look.px(8))
-        issued += _photo(state, path, look)
+            imgui.same_line(0, gap)
+        issued += _photo(state, path, ImVec2(room / columns - gap, look.px(_CELL)), look)
     if folder.left_out:
         widgets.muted(f"and {folder.left_out} more; type the path of one of those")
     if not (folder.folders or folder.photos or folder.scenes or folder.problem):
@@ -86,10 +87,10 @@ def _inside(state: State, folder: Folder, look: Look) -> list[do.Command]:
     return issued
 
 
-def _photo(state: State, path: Path, look: Look) -> list[do.Command]:
+def _photo(state: State, path: Path, size: ImVec2, look: Look) -> list[do.Command]:
     """A card with the photo and its name; a click takes it with the others."""
     chosen = path in state.opening.chosen
-    corner, size = imgui.get_cursor_screen_pos(), look.vec(_CELL, _CELL)
+    corner = imgui.get_cursor_screen_pos()
     line = imgui.get_text_line_height()
     pressed = imgui.selectable(f"##{path}", chosen, imgui.SelectableFlags_.no_auto_close_popups, size)[0]
     if not imgui.is_item_visible():

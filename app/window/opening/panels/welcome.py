@@ -36,7 +36,7 @@ def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Comm
     middle = corner.x + size.x / 2
     _line(fa.ICON_FA_CUBES, ImVec2(middle, top + look.px(40)), theme.LINE, 3.0)
     _line("Drop photos of a room here", ImVec2(middle, top + look.px(72)), theme.TEXT, 1.25)
-    hint = "two or more from a step aside, a scene, or splats"
+    hint = "two or more, taken a step apart; or a scene, or splats"
     _line(hint, ImVec2(middle, top + look.px(98)))
     issued = _buttons(ImVec2(middle, top + look.px(112)), look)
     issued += _samples(ImVec2(middle, top + look.px(176)), size.x, look)
@@ -104,7 +104,7 @@ def _samples(at: ImVec2, room: float, look: Look) -> list[do.Command]:
     gap, (width, height) = look.px(8), (look.px(side) for side in _TILE)
     pairs = samples.pairs()
     count = min(len(pairs), max(int((room - gap) / (width + gap)), 1))
-    _line("or try one of these", ImVec2(at.x, at.y - look.px(4)))
+    _line("or try one of these", ImVec2(at.x, at.y - look.px(8)))
     left = at.x - (count * (width + gap) - gap) / 2
     for place, (label, photos) in enumerate(pairs[:count]):
         corner = ImVec2(left + place * (width + gap), at.y)
@@ -113,11 +113,8 @@ def _samples(at: ImVec2, room: float, look: Look) -> list[do.Command]:
         canvas, picture = imgui.get_window_draw_list(), look.thumbnails.get(sample(place))
         end = ImVec2(corner.x + width, corner.y + height)
         if picture is not None:
-            tall = min((width / height) / picture[1], 1.0), min(picture[1] / (width / height), 1.0)
-            u, v = (1 - min(tall[0], 1)) / 2, (1 - min(tall[1], 1)) / 2
-            canvas.add_image_rounded(
-                picture[0], corner, end, ImVec2(u, v), ImVec2(1 - u, 1 - v), 0xFFFFFFFF, look.px(6)
-            )
+            low, high = widgets.middle(picture[1], width / height)
+            canvas.add_image_rounded(picture[0], corner, end, low, high, 0xFFFFFFFF, look.px(6))
         if imgui.is_item_hovered() or imgui.is_item_focused():
             canvas.add_rect(corner, end, widgets.u32(theme.ACCENT), look.px(6), look.px(2))
         _line(label, ImVec2((corner.x + end.x) / 2, end.y + look.px(20)))

@@ -8,7 +8,8 @@ from imgui_bundle import icons_fontawesome_6 as fa
 from ... import commands as do
 from ... import poses
 from ...asking.things import told
-from ...kit import theme, widgets
+from ...kit import boxes, theme, widgets
+from ...kit.boxes import Box
 from ...kit.look import Look
 from ...poses import Pose
 from ...state import State
@@ -71,27 +72,23 @@ def _keys(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
 
 
 def _names(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
-    """What the scene knows, at its place; the largest first, and none over another."""
-    insight = state.asking.insight
-    taken: list[tuple[float, float, float, float]] = []
+    """What the scene knows, at its place; the largest first, none over another or under a panel."""
+    insight, taken = state.asking.insight, list[Box]()
+    picture = (corner.x, corner.y, corner.x + size.x, corner.y + size.y)
+    walls = boxes.windows_over(picture)
     for name, k in told(state).items():
         place = insight.places[k] if insight is not None and k < len(insight.places) else None
         found = None if place is None else poses.project(np.array([place]), state.pose, (size.x, size.y))
         if found is None:
             continue
         (x, y), extent = found[1][0], imgui.calc_text_size(name)
-        left, top = x - extent.x / 2 - look.px(7), y - extent.y / 2 - look.px(3)
+        left, top = corner.x + x - extent.x / 2 - look.px(7), corner.y + y - extent.y / 2 - look.px(3)
         box = (left, top, left + extent.x + look.px(14), top + extent.y + look.px(6))
-        inside = box[0] >= 0 and box[1] >= 0 and box[2] <= size.x and box[3] <= size.y
-        if not inside or any(_overlap(box, other) for other in taken):
+        box = boxes.clear(box, walls, furthest=extent.x + look.px(14))
+        if not boxes.within(box, picture) or any(boxes.overlap(box, other) for other in (*taken, *walls)):
             continue
         taken.append(box)
-        _caption(look, ImVec2(corner.x + left, corner.y + top), name, 0.0)
-
-
-def _overlap(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
-    """Of two boxes: left, top, right, bottom."""
-    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
+        _caption(look, ImVec2(box[0], box[1]), name, 0.0)
 
 
 def comparing(state: State) -> bool:

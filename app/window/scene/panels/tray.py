@@ -21,6 +21,7 @@ _CANCEL = 104.0  # design pixels
 NOTABLE_SECONDS = 0.05  # of a finished stage; a shorter one is only a heading of others
 ASSUMED_FOV = 65.0  # degrees, as the core assumes where neither file nor person says
 HOW_TO_TELL = "click a photo to tell it"
+WITHOUT_PHOTOS = "open the photos to tell it"
 _DRAGGED = "photo"  # what a card is called while it is dragged
 
 ONE_PHOTO = "depth is a guess from one photo; a second one from a step aside measures it"
@@ -54,17 +55,17 @@ def _sentences(state: State) -> list[str]:
     said += state.info.warnings if state.info else ()
     if state.info is not None and len(state.info.views) == 1 and state.info.scene.photos:
         said.append(ONE_PHOTO)
-    return sentences(said)
+    return sentences(said, HOW_TO_TELL if state.photos else WITHOUT_PHOTOS)
 
 
-def sentences(said: Iterable[str]) -> list[str]:
-    """Warnings as sentences, each once."""
-    return list(dict.fromkeys(said_here(each) for each in said))
+def sentences(said: Iterable[str], how: str = HOW_TO_TELL) -> list[str]:
+    """Warnings as sentences, each once. how: the lens is told."""
+    return list(dict.fromkeys(said_here(each, how) for each in said))
 
 
-def said_here(text: str) -> str:
+def said_here(text: str, how: str = HOW_TO_TELL) -> str:
     """A warning as a sentence; what the core says of its command line in the window's words."""
-    return widgets.sentence(text.replace("on the command line, --fov tells it", HOW_TO_TELL))
+    return widgets.sentence(text.replace("on the command line, --fov tells it", how))
 
 
 def _hint(look: Look) -> None:
@@ -137,7 +138,7 @@ def _card(look: Look, photo: Photo, size: ImVec2, open_for_change: bool) -> bool
     picture = look.thumbnails.get(str(photo.path))
     canvas.add_rect_filled(corner, end, widgets.u32(theme.RAISED), look.px(6))
     if picture is not None:
-        low, high = _crop(picture[1], size.x / size.y)
+        low, high = widgets.middle(picture[1], size.x / size.y)
         canvas.add_image_rounded(picture[0], corner, end, low, high, 0xFFFFFFFF, look.px(6))
     else:
         icon = fa.ICON_FA_TRIANGLE_EXCLAMATION if photo.problem else fa.ICON_FA_IMAGE
@@ -230,15 +231,6 @@ def _order(state: State, index: int) -> list[do.Command]:
         imgui.end_disabled()
         widgets.tooltip(tip)
     return issued
-
-
-def _crop(aspect: float, target: float) -> tuple[ImVec2, ImVec2]:
-    """Texture corners that fill a card of aspect `target` with the middle of a picture."""
-    if aspect > target:
-        margin = (1 - target / aspect) / 2
-        return ImVec2(margin, 0), ImVec2(1 - margin, 1)
-    margin = (1 - aspect / target) / 2
-    return ImVec2(0, margin), ImVec2(1, 1 - margin)
 
 
 def _open_button() -> list[do.Command]:

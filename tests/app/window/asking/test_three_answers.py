@@ -1,6 +1,7 @@
 """Found, maybe, not found; what the scene knows; phrases in another language."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from app.window.asking.work import Encode
 from app.window.editing.pointing import AtomsNamed
 from app.window.poses import Vector
 from app.window.scene.panels import tray
+from app.window.scene.state import Photo
 from langflash_core.language.answers import best_places
 from langflash_core.language.minilm import reads_foreign
 from langflash_core.language.spaces import language_space
@@ -119,3 +121,13 @@ def test_one_photo_is_told_to_leave_depth_a_guess() -> None:
     told = [sentence for sentence in tray._sentences(one) if "depth is a guess" in sentence.lower()]
     assert len(told) == 1
     assert not any("guess" in sentence.lower() for sentence in tray._sentences(state))
+
+
+def test_the_lens_is_told_by_photos_that_are_there() -> None:
+    state = shown_scene()
+    assert state.info is not None
+    said = "assumed field of view 65 degrees; on the command line, --fov tells it"
+    state = replace(state, info=replace(state.info, warnings=(said,)), photos=())
+    assert tray.WITHOUT_PHOTOS in tray._sentences(state)[0] and "--fov" not in tray._sentences(state)[0]
+    beside = replace(state, photos=(Photo(Path("a.jpg")),))
+    assert tray.HOW_TO_TELL in tray._sentences(beside)[0]

@@ -176,7 +176,7 @@ def test_a_name_of_ones_own_is_kept_for_its_scene_and_named_by_kind() -> None:
     state = form(after(scene(), export.ShowExport()), path="/out/x.png")
     state = form(state, what=What.MASK)
     assert state.exporting.form.path == "/out/x_mask.png"
-    assert form(state, what=What.VIDEO).exporting.form.path == "/out/x_turntable.mp4"
+    assert form(state, what=What.VIDEO).exporting.form.path == "/out/x_film.mp4"
     folder = form(state, what=What.SEGMENTED)
     assert folder.exporting.form.path == "/out/x_segmented"
     assert form(folder, what=What.RGB).exporting.form.path == "/out/x_picture.png"

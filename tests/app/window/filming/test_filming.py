@@ -62,6 +62,13 @@ def test_a_preview_passes_every_key_frame_and_ends_at_the_last(shown: State) -> 
     assert after(with_keys(state, 1), ready).tour is None, "the key frames are others by now"
 
 
+def test_after_a_preview_one_orbits_around_what_the_last_key_frame_looked_at(shown: State) -> None:
+    near = replace(shown.pose, reach=shown.pose.reach / 4)
+    poses = way((shown.pose, near), 1.0)
+    assert poses[0].reach == pytest.approx(shown.pose.reach)
+    assert poses[-1].reach == pytest.approx(near.reach)
+
+
 def test_one_key_frame_is_no_way(shown: State) -> None:
     assert "two key frames" in after(with_keys(shown, 1), film.Preview()).toasts[-1].text
 
@@ -70,6 +77,13 @@ def test_key_frames_survive_a_file_and_damaged_ones_are_none(shown: State) -> No
     keys = with_keys(shown).keys
     assert read(json.loads(json.dumps(stored(keys)))) == keys
     assert read(({"centre": [0, 0]},)) == () and read(()) == ()
+    for name, wrong in (
+        ("centre", [0.0, float("nan"), 0.0]),
+        ("reach", 0.0),
+        ("fov", 180.0),
+        ("rotation", [0.0] * 4),
+    ):
+        assert read((*stored(keys[:1]), stored(keys[1:2])[0] | {name: wrong})) == (), name
     assert Record(camera_path=stored(keys)).camera_path
 
 

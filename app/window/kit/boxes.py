@@ -1,0 +1,43 @@
+"""Boxes on the screen, left, top, right, bottom: captions that keep clear of what stands over the picture."""
+
+from collections.abc import Iterable
+
+from imgui_bundle import imgui
+
+Box = tuple[float, float, float, float]
+
+_PASSING = imgui.WindowFlags_.child_window | imgui.WindowFlags_.tooltip | imgui.WindowFlags_.popup
+
+
+def overlap(one: Box, other: Box) -> bool:
+    """Whether they share more than an edge."""
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
+
+
+def within(one: Box, other: Box) -> bool:
+    """Whether the first lies in the second."""
+    return one[0] >= other[0] and one[1] >= other[1] and one[2] <= other[2] and one[3] <= other[3]
+
+
+def clear(box: Box, walls: Iterable[Box], furthest: float) -> Box:
+    """The box pushed out of each wall it is in, along the shortest way; walls further away stay covered."""
+    for wall in walls:
+        if overlap(box, wall):
+            aside = min(wall[2] - box[0], wall[0] - box[2], key=abs)
+            along = min(wall[3] - box[1], wall[1] - box[3], key=abs)
+            x, y = (aside, 0.0) if abs(aside) <= abs(along) else (0.0, along)
+            if abs(x + y) <= furthest:
+                box = (box[0] + x, box[1] + y, box[2] + x, box[3] + y)
+    return box
+
+
+def windows_over(picture: Box) -> tuple[Box, ...]:
+    """ImGui's windows that stood over the picture in the last frame, but for what comes and goes; not the one
+    that is being drawn."""
+    own, found = imgui.internal.get_current_window_read().id_, []
+    for window in imgui.get_current_context().windows:
+        if window.was_active and window.id_ != own and not window.flags & _PASSING:
+            box = (window.pos.x, window.pos.y, window.pos.x + window.size.x, window.pos.y + window.size.y)
+            if overlap(box, picture):
+                found.append(box)
+    return tuple(found)
