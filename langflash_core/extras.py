@@ -13,6 +13,7 @@ EXTRAS = {
     "moderngl": "gl",
     "open_clip": "full",
     "torchvision": "full",
+    "timm": "full",
     "matplotlib": "bench",
     "h5py": "photos",
     "skimage": "views",

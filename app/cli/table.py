@@ -1,4 +1,5 @@
-"""How far a run over many sets is: a table that is drawn again and again on a terminal, else a line a set."""
+"""How far a run over many sets or clips is: a table that is drawn again and again on a terminal, else a line
+each."""
 
 import shutil
 import sys
@@ -18,10 +19,10 @@ _LAST = 3  # failures shown
 class ProgressTable:
     """What is done and under way, on stderr; as a context manager it leaves a clean screen behind."""
 
-    def __init__(self, total: int, workers: Workers, stream: TextIO | None = None) -> None:
+    def __init__(self, total: int, workers: Workers, item: str = "set", stream: TextIO | None = None) -> None:
         self.stream = sys.stderr if stream is None else stream
         self.live = self.stream.isatty()
-        self._total, self._workers = total, workers
+        self._total, self._workers, self._item = total, workers, item
         self._ended = self._failed = 0
         self._notes: list[str] = []
         self._begun: dict[str, float] = {}
@@ -29,7 +30,7 @@ class ProgressTable:
         self._lines = 0  # on the screen now
 
     def told(self, row: Row) -> None:
-        """A set has ended."""
+        """One has ended."""
         self._ended += 1
         self._begun.pop(row.name, None)
         line = f"{row.name}: {row.status}"
@@ -52,7 +53,7 @@ class ProgressTable:
         self._draw([self._headline(now), *under_way, *(f"  {note}" for note in self._notes)])
 
     def _headline(self, now: float) -> str:
-        line = f"{self._ended}/{self._total} sets"
+        line = f"{self._ended}/{self._total} {self._item}s"
         if self._failed:
             line += f", {self._failed} failed"
         if self._ended:

@@ -1,4 +1,4 @@
-"""The ledger of a run, `ledger.csv`: one row a set that was done or failed.
+"""The ledger of a run, `ledger.csv`: one row a set (or a clip, of labels) that was done or failed.
 
 While a run lasts rows are appended, so that whatever ends it leaves every row before the last whole; at its
 end the file is written anew, in order. A row that cannot be read counts as none: its set is done again.
@@ -47,13 +47,16 @@ _KINDS = {name: type(value) for name, value in asdict(Row("", "")).items()}
 class Ledger:
     """The rows by name, and their file."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, item: str = "set") -> None:
         """Read what a run before has left.
+
+        Args:
+            item: what a row is of, "set" or "clip".
 
         Raises:
             OutputError: a file of that name is something else.
         """
-        self.path = path
+        self.path, self.item = path, item
         self.rows: dict[str, Row] = {row.name: row for row in _read(path)}
 
     def begin(self, again: Iterable[str]) -> None:

@@ -78,7 +78,7 @@ def finish(ledger: Ledger, names: Sequence[str]) -> None:
         OutputError: one cannot be written.
     """
     ledger.settle(names)
-    write_summary(list(ledger.rows.values()), ledger.path.parent)
+    write_summary(list(ledger.rows.values()), ledger.path.parent, ledger.item)
 
 
 def _row(ended: Ended) -> Row:

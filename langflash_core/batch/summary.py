@@ -1,4 +1,4 @@
-"""`summary.html`: every set of a ledger in one page that needs no other file but for its links."""
+"""`summary.html`: every row of a ledger in one page that needs no other file but for its links."""
 
 import base64
 from collections.abc import Iterator, Sequence
@@ -11,7 +11,11 @@ from langflash_core.batch.sets import SUMMARY
 from langflash_core.files import write_atomically
 
 THUMBNAIL = "thumbnail.jpg"  # in a set's folder
-_HEADINGS = ("", "set", "status", "seconds", "photos", "Gaussians", "groups", "found", "retried", "files")
+_NUMBERS = {
+    "set": {"photos": "photos", "Gaussians": "gaussians", "groups": "groups", "found": "found"},
+    "clip": {"frames": "photos", "objects": "groups", "quality": "found"},
+}
+"""By what a row is of: headings, and whose column of the ledger they are."""
 
 _PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
@@ -43,36 +47,39 @@ for (const heading of document.querySelectorAll("th")) heading.onclick = () => {
 """
 
 
-def write_summary(rows: Sequence[Row], folder: Path) -> None:
+def write_summary(rows: Sequence[Row], folder: Path, item: str = "set") -> None:
     """Write the page; thumbnails are read one by one, so that thousands need no memory.
 
     Args:
         rows: as the ledger has them; the page has failures first.
-        folder: of the ledger and of the sets' folders.
+        folder: of the ledger and of the sets' folders. item: what a row is of, "set" or "clip".
 
     Raises:
         OutputError: it cannot be written.
     """
     ordered = sorted(rows, key=lambda row: row.status != FAILED)
-    write_atomically(folder / SUMMARY, (part.encode() for part in _parts(ordered, folder)))
+    write_atomically(folder / SUMMARY, (part.encode() for part in _parts(ordered, folder, item)))
 
 
-def _parts(rows: Sequence[Row], folder: Path) -> Iterator[str]:
+def _parts(rows: Sequence[Row], folder: Path, item: str) -> Iterator[str]:
     failed = sum(row.status == FAILED for row in rows)
     counts = f"{len(rows) - failed} done, {failed} failed" if failed else f"{len(rows)} done"
-    headings = "".join(f"<th>{heading}</th>" for heading in _HEADINGS)
-    yield _PAGE.format(title=escape(f"LangFlash: {len(rows)} sets"), counts=counts, headings=headings)
+    headings = "".join(
+        f"<th>{heading}</th>"
+        for heading in ("", item, "status", "seconds", *_NUMBERS[item], "retried", "files")
+    )
+    yield _PAGE.format(title=escape(f"LangFlash: {len(rows)} {item}s"), counts=counts, headings=headings)
     for row in rows:
-        yield _line(row, folder)
+        yield _line(row, folder, item)
     yield _END
 
 
-def _line(row: Row, folder: Path) -> str:
+def _line(row: Row, folder: Path, item: str) -> str:
     own = folder / row.name
     notes = "".join(
         f"<small>{escape(note)}</small>" for note in (row.reason, *row.warnings.split(" | ")) if note
     )
-    numbers = (f"{row.seconds:.1f}", row.photos, row.gaussians, row.groups, row.found, row.retried)
+    numbers = (f"{row.seconds:.1f}", *(getattr(row, name) for name in _NUMBERS[item].values()), row.retried)
     cells = "".join(f'<td class="number" data-key="{n}">{n or ""}</td>' for n in numbers)
     failed = row.status == FAILED
     return (

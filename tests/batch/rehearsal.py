@@ -1,10 +1,13 @@
 """A run over many items by two workers, of which one is killed with -9, against the run by one.
 
     python -m tests.batch.rehearsal FOLDER [--address local] [--sets 40] [--size 84]
-    python -m tests.batch.rehearsal FOLDER --command labels CLIPS --same mask.npz
+    python -m tests.batch.moving_clips CLIPS 8
+    python -m tests.batch.rehearsal FOLDER --command labels CLIPS --same labels.safetensors
 
 Says whether the results are the same, whether anything was done twice, and what failed. With a command of its
-own any that keeps a `ledger.csv` can be rehearsed so; items are then compared file by file, by bytes.
+own any that keeps a `ledger.csv` can be rehearsed so; what is compared is the file `--same` of every item:
+all tensors of it where it holds tensors, else its bytes. Everybody has one thread, since sums are rounded
+otherwise by several.
 """
 
 import argparse
@@ -73,8 +76,8 @@ def run_killed(command: Sequence[str], output: Path, after: int) -> int:
     return run.returncode
 
 
-def same_scene(one: Path, other: Path) -> bool:
-    """Whether two scene files hold the same numbers; their headers tell times."""
+def same_tensors(one: Path, other: Path) -> bool:
+    """Whether two files hold the same numbers; their headers tell times."""
     left, right = load_file(one), load_file(other)
     return left.keys() == right.keys() and all(torch.equal(left[k], right[k]) for k in left)
 
@@ -114,6 +117,7 @@ def main() -> None:
     parser.add_argument("--command", nargs="+", help="instead of batch: a command and its arguments")
     parser.add_argument("--same", default="scene.langflash", help="the file of an item that is compared")
     args = parser.parse_args()
+    os.environ["OMP_NUM_THREADS"] = "1"
     sets = args.folder / "sets"
     if args.command is None:
         make_sets(sets, args.sets)
@@ -125,7 +129,7 @@ def main() -> None:
     cluster = [] if args.address is None else ["--address", args.address]
     two = [*langflash, "-o", str(output), "--workers", "2", *cluster]
     code = run_killed(two, output, after=max(1, len(rows_of(alone)) // 4))
-    same = same_scene if args.same.endswith(".langflash") else same_bytes
+    same = same_tensors if args.same.endswith((".langflash", ".safetensors")) else same_bytes
     document = {"exit code": code, **compared(alone, output, args.same, same)}
     before = {item: (output / item / args.same).stat().st_mtime_ns for item in rows_of(alone)
               if (output / item / args.same).is_file()}  # fmt: skip

@@ -42,3 +42,13 @@ def test_no_sets(tmp_path):
 def test_a_folder_that_was_taken_away(tmp_path):
     write_summary([Row("gone", "done")], tmp_path)
     assert "gone" in (tmp_path / SUMMARY).read_text()
+
+
+def test_clips_are_called_clips_and_have_frames_and_objects(tmp_path):
+    write_summary([Row("hall", "done", photos=24, groups=7, found="97% covered")], tmp_path, "clip")
+    page = (tmp_path / SUMMARY).read_text()
+    assert "LangFlash: 1 clips" in page
+    headings = re.findall(r"<th>([^<]*)</th>", page)
+    cells = re.findall(r'<td class="number"[^>]*>([^<]*)</td>', page)
+    assert dict(zip(headings[3:], cells, strict=False))["objects"] == "7"
+    assert headings == ["", "clip", "status", "seconds", "frames", "objects", "quality", "retried", "files"]

@@ -460,18 +460,24 @@ def _by_name(name: str, shape: torch.Size) -> torch.Tensor:
 
 
 def draw_mobile_sam() -> dict[str, torch.Tensor]:
-    """MobileSAM's encoder under its published names, and two tensors of what is not read of that file.
+    """MobileSAM's encoder under its published names, and two tensors of what is not read of that file."""
+    state = {"image_encoder.head.bias": torch.ones(3), "mask_decoder.iou_token.weight": torch.ones(1, 4)}
+    for own, value in MobileSamEncoder().state_dict().items():
+        state[f"image_encoder.{mobile_sam_name(own)}"] = _by_name(
+            mobile_sam_name(own), value.shape
+        ).contiguous()
+    return state
+
+
+def mobile_sam_name(own: str) -> str:
+    """What the published file calls a tensor of the encoder.
 
     What leads to a stage lies at the end of the one before there.
     """
-    state = {"image_encoder.head.bias": torch.ones(3), "mask_decoder.iou_token.weight": torch.ones(1, 4)}
-    for own, value in MobileSamEncoder().state_dict().items():
-        name = own.removeprefix("body.").replace(".conv.weight", ".c.weight")
-        name = name.replace("patch_embed.conv1", "patch_embed.seq.0").replace(
-            "patch_embed.conv2", "patch_embed.seq.2"
-        )
-        for stage in (1, 2, 3):
-            name = name.replace(f"stages.{stage}.downsample", f"layers.{stage - 1}.downsample")
-        name = name.replace("stages.", "layers.")
-        state[f"image_encoder.{name}"] = _by_name(name, value.shape).contiguous()
-    return state
+    name = own.removeprefix("body.").replace(".conv.weight", ".c.weight")
+    name = name.replace("patch_embed.conv1", "patch_embed.seq.0").replace(
+        "patch_embed.conv2", "patch_embed.seq.2"
+    )
+    for stage in (1, 2, 3):
+        name = name.replace(f"stages.{stage}.downsample", f"layers.{stage - 1}.downsample")
+    return name.replace("stages.", "layers.")

@@ -7,7 +7,7 @@ from functools import partial
 from typing import TextIO
 
 from langflash_core.__main__ import in_program
-from langflash_core.batch.dispatch import Job, Workers
+from langflash_core.batch.dispatch import Job
 from langflash_core.batch.ledger import FAILED, Ledger
 from langflash_core.batch.order import Order
 from langflash_core.batch.run import finish, jobs_of, left_to_do, run_jobs
@@ -16,6 +16,7 @@ from langflash_core.errors import InputError, PromptError, WeightsError
 from langflash_core.files import held_alone
 from langflash_core.formats import ALL_OUT, ANSWERS_OUT, FILMS_OUT
 
+from ..crew import crew, processors, threads_said
 from ..files import check_folder, readable_file
 from ..report import say_error, write_json
 from ..table import ProgressTable
@@ -51,7 +52,8 @@ def _worked_off(
         ledger.begin(())
         finish(ledger, names)
         return True
-    workers = _workers(args, order, len(to_do))
+    most = _as_memory_allows(max(1, processors() // (threads_said() or 1)), order.preset)
+    workers = crew(args, lambda threads: _opening(order, threads), len(to_do), most)
     try:
         with ProgressTable(len(to_do), workers) as table:
             run_jobs(to_do, ledger, workers, names, table.told, table.tick)
@@ -100,19 +102,8 @@ def _check_exports(exports: Sequence[str], prompts: Sequence[str]) -> None:
         check_encoder()
 
 
-def _workers(args: Namespace, order: Order, jobs: int) -> Workers:
-    """Processes of this machine, or actors of a cluster; never more than there are jobs."""
-    if args.address is not None:
-        from langflash_core.batch.cluster import RayWorkers
-
-        card, count = args.device == "cuda", None if args.workers is None else min(args.workers, jobs)
-        return RayWorkers(_opening(order, 1), args.address, count, threads=1, card=card)
-    from langflash_core.batch.processes import LocalWorkers
-
-    processors, said = _processors(), _threads_said()
-    default = _as_memory_allows(max(1, processors // (said or 1)), order.preset)
-    count = min(args.workers or default, jobs)
-    return LocalWorkers(_opening(order, said or max(1, processors // count)), count)
+def _opening(order: Order, threads: int) -> partial:
+    return partial(in_program, "cli.places", "open_maker", order, threads)
 
 
 def _as_memory_allows(count: int, preset: str) -> int:
@@ -122,23 +113,6 @@ def _as_memory_allows(count: int, preset: str) -> int:
     except (AttributeError, ValueError, OSError):  # it cannot be asked here
         return count
     return max(1, min(count, memory // MEMORY[preset]))
-
-
-def _threads_said() -> int | None:
-    """How many threads a process shall have, where the environment says that."""
-    said = os.environ.get("OMP_NUM_THREADS", "")
-    return int(said) if said.isdecimal() and int(said) else None
-
-
-def _opening(order: Order, threads: int) -> partial:
-    return partial(in_program, "cli.places", "open_maker", order, threads)
-
-
-def _processors() -> int:
-    """Those that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _told(

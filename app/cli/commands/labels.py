@@ -1,6 +1,5 @@
 """`langflash labels`: what is where in every frame of clips, and what it is."""
 
-import os
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -9,7 +8,7 @@ from pathlib import Path
 from typing import TextIO
 
 from langflash_core.__main__ import in_program
-from langflash_core.batch.dispatch import Job, Lost, Made, Workers
+from langflash_core.batch.dispatch import Job, Lost, Made
 from langflash_core.batch.ledger import DONE, FAILED, Ledger
 from langflash_core.batch.run import finish, run_jobs
 from langflash_core.batch.sets import LEDGER, SUMMARY
@@ -21,6 +20,7 @@ from langflash_core.lab.labels.order import LabelOrder
 from langflash_core.lab.labels.re10k import enrich, labels_inside
 from langflash_core.lab.labels.storage import LABELS, write_labels
 
+from ..crew import crew
 from ..files import check_folder, readable_file
 from ..report import ProgressBar, say_error, write_json
 from ..table import ProgressTable
@@ -47,7 +47,7 @@ def run(args: Namespace, out: TextIO) -> int:
         raise InputError(f"{args.output} holds the frames; choose another -o")
     jobs = _jobs(places, args.output, order)
     with held_alone(args.output):
-        ledger = Ledger(args.output / LEDGER)
+        ledger = Ledger(args.output / LEDGER, "clip")
         to_do = [job for job in jobs if not _is_done(job, ledger)]
         stopped = not _worked_off(args, order, to_do, ledger, [job.name for job in jobs], keyed)
         enriched = 0 if stopped or not args.enrich else _enriched(args, places, order, ledger)
@@ -102,8 +102,8 @@ def _worked_off(
                 workers = Here(partial(opening, None, bar))
                 run_jobs(to_do, ledger, workers, names, lambda row: None, lambda: None)
             return True
-        workers = _workers(args, opening, len(to_do))
-        with ProgressTable(len(to_do), workers) as table:
+        workers = crew(args, lambda threads: partial(opening, threads), len(to_do), most=1)
+        with ProgressTable(len(to_do), workers, ledger.item) as table:
             run_jobs(to_do, ledger, workers, names, table.told, table.tick)
     except KeyboardInterrupt:
         return False
@@ -121,19 +121,6 @@ def _enriched(args: Namespace, places: Sequence[ClipPlace], order: LabelOrder, l
             ledger.rows[job.name] = replace(ledger.rows[job.name], fingerprint=job.fingerprint)
     ledger.settle([job.name for job in jobs])
     return count
-
-
-def _workers(args: Namespace, opening: Callable, jobs: int) -> Workers:
-    """Processes of this machine, or actors of a cluster; never more than there are jobs."""
-    count = None if args.workers is None else min(args.workers, jobs)
-    if args.address is not None:
-        from langflash_core.batch.cluster import RayWorkers
-
-        return RayWorkers(partial(opening, 1), args.address, count, threads=1, card=args.device == "cuda")
-    from langflash_core.batch.processes import LocalWorkers
-
-    count = count or 1
-    return LocalWorkers(partial(opening, max(1, (os.cpu_count() or 1) // count)), count)
 
 
 class Here:

@@ -156,6 +156,8 @@ def _options(args: Namespace, minutes: float) -> LoopOptions:
 def _run(args: Namespace, out: TextIO) -> None:
     if args.scenes is None and not args.cache.is_dir():
         raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
+    if args.labels is not None and args.scenes is None:
+        raise InputError("--labels are of clips; name their folder with --scenes")
     scenes = None if args.scenes is None else _source(args)
     if args.sam_teacher is not None:
         readable_file(args.sam_teacher, "checkpoint of MobileSAM", WeightsError)
@@ -188,7 +190,7 @@ def _source(args: Namespace) -> SceneSource:
         raise InputError(f"there is no folder {args.scenes}; give a data set as it was unpacked")
     check_folder(args.cache)
     args.cache.mkdir(parents=True, exist_ok=True)
-    return source_at(args.scenes)
+    return source_at(args.scenes, args.labels)
 
 
 _OF_RECIPES = {"seed": 0, "batches": None, "precision": "auto"}

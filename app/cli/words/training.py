@@ -184,7 +184,10 @@ def _add_stages(actions) -> None:
         type=Path,
         metavar="FOLDER",
         help="grouping and aggregation learn from this data set as it was unpacked, ScanNet or labelled "
-        "chunks of RealEstate10K, instead of cached rooms",
+        "chunks of RealEstate10K, or posed clips with --labels, instead of cached rooms",
+    )
+    run.add_argument(
+        "--labels", type=Path, metavar="OUT", help="of --scenes: what langflash labels wrote of these clips"
     )
     _add_loop(run)
     run.add_argument(

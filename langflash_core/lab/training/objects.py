@@ -62,10 +62,13 @@ def tracked(maps: Tensor, vectors: Tensor | None) -> Objects:
     """Things that somebody has followed from frame to frame already; the largest 255 at most of those seen.
 
     Args:
-        maps: (V, H, W) int64, 0 = nobody. vectors: (M, C), row n of thing n + 1.
+        maps: (V, H, W) int64, 0 = nobody. vectors: (M, C), row n of thing n + 1; where one is 0 nothing is
+            known of the thing, and it is nobody's.
     """
     counts = torch.bincount(maps.flatten())
     counts[0] = 0
+    if vectors is not None:
+        counts[1:][vectors[: len(counts) - 1].norm(dim=1) == 0] = 0
     shown = counts.argsort(descending=True, stable=True)[: min(NOTHING, int((counts > 0).sum()))]
     rows = torch.full((len(counts),), NOTHING, dtype=torch.uint8)
     rows[shown] = torch.arange(len(shown), dtype=torch.uint8)

@@ -18,10 +18,13 @@ from typing import Protocol, runtime_checkable
 import torch
 
 from langflash_core.errors import InputError
+from langflash_core.lab.labels.clips import find_clips
+from langflash_core.lab.labels.posed import open_collected
+from langflash_core.lab.labels.storage import LABELS
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.photos.fitting import FittedPhoto, fitted, network_size
 from langflash_core.lab.photos.layouts import read_table
-from langflash_core.lab.photos.published import Re10kScene, open_scannet, re10k_scenes, scannet_names
+from langflash_core.lab.photos.published import open_scannet, re10k_scenes, scannet_names
 from langflash_core.lab.training.batches import SceneBatch, collate
 from langflash_core.lab.training.objects import Objects, linked, tracked
 from langflash_core.lab.training.photo_names import photo_label
@@ -30,6 +33,8 @@ from langflash_core.network.presets import Preset
 
 PAIRS = 4
 """Of each scene; so many different sets of its photos are ever drawn."""
+FRAMES_APART = (15, 60)
+"""Of a video, between two views."""
 _HELD = 2  # units in memory; a chunk of RealEstate10K takes about 100 MB
 _OBJECT = Label("object", "object")
 
@@ -66,13 +71,20 @@ class NamedScene:
 
 @dataclass(frozen=True)
 class TrackedScene:
-    """Frames of a video whose things were collected: followed from frame to frame, with a vector each."""
+    """Frames of a clip whose things were collected, which have followed them; vectors (M, C), one a thing."""
 
     key: str
-    folder: Re10kScene
+    folder: PhotoFolder
+    vectors: torch.Tensor
 
     def objects(self, views: Sequence[FittedPhoto], viewmats: torch.Tensor) -> Objects:
-        return tracked(torch.stack([view.labels for view in views]), self.folder.vectors)
+        maps = torch.stack([view.labels for view in views])
+        if int(maps.max()) > len(self.vectors):
+            raise InputError(
+                f"the labels of {self.key} name thing {int(maps.max())} of {len(self.vectors)}; collect them "
+                "again"
+            )
+        return tracked(maps, self.vectors)
 
 
 @dataclass(frozen=True)
@@ -116,7 +128,11 @@ def re10k_source(root: Path) -> SceneSource:
 
     def opened(unit: str) -> Sequence[Scene]:
         keys = {key: chunk for key, chunk in index.items() if str(chunk) == unit}
-        scenes = [TrackedScene(key, scene) for key, scene in re10k_scenes(root, keys) if scene.maps]
+        scenes = [
+            TrackedScene(key, scene, scene.vectors)
+            for key, scene in re10k_scenes(root, keys)
+            if scene.vectors is not None
+        ]
         if not scenes:
             raise InputError(
                 f"{root / unit} holds no labels of its videos, without which nothing can be learned of what "
@@ -124,15 +140,44 @@ def re10k_source(root: Path) -> SceneSource:
             )
         return scenes
 
-    return SceneSource(chunks, opened, (15, 60))
+    return SceneSource(chunks, opened, FRAMES_APART)
 
 
-def source_at(root: Path) -> SceneSource:
+def clip_source(clips: Path, labelled: Path) -> SceneSource:
+    """Posed clips, a unit each, of which those with labels are read.
+
+    Args:
+        clips: a clip, or a folder of them. labelled: what `langflash labels` wrote of them.
+
+    Raises:
+        InputError: there are no clips, or no labels of any.
+    """
+    places = {
+        place.name: place.path for place in find_clips(clips) if (labelled / place.name / LABELS).is_file()
+    }
+    if not places:
+        raise InputError(
+            f"{labelled} holds no labels of what lies in {clips}; collect them with langflash labels"
+        )
+
+    def opened(unit: str) -> Sequence[Scene]:
+        folder = open_collected(places[unit], labelled / unit)
+        return [TrackedScene(unit, folder, torch.from_numpy(folder.collected.vectors))]
+
+    return SceneSource(tuple(sorted(places)), opened, FRAMES_APART)
+
+
+def source_at(root: Path, labelled: Path | None = None) -> SceneSource:
     """The source that lies in a folder.
+
+    Args:
+        labelled: of clips, what `langflash labels` wrote of them.
 
     Raises:
         InputError: it is of no known layout.
     """
+    if labelled is not None:
+        return clip_source(root, labelled)
     for place in (root, root / "train"):
         if (place / "index.json").is_file():
             return re10k_source(place)
@@ -140,7 +185,7 @@ def source_at(root: Path) -> SceneSource:
         return scannet_source(root)
     raise InputError(
         f"{root} holds neither index.json and chunks (RealEstate10K as pixelSplat has it) nor scene* folders "
-        "(ScanNet); give one that does"
+        "(ScanNet); give one that does, or, of clips, their labels with --labels"
     )
 
 

@@ -394,14 +394,28 @@ def aggregation_stage(
         if collected is None:
             texts = _named_texts(found, batch.labels[i], words)
         else:  # of things without a name: all others of the scene are what they are not
-            vectors = collected.to(found.atoms)
-            texts = GroupTexts(vectors[found.instances], vectors)
+            texts = collected_texts(collected.to(found.atoms), found, network.preset.space)
         chosen = weights or AggregationWeights()
         losses.append(aggregation_loss(found.atoms, found.pooled, found.quality, texts, chosen))
         cosines.append(float(F.cosine_similarity(found.atoms.detach(), texts.truth, dim=-1).mean()))
     if not losses:
         return Loss(sum(p.sum() for p in network.aggregation.parameters()) * torch.zeros(()), {"cosine": 0.0})
     return Loss(torch.stack(losses).mean(), {"cosine": sum(cosines) / len(cosines)})
+
+
+def collected_texts(vectors: Tensor, found: "NamedParts", space: str) -> GroupTexts:
+    """The vectors (N, C) of the instances that parts are, and all of the scene for a bank.
+
+    Raises:
+        InputError: they are not of the network's space.
+    """
+    channels = found.atoms.shape[1]
+    if vectors.shape[1] != channels:
+        raise InputError(
+            f"collected vectors have {vectors.shape[1]} numbers, those of the network {channels}; collect "
+            f"them again, with langflash labels --vectors {space}"
+        )
+    return GroupTexts(vectors[found.instances], vectors)
 
 
 def _named_texts(found: "NamedParts", labels: Sequence[Label], words: Words) -> GroupTexts:

@@ -7,8 +7,9 @@ Source: Zhang et al. 2023 (MobileSAM); Wu et al. 2022 (TinyViT); Kirillov et al.
 """
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import torch
 from torch import Tensor, nn
@@ -22,7 +23,9 @@ CHANNELS = 256
 SIDE = 1024  # pixels of the longer side, as it was trained
 STRIDE = 16
 _MEAN, _STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
-_PREFIX, _UNUSED = "image_encoder.", ("norm_head.", "head.")  # of an ImageNet classifier
+PREFIX = "image_encoder."
+"""Of the encoder's names in a file of the whole."""
+_UNUSED = (PREFIX + "norm_head.", PREFIX + "head.")  # of an ImageNet classifier
 # Names of the published file, and timm's; blocks of a stage come after what leads to them there.
 _NAMES = (
     (r"^patch_embed\.seq\.0\.", "patch_embed.conv1."),
@@ -32,6 +35,9 @@ _NAMES = (
     (r"\.c\.weight$", ".conv.weight"),
     (r"^(?!neck)", "body."),
 )
+
+
+Module = TypeVar("Module", bound=nn.Module)
 
 
 class MobileSamEncoder(nn.Module):
@@ -65,9 +71,9 @@ class MobileSamEncoder(nn.Module):
         self.body = body
         self.neck = nn.Sequential(
             nn.Conv2d(320, CHANNELS, 1, bias=False),
-            _ChannelNorm(),
+            ChannelNorm(CHANNELS),
             nn.Conv2d(CHANNELS, CHANNELS, 3, padding=1, bias=False),
-            _ChannelNorm(),
+            ChannelNorm(CHANNELS),
         )
 
     @property
@@ -83,23 +89,32 @@ class MobileSamEncoder(nn.Module):
     def dense(self, images: Tensor) -> Tensor:
         """Embedding (n, 256, h, w) of photos (n, 3, H, W) in [0, 1], max(h, w) = side / 16.
 
-        As SAM does, the rest of the square is zero; cells that show nothing of the photo are left out.
+        Cells that show nothing of the photo are left out.
         """
-        height, width = images.shape[-2:]
-        scale = self.side / max(height, width)
-        size = (max(1, round(height * scale)), max(1, round(width * scale)))
-        mean, std = (images.new_tensor(each)[:, None, None] for each in (_MEAN, _STD))
+        size = self.fitting(*images.shape[-2:])
         small = F.interpolate(images, size, mode="bilinear", antialias=True)
-        square = F.pad((small - mean) / std, (0, self.side - size[1], 0, self.side - size[0]))
         rows, columns = (-(-length // STRIDE) for length in size)
-        return self(square)[..., :rows, :columns]
+        return self(self.squared(small))[..., :rows, :columns]
+
+    def fitting(self, height: int, width: int) -> tuple[int, int]:
+        """Height and width of a photo whose longer side is the encoder's."""
+        scale = self.side / max(height, width)
+        return max(1, round(height * scale)), max(1, round(width * scale))
+
+    def squared(self, small: Tensor) -> Tensor:
+        """Squares (n, 3, side, side) of photos (n, 3, h, w) of `fitting` size, in [0, 1].
+
+        Normalised, and zero where nothing is, as SAM has them.
+        """
+        mean, std = (small.new_tensor(each)[:, None, None] for each in (_MEAN, _STD))
+        return F.pad((small - mean) / std, (0, self.side - small.shape[-1], 0, self.side - small.shape[-2]))
 
 
-class _ChannelNorm(nn.LayerNorm):
+class ChannelNorm(nn.LayerNorm):
     """Layer norm over the channels of maps (n, C, h, w)."""
 
-    def __init__(self) -> None:
-        super().__init__(CHANNELS, eps=1e-6)
+    def __init__(self, width: int) -> None:
+        super().__init__(width, eps=1e-6)
 
     def forward(self, input: Tensor) -> Tensor:
         return super().forward(input.movedim(1, -1)).movedim(-1, 1)
@@ -111,24 +126,41 @@ def load_mobile_sam_encoder(path: Path, side: int = SIDE, device: str = "cpu") -
     Raises:
         WeightsError: the file cannot be read, or holds another network. InputError: not such a side.
     """
-    stored = {
-        name.removeprefix(_PREFIX): value.float() if value.is_floating_point() else value
-        for name, value in read_checkpoint(path).items()
-        if name.startswith(_PREFIX)
+    stored = own_names(read_checkpoint(path))
+    state = {name.removeprefix(PREFIX): value for name, value in stored.items() if name.startswith(PREFIX)}
+    return filled(MobileSamEncoder(side), state, path, "MobileSAM's encoder").to(device)
+
+
+def own_names(published: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """The tensors of a file of MobileSAM, those of the encoder by the names they have here, in single
+    precision; without the classifier's, which nobody asks."""
+    return {
+        _named(name): value.float() if value.is_floating_point() else value
+        for name, value in published.items()
+        if not name.startswith(_UNUSED)
     }
-    state = {_named(name): value for name, value in stored.items() if not name.startswith(_UNUSED)}
-    encoder = MobileSamEncoder(side)
+
+
+def filled(network: Module, state: Mapping[str, Tensor], path: Path, what: str) -> Module:
+    """The network, frozen, with exactly these tensors, which are of a file.
+
+    Raises:
+        WeightsError: they are others than its own; says what the file does not hold.
+    """
     try:
-        encoder.load_state_dict(state)
+        network.load_state_dict(state)
     except RuntimeError as error:
         reason = " ".join(str(error).split())[:160]
         raise WeightsError(
-            f"{path} does not hold MobileSAM's encoder ({reason}); give mobile_sam.pt or a .safetensors of it"
+            f"{path} does not hold {what} ({reason}); give mobile_sam.pt or a .safetensors of it"
         ) from None
-    return encoder.requires_grad_(False).eval().to(device)
+    return network.requires_grad_(False).eval()
 
 
-def _named(name: str) -> str:
+def _named(published: str) -> str:
+    if not published.startswith(PREFIX):
+        return published
+    name = published.removeprefix(PREFIX)
     for pattern, replacement in _NAMES:
         name = re.sub(pattern, replacement, name)
-    return name
+    return PREFIX + name

@@ -7,8 +7,8 @@ from safetensors.torch import save_file
 
 from langflash_core.errors import WeightsError
 from langflash_core.lab.labels.mobile_sam.model import MobileSam, load_mobile_sam
-from langflash_core.lab.labels.mobile_sam.vision import WindowAttention, WindowBlock
 from langflash_core.lab.labels.prompted import PromptedSam, grid_points, stability
+from tests.network.published import mobile_sam_name
 
 SIDE = 128
 
@@ -21,36 +21,37 @@ def sam() -> MobileSam:
     return model
 
 
-def test_tensors_are_as_many_and_as_large_as_in_the_published_file(sam):
-    state = sam.state_dict()
-    assert (len(state), sum(value.numel() for value in state.values())) == (439, 10_140_231)
+@pytest.fixture(scope="module")
+def file(sam) -> dict[str, torch.Tensor]:
+    """The tensors of `sam` as the published file has them, and its classifier, which nobody asks."""
+    encoder = "image_encoder."
+    state = {
+        encoder + mobile_sam_name(name.removeprefix(encoder)) if name.startswith(encoder) else name: value
+        for name, value in sam.state_dict().items()
+    }
+    state |= {f"{encoder}norm_head.{name}": torch.zeros(320) for name in ("weight", "bias")}
+    return state | {f"{encoder}head.weight": torch.zeros(1000, 320), f"{encoder}head.bias": torch.zeros(1000)}
 
 
-def test_window_attention_is_that_of_a_plain_loop():
-    torch.manual_seed(1)
-    layer = WindowAttention(8, 2, 3).eval()
-    layer.attention_biases.data.normal_()
-    x = torch.randn(2, 9, 8)
-    q, k, v = layer.qkv(layer.norm(x)).view(2, 9, 2, 12).split(4, -1)
-    plain = torch.zeros(2, 9, 2, 4)
-    for head in range(2):
-        scores = torch.zeros(2, 9, 9)
-        for a in range(9):
-            for b in range(9):
-                apart = abs(a // 3 - b // 3) * 3 + abs(a % 3 - b % 3)
-                dot = (q[:, a, head] * k[:, b, head]).sum(-1) / 2  # the root of 4 channels a head
-                scores[:, a, b] = dot + layer.attention_biases[head, apart]
-        plain[:, :, head] = scores.softmax(-1) @ v[:, :, head]
-    assert torch.allclose(layer(x), layer.proj(plain.flatten(2)), atol=1e-6)
+def test_tensors_are_as_many_and_as_large_as_in_the_published_file(file):
+    assert (len(file), sum(value.numel() for value in file.values())) == (439, 10_140_231)
 
 
-def test_windows_come_back_to_their_places_where_the_grid_is_no_multiple():
-    torch.manual_seed(2)
-    block = WindowBlock(8, 2, 7).eval()
-    block.attn.qkv.weight.data.zero_()  # attention is then the same number everywhere
-    block.attn.qkv.bias.data.zero_()
-    x = torch.randn(1, 8, 9, 12)
-    assert torch.allclose(block._attended(x), block.attn.proj.bias.view(1, 8, 1, 1).expand_as(x), atol=1e-6)
+def test_every_tensor_of_the_file_is_used(sam, file, tmp_path):
+    path = tmp_path / "sam.safetensors"
+    save_file(file, path)
+    state = load_mobile_sam(path, SIDE).state_dict()
+    assert len(state) == len(file) - 4  # of the classifier
+    assert all(torch.equal(state[name], value) for name, value in sam.state_dict().items())
+
+
+@pytest.mark.parametrize("spoil", ["missing", "surplus"])
+def test_a_file_with_other_tensors_is_refused(file, tmp_path, spoil):
+    path, name = tmp_path / "sam.safetensors", "mask_decoder.iou_token.weight"
+    kept = {other: value for other, value in file.items() if spoil == "surplus" or other != name}
+    save_file(kept | ({"more": torch.zeros(3)} if spoil == "surplus" else {}), path)
+    with pytest.raises(WeightsError, match="does not hold MobileSAM"):
+        load_mobile_sam(path)
 
 
 def test_a_photo_is_asked_by_points_and_by_rough_masks(sam):
@@ -106,8 +107,8 @@ def test_other_weights_are_refused_in_a_sentence(tmp_path):
         load_mobile_sam(path)
 
 
-def test_weights_are_read_as_half_precision_and_used_as_single(sam, tmp_path):
+def test_weights_are_read_as_half_precision_and_used_as_single(file, tmp_path):
     path = tmp_path / "half.safetensors"
-    save_file({name: t.half() if t.is_floating_point() else t for name, t in sam.state_dict().items()}, path)
+    save_file({name: t.half() if t.is_floating_point() else t for name, t in file.items()}, path)
     read = load_mobile_sam(path, SIDE)
     assert all(p.dtype == torch.float32 for p in read.parameters()) and not read.training

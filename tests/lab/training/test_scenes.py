@@ -74,7 +74,7 @@ def test_a_chair_that_only_the_second_view_sees_is_another_one():
 
 def test_tracked_things_keep_their_vectors():
     maps = torch.tensor([[[0, 7], [7, 7]], [[0, 2], [2, 7]]])
-    vectors = torch.eye(9)[:, :5]
+    vectors = torch.eye(9)
     objects = tracked(maps, vectors)
     assert objects.vectors is not None and len(objects.labels) == 2
     for number in (2, 7):

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from langflash_core.lab.labels.mobile_sam.vision import CHANNELS, ChannelNorm
+from langflash_core.network.encoders.mobile_sam import CHANNELS, ChannelNorm
 
 _HEADS = 8
 _HIDDEN = 2048

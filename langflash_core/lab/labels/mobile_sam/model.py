@@ -13,7 +13,6 @@ from PIL import Image
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from langflash_core.errors import WeightsError
 from langflash_core.lab.labels.mobile_sam.decoder import MaskDecoder
 from langflash_core.lab.labels.mobile_sam.prompts import (
     INSIDE,
@@ -22,12 +21,9 @@ from langflash_core.lab.labels.mobile_sam.prompts import (
     RIGHT_BOTTOM,
     PromptEncoder,
 )
-from langflash_core.lab.labels.mobile_sam.vision import ImageEncoder
 from langflash_core.network.checkpoints.importing import read_checkpoint
+from langflash_core.network.encoders.mobile_sam import SIDE, MobileSamEncoder, filled, own_names
 
-SIDE = 1024
-"""Of the square that it was trained on."""
-_MEAN, _STD = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)
 _SURE = 10.0
 """Logit of a rough mask that is given as yes or no."""
 
@@ -53,20 +49,18 @@ class MobileSam(nn.Module):
         """
         super().__init__()
         self.side = side
-        self.image_encoder = ImageEncoder()
+        self.image_encoder = MobileSamEncoder(side)
         self.prompt_encoder = PromptEncoder()
         self.mask_decoder = MaskDecoder()
 
     @torch.inference_mode()
     def look(self, image: UInt8[np.ndarray, "H W 3"]) -> Looked:
         """Encode a photo: its longer side becomes S, what is missing of the square is zero."""
-        height, width = image.shape[:2]
-        scale = self.side / max(height, width)
-        size = (max(1, round(width * scale)), max(1, round(height * scale)))
-        pixels = np.asarray(Image.fromarray(image).resize(size, Image.Resampling.BILINEAR), dtype=np.float32)
-        seen = torch.from_numpy((pixels - _MEAN) / _STD).float().movedim(-1, 0)
-        square = F.pad(seen, (0, self.side - size[0], 0, self.side - size[1]))
-        return Looked(self.image_encoder(square[None].to(self._device)), (height, width), scale)
+        rows, columns = self.image_encoder.fitting(*image.shape[:2])
+        small = Image.fromarray(image).resize((columns, rows), Image.Resampling.BILINEAR)
+        pixels = torch.from_numpy(np.array(small)).to(self._device).movedim(-1, 0)[None] / 255
+        features = self.image_encoder(self.image_encoder.squared(pixels))
+        return Looked(features, image.shape[:2], self.side / max(image.shape[:2]))
 
     def by_points(self, looked: Looked, points: Float[Tensor, "N 2"]) -> tuple[Tensor, Tensor]:
         """Three masks a point: logits (N, 3, S/4, S/4), above 0 inside, and predicted IoU (N, 3).
@@ -139,14 +133,4 @@ def load_mobile_sam(path: Path, side: int = SIDE, device: str = "cpu") -> Mobile
     Raises:
         WeightsError: the file cannot be read, or is not of MobileSAM.
     """
-    model = MobileSam(side)
-    stored = read_checkpoint(path)
-    state = {name: value.float() if value.is_floating_point() else value for name, value in stored.items()}
-    try:
-        model.load_state_dict(state)
-    except RuntimeError as error:
-        reason = " ".join(str(error).split())[:160]
-        raise WeightsError(
-            f"{path} does not hold MobileSAM ({reason}); give mobile_sam.pt or a .safetensors of it"
-        ) from None
-    return model.requires_grad_(False).eval().to(device)
+    return filled(MobileSam(side), own_names(read_checkpoint(path)), path, "MobileSAM").to(device)

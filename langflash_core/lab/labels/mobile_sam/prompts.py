@@ -8,7 +8,7 @@ import math
 import torch
 from torch import Tensor, nn
 
-from langflash_core.lab.labels.mobile_sam.vision import CHANNELS, ChannelNorm
+from langflash_core.network.encoders.mobile_sam import CHANNELS, ChannelNorm
 
 OUTSIDE, INSIDE, LEFT_TOP, RIGHT_BOTTOM, NO_POINT = 0, 1, 2, 3, -1
 """What a point says: not the thing, the thing, a corner of its box, nothing."""
