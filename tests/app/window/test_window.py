@@ -76,6 +76,8 @@ def scene_file(tmp_path_factory) -> Path:
 class Program:
     """The window in a process of its own, and the hands on it."""
 
+    patience = PATIENCE  # seconds, of `until`
+
     def __init__(self, display: str, *paths: Path, size: tuple[int, int] = SIZE) -> None:
         self._environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}
         self._environment.pop("WAYLAND_DISPLAY", None)
@@ -107,7 +109,7 @@ class Program:
     def until(self, holds: Callable[[dict], bool], what: str) -> dict:
         """Wait for the state to satisfy `holds`."""
         with self._changed:
-            reached = self._changed.wait_for(lambda: bool(self._lines) and holds(self._lines[-1]), PATIENCE)
+            reached = self._changed.wait_for(lambda: bool(self._lines) and holds(self._lines[-1]), self.patience)
             assert reached, f"waited for {what}; last state {self._lines[-1:]}"
             return self._lines[-1]
 
