@@ -109,7 +109,8 @@ class Program:
     def until(self, holds: Callable[[dict], bool], what: str) -> dict:
         """Wait for the state to satisfy `holds`."""
         with self._changed:
-            reached = self._changed.wait_for(lambda: bool(self._lines) and holds(self._lines[-1]), self.patience)
+            seen = lambda: bool(self._lines) and holds(self._lines[-1])  # noqa: E731
+            reached = self._changed.wait_for(seen, self.patience)
             assert reached, f"waited for {what}; last state {self._lines[-1:]}"
             return self._lines[-1]
 

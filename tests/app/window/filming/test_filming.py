@@ -8,6 +8,7 @@ import pytest
 
 from app.cli.cameras import camera_of
 from app.window import commands as do
+from app.window.editing import commands as edit
 from app.window.exporting.order import Order, order
 from app.window.exporting.process import keys_json
 from app.window.exporting.state import What
@@ -43,6 +44,17 @@ def test_key_frames_are_added_and_removed(shown: State) -> None:
     assert after(state, film.ClearKeys(), film.RemoveKey()).keys == ()
     assert len(with_keys(shown, MOST_KEYS + 3).keys) == MOST_KEYS
     assert with_keys(State(), 2).keys == (), "without a scene there is nothing to film"
+
+
+def test_key_frames_are_edits_that_are_unsaved_and_undone(shown: State) -> None:
+    state = with_keys(shown)
+    assert state.editing.unsaved and not shown.editing.unsaved
+    for command in (film.RemoveKey(1), film.ClearKeys(), film.AddKey()):
+        changed = after(state, command)
+        assert changed.keys != state.keys and after(changed, edit.Undo()).keys == state.keys
+        assert after(changed, edit.Undo(), edit.Redo()).keys == changed.keys
+    assert after(shown, film.ClearKeys()).editing.history == shown.editing.history, "there were none"
+    assert not after(state, *[edit.Undo()] * 3).editing.unsaved
 
 
 def test_a_preview_passes_every_key_frame_and_ends_at_the_last(shown: State) -> None:
