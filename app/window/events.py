@@ -39,11 +39,12 @@ class Events:
         self._wake = wake
         self._dispatch = dispatch
         self._translated: dict[int, int] = {}  # keys that are down by another name
+        self._pointer = (0.0, 0.0)  # where it was said to be, last
         glfw.set_key_callback(window, self._waking(self._key))
         glfw.set_char_callback(window, self._waking(backend.char_callback))
         glfw.set_cursor_pos_callback(window, self._waking(self._moved))
         glfw.set_cursor_enter_callback(window, self._waking(self._entered))
-        glfw.set_mouse_button_callback(window, self._waking(backend.mouse_button_callback))
+        glfw.set_mouse_button_callback(window, self._waking(self._button))
         glfw.set_scroll_callback(window, self._waking(backend.scroll_callback))
         glfw.set_window_size_callback(window, self._waking(backend.resize_callback))
         glfw.set_window_refresh_callback(window, self._waking(lambda _window: None))
@@ -81,7 +82,16 @@ class Events:
             self._backend.io.add_key_event(imgui.Key.f24, place % 2 == 0)
 
     def _moved(self, _window, x: float, y: float) -> None:
+        self._pointer = (x, y)
         self._backend.io.add_mouse_pos_event(x, y)
+
+    def _button(self, window, button: int, action: int, mods: int) -> None:
+        """To ImGui, a press in a frame after the one that brings the pointer there: an item that others may
+        overlap, as the picture, takes none before it was under the pointer for a frame."""
+        seen = self._backend.io.mouse_pos
+        if action == glfw.PRESS and (seen.x, seen.y) != self._pointer:
+            self._pause(2)
+        self._backend.mouse_button_callback(window, button, action, mods)
 
     def _entered(self, _window, entered: int) -> None:
         if not entered:

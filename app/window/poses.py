@@ -218,6 +218,23 @@ def facing(pose: Pose, forward: Vector) -> Pose:
     return replace(pose, centre=Vector(*centre.tolist()), rotation=_quaternion(axes))
 
 
+def facing_near(pose: Pose, forward: Vector, places: Sequence[Vector]) -> Pose:
+    """`facing`, no farther than `NEAR` degrees from the nearest of some places, as the pivot sees them: from
+    there on the way to where it should look from."""
+    there = facing(pose, forward)
+    if not places or degrees_aside(there, places) <= NEAR:
+        return there
+    wanted = -there.axes[:, 2]
+    ways = np.array(places) - pose.pivot
+    ways = ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-12)
+    nearest = ways[np.argmax(ways @ wanted)]
+    axis = np.cross(nearest, wanted)
+    if np.linalg.norm(axis) < 1e-6:  # right behind what the photo looked at: around it
+        axis = UP
+    direction = _about(axis / np.linalg.norm(axis), math.radians(NEAR)) @ nearest
+    return facing(pose, Vector(*(-direction).tolist()))
+
+
 def with_fov(pose: Pose, degrees: float) -> Pose:
     """Another field of view, clamped to `FOV_RANGE`."""
     return replace(pose, fov=float(np.clip(degrees, *FOV_RANGE)))

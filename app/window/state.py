@@ -9,7 +9,7 @@ from langflash_core.colormaps import HeatColours
 from .asking.state import FIRST_PROMPT, NO_ASKING, Asking, Prompt, usable
 from .editing.state import NO_EDITING, Editing
 from .exporting.state import NO_EXPORTING, Exporting
-from .filming.state import Tour
+from .filming.state import Tour, read
 from .opening.state import NO_OPENING, Opening
 from .poses import START, Pose
 from .recovery.preferences import DEFAULTS, Preferences
@@ -73,12 +73,11 @@ class State:
     """The whole program.
 
     now: seconds of the session's clock, set at the start of a frame. aside: photos of the scene on show while
-    those of a new room are in the tray. choosing: the best pair is being
-    looked for. keys: key frames of the camera's path. tour: a flight along them. metric: metres per scene
-    unit, where that is known. view: of the photo stood at, if any. compare: where the photo begins, 0 to 1
-    across the picture; None: not compared. negatives: the person's own; none: those of the scene. lines:
-    the log, oldest first. rooms: scenes that were on show before, the last one first. dropped: photos while
-    it is asked where they belong. pending: commands that wait for an answer about unsaved edits.
+    those of a new room are in the tray. choosing: the best pair is being looked
+    for. tour: a flight along the key frames. view: of the photo stood at, if any. compare: where the photo
+    begins, 0 to 1 across the picture; None: not compared. negatives: the person's own; none: those of the
+    scene. lines: the log, oldest first. rooms: scenes that were on show before, the last one first. dropped:
+    photos while it is asked where they belong. pending: commands that wait for an answer about unsaved edits.
     """
 
     now: float = 0.0
@@ -95,9 +94,7 @@ class State:
     mode: Mode = Mode.RGB
     pose: Pose = START
     flight: Flight | None = None
-    keys: tuple[Pose, ...] = ()
     tour: Tour | None = None
-    metric: float | None = None
     view: int | None = None
     compare: float | None = None
     job: Job | None = None
@@ -115,6 +112,16 @@ class State:
     preferences: Preferences = DEFAULTS
     lines: tuple[Line, ...] = ()
     leaving: bool = False
+
+    @property
+    def keys(self) -> tuple[Pose, ...]:
+        """Key frames of the camera's path."""
+        return read(self.editing.marks.camera_path) if self.editing.marks else ()
+
+    @property
+    def metric(self) -> float | None:
+        """Metres per scene unit, where that is known."""
+        return self.editing.marks.metric_scale if self.editing.marks else None
 
     @property
     def asked(self) -> tuple[Prompt, ...]:

@@ -45,10 +45,14 @@ def spoken_scene(scene: Scene, marks: Marks) -> Scene:
 
 
 def edited_scene(scene: Scene, marks: Marks) -> Scene:
-    """The scene to save: without deleted Gaussians, merged atoms as one, names in its record.
+    """The scene to save: without deleted Gaussians, merged atoms as one, names, key frames and scale in its
+    record.
 
     Hidden Gaussians are kept. Untouched marks give back the scene itself.
     """
+    record = scene.record
+    if (marks.camera_path, marks.metric_scale) != (record.camera_path, record.metric_scale):
+        scene = scene.with_record(camera_path=marks.camera_path, metric_scale=marks.metric_scale)
     if not marks.deleted and marks.atoms == atoms_of(scene):
         return scene
     joined = _joined(scene, marks.atoms)
@@ -71,7 +75,12 @@ def atoms_of(scene: Scene) -> tuple[Atom, ...]:
 
 def first_marks(scene: Scene) -> Marks:
     """The marks of a scene as it was opened."""
-    return replace(Marks.untouched(len(scene.gaussians), scene.semantics.num_atoms), atoms=atoms_of(scene))
+    return replace(
+        Marks.untouched(len(scene.gaussians), scene.semantics.num_atoms),
+        atoms=atoms_of(scene),
+        camera_path=tuple(scene.record.camera_path),
+        metric_scale=scene.record.metric_scale,
+    )
 
 
 def _masses(scene: Scene) -> Tensor:

@@ -1,18 +1,21 @@
-"""Edits of a scene: bit masks over its N Gaussians, a table of its K atoms, and a history of both.
+"""Edits of a scene: bit masks over its N Gaussians, a table of its K atoms, what people told it beside, and
+a history of all three.
 
 The scene itself never changes. `Marks` say what has become of it; an `Edit` is the difference of
-two `Marks`: the exclusive-or of each mask, which is its own inverse, and the old and new entry of
-each atom. Undoing is therefore exact, and an edit takes some hundred bytes to a few kilobytes.
+two `Marks`: the exclusive-or of each mask, which is its own inverse, the old and new entry of each
+atom, and the old and new value of what was told. Undoing is therefore exact, and an edit takes some
+hundred bytes to a few kilobytes.
 """
 
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 MASKS = ("deleted", "hidden", "selected")
+TOLD = ("camera_path", "metric_scale")
 Combine = Literal["replace", "add", "remove"]
 
 
@@ -82,12 +85,17 @@ class Atom:
 
 @dataclass(frozen=True)
 class Marks:
-    """What edits made of a scene. A deleted or hidden Gaussian is never selected."""
+    """What edits made of a scene. A deleted or hidden Gaussian is never selected.
+
+    camera_path, metric_scale: as in `Record`; plain values of JSON.
+    """
 
     deleted: Mask
     hidden: Mask
     selected: Mask
     atoms: tuple[Atom, ...]
+    camera_path: tuple[Mapping[str, Any], ...] = ()
+    metric_scale: float | None = None
 
     @staticmethod
     def untouched(num_gaussians: int, num_atoms: int) -> "Marks":
@@ -100,17 +108,24 @@ class Marks:
         """Gaussians that are shown."""
         return Mask.full(self.deleted.count) - (self.deleted | self.hidden)
 
+    @property
+    def written(self) -> tuple[Any, ...]:
+        """What a saved scene holds of them: all but what is hidden or selected."""
+        return self.deleted, self.atoms, self.camera_path, self.metric_scale
+
 
 @dataclass(frozen=True)
 class Edit:
     """One step from some marks to others.
 
     label: for people. flips: (mask, zlib of its changed bits). swaps: (atom, before, after).
+    told: (one of `TOLD`, before, after).
     """
 
     label: str
     flips: tuple[tuple[str, bytes], ...] = field(default=(), repr=False)
     swaps: tuple[tuple[int, Atom, Atom], ...] = ()
+    told: tuple[tuple[str, Any, Any], ...] = ()
 
     def apply(self, marks: Marks) -> Marks:
         """The marks after this edit.
@@ -118,7 +133,7 @@ class Edit:
         Raises:
             ValueError: the edit belongs to other marks.
         """
-        changed: dict[str, Mask] = {}
+        changed: dict[str, Any] = {}
         for name, packed in self.flips:
             mask: Mask = getattr(marks, name)
             bits = zlib.decompress(packed)
@@ -130,11 +145,16 @@ class Edit:
             if not 0 <= k < len(atoms) or atoms[k] != before:
                 raise ValueError(f"edit: expected atom {k} to be {before}")
             atoms[k] = after
+        for name, before, after in self.told:
+            if getattr(marks, name) != before:
+                raise ValueError(f"edit: expected {name} to be {before}")
+            changed[name] = after
         return replace(marks, atoms=tuple(atoms), **changed)
 
     def inverse(self) -> "Edit":
         """The edit that takes this one back, exactly."""
-        return replace(self, swaps=tuple((k, after, before) for k, before, after in self.swaps))
+        swaps = tuple((k, after, before) for k, before, after in self.swaps)
+        return replace(self, swaps=swaps, told=tuple((name, new, old) for name, old, new in self.told))
 
 
 def difference(label: str, before: Marks, after: Marks) -> Edit:
@@ -145,7 +165,9 @@ def difference(label: str, before: Marks, after: Marks) -> Edit:
         if getattr(before, name) != getattr(after, name)
     )
     pairs = enumerate(zip(before.atoms, after.atoms, strict=True))
-    return Edit(label, flips, tuple((k, old, new) for k, (old, new) in pairs if old != new))
+    swaps = tuple((k, old, new) for k, (old, new) in pairs if old != new)
+    values = ((name, getattr(before, name), getattr(after, name)) for name in TOLD)
+    return Edit(label, flips, swaps, tuple((name, old, new) for name, old, new in values if old != new))
 
 
 @dataclass(frozen=True)

@@ -3,18 +3,21 @@
     {"format": "langflash-edits", "version": 1, "digest": of the scene, "gaussians": N, "atoms": K,
      "about": {...}, "done": [...], "undone": [...]}
 
-An edit is {"label", "flips": {mask: base64 of zlib}, "swaps": [[atom, [into, name, on, denied...], [...]]]}.
+An edit is {"label", "flips": {mask: base64 of zlib}, "swaps": [[atom, [into, name, on, denied...], [...]]]},
+where key frames or the scale changed with "told": [[name, before, after]].
 """
 
 import base64
 import hashlib
 import json
+import math
 import zlib
 from pathlib import Path
+from typing import Any
 
 from langflash_core.errors import SceneFileError
 from langflash_core.files import write_atomically
-from langflash_core.scene.edits import MASKS, Atom, Edit, History, Marks
+from langflash_core.scene.edits import MASKS, TOLD, Atom, Edit, History, Marks
 from langflash_core.types import Scene
 
 FORMAT, VERSION = "langflash-edits", 1
@@ -79,11 +82,12 @@ def load_history(path: Path, scene: Scene, first: Marks) -> History:
 
 
 def _encoded(edit: Edit) -> dict:
-    return {
+    encoded = {
         "label": edit.label,
         "flips": {name: base64.b64encode(packed).decode() for name, packed in edit.flips},
         "swaps": [[k, *([a.into, a.name, a.on, *a.denied] for a in pair)] for k, *pair in edit.swaps],
     }
+    return encoded | ({"told": [list(entry) for entry in edit.told]} if edit.told else {})
 
 
 def _decoded(entry: dict) -> Edit:
@@ -91,7 +95,20 @@ def _decoded(entry: dict) -> Edit:
     if any(name not in MASKS for name, _ in flips):
         raise ValueError(f"flips: expected {', '.join(MASKS)}, received {', '.join(entry['flips'])}")
     swaps = tuple((int(k), _atom(*before), _atom(*after)) for k, before, after in entry["swaps"])
-    return Edit(str(entry["label"]), flips, swaps)
+    told = tuple((name, *(_told(name, value) for value in pair)) for name, *pair in entry.get("told", ()))
+    return Edit(str(entry["label"]), flips, swaps, told)
+
+
+def _told(name: str, value: Any) -> Any:
+    """A value as `Marks` hold it."""
+    match name, value:
+        case "camera_path", [*keys] if all(isinstance(key, dict) for key in keys):
+            return tuple(keys)
+        case "metric_scale", None:
+            return None
+        case "metric_scale", (int() | float()) as metres if math.isfinite(metres) and metres > 0:
+            return float(metres)
+    raise ValueError(f"told: expected a value of {' or '.join(TOLD)}, received {name} {value!r}")
 
 
 def _atom(into: int, name: str, on: bool, *denied: str) -> Atom:

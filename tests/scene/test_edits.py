@@ -221,6 +221,20 @@ def test_an_edited_scene_can_be_saved_and_read(scene, tmp_path: Path):
     assert (len(again.gaussians), again.semantics.num_atoms) == (150, 3)
 
 
+def test_what_was_told_is_undone_and_saved(scene):
+    first = first_marks(scene)
+    keys = ({"reach": 2.0},)
+    history = History(first).edited("key", replace(first, camera_path=keys))
+    history = history.edited("scale", replace(history.marks, metric_scale=1.5))
+    saved = edited_scene(scene, history.marks)
+    assert saved.record.camera_path == keys and saved.record.metric_scale == 1.5
+    assert saved.gaussians is scene.gaussians and first_marks(saved).written == history.marks.written
+    assert history.undo().marks.metric_scale == first.metric_scale
+    assert history.undo().undo().marks == first and history.undo().redo().marks == history.marks
+    back = edited_scene(saved, replace(first_marks(saved), camera_path=(), metric_scale=None))
+    assert back.record.camera_path == () and back.record.metric_scale is None
+
+
 # The file
 
 
@@ -228,11 +242,13 @@ def test_a_history_survives_its_file(scene, tmp_path: Path):
     history = History(first_marks(scene))
     history = history.edited("select", select(history.marks, Mask.of(np.arange(200) % 3 == 0)))
     history = history.edited("delete", delete(history.marks, history.marks.selected))
+    told = replace(history.marks, camera_path=({"reach": 1.5, "shift": [0.1, 0.0]},), metric_scale=1.52)
+    history = history.edited("told", told)
     history = history.edited("name", rename_atom(history.marks, 1, "café")).undo()
     path = tmp_path / "edits.json"
     save_history(history, scene_digest(scene), {"name": "my room"}, path)
     assert load_history(path, scene, first_marks(scene)) == history
-    assert read_about(path) == (scene_digest(scene), {"name": "my room"}, 2)
+    assert read_about(path) == (scene_digest(scene), {"name": "my room"}, 3)
     with pytest.raises(SceneFileError, match="another scene"):
         load_history(path, cloud(200, seed=5), first_marks(scene))
 
@@ -255,6 +271,11 @@ def with_done(text: str, **changes) -> str:
         lambda text: json.dumps({**json.loads(text), "version": 99}),
         lambda text: json.dumps({**json.loads(text), "version": float("inf")}),
         lambda text: with_done(text, swaps=[[float("inf"), [1, "", True], [1, "", False]]]),
+        lambda text: with_done(text, told=[["atoms", None, None]]),
+        lambda text: with_done(text, told=[["metric_scale", None, -1.0]]),
+        lambda text: with_done(text, told=[["camera_path", [], [3]]]),
+        lambda text: with_done(text, told=[["metric_scale", 2.0, 3.0]]),
+        lambda text: with_done(text, told=[["metric_scale", 2.0]]),
     ],
 )
 def test_a_damaged_history_is_refused(scene, tmp_path: Path, spoil):

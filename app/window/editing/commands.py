@@ -16,7 +16,8 @@ def change(state: State, **changes) -> State:
     return replace(state, editing=replace(state.editing, **changes))
 
 
-def _edit(state: State, label: str, marks: Marks) -> State:
+def with_edit(state: State, label: str, marks: Marks) -> State:
+    """The state after an edit, named for the list; the same where nothing has become of it."""
     history = state.editing.history
     return state if history is None else _with_history(state, history.edited(label, marks))
 
@@ -107,7 +108,7 @@ class Found:
         changed = len(after.selected ^ marks.selected)
         count = len(after.selected) if self.combine == "replace" else changed
         verb = {"replace": "Select", "add": "Add", "remove": "Unselect"}[self.combine]
-        return _edit(state, f"{verb} {count:,} {self.what}", after)
+        return with_edit(state, f"{verb} {count:,} {self.what}", after)
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,7 @@ class SelectAll:
 
     def apply(self, state: State) -> State:
         marks = state.editing.marks
-        return state if marks is None else _edit(state, "Select all", edits.select(marks, marks.visible))
+        return state if marks is None else with_edit(state, "Select all", edits.select(marks, marks.visible))
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,7 @@ class Deselect:
         marks = state.editing.marks
         if marks is None:
             return state
-        return _edit(state, "Deselect", edits.select(marks, Mask.none(marks.deleted.count)))
+        return with_edit(state, "Deselect", edits.select(marks, Mask.none(marks.deleted.count)))
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,7 @@ class Invert:
 
     def apply(self, state: State) -> State:
         marks = state.editing.marks
-        return state if marks is None else _edit(state, "Invert the selection", edits.invert(marks))
+        return state if marks is None else with_edit(state, "Invert the selection", edits.invert(marks))
 
 
 # Changing the scene
@@ -180,7 +181,7 @@ class ShowAll:
 
     def apply(self, state: State) -> State:
         marks = state.editing.marks
-        return state if marks is None else _edit(state, "Show everything", edits.show_all(marks))
+        return state if marks is None else with_edit(state, "Show everything", edits.show_all(marks))
 
 
 @dataclass(frozen=True)
@@ -199,7 +200,7 @@ class RenameAtom:
             if self.name.strip()
             else f"Unname atom {self.atom}"
         )
-        return _edit(state, label, edits.rename_atom(marks, self.atom, self.name))
+        return with_edit(state, label, edits.rename_atom(marks, self.atom, self.name))
 
 
 @dataclass(frozen=True)
@@ -214,7 +215,7 @@ class DenyAtom:
         if marks is None or not 0 <= self.atom < len(marks.atoms):
             return state
         marks = edits.deny_atom(marks, self.atom, self.text)
-        return _edit(state, f"Atom {self.atom} is not {self.text.strip()!r}", marks)
+        return with_edit(state, f"Atom {self.atom} is not {self.text.strip()!r}", marks)
 
 
 @dataclass(frozen=True)
@@ -228,7 +229,7 @@ class MergeAtoms:
         if marks is None or not self.atoms or not all(0 <= k < len(marks.atoms) for k in self.atoms):
             return state
         label = "Merge atoms " + ", ".join(map(str, self.atoms))
-        return _edit(state, label, edits.merge_atoms(marks, self.atoms))
+        return with_edit(state, label, edits.merge_atoms(marks, self.atoms))
 
 
 @dataclass(frozen=True)
@@ -242,7 +243,7 @@ class ToggleAtom:
         if marks is None or not 0 <= self.atom < len(marks.atoms):
             return state
         verb = "Silence" if marks.atoms[self.atom].on else "Wake"
-        return _edit(state, f"{verb} atom {self.atom}", edits.toggle_atom(marks, self.atom))
+        return with_edit(state, f"{verb} atom {self.atom}", edits.toggle_atom(marks, self.atom))
 
 
 @dataclass(frozen=True)
@@ -324,9 +325,9 @@ class EndFloaters:
         found = preview.mask(marks.visible)
         state = change(state, floaters=None)
         if self.then == "delete":
-            return _edit(state, f"Delete {len(found):,} floaters", edits.delete(marks, found))
+            return with_edit(state, f"Delete {len(found):,} floaters", edits.delete(marks, found))
         if self.then == "select":
-            return _edit(state, f"Select {len(found):,} floaters", edits.select(marks, found))
+            return with_edit(state, f"Select {len(found):,} floaters", edits.select(marks, found))
         return state
 
 
@@ -334,7 +335,7 @@ def _on_selection(state: State, verb: str, make) -> State:
     marks = state.editing.marks
     if marks is None or not marks.selected:
         return state
-    return _edit(state, f"{verb} {len(marks.selected):,}", make(marks, marks.selected))
+    return with_edit(state, f"{verb} {len(marks.selected):,}", make(marks, marks.selected))
 
 
 def _rewound(state: State, step) -> State:

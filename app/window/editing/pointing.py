@@ -11,7 +11,7 @@ from ..asking.state import PALETTE, Prompt
 from ..poses import Vector
 from ..scene.state import Flight, Mode
 from ..state import State
-from .commands import change
+from .commands import change, with_edit
 from .state import RADIUS_RANGE, REACH_RANGE, Card, Point, Reading, Spot, Tool
 
 LIKE_THIS = "like this"
@@ -157,9 +157,11 @@ class SetLength:
 
     def apply(self, state: State) -> State:
         length = measured(state.editing.ruler)
-        if length is None or length <= 0 or not LENGTHS[0] <= self.metres <= LENGTHS[1]:
+        marks = state.editing.marks
+        if marks is None or not length or not LENGTHS[0] <= self.metres <= LENGTHS[1]:
             return state
-        return replace(state, metric=self.metres / length)
+        label = f"This is {100 * self.metres:.4g} cm"
+        return with_edit(state, label, replace(marks, metric_scale=self.metres / length))
 
 
 LENGTHS = (0.001, 1000.0)  # metres

@@ -1,6 +1,6 @@
 """What editing adds to the state: the tool in hand, the history, what the pointer found."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
@@ -160,7 +160,14 @@ class Editing:
         """Whether a saved file would differ from the one on disk."""
         if self.marks is None or self.saved is None:
             return self.marks is not None
-        return (self.marks.deleted, self.marks.atoms) != (self.saved.deleted, self.saved.atoms)
+        return self.marks.written != self.saved.written
+
+    @property
+    def exported_anew(self) -> bool:
+        """Whether exports of the file on disk would miss edits; key frames they are told themselves."""
+        if self.marks is None or self.saved is None:
+            return self.unsaved
+        return replace(self.marks, camera_path=()).written != replace(self.saved, camera_path=()).written
 
     def atom_name(self, k: int) -> str:
         """What the person calls an atom, or else its nearest word."""

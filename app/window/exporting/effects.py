@@ -69,7 +69,7 @@ class ExportingEffects(Effects):
             return
         edited, selection = self._keeper.edited_file, self._keeper.selection_file
         copies: dict[Path, Marks] = {}
-        if state.editing.unsaved:
+        if state.editing.exported_anew:
             copies[edited] = marks
         if marks.selected:
             rest = Mask.full(marks.selected.count) - marks.selected

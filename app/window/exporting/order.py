@@ -133,7 +133,7 @@ def source(state: State) -> Path | None:
     form = state.exporting.form
     if form.only_selected and form.what.splats:
         return state.exporting.selection
-    if state.editing.unsaved:
+    if state.editing.exported_anew:
         return state.exporting.edited
     return None if state.info is None else state.info.path or state.recovery.copy
 
@@ -187,7 +187,7 @@ def remarks(state: State) -> list[str]:
     """What the command cannot carry over from the window."""
     form, notes = state.exporting.form, []
     if state.info is not None and source(state) != state.info.path:
-        unsaved = "edits are" if state.editing.unsaved else "scene is"
+        unsaved = "edits are" if state.editing.exported_anew else "scene is"
         why = "selection is" if form.only_selected and form.what.splats else unsaved
         notes.append(f"The {why} not saved: the command reads a copy that goes when the window closes.")
     if not (form.what.needs_phrases or form.only_found):

@@ -1,11 +1,13 @@
 """What can happen to the camera's path."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ..commands import Notify
+from ..editing.commands import with_edit
 from ..poses import Pose
 from ..state import State
-from .state import MOST_KEYS, Tour
+from .state import MOST_KEYS, Tour, stored
 
 
 @dataclass(frozen=True)
@@ -15,7 +17,7 @@ class AddKey:
     def apply(self, state: State) -> State:
         if state.info is None or len(state.keys) >= MOST_KEYS:
             return state
-        return replace(state, keys=(*state.keys, state.pose))
+        return _with_keys(state, f"Key frame {len(state.keys) + 1}", (*state.keys, state.pose))
 
 
 @dataclass(frozen=True)
@@ -28,8 +30,9 @@ class RemoveKey:
         keys = list(state.keys)
         if not -len(keys) <= self.place < len(keys):
             return state
+        label = f"Remove key frame {self.place % len(keys) + 1}"
         del keys[self.place]
-        return replace(state, keys=tuple(keys), tour=None)
+        return replace(_with_keys(state, label, keys), tour=None)
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class ClearKeys:
     """No key frames."""
 
     def apply(self, state: State) -> State:
-        return replace(state, keys=(), tour=None)
+        return replace(_with_keys(state, "Forget the key frames", ()), tour=None)
 
 
 @dataclass(frozen=True)
@@ -71,3 +74,9 @@ class StopTour:
 
     def apply(self, state: State) -> State:
         return replace(state, tour=None)
+
+
+def _with_keys(state: State, label: str, keys: Sequence[Pose]) -> State:
+    """Other key frames, as an edit."""
+    marks = state.editing.marks
+    return state if marks is None else with_edit(state, label, replace(marks, camera_path=stored(keys)))

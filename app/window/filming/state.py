@@ -28,7 +28,8 @@ class Tour:
 
 def stored(keys: Iterable[Pose]) -> tuple[dict[str, Any], ...]:
     """Key frames as plain values for a scene's record."""
-    return tuple(asdict(key) | {"centre": list(key.centre), "rotation": list(key.rotation)} for key in keys)
+    lists = ("centre", "rotation", "shift")  # as a file gives them back
+    return tuple(asdict(key) | {name: list(getattr(key, name)) for name in lists} for key in keys)
 
 
 def read(entries: Iterable[Mapping[str, Any]]) -> tuple[Pose, ...]:

@@ -3,8 +3,10 @@
 from dataclasses import dataclass, replace
 
 from .. import poses
+from ..commands import Notify
 from ..poses import Pose, Vector
 from ..state import State
+from .near import places_to_keep_to
 from .state import Flight, Mode
 
 
@@ -43,12 +45,22 @@ class FlyTo:
 
 @dataclass(frozen=True)
 class Face:
-    """Fly around the pivot until the picture looks along a world axis."""
+    """Fly around the pivot until the picture looks along a world axis, or as near to that as the photos
+    saw it from."""
 
     forward: Vector
 
     def apply(self, state: State) -> State:
-        return FlyTo(poses.facing(state.pose, self.forward)).apply(state)
+        pose = poses.facing_near(state.pose, self.forward, places_to_keep_to(state))
+        if pose != poses.facing(state.pose, self.forward):
+            state = Notify(NOT_SEEN, "info").apply(state)
+        return FlyTo(pose).apply(state)
+
+
+NOT_SEEN = (
+    "No photo looked from there; this is as near as they show it. "
+    'Without "Keep to what the photos saw" (Preferences) you may go on.'
+)
 
 
 SIDES = (

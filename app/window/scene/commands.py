@@ -235,8 +235,6 @@ class SceneArrived:
             photos=self.room.photos,
             editing=editing,
             pose=self.room.pose,
-            keys=self.room.keys,
-            metric=self.room.metric,
             view=None,
         )
 
@@ -257,8 +255,6 @@ class SceneArrived:
             aside=None,
             flight=None,
             tour=None,
-            keys=self.info.keys,
-            metric=self.info.scene.record.metric_scale,
             pose=self.info.views[0] if self.info.views else poses.START,
             view=0 if self.info.views else None,
         )
@@ -268,8 +264,7 @@ def _rooms(state: State, coming: SceneInfo) -> tuple[Room, ...]:
     """Those to go back to once `coming` is on show; the same file twice only where there are edits."""
     info, editing, left = state.info, state.editing, ()
     if info is not None:
-        told = (scene_photos(state), editing.history, editing.saved, state.pose, state.keys, state.metric)
-        left = (Room(info, *told),)
+        left = (Room(info, scene_photos(state), editing.history, editing.saved, state.pose),)
     rooms = (room for room in (*left, *state.rooms) if room.info.serial != coming.serial)
     kept = (room for room in rooms if room.edited or room.info.path is None or room.info.path != coming.path)
     return tuple(kept)[:MOST_ROOMS]

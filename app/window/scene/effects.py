@@ -62,7 +62,7 @@ class SceneEffects(Effects):
             case OpenScene(path, edits, alone):
                 submit(LoadScene(path, edits, alone))
             case SaveScene(path) if state.info is not None:
-                submit(WriteScene(state.info.scene, path, state.editing.marks, state.keys, state.metric))
+                submit(WriteScene(state.info.scene, path, state.editing.marks))
             case CancelJob():
                 self._hands.cancel()
             case ChoosePair() if state.choosing and not before.choosing:

@@ -93,7 +93,6 @@ class SceneInfo:
     history: edits that came with it, none of them or those of an earlier session.
     own_views: whether it says which photo made which Gaussian, so that photos can be compared.
     extent: corners (low, high) of the box around nearly all of it, world axes, scene units.
-    keys: key frames that it was saved with.
     """
 
     serial: int
@@ -108,21 +107,17 @@ class SceneInfo:
     history: "History | None" = field(default=None, compare=False, repr=False)
     own_views: bool = False
     extent: tuple[Vector, Vector] | None = None
-    keys: tuple[Pose, ...] = ()
 
 
 @dataclass(frozen=True)
 class Room:
-    """A scene that was on show, as it was left: its photos, its edits, where one stood, its key frames,
-    metres per scene unit."""
+    """A scene that was on show, as it was left: its photos, its edits, where one stood."""
 
     info: SceneInfo
     photos: tuple[Photo, ...] = ()
     history: "History | None" = field(default=None, compare=False, repr=False)
     saved: Marks | None = field(default=None, compare=False, repr=False)
     pose: Pose = START
-    keys: tuple[Pose, ...] = ()
-    metric: float | None = None
 
     @property
     def edited(self) -> bool:

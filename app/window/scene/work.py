@@ -15,8 +15,7 @@ from langflash_core.errors import ImageError, LangFlashError
 from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command, ShowPicture
-from ..filming.state import read, stored
-from ..poses import Pose, Vector, from_view, median_reach
+from ..poses import Vector, from_view, median_reach
 from ..requests import Asked, Errand, Job, SceneErrand
 from .commands import ChoosingFailed, PairChosen, PhotoFailed, PhotoRead, SceneArrived, SceneSaved, Thinned
 from .state import SceneInfo
@@ -105,7 +104,6 @@ def describe_scene(scene: "Scene", serial: int, name: str, path: Path | None = N
         history=History(first_marks(scene)),
         own_views=scene.num_views > 1 and scene.view_ids is not None,
         extent=_extent(means),
-        keys=read(scene.record.camera_path),
     )
 
 
@@ -129,15 +127,13 @@ class WriteScene(Errand):
     scene: "Scene" = field(repr=False)
     path: Path
     marks: Marks | None = None
-    keys: tuple[Pose, ...] = ()
-    metric: float | None = None
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.export import export
         from langflash_core.scene.edited import edited_scene
 
         scene = self.scene if self.marks is None else edited_scene(self.scene, self.marks)
-        export(scene.with_record(camera_path=stored(self.keys), metric_scale=self.metric), self.path)
+        export(scene, self.path)
         yield SceneSaved(self.path, self.marks)
 
 

@@ -59,6 +59,8 @@ def gaps(steps: list[dict], phases: list[tuple[str, float]]) -> list[Gap]:
 class Watched(Program):
     """A window whose loop is watched."""
 
+    patience = PATIENCE
+
     def __init__(self, display: str, size: tuple[int, int], code: Path, folder: Path, photos: list[Path]):
         self.record = folder / "record.json"
         homes = {variable: str(folder / name) for variable, name in HOMES.items()}
@@ -137,10 +139,12 @@ def walk(someone: Watched, phrase: str) -> Iterator[tuple[str, float]]:
     someone.phase("orbit")
     left = (someone.size[0] + 330) // 2
     for turn in (1, -1, 1):
+        before = someone.state["pose"]
         someone.xdotool("mousemove", str(left), str(someone.size[1] // 2), "mousedown", "1")
         for _ in range(25):
             someone.xdotool("mousemove_relative", "--", str(6 * turn), "1", "sleep", "0.02")
         someone.xdotool("mouseup", "1")
+        someone.until(lambda s, before=before: s["pose"] != before, "a camera that orbits")
         time.sleep(2.0)
         someone.xdotool("mousemove", "380", "26", "sleep", "0.4", "mousemove", "420", "26", "sleep", "0.4")
     someone.quiet(2.5)
@@ -152,7 +156,10 @@ def walk(someone: Watched, phrase: str) -> Iterator[tuple[str, float]]:
         time.sleep(0.4)
         someone.click("Export")
         someone.until(lambda s: s["exporting"], f"the export {what}")
+        began = time.perf_counter()
         someone.until(lambda s: not s["exporting"], f"the end of the export {what}")
+        yield f"export {what}", time.perf_counter() - began
+        assert any(toast.startswith("Exported") for toast in someone.state["toasts"]), someone.state["toasts"]
         time.sleep(0.5)
     someone.xdotool("key", "Escape")
     someone.quiet()

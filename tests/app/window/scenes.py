@@ -16,6 +16,8 @@ from app.window.scene.commands import SceneArrived
 from app.window.scene.state import SceneInfo
 from app.window.state import State
 from langflash_core.geometry.harmonics import colour_to_sh
+from langflash_core.scene.edited import first_marks
+from langflash_core.scene.edits import History
 from langflash_core.types import Gaussians, Record, Scene, Semantics
 
 PHRASES = ("armchair", "wall", "floor")
@@ -89,8 +91,10 @@ VIEWS = (Pose(), Pose(Vector(0.3, 0.0, 0.0)))
 
 def shown_scene(path: Path | None = Path("/rooms/my room.langflash")) -> State:
     """A state with a scene of two views and the phrase "door"."""
+    scene = room(torch.eye(3))
     info = SceneInfo(
-        serial=1, name="room", scene=room(torch.eye(3)), views=VIEWS, num_gaussians=3, num_atoms=3,
+        serial=1, name="room", scene=scene, views=VIEWS, num_gaussians=3, num_atoms=3,
         space="minilm", path=path, extent=(Vector(-1.0, -1.0, 0.0), Vector(1.0, 1.0, 2.0)),
+        history=History(first_marks(scene)),
     )  # fmt: skip
     return after(State(), SceneArrived(info), EditPrompt(0, "door"))

@@ -121,6 +121,21 @@ def _angle(a: Rotation, b: Rotation) -> float:
     return math.acos(min(abs(float(np.dot(a, b))), 1.0))
 
 
+@pytest.mark.parametrize("side", [(0, 1, 0), (0, -1, 0), (0, 0, -1), (1, 0, 0)])
+def test_a_look_along_an_axis_stays_where_photos_saw_it(side: tuple[float, float, float]) -> None:
+    start, places = Pose(reach=2.0), (Vector(0.0, 0.0, 0.0), Vector(0.2, 0.0, 0.0))
+    near, free = (poses.facing_near(start, Vector(*side), given) for given in (places, ()))
+    assert free == poses.facing(start, Vector(*side))
+    assert poses.degrees_aside(near, places) == pytest.approx(poses.NEAR, abs=1e-6)
+    assert poses.degrees_aside(free, places) > poses.FARTHEST  # what was black
+    np.testing.assert_allclose(near.pivot, start.pivot, atol=EXACT)
+    if side[2] == 0:  # on the way there
+        assert near.axes[:, 2] @ free.axes[:, 2] > start.axes[:, 2] @ free.axes[:, 2] + 0.5
+    assert poses.facing_near(start, Vector(0.0, 0.0, 1.0), places) == poses.facing(
+        start, Vector(0.0, 0.0, 1.0)
+    )
+
+
 def test_an_orbit_slows_down_far_from_the_photos_and_comes_back_freely() -> None:
     start, places = Pose(reach=2.0), (Vector(0.0, 0.0, 0.0), Vector(0.2, 0.0, 0.0))
     step = math.radians(5)

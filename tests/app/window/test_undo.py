@@ -17,7 +17,7 @@ from app.window.asking import commands as ask
 from app.window.commands import apply
 from app.window.editing import commands as edit
 from app.window.editing import pointing as point
-from app.window.editing.state import Region
+from app.window.editing.state import Reading, Region
 from app.window.editing.work import ScoreFloaters, request_for
 from app.window.exporting import commands as export
 from app.window.filming import commands as film
@@ -76,7 +76,7 @@ def edited(shown: State) -> State:
     for command in (
         edit.Found(Mask.of(rows % 7 == 0), "replace", "here"), edit.Delete(),
         edit.Found(Mask.of(rows % 5 == 0), "replace", "here"), edit.Hide(),
-        edit.RenameAtom(1, "my wall"), edit.MergeAtoms((0, 2)), edit.ToggleAtom(1),
+        film.AddKey(), edit.RenameAtom(1, "my wall"), edit.MergeAtoms((0, 2)), edit.ToggleAtom(1),
         edit.Found(Mask.of(rows % 3 == 0), "replace", "here"), edit.Invert(), edit.Undo(),
         edit.FindFloaters(), edit.FloatersFound(np.linspace(0, 6, 12_300, dtype=np.float32).tobytes()),
     ):  # fmt: skip
@@ -118,6 +118,8 @@ def value(name: str, hint, chance: np.random.Generator, state: State):
         return show.ClearPhotos()
     if hint is SceneInfo:
         return state.info
+    if hint is Scene:
+        return state.info.scene if state.info else None
     if hint is Pose:
         return state.pose
     if hint is Vector:
@@ -141,7 +143,7 @@ def bits(state: State) -> tuple:
     """All that edits hold."""
     marks = state.editing.marks
     assert marks is not None
-    return marks.deleted.bits, marks.hidden.bits, marks.selected.bits, marks.atoms
+    return marks.deleted.bits, marks.hidden.bits, marks.selected.bits, marks.atoms, state.keys, state.metric
 
 
 @pytest.mark.parametrize("cls", command_classes(), ids=lambda cls: cls.__name__)
@@ -191,12 +193,13 @@ def random_command(chance: np.random.Generator, state: State) -> do.Command:
         edit.SetStrictness(float(chance.uniform(1, 6))), edit.EndFloaters("select"),
         edit.EndFloaters("delete"), point.SetThrough(bool(chance.integers(2))),
         edit.RenameAtom(atom, f"thing {key}"), edit.ToggleAtom(atom), edit.MergeAtoms((atom, key)),
+        film.AddKey(), film.RemoveKey(key), film.ClearKeys(), point.SetLength(float(chance.uniform(0.1, 2))),
         edit.Undo(), edit.Redo(), edit.GoTo(int(chance.integers(0, 200))),
     )  # fmt: skip
     command = choices[chance.integers(len(choices))]
     if isinstance(command, edit.GoTo) and chance.random() < 0.9:
         return edit.Redo()  # rarely: it may take all of them back
-    if isinstance(command, edit.Delete) and state.editing.num_selected > 200:
+    if isinstance(command, edit.Delete) and state.editing.num_selected > 600:
         return edit.Hide()  # deleting everything early would leave nothing to edit
     return command
 
@@ -204,6 +207,8 @@ def random_command(chance: np.random.Generator, state: State) -> do.Command:
 def test_200_random_edits_undone_give_the_first_state_bit_for_bit(shown: State) -> None:
     chance = np.random.default_rng(3)
     state, names = shown, set()
+    for end in ((0.0, 0.0, 1.0), (0.5, 0.0, 1.0)):
+        state = apply(state, point.RulerPlaced(Reading((1.0, 1.0), end)))
     while len(state.editing.history.done) < 200:  # type: ignore[union-attr]
         command = random_command(chance, state)
         after = answered(state, command)
@@ -212,7 +217,8 @@ def test_200_random_edits_undone_give_the_first_state_bit_for_bit(shown: State) 
         state = after
     assert names >= {
         "SelectRegion", "SelectByPhrase", "SelectAtom", "Grow", "Invert", "SelectAll", "Deselect", "Delete",
-        "Hide", "Isolate", "ShowAll", "EndFloaters", "RenameAtom", "ToggleAtom", "MergeAtoms", "Undo", "Redo",
+        "Hide", "Isolate", "ShowAll", "EndFloaters", "RenameAtom", "ToggleAtom", "MergeAtoms", "AddKey",
+        "RemoveKey", "ClearKeys", "SetLength", "Undo", "Redo",
     }  # fmt: skip
     last, scene = bits(state), shown.info.scene  # type: ignore[union-attr]
     assert last != bits(shown)

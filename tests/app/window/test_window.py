@@ -6,6 +6,7 @@ Xvfb shows it, xdotool types and points, a second X client drops files and takes
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import threading
@@ -75,6 +76,8 @@ def scene_file(tmp_path_factory) -> Path:
 class Program:
     """The window in a process of its own, and the hands on it."""
 
+    patience = PATIENCE  # seconds, of `until`
+
     def __init__(self, display: str, *paths: Path, size: tuple[int, int] = SIZE) -> None:
         self._environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}
         self._environment.pop("WAYLAND_DISPLAY", None)
@@ -106,7 +109,8 @@ class Program:
     def until(self, holds: Callable[[dict], bool], what: str) -> dict:
         """Wait for the state to satisfy `holds`."""
         with self._changed:
-            reached = self._changed.wait_for(lambda: bool(self._lines) and holds(self._lines[-1]), PATIENCE)
+            seen = lambda: bool(self._lines) and holds(self._lines[-1])  # noqa: E731
+            reached = self._changed.wait_for(seen, self.patience)
             assert reached, f"waited for {what}; last state {self._lines[-1:]}"
             return self._lines[-1]
 
@@ -124,6 +128,15 @@ class Program:
     def xdotool(self, *words: str) -> str:
         done = subprocess.run(["xdotool", *words], env=self._environment, capture_output=True, text=True)
         return done.stdout
+
+    @contextmanager
+    def stopped(self) -> Iterator[None]:
+        """The program meanwhile reads nothing; what hands do comes to it all at once."""
+        self._process.send_signal(signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            self._process.send_signal(signal.SIGCONT)
 
     def picture(self) -> np.ndarray:
         """The canvas (h, w, 3) as shown, float in [0, 255]."""
@@ -274,6 +287,17 @@ def test_wheel_and_drags_move_the_camera(program: Program, gesture: list[str]) -
     program.until_changed(picture, 1.0)
     program.at_rest()
     assert program.state["gl_errors"] == []
+
+
+def test_a_drag_begins_even_where_the_press_comes_with_the_way_there(program: Program) -> None:
+    """As on a slow machine, or from a touch screen: all of it waits for one frame."""
+    program.xdotool("mousemove", *map(str, program.field))
+    before = program.at_rest()
+    with program.stopped():
+        program.xdotool(
+            "mousemove", *map(str, MIDDLE), "mousedown", "1", "mousemove_relative", "60", "0", "mouseup", "1"
+        )
+    program.until(lambda s: s["pose"] != before["pose"], "a moved camera")
 
 
 def test_keys_fly_and_go_home(program: Program) -> None:

@@ -4,9 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from app.window.editing import commands as edit
 from app.window.editing import pointing as point
 from app.window.editing.panels.ruler import said
 from app.window.editing.state import Reading, Tool
+from app.window.filming import commands as film
 from app.window.scene import commands as show
 from app.window.scene.work import WriteScene, describe_scene
 from app.window.state import State
@@ -39,16 +41,26 @@ def test_a_third_click_begins_anew_and_nothing_is_no_end() -> None:
     assert after(state, point.SetTool(Tool.MOVE)).editing.ruler == ()
 
 
+def test_a_scale_is_an_edit_that_is_unsaved_and_undone() -> None:
+    state = after(measured(), point.SetLength(0.76))
+    assert state.editing.unsaved and not measured().editing.unsaved
+    other = after(state, point.SetLength(0.5))
+    assert after(other, edit.Undo()).metric == state.metric
+    back = after(other, edit.Undo(), edit.Undo())
+    assert back.metric is None and not back.editing.unsaved
+    assert after(back, edit.Redo()).metric == state.metric
+
+
 def test_lengths_are_told_in_metres_where_there_is_a_scale() -> None:
     assert said(0.5, None) == "0.500 units"
     assert said(0.5, 1.52) == "76.0 cm" and said(2.0, 1.52) == "3.04 m"
 
 
 def test_the_scale_is_saved_and_comes_back(tmp_path: Path) -> None:
-    state = after(measured(), point.SetLength(0.76))
+    state = after(measured(), point.SetLength(0.76), film.AddKey())
     assert state.info is not None
     path = tmp_path / "room.langflash"
-    list(WriteScene(state.info.scene, path, None, (state.pose,), state.metric).run(lambda: False))
+    list(WriteScene(state.info.scene, path, state.editing.marks).run(lambda: False))
     again = describe_scene(load(path), 7, "room")
     back = after(State(), show.SceneArrived(again))
     assert back.metric == pytest.approx(1.52) and back.keys == (state.pose,)

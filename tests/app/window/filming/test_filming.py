@@ -5,9 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from app.cli.cameras import camera_of
 from app.window import commands as do
+from app.window import poses
+from app.window.editing import commands as edit
 from app.window.exporting.order import Order, order
 from app.window.exporting.process import keys_json
 from app.window.exporting.state import What
@@ -16,6 +19,7 @@ from app.window.filming.state import MOST_KEYS, read, stored
 from app.window.filming.work import PlanTour, way
 from app.window.poses import Vector, facing, orbit
 from app.window.scene import camera
+from app.window.scene.near import places_to_keep_to
 from app.window.scene.state import FLIGHT_SECONDS
 from app.window.state import State
 from app.window.tours import along
@@ -43,6 +47,17 @@ def test_key_frames_are_added_and_removed(shown: State) -> None:
     assert after(state, film.ClearKeys(), film.RemoveKey()).keys == ()
     assert len(with_keys(shown, MOST_KEYS + 3).keys) == MOST_KEYS
     assert with_keys(State(), 2).keys == (), "without a scene there is nothing to film"
+
+
+def test_key_frames_are_edits_that_are_unsaved_and_undone(shown: State) -> None:
+    state = with_keys(shown)
+    assert state.editing.unsaved and not shown.editing.unsaved
+    for command in (film.RemoveKey(1), film.ClearKeys(), film.AddKey()):
+        changed = after(state, command)
+        assert changed.keys != state.keys and after(changed, edit.Undo()).keys == state.keys
+        assert after(changed, edit.Undo(), edit.Redo()).keys == changed.keys
+    assert after(shown, film.ClearKeys()).editing.history == shown.editing.history, "there were none"
+    assert not after(state, *[edit.Undo()] * 3).editing.unsaved
 
 
 def test_a_preview_passes_every_key_frame_and_ends_at_the_last(shown: State) -> None:
@@ -120,4 +135,16 @@ def test_one_can_look_along_every_axis(shown: State) -> None:
         if not forward.y:
             assert pose.axes[1, 1] > 0.999, "upright"
     state = after(shown, camera.Face(Vector(0.0, 1.0, 0.0)), do.Tick(shown.now + FLIGHT_SECONDS))
-    assert state.pose.axes[:, 2] == pytest.approx((0, 1, 0), abs=1e-6)
+    assert state.pose.axes[:, 2] == pytest.approx((0, 1, 0), abs=1e-6) and not state.toasts
+
+
+def test_looking_from_where_no_photo_did_ends_where_the_scene_can_be_trusted() -> None:
+    state = shown_scene()
+    assert state.info is not None
+    scene = replace(state.info.scene, view_ids=torch.zeros(len(state.info.scene.gaussians), dtype=torch.long))
+    state = replace(state, info=replace(state.info, scene=scene))
+    above = after(state, camera.Face(Vector(0.0, 1.0, 0.0)), do.Tick(state.now + FLIGHT_SECONDS))
+    assert "No photo looked from there" in above.toasts[-1].text
+    assert poses.degrees_aside(above.pose, places_to_keep_to(above)) == pytest.approx(poses.NEAR, abs=1e-6)
+    front = after(state, camera.Face(Vector(0.0, 0.0, 1.0)))
+    assert front.toasts == state.toasts
