@@ -134,7 +134,7 @@ def staged_folder(folder: Path) -> Iterator[Path]:
     Raises:
         OutputError: a file cannot be moved, because a folder of its name is in the way.
     """
-    staging = part_beside(_nearest(folder) / folder.name)
+    staging = part_beside(_nearest(folder) / "export")  # "." has no name of its own
     staging.mkdir(mode=0o700)
     try:
         yield staging

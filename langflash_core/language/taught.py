@@ -37,7 +37,7 @@ def taught_dictionary(dictionary: Tensor, record: Record, space: LanguageSpace) 
     lessons = {k: (name, denied) for k, (name, denied) in lessons.items() if {name, *denied} & known.keys()}
     if not lessons:
         return dictionary
-    rows = torch.tensor(list(lessons))
+    rows = torch.tensor(list(lessons), device=dictionary.device)
     before = dictionary[rows]
     after = torch.stack([_moved(dictionary[k], *lesson, known) for k, lesson in lessons.items()])
     unit = normalize(dictionary, dim=-1)

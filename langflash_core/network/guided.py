@@ -1,7 +1,7 @@
 """The network with guided depth: depth maps, matches, poses and a plane sweep give the geometry."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 
@@ -137,13 +137,13 @@ class GuidedDepthNet(LangFlashNet):
             levels = self.levels(tokens, Ks)
             prior = self.depth_head(levels, tokens)
         with run.stage("poses"):
-            local = self.local(images[0])
+            local = _one_by_one(self.local, images[0])
             inputs = self._pose_inputs(views, prior, local)
             poses = estimate_poses(inputs, _key_points(views, run), run.check, _known(views))
             viewmats = torch.from_numpy(poses.viewmats).to(images)[None]
         with run.stage("refinement"):
             maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)
-            sharp = sharpened(maps.log_depths, images[0])
+            sharp = _one_by_one(sharpened, maps.log_depths, images[0])
             maps = replace(maps, log_depths=flattened(sharp, maps.log_errors))
             maps = _agreed(maps, poses, viewmats[0], Ks[0])
         with run.stage("Gaussians"):
@@ -185,6 +185,11 @@ class GuidedDepthNet(LangFlashNet):
             )
             for v in range(views.num_views)
         ]
+
+
+def _one_by_one(work: Callable[..., Tensor], *of_views: Tensor) -> Tensor:
+    """What `work` makes of all views (V, ...), view by view: a processor's caches hold one, not eight."""
+    return torch.cat([work(*own) for own in zip(*(values.split(1) for values in of_views), strict=True)])
 
 
 def _agreed(maps: DepthMaps, poses: Poses, viewmats: Tensor, Ks: Tensor) -> DepthMaps:

@@ -88,8 +88,8 @@ def _parents(sight: _Sight, scene: Scene, radius: float, colour_tolerance: float
     for view in range(scene.num_views):
         rows = (sight.views == view).nonzero().squeeze(1)
         for earlier, pixel_map in enumerate(pixel_maps):
-            candidates = _nearest(sight, rows, pixel_map, scene, earlier)
-            children, found = _pairs(sight, rows, candidates, radius, colour_tolerance)
+            near, candidates = _nearest(sight, rows, pixel_map, scene, earlier)
+            children, found = _pairs(sight, near, candidates, radius, colour_tolerance)
             parents[children] = found
             rows = rows[parents[rows] == rows]
         pixel_maps.append(_pixel_map(sight, rows, scene, view))
@@ -115,29 +115,44 @@ def _pixel_map(sight: _Sight, rows: Tensor, scene: Scene, view: int) -> Tensor:
     return pixel_map.view(height + 2, width + 2)
 
 
-def _nearest(sight: _Sight, rows: Tensor, pixel_map: Tensor, scene: Scene, view: int) -> Tensor:
-    """(n, 4) Gaussians of `view` in the four pixels around each row's place there, -1 for none."""
+def _nearest(
+    sight: _Sight, rows: Tensor, pixel_map: Tensor, scene: Scene, view: int
+) -> tuple[Tensor, Tensor]:
+    """Those of the rows (n,) that have Gaussians of `view` in the four pixels around their place there, and
+    these (n, 4), -1 for none."""
     height, width = pixel_map.shape
     corner = (_pixels(sight.means[rows], scene, view) + 0.5).floor().long()  # +1 border, -0.5 centre
-    columns = torch.stack((corner[:, 0], corner[:, 0] + 1), -1).clamp(0, width - 1)
-    lines = torch.stack((corner[:, 1], corner[:, 1] + 1), -1).clamp(0, height - 1)
-    return pixel_map[lines[:, :, None], columns[:, None, :]].flatten(1)
+    column, line = corner.unbind(-1)
+    inside = (column >= 0) & (column < width - 1) & (line >= 0) & (line < height - 1)
+    rows, first = rows[inside], (line * width + column)[inside]
+    around = torch.tensor([0, 1, width, width + 1], device=rows.device)
+    candidates = pixel_map.flatten()[first[:, None] + around]
+    some = candidates.amax(-1) >= 0
+    return rows[some], candidates[some]
 
 
 def _pairs(
     sight: _Sight, rows: Tensor, candidates: Tensor, radius: float, colour_tolerance: float
 ) -> tuple[Tensor, Tensor]:
-    """Children (c,) and their parents (c,), no parent twice."""
+    """Children (c,) and their parents (c,), no parent twice; colours are looked at where places agree."""
     there = candidates.clamp_min(0)
-    distances = (sight.means[there] - sight.means[rows, None]).norm(dim=-1)
-    reach = radius * torch.minimum(sight.footprints[there], sight.footprints[rows, None])
+    distances = (_picked(sight.means, there) - sight.means[rows, None]).norm(dim=-1)
+    reach = radius * torch.minimum(_picked(sight.footprints, there), sight.footprints[rows, None])
+    close = (candidates >= 0) & (distances < reach)
+    some = close.any(-1)
+    rows, there, close, distances = rows[some], there[some], close[some], distances[some]
     colour_gap = (sight.colours[there] - sight.colours[rows, None]).abs().amax(-1)
-    same = (candidates >= 0) & (distances < reach) & (colour_gap < colour_tolerance)
+    same = close & (colour_gap < colour_tolerance)
     distances, which = torch.where(same, distances, torch.inf).min(-1)
     matched = torch.isfinite(distances).nonzero().squeeze(1)
     found = there[matched, which[matched]]
     chosen = _first_of_each(found, distances[matched], len(sight.means))
     return rows[matched[chosen]], found[chosen]
+
+
+def _picked(values: Tensor, ids: Tensor) -> Tensor:
+    """`values[ids]` of ids (n, m), which `index_select` finds in a third of the time."""
+    return values.index_select(0, ids.flatten()).unflatten(0, ids.shape)
 
 
 def _first_of_each(keys: Tensor, costs: Tensor, num_keys: int) -> Tensor:

@@ -10,7 +10,9 @@ from torch.nn import functional as F
 from langflash_core.geometry.cameras import invert_rigid, rays
 from langflash_core.geometry.quaternions import covariances, quats_to_matrices
 from langflash_core.network.gaussians import CHANNELS, assemble_gaussians, footprints
+from langflash_core.network.guided import _one_by_one
 from langflash_core.network.stereo.prior import DepthMaps
+from langflash_core.network.stereo.sharpening import sharpened
 from langflash_core.network.stereo.sweep import Compared, patches, sweep_correlation
 
 K = torch.tensor([[40.0, 0, 16], [0, 40.0, 12], [0, 0, 1]], dtype=torch.float64)
@@ -201,3 +203,12 @@ def test_gaussians_land_on_the_surface_in_world_space():
     spread = covariances(gaussians.quats, gaussians.scales)
     assert torch.linalg.eigvalsh(spread).min() > 0
     assert torch.allclose(0.5 + 0.28209479177387814 * gaussians.sh[pixel, 0], images[1, :, 10, 7], atol=1e-12)
+
+
+def test_views_one_by_one_give_what_all_at_once_do(untrained):
+    torch.manual_seed(0)
+    images = torch.rand(3, 3, 56, 70)
+    depths = (images[:, 0] > 0.5) + torch.rand(3, 56, 70) / 10
+    for work, of_views in ((untrained.local, (images,)), (sharpened, (depths, images))):
+        # The same sums; a convolution may order them otherwise for another batch.
+        torch.testing.assert_close(_one_by_one(work, *of_views), work(*of_views), atol=1e-5, rtol=0)

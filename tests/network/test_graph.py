@@ -1,5 +1,7 @@
 """Relative poses of many pairs brought together: against scipy, against wrong edges, against drift."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -62,6 +64,22 @@ def test_exact_edges_give_the_exact_places():
     np.testing.assert_allclose(found.viewmats, viewmats, atol=1e-9)
     np.testing.assert_allclose(np.log(found.scales), logs, atol=1e-9)
     assert found.kept == tuple(pairs) and found.missing == ()
+
+
+def test_an_edge_knows_what_its_matches_know_and_never_more_than_they_share():
+    rng = np.random.default_rng(3)
+    pose = _edge(_matrix([0.1, 0.2, 0.3], [0.4, 0.0, 0.1]))
+    shift = graph._SHIFT_SIGMA * (0.1 + np.linalg.norm(pose.translation))
+    shared = np.diag(np.array([graph._TURN_SIGMA] * 3 + [shift] * 3 + [graph._SCALE_SIGMA]) ** 2)
+    root = rng.normal(size=(7, 7)) * [1e3, 1e3, 1e3, 1e2, 1e2, 1e2, 10]
+    known = replace(pose, information=root.T @ root + np.eye(7))
+    twin = np.linalg.inv(np.linalg.inv(known.information) + shared)
+    # Two inversions of matrices of condition 1e6.
+    np.testing.assert_allclose(graph._precision(known), twin, rtol=1e-6, atol=1e-6 * np.abs(twin).max())
+    blind = replace(pose, information=np.diag([0.0, 1e6, 1e6, 1e4, 1e4, 1e4, 100.0]))
+    precision = graph._precision(blind)
+    assert np.isfinite(precision).all() and precision[0, 0] == 0
+    assert (np.linalg.eigvalsh(precision) >= 0).all()
 
 
 def test_errors_do_not_grow_along_the_tree_as_they_did():

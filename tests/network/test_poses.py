@@ -6,6 +6,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from langflash_core.network.stereo import matching
+from langflash_core.network.stereo.keypoints import KeyPoints
 from langflash_core.network.stereo.matching import (
     Matches,
     RelativePose,
@@ -14,6 +15,7 @@ from langflash_core.network.stereo.matching import (
     refine_pose,
     relative_pose,
 )
+from langflash_core.network.stereo.poses import PoseInput, estimate_poses
 
 SIGMA = 1 / 600  # one pixel at a focal length of 600
 
@@ -156,3 +158,15 @@ def test_mutual_pairs_are_first_in_their_row_and_in_their_column():
             expected.setdefault(int(best[row]), row)
     assert dict(zip(columns.tolist(), rows.tolist(), strict=True)) == expected
     assert len(rows) > 10 and np.all(np.diff(rows) > 0)
+
+
+@pytest.mark.parametrize(("seen", "guessed"), [(15, ()), (14, (1,))])
+def test_a_photo_with_nothing_to_tell_places_by_is_not_placed(seen, guessed):
+    """Borders of a blank photo agree with those of any other; here even all its cells do."""
+    local = np.random.default_rng(0).normal(size=(64, 20, 30)).astype(np.float32)
+    local /= np.linalg.norm(local, axis=0)
+    K = np.array([[270.0, 0, 150], [0, 270, 100], [0, 0, 1]])
+    view = PoseInput(K, (300, 200), np.full((200, 300), 2.0), local)
+    positions = np.full((100, 2), 50.0), np.full((seen, 2), 50.0)
+    found = estimate_poses([view, view], KeyPoints(positions, {(0, 1): np.zeros((0, 2), int)}))
+    assert found.guessed == guessed

@@ -115,10 +115,11 @@ def test_sparse_weights_are_the_largest_and_sum_to_one(num_atoms, top_m):
 
 
 def test_weights_without_sum_or_finite_value_carry_nothing():
-    dense = torch.tensor([[0.0, 0.0, 0.0], [torch.nan, 0.5, 0.5], [0.5, -1.0, 0.5]])
+    nan, inf = torch.nan, torch.inf
+    dense = torch.tensor([[0, 0, 0], [nan, 0.5, 0.5], [0.5, inf, 0.5], [-inf, 0.5, 0.5], [0.5, -1, 0.5]])
     ids, values = sparse_weights(dense, 2)
-    assert values.sum(-1).tolist() == [0.0, 0.0, 1.0]
-    assert sorted(ids[2].tolist()) == [0, 2]
+    assert values.sum(-1).tolist() == [0.0, 0.0, 0.0, 0.0, 1.0]
+    assert sorted(ids[4].tolist()) == [0, 2]
 
 
 def test_tensors_of_inference_become_plain_ones():

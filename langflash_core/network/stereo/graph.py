@@ -169,10 +169,14 @@ def gap(viewmats: np.ndarray, logs: np.ndarray, edge: tuple[int, int], pose: Rel
 
 
 def _precision(pose: RelativePose) -> np.ndarray:
-    """Inverse covariance (7, 7) of an edge: that of its matches, and what they share."""
+    """Inverse covariance (7, 7) of an edge: (L^-1 + S)^-1 with L the information of its matches and S what
+    they share. In units of S it is L (L + 1)^-1, also where the matches say nothing of a direction."""
     shift = _SHIFT_SIGMA * (0.1 + np.linalg.norm(pose.translation))
-    shared = np.array([_TURN_SIGMA] * 3 + [shift] * 3 + [_SCALE_SIGMA]) ** 2
-    return np.linalg.inv(np.linalg.inv(pose.information) + np.diag(shared))
+    sigmas = np.array([_TURN_SIGMA] * 3 + [shift] * 3 + [_SCALE_SIGMA])
+    units = np.outer(sigmas, sigmas)
+    values, axes = np.linalg.eigh(pose.information * units)
+    values = values.clip(0)  # rounding
+    return (axes * (values / (1 + values))) @ axes.T / units
 
 
 def _step(viewmats, logs, pairs: Pairs, precisions) -> np.ndarray:

@@ -14,7 +14,8 @@ import numpy as np
 _MAX_FEATURES = 4000
 _CONTRAST = 0.01  # walls have little: the default of 0.04 finds nothing on them
 _RATIO = 0.8  # Lowe's test
-_MIN_INLIERS = 15
+MIN_INLIERS = 15
+"""Matches that must agree with a pose."""
 _DEPTH_SIGMA = 0.25  # log-depth error expected of a monocular map
 _SCALE_SIGMA = 0.3  # log ratio expected between the scales of two monocular maps
 _INDEPENDENT = 20
@@ -119,23 +120,23 @@ def relative_pose(matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray) ->
     Args:
         depth_i, depth_j: (n,) z of the monocular maps at the matches, > 0.
     """
-    if len(matches) < _MIN_INLIERS:
+    if len(matches) < MIN_INLIERS:
         return None
     candidates = [(np.eye(3), np.zeros(3), np.ones(len(matches), bool))]
     candidates += _five_point(matches, depth_i) + _pnp(matches, depth_i)
     best = None
     for rotation, translation, keep in candidates:
-        if keep.sum() < _MIN_INLIERS:
+        if keep.sum() < MIN_INLIERS:
             continue
         pose = refine_pose(matches.subset(keep), depth_i[keep], depth_j[keep], rotation, translation)
         pose = _score(matches, depth_i, depth_j, pose)
         if best is None or pose.cost < best.cost:
             best = pose
     for _ in range(_ROUNDS):
-        if best is None or best.num_inliers < _MIN_INLIERS:
+        if best is None or best.num_inliers < MIN_INLIERS:
             return None
         best = _score(matches, depth_i, depth_j, _refined(matches, depth_i, depth_j, best))
-    return best if best is not None and best.num_inliers >= _MIN_INLIERS else None
+    return best if best is not None and best.num_inliers >= MIN_INLIERS else None
 
 
 def _refined(matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray, pose: RelativePose) -> RelativePose:
@@ -150,14 +151,14 @@ def _five_point(matches: Matches, depth_i: np.ndarray) -> list[tuple[np.ndarray,
     essential, inliers = cv2.findEssentialMat(
         matches.x_i, matches.x_j, np.eye(3), method=cv2.USAC_MAGSAC, prob=0.9999, threshold=threshold
     )
-    if essential is None or essential.shape != (3, 3) or inliers.sum() < _MIN_INLIERS:
+    if essential is None or essential.shape != (3, 3) or inliers.sum() < MIN_INLIERS:
         return []
     keep = inliers[:, 0].astype(bool)
     _, rotation, direction, _ = cv2.recoverPose(essential, matches.x_i[keep], matches.x_j[keep], np.eye(3))
     direction = direction[:, 0]
     depths = triangulate(matches.x_i[keep], matches.x_j[keep], rotation, direction)
     usable = np.isfinite(depths) & (depths > 0)
-    if usable.sum() < _MIN_INLIERS // 2:
+    if usable.sum() < MIN_INLIERS // 2:
         return [(rotation, np.zeros(3), keep)]
     length = np.median(depth_i[keep][usable] / depths[usable])
     return [(rotation, direction * length, keep), (rotation, np.zeros(3), keep)]

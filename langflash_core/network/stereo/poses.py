@@ -10,7 +10,13 @@ from langflash_core.network.stereo.dense import match_cells
 from langflash_core.network.stereo.graph import chosen_pairs, closest, placed, unconnected
 from langflash_core.network.stereo.keypoints import WORKING_SIDE, KeyPoints
 from langflash_core.network.stereo.known import agreeing, depth_scales, log_scales
-from langflash_core.network.stereo.matching import Matches, RelativePose, relative_pose, triangulate
+from langflash_core.network.stereo.matching import (
+    MIN_INLIERS,
+    Matches,
+    RelativePose,
+    relative_pose,
+    triangulate,
+)
 
 _MIN_SHARE = 0.25  # of the matches must agree with a pose
 _MAX_DEPTH_SIGMA = 0.2  # log-depth error beyond which a triangulated match says too little
@@ -68,7 +74,8 @@ def estimate_poses(
         InputError: the photos do not fit the poses that are given.
     """
     num_views = len(views)
-    edges = {edge: _key_point_matches(views, points, *edge) for edge in chosen_pairs(num_views, points.pairs)}
+    told = {edge: rows for edge, rows in points.pairs.items() if not _blank(points, edge)}
+    edges = {edge: _key_point_matches(views, points, *edge) for edge in chosen_pairs(num_views, told)}
     if known is None:
         pairs, agreed = _pair_poses(views, edges, check)
         found = placed(num_views, pairs)
@@ -83,6 +90,12 @@ def estimate_poses(
     corrections = [_correction(v, views[v], viewmats, scales[v], agreed) for v in range(num_views)]
     shared = {edge: len(matches) for edge, matches in agreed.items()}
     return Poses(viewmats, scales, tuple(corrections), guessed, closest(num_views, shared))
+
+
+def _blank(points: KeyPoints, edge: tuple[int, int]) -> bool:
+    """Whether one of two photos shows nothing to tell places by: dense matches are its borders then, which
+    agree with those of any photo."""
+    return min(len(points.positions[view]) for view in edge) < MIN_INLIERS
 
 
 def _pair_poses(

@@ -28,6 +28,17 @@ def test_files_beside_are_kept_and_old_ones_replaced(tmp_path):
     assert sorted(os.listdir(tmp_path)) == ["mine.txt", "x.txt"]
 
 
+def test_what_is_staged_for_the_folder_one_is_in_lies_in_it(tmp_path, monkeypatch):
+    """Its parent may belong to somebody else."""
+    own = tmp_path / "own"
+    own.mkdir()
+    monkeypatch.chdir(own)
+    with staged_folder(Path("x.txt").parent) as staging:
+        assert staging.resolve().parent == own
+        (staging / "x.txt").write_bytes(b"x")
+    assert os.listdir(own) == ["x.txt"]
+
+
 def test_what_a_killed_process_leaves_goes_at_the_next_write(tmp_path):
     code = """if True:
         import os, sys
