@@ -118,8 +118,6 @@ def value(name: str, hint, chance: np.random.Generator, state: State):
         return show.ClearPhotos()
     if hint is SceneInfo:
         return state.info
-    if hint is Scene:
-        return state.info.scene if state.info else None
     if hint is Pose:
         return state.pose
     if hint is Vector:
