@@ -29,7 +29,7 @@ def principal(features: Float[Tensor, "n C"], count: int) -> Float[Tensor, "d C"
 class Decoder:
     """z -> L: the basis' own answer, and what a hidden layer of relu(z / |z| A + b) adds to it.
 
-    basis: (d, C). hidden: A (d, h); shift: b (h); out: (h, C), all None where the decoder is linear.
+    basis: (d, C). hidden: A (d, h); shift: b (h); out: (h, C).
     """
 
     basis: Tensor
