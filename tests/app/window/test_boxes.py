@@ -26,6 +26,7 @@ def test_a_caption_deep_in_a_panel_stays_covered() -> None:
 
 def test_windows_over_the_picture_are_found_but_for_what_comes_and_goes() -> None:
     context = imgui.create_context()
+    imgui.get_io().set_ini_filename("")
     imgui.get_io().backend_flags |= imgui.BackendFlags_.renderer_has_textures
     found = ()
     try:
