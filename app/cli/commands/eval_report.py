@@ -11,6 +11,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
+from langflash_core.__main__ import in_program
 from langflash_core.errors import InputError, LangFlashError
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.photos import PhotoFolder, open_folder
@@ -86,7 +87,8 @@ def report(args: Namespace, out: TextIO) -> None:
 def _neighbour(args: Namespace) -> Iterator[BaseProcess]:
     """A process beside this one, which judges all sections but the first into the same work folder; it ends
     with this one, however that ends."""
-    process = get_context("spawn").Process(target=_judge_the_rest, args=(args,), daemon=True)
+    whole = ("cli.commands.eval_report", "judge_the_rest", args)
+    process = get_context("spawn").Process(target=in_program, args=whole, daemon=True)
     process.start()
     _share_cores()
     try:
@@ -96,7 +98,8 @@ def _neighbour(args: Namespace) -> Iterator[BaseProcess]:
         process.join()
 
 
-def _judge_the_rest(args: Namespace) -> None:
+def judge_the_rest(args: Namespace) -> None:
+    """What the neighbour does."""
     from langflash_core.lab.evaluation.report import sections
 
     _share_cores()
