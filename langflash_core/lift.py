@@ -21,6 +21,7 @@ from torch import Tensor
 from langflash_core.errors import Cancelled, InputError
 from langflash_core.export.cameras import read_posed
 from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.geometry.turning import axes_matrix
 from langflash_core.images.pictures import fitting_size
 from langflash_core.images.views import load_views
 from langflash_core.network import PRESETS, load_network
@@ -29,7 +30,7 @@ from langflash_core.scene.assemble import sparse_weights
 from langflash_core.scene.bare import framing_camera
 from langflash_core.splat import render as render_reference
 from langflash_core.splat.backprojection import gathered
-from langflash_core.types import Camera, Frame, Scene, Semantics, Views
+from langflash_core.types import Camera, Frame, Gaussians, Scene, Semantics, Views
 
 PRESET = "mini"
 VIEWS = 8  # what the network was shaped for
@@ -39,6 +40,9 @@ _GREY = 0.5  # behind what a view shows, as behind transparent photos
 _COVERED = 0.5  # alpha from which a pixel speaks of the scene
 _SEEN = 1e-3  # sum of c_ip below which a Gaussian counts as not seen
 _TOP = 8  # weights kept per Gaussian
+UP = "-y"  # of the world of a `Scene`
+_TO_DOWN = {"-y": "RDF", "y": "RUB", "z": "RBD", "-z": "RFU", "x": "DLF", "-x": "URF"}  # turns: +y comes down
+UPS = tuple(_TO_DOWN)
 _QUALITY = 88
 Progress = Callable[[str, float], None]
 Renderer = Callable[[Scene, Camera], Frame]
@@ -49,6 +53,7 @@ def lift(
     photos: Views | None = None,
     viewmats: Tensor | None = None,
     *,
+    up: str = UP,
     render: Renderer | None = None,
     weights: Path | None = None,
     progress: Progress = lambda _, __: None,
@@ -60,6 +65,7 @@ def lift(
         scene: any; what language it has is replaced.
         photos, viewmats: V views and their poses (V, 4, 4) in the scene's world; None: views of the
             scene itself, around its middle.
+        up: the axis of the scene's world that points up, one of `UPS`; for views of itself.
         render: draws colour and depth; None: the reference in torch. weights: a checkpoint of `mini`.
         progress: called with the step and its place in [0, 1]. cancelled: asked between steps and views.
 
@@ -69,7 +75,7 @@ def lift(
     """
     draw = render or render_reference
     if photos is None or viewmats is None:
-        cameras = cameras_around(scene)
+        cameras = cameras_around(scene, up=up)
     else:
         cameras = [Camera(v, K, *photos.size) for v, K in zip(viewmats, photos.Ks, strict=True)]
     frames = []
@@ -114,11 +120,24 @@ def posed_views(poses: Path, photos: Sequence[Path]) -> tuple[Views, Tensor]:
     return views, posed.viewmats.float()
 
 
-def cameras_around(scene: Scene, count: int = VIEWS) -> list[Camera]:
-    """Cameras around what `framing_camera` frames, looking at its middle from two heights; +y is down."""
-    framing = framing_camera(scene.gaussians)
-    means = scene.gaussians.means[scene.gaussians.opacities >= 0.1]
-    means = means if len(means) else scene.gaussians.means
+def cameras_around(scene: Scene, count: int = VIEWS, up: str = UP) -> list[Camera]:
+    """Cameras around what `framing_camera` frames, looking at its middle from two heights, upright.
+
+    Args:
+        up: the axis of the scene's world that points up, one of `UPS`.
+    """
+    turn = axes_matrix(_TO_DOWN[up])
+    upright = replace(scene.gaussians, means=(scene.gaussians.means.double() @ turn.T).float())
+    to_upright = torch.eye(4)
+    to_upright[:3, :3] = turn
+    return [replace(c, viewmat=c.viewmat @ to_upright) for c in _cameras_around(upright, count)]
+
+
+def _cameras_around(gaussians: Gaussians, count: int) -> list[Camera]:
+    """The same where +y is down."""
+    framing = framing_camera(gaussians)
+    means = gaussians.means[gaussians.opacities >= 0.1]
+    means = means if len(means) else gaussians.means
     step = max(1, len(means) // 100_000)
     pose = invert_rigid(framing.viewmat.double())
     eye, forward = pose[:3, 3], pose[:3, 2]

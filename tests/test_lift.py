@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from langflash_core.errors import Cancelled, InputError
-from langflash_core.lift import cameras_around, lift
+from langflash_core.lift import UPS, cameras_around, lift
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from langflash_core.splat import rasterize, render
@@ -77,7 +77,7 @@ def known_network(monkeypatch) -> Scene:
     cameras = cameras_around(whole, 4)
     monkeypatch.setattr("langflash_core.lift.load_network", lambda *_, **__: named)
     monkeypatch.setattr("langflash_core.lift.posed_semantics", seen)
-    monkeypatch.setattr("langflash_core.lift.cameras_around", lambda scene: cameras)
+    monkeypatch.setattr("langflash_core.lift.cameras_around", lambda *_, **__: cameras)
     return whole
 
 
@@ -126,3 +126,17 @@ def test_cameras_look_at_the_middle_upright():
         centre = camera.viewmat[:3, :3] @ whole.gaussians.means.mean(0) + camera.viewmat[:3, 3]
         assert float(centre[2]) > 0 and float(centre[:2].abs().max()) < 0.2 * float(centre[2])
         assert float(camera.viewmat[1, 1]) > 0  # +y of the world is down in the picture
+
+
+@pytest.mark.parametrize("up", UPS)
+def test_the_axis_that_points_up_is_up_in_every_view(up):
+    whole = bare_scene(stripes().gaussians, "wall.ply")
+    upward = torch.zeros(3)
+    upward["xyz".index(up[-1])] = -1.0 if up.startswith("-") else 1.0
+    for camera in cameras_around(whole, up=up):
+        turn = camera.viewmat[:3, :3]
+        assert torch.allclose(turn @ turn.T, torch.eye(3), atol=1e-5)  # of float32
+        assert float(torch.linalg.det(turn)) > 0  # no mirror
+        in_view = turn @ upward
+        assert float(in_view[1]) < -0.8 and abs(float(in_view[0])) < 1e-5  # at most 35 degrees from above
+        assert float((turn.T @ torch.tensor([0.0, 0, 1])) @ upward) < 0  # it looks down on things

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 _SCALAR_STEPS, _VECTOR_STEPS = 24, 5
-_PAIRS_AT_ONCE = 1 << 26  # distances: 256 MB
+_PAIRS_AT_ONCE = 1 << 18  # distances: 1 MB, which a processor's cache holds
 
 
 def scalar_codebook(values: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
@@ -53,4 +53,4 @@ def _nearest(points: torch.Tensor, centres: torch.Tensor) -> torch.Tensor:
     """The nearest centre (n,) of points (n, d): |c|^2 - 2 p c is smallest where |p - c|^2 is."""
     norms = (centres**2).sum(1)
     step = max(1, _PAIRS_AT_ONCE // len(centres))
-    return torch.cat([(norms - 2 * part @ centres.T).argmin(1) for part in points.split(step)])
+    return torch.cat([torch.addmm(norms, part, centres.T, alpha=-2).argmin(1) for part in points.split(step)])

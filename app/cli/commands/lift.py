@@ -39,6 +39,7 @@ def run(args: Namespace, out: TextIO) -> None:
             scene,
             views,
             viewmats,
+            up=args.up,
             render=lambda scene, camera: renderer(scene, camera, weight_maps=False),
             weights=args.weights,
             progress=progress,

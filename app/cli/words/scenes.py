@@ -257,6 +257,13 @@ def add_lift(commands) -> None:
     )
     command.add_argument("--poses", type=Path, metavar="PATH", help="transforms.json, or a COLMAP text model")
     command.add_argument(
+        "--up",
+        choices=("x", "y", "z", "-x", "-y", "-z"),
+        default="-y",
+        metavar="AXIS",
+        help="of views of itself: the scene's axis that points up: z, or --up=-z and so on (default: -y)",
+    )
+    command.add_argument(
         "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped ones"
     )
     add_backend(command)
