@@ -486,8 +486,10 @@ def test_the_table_in_the_readme_is_what_the_code_does():
     """A row a format: whether it is read and written, and its axes."""
     from langflash_core.export import gltf, usd
 
-    lines = (Path(__file__).parents[2] / "README.md").read_text().split("### Splat files")[1].splitlines()
-    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if line.startswith("| `")]
+    readme = (Path(__file__).parents[2] / "README.md").read_text()
+    section = readme.split("### Splat files")[1].split("\n#")[0]
+    lines = [line for line in section.splitlines() if line.startswith("| `")]
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
     axes = {"`.spz`": spz._STORED_AXES, "`.glb`": gltf._AXES, "`.usd`": usd._AXES["Y"]}
     read_kinds, written_kinds = set(), set()
     for kinds, ways, letters, *_ in rows:
