@@ -39,6 +39,7 @@ def resident_megabytes() -> float:
 @pytest.fixture(scope="module")
 def use_another_program(context):
     """A program in use outlives its deletion: use this one before counting."""
+    context.__enter__()  # current, whoever else drew in between
     program = context.program(
         vertex_shader="#version 330 core\nout float x; void main() { x = 1.0; }", varyings=["x"]
     )
