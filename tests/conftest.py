@@ -18,6 +18,7 @@ os.environ["PYTHONPATH"] = os.pathsep.join([ROOT, *filter(None, [os.environ.get(
 # passes for a float, as type checkers have it.
 install_import_hook("langflash_core", "beartype.beartype(conf=beartype.BeartypeConf(is_pep484_tower=True))")
 
+import pytest  # noqa: E402 - after the hook
 import torch  # noqa: E402 - after the threads
 
 torch.set_num_threads(int(os.environ["OMP_NUM_THREADS"]))
@@ -26,3 +27,26 @@ torch.set_num_threads(int(os.environ["OMP_NUM_THREADS"]))
 def pytest_runtest_setup() -> None:
     """Of a list the checker looks at one item, drawn at random: the same one whenever a test is run again."""
     random.seed(0)
+
+
+@pytest.fixture(scope="session")
+def context():
+    """One OpenGL context without a window for all tests; they are skipped where there is none."""
+    from langflash_core.errors import GraphicsError
+    from langflash_core.graphics import offscreen_context
+
+    try:
+        made = offscreen_context()
+    except GraphicsError as problem:
+        pytest.skip(str(problem))
+    yield made
+    made.release()
+
+
+@pytest.fixture
+def gl(context):
+    """The context, free of errors before and after each test; current, whoever else drew in between."""
+    context.__enter__()
+    assert context.error == "GL_NO_ERROR"
+    yield context
+    assert context.error == "GL_NO_ERROR"

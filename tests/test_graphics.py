@@ -11,16 +11,6 @@ from langflash_core.graphics import Programs, offscreen_context, set_uniforms, s
 from langflash_core.resources import shader_path
 
 
-@pytest.fixture(scope="module")
-def context():
-    try:
-        made = offscreen_context()
-    except GraphicsError as problem:
-        pytest.skip(str(problem))
-    yield made
-    made.release()
-
-
 def test_a_shader_is_its_text_with_includes_and_defines():
     source = shader_source("splat/norm.frag", {"LAYERS": 3, "COLUMNS": 2})
     lines = source.splitlines()
@@ -57,8 +47,8 @@ def test_every_include_is_found(folder):
             assert "#include" not in source and source.startswith("#version 330 core\n"), name
 
 
-def test_programs_are_compiled_once_and_given_back(context):
-    programs = Programs(context, "splat", {"PHRASES_A_LAYER": 4})
+def test_programs_are_compiled_once_and_given_back(gl):
+    programs = Programs(gl, "splat", {"PHRASES_A_LAYER": 4})
     defines = {"EMPTY_NORM": 1e-4, "ATOMS_A_LAYER": 3}
     first = programs.get("screen.vert", "fast.frag", defines)
     assert programs.get("screen.vert", "fast.frag", dict(defines)) is first
@@ -66,11 +56,11 @@ def test_programs_are_compiled_once_and_given_back(context):
     programs.release()
     assert programs.get("screen.vert", "fast.frag", defines) is not first
     programs.release()
-    assert context.error == "GL_NO_ERROR"
+    assert gl.error == "GL_NO_ERROR"
 
 
-def test_matrices_are_given_by_rows(context):
-    program = context.program(
+def test_matrices_are_given_by_rows(gl):
+    program = gl.program(
         vertex_shader="#version 330 core\nuniform mat4 one; uniform mat4 two[2]; uniform vec4 rows[4];\n"
         "out vec4 x; out vec4 y; out vec4 z;\nvoid main() { vec4 v = vec4(1.0, 2.0, 3.0, 4.0);"
         "x = one * v; y = two[gl_VertexID + 1] * v; z = rows[gl_VertexID + 2]; }",
@@ -78,7 +68,7 @@ def test_matrices_are_given_by_rows(context):
     )
     values = np.random.default_rng(0).integers(0, 9, (2, 4, 4)).astype(float)
     set_uniforms(program, one=values[0], two=values, rows=values[0], unknown=1.0)
-    out, vao = context.buffer(reserve=48), context.vertex_array(program, [])
+    out, vao = gl.buffer(reserve=48), gl.vertex_array(program, [])
     vao.transform(out, mode=moderngl.POINTS, vertices=1)
     x, y, z = np.frombuffer(out.read(), np.float32).reshape(3, 4)
     vector = np.array([1, 2, 3, 4])

@@ -5,9 +5,8 @@ import sys
 import time
 from argparse import Namespace
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from multiprocessing import get_context
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
@@ -38,27 +37,25 @@ def report(args: Namespace, out: TextIO) -> None:
     Raises:
         LangFlashError: there is nothing to judge, or a source, the checkpoint or the output cannot be used.
     """
+    from langflash_core.lab.evaluation import report_page
+    from langflash_core.lab.evaluation.report import PUBLISHED, plans
+    from langflash_core.lab.evaluation.tallies import identity
+
     args.only = None
-    if (args.rooms, args.pack, args.posed, args.photos) == (None, None, None, None):
-        raise InputError("there is nothing to judge; give --rooms, --pack, --posed or --photos")
     if args.pack is not None:
         readable_file(args.pack, "furniture pack", InputError)
     if args.rooms is not None and not args.rooms.is_dir():
         raise InputError(f"there is no folder {args.rooms}; make it with langflash train cache")
-    sources = _sources(args)
+    first, *rest = plans(_sources(args))
     for folder in (args.output, args.small):
         if folder is not None:
             check_folder(folder)
-    from langflash_core.lab.evaluation import report_page
-    from langflash_core.lab.evaluation.report import PUBLISHED, sections
-    from langflash_core.lab.evaluation.tallies import identity
-
-    found = []
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer, _neighbour(args) as neighbour:
-        judged = sections(sources, _workplace(args, renderer, progress))
-        found.append(next(judged))
-        neighbour.join()  # what it kept is read; where it failed, this process meets the reason itself
-        found.extend(judged)
+    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+        place = _workplace(args, renderer, progress)
+        with _neighbour(args) if rest else nullcontext():
+            found = [first(place)]
+        # what the neighbour kept is read; where it failed, this process meets the reason itself
+        found += [judge(place) for judge in rest]
         drawn_by = renderer.backend
     name = args.weights.name if args.weights else args.preset
     made = report_page.Report(
@@ -84,15 +81,16 @@ def report(args: Namespace, out: TextIO) -> None:
 
 
 @contextmanager
-def _neighbour(args: Namespace) -> Iterator[BaseProcess]:
-    """A process beside this one, which judges all sections but the first into the same work folder; it ends
-    with this one, however that ends."""
+def _neighbour(args: Namespace) -> Iterator[None]:
+    """A process beside what is done here judges all sections but the first into the same work folder: it has
+    ended when this has, at once where this failed."""
     whole = ("cli.commands.eval_report", "judge_the_rest", args)
     process = get_context("spawn").Process(target=in_program, args=whole, daemon=True)
     process.start()
-    _share_cores()
     try:
-        yield process
+        with _half_of_the_threads():
+            yield
+        process.join()
     finally:
         process.kill()
         process.join()
@@ -100,23 +98,33 @@ def _neighbour(args: Namespace) -> Iterator[BaseProcess]:
 
 def judge_the_rest(args: Namespace) -> None:
     """What the neighbour does."""
-    from langflash_core.lab.evaluation.report import sections
+    from langflash_core.lab.evaluation.report import plans
 
-    _share_cores()
-    with suppress(LangFlashError, KeyboardInterrupt), open_renderer(args.backend) as renderer:
-        for _ in sections(_sources(args), _workplace(args, renderer, _silent), after=1):
-            pass
+    with (
+        suppress(LangFlashError, KeyboardInterrupt),
+        open_renderer(args.backend) as renderer,
+        _half_of_the_threads(),
+    ):
+        place = _workplace(args, renderer, _silent)
+        for judge in plans(_sources(args))[1:]:
+            judge(place)
 
 
 def _silent(stage: str, share: float) -> None:
     """The process in front tells how far it is."""
 
 
-def _share_cores() -> None:
-    """Two processes have half of the threads each."""
+@contextmanager
+def _half_of_the_threads() -> Iterator[None]:
+    """Two processes share the cores."""
     import torch
 
-    torch.set_num_threads(max(1, torch.get_num_threads() // 2))
+    threads = torch.get_num_threads()
+    torch.set_num_threads(max(1, threads // 2))
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
 
 
 def _sources(args: Namespace) -> "Sources":

@@ -94,34 +94,29 @@ class Workplace:
         return Shelf(self.folder / section, key, kind)
 
 
-def sections(sources: Sources, place: Workplace, *, after: int = 0) -> Iterator[Section]:
-    """A section of each source, as soon as it is judged; `after` so many that somebody else judges.
+def plans(sources: Sources) -> list[Callable[[Workplace], Section]]:
+    """What judges each source, in the order of the report. A judge may raise InputError: its source cannot
+    be used, or WeightsError: of the checkpoint.
 
     Raises:
-        InputError: there is no source, or one cannot be used. WeightsError: of the checkpoint.
+        InputError: there is no source.
     """
-    plans = _plans(sources, place)
-    if not plans:
-        raise InputError("there is nothing to judge; give --rooms, --pack, --posed or --photos")
-    for judge in plans[after:]:
-        yield judge()
-
-
-def _plans(sources: Sources, place: Workplace) -> list[Callable[[], Section]]:
     cache, pack, pairs, photos = sources.rooms, sources.pack, sources.posed, sources.photos
     limit = sources.limit
-    plans: list[Callable[[], Section]] = []
+    judges: list[Callable[[Workplace], Section]] = []
     if cache is not None:
-        plans.append(lambda: rooms_section(cache, place, limit))
+        judges.append(lambda place: rooms_section(cache, place, limit))
         if (cache / "train").is_dir():
-            plans.append(lambda: ablations_section(cache, place, limit))
+            judges.append(lambda place: ablations_section(cache, place, limit))
     if pack is not None:
-        plans.append(lambda: sides_section(pack, place, limit))
+        judges.append(lambda place: sides_section(pack, place, limit))
     if pairs is not None:
-        plans.append(lambda: posed_section(pairs, place, limit))
+        judges.append(lambda place: posed_section(pairs, place, limit))
     if photos is not None:
-        plans.append(lambda: photos_section(photos, sources.photo_ids or photos.ids, place))
-    return plans
+        judges.append(lambda place: photos_section(photos, sources.photo_ids or photos.ids, place))
+    if not judges:
+        raise InputError("there is nothing to judge; give --rooms, --pack, --posed or --photos")
+    return judges
 
 
 def rooms_section(data: Path, place: Workplace, limit: int | None = None) -> Section:

@@ -10,7 +10,6 @@ Sizes: B scenes, V views, h w the teacher's grid.
 import hashlib
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import torch
 from safetensors.torch import load_file, save
@@ -18,32 +17,19 @@ from torch import Tensor
 
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.training.batches import SceneBatch
-from langflash_core.lab.training.mixing import Mixed, each_of
+from langflash_core.lab.training.mixing import ToldSet
 from langflash_core.lab.training.shards import dequantise_tokens, quantise_tokens
 from langflash_core.network.encoders.mobile_sam import MobileSamEncoder
 
 
 @dataclass(frozen=True)
-class DenseSet:
+class DenseSet(ToldSet):
     """A set whose batches bring SAM's embedding of their views. folder: where it is kept."""
 
-    inner: Any
     teacher: MobileSamEncoder
     folder: Path
 
-    def part(self, number: int, count: int) -> "DenseSet":
-        """That of one of so many batches of a step."""
-        return replace(self, inner=self.inner.part(number, count))
-
-    def draw(self, count: int, views: int, generator: torch.Generator) -> SceneBatch | Mixed:
-        """As the set draws, with `dense`.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
-        return each_of(self.inner.draw(count, views, generator), self._told)
-
-    def _told(self, batch: SceneBatch) -> SceneBatch:
+    def told(self, batch: SceneBatch) -> SceneBatch:
         dense = [self._of(image) for image in batch.images.flatten(0, 1)]
         return replace(batch, dense=torch.stack(dense).unflatten(0, batch.images.shape[:2]))
 

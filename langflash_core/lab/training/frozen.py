@@ -21,7 +21,7 @@ from torch import Tensor
 
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.training.batches import Frozen, SceneBatch
-from langflash_core.lab.training.mixing import Mixed, each_of
+from langflash_core.lab.training.mixing import ToldSet
 from langflash_core.lab.training.shards import dequantise_tokens, quantise_tokens
 from langflash_core.network.checkpoints.parts import digest
 from langflash_core.network.encoders.shared import Tokens
@@ -32,10 +32,9 @@ MODULES = ("encoder", "decoder", "grouping_encoder", "grouping_decoder", "langua
 
 
 @dataclass(frozen=True)
-class FrozenSet:
+class FrozenSet(ToldSet):
     """A set whose batches bring what the network's frozen parts say of them. features: L(x), too."""
 
-    inner: Any
     network: LangFlashNet
     folder: Path
     features: bool = False
@@ -46,19 +45,7 @@ class FrozenSet:
         own = {k: v for k, v in network.state_dict().items() if k.partition(".")[0] in MODULES}
         return FrozenSet(inner, network, folder / digest(own), features)
 
-    def part(self, number: int, count: int) -> "FrozenSet":
-        """That of one of so many batches of a step."""
-        return replace(self, inner=self.inner.part(number, count))
-
-    def draw(self, count: int, views: int, generator: torch.Generator) -> SceneBatch | Mixed:
-        """As the set draws, and what is kept of it; what is not yet kept is computed and written.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
-        return each_of(self.inner.draw(count, views, generator), self._told)
-
-    def _told(self, batch: SceneBatch) -> SceneBatch:
+    def told(self, batch: SceneBatch) -> SceneBatch:
         paths = [self._path(image, K) for image, K in zip(batch.images, batch.Ks, strict=True)]
         missing = [row for row, path in enumerate(paths) if not path.is_file()]
         if missing:

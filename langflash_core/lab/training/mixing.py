@@ -5,7 +5,7 @@ their losses by their shares of the pictures.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import torch
@@ -67,6 +67,28 @@ def each_of(batch: SceneBatch | Mixed, change: Callable[[SceneBatch], SceneBatch
         return change(batch)
     rooms = None if batch.rooms is None else change(batch.rooms)
     return Mixed(change(batch.photos), rooms, batch.share)
+
+
+@dataclass(frozen=True)
+class ToldSet:
+    """A set whose batches bring what `told` adds to them. inner: draws them."""
+
+    inner: Any
+
+    def part(self, number: int, count: int) -> "ToldSet":
+        """That of one of so many batches of a step."""
+        return replace(self, inner=self.inner.part(number, count))
+
+    def draw(self, count: int, views: int, generator: torch.Generator) -> SceneBatch | Mixed:
+        """As the inner set draws, with what is known of the views besides.
+
+        Raises:
+            OutputError: what is kept on disk cannot be written.
+        """
+        return each_of(self.inner.draw(count, views, generator), self.told)
+
+    def told(self, batch: SceneBatch) -> SceneBatch:
+        raise NotImplementedError
 
 
 def loss_of(loss: StageLoss, network: LangFlashNet, batch: Any, words: Words) -> Loss:

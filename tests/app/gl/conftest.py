@@ -3,15 +3,6 @@ import pytest
 from app.gl import SplatRenderer
 
 
-@pytest.fixture
-def gl(context):
-    """The context, free of errors before and after each test; current, whoever else drew in between."""
-    context.__enter__()
-    assert context.error == "GL_NO_ERROR"
-    yield context
-    assert context.error == "GL_NO_ERROR"
-
-
 @pytest.fixture(params=["float16", "float32"])
 def renderer(gl, request):
     made = SplatRenderer(gl, request.param)

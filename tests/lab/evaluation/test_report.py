@@ -13,7 +13,7 @@ import pytest
 from langflash_core.colormaps import HEAT_STOPS
 from langflash_core.errors import InputError
 from langflash_core.lab.evaluation import labelled, posed, report_page
-from langflash_core.lab.evaluation.report import PUBLISHED, Sources, Workplace, sections
+from langflash_core.lab.evaluation.report import PUBLISHED, Sources, Workplace, plans
 from langflash_core.lab.evaluation.report_parts import Gallery, Plot, Point, Table
 from langflash_core.lab.evaluation.report_plot import svg
 from langflash_core.lab.evaluation.sights import Sight, heat_picture, label_picture, legend_of
@@ -49,7 +49,8 @@ def program(folder: PhotoFolder, monkeypatch) -> list[list[str]]:
 
 def made(folder: PhotoFolder, work: Path) -> list:
     ids = folder.ids[:2]
-    return list(sections(Sources(None, None, folder, folder, ids, limit=2), Workplace(render, work)))
+    place = Workplace(render, work)
+    return [judge(place) for judge in plans(Sources(None, None, folder, folder, ids, limit=2))]
 
 
 def test_a_report_holds_every_number_and_goes_on_where_it_stopped(folder, program, tmp_path):
@@ -93,9 +94,9 @@ def test_the_page_needs_nothing_from_elsewhere_and_escapes_what_it_says(folder, 
     assert report_page.html(replace(report, published=PUBLISHED)).count("0.7416") == 1
 
 
-def test_nothing_to_judge_is_one_sentence(tmp_path):
+def test_nothing_to_judge_is_one_sentence():
     with pytest.raises(InputError, match="give --rooms"):
-        list(sections(Sources(), Workplace(render, tmp_path)))
+        plans(Sources())
 
 
 def test_a_plot_holds_its_points_inside():
