@@ -89,18 +89,29 @@ def held_alone(folder: Path) -> Iterator[None]:
     make_folder(folder)
     own = part_beside(folder / _HELD)
     try:
-        own.touch()
-        others = [name for name in os.listdir(folder) if name.startswith(f".{_HELD}.") and name != own.name]
-        if any(_PART.fullmatch(name) for name in others):
+        if _others_hold(own):
             raise OutputError(
                 f"another run is writing to {folder}; wait for its end, or choose another place"
             )
         yield
+    finally:
+        _remove(own)
+
+
+def _others_hold(own: Path) -> bool:
+    """Mark a folder as held by this process; whether another holds it, too.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    folder = own.parent
+    try:
+        own.touch()
+        others = [name for name in os.listdir(folder) if name.startswith(f".{_HELD}.") and name != own.name]
     except OSError as error:
         reason = error.strerror or str(error)
         raise OutputError(f"cannot write to {folder}: {reason}; choose another place") from error
-    finally:
-        _remove(own)
+    return any(_PART.fullmatch(name) for name in others)
 
 
 def make_folder(folder: Path) -> None:

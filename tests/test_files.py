@@ -116,6 +116,9 @@ def test_a_folder_is_held_by_one(tmp_path):
         assert len(_parts(place)) == 1
     with held_alone(place), held_alone(tmp_path):
         pass
+    with pytest.raises(FileNotFoundError), held_alone(place):
+        (place / "missing").read_bytes()  # of what is done inside, not of the folder
+    assert not _parts(place)
     assert _parts(place) == []
 
 

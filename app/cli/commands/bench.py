@@ -22,26 +22,11 @@ def run(args: Namespace, out: TextIO) -> None:
         LangFlashError: the scene, the phrases or the output cannot be used, or OpenGL is missing.
     """
     _check(args)
-    from ...bench import document, measure, table
-    from ...bench.machine import machine
-    from ...bench.modes import AXES, modes_for
-    from ...gl import offscreen_context
+    from ...bench import measured_cases, table
 
     cases = _cases(args)
-    context = offscreen_context()
-    results = []
-    try:
-        with ProgressBar() as progress:
-            for number, case in enumerate(cases):
-
-                def told(stage: str, share: float, number: int = number) -> None:
-                    progress(stage, (number + share) / len(cases))
-
-                modes = modes_for(context, case.scene, args.only or AXES)
-                results.append(measure(context, case, modes, told))
-        measured = document(machine(context), results)
-    finally:
-        context.release()
+    with ProgressBar() as progress:
+        measured = measured_cases(cases, args.only, progress)
     if args.output is not None:
         _write(args, measured)
     if args.json:

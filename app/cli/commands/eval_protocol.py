@@ -4,7 +4,7 @@ from argparse import Namespace
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.lab.photos import PhotoFolder, open_folder
@@ -12,6 +12,10 @@ from langflash_core.lab.photos import PhotoFolder, open_folder
 from ..files import check_folder, check_output_file, readable_file
 from ..renderers import open_renderer
 from ..report import ProgressBar, write_tables
+
+if TYPE_CHECKING:
+    from langflash_core.lab.evaluation.lpips import Lpips
+    from langflash_core.lab.evaluation.tallies import Shelf
 
 
 def protocol(args: Namespace, out: TextIO) -> None:
@@ -44,7 +48,7 @@ def protocol(args: Namespace, out: TextIO) -> None:
                 progress(f"{case.name}, {done + 1} of {count or 'some'}", done / count if count else 0.0)
                 yield case
 
-        tallies = list(case_tallies(judge, told(), _shelf(args, Tally)))
+        tallies = list(case_tallies(judge, told(), _shelf(args, Tally, lpips)))
     chosen = PROTOCOLS[args.name]
     result = {"protocol": args.name, "weights": _weights(args), **result_of(tallies)}
     write_tables(args, result, cases_markdown(args.name, chosen.title, chosen.about, result), out)
@@ -99,7 +103,7 @@ def nyu_folder(path: Path) -> PhotoFolder:
     return folder
 
 
-def opened_lpips(path: Path | None):
+def opened_lpips(path: Path | None) -> "Lpips | None":
     """LPIPS as --lpips names it; None where it does not.
 
     Raises:
@@ -114,7 +118,7 @@ def _weights(args: Namespace) -> str:
     return str(args.weights) if args.weights else args.preset
 
 
-def _shelf(args: Namespace, kind: type):
+def _shelf(args: Namespace, kind: type, lpips: "Lpips | None" = None) -> "Shelf | None":
     """Where cases are kept; another checkpoint, preset, size or data set makes them anew."""
     from langflash_core.lab.evaluation.tallies import Shelf, identity
 
@@ -126,7 +130,7 @@ def _shelf(args: Namespace, kind: type):
         "weights": identity(args.weights, args.preset),
         "size": args.size,
         "index": None if args.index is None else str(args.index.resolve()),
-        "lpips": args.lpips is not None,
+        "lpips": lpips and lpips.digest,
         "align": args.align,
     }
     return Shelf(args.work / args.name, key, kind)

@@ -4,14 +4,14 @@ import shlex
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from langflash_core.__main__ import in_program
-from langflash_core.errors import InputError, LangFlashError
+from langflash_core.errors import InputError, LangFlashError, SceneFileError
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.photos import PhotoFolder, open_folder
 from langflash_core.running import Progress
@@ -21,12 +21,16 @@ from ..files import check_folder, readable_file
 from ..photos import chosen
 from ..renderers import Renderer, open_renderer
 from ..report import ProgressBar
+from ..scenes import open_scene
 from .eval_protocol import opened_lpips
 
 if TYPE_CHECKING:
     from langflash_core.lab.evaluation.report import Sources, Workplace
     from langflash_core.lab.evaluation.report_page import Report
+    from langflash_core.lab.evaluation.report_parts import Section
 
+FRAMES = 4
+"""Of the scene, in every mode."""
 WORK = "work"
 """Inside the output: tallies and pictures, so that a run that was ended goes on where it stopped."""
 
@@ -44,19 +48,21 @@ def report(args: Namespace, out: TextIO) -> None:
     args.only = None
     if args.pack is not None:
         readable_file(args.pack, "furniture pack", InputError)
+    if args.scene is not None:
+        readable_file(args.scene, "scene", SceneFileError)
     if args.rooms is not None and not args.rooms.is_dir():
         raise InputError(f"there is no folder {args.rooms}; make it with langflash train cache")
-    first, *rest = plans(_sources(args))
+    judges = plans(_sources(args))
+    if not judges and args.scene is None:
+        raise InputError("there is nothing to judge; give --rooms, --pack, --posed, --photos or --scene")
     for folder in (args.output, args.small):
         if folder is not None:
             check_folder(folder)
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
-        place = _workplace(args, renderer, progress)
-        with _neighbour(args) if rest else nullcontext():
-            found = [first(place)]
-        # what the neighbour kept is read; where it failed, this process meets the reason itself
-        found += [judge(place) for judge in rest]
-        drawn_by = renderer.backend
+    with ProgressBar() as progress:
+        drawn = [] if args.scene is None else [_drawing(args.scene, progress)]  # while nothing else runs
+        with open_renderer(args.backend) as renderer:
+            found = _judged(args, judges, _workplace(args, renderer, progress)) + drawn
+            drawn_by = renderer.backend
     name = args.weights.name if args.weights else args.preset
     made = report_page.Report(
         found,
@@ -78,6 +84,26 @@ def report(args: Namespace, out: TextIO) -> None:
         _write_small(made, args.small)
     told = ", ".join(f"{section.title}: {section.result['scenes']}" for section in found)
     print(f"{args.output / 'report.html'}: {told}", file=out)
+
+
+def _judged(
+    args: Namespace, judges: "Sequence[Callable[[Workplace], Section]]", place: "Workplace"
+) -> "list[Section]":
+    """A section of each, the first here, the others beside it."""
+    with _neighbour(args) if len(judges) > 1 else nullcontext():
+        first = [judge(place) for judge in judges[:1]]
+    # what the neighbour kept is read; where it failed, this process meets the reason itself
+    return first + [judge(place) for judge in judges[1:]]
+
+
+def _drawing(path: Path, progress: Progress) -> "Section":
+    """A scene drawn in every way that `langflash bench` knows."""
+    from langflash_core.lab.evaluation.report_drawing import drawing_section
+
+    from ...bench import measured_cases, scene_case
+
+    case = scene_case(path.stem, open_scene(path), None, FRAMES, None)
+    return drawing_section(measured_cases([case], None, progress))
 
 
 @contextmanager

@@ -238,6 +238,7 @@ def _add_report(actions) -> None:
         "--part", choices=("all", "train", "validation"), default="all", help="of --photos (default: all)"
     )
     add_description(command)
+    command.add_argument("--scene", type=Path, metavar="S", help="drawn in every way, as bench does")
     command.add_argument(
         "--small", type=Path, metavar="DIR", help="also the numbers and plots alone, for keeping"
     )

@@ -13,13 +13,15 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.errors import WeightsError
+from langflash_core.network.checkpoints.parts import digest
 
 _BLOCKS = ((0, 2), (5, 7), (10, 12, 14), (17, 19, 21), (24, 26, 28))
 _MEAN, _DEVIATION = (-0.030, -0.088, -0.188), (0.458, 0.448, 0.450)
 
 
 class Lpips:
-    """The distance with VGG-16; 0 for equal pictures, about .7 for pictures of different things."""
+    """The distance with VGG-16; 0 for equal pictures, about .7 for pictures of different things. digest: of
+    its weights."""
 
     def __init__(self, path: Path) -> None:
         """Read the weights.
@@ -37,6 +39,7 @@ class Lpips:
         if missing:
             raise WeightsError(f"{path} holds no {missing[0]}; name LPIPS weights of VGG-16")
         self._weights = {name: stored[name].float() for name in needed}
+        self.digest = digest(self._weights)
 
     @torch.no_grad()
     def maps(self, left: Tensor, right: Tensor) -> Tensor:

@@ -90,17 +90,17 @@ class Workplace:
     lpips: Lpips | None = None
 
     def shelf(self, section: str, kind: type, **key: object) -> Shelf:
-        key = {"weights": identity(self.weights, self.preset), "lpips": self.lpips is not None, **key}
+        key = {
+            "weights": identity(self.weights, self.preset),
+            "lpips": self.lpips and self.lpips.digest,
+            **key,
+        }
         return Shelf(self.folder / section, key, kind)
 
 
 def plans(sources: Sources) -> list[Callable[[Workplace], Section]]:
     """What judges each source, in the order of the report. A judge may raise InputError: its source cannot
-    be used, or WeightsError: of the checkpoint.
-
-    Raises:
-        InputError: there is no source.
-    """
+    be used, or WeightsError: of the checkpoint."""
     cache, pack, pairs, photos = sources.rooms, sources.pack, sources.posed, sources.photos
     limit = sources.limit
     judges: list[Callable[[Workplace], Section]] = []
@@ -114,8 +114,6 @@ def plans(sources: Sources) -> list[Callable[[Workplace], Section]]:
         judges.append(lambda place: posed_section(pairs, place, limit))
     if photos is not None:
         judges.append(lambda place: photos_section(photos, sources.photo_ids or photos.ids, place))
-    if not judges:
-        raise InputError("there is nothing to judge; give --rooms, --pack, --posed or --photos")
     return judges
 
 

@@ -14,25 +14,16 @@ LETTER = 6.2
 
 
 def svg(plot: Plot) -> str:
-    """The plot as one <svg> element; seconds are logarithmic where they differ by more than ten times."""
+    """The plot as one <svg> element; seconds are logarithmic where they differ by more than ten times, errors
+    where they do by more than a hundred."""
     points = [p for p in plot.points if math.isfinite(p.seconds) and math.isfinite(p.error)]
     if not points:
         return ""
     seconds = [max(p.seconds, 1e-6) for p in points]
-    logarithmic = max(seconds) > 10 * min(seconds)
-    across = _ticks(seconds, logarithmic)
     highs = [p.bounds[1] if p.bounds else p.error for p in points]
     lows = [p.bounds[0] if p.bounds else p.error for p in points]
-    up = _ticks([*highs, *lows], False)
-
-    def x(value: float) -> float:
-        low, high = across[0], across[-1]
-        share = math.log(value / low) / math.log(high / low) if logarithmic else (value - low) / (high - low)
-        return LEFT + share * (WIDTH - LEFT - RIGHT)
-
-    def y(value: float) -> float:
-        return HEIGHT - BOTTOM - (value - up[0]) / (up[-1] - up[0]) * (HEIGHT - TOP - BOTTOM)
-
+    x, across = _axis(seconds, 10, (LEFT, WIDTH - RIGHT))
+    y, up = _axis([*highs, *lows], 100, (HEIGHT - BOTTOM, TOP))
     parts = [
         f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" role="img" '
         f'aria-label="{escape(plot.title)}" xmlns="http://www.w3.org/2000/svg">'
@@ -115,12 +106,29 @@ def _dark(colour: tuple[int, int, int]) -> str:
     return f"rgb({', '.join(str(value * 3 // 4) for value in colour)})"
 
 
+def _axis(
+    values: Sequence[float], factor: float, ends: tuple[float, float]
+) -> tuple[Callable[[float], float], list[float]]:
+    """Where a value lies between two ends, and ticks; logarithmic where the largest is `factor` times the
+    smallest."""
+    logarithmic = min(values) > 0 and max(values) > factor * min(values)
+    ticks = _ticks(values, logarithmic)
+    scaled = math.log if logarithmic else float
+    low, high = scaled(ticks[0]), scaled(ticks[-1])
+
+    def place(value: float) -> float:
+        return ends[0] + (scaled(value) - low) / (high - low) * (ends[1] - ends[0])
+
+    return place, ticks
+
+
 def _ticks(values: Sequence[float], logarithmic: bool) -> list[float]:
     """Round numbers around the values, at least two."""
     low, high = min(values), max(values)
     if logarithmic:
         powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-        marks = [round(m * 10.0**p, 12) for p in powers for m in (1, 2, 5)]
+        steps = (1, 2, 5) if len(powers) < 6 else (1,)
+        marks = [round(m * 10.0**p, 12) for p in powers for m in steps]
         below, above = max(m for m in marks if m <= low), min(m for m in marks if m >= high)
         return [m for m in marks if below <= m <= above]
     reach = (high - low) or abs(high) or 1.0

@@ -1,9 +1,6 @@
 import pytest
 
 from app.bench import Case, synthetic_case
-from tests.app.gl.conftest import gl
-
-__all__ = ["gl"]
 
 
 def small_case() -> Case:

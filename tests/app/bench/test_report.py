@@ -14,6 +14,7 @@ from app.bench.machine import machine
 from app.bench.modes import modes_for
 from app.bench.plot import figure_of, write_plot
 from app.bench.report import COLUMNS, FORMAT
+from langflash_core.lab.evaluation.report_drawing import drawing_section
 from tests.app.bench.conftest import silent, small_case
 
 
@@ -49,6 +50,20 @@ def test_csv_has_the_rows_of_the_json(measured):
         assert line["case"] == measured["cases"][0]["name"]
         for name, value in row.items():
             assert line[name] == ("" if value is None else str(value))
+
+
+def test_a_section_has_every_mode_in_table_plot_and_numbers(measured):
+    section = drawing_section(measured)
+    rows = measured["cases"][0]["rows"]
+    (shown,), (plot,) = section.tables, section.plots
+    assert (
+        [row[0] for row in shown.rows] == [point.name for point in plot.points] == [r["mode"] for r in rows]
+    )
+    assert shown.rows[0][1] == "1.00" and all(len(row) == len(shown.header) for row in shown.rows)
+    for row, point in zip(rows, plot.points, strict=True):
+        assert (1e3 * point.seconds, point.error) == pytest.approx((row["ms_median"], row["relevance_mean"]))
+        assert section.result["measures"][f"{row['mode']}: psnr_db"] == row["psnr_db"]
+    assert "400 Gaussians" in section.about and measured["machine"]["gpu"] in section.about
 
 
 def test_the_table_names_machine_scene_and_every_mode(measured):

@@ -60,6 +60,13 @@ def test_a_report_of_rooms_has_the_tables_that_documents_ask_for(cache, tmp_path
     assert (tmp_path / "report" / "report.html").is_file() and list((tmp_path / "small").glob("*.svg"))
 
 
+def test_nothing_to_judge_is_one_sentence(tmp_path, capsys):
+    assert main(["eval", "report", "-o", str(tmp_path / "report")]) == 2
+    assert "give --rooms, --pack, --posed, --photos or --scene" in capsys.readouterr().err
+    assert main(["eval", "report", "-o", str(tmp_path / "report"), "--scene", str(tmp_path / "no.ply")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1 and not any(tmp_path.iterdir())
+
+
 def test_commands_are_told_without_the_folders_of_a_machine():
     words = ("/data/rooms", "--posed=/data/posed", "rooms", "--size=4x3", "a=b")
     assert [named(word) for word in words] == ["rooms", "--posed=posed", "rooms", "--size=4x3", "a=b"]

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from langflash_core.colormaps import HEAT_STOPS
-from langflash_core.errors import InputError
 from langflash_core.lab.evaluation import labelled, posed, report_page
 from langflash_core.lab.evaluation.report import PUBLISHED, Sources, Workplace, plans
 from langflash_core.lab.evaluation.report_parts import Gallery, Plot, Point, Table
@@ -94,11 +93,6 @@ def test_the_page_needs_nothing_from_elsewhere_and_escapes_what_it_says(folder, 
     assert report_page.html(replace(report, published=PUBLISHED)).count("0.7416") == 1
 
 
-def test_nothing_to_judge_is_one_sentence():
-    with pytest.raises(InputError, match="give --rooms"):
-        plans(Sources())
-
-
 def test_a_plot_holds_its_points_inside():
     points = [
         Point("fast <way>", 0.01, 0.4, (0.3, 0.5)),
@@ -113,6 +107,14 @@ def test_a_plot_holds_its_points_inside():
     assert 62 <= fast_x < slow_x <= 616 and 18 <= slow_y <= 292 and fast_y < slow_y  # less error is lower
     assert svg(Plot("Nothing", "", "", [])) == ""
     assert "<circle" in svg(Plot("One", "", "", [Point("only", 1.0, 0.0)]))
+
+
+def test_errors_of_many_sizes_stand_on_a_logarithmic_axis():
+    errors = (1e-8, 1e-5, 1e-2)
+    drawn = svg(Plot("Speed", "seconds", "error", [Point(str(e), 1.0, e) for e in errors]))
+    heights = [float(y) for y in re.findall(r'<circle cx="[\d.]+" cy="([\d.]+)"', drawn)]
+    assert heights[0] - heights[1] == pytest.approx(heights[1] - heights[2], abs=0.2)  # written to tenths
+    assert len(re.findall('class="grid" x1="62"', drawn)) == 7  # a line a power of ten
 
 
 def test_a_gallery_shows_the_worst_first_then_the_best(tmp_path):
