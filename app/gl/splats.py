@@ -10,22 +10,29 @@ from torch.nn import functional as F
 
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.geometry.quaternions import unit_quats
-from langflash_core.graphics import Programs, set_uniforms
+from langflash_core.graphics import Programs, draws_in_software, set_uniforms
 from langflash_core.splat.projection import ALPHA_MIN, DILATION, NEAR, TAN_MARGIN, drawable_rows
 from langflash_core.types import Camera, Scene
 
 from .layout import ATOMS_A_LAYER
+from .targets import as_sprites
 
 _ROW_TEXELS = 4096
 _ROWS_AT_ONCE = 1 << 16  # Gaussians: 12 MB of coefficients of degree 3
 TINTS = ((0.16, 0.56, 1.0), (1.0, 0.22, 0.20))  # colours of tint 1, selected, and tint 2, to be deleted
 TINTED = 0.75  # share of the tint; the rest and the shading stay, so that shapes can be seen
 _PLACE_FLOATS = 11  # place (4), shape (4), colour (3)
+_SLACK = 0.02  # deviations, of quad.vert
+_MARGIN = 128.0  # pixels around the image where a sprite's centre may be
 _WIDEST = 1e12  # scene units: wider Gaussians are flat over any view, and float32 squares end at 1e38
 
 
 class SplatBuffers:
     """Owns the vertex data of a scene; `sort` chooses and orders, `project` and `expand` fill.
+
+    Where OpenGL runs on the processor, footprints are read back: `boxes` (n, 4) float32 of those chosen, x0, y0,
+    x1, y1 in pixels, in draw order, else None. And where none of them is too large, `sprites` are drawn
+    in place of quads: the same fragments out of one vertex, some 30 % quicker there.
 
     Gaussians with a value or a weight that is not finite are left out (`num_dropped`), and those
     below opacity 1/255, which no pixel can show.
@@ -35,6 +42,10 @@ class SplatBuffers:
         self._ctx = ctx
         self._programs = programs
         self._owned: list = []
+        self._in_software = draws_in_software(ctx)
+        self._largest = min(2 * _MARGIN, ctx.info["GL_POINT_SIZE_RANGE"][1])  # sprite
+        self.boxes: np.ndarray | None = None
+        self.sprites = False
         gaussians = scene.gaussians.map(lambda v: v.detach().cpu().float())
         finite = drawable_rows(scene).cpu()
         kept = finite & (gaussians.opacities >= ALPHA_MIN)
@@ -193,6 +204,24 @@ class SplatBuffers:
         buffers = (*self._vertex_buffers, self._tints)
         content = [(b, f, n) for b, f, n in zip(buffers, formats, names, strict=True)]
         self._transform(program, content, self.places)
+        if self._in_software:
+            self._measure((camera.width, camera.height))
+
+    def _measure(self, size: tuple[int, int]) -> None:
+        """`boxes`, and whether all that reach the image are small enough for sprites."""
+        chosen = 4 * _PLACE_FLOATS * len(self.order)
+        places = np.frombuffer(self.places.read(chosen), np.float32).reshape(-1, _PLACE_FLOATS)
+        centres, (l11, l21, l22, radius) = places[:, :2], places[:, 4:8].T
+        with np.errstate(over="ignore", invalid="ignore"):  # what is broken compares as beside the image
+            reaches = (radius + _SLACK)[:, None] * np.stack((l11, np.hypot(l21, l22)), 1)
+            self.boxes = np.concatenate((centres - reaches, centres + reaches), 1)
+            touching = ((self.boxes[:, 2:] > 0) & (self.boxes[:, :2] < size)).all(1)
+        self.sprites = bool((2 * reaches[touching] < self._largest).all())
+
+    @property
+    def defines(self) -> dict[str, float]:
+        """What quad.vert is compiled with to draw these."""
+        return {"MARGIN": _MARGIN} if self.sprites else {}
 
     def expand(self, atoms: np.ndarray, first: int, num_layers: int) -> moderngl.Buffer:
         """Dense weights of `num_layers` layers of `atoms`, from place `first` on, in draw order."""
@@ -240,17 +269,25 @@ class SplatBuffers:
         num_layers: int = 0,
         colour: bool = True,
     ) -> None:
-        """One instanced quad per chosen Gaussian, with its colour, `num_layers` of weights, or both."""
+        """One quad or sprite per chosen Gaussian, with its colour, `num_layers` of weights, or both.
+
+        Args:
+            program: of quad.vert with these `defines`.
+        """
         key = ("draw", program.glo)
         if key not in self._vaos:
-            footprint = ("in_place", "in_shape")
-            content: list[tuple] = [(self.places, "4f 4f 12x/i", *footprint)]
+            footprint, each = ("in_place", "in_shape"), "v" if self.sprites else "i"
+            content: list[tuple] = [(self.places, f"4f 4f 12x/{each}", *footprint)]
             if colour:
-                content = [(self.places, "4f 4f 3f/i", *footprint, "in_colour")]
+                content = [(self.places, f"4f 4f 3f/{each}", *footprint, "in_colour")]
             if weights is not None:
-                content.append((weights, f"{ATOMS_A_LAYER * num_layers}f/i", "in_weights"))
+                content.append((weights, f"{ATOMS_A_LAYER * num_layers}f/{each}", "in_weights"))
             self._vaos[key] = self._ctx.vertex_array(program, content)
-        self._vaos[key].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(self.order))
+        if self.sprites:
+            with as_sprites(self._ctx, int(_MARGIN)):
+                self._vaos[key].render(moderngl.POINTS, vertices=len(self.order))
+        else:
+            self._vaos[key].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(self.order))
 
     def _drop_vaos(self) -> None:
         for vao in self._vaos.values():

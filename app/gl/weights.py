@@ -83,7 +83,7 @@ class WeightMaps:
         """One pass, of the atoms from place `first` on."""
         count = num_layers(min(ATOMS_A_PASS, len(atoms) - first))
         expanded = splats.expand(atoms, first, count)
-        program = self._painter.programs.get("quad.vert", "weights.frag", {"LAYERS": count})
+        program = self._painter.programs.get("quad.vert", "weights.frag", {"LAYERS": count, **splats.defines})
         set_uniforms(program, image_size=tuple(float(n) for n in self._size))
         target = layers.layers(first // ATOMS_A_LAYER, count)
         target.clear()
