@@ -1,4 +1,5 @@
-"""Weight maps W_k(p) of the atoms in view: drawn in passes of `layout.ATOMS_A_PASS`, read back on request."""
+"""Weight maps W_k(p) of the atoms in view: drawn in passes of `layout.ATOMS_A_PASS`,
+on a processor cell by cell (cells.py), read back on request."""
 
 from dataclasses import dataclass
 
@@ -122,7 +123,7 @@ class WeightMaps:
         target.scissor = cell.box
         with drawing(target, PREMULTIPLIED):
             splats.draw_some(program, cell.places, slots, count)
-        target.scissor = None
+        target.scissor = (0, 0, *self._size)
 
     def release(self) -> None:
         self._layers.release()

@@ -27,6 +27,7 @@ def drawn(gl, scene, view, splats=SplatBuffers):
     renderer.draw(view)
     frame = renderer.frame(weight_maps=True)
     film = renderer.colours(view).copy()
+    assert renderer._scene is not None and frame.weight_maps is not None
     sprites = renderer._scene.whole.splats.sprites
     renderer.release()
     return (frame.rgb, frame.alphas, frame.depths, frame.weight_maps), film, sprites
