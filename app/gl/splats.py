@@ -10,22 +10,30 @@ from torch.nn import functional as F
 
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.geometry.quaternions import unit_quats
-from langflash_core.graphics import Programs, set_uniforms
+from langflash_core.graphics import Programs, draws_in_software, set_uniforms
 from langflash_core.splat.projection import ALPHA_MIN, DILATION, NEAR, TAN_MARGIN, drawable_rows
 from langflash_core.types import Camera, Scene
 
 from .layout import ATOMS_A_LAYER
+from .targets import as_sprites
 
 _ROW_TEXELS = 4096
 _ROWS_AT_ONCE = 1 << 16  # Gaussians: 12 MB of coefficients of degree 3
 TINTS = ((0.16, 0.56, 1.0), (1.0, 0.22, 0.20))  # colours of tint 1, selected, and tint 2, to be deleted
 TINTED = 0.75  # share of the tint; the rest and the shading stay, so that shapes can be seen
-_PLACE_FLOATS = 11  # place (4), shape (4), colour (3)
+_SHAPE_FLOATS = 8  # place (4), shape (4)
+_PLACE_FLOATS = _SHAPE_FLOATS + 3  # and colour
+_SLACK = 0.02  # deviations, of quad.vert
+_MARGIN = 128.0  # pixels around the image where a sprite's centre may be
 _WIDEST = 1e12  # scene units: wider Gaussians are flat over any view, and float32 squares end at 1e38
 
 
 class SplatBuffers:
     """Owns the vertex data of a scene; `sort` chooses and orders, `project` and `expand` fill.
+
+    Where OpenGL runs on the processor, `project` reads the `footprints` of the chosen Gaussians back: (n, 8)
+    float32, place and shape as project.vert has them, in draw order; elsewhere None. Where none is too
+    large, `sprites` are drawn there in place of quads: the same fragments out of one vertex, 30 % quicker.
 
     Gaussians with a value or a weight that is not finite are left out (`num_dropped`), and those
     below opacity 1/255, which no pixel can show.
@@ -35,6 +43,10 @@ class SplatBuffers:
         self._ctx = ctx
         self._programs = programs
         self._owned: list = []
+        self._in_software = draws_in_software(ctx)
+        self._largest = min(2 * _MARGIN, ctx.info["GL_POINT_SIZE_RANGE"][1])  # sprite
+        self.footprints: np.ndarray | None = None
+        self.sprites = False
         gaussians = scene.gaussians.map(lambda v: v.detach().cpu().float())
         finite = drawable_rows(scene).cpu()
         kept = finite & (gaussians.opacities >= ALPHA_MIN)
@@ -73,6 +85,7 @@ class SplatBuffers:
         self._sparse = self._upload_weights()
         self._slots = self._own(self._ctx.texture((max(1, self._num_atoms), 1), 1, dtype="f4"))
         self._weights = self._own(_Growing(self._ctx))
+        self._some = self._own(_Growing(self._ctx))
         self._numbers = self._own(_Growing(self._ctx))
         self._vaos: dict[tuple, moderngl.VertexArray] = {}
 
@@ -135,7 +148,7 @@ class SplatBuffers:
 
     def draw_in(self, order: np.ndarray) -> None:
         """Draw these rows of the Gaussians kept, the first first."""
-        self.order = order.astype(np.uint32)
+        self.order, self.footprints = order.astype(np.uint32), None
         if len(order):
             self._order_buffer.write(self.order.tobytes())
 
@@ -165,9 +178,14 @@ class SplatBuffers:
         """Atoms (Ka,) that the chosen Gaussians carry with a weight above 0, ascending."""
         if not (self._num_atoms and len(self.order)):
             return np.zeros(0, np.int64)
-        carried = np.bitwise_or.reduce(self._carried[self.order], axis=0)  # (words,) uint64
-        bits = np.unpackbits(carried.astype("<u8").view(np.uint8), bitorder="little")
-        return np.flatnonzero(bits[: self._num_atoms])
+        return np.flatnonzero(self.atoms_of(np.arange(len(self.order)), np.zeros(1, np.int64)))
+
+    def atoms_of(self, places: np.ndarray, starts: np.ndarray) -> np.ndarray:
+        """(runs, K) bool: atoms that the chosen Gaussians at these `places` of the order carry with a weight
+        above 0, together in each run of places, from `starts` on."""
+        carried = np.bitwise_or.reduceat(self._carried[self.order[places]], starts, axis=0)  # (runs, words)
+        bits = np.unpackbits(carried.astype("<u8").view(np.uint8), axis=1, bitorder="little")
+        return bits[:, : self._num_atoms].astype(bool)
 
     def project(self, camera: Camera) -> None:
         """Footprints and colours of the chosen Gaussians into `places`, in draw order."""
@@ -193,6 +211,42 @@ class SplatBuffers:
         buffers = (*self._vertex_buffers, self._tints)
         content = [(b, f, n) for b, f, n in zip(buffers, formats, names, strict=True)]
         self._transform(program, content, self.places)
+        if self._in_software:
+            self._measure((camera.width, camera.height))
+
+    def _measure(self, size: tuple[int, int]) -> None:
+        """Read the footprints back; whether all that reach the image are small enough for sprites."""
+        chosen = 4 * _PLACE_FLOATS * len(self.order)
+        read = np.frombuffer(self.places.read(chosen), np.float32).reshape(-1, _PLACE_FLOATS)
+        self.footprints = read[:, :_SHAPE_FLOATS]
+        sides = 2 * np.maximum(*self._reaches())
+        if not (sides < self._largest).all():  # what is broken compares as beside the image
+            x0, y0, x1, y1 = self.boxes()
+            touching = (x1 > 0) & (y1 > 0) & (x0 < size[0]) & (y0 < size[1])
+            self.sprites = bool((sides[touching] < self._largest).all())
+        else:
+            self.sprites = True
+
+    def _reaches(self) -> tuple[np.ndarray, np.ndarray]:
+        """Half the sides (n,) of the boxes, pixels."""
+        assert self.footprints is not None
+        l11, l21, l22, radius = self.footprints[:, 4:].T
+        with np.errstate(over="ignore", invalid="ignore"):
+            radius = radius + np.float32(_SLACK)
+            return radius * l11, radius * np.sqrt(l21 * l21 + l22 * l22)
+
+    def boxes(self) -> np.ndarray:
+        """(4, n) float32 x0, y0, x1, y1 of the footprints that were read back, pixels, in draw order."""
+        assert self.footprints is not None
+        x, y = self.footprints[:, :2].T
+        wide, tall = self._reaches()
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.stack((x - wide, y - tall, x + wide, y + tall))
+
+    @property
+    def defines(self) -> dict[str, float]:
+        """What quad.vert is compiled with to draw these."""
+        return {"MARGIN": _MARGIN} if self.sprites else {}
 
     def expand(self, atoms: np.ndarray, first: int, num_layers: int) -> moderngl.Buffer:
         """Dense weights of `num_layers` layers of `atoms`, from place `first` on, in draw order."""
@@ -240,17 +294,56 @@ class SplatBuffers:
         num_layers: int = 0,
         colour: bool = True,
     ) -> None:
-        """One instanced quad per chosen Gaussian, with its colour, `num_layers` of weights, or both."""
+        """One quad or sprite per chosen Gaussian, with its colour, `num_layers` of weights, or both.
+
+        Args:
+            program: of quad.vert with these `defines`.
+        """
         key = ("draw", program.glo)
         if key not in self._vaos:
-            footprint = ("in_place", "in_shape")
-            content: list[tuple] = [(self.places, "4f 4f 12x/i", *footprint)]
+            footprint, each = ("in_place", "in_shape"), "v" if self.sprites else "i"
+            content: list[tuple] = [(self.places, f"4f 4f 12x/{each}", *footprint)]
             if colour:
-                content = [(self.places, "4f 4f 3f/i", *footprint, "in_colour")]
+                content = [(self.places, f"4f 4f 3f/{each}", *footprint, "in_colour")]
             if weights is not None:
-                content.append((weights, f"{ATOMS_A_LAYER * num_layers}f/i", "in_weights"))
+                content.append((weights, f"{ATOMS_A_LAYER * num_layers}f/{each}", "in_weights"))
             self._vaos[key] = self._ctx.vertex_array(program, content)
-        self._vaos[key].render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(self.order))
+        self._render(self._vaos[key], len(self.order))
+
+    def draw_some(
+        self, program: moderngl.Program, places: np.ndarray, slots: np.ndarray, num_layers: int
+    ) -> None:
+        """As `draw`, weights alone, of those at these places of the order, whose footprints were read back.
+
+        Args:
+            places: ascending. slots: (K,) int64, place of each atom in the layers, 3 `num_layers` for none.
+        """
+        assert self.footprints is not None
+        rows = self.order[places]
+        width = ATOMS_A_LAYER * num_layers
+        dense = np.zeros((len(rows), width + 1), np.float32)  # the last one for atoms of other layers
+        flat, firsts = dense.ravel(), np.arange(len(rows)) * (width + 1)
+        for ids, values in zip(self._ids[rows].T, self._values[rows].T, strict=True):
+            flat[firsts + slots[ids]] += values
+        streams = self.footprints[places], np.ascontiguousarray(dense[:, :width])
+        for buffer, stream in zip((self._some, self._weights), streams, strict=True):
+            buffer.at_least(stream.nbytes).write(stream)
+        key = ("some", program.glo)
+        if key not in self._vaos:
+            each = "v" if self.sprites else "i"
+            content = [
+                (self._some.at_least(0), f"4f 4f/{each}", "in_place", "in_shape"),
+                (self._weights.at_least(0), f"{ATOMS_A_LAYER * num_layers}f/{each}", "in_weights"),
+            ]
+            self._vaos[key] = self._ctx.vertex_array(program, content)
+        self._render(self._vaos[key], len(rows))
+
+    def _render(self, vao: moderngl.VertexArray, count: int) -> None:
+        if self.sprites:
+            with as_sprites(self._ctx, int(_MARGIN)):
+                vao.render(moderngl.POINTS, vertices=count)
+        else:
+            vao.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=count)
 
     def _drop_vaos(self) -> None:
         for vao in self._vaos.values():

@@ -1,9 +1,9 @@
 """Pictures drawn on the processor, by threads of Python, for machines without a graphics card.
 
-There OpenGL runs on the processor too, and weight maps cost it eight times the colours: every splat blends
-into eight targets. `langflash_core/splat/tiles.py` composites colours and all weights in one product, in some
-three times the colours' time, and any thread may call it, so that no frame waits. A renderer takes the
-result (`SplatRenderer.bring`) and shows it like its own.
+There OpenGL runs on the processor too, on the thread of its context, and weight maps cost it twice the
+colours. `langflash_core/splat/tiles.py` composites colours and all weights in one product: more work, but any
+thread may do it, so that no frame waits. A renderer takes the result (`SplatRenderer.bring`) and shows it
+like its own.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,7 @@
 """What is drawn into: float targets, layers of texture arrays, and a scope that leaves no trace."""
 
 import ctypes
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 import moderngl
@@ -60,6 +60,23 @@ def drawing(
         previous.use()
 
 
+@contextmanager
+def as_sprites(ctx: moderngl.Context, margin: int) -> Iterator[None]:
+    """Draw points as large as their shader says into the framebuffer in use, within `drawing`.
+
+    The viewport is `margin` pixels wider on every side: points are left out with their centres.
+    """
+    framebuffer = ctx.fbo
+    x, y, width, height = before = framebuffer.viewport
+    framebuffer.viewport = (x - margin, y - margin, width + 2 * margin, height + 2 * margin)
+    ctx.enable(moderngl.PROGRAM_POINT_SIZE)
+    try:
+        yield
+    finally:
+        ctx.disable(moderngl.PROGRAM_POINT_SIZE)
+        framebuffer.viewport = before
+
+
 def read(texture: moderngl.Texture | moderngl.TextureArray) -> np.ndarray:
     """Every value of a float texture, flat, as float32."""
     return np.frombuffer(texture.read(), NUMPY_TYPES[texture.dtype]).astype(np.float32)
@@ -106,17 +123,22 @@ class LayerTarget:
         self, first: int, count: int, beside: tuple[moderngl.Texture, ...] = ()
     ) -> moderngl.Framebuffer:
         """A framebuffer whose attachments are `beside` and then `count` layers from `first` on."""
-        key = (count, *(texture.glo for texture in beside))
+        return self.chosen(range(first, first + count), beside)
+
+    def chosen(
+        self, chosen: Sequence[int], beside: tuple[moderngl.Texture, ...] = ()
+    ) -> moderngl.Framebuffer:
+        """A framebuffer whose attachments are `beside` and then these layers."""
+        key = (len(chosen), *(texture.glo for texture in beside))
         if key not in self._framebuffers:
             stand_in = self._ctx.texture(self.array.size[:2], 4, dtype=self._dtype)
-            self._framebuffers[key] = self._ctx.framebuffer([*beside, *[stand_in] * count])
+            self._framebuffers[key] = self._ctx.framebuffer([*beside, *[stand_in] * len(chosen)])
             stand_in.release()
         framebuffer = self._framebuffers[key]
         previous = bound_framebuffer(self._ctx)
         framebuffer.use()
-        for offset in range(count):
-            point = _GL_COLOR_ATTACHMENT0 + len(beside) + offset
-            self._attach(_GL_FRAMEBUFFER, point, self.array.glo, 0, first + offset)
+        for place, layer in enumerate(chosen, len(beside)):
+            self._attach(_GL_FRAMEBUFFER, _GL_COLOR_ATTACHMENT0 + place, self.array.glo, 0, layer)
         previous.use()
         return framebuffer
 

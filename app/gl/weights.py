@@ -1,4 +1,5 @@
-"""Weight maps W_k(p) of the atoms in view: drawn in passes of `layout.ATOMS_A_PASS`, read back on request."""
+"""Weight maps W_k(p) of the atoms in view: drawn in passes of `layout.ATOMS_A_PASS`,
+on a processor cell by cell (cells.py), read back on request."""
 
 from dataclasses import dataclass
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from langflash_core.graphics import set_uniforms
 
+from .cells import Cell, cells_of, chosen_layers, together
 from .layout import ATOMS_A_LAYER, ATOMS_A_PASS, LAYERS_A_PASS, num_layers
 from .painter import Painter
 from .scene import Level
@@ -72,6 +74,8 @@ class WeightMaps:
         return self._maps
 
     def _drawn(self, level: Level) -> Maps:
+        if level.splats.footprints is not None:
+            return self._drawn_in_cells(level)
         atoms = level.splats.active_atoms()
         whole_passes = -(-len(atoms) // ATOMS_A_PASS) * LAYERS_A_PASS
         layers = self._layers.at_least(max(1, whole_passes))
@@ -83,13 +87,43 @@ class WeightMaps:
         """One pass, of the atoms from place `first` on."""
         count = num_layers(min(ATOMS_A_PASS, len(atoms) - first))
         expanded = splats.expand(atoms, first, count)
-        program = self._painter.programs.get("quad.vert", "weights.frag", {"LAYERS": count})
+        program = self._painter.programs.get("quad.vert", "weights.frag", {"LAYERS": count, **splats.defines})
         set_uniforms(program, image_size=tuple(float(n) for n in self._size))
         target = layers.layers(first // ATOMS_A_LAYER, count)
         target.clear()
         with drawing(target, PREMULTIPLIED):
             splats.draw(program, expanded, count, colour=False)
         self._painter.passes["weights"] += 1
+
+    def _drawn_in_cells(self, level: Level) -> Maps:
+        """The same, each cell of the picture with its own atoms alone (cells.py)."""
+        cells = cells_of(level.splats, self._size)
+        atoms = together(cells)
+        passes = -(-len(atoms) // ATOMS_A_PASS)
+        layers = self._layers.at_least(max(1, passes * LAYERS_A_PASS))
+        for first in range(0, num_layers(len(atoms)), LAYERS_A_PASS):
+            layers.layers(first, LAYERS_A_PASS).clear()
+        for cell in cells:
+            for chosen in chosen_layers(cell, atoms, layers.num_layers):
+                self._draw_cell(level.splats, layers, cell, atoms, chosen)
+        self._painter.passes["weights"] += passes
+        return Maps(layers, atoms, level.order_key)
+
+    def _draw_cell(
+        self, splats: SplatBuffers, layers: LayerTarget, cell: Cell, atoms: np.ndarray, chosen: list[int]
+    ) -> None:
+        count = len(chosen)
+        program = self._painter.programs.get("quad.vert", "weights.frag", {"LAYERS": count, **splats.defines})
+        set_uniforms(program, image_size=tuple(float(n) for n in self._size))
+        slots = np.full(len(cell.atoms), ATOMS_A_LAYER * count)
+        for place, layer in enumerate(chosen):
+            there = atoms[ATOMS_A_LAYER * layer :][:ATOMS_A_LAYER]
+            slots[there] = ATOMS_A_LAYER * place + np.arange(len(there))
+        target = layers.chosen(chosen)
+        target.scissor = cell.box
+        with drawing(target, PREMULTIPLIED):
+            splats.draw_some(program, cell.places, slots, count)
+        target.scissor = (0, 0, *self._size)
 
     def release(self) -> None:
         self._layers.release()

@@ -104,17 +104,36 @@ class _Lists:
     grid: tuple[int, int]
 
 
-def _tile_lists(footprints: Footprints, width: int, height: int) -> _Lists:
-    columns, rows = -(-width // TILE), -(-height // TILE)
-    x0, y0, x1, y1 = footprints.boxes().numpy().T
-    left, top = np.clip(x0, 0, width) // TILE, np.clip(y0, 0, height) // TILE
-    wide = np.maximum(-(-np.clip(x1, 0, width) // TILE) - left, 0)
-    tall = np.maximum(-(-np.clip(y1, 0, height) // TILE) - top, 0)
+def tiles_touched(
+    boxes: np.ndarray, width: int, height: int, side: int = TILE
+) -> tuple[np.ndarray, np.ndarray, tuple[int, int]]:
+    """Every pair of a box and a tile of side x side pixels of an image that it touches.
+
+    Args:
+        boxes: (n, 4) integers x0, y0, x1, y1, pixels, the last ones outside.
+
+    Returns:
+        Row of the box and number of the tile of each pair, in the order of the boxes; how many columns and
+        rows of tiles there are.
+    """
+    columns, rows = -(-width // side), -(-height // side)
+    x0, y0, x1, y1 = boxes.T
+    left, top = np.clip(x0, 0, width) // side, np.clip(y0, 0, height) // side
+    wide = np.maximum(-(-np.clip(x1, 0, width) // side) - left, 0)
+    tall = np.maximum(-(-np.clip(y1, 0, height) // side) - top, 0)
     pairs = wide * tall
     members = np.repeat(np.arange(len(pairs), dtype=np.int32), pairs)
     local = np.arange(len(members)) - np.repeat(np.cumsum(pairs) - pairs, pairs)
     across = wide[members]
-    tile = (top[members] + local // across) * columns + left[members] + local % across
+    return (
+        members,
+        (top[members] + local // across) * columns + left[members] + local % across,
+        (columns, rows),
+    )
+
+
+def _tile_lists(footprints: Footprints, width: int, height: int) -> _Lists:
+    members, tile, (columns, rows) = tiles_touched(footprints.boxes().numpy(), width, height)
     small = np.uint16 if columns * rows <= 1 << 16 else np.uint32  # sixteen bits are sorted by counting
     order = np.argsort(tile.astype(small), kind="stable")  # pairs came nearest first, and stay so
     counts = np.bincount(tile, minlength=columns * rows)

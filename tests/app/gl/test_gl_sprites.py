@@ -1,0 +1,59 @@
+"""Sprites, which software OpenGL draws in place of quads, against quads: the same to the bit."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from app.gl import SplatRenderer
+from app.gl.splats import SplatBuffers
+from langflash_core.graphics import draws_in_software
+from tests.splat.scenes import camera, cloud
+
+
+class Quads(SplatBuffers):
+    """As on a graphics card."""
+
+    def __init__(self, *args):
+        super().__init__(*args)
+        self._in_software = False
+
+
+def drawn(gl, scene, view, splats=SplatBuffers):
+    """Colour, depth and weight maps; whether sprites were drawn; the picture of films."""
+    renderer = SplatRenderer(gl, "float32", splats=splats)
+    renderer.set_scene(scene)
+    renderer.draw(view)
+    frame = renderer.frame(weight_maps=True)
+    film = renderer.colours(view).copy()
+    assert renderer._scene is not None and frame.weight_maps is not None
+    sprites = renderer._scene.whole.splats.sprites
+    renderer.release()
+    return (frame.rgb, frame.alphas, frame.depths, frame.weight_maps), film, sprites
+
+
+@pytest.fixture
+def software(gl):
+    if not draws_in_software(gl):
+        pytest.skip("a graphics card draws quads")
+
+
+@pytest.mark.parametrize("widening", [0.3, 1.0, 3.0])
+def test_sprites_draw_what_quads_draw(gl, software, widening):
+    scene = cloud(400, 7)
+    scene = replace(scene, gaussians=replace(scene.gaussians, scales=scene.gaussians.scales * widening))
+    sprites, quads = drawn(gl, scene, camera()), drawn(gl, scene, camera(), Quads)
+    assert sprites[2] and not quads[2]
+    assert all(torch.equal(mine, true) for mine, true in zip(sprites[0], quads[0], strict=True))
+    assert np.array_equal(sprites[1], quads[1])
+
+
+def test_splats_too_large_for_sprites_are_drawn_as_quads(gl, software):
+    scene = cloud(50, 4)
+    scales = scene.gaussians.scales.clone()
+    scales[0] = 1e3  # wider than any sprite may be
+    scene = replace(scene, gaussians=replace(scene.gaussians, scales=scales))
+    mine, true = drawn(gl, scene, camera()), drawn(gl, scene, camera(), Quads)
+    assert not mine[2]
+    assert all(torch.equal(a, b) for a, b in zip(mine[0], true[0], strict=True))
