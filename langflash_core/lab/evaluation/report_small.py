@@ -12,12 +12,15 @@ A document marks where a table of the report stands:
 
 import re
 from collections.abc import Mapping
+from textwrap import fill
 from typing import Any
 
 from langflash_core.lab.evaluation.report_page import Report, document_of
 from langflash_core.lab.evaluation.report_parts import Table, table_lines
 from langflash_core.lab.evaluation.report_plot import svg
 
+LINE = 110
+"""Letters of a document's line."""
 _PLACE = re.compile(r"(<!-- report (\w+): (.+?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -71,8 +74,8 @@ def filled(text: str, document: Mapping[str, Any]) -> str:
     def table(place: re.Match) -> str:
         opening, section, title, closing = place.groups()
         lines = table_lines(_table(document, section, title))
-        scenes = document["sections"][section]["scenes"]
-        told = f"{scenes} scenes, weights {document['weights']}, {document['made']}:"
+        about = document["sections"][section]["about"]
+        told = fill(f"{about} Weights {document['weights']}, {document['made']}.", LINE)
         return "\n".join([opening.rstrip("\n"), told, "", *lines, closing])
 
     return _PLACE.sub(table, text)
