@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from langflash_core.geometry.cameras import project, transform
+from langflash_core.geometry.cameras import pictured
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.scene.assemble import renormalised
 from langflash_core.scene.fields import stored_bytes
@@ -96,17 +96,16 @@ def _parents(sight: _Sight, scene: Scene, radius: float, colour_tolerance: float
     return parents
 
 
-def _pixels(points: Tensor, scene: Scene, view: int) -> Tensor:
-    """(n, 2) pixels of world points in a view; far outside where they lie behind it."""
-    pos_c = transform(scene.viewmats[view], points)
-    pos_px = project(pos_c, scene.Ks[view])
-    return torch.where(pos_c[:, 2:] > 0, pos_px, -1e6).clamp(-1e6, 1e6)
+def _pixels(points: Tensor, scene: Scene, view: int) -> tuple[Tensor, Tensor]:
+    """Columns and lines (n,) of world points in a view; far outside where they lie behind it."""
+    x, y, z = pictured(scene.viewmats[view], scene.Ks[view], points.T)
+    return torch.where(z > 0, x, -1e6).clamp(-1e6, 1e6), torch.where(z > 0, y, -1e6).clamp(-1e6, 1e6)
 
 
 def _pixel_map(sight: _Sight, rows: Tensor, scene: Scene, view: int) -> Tensor:
     """(H + 2, W + 2) of the most opaque Gaussian per pixel, -1 where none; a border of -1."""
     width, height = scene.view_size
-    column, line = (_pixels(sight.means[rows], scene, view).floor().long() + 1).unbind(-1)
+    column, line = (along.floor().long() + 1 for along in _pixels(sight.means[rows], scene, view))
     inside = (column >= 1) & (column <= width) & (line >= 1) & (line <= height)
     rows, places = rows[inside], (line * (width + 2) + column)[inside]
     chosen = _first_of_each(places, -sight.opacities[rows], (height + 2) * (width + 2))
@@ -121,8 +120,8 @@ def _nearest(
     """Those of the rows (n,) that have Gaussians of `view` in the four pixels around their place there, and
     these (n, 4), -1 for none."""
     height, width = pixel_map.shape
-    corner = (_pixels(sight.means[rows], scene, view) + 0.5).floor().long()  # +1 border, -0.5 centre
-    column, line = corner.unbind(-1)
+    pixels = _pixels(sight.means[rows], scene, view)
+    column, line = ((along + 0.5).floor().long() for along in pixels)  # +1 border, -0.5 centre
     inside = (column >= 0) & (column < width - 1) & (line >= 0) & (line < height - 1)
     rows, first = rows[inside], (line * width + column)[inside]
     around = torch.tensor([0, 1, width, width + 1], device=rows.device)
