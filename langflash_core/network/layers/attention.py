@@ -4,7 +4,6 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-
 Memory = tuple[Tensor, Tensor]
 """Keys and values of tokens that are read, (B, heads, m, head_dim) each."""
 
