@@ -35,18 +35,15 @@ def seen_through(
     """
     num_views, height, width = depths.shape
     blocked = torch.zeros(num_views, height * width, dtype=torch.bool, device=means.device)
-    surfaces, trusts = depths.flatten(1), confidences.flatten(1)
+    limits, trusts = (1 - tolerance) * depths.flatten(1), confidences.flatten(1)
     for view, own in enumerate(means.reshape(num_views, -1, 3)):
-        points = own.T.contiguous()
         for other in range(num_views):
             if other == view:
                 continue
-            x, y, z = pictured(viewmats[other], Ks[other], points)
+            x, y, z = pictured(viewmats[other], Ks[other], own.T)
             inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
-            seen = inside.nonzero()[:, 0]
-            places = y[seen].long() * width + x[seen].long()
-            nearer = z[seen] < (1 - tolerance) * surfaces[other, places]
-            theirs, ours = trusts[other, places], trusts[view, seen]
-            outvoted = (theirs > ours) if other > view else (theirs >= ours)
-            blocked[view, seen[nearer & outvoted]] = True
+            places = torch.where(inside, y.floor() * width + x.floor(), 0.0).long()
+            theirs = trusts[other].index_select(0, places)
+            outvoted = (theirs > trusts[view]) if other > view else (theirs >= trusts[view])
+            blocked[view] |= inside & (z < limits[other].index_select(0, places)) & outvoted
     return blocked.flatten()

@@ -88,5 +88,5 @@ def test_pictured_is_transform_and_project():
     points = torch.randn(50, 3, dtype=torch.float64)
     pos_c = transform(viewmat, points)
     expected = torch.cat((project(pos_c, K), pos_c[:, 2:]), 1)
-    found = pictured(viewmat, K, points.T).T
+    found = torch.stack(pictured(viewmat, K, points.T), 1)
     assert torch.allclose(found, expected, rtol=1e-12, atol=1e-9)  # of points behind, pixels are huge

@@ -1,13 +1,14 @@
 """Attention, decoders, DPT, grouping and aggregation: shapes for every view count, and the maths."""
 
 import math
+from typing import cast
 
 import pytest
 import torch
 from torch.nn import functional as F
 
 from langflash_core.network.encoders.shared import Tokens
-from langflash_core.network.layers.attention import Attention, rope_2d, rotate
+from langflash_core.network.layers.attention import Attention, CrossBlock, rope_2d, rotate
 from langflash_core.network.layers.decoder import TwoStackDecoder, normalised_intrinsics
 from langflash_core.network.layers.dpt import DPT
 from langflash_core.network.presets import MINI
@@ -69,7 +70,7 @@ def test_a_layer_of_the_stacks_equals_every_view_reading_all_others(num_views):
     decoder = TwoStackDecoder(MINI).double().eval()
     x = torch.randn(2, num_views, GRID[0] * GRID[1] + 1, MINI.decoder_dim).double()
     code = rope_2d(GRID, MINI.decoder_dim // MINI.decoder_heads, MINI.rope_base, extra=1)
-    first, other = decoder.first[0], decoder.other[0]
+    first, other = cast(CrossBlock, decoder.first[0]), cast(CrossBlock, decoder.other[0])
     expected = []
     for view in range(num_views):
         block, others = other if view else first, [v for v in range(num_views) if v != view] or [view]
