@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional as F
 
 from langflash_core.errors import WeightsError
 from langflash_core.network.encoders.shared import Tokens
@@ -270,10 +269,24 @@ def _beside(work: Callable[[], Tensor], device: torch.device) -> Callable[[], Te
 
 
 def pooled_weights(weights: Tensor, features: Tensor) -> Tensor:
-    """Weights (V, K, H, W) at the size of features (1, V, C, h, w), as a batch of one scene."""
-    if weights.shape[1] == 0:
-        return weights.new_zeros(1, len(weights), 0, features.shape[-2], features.shape[-1])
-    return F.adaptive_avg_pool2d(weights, (features.shape[-2], features.shape[-1]))[None]
+    """Weights (V, K, H, W) at the size of features (1, V, C, h, w), as a batch of one scene.
+
+    The means of `adaptive_avg_pool2d`, the twin, which goes through them number by number: a window's mean is
+    one over rows of one over columns, and both are matrix products.
+    """
+    rows, columns = (
+        _windows(weights.shape[-dim], features.shape[-dim]).to(weights) for dim in (2, 1)
+    )  # (h, H), (w, W)
+    return (rows @ weights @ columns.T)[None]
+
+
+def _windows(length: int, count: int) -> Tensor:
+    """(count, length) float64: means over so many equal parts, widened to whole numbers."""
+    ends = torch.arange(count + 1) * length
+    first, last = ends[:-1] // count, -(-ends[1:] // count)
+    places = torch.arange(length)
+    inside = (places >= first[:, None]) & (places < last[:, None])
+    return inside.double() / (last - first)[:, None]
 
 
 def _of_another_size(trained: int, size: tuple[int, int]) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 import torch
 from torch import Tensor
 
-from langflash_core.geometry.cameras import project, transform
+from langflash_core.geometry.cameras import pictured
 
 TOLERANCE = 0.12
 """A Gaussian this much nearer (relative depth) than the surface another photo sees is in its way:
@@ -35,21 +35,15 @@ def seen_through(
     """
     num_views, height, width = depths.shape
     blocked = torch.zeros(num_views, height * width, dtype=torch.bool, device=means.device)
-    points = means.reshape(num_views, -1, 3)
-    for view in range(num_views):
-        own = confidences[view].flatten()
+    limits, trusts = (1 - tolerance) * depths.flatten(1), confidences.flatten(1)
+    for view, own in enumerate(means.reshape(num_views, -1, 3)):
         for other in range(num_views):
             if other == view:
                 continue
-            pos_c = transform(viewmats[other], points[view])
-            x, y = project(pos_c, Ks[other]).floor().unbind(-1)
-            inside = (pos_c[:, 2] > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
-            column, row = (
-                x.nan_to_num().clamp(0, width - 1).long(),
-                y.nan_to_num().clamp(0, height - 1).long(),
-            )
-            nearer = pos_c[:, 2] < (1 - tolerance) * depths[other, row, column]
-            theirs = confidences[other, row, column]
-            outvoted = (theirs > own) if other > view else (theirs >= own)
-            blocked[view] |= inside & nearer & outvoted
+            x, y, z = pictured(viewmats[other], Ks[other], own.T)
+            inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
+            places = torch.where(inside, y.floor() * width + x.floor(), 0.0).long()
+            theirs = trusts[other].index_select(0, places)
+            outvoted = (theirs > trusts[view]) if other > view else (theirs >= trusts[view])
+            blocked[view] |= inside & (z < limits[other].index_select(0, places)) & outvoted
     return blocked.flatten()

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from langflash_core.geometry.cameras import project, transform
+from langflash_core.geometry.cameras import pictured
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.scene.assemble import renormalised
 from langflash_core.scene.fields import stored_bytes
@@ -29,7 +29,7 @@ _CHUNK = 65_536  # merged Gaussians whose dense weights are held at once
 class _Sight:
     """What matching needs of every Gaussian: its own view, pixel footprint, and colour."""
 
-    means: Tensor  # (N, 3)
+    means: Tensor  # (3, N)
     opacities: Tensor  # (N,)
     views: Tensor  # (N,)
     footprints: Tensor  # (N,) scene units per pixel in its own view
@@ -78,12 +78,13 @@ def _sight(scene: Scene) -> _Sight:
     depths = (rotations[views] * gaussians.means).sum(-1) + shifts[views]
     focal = (scene.Ks[:, 0, 0] + scene.Ks[:, 1, 1]) / 2
     footprints = depths.clamp_min(0) / focal[views]
-    return _Sight(gaussians.means, gaussians.opacities, views, footprints, gaussians.sh[:, 0] * SH_C0)
+    means, colours = gaussians.means.T.contiguous(), gaussians.sh[:, 0] * SH_C0
+    return _Sight(means, gaussians.opacities, views, footprints, colours)
 
 
 def _parents(sight: _Sight, scene: Scene, radius: float, colour_tolerance: float) -> Tensor:
     """(N,) the Gaussian of an earlier view that each one duplicates, or itself."""
-    parents = torch.arange(len(sight.means), device=sight.means.device)
+    parents = torch.arange(len(sight.views), device=sight.views.device)
     pixel_maps: list[Tensor] = []
     for view in range(scene.num_views):
         rows = (sight.views == view).nonzero().squeeze(1)
@@ -96,17 +97,17 @@ def _parents(sight: _Sight, scene: Scene, radius: float, colour_tolerance: float
     return parents
 
 
-def _pixels(points: Tensor, scene: Scene, view: int) -> Tensor:
-    """(n, 2) pixels of world points in a view; far outside where they lie behind it."""
-    pos_c = transform(scene.viewmats[view], points)
-    pos_px = project(pos_c, scene.Ks[view])
-    return torch.where(pos_c[:, 2:] > 0, pos_px, -1e6).clamp(-1e6, 1e6)
+def _pixels(points: Tensor, scene: Scene, view: int) -> tuple[Tensor, Tensor]:
+    """Columns and lines (n,) of world points (3, n) in a view; far outside where they lie behind it."""
+    x, y, z = pictured(scene.viewmats[view], scene.Ks[view], points)
+    return torch.where(z > 0, x, -1e6).clamp(-1e6, 1e6), torch.where(z > 0, y, -1e6).clamp(-1e6, 1e6)
 
 
 def _pixel_map(sight: _Sight, rows: Tensor, scene: Scene, view: int) -> Tensor:
     """(H + 2, W + 2) of the most opaque Gaussian per pixel, -1 where none; a border of -1."""
     width, height = scene.view_size
-    column, line = (_pixels(sight.means[rows], scene, view).floor().long() + 1).unbind(-1)
+    pixels = _pixels(sight.means.index_select(1, rows), scene, view)
+    column, line = (along.floor().long() + 1 for along in pixels)
     inside = (column >= 1) & (column <= width) & (line >= 1) & (line <= height)
     rows, places = rows[inside], (line * (width + 2) + column)[inside]
     chosen = _first_of_each(places, -sight.opacities[rows], (height + 2) * (width + 2))
@@ -121,12 +122,12 @@ def _nearest(
     """Those of the rows (n,) that have Gaussians of `view` in the four pixels around their place there, and
     these (n, 4), -1 for none."""
     height, width = pixel_map.shape
-    corner = (_pixels(sight.means[rows], scene, view) + 0.5).floor().long()  # +1 border, -0.5 centre
-    column, line = corner.unbind(-1)
+    pixels = _pixels(sight.means.index_select(1, rows), scene, view)
+    column, line = ((along + 0.5).floor().long() for along in pixels)  # +1 border, -0.5 centre
     inside = (column >= 0) & (column < width - 1) & (line >= 0) & (line < height - 1)
     rows, first = rows[inside], (line * width + column)[inside]
     around = torch.tensor([0, 1, width, width + 1], device=rows.device)
-    candidates = pixel_map.flatten()[first[:, None] + around]
+    candidates = _picked(pixel_map.flatten(), first[:, None] + around)
     some = candidates.amax(-1) >= 0
     return rows[some], candidates[some]
 
@@ -136,7 +137,8 @@ def _pairs(
 ) -> tuple[Tensor, Tensor]:
     """Children (c,) and their parents (c,), no parent twice; colours are looked at where places agree."""
     there = candidates.clamp_min(0)
-    distances = (_picked(sight.means, there) - sight.means[rows, None]).norm(dim=-1)
+    x, y, z = (_picked(along, there) - along.index_select(0, rows)[:, None] for along in sight.means)
+    distances = (x * x + y * y + z * z).sqrt()
     reach = radius * torch.minimum(_picked(sight.footprints, there), sight.footprints[rows, None])
     close = (candidates >= 0) & (distances < reach)
     some = close.any(-1)
@@ -146,7 +148,7 @@ def _pairs(
     distances, which = torch.where(same, distances, torch.inf).min(-1)
     matched = torch.isfinite(distances).nonzero().squeeze(1)
     found = there[matched, which[matched]]
-    chosen = _first_of_each(found, distances[matched], len(sight.means))
+    chosen = _first_of_each(found, distances[matched], len(sight.views))
     return rows[matched[chosen]], found[chosen]
 
 

@@ -11,9 +11,10 @@ from langflash_core.geometry.cameras import invert_rigid, rays
 from langflash_core.geometry.quaternions import covariances, quats_to_matrices
 from langflash_core.network.gaussians import CHANNELS, assemble_gaussians, footprints
 from langflash_core.network.guided import _one_by_one
+from langflash_core.network.model import pooled_weights
 from langflash_core.network.stereo.prior import DepthMaps
 from langflash_core.network.stereo.sharpening import sharpened
-from langflash_core.network.stereo.sweep import Compared, patches, sweep_correlation
+from langflash_core.network.stereo.sweep import Compared, gathered, patches, sweep_correlation
 
 K = torch.tensor([[40.0, 0, 16], [0, 40.0, 12], [0, 0, 1]], dtype=torch.float64)
 
@@ -54,6 +55,35 @@ def test_sweep_equals_its_twin():
         assert volume[0, 0, plane, row, column].item() == pytest.approx(expected, abs=1e-10)
     assert grouped.shape == (2, 3, 5, 24, 32)
     torch.testing.assert_close(grouped.sum(1), volume[:, 0])
+
+
+def test_vectors_are_gathered_as_grid_sample_has_them():
+    """Also on the border, where half of what is read is 0; both round float64."""
+    torch.manual_seed(0)
+    maps = torch.randn(2, 5, 6, 9, dtype=torch.float64)
+    places = torch.rand(2, 40, 3, dtype=torch.float64) * 2 - 1
+    places[:, 0, :2] = torch.tensor([[-1.0, 1.0], [1.0, -1.0]])
+    table = Compared.of(maps, (6, 9)).table[1]
+    found = gathered(table, (6, 9), places)
+    expected = F.grid_sample(maps[1:], places.movedim(0, -1)[None], align_corners=False)[0]
+    assert torch.allclose(found, expected.movedim(0, -1), rtol=0, atol=1e-12)
+
+
+def test_a_sweep_in_float32_stays_close_to_float64():
+    """Products of unit vectors of 64 numbers round at 1e-6; a place moves by as much of a pixel, and vectors
+    change from one pixel to the next by at most 2."""
+    torch.manual_seed(0)
+    features = F.normalize(torch.randn(2, 64, 24, 32, dtype=torch.float64), dim=1)
+    log_depths = torch.rand(2, 24, 32, dtype=torch.float64) * 0.5 + 0.5
+    offsets = torch.linspace(-0.4, 0.4, 5, dtype=torch.float64)
+    viewmats = torch.eye(4, dtype=torch.float64).repeat(2, 1, 1)
+    viewmats[1, 0, 3] = -0.01  # every point stays clear of the border, where it counts or does not
+    volumes = []
+    for kind in (torch.float64, torch.float32):
+        compared = [Compared.of(features.to(kind), (24, 32), 2)]
+        given = (log_depths.to(kind), offsets.to(kind), viewmats.to(kind), K.expand(2, 3, 3).to(kind))
+        volumes.append(sweep_correlation(compared, *given)[0][0].double())
+    assert (volumes[0] - volumes[1]).abs().max() < 1e-4
 
 
 def test_sweep_peaks_at_the_true_depth():
@@ -212,3 +242,13 @@ def test_views_one_by_one_give_what_all_at_once_do(untrained):
     for work, of_views in ((untrained.local, (images,)), (sharpened, (depths, images))):
         # The same sums; a convolution may order them otherwise for another batch.
         torch.testing.assert_close(_one_by_one(work, *of_views), work(*of_views), atol=1e-5, rtol=0)
+
+
+def test_weights_are_pooled_as_adaptive_pooling_has_them():
+    """Windows that do not divide the map overlap; both round float64."""
+    torch.manual_seed(0)
+    weights = torch.rand(2, 3, 21, 35, dtype=torch.float64)
+    for size in ((6, 10), (21, 35), (4, 9), (1, 1)):
+        found = pooled_weights(weights, torch.zeros(1, 2, 4, *size, dtype=torch.float64))
+        assert torch.allclose(found[0], F.adaptive_avg_pool2d(weights, size), rtol=0, atol=1e-12)
+    assert pooled_weights(weights[:, :0], torch.zeros(1, 2, 4, 6, 10)).shape == (1, 2, 0, 6, 10)

@@ -1,13 +1,14 @@
 """Attention, decoders, DPT, grouping and aggregation: shapes for every view count, and the maths."""
 
 import math
+from typing import cast
 
 import pytest
 import torch
 from torch.nn import functional as F
 
 from langflash_core.network.encoders.shared import Tokens
-from langflash_core.network.layers.attention import Attention, rope_2d, rotate
+from langflash_core.network.layers.attention import Attention, CrossBlock, rope_2d, rotate
 from langflash_core.network.layers.decoder import TwoStackDecoder, normalised_intrinsics
 from langflash_core.network.layers.dpt import DPT
 from langflash_core.network.presets import MINI
@@ -61,6 +62,21 @@ def test_decoder_keeps_views_and_stays_finite(num_views):
     middle, last = decoder(_tokens(num_views), _intrinsics(num_views))
     assert middle.shape == last.shape == (1, num_views, 12, MINI.decoder_dim)
     assert torch.isfinite(last).all()
+
+
+@pytest.mark.parametrize("num_views", [1, 2, 3, 5])
+def test_a_layer_of_the_stacks_equals_every_view_reading_all_others(num_views):
+    """Keys and values made once, in a ring, against a memory gathered for each view; both round float64."""
+    decoder = TwoStackDecoder(MINI).double().eval()
+    x = torch.randn(2, num_views, GRID[0] * GRID[1] + 1, MINI.decoder_dim).double()
+    code = rope_2d(GRID, MINI.decoder_dim // MINI.decoder_heads, MINI.rope_base, extra=1)
+    first, other = cast(CrossBlock, decoder.first[0]), cast(CrossBlock, decoder.other[0])
+    expected = []
+    for view in range(num_views):
+        block, others = other if view else first, [v for v in range(num_views) if v != view] or [view]
+        memory = torch.cat([x[:, v] for v in others], 1)
+        expected.append(block(x[:, view], block.memory(memory, code.repeat(1, len(others), 1)), code))
+    assert torch.allclose(decoder._layer(x, code, first, other), torch.stack(expected, 1), rtol=0, atol=1e-12)
 
 
 def test_decoder_treats_other_views_alike_and_reads_them():

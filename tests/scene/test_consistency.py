@@ -1,10 +1,12 @@
 """Free space: what a photo sees through goes, and never both sides of a conflict."""
 
+import itertools
+
 import pytest
 import torch
 
-from langflash_core.geometry.cameras import invert_rigid, transform, unproject
-from langflash_core.scene.consistency import seen_through
+from langflash_core.geometry.cameras import invert_rigid, project, transform, unproject
+from langflash_core.scene.consistency import TOLERANCE, seen_through
 
 K = torch.tensor([[30.0, 0, 16], [0, 30.0, 12], [0, 0, 1]])
 
@@ -67,3 +69,28 @@ def test_numbers_that_are_not_finite_do_not_raise():
     means = torch.full((2 * 24 * 32, 3), float("nan"))
     viewmats = torch.eye(4).repeat(2, 1, 1)
     assert not seen_through(means, viewmats, K.expand(2, 3, 3), depths, torch.ones(2, 24, 32)).any()
+
+
+def test_several_views_equal_their_twin():
+    """Against every point in every view by the plain functions; in float64 none changes sides."""
+    torch.manual_seed(0)
+    viewmats = torch.eye(4, dtype=torch.float64).repeat(4, 1, 1)
+    viewmats[1:, :3, 3] = torch.randn(3, 3, dtype=torch.float64) * 0.3
+    Ks = K.double().expand(4, 3, 3)
+    depths = torch.rand(4, 24, 32, dtype=torch.float64) * 3 + 0.5
+    confidences = torch.randint(0, 3, (4, 24, 32)).double() / 2
+    points = unproject(depths, Ks).flatten(1, 2)
+    means = [transform(invert_rigid(m), p) for m, p in zip(viewmats, points, strict=True)]
+    expected = torch.zeros(4, 24 * 32, dtype=torch.bool)
+    for view, other in itertools.permutations(range(4), 2):
+        pos_c = transform(viewmats[other], means[view])
+        for i, ((x, y), z) in enumerate(
+            zip(project(pos_c, Ks[other]).tolist(), pos_c[:, 2].tolist(), strict=True)
+        ):
+            if z <= 0 or not (0 <= x < 32 and 0 <= y < 24):
+                continue
+            theirs, own = confidences[other, int(y), int(x)], confidences[view].flatten()[i]
+            outvoted = theirs > own or (theirs == own and other < view)
+            expected[view, i] |= bool(z < (1 - TOLERANCE) * depths[other, int(y), int(x)] and outvoted)
+    blocked = seen_through(torch.cat(means), viewmats, Ks, depths, confidences)
+    assert expected.any() and torch.equal(blocked, expected.flatten())

@@ -4,6 +4,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+Memory = tuple[Tensor, Tensor]
+"""Keys and values of tokens that are read, (B, heads, m, head_dim) each."""
+
 
 def rope_2d(grid: tuple[int, int], head_dim: int, base: float, *, extra: int = 0) -> Tensor:
     """Cosines and sines (2, h*w + extra, head_dim) of rotary codes for patch rows and columns.
@@ -44,13 +47,22 @@ class Attention(nn.Module):
         self, query: Tensor, key: Tensor, value: Tensor, codes: tuple[Tensor, Tensor] | None = None
     ) -> Tensor:
         """(B, n, C) from queries (B, n, C), keys and values (B, m, C)."""
-        q, k, v = (
-            layer(x).unflatten(-1, (self.heads, -1)).transpose(1, 2)
-            for layer, x in ((self.query, query), (self.key, key), (self.value, value))
-        )
-        if codes is not None:
-            q, k = rotate(q, codes[0]), rotate(k, codes[1])
-        return self.out(F.scaled_dot_product_attention(q, k, v).transpose(1, 2).flatten(2))
+        own, of_memory = codes if codes is not None else (None, None)
+        return self.gathered(query, self.memory(key, value, of_memory), own)
+
+    def memory(self, key: Tensor, value: Tensor, code: Tensor | None = None) -> Memory:
+        """What queries read of (B, m, C): one memory serves many."""
+        k, v = self._of_heads(self.key(key)), self._of_heads(self.value(value))
+        return k if code is None else rotate(k, code), v
+
+    def gathered(self, query: Tensor, memory: Memory, code: Tensor | None = None) -> Tensor:
+        """(B, n, C) from queries (B, n, C) and a memory."""
+        q = self._of_heads(self.query(query))
+        q = q if code is None else rotate(q, code)
+        return self.out(F.scaled_dot_product_attention(q, *memory).transpose(1, 2).flatten(2))
+
+    def _of_heads(self, x: Tensor) -> Tensor:
+        return x.unflatten(-1, (self.heads, -1)).transpose(1, 2)
 
 
 class MLP(nn.Sequential):
@@ -82,12 +94,16 @@ class CrossBlock(nn.Module):
         self.norm1, self.norm2, self.norm3, self.norm_memory = (nn.LayerNorm(dim, eps) for _ in range(4))
         self.attn, self.cross, self.mlp = Attention(dim, heads), Attention(dim, heads), MLP(dim, 4 * dim)
 
-    def forward(self, tokens: Tensor, memory: Tensor, code: Tensor, memory_code: Tensor) -> Tensor:
+    def forward(self, tokens: Tensor, memory: Memory, code: Tensor) -> Tensor:
         x = self.norm1(tokens)
         tokens = tokens + self.attn(x, x, x, (code, code))
-        m = self.norm_memory(memory)
-        tokens = tokens + self.cross(self.norm2(tokens), m, m, (code, memory_code))
+        tokens = tokens + self.cross.gathered(self.norm2(tokens), memory, code)
         return tokens + self.mlp(self.norm3(tokens))
+
+    def memory(self, tokens: Tensor, code: Tensor) -> Memory:
+        """What this block reads of other tokens (B, m, C)."""
+        m = self.norm_memory(tokens)
+        return self.cross.memory(m, m, code)
 
 
 class QueryBlock(nn.Module):

@@ -1,10 +1,13 @@
 """Two-stack decoder (views look at each other) and the Siamese decoder of the semantic branch."""
 
+from collections.abc import Iterator
+from typing import cast
+
 import torch
 from torch import Tensor, nn
 
 from langflash_core.network.encoders.shared import Tokens
-from langflash_core.network.layers.attention import CrossBlock, SelfBlock, rope_2d
+from langflash_core.network.layers.attention import CrossBlock, Memory, SelfBlock, rope_2d
 from langflash_core.network.presets import GuidedDepth, Preset
 
 
@@ -38,20 +41,36 @@ class TwoStacks(nn.Module):
         code = rope_2d(grid, self.head_dim, self.base, extra=1).to(x.device)
         given = []
         for first, other in zip(self.first, self.other, strict=True):
-            x = self._layer(x, code, first, other)
+            x = self._layer(x, code, cast(CrossBlock, first), cast(CrossBlock, other))
             given.append(x)
         return [*given[:-1], self.norm(x)]
 
     @staticmethod
-    def _layer(x: Tensor, code: Tensor, first: nn.Module, other: nn.Module) -> Tensor:
-        num_views = x.shape[1]
-        memory_code = code.repeat(1, max(num_views - 1, 1), 1)
-        outputs = []
-        for view in range(num_views):
-            others = [v for v in range(num_views) if v != view] or [view]
-            memory = x[:, others].flatten(1, 2)
-            outputs.append((other if view else first)(x[:, view], memory, code, memory_code))
+    def _layer(x: Tensor, code: Tensor, first: CrossBlock, other: CrossBlock) -> Tensor:
+        seen = x[:, 1:] if x.shape[1] > 1 else x
+        memory = first.memory(seen.flatten(1, 2), code.repeat(1, seen.shape[1], 1))
+        outputs = [first(x[:, 0], memory, code)]
+        for view, memory in enumerate(_memories(x, code, other), start=1):
+            outputs.append(other(x[:, view], memory, code))
         return torch.stack(outputs, 1)
+
+
+def _memories(x: Tensor, code: Tensor, block: CrossBlock) -> Iterator[Memory]:
+    """What each view but the first reads of all others, from tokens (B, V, m, C).
+
+    Keys and values are made once, not once a reader. They lie there twice, so that all views but one are a
+    slice of that ring; attention does not mind their order.
+    """
+    num_views, length = x.shape[1], x.shape[2]
+    if num_views == 2:
+        yield block.memory(x[:, 0], code)
+    if num_views < 3:
+        return
+    keys, values = block.memory(x.flatten(1, 2), code.repeat(1, num_views, 1))
+    keys, values = torch.cat((keys, keys), 2), torch.cat((values, values), 2)
+    for view in range(1, num_views):
+        others = slice((view + 1) * length, (view + num_views) * length)
+        yield keys[:, :, others], values[:, :, others]
 
 
 class TwoStackDecoder(TwoStacks):

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.geometry.cameras import invert_rigid, pixel_grid, project, transform, unproject
+from langflash_core.geometry.cameras import invert_rigid, pictured, pixel_grid, unproject
 from langflash_core.network.stereo.prior import DepthMaps
 from langflash_core.network.stereo.sweep import Neighbours, everyone
 
@@ -64,11 +64,11 @@ def carried(
     points: Tensor, viewmats: Tensor, Ks: Tensor, view: int, other: int, size: tuple[int, int]
 ) -> Carried:
     """Points (P, 3) in the frame of `view`'s camera, seen from `other`, whose picture is `size` = (H, W)."""
-    pos_o = transform(viewmats[other] @ invert_rigid(viewmats[view]), points)
+    x, y, depths = pictured(viewmats[other] @ invert_rigid(viewmats[view]), Ks[other], points.T)
     height, width = size
-    places = (project(pos_o, Ks[other]) / pos_o.new_tensor([width, height]) * 2 - 1).clamp(-4, 4)
-    inside = (pos_o[:, 2] > 1e-4) & (places.abs() <= 1).all(-1)
-    return Carried(pos_o[:, 2].clamp_min(1e-4).log(), places, inside)
+    x, y = (x / width * 2 - 1).clamp(-4, 4), (y / height * 2 - 1).clamp(-4, 4)
+    inside = (depths > 1e-4) & (x.abs() <= 1) & (y.abs() <= 1)
+    return Carried(depths.clamp_min(1e-4).log(), torch.stack((x, y), -1), inside)
 
 
 def sampled(maps: Tensor, places: Tensor) -> Tensor:

@@ -24,6 +24,7 @@ from langflash_core.network.stereo.prior import LOG_ERROR_RANGE, DepthMaps, resi
 Neighbours = Sequence[Sequence[int]]
 """Of each view the others that it is compared with."""
 _TYPICAL_LOG_ERROR = -1.5  # centres the error channel that the network reads
+_AT_ONCE = 10_000  # places whose vectors are gathered together
 
 
 def everyone(num_views: int) -> Neighbours:
@@ -33,22 +34,28 @@ def everyone(num_views: int) -> Neighbours:
 
 @dataclass(frozen=True)
 class Compared:
-    """What a sweep compares: unit vectors of every view as they are, (V, C, h', w'), the same at the
-    size of the depth maps, (V, C, h, w), and in how many equal groups their channels are summed."""
+    """What a sweep compares: unit vectors of every view.
 
-    maps: Tensor
+    table: (V, (h' + 2) (w' + 2), C), maps of `size` = (h', w') with a border of zeros, as rows.
+    own: (V, h w, C, G) at the size of the depth maps, once for each of G equal groups of channels and 0
+    outside of it: products with it are sums by group.
+    """
+
+    table: Tensor
+    size: tuple[int, int]
     own: Tensor
-    groups: int
 
     @staticmethod
     def of(maps: Tensor, size: tuple[int, int], groups: int = 1) -> "Compared":
-        """Vectors of any size, for depth maps of `size`; groups must divide C."""
-        return Compared(maps, maps if _size(maps) == size else resize(maps, size), groups)
+        """Vectors (V, C, h', w') of any size, for depth maps of `size`; groups must divide C."""
+        own = _rows(maps if _size(maps) == size else resize(maps, size))
+        belongs = torch.eye(groups).to(own).repeat_interleave(own.shape[-1] // groups, 0)  # (C, G)
+        return Compared(_rows(F.pad(maps, (1,) * 4)).contiguous(), _size(maps), own[..., None] * belongs)
 
     def views(self, first: int, count: int) -> "Compared":
         """The views of one scene out of several."""
         part = slice(first, first + count)
-        return Compared(self.maps[part], self.own[part], self.groups)
+        return Compared(self.table[part], self.size, self.own[part])
 
 
 def sweep_correlation(
@@ -75,42 +82,73 @@ def sweep_correlation(
     in Guo et al. 2019 (group-wise correlation).
     """
     num_views, height, width = log_depths.shape
-    directions = rays(Ks, width, height)  # (V, h, w, 3)
+    directions = rays(Ks, width, height).flatten(1, 2).transpose(1, 2)  # (V, 3, h w)
     correlations: list[list[Tensor]] = [[] for _ in compared]
     visibilities = []
     for view, others in enumerate(neighbours or everyone(num_views)):
-        depths = (log_depths[view] + offsets[:, None, None]).exp()  # (P, h, w)
-        totals = [depths.new_zeros(c.groups, *depths.shape) for c in compared]
+        depths = (log_depths[view].flatten()[:, None] + offsets).exp()  # (h w, P)
+        totals = [depths.new_zeros(*depths.shape, c.own.shape[-1]) for c in compared]
         count = torch.zeros_like(depths)
         for other in others:
             relative = viewmats[other] @ invert_rigid(viewmats[view])
-            pos_o = directions[view] @ relative[:3, :3].T * depths[..., None] + relative[:3, 3]
-            ndc, seen = _projected(pos_o, Ks[other])
+            turned = relative[:3, :3] @ directions[view]
+            pos_o = turned[..., None] * depths + relative[:3, 3, None, None]  # (3, h w, P)
+            ndc, seen = _projected(pos_o, Ks[other], (height, width))
             for c, total in zip(compared, totals, strict=True):
-                warped = _sample(c.maps[other], ndc)
-                products = (warped * c.own[view]).unflatten(1, (c.groups, -1)).sum(2)  # (P, G, h, w)
-                total += products.movedim(1, 0) * seen
+                total += _products(c, view, other, ndc) * seen[..., None]
             count = count + seen
         for found, total in zip(correlations, totals, strict=True):
-            found.append(total / count.clamp_min(1))
-        visibilities.append(count / max(len(others), 1))
+            mean = total / count.clamp_min(1)[..., None]
+            found.append(mean.permute(2, 1, 0).unflatten(2, (height, width)))
+        visibilities.append((count / max(len(others), 1)).T.unflatten(1, (height, width)))
     return [torch.stack(found) for found in correlations], torch.stack(visibilities)
 
 
-def _projected(pos_c: Tensor, K: Tensor) -> tuple[Tensor, Tensor]:
-    """Where points (P, h, w, 3) lie in a picture of h x w, as (P, h, w, 2) of -1 to 1, and (P, h, w) 1
-    where they are in view."""
-    height, width = pos_c.shape[1:3]
-    z = pos_c[..., 2]
-    xy = pos_c[..., :2] / z.clamp_min(1e-4)[..., None] * K.diagonal()[:2] + K[:2, 2]
-    ndc = (xy / xy.new_tensor([width, height]) * 2 - 1).clamp(-4, 4)
-    return ndc, ((z > 1e-4) & (ndc.abs() <= 1).all(-1)).to(pos_c.dtype)
+def _projected(pos_c: Tensor, K: Tensor, size: tuple[int, int]) -> tuple[Tensor, Tensor]:
+    """Where points (3, X, P) lie in a picture of (h, w), as (2, X, P) of -1 to 1, and (X, P) 1 where they
+    are in view; the others are said to lie in the middle."""
+    z = pos_c[2]
+    scale, shift = K.diagonal()[:2, None, None], K[:2, 2, None, None]
+    ends = pos_c.new_tensor([size[1], size[0]])[:, None, None]
+    ndc = (pos_c[:2] / z.clamp_min(1e-4) * scale + shift) / ends * 2 - 1
+    seen = (z > 1e-4) & (ndc.abs() <= 1).all(0)
+    return torch.where(seen, ndc, 0.0), seen.to(pos_c.dtype)
 
 
-def _sample(features: Tensor, ndc: Tensor) -> Tensor:
-    """Bilinear features (P, C, h, w) of one map (C, h', w') at (P, h, w, 2)."""
-    batch = features[None].expand(len(ndc), -1, -1, -1)
-    return F.grid_sample(batch, ndc.to(features.dtype), align_corners=False)
+def _products(compared: Compared, view: int, other: int, ndc: Tensor) -> Tensor:
+    """Products (X, P, G) of a view's pixels with another's points at (2, X, P), as `Compared` has them.
+
+    Some pixels at a time: what was gathered of them stays in a processor's cache.
+    """
+    at_once = max(1, _AT_ONCE // ndc.shape[2])
+    table, own = compared.table[other], compared.own[view]
+    parts = zip(ndc.split(at_once, 1), own.split(at_once), strict=True)
+    return torch.cat([torch.bmm(gathered(table, compared.size, there), here) for there, here in parts])
+
+
+def gathered(table: Tensor, size: tuple[int, int], ndc: Tensor) -> Tensor:
+    """Bilinear vectors (X, P, C) of a map of `size` = (h, w) at places (2, X, P) of -1 to 1.
+
+    Each is a weighted sum of four rows of the table ((h + 2) (w + 2), C), whose border is 0: as embeddings
+    are gathered, and not channel by channel, as `grid_sample` does, the twin, which it equals but for
+    rounding.
+    """
+    ends = ndc.new_tensor([size[1], size[0]])[:, None, None]
+    places = (ndc + 1) * (ends / 2) + 0.5  # pixels' centres are whole numbers, the first is 1
+    low = places.floor()
+    right, down = places - low
+    left, up = 1 - right, 1 - down
+    column, row = low.int()
+    width = size[1] + 2
+    ids = (row * width + column)[..., None] + torch.tensor([0, 1, width, width + 1]).to(column)
+    shares = torch.stack((up * left, up * right, down * left, down * right), -1)
+    bags = ids.flatten(0, 1), shares.flatten(0, 1)
+    return F.embedding_bag(bags[0], table, per_sample_weights=bags[1], mode="sum").unflatten(0, row.shape)
+
+
+def _rows(maps: Tensor) -> Tensor:
+    """Maps (V, C, h, w) as (V, h w, C)."""
+    return maps.flatten(2).transpose(1, 2)
 
 
 def patches(images: Tensor, reach: int = 2) -> Tensor:
