@@ -8,9 +8,11 @@ FADING = 30.0  # degrees aside from which the picture fades: `FULL` of langflash
 
 
 def places_to_keep_to(state: State) -> tuple[Vector, ...]:
-    """Of the photos that the scene was made of; none where nobody knows them, or wants to keep to them."""
+    """Of the photos that the scene was made of; none where nobody knows them, or wants to keep to them,
+    or the picture is a plan."""
     info = state.info
-    if info is None or info.scene.view_ids is None or not state.preferences.near_photos:
+    kept = state.preferences.near_photos and state.pose.span is None
+    if info is None or info.scene.view_ids is None or not kept:
         return ()
     return tuple(view.centre for view in info.views)
 
