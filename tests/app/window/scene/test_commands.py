@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from app.window import commands as do
+from app.window.asking.commands import EditPrompt
 from app.window.effects import Hands
 from app.window.poses import Pose
 from app.window.scene import camera, work
@@ -156,3 +157,12 @@ def test_parallel_rays_come_and_go_and_see_from_every_axis(shown: State) -> None
     landed = after(under_way, do.Tick(under_way.now + FLIGHT_SECONDS + 0.1))
     assert landed.pose.span is not None, "the end of the flight is seen by parallel rays"
     assert landed.pose.pivot == pytest.approx(shown.info.views[1].pivot if shown.info else None)
+
+
+def test_what_a_reconstruction_found_is_named_in_the_picture_until_a_phrase_is_asked(info) -> None:
+    made = after(State(), show.AddPhotos(PATHS[:2]), show.Reconstruct(), show.SceneArrived(info))
+    assert made.asking.named
+    opened = after(State(), show.OpenScene(Path("/a.langflash")), show.SceneArrived(info))
+    assert not opened.asking.named
+    asking = after(State(), EditPrompt(0, "door"), show.AddPhotos(PATHS[:2]), show.Reconstruct())
+    assert not after(asking, show.SceneArrived(info)).asking.named
