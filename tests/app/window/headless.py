@@ -2,11 +2,17 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import SimpleNamespace
 
 from imgui_bundle import ImVec2, imgui
 
 from app.window.kit.boxes import Box
 from app.window.kit.look import Look
+
+
+def look(scale: float = 1.0) -> Look:
+    """Without a picture and thumbnails."""
+    return Look(scale, None, SimpleNamespace(get=lambda name: None))  # pyright: ignore[reportArgumentType]
 
 
 @contextmanager
@@ -34,5 +40,5 @@ def frames(draw: Callable[[Look], object], look: Look, count: int = 4) -> None:
 def box(name: str) -> Box:
     """Where a window of the last frame is."""
     window = imgui.internal.find_window_by_name(name)
-    assert window is not None and window.was_active | window.active, name
+    assert window is not None and (window.was_active or window.active), name
     return (window.pos.x, window.pos.y, window.pos.x + window.size.x, window.pos.y + window.size.y)

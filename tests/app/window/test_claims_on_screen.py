@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,15 +21,10 @@ from app.window.scene.state import Photo
 from app.window.state import State
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History, Mask
-from tests.app.window.headless import box, context, frames
+from tests.app.window.headless import box, context, frames, look
 from tests.app.window.scenes import after, shown_scene
 
 LEFT, TOP, STATUS = 348, 52, 32  # of the picture's place, design pixels
-
-
-def look(scale: float = 1.0) -> Look:
-    nothing = SimpleNamespace(get=lambda name: None)
-    return Look(scale, None, nothing)  # pyright: ignore[reportArgumentType]
 
 
 def place(size: tuple[int, int]) -> tuple[ImVec2, ImVec2]:

@@ -166,9 +166,9 @@ def test_a_polygon_is_clicked_corner_by_corner_and_a_lasso_is_drawn(program: Pro
     program.xdotool("key", "ctrl+z")
     program.until(lambda s: s["selected"] == 0, "undo")
     move(program, (x - 30, y - 30))
-    way = (word for step in ((60, 0), (0, 60), (-60, 0)) for word in
-           ("mousemove_relative", "--", *map(str, step), "sleep", "0.3"))  # fmt: skip
-    program.xdotool("mousedown", "1", "sleep", "0.3", *way, "mouseup", "1")
+    sides = ((30, 0), (30, 0), (0, 30), (0, 30), (-30, 0), (-30, 0))
+    steps = [("mousemove_relative", "--", *map(str, side), "sleep", "0.7") for side in sides]
+    program.xdotool("sleep", "0.7", "mousedown", "1", "sleep", "0.7", *sum(steps, ()), "mouseup", "1")
     drawn = program.until(lambda s: s["selected"] > 0 and not s["waiting"], "the lasso")["selected"]
     assert drawn == pytest.approx(clicked, rel=0.1)
 

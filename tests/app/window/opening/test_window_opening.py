@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from langflash_core.resources import asset_path
-from tests.app.window.test_window import MIDDLE, TOP, Program, display, pytestmark
+from tests.app.window.test_window import TOP, Program, display, pytestmark
 
 __all__ = ["display", "pytestmark"]  # the fixture and the mark of the window's tests
 
@@ -25,7 +25,8 @@ def home(tmp_path: Path, monkeypatch) -> Path:
 
 def test_an_empty_window_opens_photos_with_clicks_alone(display: str, home: Path) -> None:
     program = Program(display)
-    program.xdotool("mousemove", str(MIDDLE[0]), str(TOP + 20), "sleep", "0.5", "click", "1")
+    left, _, right, _ = program.box("welcome")
+    program.xdotool("mousemove", str((left + right) // 2), str(TOP + 20), "sleep", "1.5", "click", "1")
     program.until(lambda s: s["dialog"] == "open", "the dialog for files")
     program.click(f"##{home / 'toy_left.png'}")
     program.click(f"##{home / 'toy_right.png'}")
