@@ -15,8 +15,7 @@ from langflash_core.errors import SceneFileError
 from langflash_core.scene.edits import History
 
 from ..places import state_folder
-from ..scene.drops import SCENE_SUFFIX
-from .sessions import still_there
+from ..scene.drops import SCENE_SUFFIX, still_there
 from .state import KeptPhoto, Offer
 
 if TYPE_CHECKING:

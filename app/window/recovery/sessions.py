@@ -7,7 +7,6 @@ however it dies. A file whose lock is free belongs to nobody: it is offered agai
 import json
 import os
 import sys
-from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import asdict, replace
 from math import isfinite
@@ -18,8 +17,8 @@ from langflash_core.errors import OutputError
 
 from ..places import state_folder
 from ..poses import Pose, Rotation, Vector
-from ..scene.drops import SCENE_SUFFIX
-from .state import Kept, KeptPhoto
+from ..scene.drops import SCENE_SUFFIX, still_there
+from .state import Kept
 
 PREFIX = "session-"
 EDITED, SELECTION = f".edited{SCENE_SUFFIX}", f".selection{SCENE_SUFFIX}"
@@ -67,17 +66,6 @@ def read(path: Path) -> Kept | None:
     except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError):
         return None
     return replace(kept, photos=photos, fovs=fovs, scene=scene, edits=edits, missing=missing)
-
-
-def still_there(photos: Iterable[KeptPhoto]) -> tuple[tuple[KeptPhoto, ...], tuple[str, ...]]:
-    """Photos that are on the disk, and the names of the others."""
-    found, missing = list[KeptPhoto](), list[str]()
-    for path, fov in photos:
-        if os.path.isfile(path):
-            found.append((path, None if fov is None else float(fov)))
-        else:
-            missing.append(os.path.basename(path))
-    return tuple(found), tuple(missing)
 
 
 def _asked(content: dict, count: int) -> dict[str, tuple]:
