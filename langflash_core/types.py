@@ -3,6 +3,7 @@
 Axes      OpenCV cameras: +x right, +y down, +z forward. World = camera of view 0.
 Poses     `viewmats` (V, 4, 4) map world to camera: pos_c = R pos_w + t.
 Pixels    `Ks` (V, 3, 3) in pixels; the centre of the top-left pixel is (0.5, 0.5).
+          (u, v) = (fx x / z + cx, fy y / z + cy); of an orthographic camera (fx x + cx, fy y + cy).
 Rotations quaternions wxyz, unit.
 Values    bare names are activated: scales > 0 (standard deviations, scene units),
           opacities in [0, 1]. Stored forms say so: `log_scales`, `logit_opacities`.
@@ -33,17 +34,22 @@ LUMA = (0.299, 0.587, 0.114)
 
 @dataclass(frozen=True)
 class Camera:
-    """One pinhole camera: `viewmat` (4, 4), `K` (3, 3) pixels, image size in pixels."""
+    """One camera: `viewmat` (4, 4), `K` (3, 3) pixels, image size in pixels.
+
+    A pinhole, unless it is `orthographic`: then its rays are parallel to its z axis, and its focal lengths
+    are pixels per scene unit, at any depth.
+    """
 
     viewmat: Tensor
     K: Tensor
     width: int
     height: int
+    orthographic: bool = False
 
     def resized(self, width: int, height: int) -> "Camera":
         """The same camera drawn at another size; the field of view is kept per axis."""
         ratio = torch.tensor([width / self.width, height / self.height, 1.0]).to(self.K)
-        return Camera(self.viewmat, self.K * ratio[:, None], width, height)
+        return replace(self, K=self.K * ratio[:, None], width=width, height=height)
 
 
 @dataclass(frozen=True)

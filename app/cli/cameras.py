@@ -3,7 +3,7 @@
 import json
 import math
 from argparse import Namespace
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import torch
 from langflash_core.errors import ViewError
 from langflash_core.types import Camera, Scene
 
+from ..window.poses import median_reach
 from .files import readable_file
 from .values import LARGEST_SIDE
 
@@ -26,12 +27,13 @@ class CameraChoice:
     """What the command line says about the camera, checked as far as it can be without a scene.
 
     view: index of a photo, None when `described` holds a camera. size: (width, height) to
-    draw, None for the camera's own.
+    draw, None for the camera's own. ortho: by parallel rays.
     """
 
     view: int | None
     described: Camera | None
     size: tuple[int, int] | None
+    ortho: bool = False
 
     def of(self, scene: Scene) -> Camera:
         """The camera for `scene`.
@@ -40,28 +42,46 @@ class CameraChoice:
             ViewError: the scene has no such view.
         """
         if self.described is not None:
-            return self.described if self.size is None else self.described.resized(*self.size)
-        view = self.view or 0
+            camera = self.described if self.size is None else self.described.resized(*self.size)
+            return self._by_rays(camera, scene)
+        return self.of_photo(scene, self.view or 0)
+
+    def of_photo(self, scene: Scene, view: int) -> Camera:
+        """The camera of a photo, with size and rays as asked for.
+
+        Raises:
+            ViewError: the scene has no such view.
+        """
         if not 0 <= view < scene.num_views:
             raise ViewError(
                 f"there is no view {view}: this scene has {scene.num_views}, counted from 0; "
                 f"use --view 0{_last(scene.num_views)}"
             )
-        return scene.camera(view, *(self.size or (None, None)))
+        return self._by_rays(scene.camera(view, *(self.size or (None, None))), scene)
+
+    def _by_rays(self, camera: Camera, scene: Scene) -> Camera:
+        if not self.ortho or camera.orthographic:
+            return camera
+        means, K = scene.gaussians.means.double().numpy(), camera.K.double().numpy()
+        depth = median_reach(means, camera.viewmat.double().numpy(), K, (camera.width, camera.height))
+        per_unit = camera.K / camera.K.new_tensor([[depth], [depth], [1.0]])
+        per_unit[:2, 2] = camera.K[:2, 2]
+        return replace(camera, K=per_unit, orthographic=True)
 
 
 def chosen_camera(args: Namespace) -> CameraChoice:
-    """Read --view, --camera and --size.
+    """Read --view, --camera, --size and --ortho.
 
     Raises:
         ViewError: the camera file cannot be used.
     """
     described = None if args.camera is None else read_camera(args.camera)
-    return CameraChoice(None if described else args.view or 0, described, args.size)
+    return CameraChoice(None if described else args.view or 0, described, args.size, bool(args.ortho))
 
 
 def read_camera(path: Path) -> Camera:
-    """A camera from JSON: {"viewmat": 4 x 4 world to camera, "K": 3 x 3 pixels, "width", "height"}.
+    """A camera from JSON: {"viewmat": 4 x 4 world to camera, "K": 3 x 3 pixels, "width", "height"}; with
+    "orthographic": true its rays are parallel, and K's focal lengths are pixels per scene unit.
 
     Raises:
         ViewError: missing, not JSON, or not a rigid pose with a usable pinhole K.
@@ -83,11 +103,12 @@ def camera_of(fields: Any, path: str) -> Camera:
     try:
         viewmat, K = _matrix(fields["viewmat"], 4), _matrix(fields["K"], 3)
         width, height = fields["width"], fields["height"]
+        orthographic = fields.get("orthographic", False)
     except KeyError as missing:
         raise ViewError(
             f"{path} has no {missing}; a camera file holds viewmat, K, width and height"
         ) from None
-    except TypeError:
+    except (TypeError, AttributeError):
         raise ViewError(
             f"{path} is not a camera file: expected a JSON object with viewmat, K, width and height"
         ) from None
@@ -95,10 +116,12 @@ def camera_of(fields: Any, path: str) -> Camera:
         raise ViewError(
             f"{path} is not a camera file: {problem}; it holds viewmat, K, width and height"
         ) from None
+    if not isinstance(orthographic, bool):
+        raise ViewError(f"{path}: orthographic must be true or false, not {orthographic!r}")
     problem = _size_problem(width, height) or _pose_problem(viewmat) or _pinhole_problem(K)
     if problem:
         raise ViewError(f"{path}: {problem}")
-    return Camera(torch.tensor(viewmat), torch.tensor(K), width, height)
+    return Camera(torch.tensor(viewmat), torch.tensor(K), width, height, orthographic)
 
 
 def _matrix(rows: Any, side: int) -> Matrix:

@@ -177,6 +177,8 @@ def read_key_frames(path: Path, seconds: float | None) -> tuple[list[Camera], li
     if not isinstance(entries, list) or len(entries) < 2:
         raise ViewError(f"{path} holds no key frames: expected a JSON list of two or more cameras")
     cameras = [camera_of(entry, f"{path}, key frame {number}") for number, entry in enumerate(entries)]
+    if len({camera.orthographic for camera in cameras}) > 1:
+        raise ViewError(f"{path}: either all key frames are orthographic, or none")
     times = [entry.get("time") for entry in entries]
     if all(time is None for time in times):
         return cameras, np.linspace(0, seconds or SECONDS, len(cameras)).tolist()

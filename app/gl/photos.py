@@ -60,7 +60,7 @@ class PhotoDepths:
             matrices[photo] = _numbers(seen.viewmat) @ back
         return {
             "num_photos": len(self.cameras),
-            "pinhole": _pinhole(camera),
+            **_lens(camera),
             "pinholes": pinholes,
             "to_photos": matrices,
         }
@@ -75,12 +75,16 @@ def photo_places(scene: Scene, camera: Camera) -> dict[str, np.ndarray | int]:
     near = places[np.argsort(np.linalg.norm(places, axis=1), kind="stable")[:MOST_PHOTOS]]
     eyes = np.zeros((MOST_PHOTOS, 3))
     eyes[: len(near)] = near
-    return {"num_photos": len(near), "pinhole": _pinhole(camera), "eyes": eyes}
+    return {"num_photos": len(near), **_lens(camera), "eyes": eyes}
 
 
 def _small(camera: Camera) -> Camera:
     ratio = min(1.0, LONGEST_SIDE / max(camera.width, camera.height))
     return camera.resized(max(1, round(camera.width * ratio)), max(1, round(camera.height * ratio)))
+
+
+def _lens(camera: Camera) -> dict[str, np.ndarray | int]:
+    return {"pinhole": _pinhole(camera), "orthographic": int(camera.orthographic)}
 
 
 def _pinhole(camera: Camera) -> np.ndarray:

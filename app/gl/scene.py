@@ -157,5 +157,5 @@ class LiveScene:
 
 
 def _camera_key(camera: Camera) -> tuple:
-    pose = camera.viewmat.detach().cpu().double().numpy().tobytes()
-    return pose, camera.K.detach().cpu().double().numpy().tobytes(), camera.width, camera.height
+    pose, K = (m.detach().cpu().double().numpy().tobytes() for m in (camera.viewmat, camera.K))
+    return pose, K, camera.width, camera.height, camera.orthographic

@@ -153,16 +153,20 @@ class SplatBuffers:
             self._order_buffer.write(self.order.tobytes())
 
     def _may_touch(self, camera: Camera, viewmat: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """(N,) bool, conservative: the Frobenius norm of the Jacobian bounds the footprint."""
+        """(N,) bool, conservative: the Frobenius norm of the Jacobian bounds the footprint.
+
+        Of an orthographic camera |J|_F^2 = fx^2 + fy^2, wherever the Gaussian is.
+        """
         K = camera.K.detach().cpu().double().numpy()
         seen = z >= NEAR
-        inverse = 1 / np.where(seen, z, 1.0).astype(np.float32)
+        flat = camera.orthographic
+        inverse = np.ones(len(z), np.float32) if flat else 1 / np.where(seen, z, 1.0).astype(np.float32)
         sizes = (camera.width, camera.height)
         bound = 0.0  # |J|_F^2 z^2 <= sum over axes of focal^2 (1 + steepest slope^2)
         for axis, extent in enumerate(sizes):
             focal, principal = K[axis, axis], K[axis, 2]
             steepest = (max(principal, extent - principal) + TAN_MARGIN * 0.5 * extent) / focal
-            bound += focal * focal * (1 + steepest * steepest)
+            bound += focal * focal * (1 if flat else 1 + steepest * steepest)
         rounding = np.float32(1e-6 * np.abs(viewmat[:3, 3]).max())  # of places far from the origin
         deviations = np.sqrt(
             np.square((self._widest + rounding) * inverse) * np.float32(bound) + np.float32(DILATION)
@@ -203,6 +207,7 @@ class SplatBuffers:
             eye=eye,
             eye_rest=eye - eye.astype(np.float32),
             pinhole=np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2]]),
+            orthographic=int(camera.orthographic),
             image_size=(float(camera.width), float(camera.height)),
             tint_colours=np.array(TINTS),
         )

@@ -17,6 +17,7 @@ MODIFIERS = frozenset(
     (glfw.KEY_LEFT_CONTROL, glfw.KEY_RIGHT_CONTROL, glfw.KEY_LEFT_SUPER, glfw.KEY_RIGHT_SUPER)
 )
 CHORDS = glfw.MOD_CONTROL | glfw.MOD_SUPER
+ENTER = frozenset((glfw.KEY_ENTER, glfw.KEY_KP_ENTER))
 FOCUS_FRAMES = 6  # from a command until the field that it opens takes letters
 
 
@@ -72,7 +73,9 @@ class Events:
                 # ImGui would take Ctrl+A and the release of Ctrl, come in one frame, for a bare A.
                 self._pause(2)
         self._backend.keyboard_callback(window, named, scancode, action, mods)
-        if action == glfw.PRESS and (mods & CHORDS or key in (glfw.KEY_ENTER, glfw.KEY_KP_ENTER)):
+        if action == glfw.PRESS and (mods & CHORDS or key in ENTER):
+            # Let go at once: held over slow frames it would be pressed again, in the field that it opened.
+            self._backend.keyboard_callback(window, named, scancode, glfw.RELEASE, mods)
             self._pause(FOCUS_FRAMES)  # a new field has the focus before the next letter comes
 
     def _pause(self, frames: int) -> None:

@@ -3,6 +3,9 @@
 Conventions of the core: OpenCV axes, world = camera of view 0, quaternions wxyz. World up is
 -y, because view 0 was held roughly level. A pose frames a *box* with the shape of the photos
 inside a panel of any shape: the box always fits, so an input view shows all of its photo.
+
+A pose with a `span` sees by parallel rays (orthographic). It stands clear of the scene, since what is
+behind it is not drawn: how large things are follows from the span, not from where it stands.
 """
 
 import math
@@ -54,7 +57,8 @@ class Pose:
     centre: scene units. rotation: camera to world. reach: distance to the pivot along the
     viewing direction, scene units. fov: degrees over the longer side of the photo box.
     aspect: width / height of the box. shift: principal point minus the box's middle, in box
-    widths and heights.
+    widths and heights. span: of parallel rays, scene units along the longer side of the box; None
+    sees in perspective.
     """
 
     centre: Vector = ORIGIN
@@ -63,6 +67,7 @@ class Pose:
     fov: float = 60.0
     aspect: float = 4 / 3
     shift: tuple[float, float] = (0.0, 0.0)
+    span: float | None = None
 
     @property
     def axes(self) -> np.ndarray:
@@ -74,30 +79,40 @@ class Pose:
         """The point (3,) that orbits turn around."""
         return np.array(self.centre) + self.reach * self.axes[:, 2]
 
+    @property
+    def distance(self) -> float:
+        """From where the pivot looks as large in perspective as it does: `reach`, without a span."""
+        return self.reach if self.span is None else 0.5 * self.span / math.tan(math.radians(self.fov) / 2)
+
 
 START = Pose()  # of an empty window
 
 
-def from_view(viewmat: np.ndarray, K: np.ndarray, size: tuple[int, int], reach: float) -> Pose:
+def from_view(
+    viewmat: np.ndarray, K: np.ndarray, size: tuple[int, int], reach: float, orthographic: bool = False
+) -> Pose:
     """The pose of an input view: viewmat (4, 4) world to camera, K (3, 3), size (width, height)."""
     width, height = size
     axes = viewmat[:3, :3].T
-    focal = K[0, 0] if width >= height else K[1, 1]
+    longer = max(width, height) / float(K[0, 0] if width >= height else K[1, 1])
     return Pose(
         centre=Vector(*(-axes @ viewmat[:3, 3]).tolist()),
         rotation=_quaternion(axes),
         reach=max(float(reach), MIN_REACH),
-        fov=math.degrees(2 * math.atan(0.5 * max(width, height) / float(focal))),
+        fov=START.fov if orthographic else math.degrees(2 * math.atan(0.5 * longer)),
         aspect=width / height,
         shift=(float(K[0, 2]) / width - 0.5, float(K[1, 2]) / height - 0.5),
+        span=longer if orthographic else None,
     )
 
 
 def intrinsics(pose: Pose, width: int, height: int) -> np.ndarray:
-    """K (3, 3) in pixels of a width x height picture that holds the pose's whole box."""
+    """K (3, 3) in pixels of a width x height picture that holds the pose's whole box; with a span, focal
+    lengths in pixels per scene unit."""
     box_width = min(width, height * pose.aspect)
     box_height = box_width / pose.aspect
-    focal = 0.5 * max(box_width, box_height) / math.tan(math.radians(pose.fov) / 2)
+    longer = max(box_width, box_height)
+    focal = 0.5 * longer / math.tan(math.radians(pose.fov) / 2) if pose.span is None else longer / pose.span
     centre_x = width / 2 + pose.shift[0] * box_width
     centre_y = height / 2 + pose.shift[1] * box_height
     return np.array([[focal, 0.0, centre_x], [0.0, focal, centre_y], [0.0, 0.0, 1.0]])
@@ -122,6 +137,7 @@ def to_camera(pose: Pose, width: int, height: int) -> "Camera":
         torch.tensor(intrinsics(pose, width, height), dtype=torch.float32),
         width,
         height,
+        pose.span is not None,
     )
 
 
@@ -134,8 +150,32 @@ def project(
     pos_c = points @ matrix[:3, :3].T + matrix[:3, 3]
     if pos_c[:, 2].min() < NEAREST:
         return None
-    pos_px = pos_c @ intrinsics(pose, max(round(size[0]), 1), max(round(size[1]), 1)).T
-    return pos_c, pos_px[:, :2] / pos_px[:, 2:]
+    K = intrinsics(pose, max(round(size[0]), 1), max(round(size[1]), 1))
+    across = pos_c[:, :2] if pose.span is not None else pos_c[:, :2] / pos_c[:, 2:]
+    return pos_c, across * K.diagonal()[:2] + K[:2, 2]
+
+
+def orthographic(pose: Pose, low: Vector, high: Vector) -> Pose:
+    """The pose by parallel rays, the pivot as large as before, clear of the box from `low` to `high`."""
+    span = 2 * pose.distance * math.tan(math.radians(pose.fov) / 2)
+    return _clear(replace(pose, span=max(span, MIN_REACH)), low, high)
+
+
+def perspective(pose: Pose) -> Pose:
+    """The pose without a span, the pivot as large as before."""
+    return _at_reach(replace(pose, span=None), max(pose.distance, MIN_REACH))
+
+
+def _clear(pose: Pose, low: Vector, high: Vector) -> Pose:
+    """Stepped back from the pivot until it can turn around it with the whole box ahead."""
+    corners = np.maximum(np.abs(np.array(low) - pose.pivot), np.abs(np.array(high) - pose.pivot))
+    return _at_reach(pose, max(pose.reach, FRAME_MARGIN * float(np.linalg.norm(corners)) + NEAREST))
+
+
+def _at_reach(pose: Pose, reach: float) -> Pose:
+    """So far from the same pivot."""
+    centre = pose.pivot - reach * pose.axes[:, 2]
+    return replace(pose, centre=Vector(*centre.tolist()), reach=reach)
 
 
 def orbit(pose: Pose, yaw: float, pitch: float) -> Pose:
@@ -193,16 +233,18 @@ def pan(pose: Pose, right: float, down: float) -> Pose:
 
 
 def fly(pose: Pose, right: float, down: float, forward: float) -> Pose:
-    """Move along the camera's own axes, scene units."""
+    """Move along the camera's own axes, scene units; with a span, forward comes nearer as `zoom` does."""
+    if pose.span is not None:
+        pose, forward = zoom(pose, math.exp(-forward / pose.distance)), 0.0
     step = pose.axes @ np.array([right, down, forward])
     return replace(pose, centre=Vector(*(np.array(pose.centre) + step).tolist()))
 
 
 def zoom(pose: Pose, factor: float) -> Pose:
-    """Scale the distance to the pivot; a factor below 1 comes nearer."""
-    reach = max(pose.reach * factor, MIN_REACH)
-    centre = pose.pivot - reach * pose.axes[:, 2]
-    return replace(pose, centre=Vector(*centre.tolist()), reach=reach)
+    """Scale the distance to the pivot, or the span; a factor below 1 comes nearer."""
+    if pose.span is not None:
+        return replace(pose, span=max(pose.span * factor, MIN_REACH))
+    return _at_reach(pose, max(pose.reach * factor, MIN_REACH))
 
 
 def facing(pose: Pose, forward: Vector) -> Pose:
@@ -242,7 +284,8 @@ def with_fov(pose: Pose, degrees: float) -> Pose:
 
 def units_per_pixel(pose: Pose, width: int, height: int) -> float:
     """Scene units that one pixel spans at the pivot's depth."""
-    return pose.reach / float(intrinsics(pose, width, height)[0, 0])
+    depth = pose.reach if pose.span is None else 1.0
+    return depth / float(intrinsics(pose, width, height)[0, 0])
 
 
 def framing(pose: Pose, low: Vector, high: Vector) -> Pose:
@@ -250,6 +293,13 @@ def framing(pose: Pose, low: Vector, high: Vector) -> Pose:
     corners = np.array([[x, y, z] for x in (low.x, high.x) for y in (low.y, high.y) for z in (low.z, high.z)])
     middle = (np.array(low) + np.array(high)) / 2
     offsets = (corners - middle) @ pose.axes  # (8, 3) right, down, forward
+    if pose.span is not None:
+        across, along = abs(offsets[:, 0]).max(), abs(offsets[:, 1]).max()
+        widest = max(across, along * pose.aspect)  # half the box's width
+        span = 2 * FRAME_MARGIN * float(widest / min(pose.aspect, 1.0))
+        centre = middle - pose.reach * pose.axes[:, 2]
+        there = replace(pose, centre=Vector(*centre.tolist()), span=max(span, MIN_REACH))
+        return _clear(there, low, high)
     half = math.tan(math.radians(pose.fov) / 2)
     half_x, half_y = (half, half / pose.aspect) if pose.aspect >= 1 else (half * pose.aspect, half)
     needed = np.maximum(abs(offsets[:, 0]) / half_x, abs(offsets[:, 1]) / half_y) - offsets[:, 2]
@@ -259,11 +309,15 @@ def framing(pose: Pose, low: Vector, high: Vector) -> Pose:
 
 
 def blend(start: Pose, end: Pose, fraction: float) -> Pose:
-    """Between two poses: slerp of the rotations, smooth start and stop; exact at both ends."""
+    """Between two poses: slerp of the rotations, smooth start and stop; exact at both ends.
+
+    Between perspective and parallel rays the way is one in perspective.
+    """
     if fraction <= 0.0:
         return start
     if fraction >= 1.0:
         return end
+    start, end = alike((start, end))
     t = fraction * fraction * (3.0 - 2.0 * fraction)
 
     def mix(a: float, b: float) -> float:
@@ -276,7 +330,14 @@ def blend(start: Pose, end: Pose, fraction: float) -> Pose:
         fov=mix(start.fov, end.fov),
         aspect=mix(start.aspect, end.aspect),
         shift=(mix(start.shift[0], end.shift[0]), mix(start.shift[1], end.shift[1])),
+        span=None if start.span is None or end.span is None else mix(start.span, end.span),
     )
+
+
+def alike(all_poses: Sequence[Pose]) -> tuple[Pose, ...]:
+    """As they are where all see by parallel rays, else all in perspective."""
+    flat = all(pose.span is not None for pose in all_poses)
+    return tuple(pose if flat or pose.span is None else perspective(pose) for pose in all_poses)
 
 
 def slerp(start: Rotation, end: Rotation, t: float) -> Rotation:

@@ -18,6 +18,7 @@ def even(size: tuple[int, int]) -> tuple[int, int]:
 
 def along(cameras: list[Camera], times: list[float], size: tuple[int, int] | None = None) -> list[Camera]:
     """Smoothly through all key frames: splines of place and rotation, lenses in between without overshoot.
+    All orthographic, or none.
 
     Speeds are continuous. Source: of the rotations, scipy's RotationSpline.
     """
@@ -34,4 +35,4 @@ def along(cameras: list[Camera], times: list[float], size: tuple[int, int] | Non
     viewmats[:, :3, :3] = rotations
     viewmats[:, :3, 3] = -(rotations @ places[..., None])[..., 0]
     found = zip(torch.from_numpy(viewmats).float(), torch.from_numpy(lenses(moments)).float(), strict=True)
-    return [Camera(viewmat, K, width, height) for viewmat, K in found]
+    return [Camera(viewmat, K, width, height, cameras[0].orthographic) for viewmat, K in found]

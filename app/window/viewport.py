@@ -236,7 +236,8 @@ class Viewport:
         if alpha < SHOWN_ALPHA:
             return Reading(at, atoms=None if weights is None else ()), weights
         K, viewmat = self._camera.K.double().numpy(), self._camera.viewmat.double().numpy()
-        pos_c = depth * np.array([(x + 0.5 - K[0, 2]) / K[0, 0], (y + 0.5 - K[1, 2]) / K[1, 1], 1.0])
+        across = np.array([(x + 0.5 - K[0, 2]) / K[0, 0], (y + 0.5 - K[1, 2]) / K[1, 1]])
+        pos_c = np.array([*(across * (1.0 if self._camera.orthographic else depth)), depth])
         place = viewmat[:3, :3].T @ (pos_c - viewmat[:3, 3])
         point = (float(place[0]), float(place[1]), float(place[2]))
         return Reading(at, point, depth, None if weights is None else strongest(weights)), weights
@@ -467,17 +468,17 @@ class Viewport:
             return  # what is on show stays until the answer is there
         active = next((i for i, p in enumerate(asked) if p.key == state.active), 0)
         colours = state.heat_colours
+        faded = state.preferences.near_photos and mode is Mode.RGB and drawn.pose.span is None
         colouring = (
             mode,
             active,
             state.asking.atom,
-            state.preferences.near_photos,
+            faded,
             tuple((p.colour, p.cut, p.shown_from) for p in asked),
             colours,
         )
         if colouring != self._colouring:
             self._colouring = colouring
-            faded = state.preferences.near_photos and mode is Mode.RGB
             self._texture = (
                 renderer.faded_texture()
                 if faded

@@ -31,7 +31,8 @@ def write_npz(result: QueryResult, path: Path) -> None:
 
 def write_view(frame: Frame, semantics: Semantics, camera: Camera, path: Path) -> None:
     """A view with its language: `rgb` (H, W, 3), `alphas` and `depth` (H, W), `weights` (H, W, K), all
-    float32; `dictionary` (K, C) float32; `viewmat` (4, 4), `K` (3, 3) float64; `space` text.
+    float32; `dictionary` (K, C) float32; `viewmat` (4, 4), `K` (3, 3) float64; `orthographic`
+    bool; `space` text.
 
     The feature image, C channels a pixel, is `weights @ dictionary`: that product is what the renderer
     never has to form, and K numbers a pixel hold all of it.
@@ -52,6 +53,7 @@ def write_view(frame: Frame, semantics: Semantics, camera: Camera, path: Path) -
         dictionary=semantics.dictionary.detach().cpu().float().numpy(),
         viewmat=camera.viewmat.detach().cpu().double().numpy(),
         K=camera.K.detach().cpu().double().numpy(),
+        orthographic=np.array(camera.orthographic),
         space=np.array(semantics.space, dtype=np.str_),
     )
     write_atomically(path, stream.getvalue())

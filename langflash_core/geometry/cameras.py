@@ -43,10 +43,13 @@ def rays(Ks: Tensor, width: int, height: int) -> Tensor:
     return torch.cat((xy, torch.ones_like(xy[..., :1])), -1)
 
 
-def unproject(depths: Tensor, Ks: Tensor) -> Tensor:
+def unproject(depths: Tensor, Ks: Tensor, orthographic: bool = False) -> Tensor:
     """Points (..., H, W, 3) in the camera frame from z-depths (..., H, W)."""
     height, width = depths.shape[-2:]
-    return rays(Ks, width, height) * depths[..., None]
+    ahead = rays(Ks, width, height)
+    if orthographic:
+        return torch.cat((ahead[..., :2].expand(*depths.shape, 2), depths[..., None]), -1)
+    return ahead * depths[..., None]
 
 
 def project(pos_c: Tensor, K: Tensor, eps: float = 1e-8) -> Tensor:

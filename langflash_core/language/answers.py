@@ -92,8 +92,8 @@ def best_places(
 
 def world_points(depths: Tensor, camera: Camera) -> Tensor:
     """World points (H, W, 3) of z-depths (H, W) seen by `camera`."""
-    Ks, viewmat = camera.K.to(depths), camera.viewmat.to(depths)
-    return transform(invert_rigid(viewmat), unproject(depths, Ks).flatten(0, 1)).unflatten(0, depths.shape)
+    points = unproject(depths, camera.K.to(depths), camera.orthographic).flatten(0, 1)
+    return transform(invert_rigid(camera.viewmat.to(depths)), points).unflatten(0, depths.shape)
 
 
 def weighted_centroid(points: Tensor, weights: Tensor) -> Tensor:

@@ -25,7 +25,7 @@ COSINES = math.cos(math.radians(NONE)), math.cos(math.radians(FULL))
 
 
 def trust(
-    points: Float[Tensor, "*n 3"], eye: Float[Tensor, " 3"], eyes: Float[Tensor, "V 3"]
+    points: Float[Tensor, "*n 3"], eye: Float[Tensor, "*#n 3"], eyes: Float[Tensor, "V 3"]
 ) -> Float[Tensor, "*n"]:
     """How far surfaces are known as they are seen from `eye`, in [0, 1]; exactly 1 from a photo's own place.
 
@@ -59,9 +59,12 @@ def faded(frame: Frame, camera: Camera, scene: Scene) -> Frame:
     if scene.view_ids is None:
         raise InputError("this scene does not say which photos it was made of; leave --fade out")
     pose = invert_rigid(camera.viewmat.to(frame.depths))
-    points = transform(pose, unproject(frame.depths, camera.K.to(frame.depths)).flatten(0, 1))
+    points = transform(
+        pose, unproject(frame.depths, camera.K.to(frame.depths), camera.orthographic).flatten(0, 1)
+    )
+    eye = points - pose[:3, 2] if camera.orthographic else pose[:3, 3]  # or whence each ray comes
     eyes = invert_rigid(scene.viewmats.to(frame.depths))[:, :3, 3]
-    known = trust(points, pose[:3, 3], eyes).unflatten(0, frame.depths.shape)
+    known = trust(points, eye, eyes).unflatten(0, frame.depths.shape)
     known = torch.where(frame.depths > 0, known, torch.ones_like(known))  # too thin to have a depth
     return replace(
         frame,

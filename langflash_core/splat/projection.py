@@ -2,7 +2,8 @@
 
 A Gaussian (mu, Sigma) seen by a camera (R, t, K) becomes a 2D Gaussian around the projection
 of mu, with covariance S = J R Sigma R^T J^T + 0.3 I in pixels^2. J is the Jacobian of the
-pinhole projection at mu, its direction clamped to 1.3 times the field of view. With the
+pinhole projection at mu, its direction clamped to 1.3 times the field of view. An orthographic
+projection is linear: its J is diag(fx, fy) without the column of z, and S is exact. With the
 half matrix A = J R Q diag(s) (2, 3), S = A A^T + e I, and Cauchy-Binet gives
 
     det S = sum of the squared 2x2 minors of A + e tr(A A^T) + e^2,
@@ -96,8 +97,10 @@ def view_depths(gaussians: Gaussians, camera: Camera) -> Tensor:
 
 
 def view_colours(gaussians: Gaussians, camera: Camera) -> Tensor:
-    """Colours (N, 3) as this camera sees them, clamped at 0, not above."""
+    """Colours (N, 3) as this camera sees them, clamped at 0, not above; parallel rays have its axis."""
     viewmat = camera.viewmat.to(gaussians.means)
+    if camera.orthographic:
+        return sh_to_colour(gaussians.sh, viewmat[2, :3].expand_as(gaussians.means))
     position = -viewmat[:3, :3].T @ viewmat[:3, 3]
     return sh_to_colour(gaussians.sh, normalize(gaussians.means - position, dim=-1))
 
@@ -136,13 +139,15 @@ def _footprint(pos_c: Tensor, gaussians: Gaussians, camera: Camera) -> tuple[Ten
     K = camera.K.to(pos_c)
     focal = torch.stack((K[0, 0], K[1, 1]))
     principal = K[:2, 2]
+    rotation = camera.viewmat[:3, :3].to(pos_c)
+    axes_c = rotation @ (quats_to_matrices(gaussians.quats) * gaussians.scales[:, None, :])  # (n, 3, 3)
+    if camera.orthographic:
+        return pos_c[:, :2] * focal + principal, _cholesky(axes_c[:, :2] * focal[:, None])
     size = torch.tensor([camera.width, camera.height]).to(pos_c)
     depths = pos_c[:, 2:]
     slopes = pos_c[:, :2] / depths
     margin = TAN_MARGIN * 0.5 * size / focal
     clamped = slopes.clamp(-principal / focal - margin, (size - principal) / focal + margin)
-    rotation = camera.viewmat[:3, :3].to(pos_c)
-    axes_c = rotation @ (quats_to_matrices(gaussians.quats) * gaussians.scales[:, None, :])  # (n, 3, 3)
     scaled = axes_c / depths[..., None]
     half = (scaled[:, :2] - clamped[..., None] * scaled[:, 2:]) * focal[:, None]  # A, (n, 2, 3)
     return slopes * focal + principal, _cholesky(half)

@@ -15,7 +15,22 @@ mat3 rotation_of(vec4 q) {  // unit
         2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
 }
 
-// (l11, l21, l22) of S = A A^T + 0.3 I. Cauchy-Binet keeps det S a sum of positive terms.
+// (l11, l21, l22) of S = A A^T + 0.3 I of the rows of A. Cauchy-Binet keeps det S a sum of positive terms.
+vec3 root_of(vec3 top, vec3 bottom) {
+    vec3 minors = cross(top, bottom);
+    float var_x = dot(top, top) + DILATION;
+    float var_y = dot(bottom, bottom) + DILATION;
+    float det = dot(minors, minors) + DILATION * (var_x + var_y - DILATION);
+    float l11 = sqrt(var_x);
+    return vec3(l11, dot(top, bottom) / l11, sqrt(det / var_x));
+}
+
+// Of parallel rays: the same at every place, and exact. `focal` in pixels per unit.
+vec3 parallel_root(mat3 axes_c, vec2 focal) {
+    mat3 rows = transpose(axes_c);
+    return root_of(focal.x * rows[0], focal.y * rows[1]);
+}
+
 vec3 footprint_root(vec3 pos_c, mat3 axes_c, vec4 pinhole, vec2 size) {
     vec2 focal = pinhole.xy, principal = pinhole.zw;
     vec2 margin = TAN_MARGIN * 0.5 * size / focal;
@@ -23,12 +38,7 @@ vec3 footprint_root(vec3 pos_c, mat3 axes_c, vec4 pinhole, vec2 size) {
     mat3 rows = transpose(axes_c) / pos_c.z;
     vec3 top = focal.x * (rows * vec3(1.0, 0.0, -slope.x));
     vec3 bottom = focal.y * (rows * vec3(0.0, 1.0, -slope.y));
-    vec3 minors = cross(top, bottom);
-    float var_x = dot(top, top) + DILATION;
-    float var_y = dot(bottom, bottom) + DILATION;
-    float det = dot(minors, minors) + DILATION * (var_x + var_y - DILATION);
-    float l11 = sqrt(var_x);
-    return vec3(l11, dot(top, bottom) / l11, sqrt(det / var_x));
+    return root_of(top, bottom);
 }
 
 // whitening holds 1 / l11, l21, 1 / l22, opacity.

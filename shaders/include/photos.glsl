@@ -7,6 +7,7 @@ uniform sampler2D depth;                 // of the picture: sum of T alpha z, su
 uniform sampler2DArray photo_depths;     // z, 0 where a photo shows nothing
 uniform int num_photos;
 uniform vec4 pinhole;                    // fx, fy, cx, cy
+uniform bool orthographic;               // of the picture
 uniform vec4 pinholes[MAX_PHOTOS];
 uniform mat4 to_photos[MAX_PHOTOS];      // the picture's camera to a photo's
 
@@ -15,7 +16,7 @@ vec3 surface(ivec2 pixel) {
     vec2 sums = texelFetch(depth, pixel, 0).rg;
     if (sums.y < COVERED_ALPHA) return vec3(0.0);
     float z = sums.x / sums.y;
-    return vec3((vec2(pixel) + 0.5 - pinhole.zw) / pinhole.xy * z, z);
+    return vec3((vec2(pixel) + 0.5 - pinhole.zw) / pinhole.xy * (orthographic ? 1.0 : z), z);
 }
 
 // (z of the point in this photo) / (depth of the photo there); 0 where the photo does not frame it.

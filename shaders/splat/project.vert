@@ -28,7 +28,8 @@ const float HALF_MAX = 65504.0;  // of float16: sums of T alpha c stay finite in
 uniform mat4 viewmat;      // world to camera
 uniform vec3 eye;          // camera centre, world; what float32 rounds off it is eye_rest, so that
 uniform vec3 eye_rest;     // scenes far from their origin lose no digits
-uniform vec4 pinhole;      // fx, fy, cx, cy in pixels
+uniform vec4 pinhole;      // fx, fy, cx, cy in pixels; of an orthographic camera fx, fy are pixels per unit
+uniform bool orthographic;
 uniform vec2 image_size;   // pixels
 uniform vec3 tint_colours[2];
 
@@ -41,10 +42,14 @@ void main() {
     vec3 pos_c = mat3(viewmat) * from_eye;
     mat3 axes_w = rotation_of(in_quat);
     axes_w = mat3(axes_w[0] * in_scale.x, axes_w[1] * in_scale.y, axes_w[2] * in_scale.z);
-    vec3 root = footprint_root(pos_c, mat3(viewmat) * axes_w, pinhole, image_size);
-    out_place = vec4(pos_c.xy / pos_c.z * pinhole.xy + pinhole.zw, in_mean.w, pos_c.z);
+    mat3 axes_c = mat3(viewmat) * axes_w;
+    vec3 root = orthographic ? parallel_root(axes_c, pinhole.xy)
+                             : footprint_root(pos_c, axes_c, pinhole, image_size);
+    vec2 centre = pos_c.xy / (orthographic ? 1.0 : pos_c.z);
+    out_place = vec4(centre * pinhole.xy + pinhole.zw, in_mean.w, pos_c.z);
     out_shape = vec4(root, CUT);
-    out_colour = min(sh_colour(normalize(from_eye)), HALF_MAX);
+    vec3 direction = orthographic ? transpose(mat3(viewmat))[2] : normalize(from_eye);
+    out_colour = min(sh_colour(direction), HALF_MAX);
     int tint = int(255.0 * in_tint + 0.5);
     if (tint > 0) {
         float grey = luma(min(out_colour, 1.0));

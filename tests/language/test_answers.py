@@ -1,9 +1,11 @@
 import math
+from dataclasses import replace
 
 import pytest
 import torch
 
 from langflash_core.errors import PromptError
+from langflash_core.geometry.cameras import pixel_grid
 from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.language.answers import (
     answer,
@@ -128,6 +130,18 @@ def test_world_points_undo_the_camera():
     back = points @ turn.T + viewmat[:3, 3]
     # Pixel (x, y) = (10.5, 20.5) at z = 3; float32 of numbers below 10.
     assert back[20, 10].tolist() == pytest.approx([(10.5 - 40) / 70 * 3, (20.5 - 30) / 70 * 3, 3.0], abs=1e-5)
+
+
+def test_world_points_undo_parallel_rays():
+    g = torch.Generator().manual_seed(0)
+    seen = camera()
+    flat = replace(seen, orthographic=True)
+    depths = 1 + torch.rand(HEIGHT, WIDTH, generator=g)
+    points = world_points(depths, flat)
+    pos_c = points @ flat.viewmat[:3, :3].T + flat.viewmat[:3, 3]
+    torch.testing.assert_close(pos_c[..., 2], depths)
+    pos_px = pos_c[..., :2] * flat.K.diagonal()[:2] + flat.K[:2, 2]
+    torch.testing.assert_close(pos_px, pixel_grid(WIDTH, HEIGHT, like=depths), rtol=0, atol=1e-3)
 
 
 def test_the_centroid_follows_the_weights():

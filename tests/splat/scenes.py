@@ -1,5 +1,6 @@
 """Synthetic scenes, and the reference's own slow twin: one pixel and one Gaussian at a time."""
 
+import dataclasses
 import math
 from collections.abc import Sequence
 
@@ -19,6 +20,13 @@ def camera(
         [[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]], dtype=torch.float64
     )
     return Camera(torch.eye(4, dtype=torch.float64) if pose is None else pose, K, width, height)
+
+
+def parallel(seen: Camera, depth: float = 2.0) -> Camera:
+    """The orthographic camera that shows what lies at `depth` as large as a pinhole does."""
+    K = seen.K / seen.K.new_tensor([[depth], [depth], [1.0]])
+    K[:2, 2] = seen.K[:2, 2]
+    return dataclasses.replace(seen, K=K, orthographic=True)
 
 
 def turned(yaw: float, shift: tuple[float, float, float]) -> torch.Tensor:
@@ -133,6 +141,11 @@ def _footprint(
     w, *xyz = gaussians.quats[i].tolist()
     turn = viewmat[:3, :3] @ Rotation.from_quat([*xyz, w]).as_matrix()
     covariance = turn @ np.diag(gaussians.scales[i].numpy() ** 2) @ turn.T
+    if seen.orthographic:
+        J = np.array([[fx, 0, 0], [0, fy, 0]])
+        centre = np.array([fx * x + cx, fy * y + cy])
+        spread = J @ covariance @ J.T + 0.3 * np.eye(2)
+        return i, centre, np.linalg.inv(spread), float(gaussians.opacities[i])
     slack_x, slack_y = 0.3 * 0.5 * seen.width / fx, 0.3 * 0.5 * seen.height / fy
     tx = z * np.clip(x / z, -cx / fx - slack_x, (seen.width - cx) / fx + slack_x)
     ty = z * np.clip(y / z, -cy / fy - slack_y, (seen.height - cy) / fy + slack_y)

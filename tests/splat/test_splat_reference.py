@@ -8,7 +8,7 @@ import torch
 
 from langflash_core.splat import project, rasterize, reference, render, view_depths
 from langflash_core.types import Camera, Gaussians
-from tests.splat.scenes import brute_force, camera, cloud, maps_of, scene_of, splats, turned
+from tests.splat.scenes import brute_force, camera, cloud, maps_of, parallel, scene_of, splats, turned
 
 # Both sides are float64; running sums of logs lose a few digits of 1e-16 per layer.
 EXACT = 1e-10
@@ -31,16 +31,47 @@ def test_equals_plain_loops(pose, principal):
     assert alphas.max() > 0.9, "the scene must cover something"
 
 
-def test_gradients():
+@pytest.mark.parametrize("pose", [None, turned(0.3, (0.1, -0.05, 0.2))])
+def test_parallel_rays_equal_plain_loops(pose):
+    scene = cloud(60, size=0.08)
+    seen = parallel(camera(20, 16, 15.0, pose))
+    features = torch.randn(60, 4, dtype=torch.float64, generator=torch.Generator().manual_seed(1))
+    maps, alphas = rasterize(scene.gaussians, features, seen)
+    expected, expected_alphas = brute_force(scene.gaussians, features.numpy(), seen)
+    torch.testing.assert_close(maps, torch.from_numpy(expected), rtol=0, atol=EXACT)
+    torch.testing.assert_close(alphas, torch.from_numpy(expected_alphas), rtol=0, atol=EXACT)
+    assert alphas.max() > 0.9, "the scene must cover something"
+
+
+def test_parallel_rays_are_those_of_a_pinhole_far_away():
+    """From 1e6 units, rays that meet the scene differ from parallel ones by 3e-6: colours, which turn with
+    the direction, footprints and depths follow within a few times that."""
+    scene, flat = cloud(200, num_atoms=3, size=0.08), parallel(camera())
+    away = 1e6
+    viewmat = flat.viewmat.clone()
+    viewmat[2, 3] += away - 2.0  # what was 2 ahead is `away` ahead
+    K = flat.K * torch.tensor([[away], [away], [1.0]], dtype=torch.float64)
+    K[:2, 2] = flat.K[:2, 2]
+    far = Camera(viewmat, K, flat.width, flat.height)
+    near, distant = render(scene, flat), render(scene, far)
+    assert near.alphas.mean() > 0.3
+    torch.testing.assert_close(near.rgb, distant.rgb, rtol=0, atol=1e-4)
+    torch.testing.assert_close(maps_of(near), maps_of(distant), rtol=0, atol=1e-4)
+    solid = near.alphas > 0.1
+    torch.testing.assert_close(near.depths[solid], distant.depths[solid] - away + 2.0, rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize("flat", [False, True])
+def test_gradients(flat):
     scene = cloud(6, size=0.15, seed=3)
     fields = [f.clone().requires_grad_() for f in scene.gaussians.map(lambda v: v).__dict__.values()]
     features = torch.rand(6, 2, dtype=torch.float64, requires_grad=True)
     viewmat = turned(0.1, (0.0, 0.1, 0.0)).requires_grad_()
-    seen = camera(7, 6, 6.0)
+    seen = parallel(camera(7, 6, 6.0)) if flat else camera(7, 6, 6.0)
 
     def draw(means, quats, scales, opacities, features, viewmat):
         gaussians = Gaussians(means, quats, scales, opacities, scene.gaussians.sh)
-        return rasterize(gaussians, features, Camera(viewmat, seen.K, 7, 6))
+        return rasterize(gaussians, features, dataclasses.replace(seen, viewmat=viewmat))
 
     # gradcheck's own tolerances: float64 central differences of step 1e-6.
     assert torch.autograd.gradcheck(draw, (*fields[:4], features, viewmat))

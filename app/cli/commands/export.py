@@ -84,7 +84,8 @@ def write_whole(scene: Scene, path: Path, renderer: Renderer, prompts: Sequence[
         LangFlashError: the path cannot be written, or no mask is found.
     """
     suffix = kind_of(path)
-    unset = dict.fromkeys(("threshold", "what", "seconds", "path", "view", "camera", "size", "span"))
+    looks = ("view", "camera", "size", "ortho")
+    unset = dict.fromkeys(("threshold", "what", "seconds", "path", "span", *looks))
     asked = list(prompts) if suffix in (*ANSWERS_OUT, PAGE_OUT) else []
     off = dict.fromkeys(("with_text", "replace", "fade"), False)
     said = {"all_views": suffix == ".csv", "colormap": COLOUR_MAPS[0], **off}
@@ -154,11 +155,11 @@ def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
 
 
 def _check_camera_words(args: Namespace, suffix: str) -> None:
-    looked_at = [name for name in ("view", "camera", "size") if getattr(args, name) is not None]
+    looked_at = [name for name in ("view", "camera", "size", "ortho") if getattr(args, name) is not None]
     if args.segmented and args.all_views:
         raise InputError("--segmented looks from every photo by itself; leave --all-views away")
     if args.all_views:
-        if set(looked_at) - {"size"}:
+        if set(looked_at) - {"size", "ortho"}:
             raise InputError(f"--all-views looks from every photo; leave --{looked_at[0]} away")
         looked_at.append("all-views")
     if suffix in (*SCENES_OUT, *CAMERAS_OUT, PAGE_OUT) and looked_at and args.what != "boxes":
@@ -337,7 +338,7 @@ def _of_photos(args: Namespace) -> bool:
 def _photos_or(args: Namespace, scene: Scene, choice: CameraChoice) -> list[Camera]:
     if not _of_photos(args):
         return [choice.of(scene)]
-    return [scene.camera(view, *(args.size or (None, None))) for view in range(scene.num_views)]
+    return [choice.of_photo(scene, view) for view in range(scene.num_views)]
 
 
 def _write_masks(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:

@@ -28,7 +28,8 @@ def command(args: Namespace) -> str:
             value = "{}x{}".format(*value)
         if isinstance(value, str | int | float | Path):
             words += [f"--{name}", str(value)]
-    return shlex.join([*words, *["--fade"] * args.fade, "--prompt", *args.prompt])
+    flags = [f"--{name}" for name in ("fade", "ortho") if getattr(args, name)]
+    return shlex.join([*words, *flags, "--prompt", *args.prompt])
 
 
 def document(
@@ -97,5 +98,6 @@ def _view(
         "height": camera.height,
         "viewmat": camera.viewmat.tolist(),
         "K": camera.K.tolist(),
+        "orthographic": camera.orthographic,
         "files": {**files, **({"depth_exr": "depth.exr"} if exr else {})},
     }

@@ -64,6 +64,12 @@ def add_camera(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--size", type=size, metavar="WxH", help="pixels to draw (default: as the network saw it)"
     )
+    command.add_argument(
+        "--ortho",
+        action="store_const",
+        const=True,
+        help="parallel rays instead of perspective, at the scale of the picture's middle",
+    )
 
 
 def add_fade(command: argparse.ArgumentParser) -> None:

@@ -160,7 +160,8 @@ class FindInSphere(AtPixel):
             camera = to_camera(self.pose, *self.size)
             viewmat = camera.viewmat.double().numpy()
             depth = float(viewmat[2, :3] @ centre + viewmat[2, 3])
-            ball = np.linalg.norm(means - centre, axis=1) <= self.radius * depth / float(camera.K[0, 0])
+            unit = (1.0 if camera.orthographic else depth) / float(camera.K[0, 0])  # of a pixel there
+            ball = np.linalg.norm(means - centre, axis=1) <= self.radius * unit
             found = ball & self.marks.visible.rows()
         yield Found(Mask.of(found), self.combine, "in a ball")
 

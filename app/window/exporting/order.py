@@ -11,6 +11,7 @@ from pathlib import Path
 from langflash_core.formats import COLOUR_MAPS
 
 from ..scene.drops import typed_path
+from ..scene.near import keeps_near
 from ..state import State
 from .state import ExportForm, What
 
@@ -78,7 +79,7 @@ def order(state: State) -> Order | str:
 def fades(state: State) -> bool:
     """Whether the export leaves out, softly, what no photo looked at: as on show, unless said otherwise."""
     form = state.exporting.form
-    return form.what.fades and (state.preferences.near_photos if form.fade is None else form.fade)
+    return form.what.fades and (keeps_near(state) if form.fade is None else form.fade)
 
 
 def _colours(state: State) -> list[str]:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from ..poses import Pose, intrinsics, viewmat
+from ..poses import Pose, alike, intrinsics, viewmat
 
 _LAST_LINES = 20
 _PROGRAM = "langflash_core"  # its __main__ finds the command line, installed or not
@@ -100,7 +100,7 @@ def camera_json(pose: Pose, width: int, height: int) -> bytes:
 
 def keys_json(keys: Sequence[Pose], width: int, height: int) -> bytes:
     """The file of key frames of `--path`."""
-    return json.dumps([_camera(key, width, height) for key in keys], indent=2).encode()
+    return json.dumps([_camera(key, width, height) for key in alike(keys)], indent=2).encode()
 
 
 def _camera(pose: Pose, width: int, height: int) -> dict:
@@ -109,4 +109,5 @@ def _camera(pose: Pose, width: int, height: int) -> dict:
         "K": intrinsics(pose, width, height).tolist(),
         "width": width,
         "height": height,
+        "orthographic": pose.span is not None,
     }

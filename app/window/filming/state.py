@@ -41,6 +41,7 @@ def read(entries: Iterable[Mapping[str, Any]]) -> tuple[Pose, ...]:
                 Rotation(*map(float, entry["rotation"])),
                 *(float(entry[name]) for name in ("reach", "fov", "aspect")),
                 shift=(float(entry["shift"][0]), float(entry["shift"][1])),
+                span=None if entry.get("span") is None else float(entry["span"]),
             )
             for entry in entries
         ]
@@ -51,7 +52,8 @@ def read(entries: Iterable[Mapping[str, Any]]) -> tuple[Pose, ...]:
 
 def _can_look(pose: Pose) -> bool:
     """Whether a picture can be drawn from there."""
-    numbers = (*pose.centre, *pose.rotation, pose.reach, pose.fov, pose.aspect, *pose.shift)
+    span = 1.0 if pose.span is None else pose.span
+    numbers = (*pose.centre, *pose.rotation, pose.reach, pose.fov, pose.aspect, *pose.shift, span)
     turned = sum(part * part for part in pose.rotation)
     return (
         all(map(isfinite, numbers))
@@ -59,4 +61,5 @@ def _can_look(pose: Pose) -> bool:
         and pose.reach > 0
         and 0 < pose.fov < 180
         and pose.aspect > 0
+        and span > 0
     )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..commands import Command
-from ..poses import Pose, from_view, to_camera
+from ..poses import Pose, alike, from_view, to_camera
 from ..requests import Asked, Errand
 from .commands import TourReady
 
@@ -30,6 +30,7 @@ def way(keys: Sequence[Pose], seconds: float) -> tuple[Pose, ...]:
     """Poses of a film of so many seconds along two or more key frames."""
     from ..tours import along  # loads torch; the worker has by now
 
+    keys = alike(keys)
     width, height = _SIDE, max(2, round(_SIDE / keys[0].aspect))
     cameras = along(
         [to_camera(key, width, height) for key in keys], np.linspace(0, seconds, len(keys)).tolist()
@@ -38,7 +39,8 @@ def way(keys: Sequence[Pose], seconds: float) -> tuple[Pose, ...]:
     reaches = np.interp(
         np.linspace(0, len(keys) - 1, len(cameras)), range(len(keys)), [k.reach for k in keys]
     )
+    lenses = ((c.viewmat.double().numpy(), c.K.double().numpy(), c.orthographic) for c in cameras)
     return tuple(
-        from_view(camera.viewmat.double().numpy(), camera.K.double().numpy(), size, float(reach))
-        for camera, reach in zip(cameras, reaches, strict=True)
+        from_view(viewmat, K, size, float(reach), flat)
+        for (viewmat, K, flat), reach in zip(lenses, reaches, strict=True)
     )

@@ -25,9 +25,12 @@ from ..state import State
 
 BRUSH_STEP = 1.15  # of its radius, per press of [ or ]
 _DIGITS = "1234567890"
+_SIDE_KEYS = {"the front": "keypad1", "the right": "keypad3", "above": "keypad7"}
 _SIGNS = {
     imgui.Key.comma: ",", imgui.Key.left_bracket: "[", imgui.Key.right_bracket: "]",
     imgui.Key.delete: "Del", imgui.Key.backspace: "Backspace", imgui.Key.home: "Home",
+    imgui.Key.keypad1: "Num 1", imgui.Key.keypad3: "Num 3", imgui.Key.keypad5: "Num 5",
+    imgui.Key.keypad7: "Num 7",
 }  # fmt: skip
 
 
@@ -165,7 +168,10 @@ def _looking() -> Iterable[Entry]:
     yield Entry("Names of things in the picture", group, _names, _plain("n"))
     yield Entry("Keep to what the photos saw", group, _near_photos)
     for side, forward in camera.SIDES:
-        yield Entry(f"Look from {side}", group, _shown(camera.Face(forward)))
+        keys = _plain(_SIDE_KEYS[side]) if side in _SIDE_KEYS else ()
+        yield Entry(f"Look from {side}", group, _shown(camera.Face(forward)), keys)
+    rays = (*_plain("u"), *_plain("keypad5"))
+    yield Entry("Parallel rays (orthographic), or perspective", group, _shown(camera.SwitchRays()), rays)
     yield Entry("Add a key frame", group, _shown(film.AddKey()), _plain("m"))
     yield Entry("Remove the last key frame", group, lambda s: film.RemoveKey() if s.keys else None)
     yield Entry("Fly along the key frames", group, _shown(film.Preview()), _plain("j"))

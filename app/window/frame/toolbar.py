@@ -34,11 +34,12 @@ def draw(state: State, look: Look) -> list[do.Command]:
 
 
 def _fov(state: State, look: Look) -> list[do.Command]:
-    imgui.begin_disabled(state.info is None)
+    flat = state.pose.span is not None
+    imgui.begin_disabled(state.info is None or flat)
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, "FOV")
     imgui.same_line()
-    tip = "Field of view over the longer side of the photo"
+    tip = "Parallel rays have none" if flat else "Field of view over the longer side of the photo"
     degrees = f"{state.pose.fov:.0f}°"
     changed, fov = widgets.slider("##fov", state.pose.fov, FOV_RANGE, degrees, tip, look.px(_FOV))
     imgui.end_disabled()

@@ -1,16 +1,19 @@
 """Preferences, and what of an earlier session is offered again."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 from ..asking.state import PALETTE, Prompt
+from ..commands import Notify
 from ..poses import Pose
+from ..scene.commands import scene_photos
 from ..scene.state import Mode, Photo
 from ..state import State
 from .preferences import PANEL_WIDTHS, SCALES, SPEEDS, Preferences
-from .state import Kept, Offer
+from .state import Kept, KeptPhoto, Offer
 
 
 def change(state: State, **changes: Any) -> State:
@@ -92,8 +95,23 @@ class EndSessionOffer:
         state = change(state, session=None)
         if kept is None or not self.restore:
             return state
-        photos = tuple(Photo(Path(path), fov=fov) for path, fov in zip(kept.photos, kept.fovs, strict=True))
-        return restored_phrases(replace(state, photos=photos), kept)
+        state = restored_tray(state, tuple(zip(kept.photos, kept.fovs, strict=True)), kept.missing)
+        return restored_phrases(state, kept)
+
+
+def restored_tray(state: State, photos: Iterable[KeptPhoto], missing: Sequence[str]) -> State:
+    """The tray with the photos of an earlier session, and a sentence on those that have gone."""
+    state = replace(state, photos=tuple(Photo(Path(path), fov=fov) for path, fov in photos))
+    if not missing:
+        return state
+    others = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+    text = f"{missing[0]}{others} of the tray cannot be found any more; drop the photos again to use them."
+    return Notify(text, "info").apply(state)
+
+
+def kept_photos(state: State) -> tuple[KeptPhoto, ...]:
+    """The photos of the scene on show, to be kept with it."""
+    return tuple((str(photo.path), photo.fov) for photo in scene_photos(state))
 
 
 def restored_phrases(state: State, kept: Kept) -> State:
@@ -165,13 +183,19 @@ class OfferEdits:
 
 @dataclass(frozen=True)
 class EndOffer:
-    """Restore the edits, or `forget` them for good; otherwise they are offered again next time."""
+    """Restore the edits with the photos of their scene, or `forget` them for good; otherwise they are
+    offered again next time."""
 
     restore: bool = False
     forget: bool = False
 
     def apply(self, state: State) -> State:
-        return change(state, edits=None)
+        offer = state.recovery.edits
+        state = change(state, edits=None)
+        if offer is None or not self.restore or not (offer.photos or offer.missing):
+            return state
+        before = scene_photos(state) if state.info is not None else None
+        return restored_tray(replace(state, aside=before), offer.photos, offer.missing)
 
 
 def _within(value: float, limits: tuple[float, float]) -> float:

@@ -5,6 +5,7 @@ opened, and the history of its edits. Both are written whole. The eight newest a
 names the session.
 """
 
+from collections.abc import Iterable
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
@@ -14,8 +15,8 @@ from langflash_core.errors import SceneFileError
 from langflash_core.scene.edits import History
 
 from ..places import state_folder
-from ..scene.drops import SCENE_SUFFIX
-from .state import Offer
+from ..scene.drops import SCENE_SUFFIX, still_there
+from .state import KeptPhoto, Offer
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
@@ -25,8 +26,18 @@ MOST_KEPT = 8
 SUFFIX = ".edits"
 
 
-def keep(scene: "Scene", history: History, name: str, path: Path | None, token: str) -> Path:
+def keep(
+    scene: "Scene",
+    history: History,
+    name: str,
+    path: Path | None,
+    token: str,
+    photos: Iterable[KeptPhoto] = (),
+) -> Path:
     """Write edits, and their scene where it is not there yet; returns the file of edits.
+
+    Args:
+        photos: of the tray.
 
     Raises:
         OutputError: the folder cannot be written.
@@ -40,7 +51,8 @@ def keep(scene: "Scene", history: History, name: str, path: Path | None, token: 
     make_folder(edits.parent)
     if not edits.with_suffix(SCENE_SUFFIX).is_file():
         save(scene, edits.with_suffix(SCENE_SUFFIX))
-    about = {"name": name, "path": None if path is None else str(path)}
+    where = None if path is None else str(path)
+    about = {"name": name, "path": where, "photos": [list(photo) for photo in photos]}
     save_history(history, digest, about, edits)
     for old in _newest_first()[MOST_KEPT:]:
         forget_file(old)
@@ -72,8 +84,18 @@ def find(scene: "Scene | None" = None, path: Path | None = None) -> Offer | None
             ours = path is not None and about.get("path") == str(path)
             if count and edits.with_suffix(SCENE_SUFFIX).is_file() and (wanted in (None, digest) or ours):
                 when = datetime.fromtimestamp(edits.stat().st_mtime)
-                return Offer(edits, str(about.get("name", "")), count, when)
+                photos, missing = _tray(about.get("photos"))
+                return Offer(edits, str(about.get("name", "")), count, when, photos, missing)
     return None
+
+
+def _tray(entries: object) -> tuple[tuple[KeptPhoto, ...], tuple[str, ...]]:
+    """The photos that a file of edits names, and the names of those that have gone; none where it is
+    damaged, or of an earlier version."""
+    try:
+        return still_there((str(path), fov) for path, fov in entries)  # pyright: ignore[reportGeneralTypeIssues]
+    except (TypeError, ValueError):
+        return (), ()
 
 
 def _place(digest: str, token: str) -> Path:

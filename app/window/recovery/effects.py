@@ -29,6 +29,7 @@ from .commands import (
     Opened,
     Prefer,
     StandAgain,
+    kept_photos,
 )
 from .keeper import Keeper
 from .preferences import Preferences
@@ -105,7 +106,7 @@ class RecoveryEffects(Effects):
             return
         try:
             if state.editing.unsaved and history.done:
-                self._keeper.keep_edits(info, history)
+                self._keeper.keep_edits(info, history, kept_photos(state))
             elif self._edits_wrote or history.done:
                 self._keeper.forget_edits(info)
         except LangFlashError:
@@ -121,7 +122,7 @@ class RecoveryEffects(Effects):
             case Reconstruct():
                 self._restoring, self._wanted = self._wanted, None
             case SceneArrived(info):
-                self._arrived(info, before)
+                self._arrived(info, before, state)
             case SceneSaved(path):
                 self._settle(state)
                 self._hands.perform(Opened(path))
@@ -146,13 +147,13 @@ class RecoveryEffects(Effects):
         if snapshot != self._snapshot:
             self._snapshot, self._keep_at = snapshot, state.now + KEEP_AFTER
 
-    def _arrived(self, info: SceneInfo, before: State) -> None:
-        self._take_edits(info, before)
+    def _arrived(self, info: SceneInfo, before: State, state: State) -> None:
+        self._take_edits(info, before, state)
         self._take_session(info)
 
     # Edits
 
-    def _take_edits(self, info: SceneInfo, before: State) -> None:
+    def _take_edits(self, info: SceneInfo, before: State, state: State) -> None:
         """Keep those of the scene before; those of the scene that has come are restored or looked for."""
         if before.info is not None and before.editing.unsaved and before.editing.dirty:
             self._keep_edits(before)
@@ -162,7 +163,7 @@ class RecoveryEffects(Effects):
         self._edits_kept, self._edits_wrote, self._keep_edits_at = False, False, NEVER
         restored, self._restoring_edits = self._restoring_edits, None
         if info.history is not None and info.history.done:  # restored, or a room of this session
-            self._write_edits(info, info.history)
+            self._write_edits(info, info.history, state)
             if restored is not None and not self._keeper.own(restored):
                 self._hands.submit(ForgetFile(restored))
         else:
@@ -170,6 +171,8 @@ class RecoveryEffects(Effects):
 
     def _end_offer(self, offer: Offer, restore: bool, forget: bool) -> None:
         if restore:
+            if offer.photos:
+                self._hands.submit(MakeThumbnails(tuple(Path(path) for path, _ in offer.photos)))
             self._hands.perform(OpenScene(offer.scene, offer.edits))
         elif forget:
             self._hands.submit(ForgetFile(offer.edits))
@@ -187,10 +190,10 @@ class RecoveryEffects(Effects):
     def _keep_edits(self, state: State) -> None:
         info, history = state.info, state.editing.history
         if info is not None and history is not None and history.done:
-            self._write_edits(info, history)
+            self._write_edits(info, history, state)
 
-    def _write_edits(self, info: SceneInfo, history: History) -> None:
-        place = (info.name, info.path, self._keeper.token)
+    def _write_edits(self, info: SceneInfo, history: History, state: State) -> None:
+        place = (info.name, info.path, self._keeper.token, kept_photos(state))
         self._hands.submit(KeepEdits(info.serial, info.scene, history, *place))
         self._edits_kept = self._edits_wrote = True
 

@@ -4,6 +4,7 @@ under one name. What is kept is offered again by `sessions` and `edits`."""
 import json
 import os
 import secrets
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
@@ -16,7 +17,7 @@ from ..scene.drops import SCENE_SUFFIX
 from ..scene.state import SceneInfo
 from . import edits
 from .sessions import CONTENTS, EDITED, PREFIX, SELECTION, fields, locked
-from .state import Kept
+from .state import Kept, KeptPhoto
 
 
 class Keeper:
@@ -78,13 +79,13 @@ class Keeper:
         """Whether a file of kept edits is this window's."""
         return file.name.endswith(f"-{self.token}{edits.SUFFIX}")
 
-    def keep_edits(self, info: SceneInfo, history: History) -> None:
+    def keep_edits(self, info: SceneInfo, history: History, photos: Iterable[KeptPhoto]) -> None:
         """Write the edits of a scene, in this thread.
 
         Raises:
             OutputError: the folder cannot be written.
         """
-        edits.keep(info.scene, history, info.name, info.path, self.token)
+        edits.keep(info.scene, history, info.name, info.path, self.token, photos)
 
     def forget_edits(self, info: SceneInfo) -> None:
         """Remove the edits kept of a scene; nothing there is fine."""

@@ -17,7 +17,7 @@ from langflash_core.errors import OutputError
 
 from ..places import state_folder
 from ..poses import Pose, Rotation, Vector
-from ..scene.drops import SCENE_SUFFIX
+from ..scene.drops import SCENE_SUFFIX, still_there
 from .state import Kept
 
 PREFIX = "session-"
@@ -54,18 +54,18 @@ def read(path: Path) -> Kept | None:
             centre, rotation = Vector(*map(float, pose["centre"])), Rotation(*map(float, pose["rotation"]))
             rest = {name: float(pose[name]) for name in ("reach", "fov", "aspect")}
             shift = (float(pose["shift"][0]), float(pose["shift"][1]))
-            placed = Pose(centre, rotation, shift=shift, **rest)
+            span = None if pose.get("span") is None else float(pose["span"])
+            placed = Pose(centre, rotation, shift=shift, span=span, **rest)
         lists = {name: tuple(content.pop(name)) for name in ("photos", "fovs", "phrases")}
         asked = _asked(content, len(lists["phrases"]))
         kept = Kept(pose=placed, file=path, **asked, **lists, **content)
-        there = [os.path.isfile(photo) for photo in kept.photos]
-        photos = tuple(photo for photo, here in zip(kept.photos, there, strict=True) if here)
-        fovs = tuple(fov for fov, here in zip(kept.fovs, there, strict=True) if here)
+        there, missing = still_there(zip(kept.photos, kept.fovs, strict=True))
+        photos, fovs = tuple(photo for photo, _ in there), tuple(fov for _, fov in there)
         edits = kept.edits if kept.edits and os.path.isfile(kept.edits) else ""
         scene = kept.scene if edits or (kept.scene and os.path.isfile(kept.scene)) else ""
     except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError):
         return None
-    return replace(kept, photos=photos, fovs=fovs, scene=scene, edits=edits)
+    return replace(kept, photos=photos, fovs=fovs, scene=scene, edits=edits, missing=missing)
 
 
 def _asked(content: dict, count: int) -> dict[str, tuple]:
@@ -101,7 +101,7 @@ def forget(path: Path) -> None:
 def fields(kept: Kept) -> dict:
     """What its file holds."""
     content = asdict(replace(kept, file=None))
-    del content["file"]
+    del content["file"], content["missing"]
     return content
 
 

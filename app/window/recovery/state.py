@@ -7,13 +7,17 @@ from pathlib import Path
 from ..poses import Pose
 from ..scene.drops import SCENE_SUFFIX
 
+KeptPhoto = tuple[str, float | None]
+"""A photo of the tray: its path, and the person's own field of view in degrees."""
+
 
 @dataclass(frozen=True)
 class Kept:
     """What a session holds. scene: its file, or the copy kept of one that was never saved, then
     `saved` is false. edits: the file of those that nobody saved. phrases: texts. likes: of each phrase
     the language vector that it asks instead, float32 bytes in hexadecimal digits, or none. thresholds: of
-    each phrase the person's own. colours, visible: of each phrase. file: where this was read from."""
+    each phrase the person's own. colours, visible: of each phrase. file: where this was read from.
+    missing: names of photos that were in the tray and are not on the disk any more."""
 
     photos: tuple[str, ...] = ()
     fovs: tuple[float | None, ...] = ()
@@ -29,6 +33,7 @@ class Kept:
     mode: str = "RGB"
     pose: Pose | None = None
     file: Path | None = None
+    missing: tuple[str, ...] = ()
 
     @property
     def empty(self) -> bool:
@@ -48,12 +53,15 @@ class Kept:
 
 @dataclass(frozen=True)
 class Offer:
-    """Edits of an earlier session that were not saved. edits: the file. when: written."""
+    """Edits of an earlier session that were not saved. edits: the file. when: written. photos: those that
+    were in the tray, with their fields of view. missing: names of those not on the disk any more."""
 
     edits: Path
     name: str
     count: int
     when: datetime
+    photos: tuple[KeptPhoto, ...] = ()
+    missing: tuple[str, ...] = ()
 
     @property
     def scene(self) -> Path:

@@ -15,6 +15,7 @@ from ..commands import Command
 from ..requests import Asked, Errand, SceneErrand
 from . import edits
 from .commands import CopyKept, EditsKept, OfferEdits
+from .state import KeptPhoto
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
@@ -46,9 +47,11 @@ class KeepEdits(SceneErrand):
     name: str
     path: Path | None
     token: str
+    photos: tuple[KeptPhoto, ...] = ()
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        yield EditsKept(edits.keep(self.scene, self.history, self.name, self.path, self.token))
+        kept = edits.keep(self.scene, self.history, self.name, self.path, self.token, self.photos)
+        yield EditsKept(kept)
 
 
 @dataclass(frozen=True)

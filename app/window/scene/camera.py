@@ -57,9 +57,26 @@ class Face:
         return FlyTo(pose).apply(state)
 
 
+@dataclass(frozen=True)
+class SwitchRays:
+    """Parallel rays (orthographic) for perspective, and back; what is looked at stays as large."""
+
+    def apply(self, state: State) -> State:
+        info = state.info
+        if info is None:
+            return state
+        there = state.flight.end if state.flight else state.pose
+        if there.span is not None:
+            switched = poses.perspective(there)
+        else:
+            at = Vector(*there.pivot.tolist())
+            switched = poses.orthographic(there, *(info.extent or (at, at)))
+        return FlyTo(switched).apply(state) if state.flight else MoveTo(switched).apply(state)
+
+
 NOT_SEEN = (
     "No photo looked from there; this is as near as they show it. "
-    'Without "Keep to what the photos saw" (Preferences) you may go on.'
+    'With parallel rays (U), or without "Keep to what the photos saw" (Preferences), you may go on.'
 )
 
 

@@ -13,7 +13,7 @@ from ..commands import NOTHING_TO_SAVE, Command, Notify, ShowDialog
 from ..editing.state import fresh
 from ..state import State
 from .drops import MAX_PHOTOS
-from .state import MOST_ROOMS, RECONSTRUCTING, Job, Photo, Room, SceneInfo
+from .state import MOST_ROOMS, RECONSTRUCTING, RESTORING, Job, Photo, Room, SceneInfo
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
@@ -182,7 +182,7 @@ class OpenScene:
     alone: bool = False
 
     def apply(self, state: State) -> State:
-        title = "Restoring" if self.edits else f"Opening {self.path.name}"
+        title = RESTORING if self.edits else f"Opening {self.path.name}"
         return replace(state, job=Job(title, "reading", started=state.now))
 
 
@@ -414,8 +414,9 @@ class JobCancelled:
 
 
 def _ended(state: State) -> State:
-    """Without its job; where that was to make a new room, the tray is that of the scene on show again."""
-    if state.job is not None and state.job.title != RECONSTRUCTING:
+    """Without its job; where that was to make a new room, or to restore one, the tray is that of the scene on
+    show again."""
+    if state.job is not None and state.job.title not in (RECONSTRUCTING, RESTORING):
         return replace(state, job=None)
     return replace(state, job=None, photos=scene_photos(state), aside=None)
 

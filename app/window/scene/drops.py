@@ -27,6 +27,19 @@ class Drop:
     rejected: tuple[str, ...] = ()
 
 
+def still_there(
+    photos: Iterable[tuple[str, float | None]],
+) -> tuple[tuple[tuple[str, float | None], ...], tuple[str, ...]]:
+    """Of photos with their fields of view those that are on the disk, and the names of the others."""
+    found, missing = list[tuple[str, float | None]](), list[str]()
+    for path, fov in photos:
+        if os.path.isfile(path):
+            found.append((path, None if fov is None else float(fov)))
+        else:
+            missing.append(os.path.basename(path))
+    return tuple(found), tuple(missing)
+
+
 def typed_path(text: str) -> Path:
     """The path a person typed, with `~` spelled out; an unknown user's stays as it is."""
     return Path(os.path.expanduser(text.strip()))

@@ -70,8 +70,8 @@ class Photo:
     notes: tuple[str, ...] = ()
 
 
-RECONSTRUCTING = "Reconstructing"
-"""Title of the job that makes a scene out of the tray."""
+RECONSTRUCTING, RESTORING = "Reconstructing", "Restoring"
+"""Titles of the jobs that make a scene out of the tray, and out of what an earlier session kept."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from tests.app.cli.conftest import HEIGHT, WIDTH, stripes
 
 
 def choice(**given):
-    return chosen_camera(Namespace(**{"view": None, "camera": None, "size": None, **given}))
+    return chosen_camera(Namespace(**{"view": None, "camera": None, "size": None, "ortho": None, **given}))
 
 
 def test_view_defaults_to_the_first():
@@ -45,3 +45,23 @@ def test_file_round_trip(tmp_path):
     assert torch.equal(camera.viewmat, viewmat) and camera.K.tolist() == K
     drawn = choice(camera=path, size=(160, 120)).of(stripes())
     assert drawn.K[0].tolist() == [150.0, 0.0, 80.0]
+
+
+def test_a_camera_file_may_have_parallel_rays(tmp_path):
+    K = [[300.0, 0.0, 160.0], [0.0, 300.0, 120.0], [0.0, 0.0, 1.0]]
+    described = {"viewmat": torch.eye(4).tolist(), "K": K, "width": 320, "height": 240}
+    path = tmp_path / "camera.json"
+    path.write_text(json.dumps({**described, "orthographic": True}))
+    assert choice(camera=path, size=(160, 120)).of(stripes()).orthographic
+    path.write_text(json.dumps({**described, "orthographic": "yes"}))
+    with pytest.raises(ViewError, match="must be true or false"):
+        read_camera(path)
+
+
+def test_ortho_keeps_the_middle_of_the_picture_as_large():
+    scene = stripes()
+    pinhole, flat = choice().of(scene), choice(ortho=True).of(scene)
+    assert flat.orthographic and not pinhole.orthographic
+    depth = float(scene.gaussians.means[:, 2].median())
+    assert float(flat.K[0, 0]) == pytest.approx(float(pinhole.K[0, 0]) / depth, rel=0.05)
+    assert torch.equal(flat.K[:2, 2], pinhole.K[:2, 2])

@@ -11,7 +11,7 @@ from app.gl.layout import ATOMS_A_LAYER, ATOMS_A_PASS
 from langflash_core.language.relevance import relevance_maps
 from langflash_core.splat import render
 from tests.app.gl.questions import full_relevance, psnr, question
-from tests.splat.scenes import camera, cloud, maps_of, scene_of, splats, turned
+from tests.splat.scenes import camera, cloud, maps_of, parallel, scene_of, splats, turned
 
 # float16 keeps 11 bits, 5e-4 of a value, and back-to-front blending rounds once a layer while
 # later layers shrink earlier errors: about 60 dB. float32 is limited by the few pixels where
@@ -57,6 +57,30 @@ def test_colour_depth_and_transmittance(gl, precision, degree):
     expected = render(scene, seen, background=(0.2, 0.4, 0.9))
     assert expected.alphas.mean() > 0.5, "the scene must cover something"
     assert_agrees(frame, expected, precision)
+
+
+@pytest.mark.parametrize("degree", [0, 3])
+def test_parallel_rays(gl, precision, degree):
+    scene = cloud(2000, num_atoms=5, degree=degree, dtype=torch.float32)
+    seen = parallel(camera(96, 80, 80.0, turned(0.15, (0.1, 0.0, 0.1))))
+    frame, expected = draw(gl, precision, scene, seen), render(scene, seen)
+    assert expected.alphas.mean() > 0.5, "the scene must cover something"
+    assert_agrees(frame, expected, precision)
+    assert (maps_of(frame) - maps_of(expected)).abs().mean() <= WEIGHT_ERROR[precision]
+
+
+def test_parallel_rays_are_another_picture_of_the_same_place(gl):
+    scene, pinhole = cloud(500, dtype=torch.float32), camera(64, 48, 50.0)
+    flat = dataclasses.replace(pinhole, orthographic=True)
+    renderer = SplatRenderer(gl, "float32")
+    renderer.set_scene(scene)
+    renderer.draw(pinhole)
+    first = renderer.frame().rgb
+    renderer.draw(flat)
+    second = renderer.frame().rgb
+    renderer.release()
+    assert psnr(second, render(scene, flat).rgb) >= PSNR["float32"]
+    assert psnr(second, first) < 20
 
 
 @pytest.mark.parametrize("num_atoms", [0, 1, 23, 24, 25, 130])

@@ -9,7 +9,7 @@ import torch
 from app.gl import SplatRenderer
 from langflash_core.scene.trust import faded
 from tests.app.gl.questions import question
-from tests.splat.scenes import camera, cloud, maps_of, scene_of, splats
+from tests.splat.scenes import camera, cloud, maps_of, parallel, scene_of, splats
 
 pytestmark = pytest.mark.usefixtures("queries")
 
@@ -152,8 +152,8 @@ def test_what_is_missing_is_named(renderer):
         renderer.draw(dataclasses.replace(camera(), width=0))
 
 
-@pytest.mark.parametrize("aside", [0.0, 0.6, 1.6])
-def test_faded_is_the_frame_fading_over_the_background(asked, aside):
+@pytest.mark.parametrize(("aside", "flat"), [(0.0, False), (0.6, False), (1.6, False), (0.6, True)])
+def test_faded_is_the_frame_fading_over_the_background(asked, aside, flat):
     scene = dataclasses.replace(
         cloud(1500, 12, dtype=torch.float32), view_ids=torch.zeros(1500, dtype=torch.int64)
     )
@@ -162,6 +162,8 @@ def test_faded_is_the_frame_fading_over_the_background(asked, aside):
     viewmat = shot.viewmat.clone()
     viewmat[0, 3] -= aside * scene.gaussians.means[:, 2].mean()
     shot = dataclasses.replace(shot, viewmat=viewmat)
+    if flat:
+        shot = parallel(shot)
     asked.draw(shot)
     black = asked.frame()
     asked.draw(shot, background=(0.0, 0.5, 1.0))

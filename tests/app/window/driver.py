@@ -42,6 +42,7 @@ def summary(session: Session) -> dict:
         "photos": [photo.path.name for photo in state.photos],
         "mode": state.mode.name,
         "pose": [*state.pose.centre, *state.pose.rotation],
+        "span": state.pose.span,
         "view": state.view,
         "flying": state.flight is not None,
         "job": None if state.job is None else state.job.stage,

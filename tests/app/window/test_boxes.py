@@ -3,6 +3,8 @@
 from imgui_bundle import ImVec2, imgui
 
 from app.window.kit.boxes import clear, overlap, windows_over, within
+from app.window.kit.look import Look
+from tests.app.window.headless import context, frames, look
 
 BAR = (0.0, 0.0, 48.0, 460.0)
 
@@ -25,26 +27,19 @@ def test_a_caption_deep_in_a_panel_stays_covered() -> None:
 
 
 def test_windows_over_the_picture_are_found_but_for_what_comes_and_goes() -> None:
-    context = imgui.create_context()
-    imgui.get_io().set_ini_filename("")
-    imgui.get_io().backend_flags |= imgui.BackendFlags_.renderer_has_textures
-    found = ()
-    try:
-        for _ in range(
-            3
-        ):  # what stood there in the last frame counts; a window is as large as it says in its second
-            imgui.get_io().display_size = ImVec2(800, 600)
-            imgui.new_frame()
-            for name, at in (("bar", (10, 20)), ("aside", (700, 20))):
-                imgui.set_next_window_pos(ImVec2(*at))
-                imgui.set_next_window_size(ImVec2(60, 80))
-                imgui.begin(name)
-                imgui.end()
-            imgui.set_tooltip("passing")
-            imgui.begin("picture")
-            found = windows_over((0, 0, 600, 600))
+    found = []
+
+    def windows(_look: Look) -> None:
+        for name, at in (("bar", (10, 20)), ("aside", (700, 20))):
+            imgui.set_next_window_pos(ImVec2(*at))
+            imgui.set_next_window_size(ImVec2(60, 80))
+            imgui.begin(name)
             imgui.end()
-            imgui.end_frame()
-    finally:
-        imgui.destroy_context(context)
-    assert found == ((10, 20, 70, 100),)
+        imgui.set_tooltip("passing")
+        imgui.begin("picture")
+        found.append(windows_over((0, 0, 600, 600)))  # of the last frame
+        imgui.end()
+
+    with context((800, 600)):
+        frames(windows, look())
+    assert found[-1] == ((10, 20, 70, 100),)

@@ -1,5 +1,6 @@
 """Commands that every part of the window shares, as pure changes of a frozen state; and small words."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -7,14 +8,14 @@ import torch
 
 from app.window import commands as do
 from app.window.asking import commands as ask
-from app.window.frame.status import fitting
+from app.window.frame.status import figures, fitting
 from app.window.kit.widgets import sentence
 from app.window.scene import camera
 from app.window.scene import commands as show
 from app.window.scene.state import Mode
 from app.window.scene.work import describe_scene
 from app.window.state import TOAST_SECONDS, State
-from tests.app.window.scenes import after, room
+from tests.app.window.scenes import after, room, shown_scene
 
 
 @pytest.fixture(scope="module")
@@ -72,3 +73,12 @@ def test_the_status_bar_shows_what_fits() -> None:
 )
 def test_problems_are_shown_as_sentences(said: str, shown: str) -> None:
     assert sentence(said) == shown
+
+
+def test_a_finer_picture_on_its_way_is_told_in_the_status_bar() -> None:
+    state = shown_scene()
+    assert not any("finer" in text for text in figures(state))
+    drawing = replace(state, stats=replace(state.stats, settling=True))
+    assert "a finer picture is being drawn" in figures(drawing)
+    failed = replace(state, stats=replace(state.stats, failing=True))
+    assert any("could not be drawn" in text for text in figures(failed))

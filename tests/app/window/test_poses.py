@@ -157,3 +157,80 @@ def test_an_orbit_slows_down_far_from_the_photos_and_comes_back_freely() -> None
     quick = poses.orbit_near(start, 40 * step, 0.0, places)
     assert poses.degrees_aside(quick, places) == pytest.approx(angles[-1], abs=1.0)
     assert poses.orbit_near(free, step, 0.0, places) != free
+
+
+LOW, HIGH = Vector(-1.0, -1.0, 0.0), Vector(1.0, 1.0, 2.0)
+
+
+def at_pixel(pose: Pose, point: tuple[float, float, float], size: tuple[int, int] = (640, 480)) -> np.ndarray:
+    found = poses.project(np.array([point]), pose, size)
+    assert found is not None
+    return found[1][0]
+
+
+def test_parallel_rays_keep_the_pivot_as_large_and_everything_ahead() -> None:
+    before = some_pose()
+    flat = poses.orthographic(before, LOW, HIGH)
+    np.testing.assert_allclose(flat.pivot, before.pivot, atol=EXACT)
+    side = tuple(before.pivot + 0.1 * before.axes[:, 0])
+    np.testing.assert_allclose(at_pixel(flat, side), at_pixel(before, side), atol=1e-6)
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 2)], float)
+    for turned in (flat, poses.orbit(flat, 2.0, 0.5), poses.facing(flat, Vector(0.0, 1.0, 0.0))):
+        assert poses.project(corners, turned, (640, 480)) is not None
+    back = poses.perspective(flat)
+    np.testing.assert_allclose(back.centre, before.centre, atol=EXACT)
+    assert back.span is None and back.reach == pytest.approx(before.reach)
+
+
+def test_parallel_rays_show_a_point_at_one_place_at_any_depth() -> None:
+    flat = poses.orthographic(Pose(reach=2.0), LOW, HIGH)
+    np.testing.assert_allclose(at_pixel(flat, (0.3, 0.2, 0.5)), at_pixel(flat, (0.3, 0.2, 1.9)), atol=EXACT)
+    unit = poses.units_per_pixel(flat, 640, 480)
+    across = at_pixel(flat, (0.5, 0.0, 1.0)) - at_pixel(flat, (0.0, 0.0, 1.0))
+    assert across[0] * unit == pytest.approx(0.5)
+
+
+def test_the_cameras_own_projection_is_the_poses() -> None:
+    flat = poses.orbit(poses.orthographic(some_pose(), LOW, HIGH), 0.4, 0.2)
+    camera = poses.to_camera(flat, 640, 480)
+    assert camera.orthographic
+    point = torch.tensor([[0.2, -0.3, 1.1]])
+    pos_c = transform(camera.viewmat, point)[0]
+    expected = pos_c[:2] * torch.stack((camera.K[0, 0], camera.K[1, 1])) + camera.K[:2, 2]
+    np.testing.assert_allclose(
+        at_pixel(flat, (0.2, -0.3, 1.1)), expected.numpy(), atol=1e-2
+    )  # float32 pixels
+    again = poses.from_view(
+        camera.viewmat.double().numpy(), camera.K.double().numpy(), (640, 480), flat.reach, orthographic=True
+    )
+    assert again.span == pytest.approx(flat.span, rel=SINGLE)
+
+
+def test_with_parallel_rays_nearer_means_larger() -> None:
+    flat = poses.orthographic(Pose(reach=2.0), LOW, HIGH)
+    assert flat.span is not None
+    zoomed, flown = poses.zoom(flat, 0.5), poses.fly(flat, 0.0, 0.0, 0.1)
+    assert zoomed.span == flat.span / 2 and zoomed.centre == flat.centre
+    assert flown.span is not None and flown.span < flat.span and flown.centre == flat.centre
+
+
+@pytest.mark.parametrize("aspect", [4 / 3, 3 / 4])
+def test_framing_by_parallel_rays_shows_the_whole_box(aspect: float) -> None:
+    flat = poses.orthographic(Pose(reach=0.5, aspect=aspect), LOW, HIGH)
+    framed = poses.framing(poses.orbit(flat, 0.7, 0.3), LOW, HIGH)
+    size = (round(480 * aspect), 480)
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 2)], float)
+    found = poses.project(corners, framed, size)
+    assert found is not None
+    assert (found[1] >= 0).all() and (found[1] <= np.array(size)).all()
+    assert (found[1].max(0) - found[1].min(0) > 0.9 * np.array(size)).any()  # and no smaller than needed
+
+
+def test_the_way_between_perspective_and_parallel_rays_is_in_perspective() -> None:
+    start, flat = some_pose(), poses.orthographic(some_pose(), LOW, HIGH)
+    assert poses.blend(start, flat, 0.0) is start and poses.blend(start, flat, 1.0) is flat
+    assert poses.blend(start, flat, 0.5).span is None
+    wider = poses.zoom(flat, 2.0)
+    middle = poses.blend(flat, wider, 0.5)
+    assert flat.span is not None and middle.span == pytest.approx(1.5 * flat.span)
+    assert poses.alike((start, flat))[1].span is None and poses.alike((flat, wider)) == (flat, wider)

@@ -7,6 +7,7 @@ import pytest
 
 from app.gl import still
 from app.window.governor import Governor, Kind, Plan
+from app.window.poses import orbit
 from app.window.scene.state import Mode
 from app.window.viewport import RETRY_SECONDS, Viewport
 from langflash_core.language.relevance import compile_query
@@ -91,4 +92,33 @@ def test_a_picture_that_could_not_be_drawn_is_told_and_tried_again(context, monk
         broken[0] = False
         live(RETRY_SECONDS, lambda: getattr(viewport.drawn, "plan", Plan(Kind.FAST, 0.5)).scale == 1.0)
         assert not viewport.failing
+        viewport.release()
+
+
+def test_only_the_picture_on_show_is_scored(context) -> None:
+    """A score and the picture beside it are of the same place, the same marks and the same question."""
+    space = language_space("minilm")
+    shown = shown_scene()
+    assert shown.info is not None
+    scene = room(space.encode(list(PHRASES)))
+    state = replace(shown, mode=Mode.HEAT, info=replace(shown.info, scene=scene))
+    query = compile_query(scene, space, list(PHRASES[:1]))
+    with context:
+        viewport = Viewport(context)
+        viewport.set_scene(1, scene)
+        viewport.ask((0,), query, state.asking.lapses)
+        view = None
+        for _ in range(600):
+            state = replace(state, now=state.now + 0.05)
+            viewport.update(state, SIZE, touched=0.0)
+            view = viewport.view(state)
+            if view is not None:
+                break
+            time.sleep(0.01)
+        assert view is not None and viewport.view(state) is None, "once"
+        viewport.ask((0,), query, state.asking.lapses)
+        assert viewport.view(replace(state, pose=orbit(state.pose, 0.2, 0.0))) is None, "of another place"
+        lapsed = replace(state, asking=replace(state.asking, lapses=state.asking.lapses + 1))
+        assert viewport.view(lapsed) is None, "of a question that holds no more"
+        assert viewport.view(state) is not None
         viewport.release()

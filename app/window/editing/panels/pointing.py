@@ -129,12 +129,11 @@ def _pinned_at(state: State, reading: Reading, place: ImVec2, size: ImVec2) -> I
     """Where the place asked about is on the screen now; None behind the camera or beside the picture."""
     if reading.point is None:
         return _on_screen(reading.at, place)
-    width, height = round(size.x), round(size.y)
-    viewmat, K = poses.viewmat(state.pose), poses.intrinsics(state.pose, width, height)
-    x, y, z = viewmat[:3, :3] @ np.array(reading.point) + viewmat[:3, 3]
-    if z <= poses.MIN_REACH:
+    found = poses.project(np.array([reading.point]), state.pose, (size.x, size.y))
+    if found is None:
         return None
-    at = ImVec2(place.x + K[0, 0] * x / z + K[0, 2], place.y + K[1, 1] * y / z + K[1, 2])
+    x, y = found[1][0]
+    at = ImVec2(place.x + float(x), place.y + float(y))
     inside = place.x <= at.x <= place.x + size.x and place.y <= at.y <= place.y + size.y
     return at if inside else None
 

@@ -35,6 +35,7 @@ _AROUND = 34.0  # of the strip, beside its tools: its edge and two lines
 _VIEWS = 92.0  # that the viewpoints below it take
 _MARGIN = 12.0
 _LONG = 610.0  # width of everything a selection can do, in one line
+_TALL = 6.0  # height of that in two, in lines of text
 _BAR = (
     widgets.PLAIN | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
 )  # a small window over the picture
@@ -45,8 +46,8 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     corner = ImVec2(place.x + look.px(_MARGIN), place.y + look.px(_MARGIN))
     side = tool_side(size.y / look.scale)
     issued, _ = _panel("##tools", corner, look, lambda: _strip(state, look, side), tight=True)
-    room = size.x - look.px(_BUTTON + 22 + 2 * _MARGIN)
     corner = ImVec2(corner.x + look.px(_BUTTON + 22), corner.y)
+    room = _beside_dictionary(corner.x, place.x + size.x - look.px(_MARGIN), corner.y) - corner.x
     bars = []
     if state.editing.tool.selects:
         bars.append(lambda: _options(state, look))
@@ -63,6 +64,15 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
         issued += wanted
         corner = ImVec2(corner.x, corner.y + height + look.px(8))
     return issued
+
+
+def _beside_dictionary(left: float, right: float, top: float) -> float:
+    """Where bars that begin at `left` and `top` end: before the dictionary where that stands beside them."""
+    window = imgui.internal.find_window_by_name("Dictionary")
+    if window is None or not window.was_active or not left < window.pos.x < right:
+        return right
+    beside = window.pos.y < top + _TALL * imgui.get_font_size() and window.pos.y + window.size.y > top
+    return window.pos.x if beside else right
 
 
 def tool_side(height: float) -> float:

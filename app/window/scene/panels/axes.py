@@ -1,7 +1,8 @@
-"""Over the picture's upper right corner: the world's axes, and the way to look along one."""
+"""Over the picture's upper right corner: the world's axes, the way to look along one, the kind of rays."""
 
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
 
 from ... import commands as do
 from ...kit import theme, widgets
@@ -11,6 +12,7 @@ from .. import camera
 
 SIZE = 84.0  # design pixels
 _ARM, _BALL = 30.0, 8.0
+_RAYS = 28.0  # design pixels, of the button beside them
 _COLOURS = (ImVec4(0.93, 0.36, 0.36, 1), ImVec4(0.55, 0.82, 0.35, 1), ImVec4(0.35, 0.60, 0.96, 1))
 _LETTERS = "XYZ"
 
@@ -22,8 +24,9 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     issued: list[do.Command] = []
     middle = ImVec2(place.x + size.x - look.px(SIZE / 2 + 8), place.y + look.px(SIZE / 2 + 8))
     half = look.px(SIZE / 2)
-    imgui.set_next_window_pos(ImVec2(middle.x - half, middle.y - half))
-    imgui.set_next_window_size(ImVec2(2 * half, 2 * half))
+    rays = look.px(_RAYS)
+    imgui.set_next_window_pos(ImVec2(middle.x - half - rays, middle.y - half))
+    imgui.set_next_window_size(ImVec2(2 * half + rays, 2 * half))
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
     flags = widgets.PLAIN | imgui.WindowFlags_.no_background | imgui.WindowFlags_.no_focus_on_appearing
     imgui.begin("##axes", None, flags)
@@ -48,7 +51,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
             canvas.add_circle(ball, radius, widgets.u32(faint), 0, look.px(1.5))
         if (pointer.x - ball.x) ** 2 + (pointer.y - ball.y) ** 2 <= (1.3 * radius) ** 2:
             nearest = (name, forward, ball, radius)
-    imgui.set_cursor_pos(ImVec2(0, 0))
+    imgui.set_cursor_pos(ImVec2(rays, 0))
     pressed = imgui.invisible_button("axes", ImVec2(2 * half, 2 * half))
     if nearest is not None and imgui.is_item_hovered():
         name, forward, ball, radius = nearest
@@ -56,9 +59,24 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
         imgui.set_tooltip(f"Look from {name}")
         if pressed:
             issued.append(camera.Face(forward))
+    imgui.set_cursor_pos(ImVec2(0, 2 * half - rays))
+    issued += _rays(state, rays)
     imgui.end()
     imgui.pop_style_var()
     return issued
+
+
+def _rays(state: State, side: float) -> list[do.Command]:
+    """A button that shows the kind of rays and changes it."""
+    flat = state.pose.span is not None
+    icon = fa.ICON_FA_BORDER_ALL if flat else fa.ICON_FA_CUBE
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(0, 0))
+    with widgets.colours(text=theme.ACCENT if flat else theme.TEXT):
+        pressed = imgui.button(f"{icon}##rays", ImVec2(side, side))
+    imgui.pop_style_var()
+    now, other = ("Parallel rays", "perspective") if flat else ("Perspective", "parallel rays")
+    widgets.tooltip(f"{now}; a click for {other}  (U)")
+    return [camera.SwitchRays()] if pressed else []
 
 
 def ends(state: State) -> list[tuple[str, camera.Vector, tuple[float, float], float]]:

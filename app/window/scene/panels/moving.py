@@ -30,7 +30,7 @@ def pointed(state: State, look: Look, size: ImVec2) -> Pose:
     # On a slow machine the way to the place and the press share a frame: that way is no drag.
     if held and not imgui.is_item_activated() and (dx or dy):
         turn = TURN / look.scale
-        if _held(1):
+        if _held(1) and pose.span is None:
             pose = poses.look(pose, -dx * turn, -dy * turn)
         elif selecting and not io.key_alt and not _held(2):
             pass  # the left button draws a region
@@ -67,7 +67,7 @@ def flown(pose: Pose, speed: float) -> Pose:
     io = imgui.get_io()
     if io.want_text_input or io.key_ctrl or imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
         return pose
-    step = speed * SPEED * pose.reach * min(io.delta_time, LONGEST_STEP) * (FAST if io.key_shift else 1.0)
+    step = speed * SPEED * pose.distance * min(io.delta_time, LONGEST_STEP) * (FAST if io.key_shift else 1.0)
     held = [axis for key, axis in _FLY_KEYS if imgui.is_key_down(key)]
     right, down, forward = (step * sum(axis[i] for axis in held) for i in range(3))
     return poses.fly(pose, right, down, forward) if held else pose

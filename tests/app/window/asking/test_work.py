@@ -12,15 +12,23 @@ from app.window.asking import commands as ask
 from app.window.asking import work
 from app.window.asking.prompt_sets import read_prompts
 from app.window.asking.state import BINS
+from app.window.asking.work import Encode
+from app.window.editing.effects import EditingEffects
+from app.window.effects import Hands
+from app.window.scene.commands import SceneArrived
+from app.window.scene.work import describe_scene
+from app.window.state import State
+from app.window.viewport import Viewport
 from app.window.worker import Worker
+from langflash_core.language import minilm
 from langflash_core.language.relevance import compile_query, relevance_maps
-from langflash_core.language.spaces import language_space
+from langflash_core.language.spaces import encode_cached, language_space
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import Mask, delete
 from langflash_core.splat import render
 from langflash_core.types import Semantics
 from tests.app.window.asking.test_prompt_sets import a_set
-from tests.app.window.scenes import PHRASES, room
+from tests.app.window.scenes import PHRASES, after, room
 from tests.app.window.test_worker import wait_for
 
 
@@ -107,3 +115,22 @@ def test_atoms_without_photos_or_numbers_do_no_harm(scene) -> None:
     (empty,) = work.DescribeAtoms(1, none).run(lambda: False)
     assert isinstance(empty, ask.AtomsDescribed)
     assert (empty.insight.shares, empty.insight.order) == ((), ())
+
+
+def test_a_scene_that_has_come_has_the_text_model_loaded_before_a_phrase_is_typed(monkeypatch) -> None:
+    """What is asked of the worker when a scene arrives reads the text tower; so the first phrase does not."""
+    scene = room(language_space("minilm").encode(list(PHRASES)))
+    info = describe_scene(scene, serial=1, name="room")
+    asked = []
+    hands = Hands(print, print, asked.append, lambda: None, lambda: 0.0)
+    effects = EditingEffects(hands, Viewport.__new__(Viewport))
+    state = after(State(), SceneArrived(info))
+    effects.follow(SceneArrived(info), State(), state)
+    minilm.load_minilm.cache_clear()
+    encode_cached.cache_clear()
+    for request in asked:
+        list(request.run(lambda: False))
+    assert minilm.load_minilm.cache_info().currsize == 1
+    monkeypatch.setattr(minilm, "read_minilm", None)
+    request = Encode(1, scene, (0,), ("armchair",), (), (b"",), first_marks(scene), 0)
+    assert list(request.run(lambda: False))

@@ -153,6 +153,26 @@ def test_a_box_with_shift_adds_and_with_ctrl_removes(program: Program) -> None:
     assert state["pose"] == [0, 0, 0, 1, 0, 0, 0]  # the camera stood still all the while
 
 
+def test_a_polygon_is_clicked_corner_by_corner_and_a_lasso_is_drawn(program: Program) -> None:
+    press(program, "l", "LASSO")
+    x, y = CHAIR
+    for across, down in ((-30, -30), (30, -30), (30, 30), (-30, 30)):
+        move(program, (x + across, y + down))
+        program.xdotool("sleep", "0.5", "click", "1", "sleep", "0.5")
+    assert program.state["selected"] == 0, "a polygon waits for its last corner"
+    move(program, (x - 29, y - 30))
+    program.xdotool("sleep", "0.5", "click", "1")
+    clicked = program.until(lambda s: s["selected"] > 0 and not s["waiting"], "the polygon")["selected"]
+    program.xdotool("key", "ctrl+z")
+    program.until(lambda s: s["selected"] == 0, "undo")
+    move(program, (x - 30, y - 30))
+    sides = ((30, 0), (30, 0), (0, 30), (0, 30), (-30, 0), (-30, 0))
+    steps = [("mousemove_relative", "--", *map(str, side), "sleep", "0.7") for side in sides]
+    program.xdotool("sleep", "0.7", "mousedown", "1", "sleep", "0.7", *sum(steps, ()), "mouseup", "1")
+    drawn = program.until(lambda s: s["selected"] > 0 and not s["waiting"], "the lasso")["selected"]
+    assert drawn == pytest.approx(clicked, rel=0.1)
+
+
 def test_a_crash_loses_no_edit(display: str, scene_file: Path, state_folder: Path) -> None:
     running = Program(display, scene_file)
     running.until(lambda s: s["scene"] == "room.langflash", "the scene")

@@ -10,7 +10,7 @@ import torch
 from app.window.editing import commands as edit
 from app.window.editing import work
 from app.window.editing.state import Reading, Region
-from app.window.poses import to_camera
+from app.window.poses import orthographic, project, to_camera, units_per_pixel
 from app.window.requests import SceneErrand
 from app.window.scene.work import describe_scene
 from langflash_core.language.relevance import compile_query, relevance_maps
@@ -200,3 +200,23 @@ def test_atoms_are_named(info) -> None:
 def test_floaters_are_scored_for_every_row(info) -> None:
     floaters = result(work.ScoreFloaters(*scene_of(info)))
     assert isinstance(floaters, edit.FloatersFound) and len(floaters.scores) == 4 * 12_300
+
+
+def test_with_parallel_rays_a_region_a_ball_and_a_click_take_what_they_show(info) -> None:
+    own = info.views[0]
+    flat = orthographic(own, *info.extent)
+    middle = np.array([CHAIR])
+    found = project(middle, flat, SIZE)
+    assert found is not None
+    at = tuple(found[1][0].tolist())
+    brush = work.FindInRegion(*scene_of(info), Region((at,), radius=6.0), flat, SIZE, False, "replace")
+    brushed = result(brush).mask.rows()
+    assert brushed.any() and not brushed[CHAIRS:].any()  # the block's front alone
+    thing = result(work.FindThing(*scene_of(info), at, flat, SIZE, "replace")).mask.rows()
+    assert thing[:CHAIRS].mean() > 0.99 and not thing[CHAIRS:].any()
+    pixels = 20.0
+    ball = result(work.FindInSphere(*scene_of(info), at, flat, SIZE, "replace", pixels)).mask.rows()
+    means = info.scene.gaussians.means.numpy()
+    reach = np.linalg.norm(means[ball] - means[ball].mean(0), axis=1).max()
+    # Of a flat front: as wide as the ball, up to the spacing of its Gaussians and a pixel.
+    assert reach == pytest.approx(pixels * units_per_pixel(flat, *SIZE), abs=0.02)

@@ -60,6 +60,8 @@ def test_what_fades_on_show_fades_in_files_unless_said_otherwise() -> None:
     assert fades(True, what=What.RGB) and fades(True, what=What.VIDEO) and not fades(False, what=What.RGB)
     assert fades(False, what=What.RGB, fade=True) and not fades(True, what=What.RGB, fade=False)
     assert not fades(True, what=What.PLY) and not fades(True, what=What.MASK)
+    plan = after(form(scene(), path="/out/a picture", what=What.RGB), camera.SwitchRays())
+    assert plan.preferences.near_photos and not export_form.fades(plan), "a plan does not fade on show"
 
 
 def wrong(state: State) -> str:

@@ -148,3 +148,20 @@ def test_looking_from_where_no_photo_did_ends_where_the_scene_can_be_trusted() -
     assert poses.degrees_aside(above.pose, places_to_keep_to(above)) == pytest.approx(poses.NEAR, abs=1e-6)
     front = after(state, camera.Face(Vector(0.0, 0.0, 1.0)))
     assert front.toasts == state.toasts
+
+
+def test_key_frames_by_parallel_rays_are_saved_and_filmed(shown: State) -> None:
+    keys = with_keys(after(shown, camera.SwitchRays())).keys
+    assert all(key.span is not None for key in keys)
+    assert read(json.loads(json.dumps(stored(keys)))) == keys
+    assert read((stored(keys[:1])[0] | {"span": 0.0},)) == ()
+    cameras = [camera_of(entry, "key") for entry in json.loads(keys_json(keys, 640, 480))]
+    assert all(seen.orthographic for seen in along(cameras, [0.0, 1.0, 2.0]))
+    previewed = way(keys, 2.0)
+    assert previewed[-1].span == pytest.approx(keys[-1].span, rel=1e-2)  # sides of the film are even
+
+
+def test_a_film_of_both_kinds_of_rays_is_one_in_perspective(shown: State) -> None:
+    keys = (*with_keys(shown, 1).keys, *with_keys(after(shown, camera.SwitchRays()), 1).keys)
+    assert not any(entry["orthographic"] for entry in json.loads(keys_json(keys, 640, 480)))
+    assert all(pose.span is None for pose in way(keys, 1.0))

@@ -160,6 +160,66 @@ def test_without_a_session_the_newest_edits_are_looked_for(desk: Desk) -> None:
     other.effects.close(other.state, crashed=False)
 
 
+def with_photos(folder: Path, count: int = 2) -> tuple[Path, ...]:
+    paths = tuple(folder / f"photo {number}.jpg" for number in range(count))
+    for path in paths:
+        path.write_bytes(b"")
+    return paths
+
+
+def leave_edits(info, paths: tuple[Path, ...]) -> None:
+    """A session with photos in the tray that ends with edits unsaved."""
+    desk = Desk()
+    desk.perform(show.AddPhotos(paths))
+    desk.perform(show.SetPhotoFov(1, 70.0))
+    desk.perform(show.SceneArrived(info))
+    desk.perform(edit.Found(some(), "replace", "here"))
+    desk.perform(edit.Delete())
+    desk.effects.close(desk.state, crashed=False)
+
+
+def test_restored_edits_bring_the_photos_of_the_tray_back(desk: Desk, info, tmp_path: Path) -> None:
+    paths = with_photos(tmp_path)
+    leave_edits(info, paths)
+    desk.effects.begin(DEFAULTS, "", empty=True)
+    desk.work()
+    offer = desk.state.recovery.edits
+    assert offer is not None
+    desk.perform(keep.EndOffer(restore=True))
+    assert any(isinstance(each, scene_work.MakeThumbnails) and each.paths == paths for each in desk.asked)
+    desk.perform(scene_work.LoadScene(offer.scene, offer.edits).run(3, print, lambda: False))
+    assert [(photo.path, photo.fov) for photo in desk.state.photos] == [(paths[0], None), (paths[1], 70.0)]
+    assert desk.state.info is not None and desk.state.toasts == ()
+
+
+def test_photos_that_have_gone_are_named_in_one_sentence(desk: Desk, info, tmp_path: Path) -> None:
+    paths = with_photos(tmp_path)
+    leave_edits(info, paths)
+    paths[0].unlink()
+    desk.effects.begin(DEFAULTS, "", empty=True)
+    desk.work()
+    desk.perform(keep.EndOffer(restore=True))
+    assert [photo.path for photo in desk.state.photos] == [paths[1]]
+    assert "photo 0.jpg of the tray cannot be found" in desk.state.toasts[-1].text
+
+
+def test_the_room_that_restored_edits_replace_keeps_its_own_photos(desk: Desk, info, tmp_path: Path) -> None:
+    paths = with_photos(tmp_path, 3)
+    leave_edits(info, paths[:1])
+    for each in (show.AddPhotos(paths[1:]), show.SceneArrived(replace(info, serial=2, name="other"))):
+        desk.perform(each)
+    desk.work()
+    offer = desk.state.recovery.edits
+    assert offer is not None  # of the same content
+    desk.perform(keep.EndOffer(restore=True))
+    assert [photo.path for photo in desk.state.photos] == [paths[0]]
+    failed = apply(desk.state, show.JobFailed("It is damaged."))
+    assert [photo.path for photo in failed.photos] == list(paths[1:]) and failed.aside is None
+    desk.perform(scene_work.LoadScene(offer.scene, offer.edits).run(3, print, lambda: False))
+    assert [photo.path for photo in desk.state.photos] == [paths[0]]
+    assert [photo.path for photo in desk.state.rooms[0].photos] == list(paths[1:])
+
+
 def test_what_holds_for_one_scene_is_nothing_for_another(info) -> None:
     shown = apply(State(), show.SceneArrived(info))
     word = Notify("a word")

@@ -54,6 +54,7 @@ def test_a_killed_session_is_left_behind(folders: Path) -> None:
     photo.unlink()  # what is gone is not offered
     again = sessions.left_behind()
     assert again is not None and again.photos == () and again.fovs == ()
+    assert again.missing == ("a photo.png",)
     sessions.forget(kept.file)
     assert sessions.left_behind() is None and list(state_folder().iterdir()) == []
 

@@ -41,6 +41,8 @@ def test_a_killed_session_comes_back_whole(display: str, scene_file: Path, folde
     running.xdotool("key", "Delete")
     before = running.until(lambda s: s["deleted"] == COUNT, "everything deleted")
     wait_for_files(lambda: kept(state).get("edits") and kept(state)["phrases"] == ["armchair"], "the session")
+    edits = Path(kept(state)["edits"])
+    wait_for_files(lambda: len(json.loads(edits.read_bytes())["done"]) == 2, "both edits")
     wait_for_files(lambda: kept(state)["pose"]["centre"] == before["pose"][:3], "the camera")
     os.kill(running._process.pid, signal.SIGKILL)
     running.leave()

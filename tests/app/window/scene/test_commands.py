@@ -3,10 +3,12 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
 from app.window import commands as do
+from app.window.asking.commands import EditPrompt
 from app.window.effects import Hands
 from app.window.poses import Pose
 from app.window.scene import camera, work
@@ -136,3 +138,31 @@ def test_a_scene_from_a_file_takes_the_photos_of_another_away(shown: State, info
     assert after(state[-1], arrived).photos == ()
     made = after(state[-1], show.SceneArrived(info))
     assert len(made.photos) == 3  # it was made of them
+
+
+def test_parallel_rays_come_and_go_and_see_from_every_axis(shown: State) -> None:
+    flat = after(shown, camera.SwitchRays())
+    assert (
+        flat.pose.span is not None
+        and flat.view is None
+        and flat.pose.pivot == pytest.approx(shown.pose.pivot)
+    )
+    assert after(flat, camera.SwitchRays()).pose.centre == pytest.approx(shown.pose.centre)
+    assert after(State(), camera.SwitchRays()) == State()
+    for _, forward in camera.SIDES:  # a plan is looked at from anywhere, whatever the photos saw
+        there = after(flat, camera.Face(forward), do.Tick(flat.now + FLIGHT_SECONDS + 0.1))
+        assert there.pose.axes[:, 2] == pytest.approx(np.array(forward), abs=1e-6)
+        assert there.pose.span == flat.pose.span and not there.toasts
+    under_way = after(shown, camera.JumpTo(1), camera.SwitchRays())
+    landed = after(under_way, do.Tick(under_way.now + FLIGHT_SECONDS + 0.1))
+    assert landed.pose.span is not None, "the end of the flight is seen by parallel rays"
+    assert landed.pose.pivot == pytest.approx(shown.info.views[1].pivot if shown.info else None)
+
+
+def test_what_a_reconstruction_found_is_named_in_the_picture_until_a_phrase_is_asked(info) -> None:
+    made = after(State(), show.AddPhotos(PATHS[:2]), show.Reconstruct(), show.SceneArrived(info))
+    assert made.asking.named
+    opened = after(State(), show.OpenScene(Path("/a.langflash")), show.SceneArrived(info))
+    assert not opened.asking.named
+    asking = after(State(), EditPrompt(0, "door"), show.AddPhotos(PATHS[:2]), show.Reconstruct())
+    assert not after(asking, show.SceneArrived(info)).asking.named
