@@ -41,7 +41,7 @@ def keep(scene: "Scene", history: History, name: str, path: Path | None, token: 
     if not edits.with_suffix(SCENE_SUFFIX).is_file():
         save(scene, edits.with_suffix(SCENE_SUFFIX))
     about = {"name": name, "path": None if path is None else str(path)}
-    save_history(history, digest, about, edits)
+    save_history(history, scene, about, edits)
     for old in _newest_first()[MOST_KEPT:]:
         forget_file(old)
     return edits

@@ -241,7 +241,7 @@ class SceneArrived:
     def _shown(self, state: State) -> State:
         prompts = tuple(replace(p, score=None) for p in state.prompts)
         history = self.info.history
-        saved = None if history is None else history.moved_to(0).marks
+        saved = None if history is None else history.first
         made = state.job is not None and state.job.title == RECONSTRUCTING
         return replace(
             state,

@@ -73,8 +73,7 @@ def _restored(info: SceneInfo, edits: Path) -> SceneInfo:
     """
     from langflash_core.scene.edits_file import load_history, read_about
 
-    assert info.history is not None
-    history = load_history(edits, info.scene, info.history.marks)
+    history = load_history(edits, info.scene)
     about = read_about(edits)[1]
     path = Path(about["path"]) if about.get("path") else None
     return replace(info, name=str(about.get("name", "")), path=path, history=history)
