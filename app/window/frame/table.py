@@ -10,8 +10,9 @@ from .. import commands as do
 from ..asking import commands as ask
 from ..asking.prompt_sets import MOST_PROMPTS
 from ..editing import commands as edit
+from ..editing import placing
 from ..editing import pointing as point
-from ..editing.state import Tool
+from ..editing.state import Handle, Tool
 from ..exporting import commands as export
 from ..filming import commands as film
 from ..opening import commands as opening
@@ -27,6 +28,8 @@ BRUSH_STEP = 1.15  # of its radius, per press of [ or ]
 _DIGITS = "1234567890"
 _SIGNS = {
     imgui.Key.comma: ",", imgui.Key.left_bracket: "[", imgui.Key.right_bracket: "]",
+    imgui.Key.left_arrow: "Left", imgui.Key.right_arrow: "Right", imgui.Key.up_arrow: "Up",
+    imgui.Key.down_arrow: "Down", imgui.Key.page_up: "PgUp", imgui.Key.page_down: "PgDn",
     imgui.Key.delete: "Del", imgui.Key.backspace: "Backspace", imgui.Key.home: "Home",
 }  # fmt: skip
 
@@ -209,6 +212,11 @@ def _tools() -> Iterable[Entry]:
         ("Select the thing under a click", "c", Tool.PICK), ("Measure", "t", Tool.RULER),
     ):  # fmt: skip
         yield Entry(name, group, _shown(point.SetTool(tool)), _plain(key))
+    for name, key, handle in (
+        ("Move the selection", "y", Handle.MOVE), ("Turn the selection", "u", Handle.TURN),
+        ("Scale the selection", "i", Handle.SCALE),
+    ):  # fmt: skip
+        yield Entry(name, group, _shown(placing.SetHandle(handle)), _plain(key))
     yield Entry("A smaller brush", group, _brush(1 / BRUSH_STEP), _plain("left_bracket"), repeats=True)
     yield Entry("A larger brush", group, _brush(BRUSH_STEP), _plain("right_bracket"), repeats=True)
     yield Entry("Find floaters", group, _shown(edit.FindFloaters()))
@@ -228,9 +236,21 @@ def _editing() -> Iterable[Entry]:
     yield Entry("Grow the selection", group, _selected(edit.Grow()), _plain("g"))
     deleting = (*_plain("delete"), *_plain("backspace"))
     yield Entry("Delete the selection", group, _selected(edit.Delete()), deleting)
+    yield Entry("Recolour the selection", group, _selected(placing.BeginTint()), _ctrl("t"))
+    for name, key, nudge in (
+        ("left", "left_arrow", placing.Nudge(right=-1)), ("right", "right_arrow", placing.Nudge(right=1)),
+        ("up", "up_arrow", placing.Nudge(down=-1)), ("down", "down_arrow", placing.Nudge(down=1)),
+        ("away", "page_up", placing.Nudge(ahead=1)), ("nearer", "page_down", placing.Nudge(ahead=-1)),
+    ):  # fmt: skip
+        yield Entry(f"Gizmo: a step {name}", group, _placing(nudge), _ctrl(key))
     yield Entry("Hide the selection", group, _selected(edit.Hide()))
     yield Entry("Show the selection alone", group, _selected(edit.Isolate()))
     yield Entry("Show what is hidden", group, _shown(edit.ShowAll()))
+
+
+def _placing(command: do.Command) -> Callable[[State], do.Command | None]:
+    """Once the gizmo has something to move."""
+    return lambda state: command if state.editing.placing else None
 
 
 def _undo(state: State) -> do.Command | None:

@@ -35,9 +35,10 @@ PATIENCE = 120.0  # seconds without any sign of life that count as a hang, also 
 STEPS_AT_ONCE = 12
 SLOPE_MB = 8.0  # a minute; a scene that leaked at each opening would be 20, a reconstruction hundreds
 KEYS = (
-    *"wasdqehzfpkvxrbcglonmjt1234567890", "bracketleft", "bracketright", "Delete", "BackSpace", "Escape",
+    *"wasdqehzfpkvxrbcglonmjtyui1234567890", "bracketleft", "bracketright", "Delete", "BackSpace", "Escape",
     "Return", "Tab", "shift+Tab", "Up", "Down", "Left", "Right", "Home", "End", "space", "F1", "F2",
-    "minus", "plus", *(f"ctrl+{letter}" for letter in "zyadisoepqvcf"),
+    "minus", "plus", *(f"ctrl+{letter}" for letter in "zyadisoepqvcftm"),
+    *(f"ctrl+{key}" for key in ("Left", "Right", "Up", "Down", "Prior", "Next")),
     "ctrl+comma", "ctrl+shift+z", "F6", "F11",
 )  # fmt: skip
 WORDS = (
