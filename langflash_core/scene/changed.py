@@ -41,10 +41,7 @@ def changed_scene(scene: Scene, marks: Marks, more: Change | None = None) -> Sce
     more: a change that is not in the marks yet. The last two results are kept, since every question about
     a moved scene begins with it.
     """
-    if marks.changes:
-        gaussians = _kept(scene.gaussians, marks.changes)
-    else:
-        gaussians = scene.gaussians
+    gaussians = _kept(scene.gaussians, marks.changes) if marks.changes else scene.gaussians
     gaussians = changed(gaussians, () if more is None else (more,))
     return scene if gaussians is scene.gaussians else replace(scene, gaussians=gaussians)
 

@@ -46,12 +46,14 @@ def spoken_scene(scene: Scene, marks: Marks) -> Scene:
 
 
 def edited_scene(scene: Scene, marks: Marks) -> Scene:
-    """The scene to save: its Gaussians moved and recoloured, without deleted ones, merged atoms as one, names,
-    key frames and scale in its record.
+    """The scene to save: its Gaussians moved and recoloured, without deleted ones; merged atoms as one;
+    names, key frames and scale in its record.
 
     Hidden Gaussians are kept. Untouched marks give back the scene itself.
     """
     scene = there(changed_scene(scene, marks), marks)
+    if scene.view_ids is not None and bool((scene.view_ids < 0).any()):
+        scene = replace(scene, view_ids=None)
     marks = marks.of_size(len(scene.gaussians), marks.atoms[: marks.there[1]])
     record = scene.record
     if (marks.camera_path, marks.metric_scale) != (record.camera_path, record.metric_scale):

@@ -105,7 +105,9 @@ class Edit:
         """About what it takes in memory."""
         flips = sum(len(packed) for _, packed in self.flips)
         values = sum(300 * len(value) for _, *pair in self.told for value in pair if isinstance(value, tuple))
-        moved = 0 if self.changes is None else sum(len(c.rows.bits) for c in self.changes[1] + self.changes[2])
+        moved = (
+            0 if self.changes is None else sum(len(c.rows.bits) for c in self.changes[1] + self.changes[2])
+        )
         return 500 + flips + values + moved + 500 * len(self.swaps)
 
     def apply(self, marks: Marks) -> Marks:

@@ -23,7 +23,7 @@ from langflash_core.errors import SceneFileError
 from langflash_core.files import write_atomically
 from langflash_core.scene.changes import Change, checked, told
 from langflash_core.scene.edited import first_marks
-from langflash_core.scene.edits import MASKS, TOLD, Atom, Edit, History, Marks, difference
+from langflash_core.scene.edits import MASKS, TOLD, Atom, Edit, History, difference
 from langflash_core.scene.mask import Mask
 from langflash_core.types import Scene
 

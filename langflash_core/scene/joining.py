@@ -42,8 +42,8 @@ def joined(first: Scene, second: Scene, names: tuple[str, str] = ("this scene", 
     placed = changed(second.gaussians, (beside(first, second),))
     gaussians = _stacked(first.gaussians, placed)
     view_ids = None
-    if first.view_ids is not None:  # nobody made the second's; see `edited_scene`, which leaves them out
-        view_ids = torch.cat((first.view_ids, first.view_ids.new_zeros(len(placed))))
+    if first.view_ids is not None:
+        view_ids = torch.cat((first.view_ids, first.view_ids.new_full((len(placed),), -1)))
     scene = replace(
         first,
         gaussians=gaussians,
@@ -81,8 +81,8 @@ def _check(first: Scene, second: Scene, names: tuple[str, str]) -> None:
         return
     if ours.space != theirs.space or ours.dictionary.shape[1] != theirs.dictionary.shape[1]:
         raise InputError(
-            f"{names[1]} speaks {theirs.space} and {names[0]} speaks {ours.space}, so no phrase could be asked "
-            "of both; merge scenes that the same preset made"
+            f"{names[1]} speaks {theirs.space} and {names[0]} speaks {ours.space}, so no phrase could be "
+            "asked of both; merge scenes that the same preset made"
         )
     if ours.num_atoms + theirs.num_atoms > MOST_ATOMS:
         raise InputError(
@@ -105,7 +105,10 @@ def _stacked(first: Gaussians, second: Gaussians) -> Gaussians:
     """Both, with as many harmonics as the one that has more; the others' are 0."""
     bases = max(first.sh.shape[1], second.sh.shape[1])
     ours, theirs = (replace(some, sh=_padded(some.sh, bases)) for some in (first, second))
-    pairs = ((getattr(ours, name), getattr(theirs, name)) for name in ("means", "quats", "scales", "opacities", "sh"))
+    pairs = (
+        (getattr(ours, name), getattr(theirs, name))
+        for name in ("means", "quats", "scales", "opacities", "sh")
+    )
     return Gaussians(*(torch.cat((mine, yours.to(mine))) for mine, yours in pairs))
 
 
@@ -113,7 +116,10 @@ def _joined_semantics(first: Semantics, second: Semantics) -> Semantics:
     """One dictionary; the second's numbers begin behind the first's. Who carries less weights gets zeros."""
     spoken = second if first.space == NO_LANGUAGE else first
     channels, most = spoken.dictionary.shape[1], max(first.weight_ids.shape[1], second.weight_ids.shape[1])
-    rows = [each.dictionary if each.num_atoms else each.dictionary.new_zeros(0, channels) for each in (first, second)]
+    rows = [
+        each.dictionary if each.num_atoms else each.dictionary.new_zeros(0, channels)
+        for each in (first, second)
+    ]
     shifted = second.weight_ids + first.num_atoms if second.num_atoms else second.weight_ids
     values = (_padded(first.weight_values, most), _padded(second.weight_values, most))
     return Semantics(

@@ -34,9 +34,8 @@ from langflash_core.export.cameras import read_posed
 from langflash_core.images.decode import read_photo
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
-from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History, Marks, Mask, hide, rename_atom
-from langflash_core.scene.edits_file import load_history, save_history, scene_digest
+from langflash_core.scene.edits_file import load_history, save_history
 from tests.app.cli.conftest import stripes
 from tests.export.splats import ksplat_bytes, random_gaussians
 

@@ -69,7 +69,9 @@ def test_a_move_is_a_similarity_of_means_covariances_and_colours() -> None:
         np.testing.assert_allclose(after.means[i].numpy(), wanted, atol=1e-12)
         np.testing.assert_allclose(moved[i], turned, atol=1e-12)
         # the turning of harmonics is solved by least squares of 64 directions
-        torch.testing.assert_close(sh_to_colour(after.sh[i : i + 1], seen[None])[0], colours[i], atol=1e-9, rtol=0)
+        torch.testing.assert_close(
+            sh_to_colour(after.sh[i : i + 1], seen[None])[0], colours[i], atol=1e-9, rtol=0
+        )
     assert after.opacities is before.opacities
 
 

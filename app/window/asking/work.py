@@ -170,7 +170,9 @@ class WeighAtoms(SceneErrand):
         from langflash_core.scene.changed import changed_scene
 
         found = atom_places(changed_scene(self.scene, self.marks))
-        yield AtomsWeighed(_shares(self.scene, self.marks), tuple(place and Vector(*place) for place in found))
+        yield AtomsWeighed(
+            _shares(self.scene, self.marks), tuple(place and Vector(*place) for place in found)
+        )
 
 
 def _shares(scene: "Scene", marks: Marks | None) -> tuple[float, ...]:

@@ -13,7 +13,6 @@ from ..scene.state import Mode
 from ..state import State
 from .state import STRICTNESS_RANGE, Floaters, Point, Region
 
-
 FELL_OFF = "The oldest edits can no longer be undone: the list holds the last 1,000, or 32 MB of them."
 
 

@@ -127,7 +127,9 @@ class Nudge:
                 way = axes @ np.array([self.right, self.down, self.ahead]) * STEP * state.pose.reach
                 gesture = Moved(marks.selected, offset=_spot(way))
             case Handle.TURN:
-                axis = self.right * np.array([0.0, -1.0, 0.0]) - self.down * axes[:, 0] + self.ahead * axes[:, 2]
+                axis = (
+                    self.right * np.array([0.0, -1.0, 0.0]) - self.down * axes[:, 0] + self.ahead * axes[:, 2]
+                )
                 gesture = Moved.about(marks.selected, centre, turn_about(_spot(axis), TURN_STEP))
             case Handle.SCALE:
                 larger = self.right - self.down + self.ahead

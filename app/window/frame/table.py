@@ -110,6 +110,8 @@ def _files() -> Iterable[Entry]:
     yield Entry("Save ...", group, _shown(dialog("save")), _ctrl("s"), fa.ICON_FA_FLOPPY_DISK, in_fields=True)
     exporting = fa.ICON_FA_FILE_EXPORT
     yield Entry("Export ...", group, _shown(export.ShowExport()), _ctrl("e"), exporting, in_fields=True)
+    merging = _shown(opening.OpenFiles(merging=True))
+    yield Entry("Merge a scene into this one ...", group, merging, _ctrl("m"), fa.ICON_FA_OBJECT_GROUP)
     reconstruct = show.Instead((show.Reconstruct(),))
     yield Entry("Reconstruct the photos", group, lambda s: reconstruct if s.photos else None)
     yield Entry("Back to the room before", group, _room_before)

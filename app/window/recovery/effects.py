@@ -120,8 +120,8 @@ class RecoveryEffects(Effects):
                 self._restoring, self._wanted, self._restoring_edits = self._wanted, None, edits
             case Reconstruct():
                 self._restoring, self._wanted = self._wanted, None
-            case SceneArrived(info):
-                self._arrived(info, before)
+            case SceneArrived(info, replaces=replaces):
+                self._arrived(info, before, replaces)
             case SceneSaved(path):
                 self._settle(state)
                 self._hands.perform(Opened(path))
@@ -146,15 +146,18 @@ class RecoveryEffects(Effects):
         if snapshot != self._snapshot:
             self._snapshot, self._keep_at = snapshot, state.now + KEEP_AFTER
 
-    def _arrived(self, info: SceneInfo, before: State) -> None:
-        self._take_edits(info, before)
+    def _arrived(self, info: SceneInfo, before: State, replaces: bool) -> None:
+        self._take_edits(info, before, replaces)
         self._take_session(info)
 
     # Edits
 
-    def _take_edits(self, info: SceneInfo, before: State) -> None:
-        """Keep those of the scene before; those of the scene that has come are restored or looked for."""
-        if before.info is not None and before.editing.unsaved and before.editing.dirty:
+    def _take_edits(self, info: SceneInfo, before: State, replaces: bool) -> None:
+        """Keep those of the scene before, unless they are those of the scene that has come as well; those are
+        restored or looked for."""
+        if replaces and before.info is not None:
+            self._hands.submit(ForgetEdits(before.info.scene, self._keeper.token))
+        elif before.info is not None and before.editing.unsaved and before.editing.dirty:
             self._keep_edits(before)
             if before.info.path is None or before.editing.history is None or before.editing.history.done:
                 text = f"The edits of {before.info.name} are kept; go back to it to go on with them."
@@ -209,7 +212,8 @@ class RecoveryEffects(Effects):
         self._copied = False
         if unsaved:
             self._hands.perform(CopyAt(self._keeper.scene_file))
-            self._hands.submit(KeepCopy(info.serial, info.scene, self._keeper.scene_file))
+            first = None if info.history is None else info.history.first
+            self._hands.submit(KeepCopy(info.serial, info.scene, self._keeper.scene_file, first))
         if kept is not None and kept.file is not None:
             self._outlived = kept.file
         if not unsaved:

@@ -42,7 +42,10 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> tuple[list[do
     gizmo.set_drawlist(imgui.get_window_draw_list())
     gizmo.set_rect(place.x, place.y, size.x, size.y)
     context = imgui.get_current_context()
-    hovered, context.hovered_id_previous_frame = context.hovered_id_previous_frame, 0  # the picture is no obstacle
+    hovered, context.hovered_id_previous_frame = (
+        context.hovered_id_previous_frame,
+        0,
+    )  # the picture is no obstacle
     matrix = _matrix(standing)
     view, projection = _matrix(view_of(state.pose)), _matrix(projection_of(state.pose, size))
     operation = _OPERATIONS[editing.handle]

@@ -1,7 +1,7 @@
 """Bars over the picture: the numbers of the gizmo, and the colour of a tint."""
 
-from imgui_bundle import imgui
 from imgui_bundle import icons_fontawesome_6 as fa
+from imgui_bundle import imgui
 
 from langflash_core.scene.changes import SCALES, Moved
 
@@ -82,7 +82,9 @@ def draw_tint(state: State, tint: Tint, look: Look) -> list[do.Command]:
     widgets.tooltip("The colour; light and shade stay")
     imgui.same_line()
     text = f"{100 * tint.strength:.0f} %"
-    moved, strength = widgets.slider("##strength", tint.strength, (0.0, 1.0), text, "How much of it", look.px(150))
+    moved, strength = widgets.slider(
+        "##strength", tint.strength, (0.0, 1.0), text, "How much of it", look.px(150)
+    )
     imgui.same_line(0, look.px(14))
     issued: list[do.Command] = []
     if repainted or moved:
