@@ -46,7 +46,7 @@ class Handle(Enum):
 class Tint:
     """A colour in [0, 1] and how much of it, 0 to 1."""
 
-    colour: tuple[float, float, float] = (0.20, 0.45, 0.85)
+    colour: tuple[float, float, float] = (0.80, 0.24, 0.18)
     strength: float = 0.8
 
 

@@ -10,12 +10,12 @@ from langflash_core.formats import COLOUR_MAPS
 
 from ..commands import Command, Notify
 from ..editing.placing import SetHandle
-from ..editing.pointing import FrameSelection
 from ..editing.state import Handle
 from ..effects import Effects, Hands
 from ..kit.textures import Thumbnails
 from ..state import State
 from ..viewport import Viewport
+from .camera import FrameAll
 from .commands import (
     AddPhotos,
     All,
@@ -99,7 +99,7 @@ class SceneEffects(Effects):
             case All(commands):
                 waited = commands
             case Merged() if command.fits(before):
-                waited = [command.arrival(before), SetHandle(Handle.MOVE), FrameSelection()]
+                waited = [command.arrival(before), SetHandle(Handle.MOVE), FrameAll()]
             case GoToRoom(serial):
                 rooms = (room for room in state.rooms if room.info.serial == serial)
                 waited = [SceneArrived(replace(r.info, history=r.history), room=r) for r in rooms]

@@ -41,6 +41,7 @@ KEYS = (
     *(f"ctrl+{key}" for key in ("Left", "Right", "Up", "Down", "Prior", "Next")),
     "ctrl+comma", "ctrl+shift+z", "F6", "F11",
 )  # fmt: skip
+SURE = ("Discard", "Open it")  # buttons of the questions before a scene that is opened
 WORDS = (
     "armchair",
     "wall - floor",
@@ -96,6 +97,7 @@ def inside(width: int, height: int) -> None:
             frames, latest = frames + 1, max(latest, session.lag)
         if time.monotonic() - said > 0.5:
             said, state = time.monotonic(), session.state
+            now = items.now()
             line = {
                 "frames": frames,
                 "latest": latest,
@@ -105,7 +107,7 @@ def inside(width: int, height: int) -> None:
                 "gl_errors": session.gl_errors,
                 "dialog": state.dialog,
                 "job": None if state.job is None else state.job.stage,
-                "discard": items.now().get("Discard", [None])[0],
+                "discard": next((now[name][0] for name in SURE if now.get(name)), None),
             }
             sys.stdout.write(json.dumps(line) + "\n")
             sys.stdout.flush()
@@ -273,7 +275,8 @@ class Watched:
                 click(self.last["discard"])
             elif self.last.get("scene") == name:
                 time.sleep(2.0)  # for what follows a scene: words of its atoms, files kept
-                return self.last.get("scene") == name
+                if not self.last.get("discard"):
+                    return self.last.get("scene") == name
             time.sleep(0.2)
         return False
 

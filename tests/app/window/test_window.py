@@ -350,6 +350,7 @@ def test_drops_a_real_drop_and_escape(program: Program, scene_file: Path, tmp_pa
     program.client.drop(program.window, [notes], MIDDLE)
     program.until(lambda s: any("my notes.txt is no photo" in t for t in s["toasts"]), "a toast")
     program.client.drop(program.window, [scene_file], MIDDLE)
+    program.click("Open it")
     program.until(lambda s: s["scene"] == "room.langflash", "the dropped scene")
     broken = tmp_path / "broken photo.jpg"
     broken.write_bytes(b"\xff\xd8\xff\xe0 cut short")

@@ -53,7 +53,7 @@ def _fields(state: State, pivot: placing.Spot, look: Look) -> list[do.Command]:
         imgui.same_line(0, look.px(10))
         if len(numbers) > 1:
             imgui.align_text_to_frame_padding()
-            imgui.text_colored(theme.MUTED, "xyz"[place])
+            imgui.text_colored(theme.AXES[place], "xyz"[place])
             imgui.same_line(0, look.px(5))
         imgui.set_next_item_width(look.px(_FIELD))
         speed = unit * _SPEEDS[editing.handle]
