@@ -90,7 +90,7 @@ def projection_of(pose: Pose, size: ImVec2) -> np.ndarray:
 
 
 def _matrix(values: np.ndarray) -> "gizmo.Matrix16":
-    return gizmo.Matrix16(values.T.ravel().astype(np.float32))  # column by column
+    return gizmo.Matrix16(values.T.ravel().tolist())  # column by column
 
 
 def _snap(state: State) -> "gizmo.Matrix3 | None":
@@ -101,7 +101,7 @@ def _snap(state: State) -> "gizmo.Matrix3 | None":
         Handle.TURN: _TURN_SNAP,
         Handle.SCALE: _SCALE_SNAP,
     }[state.editing.handle]
-    return gizmo.Matrix3(np.full(3, step, np.float32))
+    return gizmo.Matrix3([step] * 3)
 
 
 def _style(look: Look, size: ImVec2) -> None:
