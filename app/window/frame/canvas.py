@@ -29,10 +29,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
         imgui.invisible_button("picture", ImVec2(max(size.x, 1), max(size.y, 1)))
         return []
     placed, taken = gizmo.draw(state, look, corner, size)
-    if taken:
-        imgui.dummy(size)
-        return placed
-    over = placed + in_space.draw(state, look, corner, size)
+    over = placed if taken else placed + in_space.draw(state, look, corner, size)
     if any(isinstance(command, camera.JumpTo) for command in over):
         return over  # the click was on a camera
     buttons = imgui.ButtonFlags_
@@ -40,7 +37,10 @@ def draw(state: State, look: Look) -> list[do.Command]:
     flags = buttons.mouse_button_left | buttons.mouse_button_right | buttons.mouse_button_middle
     imgui.invisible_button("picture", ImVec2(max(size.x, 1), max(size.y, 1)), flags)
     if state.info is None:
-        return []
+        return over
+    if taken:  # the picture is there even so: a press that comes right beside the gizmo finds it hovered
+        pose = moving.flown(state.pose, state.preferences.speed)
+        return over + ([camera.MoveTo(pose)] if pose != state.pose else [])
     issued = over + hands.hover(state, corner)
     if state.editing.tool.selects and not imgui.get_io().key_alt:
         issued += hands.region(state, look, corner)

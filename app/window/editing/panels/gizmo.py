@@ -56,7 +56,8 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> tuple[list[do
         values = np.array(matrix.values, float).reshape(4, 4).T
         gesture = placing.from_matrix(values, pivot, editing.handle, before)
         return ([placing.Adjust(gesture)] if gesture != editing.gesture else []), True
-    return _rest(state), gizmo.is_over() or gizmo.is_using()
+    ending = isinstance(editing.gesture, placing.Moved)  # in the frame in which the hand lets go
+    return _rest(state), gizmo.is_over() or gizmo.is_using() or ending
 
 
 def _rest(state: State) -> list[do.Command]:
@@ -66,7 +67,8 @@ def _rest(state: State) -> list[do.Command]:
 
 
 def let_go() -> None:
-    """What the gizmo holds it holds no longer."""
+    """What the gizmo holds it holds no longer, nor does the picture below it, which would orbit."""
+    imgui.internal.clear_active_id()
     gizmo.enable(False)
     gizmo.enable(True)
 
