@@ -18,7 +18,7 @@ from app.window.commands import apply
 from app.window.editing import commands as edit
 from app.window.editing import placing
 from app.window.editing import pointing as point
-from app.window.editing.state import Handle, Reading, Region
+from app.window.editing.state import Reading, Region
 from app.window.editing.work import ScoreFloaters, request_for
 from app.window.exporting import commands as export
 from app.window.filming import commands as film
@@ -194,11 +194,10 @@ def random_command(chance: np.random.Generator, state: State) -> do.Command:
         edit.EndFloaters("delete"), point.SetThrough(bool(chance.integers(2))),
         edit.RenameAtom(atom, f"thing {key}"), edit.ToggleAtom(atom), edit.MergeAtoms((atom, key)),
         film.AddKey(), film.RemoveKey(key), film.ClearKeys(), point.SetLength(float(chance.uniform(0.1, 2))),
-        placing.Nudge(*chance.uniform(-1, 1, 3).tolist()), placing.SetHandle(list(Handle)[key]),
-        placing.BeginTint(), placing.EndGesture(),
+        placing.Nudge(*chance.uniform(-1, 1, 3).tolist()), placing.BeginTint(),
         edit.Undo(), edit.Redo(), edit.GoTo(int(chance.integers(0, 200))),
     )  # fmt: skip
-    command = choices[chance.integers(len(choices))]
+    command = placing.EndGesture() if state.editing.gesture else choices[chance.integers(len(choices))]
     if isinstance(command, edit.GoTo) and chance.random() < 0.9:
         return edit.Redo()  # rarely: it may take all of them back
     if isinstance(command, edit.Delete) and state.editing.num_selected > 600:
