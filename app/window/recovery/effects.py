@@ -155,9 +155,7 @@ class RecoveryEffects(Effects):
     def _take_edits(self, info: SceneInfo, before: State, replaces: bool) -> None:
         """Keep those of the scene before, unless they are those of the scene that has come as well; those are
         restored or looked for."""
-        if replaces and before.info is not None:
-            self._hands.submit(ForgetEdits(before.info.scene, self._keeper.token))
-        elif before.info is not None and before.editing.unsaved and before.editing.dirty:
+        if not replaces and before.info is not None and before.editing.unsaved and before.editing.dirty:
             self._keep_edits(before)
             if before.info.path is None or before.editing.history is None or before.editing.history.done:
                 text = f"The edits of {before.info.name} are kept; go back to it to go on with them."
@@ -170,6 +168,8 @@ class RecoveryEffects(Effects):
                 self._hands.submit(ForgetFile(restored))
         else:
             self._hands.submit(LookForEdits(info.serial, info.scene, info.path))
+        if replaces and before.info is not None:  # once the same edits lie beside the scene that has come
+            self._hands.submit(ForgetEdits(before.info.scene, self._keeper.token))
 
     def _end_offer(self, offer: Offer, restore: bool, forget: bool) -> None:
         if restore:

@@ -32,8 +32,8 @@ _COMBINES: tuple[tuple[Combine, str, str], ...] = (
     ("remove", fa.ICON_FA_MINUS, "Take from the selection  (Ctrl)"),
 )
 _BUTTON = 36.0  # design pixels of a tool's side
-_SMALLEST = 22.0
-_GAP = 4.0
+_SMALLEST = 20.0
+_GAP = 3.0
 _AROUND = 34.0  # of the strip, beside its tools: its edge and two lines
 _VIEWS = 92.0  # that the viewpoints below it take
 _MARGIN = 12.0

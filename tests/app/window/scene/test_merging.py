@@ -68,7 +68,9 @@ def test_a_merge_is_an_edit_whose_things_are_selected_with_the_gizmo_in_hand(
     assert (editing.tool, editing.handle) == (Tool.PLACE, Handle.MOVE) and state.flight is not None
     assert editing.unsaved and editing.marks.atoms[3].name == "crate"
     desk.perform(Nudge(right=1))
-    whole = edited_scene(desk.state.info.scene, desk.state.editing.marks)
+    nudged = desk.state.editing.marks
+    assert nudged is not None and len(nudged.changes) == 1
+    whole = edited_scene(state.info.scene, nudged)
     save(whole, tmp_path / "whole.langflash")
     again = load(tmp_path / "whole.langflash")
     assert len(again.gaussians) == COUNT - 9 + OTHERS and again.record.atom_names == {3: "crate"}
@@ -84,6 +86,7 @@ def test_undoing_a_merge_leaves_the_scene_as_it_was_and_another_can_follow(desk:
     assert state.info is not None and state.editing.marks is not None and state.editing.unsaved == saved
     alone = edited_scene(state.info.scene, state.editing.marks)
     assert torch.equal(alone.gaussians.means, wanted.gaussians.means)
+    assert alone.view_ids is not None and wanted.view_ids is not None
     assert torch.equal(alone.view_ids, wanted.view_ids) and alone.record == wanted.record
     assert alone.semantics.num_atoms == 3
     desk.perform(edit.Undo(), edit.Undo())
