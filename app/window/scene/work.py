@@ -90,7 +90,7 @@ class JoinScenes(Job):
         own, name = self.info, self.path.name
         scene = joined(there(own.scene, self.marks), read_scene(self.path), (own.name, name))
         info = describe_scene(scene, serial, own.name, own.path)
-        return Merged(own.serial, self.marks.there, replace(info, own_views=False), name)
+        return Merged(own.serial, self.marks.there, info, name)
 
 
 def _restored(info: SceneInfo, edits: Path) -> SceneInfo:

@@ -124,6 +124,8 @@ BEFORE = {
 
 
 def test_a_merge_takes_the_kept_edits_along_and_is_restored(desk: Desk, info, tmp_path: Path) -> None:
+    views = torch.zeros(12_300, dtype=torch.int64)  # of the merged Gaussians nobody knows the view
+    info = replace(info, scene=replace(info.scene, view_ids=views))
     desk.perform(show.SceneArrived(info))
     desk.perform(edit.Found(some(), "replace", "here"))
     desk.perform(edit.Delete())
@@ -141,6 +143,8 @@ def test_a_merge_takes_the_kept_edits_along_and_is_restored(desk: Desk, info, tm
     again = LoadScene(kept.with_suffix(".langflash"), kept).run(3, lambda *_: None, lambda: False)
     assert isinstance(again, show.SceneArrived) and history is not None
     assert again.info.history == history and len(history.marks.selected) == 12_300
+    assert again.info.scene.view_ids is not None
+    assert torch.equal(again.info.scene.view_ids, torch.cat((views, views - 1)))
     assert after_restoring(again).editing.unsaved
     assert not after_restoring(again, *3 * (edit.Undo(),)).editing.unsaved
 
