@@ -188,7 +188,8 @@ class Scene:
     viewmats (V, 4, 4) and Ks (V, 3, 3) describe the input views at `view_size` (width, height).
     A scene from a splat file has no photos: its one view frames it, and its world is the file's.
     photos: small JPEG bytes per view, or none. view_ids: (N,) int64 in [0, V), the view that each
-    Gaussian was predicted from; None where nobody knows.
+    Gaussian was predicted from; None where nobody knows; -1 of those that no photo of this scene made, which
+    a merge brought and files do not tell apart.
 
     Raises:
         ValueError: sizes disagree, or a number names no view or no atom.
@@ -217,7 +218,7 @@ class Scene:
             raise ValueError(f"photos: expected {num_views}, one per view, received {len(self.photos)}")
         if self.view_ids is not None:
             _shape("view_ids", self.view_ids, (count,))
-            _names("view_ids", self.view_ids, num_views)
+            _names("view_ids", self.view_ids, num_views, lowest=-1)
         for name in ("atom_names", "atom_denials", "silent_atoms"):
             atoms = torch.tensor(list(getattr(self.record, name)), dtype=torch.int64)
             _names(name, atoms, self.semantics.num_atoms)
@@ -372,12 +373,12 @@ def _shape(name: str, values: Tensor, expected: tuple[int, ...]) -> None:
         raise ValueError(f"{name}: expected shape {expected}, received {tuple(values.shape)}")
 
 
-def _names(name: str, ids: Tensor, count: int) -> None:
-    """Numbers int64 in [0, count)."""
+def _names(name: str, ids: Tensor, count: int, lowest: int = 0) -> None:
+    """Numbers int64 in [lowest, count)."""
     if ids.dtype != torch.int64:
         raise ValueError(f"{name}: expected int64, received {ids.dtype}")
     if ids.numel() == 0:
         return
     low, high = (int(bound) for bound in ids.aminmax())
-    if low < 0 or high >= count:
-        raise ValueError(f"{name}: expected values in [0, {count}), received {low} to {high}")
+    if low < lowest or high >= count:
+        raise ValueError(f"{name}: expected values in [{lowest}, {count}), received {low} to {high}")

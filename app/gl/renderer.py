@@ -23,6 +23,7 @@ from langflash_core.export.colours import heat
 from langflash_core.formats import COLOUR_MAPS
 from langflash_core.graphics import draws_in_software
 from langflash_core.language.relevance import CompiledQuery
+from langflash_core.scene.changes import Change
 from langflash_core.splat.projection import ALPHA_MIN, NEAR
 from langflash_core.types import Camera, Frame, Scene
 
@@ -213,6 +214,16 @@ class SplatRenderer:
         if self._scene is None or shown.shape != (count,) or tints.shape != (count,):
             raise ValueError(f"mark: expected {count} rows, received {shown.shape} and {tints.shape}")
         self._scene.mark(shown, tints)
+
+    def change(self, changes: tuple[Change, ...]) -> None:
+        """Draw Gaussians as edits moved and recoloured them; all of them, in order; holds until `set_scene`.
+
+        Raises:
+            ValueError: there is no scene.
+        """
+        if self._scene is None:
+            raise ValueError("change: expected set_scene before, received no scene")
+        self._scene.change(changes)
 
     @property
     def in_software(self) -> bool:

@@ -1,17 +1,21 @@
 """What lives as long as the scene: its Gaussians by level of detail, their marks, what its photos see."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from itertools import count
 
 import moderngl
 import numpy as np
+import torch
 
 from langflash_core.export.colours import atom_colours
 from langflash_core.graphics import Programs
 from langflash_core.language.relevance import finite_atoms
+from langflash_core.scene.changed import changed
+from langflash_core.scene.changes import Change
 from langflash_core.scene.thin import thin_with_rows
-from langflash_core.types import Camera, Scene
+from langflash_core.types import Camera, Gaussians, Scene
 
 from .colours import feature_axes
 from .painter import Painter
@@ -29,17 +33,22 @@ class Level:
     what was drawn from another order or other places shows another key.
     """
 
-    def __init__(self, splats: SplatBuffers, rows: np.ndarray):
-        """rows: of the scene's N Gaussians, that this level draws."""
+    def __init__(self, splats: SplatBuffers, rows: np.ndarray, gaussians: Gaussians):
+        """rows: of the scene's N Gaussians, that this level draws. gaussians: as it draws them."""
         self.splats = splats
         self.order_key = self.places_key = 0
         self._rows = rows
+        self._gaussians = gaussians
+        self._changes: tuple[Change, ...] | None = None  # to be brought to the card
         self._camera: tuple | None = None  # that the Gaussians are ordered for
         self._projected = False
         self._norms: tuple[bytes, np.ndarray] | None = None  # factor and |f_i|
 
     def prepare(self, camera: Camera) -> None:
         """Order and project the Gaussians, unless they are for this camera and these marks."""
+        if self._changes is not None:
+            self.splats.place(changed(self._gaussians, self._changes, torch.from_numpy(self._rows)))
+            self._changes = None
         key = _camera_key(camera)
         if key != self._camera:
             self.splats.sort(camera)
@@ -54,6 +63,10 @@ class Level:
         if self.splats.mark(shown[self._rows], tints[self._rows]):
             self._camera = None
         self._projected = False
+
+    def change(self, changes: tuple[Change, ...]) -> None:
+        """Draw the Gaussians as edits moved and recoloured them, from the next picture on."""
+        self._changes, self._camera = changes, None
 
     @property
     def depth_range(self) -> tuple[float, float]:
@@ -80,6 +93,7 @@ class LiveScene:
         self._painter = painter
         self._make_splats = make_splats
         self._marks: tuple[np.ndarray, np.ndarray] | None = None  # shown, tints
+        self._changes: tuple[Change, ...] = ()
         self._photos: dict[bool, PhotoDepths] = {}  # by whether each sees its own Gaussians alone
         self._levels: dict[float, Level] = {}  # by share of the Gaussians
         self.whole = self._made(1.0, scene, np.arange(len(scene.gaussians)))
@@ -121,7 +135,8 @@ class LiveScene:
     def photo_depths(self, own: bool) -> PhotoDepths:
         """What the photos see, of all Gaussians or each of its own alone; drawn once."""
         if own not in self._photos:
-            self._photos[own] = PhotoDepths(self._painter, self.scene, own)
+            gaussians = changed(self.scene.gaussians, self._changes)
+            self._photos[own] = PhotoDepths(self._painter, replace(self.scene, gaussians=gaussians), own)
         return self._photos[own]
 
     def mark(self, shown: np.ndarray, tints: np.ndarray) -> None:
@@ -134,6 +149,18 @@ class LiveScene:
         for level in self._levels.values():
             level.mark(shown, tints)
 
+    def change(self, changes: tuple[Change, ...]) -> None:
+        """Draw the Gaussians as edits moved and recoloured them; all changes of the scene, in order."""
+        self._changes = changes
+        for level in self._levels.values():
+            level.change(changes)
+        self._drop_photos()
+
+    def _drop_photos(self) -> None:
+        for photos in self._photos.values():
+            photos.release()
+        self._photos.clear()
+
     def forget(self) -> None:
         """Order and project every level anew for its next picture."""
         for level in self._levels.values():
@@ -141,7 +168,9 @@ class LiveScene:
 
     def _made(self, share: float, scene: Scene, rows: np.ndarray) -> Level:
         splats = self._make_splats(self._painter.ctx, self._painter.programs, scene)
-        level = self._levels[share] = Level(splats, rows)
+        level = self._levels[share] = Level(splats, rows, scene.gaussians)
+        if self._changes:
+            level.change(self._changes)
         if self._marks is not None:
             level.mark(*self._marks)
         return level
@@ -150,10 +179,8 @@ class LiveScene:
         """Give every buffer and texture back."""
         for level in self._levels.values():
             level.splats.release()
-        for photos in self._photos.values():
-            photos.release()
         self._levels.clear()
-        self._photos.clear()
+        self._drop_photos()
 
 
 def _camera_key(camera: Camera) -> tuple:

@@ -12,7 +12,7 @@ from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.geometry.quaternions import unit_quats
 from langflash_core.graphics import Programs, draws_in_software, set_uniforms
 from langflash_core.splat.projection import ALPHA_MIN, DILATION, NEAR, TAN_MARGIN, drawable_rows
-from langflash_core.types import Camera, Scene
+from langflash_core.types import Camera, Gaussians, Scene
 
 from .layout import ATOMS_A_LAYER
 from .targets import as_sprites
@@ -59,9 +59,7 @@ class SplatBuffers:
         self.num_gaussians = len(gaussians)
         self.order = np.zeros(0, np.uint32)
         self.depth_range = (NEAR, 1.0)
-        self._means = gaussians.means.numpy()
-        self._coordinates = np.ascontiguousarray(self._means.T, np.float64)
-        self._widest = gaussians.scales.abs().amax(-1).numpy()
+        self._set_places(gaussians.means, gaussians.scales)
         self._ids = scene.semantics.weight_ids.cpu()[kept].numpy()
         self._values = scene.semantics.weight_values.detach().cpu().float()[kept].numpy()
         self._num_atoms = scene.semantics.num_atoms
@@ -95,12 +93,16 @@ class SplatBuffers:
         self._sh_vec4s = (num_numbers + 3) // 4
         stride = 16 * self._sh_vec4s  # bytes
         buffer = self._own(self._ctx.buffer(reserve=stride * len(rows)))
+        self._write_harmonics(buffer, sh, rows)
+        return buffer
+
+    def _write_harmonics(self, buffer: moderngl.Buffer, sh: np.ndarray, rows: np.ndarray) -> None:
+        num_numbers, stride = 3 * (self.sh_degree + 1) ** 2, 16 * self._sh_vec4s
         for first in range(0, len(rows), _ROWS_AT_ONCE):
             some = sh[rows[first : first + _ROWS_AT_ONCE]].reshape(-1, 3 * sh.shape[1])[:, :num_numbers]
             padded = np.zeros((len(some), 4 * self._sh_vec4s), np.float32)
             padded[:, :num_numbers] = some
             buffer.write(padded.tobytes(), offset=stride * first)
-        return buffer
 
     def _upload_weights(self) -> moderngl.Texture:
         pairs = np.stack((self._ids.astype(np.float32), self._values), -1).reshape(-1, 2)
@@ -125,6 +127,29 @@ class SplatBuffers:
         if self.num_gaussians:
             self._tints.write(np.ascontiguousarray(tints[self._kept], np.uint8).tobytes())
         return not np.array_equal(before, self._shown)
+
+    def place(self, gaussians: Gaussians) -> None:
+        """The same Gaussians elsewhere or in other colours: `gaussians` has all N, moved or recoloured.
+
+        Opacities and weights stay. Sort and project after this.
+        """
+        if not self.num_gaussians:
+            return
+        rows = torch.from_numpy(np.flatnonzero(self._kept))
+        means, quats, scales = (v[rows].float() for v in (gaussians.means, gaussians.quats, gaussians.scales))
+        scales = scales.clamp(-_WIDEST, _WIDEST)
+        self._set_places(means, scales)
+        place = np.concatenate((self._means, gaussians.opacities[rows].float().numpy()[:, None]), 1)
+        for buffer, values in zip(
+            self._vertex_buffers, (place, unit_quats(quats).numpy(), scales.numpy()), strict=False
+        ):
+            buffer.write(np.ascontiguousarray(values).tobytes())
+        self._write_harmonics(self._vertex_buffers[3], gaussians.sh.float().numpy(), rows.numpy())
+
+    def _set_places(self, means: torch.Tensor, scales: torch.Tensor) -> None:
+        self._means = means.numpy()
+        self._coordinates = np.ascontiguousarray(self._means.T, np.float64)
+        self._widest = scales.abs().amax(-1).numpy()
 
     def sort(self, camera: Camera) -> None:
         """Choose the Gaussians that may touch the image and order them back to front.

@@ -109,7 +109,7 @@ class Events:
         self._dispatch(Leave())
 
     def _dropped(self, _window, paths: Sequence[str]) -> None:
-        self._dispatch(OpenPaths(tuple(paths)))
+        self._dispatch(OpenPaths(tuple(paths), dropped=True))
 
 
 def _by_letter(key: int, scancode: int) -> int:

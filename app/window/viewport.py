@@ -16,7 +16,9 @@ import numpy as np
 
 from langflash_core.colormaps import HeatColours
 from langflash_core.errors import GraphicsError
-from langflash_core.scene.edits import Marks, Mask
+from langflash_core.scene.changes import Change, Recoloured
+from langflash_core.scene.edits import Marks
+from langflash_core.scene.mask import Mask
 
 from .artist import Artist, Asked
 from .asking.state import Prompt, margin_span
@@ -102,7 +104,9 @@ class Viewport:
         self._pose = START
         self._size = (0, 0)  # of the panel, pixels
         self._moved = 0.0
-        self._marks: tuple[Marks | None, Mask | None] = (None, None)
+        self._marks: tuple[Marks | None, Mask | None, Change | None] = (None, None, None)
+        self._scene: Scene | None = None  # as edits moved and recoloured it
+        self._adjusting = False  # what is drawn changes with every frame
         self._shown: tuple[np.ndarray, np.ndarray] | None = None  # and tints, as the renderer has them
         self._marked = 0  # how often; names the marks in what is drawn
         self._answered: tuple | None = None
@@ -161,7 +165,7 @@ class Viewport:
         renderer.ask(None)
         self._serial, self._query, self._keys = serial, None, ()
         self._drawn = self._texture = self._colouring = self._answered = None
-        self._marks = (None, None)
+        self._marks, self._scene = (None, None, None), scene
         self._shown: tuple[np.ndarray, np.ndarray] | None = None
         self._still = self._finished = self._failed = None
         self._fresh, self._unpainted = True, False
@@ -192,15 +196,28 @@ class Viewport:
         if self._renderer is not None:
             self._renderer.ask(query)
 
-    def mark(self, marks: Marks | None, doomed: Mask | None) -> None:
-        """Show the scene as marked: without what is deleted or hidden, the selection in a tint.
+    def mark(
+        self, scene: "Scene | None", marks: Marks | None, doomed: Mask | None, gesture: Change | None = None
+    ) -> None:
+        """Show the scene as marked: without what is deleted or hidden, the selection in a tint, things where
+        they were moved to.
 
-        doomed: what a preview would delete, in another tint.
+        doomed: what a preview would delete, in another tint. gesture: a change under way.
         """
-        if self._renderer is None or marks is None or (marks, doomed) == self._marks:
+        if self._renderer is None or marks is None or scene is None:
             return
-        self._marks = (marks, doomed)
-        tints = marks.selected.rows().astype(np.uint8)
+        if (marks, doomed, gesture) == self._marks:
+            return
+        before, _, adjusted = self._marks
+        self._marks, self._adjusting = (marks, doomed, gesture), gesture is not None
+        if (marks.changes, gesture) != (before.changes if before else (), adjusted):
+            from langflash_core.scene.changed import changed_scene
+
+            self._scene = changed_scene(scene, marks, gesture)
+            self._renderer.change((*marks.changes, *(() if gesture is None else (gesture,))))
+        tints = np.zeros(marks.selected.count, np.uint8)
+        if not isinstance(gesture, Recoloured):  # its colour is to be seen
+            tints[marks.selected.rows()] = 1
         if doomed is not None:
             tints[doomed.rows()] = 2
         self._shown = marks.visible.rows(), tints
@@ -250,7 +267,8 @@ class Viewport:
         """
         if self._renderer is None or state.info is None or min(size) < 8:
             return float("inf")
-        if (state.pose, size) != (self._pose, self._size):
+        if (state.pose, size) != (self._pose, self._size) or self._adjusting:
+            self._adjusting = False
             self._pose, self._size, self._moved = state.pose, size, state.now
             self._failed = None
         if self._fresh:  # to take a scene took a frame's time
@@ -319,7 +337,7 @@ class Viewport:
         width, height = (max(8, round(side * scale)) for side in wanted.size)
         camera, info, shown = to_camera(wanted.pose, width, height), state.info, self._shown
         assert info is not None
-        asked, scene, maps = self._questions(state), info.scene, kind is Kind.MAPS
+        asked, scene, maps = self._questions(state), self._scene or info.scene, kind is Kind.MAPS
 
         def work(stopping: Asked) -> "tuple[Still, float]":
             from ..gl.still import draw_still

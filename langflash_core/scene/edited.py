@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from langflash_core.scene.changed import changed_scene
 from langflash_core.scene.edits import Atom, Marks
 from langflash_core.types import Scene
 
@@ -45,11 +46,15 @@ def spoken_scene(scene: Scene, marks: Marks) -> Scene:
 
 
 def edited_scene(scene: Scene, marks: Marks) -> Scene:
-    """The scene to save: without deleted Gaussians, merged atoms as one, names, key frames and scale in its
-    record.
+    """The scene to save: its Gaussians moved and recoloured, without deleted ones; merged atoms as one;
+    names, key frames and scale in its record.
 
     Hidden Gaussians are kept. Untouched marks give back the scene itself.
     """
+    scene = there(changed_scene(scene, marks), marks)
+    if scene.view_ids is not None and bool((scene.view_ids < 0).any()):
+        scene = replace(scene, view_ids=None)
+    marks = marks.of_size(len(scene.gaussians), marks.atoms[: marks.there[1]])
     record = scene.record
     if (marks.camera_path, marks.metric_scale) != (record.camera_path, record.metric_scale):
         scene = scene.with_record(camera_path=marks.camera_path, metric_scale=marks.metric_scale)
@@ -62,7 +67,31 @@ def edited_scene(scene: Scene, marks: Marks) -> Scene:
 
 def left(scene: Scene, marks: Marks) -> Scene:
     """The scene without deleted Gaussians; its atoms and its record as they are."""
-    return scene.rows(torch.from_numpy(~marks.deleted.rows())) if marks.deleted else scene
+    kept = marks.left
+    return scene if len(kept) == kept.count else scene.rows(torch.from_numpy(kept.rows()))
+
+
+def there(scene: Scene, marks: Marks) -> Scene:
+    """The scene without what a merge brought that was undone."""
+    num_gaussians, num_atoms = marks.there
+    if marks.there == (len(scene.gaussians), scene.semantics.num_atoms):
+        return scene
+    semantics = scene.semantics.rows(torch.arange(num_gaussians))
+    semantics = replace(semantics, dictionary=semantics.dictionary[:num_atoms])
+    record = scene.record
+    record = replace(
+        record,
+        atom_names={k: name for k, name in record.atom_names.items() if k < num_atoms},
+        atom_denials={k: words for k, words in record.atom_denials.items() if k < num_atoms},
+        silent_atoms=tuple(k for k in record.silent_atoms if k < num_atoms),
+    )
+    return replace(
+        scene,
+        gaussians=scene.gaussians.rows(torch.arange(num_gaussians)),
+        semantics=semantics,
+        view_ids=None if scene.view_ids is None else scene.view_ids[:num_gaussians],
+        record=record,
+    )
 
 
 def atoms_of(scene: Scene) -> tuple[Atom, ...]:

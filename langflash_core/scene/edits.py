@@ -1,10 +1,13 @@
-"""Edits of a scene: bit masks over its N Gaussians, a table of its K atoms, what people told it beside, and
-a history of all three.
+"""Edits of a scene: bit masks over its N Gaussians, a table of its K atoms, where Gaussians were moved to and
+how they were recoloured, what people told it beside, and a history of all of it.
 
 The scene itself never changes. `Marks` say what has become of it; an `Edit` is the difference of
 two `Marks`: the exclusive-or of each mask, which is its own inverse, the old and new entry of each
-atom, and the old and new value of what was told. Undoing is therefore exact, and an edit takes some
-hundred bytes to a few kilobytes.
+atom, the changes of Gaussians that came and went, and the old and new value of what was told. Undoing is
+therefore exact, and an edit takes some hundred bytes to a few kilobytes.
+
+Memory is bounded: a history keeps the last `MOST_EDITS` edits, and fewer where they take more than
+`MOST_BYTES`; older ones stay done and can no longer be undone.
 """
 
 import zlib
@@ -12,61 +15,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
-import numpy as np
+from langflash_core.scene.changes import Change, with_change
+from langflash_core.scene.mask import Mask
 
 MASKS = ("deleted", "hidden", "selected")
-TOLD = ("camera_path", "metric_scale")
+TOLD = ("camera_path", "metric_scale", "there")
+MOST_EDITS = 1000
+MOST_BYTES = 32 * 2**20  # of the edits of one scene
 Combine = Literal["replace", "add", "remove"]
-
-
-@dataclass(frozen=True)
-class Mask:
-    """A set of rows 0 to count - 1. bits: one each, lowest first, the last byte filled with 0."""
-
-    count: int
-    bits: bytes = field(repr=False)
-
-    @staticmethod
-    def none(count: int) -> "Mask":
-        """The empty set."""
-        return Mask(count, bytes(-(-count // 8)))
-
-    @staticmethod
-    def of(rows: np.ndarray) -> "Mask":
-        """The rows that are true in a boolean (count,)."""
-        return Mask(len(rows), np.packbits(np.asarray(rows, bool), bitorder="little").tobytes())
-
-    @staticmethod
-    def full(count: int) -> "Mask":
-        """Every row."""
-        return Mask.of(np.ones(count, bool))
-
-    def rows(self) -> np.ndarray:
-        """Boolean (count,)."""
-        packed = np.frombuffer(self.bits, np.uint8)
-        return np.unpackbits(packed, count=self.count, bitorder="little").astype(bool)
-
-    def __len__(self) -> int:
-        """How many rows are in the set."""
-        return int.from_bytes(self.bits, "little").bit_count()
-
-    def __or__(self, other: "Mask") -> "Mask":
-        return self._with(np.bitwise_or, other)
-
-    def __and__(self, other: "Mask") -> "Mask":
-        return self._with(np.bitwise_and, other)
-
-    def __xor__(self, other: "Mask") -> "Mask":
-        return self._with(np.bitwise_xor, other)
-
-    def __sub__(self, other: "Mask") -> "Mask":
-        return self & (other ^ Mask.full(self.count))
-
-    def _with(self, combine: np.ufunc, other: "Mask") -> "Mask":
-        if other.count != self.count:
-            raise ValueError(f"mask: expected {self.count} rows, received {other.count}")
-        ours, theirs = np.frombuffer(self.bits, np.uint8), np.frombuffer(other.bits, np.uint8)
-        return Mask(self.count, combine(ours, theirs).tobytes())
 
 
 @dataclass(frozen=True)
@@ -87,31 +43,47 @@ class Atom:
 class Marks:
     """What edits made of a scene. A deleted or hidden Gaussian is never selected.
 
-    camera_path, metric_scale: as in `Record`; plain values of JSON.
+    camera_path, metric_scale: as in `Record`; plain values of JSON. changes: of Gaussians, in order. there:
+    how many of the scene's first Gaussians and atoms there are; others came with a merge that was undone.
     """
 
     deleted: Mask
     hidden: Mask
     selected: Mask
     atoms: tuple[Atom, ...]
+    there: tuple[int, int]
     camera_path: tuple[Mapping[str, Any], ...] = ()
     metric_scale: float | None = None
+    changes: tuple[Change, ...] = ()
 
     @staticmethod
     def untouched(num_gaussians: int, num_atoms: int) -> "Marks":
         """Of a scene that nobody has edited."""
         nothing = Mask.none(num_gaussians)
-        return Marks(nothing, nothing, nothing, tuple(Atom(k) for k in range(num_atoms)))
+        atoms = tuple(Atom(k) for k in range(num_atoms))
+        return Marks(nothing, nothing, nothing, atoms, (num_gaussians, num_atoms))
+
+    @property
+    def left(self) -> Mask:
+        """Gaussians that there are and that are not deleted."""
+        return Mask.first(self.deleted.count, self.there[0]) - self.deleted
 
     @property
     def visible(self) -> Mask:
         """Gaussians that are shown."""
-        return Mask.full(self.deleted.count) - (self.deleted | self.hidden)
+        return self.left - self.hidden
 
     @property
     def written(self) -> tuple[Any, ...]:
         """What a saved scene holds of them: all but what is hidden or selected."""
-        return self.deleted, self.atoms, self.camera_path, self.metric_scale
+        return self.left, self.atoms[: self.there[1]], self.camera_path, self.metric_scale, self.changes
+
+    def of_size(self, num_gaussians: int, atoms: tuple[Atom, ...]) -> "Marks":
+        """The same marks where the scene has other Gaussians and atoms behind the ones they are about, which
+        these marks do not know of. atoms: of that scene, as it was opened."""
+        masks = {name: getattr(self, name).of_count(num_gaussians) for name in MASKS}
+        atoms = (*self.atoms, *atoms[len(self.atoms) :])[: len(atoms)]
+        return replace(self, **masks, atoms=atoms, changes=_resized(self.changes, num_gaussians))
 
 
 @dataclass(frozen=True)
@@ -119,13 +91,24 @@ class Edit:
     """One step from some marks to others.
 
     label: for people. flips: (mask, zlib of its changed bits). swaps: (atom, before, after).
-    told: (one of `TOLD`, before, after).
+    told: (one of `TOLD`, before, after). changes: how many stayed, those that went, those that came.
     """
 
     label: str
     flips: tuple[tuple[str, bytes], ...] = field(default=(), repr=False)
     swaps: tuple[tuple[int, Atom, Atom], ...] = ()
     told: tuple[tuple[str, Any, Any], ...] = ()
+    changes: tuple[int, tuple[Change, ...], tuple[Change, ...]] | None = None
+
+    @property
+    def num_bytes(self) -> int:
+        """About what it takes in memory."""
+        flips = sum(len(packed) for _, packed in self.flips)
+        values = sum(300 * len(value) for _, *pair in self.told for value in pair if isinstance(value, tuple))
+        moved = (
+            0 if self.changes is None else sum(len(c.rows.bits) for c in self.changes[1] + self.changes[2])
+        )
+        return 500 + flips + values + moved + 500 * len(self.swaps)
 
     def apply(self, marks: Marks) -> Marks:
         """The marks after this edit.
@@ -149,12 +132,32 @@ class Edit:
             if getattr(marks, name) != before:
                 raise ValueError(f"edit: expected {name} to be {before}")
             changed[name] = after
+        if self.changes is not None:
+            stayed, went, came = self.changes
+            if marks.changes[stayed:] != went:
+                raise ValueError(f"edit: expected {stayed + len(went)} changes of Gaussians")
+            changed["changes"] = (*marks.changes[:stayed], *came)
         return replace(marks, atoms=tuple(atoms), **changed)
 
     def inverse(self) -> "Edit":
         """The edit that takes this one back, exactly."""
         swaps = tuple((k, after, before) for k, before, after in self.swaps)
-        return replace(self, swaps=swaps, told=tuple((name, new, old) for name, old, new in self.told))
+        told = tuple((name, new, old) for name, old, new in self.told)
+        changes = None if self.changes is None else (self.changes[0], self.changes[2], self.changes[1])
+        return replace(self, swaps=swaps, told=told, changes=changes)
+
+    def of_size(self, old: int, new: int) -> "Edit":
+        """The same edit of a scene with `new` Gaussians, more or fewer behind the `old` that it is about."""
+        masks = ((name, Mask(old, zlib.decompress(packed)).of_count(new)) for name, packed in self.flips)
+        changes = self.changes
+        if changes is not None:
+            changes = (changes[0], _resized(changes[1], new), _resized(changes[2], new))
+        flips = tuple((name, zlib.compress(mask.bits, 1)) for name, mask in masks)
+        return replace(self, flips=flips, changes=changes)
+
+
+def _resized(changes: tuple[Change, ...], count: int) -> tuple[Change, ...]:
+    return tuple(replace(change, rows=change.rows.of_count(count)) for change in changes)
 
 
 def difference(label: str, before: Marks, after: Marks) -> Edit:
@@ -167,36 +170,87 @@ def difference(label: str, before: Marks, after: Marks) -> Edit:
     pairs = enumerate(zip(before.atoms, after.atoms, strict=True))
     swaps = tuple((k, old, new) for k, (old, new) in pairs if old != new)
     values = ((name, getattr(before, name), getattr(after, name)) for name in TOLD)
-    return Edit(label, flips, swaps, tuple((name, old, new) for name, old, new in values if old != new))
+    told = tuple((name, old, new) for name, old, new in values if old != new)
+    return Edit(label, flips, swaps, told, _other_changes(before.changes, after.changes))
+
+
+def _other_changes(
+    before: tuple[Change, ...], after: tuple[Change, ...]
+) -> tuple[int, tuple[Change, ...], tuple[Change, ...]] | None:
+    """As `Edit.changes`; None where they are the same."""
+    if before == after:
+        return None
+    pairs = enumerate(zip(before, after, strict=False))
+    stayed = next((place for place, (old, new) in pairs if old != new), min(len(before), len(after)))
+    return stayed, before[stayed:], after[stayed:]
 
 
 @dataclass(frozen=True)
 class History:
-    """Marks with the edits that led to them; `undone` are those taken back, the next to redo last."""
+    """Marks with the edits that led to them; `undone` are those taken back, the next to redo last.
+
+    forgotten: how many older edits are done for good. opened: the marks before those, None where there are
+    none: see `first`.
+    """
 
     marks: Marks
     done: tuple[Edit, ...] = ()
     undone: tuple[Edit, ...] = ()
+    forgotten: int = 0
+    opened: Marks | None = None
+
+    @property
+    def first(self) -> Marks:
+        """The marks of the scene as it was opened."""
+        return self.moved_to(0).marks if self.opened is None else self.opened
 
     def edited(self, label: str, after: Marks) -> "History":
         """With one more edit, if it changes anything; what was undone is forgotten."""
         if after == self.marks:
             return self
-        return History(after, (*self.done, difference(label, self.marks, after)))
+        done = (*self.done, difference(label, self.marks, after))
+        return replace(self, marks=after, done=done, undone=()).bounded()
+
+    def bounded(self, most_edits: int = MOST_EDITS, most_bytes: int = MOST_BYTES) -> "History":
+        """Without the oldest edits where there are too many; the last one always stays."""
+        kept, total = 0, 0
+        for edit in reversed(self.done):
+            total += edit.num_bytes
+            if kept and (kept >= most_edits or total > most_bytes):
+                break
+            kept += 1
+        lost = len(self.done) - kept
+        if not lost:
+            return self
+        return replace(self, done=self.done[lost:], forgotten=self.forgotten + lost, opened=self.first)
+
+    def of_size(self, num_gaussians: int, atoms: tuple[Atom, ...]) -> "History":
+        """The same history of a scene with other Gaussians and atoms behind its own: see `Marks.of_size`.
+        What was undone is forgotten."""
+        old = self.marks.deleted.count
+        return replace(
+            self,
+            marks=self.marks.of_size(num_gaussians, atoms),
+            done=tuple(edit.of_size(old, num_gaussians) for edit in self.done),
+            undone=(),
+            opened=None if self.opened is None else self.opened.of_size(num_gaussians, atoms),
+        )
 
     def undo(self) -> "History":
         """One edit back; the same where there is none."""
         if not self.done:
             return self
         *earlier, last = self.done
-        return History(last.inverse().apply(self.marks), tuple(earlier), (*self.undone, last))
+        marks = last.inverse().apply(self.marks)
+        return replace(self, marks=marks, done=tuple(earlier), undone=(*self.undone, last))
 
     def redo(self) -> "History":
         """One edit forth; the same where there is none."""
         if not self.undone:
             return self
         *rest, following = self.undone
-        return History(following.apply(self.marks), (*self.done, following), tuple(rest))
+        marks = following.apply(self.marks)
+        return replace(self, marks=marks, done=(*self.done, following), undone=tuple(rest))
 
     def moved_to(self, position: int) -> "History":
         """With `position` edits done, 0 to all."""
@@ -244,6 +298,11 @@ def isolate(marks: Marks, rows: Mask) -> Marks:
 def show_all(marks: Marks) -> Marks:
     """Show what was hidden; what was deleted stays away."""
     return replace(marks, hidden=Mask.none(marks.hidden.count))
+
+
+def change(marks: Marks, one: Change) -> Marks:
+    """Move or recolour Gaussians."""
+    return replace(marks, changes=with_change(marks.changes, one))
 
 
 def rename_atom(marks: Marks, k: int, name: str) -> Marks:

@@ -4,7 +4,10 @@
      "about": {...}, "done": [...], "undone": [...]}
 
 An edit is {"label", "flips": {mask: base64 of zlib}, "swaps": [[atom, [into, name, on, denied...], [...]]]},
-where key frames or the scale changed with "told": [[name, before, after]].
+where key frames or the scale changed with "told": [[name, before, after]], where Gaussians were moved or
+recoloured with "changes": [stayed, [went], [came]], each of those [kind, base64 of zlib, numbers].
+What came before the first edit of "done" is in "before": edits without a name, from the scene to the marks
+that its history began with and on to those that can still be undone to; "forgotten" counts the latter.
 """
 
 import base64
@@ -12,12 +15,16 @@ import hashlib
 import json
 import math
 import zlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from langflash_core.errors import SceneFileError
 from langflash_core.files import write_atomically
-from langflash_core.scene.edits import MASKS, TOLD, Atom, Edit, History, Marks
+from langflash_core.scene.changes import Change, checked, told
+from langflash_core.scene.edited import first_marks
+from langflash_core.scene.edits import MASKS, TOLD, Atom, Edit, History, difference
+from langflash_core.scene.mask import Mask
 from langflash_core.types import Scene
 
 FORMAT, VERSION = "langflash-edits", 1
@@ -32,21 +39,24 @@ def scene_digest(scene: Scene) -> str:
     return total.hexdigest()
 
 
-def save_history(history: History, digest: str, about: dict, path: Path) -> None:
-    """Write a history; `about` holds plain JSON values of the caller's own.
+def save_history(history: History, scene: Scene, about: dict, path: Path) -> None:
+    """Write a history of edits of a scene; `about` holds plain JSON values of the caller's own.
 
     Raises:
         OutputError: the path cannot be written.
     """
+    marks, oldest = (first_marks(scene), history.first), history.moved_to(0).marks
     content = {
         "format": FORMAT,
         "version": VERSION,
-        "digest": digest,
+        "digest": scene_digest(scene),
         "gaussians": history.marks.deleted.count,
         "atoms": len(history.marks.atoms),
         "about": about,
         "done": [_encoded(edit) for edit in history.done],
         "undone": [_encoded(edit) for edit in history.undone],
+        "before": [_encoded(difference("", *marks)), _encoded(difference("", history.first, oldest))],
+        "forgotten": history.forgotten,
     }
     write_atomically(path, json.dumps(content).encode())
 
@@ -61,8 +71,8 @@ def read_about(path: Path) -> tuple[str, dict, int]:
     return content["digest"], content["about"], len(content["done"])
 
 
-def load_history(path: Path, scene: Scene, first: Marks) -> History:
-    """The history in a file, over a scene whose marks were `first`.
+def load_history(path: Path, scene: Scene) -> History:
+    """The history in a file, over the scene that it is about.
 
     Raises:
         SceneFileError: missing, damaged, or about another scene.
@@ -71,10 +81,18 @@ def load_history(path: Path, scene: Scene, first: Marks) -> History:
     if content["digest"] != scene_digest(scene):
         raise SceneFileError(f"{path.name} holds edits of another scene; open the scene they were made in")
     try:
-        done = tuple(_decoded(entry) for entry in content["done"])
-        undone = tuple(_decoded(entry) for entry in content["undone"])
-        history = History(first, (), tuple(reversed(done))).moved_to(len(done))
-        whole = History(history.marks, history.done, undone)
+        count = len(scene.gaussians)
+        done, undone, before = (
+            tuple(_decoded(entry, count) for entry in content.get(part, ()))
+            for part in ("done", "undone", "before")
+        )
+        passed = [first_marks(scene)]
+        for edit in before:
+            passed.append(edit.apply(passed[-1]))
+        forgotten = max(int(content.get("forgotten", 0)), 0)
+        opened = passed[min(len(before), 1)] if forgotten else None
+        start = History(passed[-1], (), tuple(reversed(done)), forgotten, opened)
+        whole = replace(start.moved_to(len(done)), undone=undone)
         whole.moved_to(len(done) + len(undone))  # what can be redone must fit as well
     except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, zlib.error) as error:
         raise SceneFileError(f"{path.name} is damaged ({error}); edit the scene again") from error
@@ -87,16 +105,38 @@ def _encoded(edit: Edit) -> dict:
         "flips": {name: base64.b64encode(packed).decode() for name, packed in edit.flips},
         "swaps": [[k, *([a.into, a.name, a.on, *a.denied] for a in pair)] for k, *pair in edit.swaps],
     }
-    return encoded | ({"told": [list(entry) for entry in edit.told]} if edit.told else {})
+    if edit.told:
+        encoded["told"] = [list(entry) for entry in edit.told]
+    if edit.changes is not None:
+        stayed, *both = edit.changes
+        encoded["changes"] = [stayed, *([_encoded_change(each) for each in some] for some in both)]
+    return encoded
 
 
-def _decoded(entry: dict) -> Edit:
+def _encoded_change(change: Change) -> list:
+    kind, numbers = told(change)
+    return [kind, base64.b64encode(zlib.compress(change.rows.bits, 1)).decode(), numbers]
+
+
+def _decoded_change(count: int, kind: str, packed: str, numbers: list) -> Change:
+    bits = zlib.decompress(base64.b64decode(packed, validate=True))
+    if len(bits) != -(-count // 8):
+        raise ValueError(f"changes: expected a scene of {8 * len(bits)} rows, received {count}")
+    return checked(kind, Mask(count, bits), numbers)
+
+
+def _decoded(entry: dict, count: int) -> Edit:
     flips = tuple((name, base64.b64decode(packed, validate=True)) for name, packed in entry["flips"].items())
     if any(name not in MASKS for name, _ in flips):
         raise ValueError(f"flips: expected {', '.join(MASKS)}, received {', '.join(entry['flips'])}")
     swaps = tuple((int(k), _atom(*before), _atom(*after)) for k, before, after in entry["swaps"])
-    told = tuple((name, *(_told(name, value) for value in pair)) for name, *pair in entry.get("told", ()))
-    return Edit(str(entry["label"]), flips, swaps, told)
+    values = tuple((name, *(_told(name, value) for value in pair)) for name, *pair in entry.get("told", ()))
+    changes = None
+    if "changes" in entry:
+        stayed, *both = entry["changes"]
+        went, came = (tuple(_decoded_change(count, *each) for each in some) for some in both)
+        changes = int(stayed), went, came
+    return Edit(str(entry["label"]), flips, swaps, values, changes)
 
 
 def _told(name: str, value: Any) -> Any:
@@ -108,6 +148,8 @@ def _told(name: str, value: Any) -> Any:
             return None
         case "metric_scale", (int() | float()) as metres if math.isfinite(metres) and metres > 0:
             return float(metres)
+        case "there", [int() as num_gaussians, int() as num_atoms] if min(num_gaussians, num_atoms) >= 0:
+            return num_gaussians, num_atoms
     raise ValueError(f"told: expected a value of {' or '.join(TOLD)}, received {name} {value!r}")
 
 

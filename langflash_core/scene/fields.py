@@ -50,7 +50,9 @@ def to_fields(scene: Scene) -> dict[str, Tensor]:
 
 
 def _narrow(ids: Tensor, count: int) -> Tensor:
-    """Numbers below `count` in as few bytes as hold them."""
+    """Numbers below `count`, or -1, in as few bytes as hold them."""
+    if ids.numel() and int(ids.min()) < 0:
+        count = max(count, 2**8 + 1)  # bytes have no sign
     return ids.to(next(dtype for limit, dtype in _ID_TYPES if count <= limit))
 
 

@@ -34,9 +34,8 @@ from langflash_core.export.cameras import read_posed
 from langflash_core.images.decode import read_photo
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
-from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History, Marks, Mask, hide, rename_atom
-from langflash_core.scene.edits_file import load_history, save_history, scene_digest
+from langflash_core.scene.edits_file import load_history, save_history
 from tests.app.cli.conftest import stripes
 from tests.export.splats import ksplat_bytes, random_gaussians
 
@@ -80,7 +79,7 @@ def other_files(folder: Path) -> dict[str, bytes]:
     marks = Marks.untouched(len(scene.gaussians), scene.semantics.num_atoms)
     history = History(marks).edited("hide", hide(marks, Mask.of(scene.gaussians.means[:, 0].numpy() > 0)))
     history = history.edited("rename", rename_atom(history.marks, 0, "seat"))
-    save_history(history.undo(), scene_digest(scene), {"name": "made"}, folder / "a.edits")
+    save_history(history.undo(), scene, {"name": "made"}, folder / "a.edits")
     posed = replace(scene, photos=((folder / "a.jpg").read_bytes(),) * 2)
     posed = posed.with_record(photos=("left.jpg", "right.jpg"))
     export(posed, folder / "transforms.json")
@@ -183,7 +182,7 @@ def reader_of(path: Path) -> Callable[[], object]:
     if name in ("transforms.json", "cameras.txt", "images.txt"):
         return lambda: read_posed(path.with_name("cameras.txt") if name == "images.txt" else path)
     if name == "a.edits":
-        return lambda: load_history(path, stripes(), first_marks(stripes()))
+        return lambda: load_history(path, stripes())
     if name == "one.camera.json":
         return lambda: read_camera(path)
     if name == "two.keys.json":

@@ -246,11 +246,11 @@ def test_a_history_survives_its_file(scene, tmp_path: Path):
     history = history.edited("told", told)
     history = history.edited("name", rename_atom(history.marks, 1, "café")).undo()
     path = tmp_path / "edits.json"
-    save_history(history, scene_digest(scene), {"name": "my room"}, path)
-    assert load_history(path, scene, first_marks(scene)) == history
+    save_history(history, scene, {"name": "my room"}, path)
+    assert load_history(path, scene) == history
     assert read_about(path) == (scene_digest(scene), {"name": "my room"}, 3)
     with pytest.raises(SceneFileError, match="another scene"):
-        load_history(path, cloud(200, seed=5), first_marks(scene))
+        load_history(path, cloud(200, seed=5))
 
 
 def with_done(text: str, **changes) -> str:
@@ -280,7 +280,7 @@ def with_done(text: str, **changes) -> str:
 )
 def test_a_damaged_history_is_refused(scene, tmp_path: Path, spoil):
     path = tmp_path / "edits.json"
-    save_history(History(first_marks(scene)), scene_digest(scene), {}, path)
+    save_history(History(first_marks(scene)), scene, {}, path)
     path.write_text(spoil(path.read_text()))
     with pytest.raises(SceneFileError, match="edits\\.json"):
-        load_history(path, scene, first_marks(scene))
+        load_history(path, scene)

@@ -353,13 +353,17 @@ class AtomsDescribed:
 
 @dataclass(frozen=True)
 class AtomsWeighed:
-    """Shares (K,) of what is left of the scene."""
+    """Shares (K,) of what is left of the scene, and where each atom is, world."""
 
     shares: tuple[float, ...]
+    places: tuple[Vector | None, ...] = ()
 
     def apply(self, state: State) -> State:
         insight = state.asking.insight
-        return state if insight is None else change(state, insight=replace(insight, shares=self.shares))
+        if insight is None:
+            return state
+        places = self.places or insight.places
+        return change(state, insight=replace(insight, shares=self.shares, places=places))
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ class AskingEffects(Effects):
         old, new, info = before.editing.marks, state.editing.marks, state.info
         if info is None or info is not before.info or old is None or new is None:
             return
-        if info.num_atoms and old.deleted != new.deleted:
+        if info.num_atoms and (old.left, old.changes) != (new.left, new.changes):
             self._hands.submit(WeighAtoms(info.serial, info.scene, new))
 
     def after_picture(self, state: State) -> None:

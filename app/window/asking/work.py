@@ -136,7 +136,9 @@ class DescribeAtoms(SceneErrand):
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.export.colours import atom_colours
         from langflash_core.scene.atoms import atom_pictures, atom_places, describe_atoms
+        from langflash_core.scene.changed import changed_scene
 
+        placed = self.scene if self.marks is None else changed_scene(self.scene, self.marks)
         report = describe_atoms(self.scene)
         shares = _shares(self.scene, self.marks)
         colours = atom_colours(self.scene.semantics.dictionary.double().numpy())
@@ -149,7 +151,7 @@ class DescribeAtoms(SceneErrand):
                 colours=tuple((float(r), float(g), float(b)) for r, g, b in colours),
                 order=report.order,
                 similarity=report.similarity,
-                places=tuple(place and Vector(*place) for place in atom_places(self.scene)),
+                places=tuple(place and Vector(*place) for place in atom_places(placed)),
             )
         )
 
@@ -164,7 +166,13 @@ class WeighAtoms(SceneErrand):
     marks: Marks
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        yield AtomsWeighed(_shares(self.scene, self.marks))
+        from langflash_core.scene.atoms import atom_places
+        from langflash_core.scene.changed import changed_scene
+
+        found = atom_places(changed_scene(self.scene, self.marks))
+        yield AtomsWeighed(
+            _shares(self.scene, self.marks), tuple(place and Vector(*place) for place in found)
+        )
 
 
 def _shares(scene: "Scene", marks: Marks | None) -> tuple[float, ...]:

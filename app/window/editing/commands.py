@@ -3,12 +3,17 @@
 from dataclasses import dataclass, replace
 
 from langflash_core.scene import edits
-from langflash_core.scene.edits import Combine, History, Marks, Mask
+from langflash_core.scene.changes import Moved
+from langflash_core.scene.edits import Combine, History, Marks
+from langflash_core.scene.mask import Mask
 
 from ..asking.commands import lapsed
+from ..commands import Notify
 from ..scene.state import Mode
 from ..state import State
 from .state import STRICTNESS_RANGE, Floaters, Point, Region
+
+FELL_OFF = "The oldest edits can no longer be undone: the list holds the last 1,000, or 32 MB of them."
 
 
 def change(state: State, **changes) -> State:
@@ -17,9 +22,14 @@ def change(state: State, **changes) -> State:
 
 
 def with_edit(state: State, label: str, marks: Marks) -> State:
-    """The state after an edit, named for the list; the same where nothing has become of it."""
+    """The state after an edit, named for the list; the same where nothing has become of it. Says so when the
+    first of the oldest edits can no longer be undone."""
     history = state.editing.history
-    return state if history is None else _with_history(state, history.edited(label, marks))
+    if history is None:
+        return state
+    after = history.edited(label, marks)
+    state = _with_history(state, after)
+    return Notify(FELL_OFF, "info").apply(state) if after.forgotten and not history.forgotten else state
 
 
 # Selecting; what must be computed is asked of the worker, and comes back as `Found`
@@ -346,10 +356,12 @@ def _rewound(state: State, step) -> State:
 def _with_history(state: State, history: History) -> State:
     """Another history; scores hold on only while it shows the same Gaussians with the same atoms."""
     before = state.editing.marks
-    state = change(state, history=history)
+    state = change(state, history=history, gesture=None, tint=None)
     return state if _spoken_of(before) == _spoken_of(history.marks) else lapsed(state)
 
 
 def _spoken_of(marks: Marks | None) -> tuple | None:
     """What of the marks a score rests on."""
-    return None if marks is None else (marks.visible, marks.atoms)
+    if marks is None:
+        return None
+    return marks.visible, marks.atoms, tuple(each for each in marks.changes if isinstance(each, Moved))

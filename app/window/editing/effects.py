@@ -29,7 +29,8 @@ class EditingEffects(Effects):
         """Bring deletions, selection and preview into the picture."""
         marks, preview = state.editing.marks, state.editing.floaters
         doomed = preview.mask(marks.visible) if marks is not None and preview is not None else None
-        self._viewport.mark(marks, doomed)
+        scene = None if state.info is None else state.info.scene
+        self._viewport.mark(scene, marks, doomed, state.editing.gesture)
 
     def after_picture(self, state: State) -> None:
         """Read what is under the pointer, and what a click asked about once the picture rests."""

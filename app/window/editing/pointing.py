@@ -28,7 +28,8 @@ class SetTool:
     tool: Tool
 
     def apply(self, state: State) -> State:
-        return change(state, tool=self.tool, drag=(), hover=None, asked=None, card=None, ruler=())
+        state = change(state, tool=self.tool, drag=(), hover=None, asked=None, card=None, ruler=())
+        return change(state, gesture=None, tint=None)
 
 
 @dataclass(frozen=True)
@@ -234,8 +235,10 @@ class FrameSelection:
         marks = state.editing.marks
         if marks is None or state.info is None:
             return state
+        from langflash_core.scene.changed import changed_scene  # loads torch; a scene is there, so it is
+
         rows = (marks.selected or marks.visible).rows()
-        points = state.info.scene.gaussians.means.numpy()[rows]
+        points = changed_scene(state.info.scene, marks).gaussians.means.numpy()[rows]
         if not len(points):
             return state
         low, high = np.quantile(points, (0.02, 0.98), axis=0)

@@ -5,7 +5,9 @@ from enum import Enum
 
 import numpy as np
 
-from langflash_core.scene.edits import Combine, History, Marks, Mask
+from langflash_core.scene.changes import Change
+from langflash_core.scene.edits import Combine, History, Marks
+from langflash_core.scene.mask import Mask
 
 RADIUS_RANGE = (4.0, 160.0)  # design pixels
 PICK_RADIUS = 4.0
@@ -24,11 +26,28 @@ class Tool(Enum):
     BRUSH = "Brush"
     SPHERE = "Sphere"
     PICK = "Thing"
+    PLACE = "Place"
     RULER = "Ruler"
 
     @property
     def selects(self) -> bool:
         return self in (Tool.BOX, Tool.LASSO, Tool.BRUSH, Tool.SPHERE, Tool.PICK)
+
+
+class Handle(Enum):
+    """What the gizmo does with the selection; the value is the name for people."""
+
+    MOVE = "Move"
+    TURN = "Turn"
+    SCALE = "Scale"
+
+
+@dataclass(frozen=True)
+class Tint:
+    """A colour in [0, 1] and how much of it, 0 to 1."""
+
+    colour: tuple[float, float, float] = (0.80, 0.24, 0.18)
+    strength: float = 0.8
 
 
 Point = tuple[float, float]
@@ -120,6 +139,7 @@ class Editing:
     drag: the region being drawn, framebuffer pixels. waiting: what the worker is looking for.
     hover: what is under the pointer. asked: where a click waits for the picture to rest.
     names: nearest words of each atom, best first. ruler: the ends of what is measured, world.
+    gesture: a change of the selection that is shown and not made yet. tint: of it, while a colour is chosen.
     """
 
     history: History | None = None
@@ -137,6 +157,10 @@ class Editing:
     names: tuple[tuple[str, ...], ...] = ()
     floaters: Floaters | None = None
     ruler: tuple[Spot, ...] = ()
+    handle: Handle = Handle.MOVE
+    gesture: Change | None = None
+    tint: Tint | None = None
+    last_tint: Tint = Tint()
 
     @property
     def marks(self) -> Marks | None:
@@ -149,6 +173,11 @@ class Editing:
     @property
     def num_deleted(self) -> int:
         return len(self.history.marks.deleted) if self.history else 0
+
+    @property
+    def placing(self) -> bool:
+        """Whether the gizmo has something to move."""
+        return self.tool is Tool.PLACE and self.num_selected > 0 and self.tint is None
 
     @property
     def dirty(self) -> bool:
@@ -216,5 +245,5 @@ def fresh(editing: Editing, history: History | None, saved: Marks | None) -> Edi
     """Editing of a scene that has just come; tool and settings stay in the hand."""
     return Editing(
         history=history, saved=saved, tool=editing.tool, combine=editing.combine, radius=editing.radius,
-        through=editing.through, reach=editing.reach,
+        through=editing.through, reach=editing.reach, handle=editing.handle, last_tint=editing.last_tint,
     )  # fmt: skip

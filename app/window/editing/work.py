@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from langflash_core.scene.edits import Combine, Marks, Mask
+from langflash_core.scene.edits import Combine, Marks
+from langflash_core.scene.mask import Mask
 
 from ..commands import Command, Notify
 from ..poses import Pose, to_camera
@@ -34,7 +35,7 @@ from .state import PICK_RADIUS, Point, Reading, Region, strongest
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from langflash_core.types import Scene
+    from langflash_core.types import Gaussians, Scene
 
 MOST_PIXELS = 120_000  # of a region; a larger one is looked at coarser, which takes seconds less
 WORDS_ASKED, WORDS_OF_ATOM = 6, 3
@@ -46,6 +47,12 @@ class EditErrand(SceneErrand):
 
     scene: "Scene" = field(repr=False)
     marks: Marks = field(repr=False)
+
+    def placed(self) -> "Gaussians":
+        """Its Gaussians where edits moved them."""
+        from langflash_core.scene.changed import changed_scene
+
+        return changed_scene(self.scene, self.marks).gaussians
 
     def spoken(self) -> "Scene":
         """The scene with its atoms merged and silenced as marked."""
@@ -92,7 +99,7 @@ class FindInRegion(Selection):
             pixels = self.region.pixels(width, height, width / self.size[0])
         camera = to_camera(self.pose, pixels.shape[1], pixels.shape[0])
         visible = self.marks.visible.rows()
-        found = seen_in(self.scene.gaussians, visible, camera, pixels, through=self.through)
+        found = seen_in(self.placed(), visible, camera, pixels, through=self.through)
         yield Found(Mask.of(found), self.combine, self.region.what)
 
 
@@ -111,7 +118,7 @@ class AtPixel(Selection):
 
         pixels = Region((self.at,), PICK_RADIUS).pixels(*self.size)
         camera = to_camera(self.pose, *self.size)
-        return seen_in(self.scene.gaussians, self.marks.visible.rows(), camera, pixels)
+        return seen_in(self.placed(), self.marks.visible.rows(), camera, pixels)
 
 
 @dataclass(frozen=True)
@@ -130,7 +137,7 @@ class FindThing(AtPixel):
         if len(of_one) and of_one.max() >= 0:
             group = np.bincount(of_one[of_one >= 0]).argmax()
             members = np.isin(groups, self._alike(int(group))) & self.marks.visible.rows()
-            things = instances(self.scene.gaussians, members)
+            things = instances(self.placed(), members)
             here = things[seen & (things > 0)]
             if len(here):
                 seen = things == np.bincount(here).argmax()
@@ -154,7 +161,7 @@ class FindInSphere(AtPixel):
     radius: float
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        found, means = self.seen(), self.scene.gaussians.means.double().numpy()
+        found, means = self.seen(), self.placed().means.double().numpy()
         if found.any():
             centre = np.median(means[found], axis=0)
             camera = to_camera(self.pose, *self.size)
@@ -223,7 +230,7 @@ class GrowSelection(Selection):
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.scene.selection import grow, spacing
 
-        means = self.scene.gaussians.means.numpy()
+        means = self.placed().means.numpy()
         visible = self.marks.visible.rows()
         allowed = visible & self.within.meant() if self.within else visible
         distance = self.reach * spacing(means[visible])
@@ -238,7 +245,7 @@ class ScoreFloaters(EditErrand):
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.scene.selection import isolation
 
-        scores = isolation(self.scene.gaussians, self.marks.visible.rows())
+        scores = isolation(self.placed(), self.marks.visible.rows())
         yield FloatersFound(scores.tobytes())
 
 
@@ -295,7 +302,7 @@ class Weigh(EditErrand):
         from langflash_core.splat.picking import weights_at
 
         x, y = (min(max(int(at), 0), side - 1) for at, side in zip(self.reading.at, self.size, strict=True))
-        rows, footprints = _projected(self.scene, self.marks.visible, self.pose, self.size)
+        rows, footprints = _projected(self.placed(), self.marks.visible, self.pose, self.size)
         return weights_at(self.scene.semantics, rows, footprints, x, y).numpy()
 
     def weighed(self, weights: np.ndarray) -> Reading:
@@ -306,14 +313,14 @@ class Weigh(EditErrand):
 _views: dict[tuple, tuple] = {}  # the last view that was projected
 
 
-def _projected(scene: "Scene", visible: Mask, pose: Pose, size: tuple[int, int]):
+def _projected(gaussians: "Gaussians", visible: Mask, pose: Pose, size: tuple[int, int]):
     """Rows of what is shown, and their footprints in a view."""
     from langflash_core.splat.picking import projected
 
-    key = (id(scene), visible, pose, size)
+    key = (id(gaussians), visible, pose, size)
     if key not in _views:
         _views.clear()
-        _views[key] = scene, *projected(scene.gaussians, visible.rows(), to_camera(pose, *size))
+        _views[key] = gaussians, *projected(gaussians, visible.rows(), to_camera(pose, *size))
     return _views[key][1:]
 
 

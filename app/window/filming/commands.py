@@ -15,8 +15,11 @@ class AddKey:
     """The present view is the next key frame."""
 
     def apply(self, state: State) -> State:
-        if state.info is None or len(state.keys) >= MOST_KEYS:
+        if state.info is None:
             return state
+        if len(state.keys) >= MOST_KEYS:
+            text = f"A camera path has at most {MOST_KEYS} key frames; remove one before you add another."
+            return Notify(text).apply(state)
         return _with_keys(state, f"Key frame {len(state.keys) + 1}", (*state.keys, state.pose))
 
 

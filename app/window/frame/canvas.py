@@ -3,7 +3,7 @@
 from imgui_bundle import ImVec2, imgui
 
 from .. import commands as do
-from ..editing.panels import hands
+from ..editing.panels import gizmo, hands
 from ..editing.state import Tool
 from ..kit.look import Look
 from ..opening.panels import welcome
@@ -28,7 +28,8 @@ def draw(state: State, look: Look) -> list[do.Command]:
         welcome.draw_photos(state, look, corner, size)
         imgui.invisible_button("picture", ImVec2(max(size.x, 1), max(size.y, 1)))
         return []
-    over = in_space.draw(state, look, corner, size)
+    placed, taken = gizmo.draw(state, look, corner, size)
+    over = placed if taken else placed + in_space.draw(state, look, corner, size)
     if any(isinstance(command, camera.JumpTo) for command in over):
         return over  # the click was on a camera
     buttons = imgui.ButtonFlags_
@@ -36,10 +37,15 @@ def draw(state: State, look: Look) -> list[do.Command]:
     flags = buttons.mouse_button_left | buttons.mouse_button_right | buttons.mouse_button_middle
     imgui.invisible_button("picture", ImVec2(max(size.x, 1), max(size.y, 1)), flags)
     if state.info is None:
-        return []
+        return over
+    if taken:  # the picture is there even so: a press that comes right beside the gizmo finds it hovered
+        pose = moving.flown(state.pose, state.preferences.speed)
+        return over + ([camera.MoveTo(pose)] if pose != state.pose else [])
     issued = over + hands.hover(state, corner)
     if state.editing.tool.selects and not imgui.get_io().key_alt:
         issued += hands.region(state, look, corner)
+    elif state.editing.tool is Tool.PLACE:
+        issued += hands.pick(state, look, corner)
     elif state.editing.tool in (Tool.POINT, Tool.RULER):
         issued += hands.ask(look, corner)
     pose = moving.pointed(state, look, size)

@@ -26,6 +26,8 @@ TITLES = {
     "help": "Mouse and keys",
     "leave": "Leave?",
     "drop": "Where do these photos belong?",
+    "drop scene": "Open or merge?",
+    "merge": "Merge a scene into this one",
     "unsaved": "Edits are not saved",
     "save prompts": "Save the phrases",
     "load prompts": "Load phrases",
@@ -43,6 +45,7 @@ WIDTHS = {  # design pixels; others 520
     "help": _HELP,
     "palette": palette.WIDTH,
     "open": browser.WIDTH,
+    "merge": browser.WIDTH,
 }
 GESTURES = (
     ("Left drag", "orbit"),
@@ -58,6 +61,7 @@ GESTURES = (
 _COLUMNS = ((None, "View"), ("File", "Find", "Tools", "Edit", "Program"))  # of help; None: the gestures
 _CLOSING = (
     do.ShowDialog | show.SaveScene | show.OpenPaths | show.Instead | show.All | show.GoOn | show.SaveFirst
+    | show.MergeScene
     | ask.SavePrompts | ask.LoadPrompts | export.Export
 )  # fmt: skip
 
@@ -102,6 +106,8 @@ def _body(dialog: str) -> Callable[[State, Look], list[do.Command]]:
         "help": _help,
         "leave": _leave,
         "drop": rooms.draw_drop,
+        "drop scene": rooms.draw_scene_drop,
+        "merge": browser.draw,
         "unsaved": rooms.draw_unsaved,
         "save prompts": _save_prompts,
         "load prompts": _load_prompts,

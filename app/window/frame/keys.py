@@ -4,7 +4,9 @@ from imgui_bundle import imgui
 
 from .. import commands as do
 from ..editing import commands as edit
+from ..editing import placing
 from ..editing import pointing as point
+from ..editing.panels import gizmo
 from ..editing.state import Tool
 from ..filming import commands as film
 from ..scene import commands as show
@@ -75,6 +77,9 @@ def _escape(state: State) -> list[do.Command]:
         return [film.StopTour()]
     if state.job is not None and not state.job.cancelling:
         return [show.CancelJob()]
+    if editing.gesture is not None:
+        gizmo.let_go()
+        return [placing.EndGesture(keep=False)]
     if editing.card is not None or editing.asked is not None:
         return [point.CloseCard()]
     if editing.floaters is not None:

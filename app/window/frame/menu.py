@@ -31,7 +31,7 @@ def _items(state: State) -> list[do.Command]:
     issued += _recent(state)
     issued += _samples()
     imgui.separator()
-    issued += _named(state, "Save ...", "Export ...")
+    issued += _named(state, "Save ...", "Export ...", "Merge a scene into this one ...")
     imgui.separator()
     issued += _named(state, "All commands", "Preferences", "Log", "Mouse and keys")
     imgui.separator()

@@ -40,14 +40,16 @@ def figures(state: State) -> list[str]:
         said.append(f"{aside:.0f} degrees aside of the photos: less is known here")
     if state.info is not None:
         width, height = stats.picture_size
+        marks = state.editing.marks
+        there = marks.there if marks else (state.info.num_gaussians, state.info.num_atoms)
         if stats.failing:
             said.append("a finer picture could not be drawn (F2: why); it is tried again")
         elif stats.settling:
             said.append("a finer picture is being drawn")
         said += [
             f"picture {1000 * stats.picture_seconds:.0f} ms at {width} x {height}",
-            _count(state.info.num_gaussians, state.editing.num_deleted),
-            f"{state.info.num_atoms} atoms",
+            _count(there[0], state.editing.num_deleted),
+            f"{there[1]} atoms",
         ]
         hover = state.editing.hover
         if hover is not None and hover.point is not None:

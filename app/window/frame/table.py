@@ -10,8 +10,9 @@ from .. import commands as do
 from ..asking import commands as ask
 from ..asking.prompt_sets import MOST_PROMPTS
 from ..editing import commands as edit
+from ..editing import placing
 from ..editing import pointing as point
-from ..editing.state import Tool
+from ..editing.state import Handle, Tool
 from ..exporting import commands as export
 from ..filming import commands as film
 from ..opening import commands as opening
@@ -28,6 +29,8 @@ _DIGITS = "1234567890"
 _SIDE_KEYS = {"the front": "keypad1", "the right": "keypad3", "above": "keypad7"}
 _SIGNS = {
     imgui.Key.comma: ",", imgui.Key.left_bracket: "[", imgui.Key.right_bracket: "]",
+    imgui.Key.left_arrow: "Left", imgui.Key.right_arrow: "Right", imgui.Key.up_arrow: "Up",
+    imgui.Key.down_arrow: "Down", imgui.Key.page_up: "PgUp", imgui.Key.page_down: "PgDn",
     imgui.Key.delete: "Del", imgui.Key.backspace: "Backspace", imgui.Key.home: "Home",
     imgui.Key.keypad1: "Num 1", imgui.Key.keypad3: "Num 3", imgui.Key.keypad5: "Num 5",
     imgui.Key.keypad7: "Num 7",
@@ -110,6 +113,8 @@ def _files() -> Iterable[Entry]:
     yield Entry("Save ...", group, _shown(dialog("save")), _ctrl("s"), fa.ICON_FA_FLOPPY_DISK, in_fields=True)
     exporting = fa.ICON_FA_FILE_EXPORT
     yield Entry("Export ...", group, _shown(export.ShowExport()), _ctrl("e"), exporting, in_fields=True)
+    merging = _shown(opening.OpenFiles(merging=True))
+    yield Entry("Merge a scene into this one ...", group, merging, _ctrl("m"), fa.ICON_FA_OBJECT_GROUP)
     reconstruct = show.Instead((show.Reconstruct(),))
     yield Entry("Reconstruct the photos", group, lambda s: reconstruct if s.photos else None)
     yield Entry("Back to the room before", group, _room_before)
@@ -215,6 +220,11 @@ def _tools() -> Iterable[Entry]:
         ("Select the thing under a click", "c", Tool.PICK), ("Measure", "t", Tool.RULER),
     ):  # fmt: skip
         yield Entry(name, group, _shown(point.SetTool(tool)), _plain(key))
+    for name, key, handle in (
+        ("Move the selection", "y", Handle.MOVE), ("Turn the selection", "u", Handle.TURN),
+        ("Scale the selection", "i", Handle.SCALE),
+    ):  # fmt: skip
+        yield Entry(name, group, _shown(placing.SetHandle(handle)), _plain(key))
     yield Entry("A smaller brush", group, _brush(1 / BRUSH_STEP), _plain("left_bracket"), repeats=True)
     yield Entry("A larger brush", group, _brush(BRUSH_STEP), _plain("right_bracket"), repeats=True)
     yield Entry("Find floaters", group, _shown(edit.FindFloaters()))
@@ -234,9 +244,21 @@ def _editing() -> Iterable[Entry]:
     yield Entry("Grow the selection", group, _selected(edit.Grow()), _plain("g"))
     deleting = (*_plain("delete"), *_plain("backspace"))
     yield Entry("Delete the selection", group, _selected(edit.Delete()), deleting)
+    yield Entry("Recolour the selection", group, _selected(placing.BeginTint()), _ctrl("t"))
+    for name, key, nudge in (
+        ("left", "left_arrow", placing.Nudge(right=-1)), ("right", "right_arrow", placing.Nudge(right=1)),
+        ("up", "up_arrow", placing.Nudge(down=-1)), ("down", "down_arrow", placing.Nudge(down=1)),
+        ("away", "page_up", placing.Nudge(ahead=1)), ("nearer", "page_down", placing.Nudge(ahead=-1)),
+    ):  # fmt: skip
+        yield Entry(f"Gizmo: a step {name}", group, _placing(nudge), _ctrl(key))
     yield Entry("Hide the selection", group, _selected(edit.Hide()))
     yield Entry("Show the selection alone", group, _selected(edit.Isolate()))
     yield Entry("Show what is hidden", group, _shown(edit.ShowAll()))
+
+
+def _placing(command: do.Command) -> Callable[[State], do.Command | None]:
+    """Once the gizmo has something to move."""
+    return lambda state: command if state.editing.placing else None
 
 
 def _undo(state: State) -> do.Command | None:

@@ -17,6 +17,10 @@ STATUS_HEIGHT = 32.0
 _FONTS = Path(imgui_bundle.__file__).parent / "assets" / "fonts"
 
 
+AXES = (ImVec4(0.93, 0.36, 0.36, 1), ImVec4(0.55, 0.82, 0.35, 1), ImVec4(0.35, 0.60, 0.96, 1))
+"""x, y and z of the world, in both themes."""
+
+
 @dataclass(frozen=True)
 class Palette:
     """The colours of one theme. Panels take them by name from this module: `theme.TEXT`."""

@@ -5,12 +5,17 @@ from pathlib import Path
 
 from ..commands import ShowDialog
 from ..state import State
-from .state import NO_OPENING, Folder
+from .state import LOOKING, NO_OPENING, Folder
 
 
 @dataclass(frozen=True)
 class OpenFiles:
-    """Look for files: with the desktop's own dialog where there is one (the effects know), else with ours."""
+    """Look for files: with the desktop's own dialog where there is one (the effects know), else with ours.
+
+    merging: for a scene that is to be merged into the one on show.
+    """
+
+    merging: bool = False
 
     def apply(self, state: State) -> State:
         return state
@@ -18,13 +23,15 @@ class OpenFiles:
 
 @dataclass(frozen=True)
 class LookInto:
-    """Our own dialog, at a folder; None: where one was last."""
+    """Our own dialog, at a folder; None: where one was last. merging: as in `OpenFiles`; it stays so while
+    the dialog is open."""
 
     folder: Path | None = None
+    merging: bool = False
 
     def apply(self, state: State) -> State:
-        if state.dialog != "open":
-            state = ShowDialog("open").apply(state)
+        if state.dialog not in LOOKING:
+            state = ShowDialog("merge" if self.merging else "open").apply(state)
         return replace(state, opening=NO_OPENING, dialog_path="")
 
 

@@ -8,11 +8,11 @@ from ..commands import Command
 from ..effects import Effects, Hands
 from ..kit.textures import Thumbnails
 from ..scene import samples
-from ..scene.commands import Loaded, OpenPaths
+from ..scene.commands import Loaded, MergeScene, OpenPaths
 from ..state import State
 from . import native
 from .commands import FolderRead, LookInto, MorePictures, OpenFiles, Paste
-from .state import small
+from .state import LOOKING, small
 from .work import PastePicture, ReadFolder, SampleTiles, SmallPictures
 
 POLL_SECONDS = 0.1  # of the desktop's dialog
@@ -27,6 +27,7 @@ class OpeningEffects(Effects):
         self._thumbnails = thumbnails
         self._clipboard = clipboard
         self._dialog: native.NativeDialog | None = None
+        self._merging = False  # what was looked for last is to be merged
         self._polled = 0.0
 
     @property
@@ -43,29 +44,31 @@ class OpeningEffects(Effects):
         if chosen is not None:
             self._dialog = None
             if chosen:
-                self._hands.dispatch(OpenPaths(chosen))
+                merging = self._merging and state.info is not None
+                self._hands.dispatch(MergeScene(Path(chosen[0])) if merging else OpenPaths(chosen))
 
     def follow(self, command: Command, before: State, state: State) -> None:
         """Folders are read by the worker; small pictures of one go with its dialog."""
         match command:
-            case OpenFiles() if self._dialog is None:
+            case OpenFiles(merging) if self._dialog is None:
+                self._merging = merging
                 if native.is_there():
-                    self._dialog = native.NativeDialog(state.preferences.folder)
+                    self._dialog = native.NativeDialog(state.preferences.folder, merging)
                 else:
-                    self._hands.perform(LookInto())
+                    self._hands.perform(LookInto(merging=merging))
             case LookInto(folder):
                 self._forget(before)
                 self._hands.submit(ReadFolder(folder or _start(state)))
             case FolderRead(folder):
                 self._hands.submit(SmallPictures(folder.path, folder.photos))
-            case MorePictures(folder, paths) if state.dialog == "open" and _is_at(state, folder):
+            case MorePictures(folder, paths) if state.dialog in LOOKING and _is_at(state, folder):
                 self._hands.submit(SmallPictures(folder, paths))
             case Paste():
                 self._paste()
             case Loaded() if state.info is None:
                 self._hands.submit(SampleTiles())
             case _:
-                if before.dialog == "open" and state.dialog != "open":
+                if before.dialog in LOOKING and state.dialog not in LOOKING:
                     self._forget(before)
 
     def _paste(self) -> None:

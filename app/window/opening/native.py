@@ -19,12 +19,15 @@ def is_there() -> bool:
 class NativeDialog:
     """One dialog; it is open until `chosen` says something. Main thread only."""
 
-    def __init__(self, folder: str) -> None:
-        endings = " ".join(f"*{suffix}" for suffix in sorted({*PHOTO_SUFFIXES, *SCENE_SUFFIXES}))
+    def __init__(self, folder: str, scenes_alone: bool = False) -> None:
+        suffixes = SCENE_SUFFIXES if scenes_alone else {*PHOTO_SUFFIXES, *SCENE_SUFFIXES}
+        endings = " ".join(f"*{suffix}" for suffix in sorted(suffixes))
         start = folder if Path(folder).is_dir() else str(Path.home())
-        filters = ["Photos and scenes", endings, "All files", "*"]
-        several = portable_file_dialogs.opt.multiselect
-        self._dialog = portable_file_dialogs.open_file("Open photos or a scene", start, filters, several)
+        filters = ["Scenes" if scenes_alone else "Photos and scenes", endings, "All files", "*"]
+        title = "Merge a scene into this one" if scenes_alone else "Open photos or a scene"
+        options = portable_file_dialogs.opt
+        several = options.none if scenes_alone else options.multiselect
+        self._dialog = portable_file_dialogs.open_file(title, start, filters, several)
 
     def chosen(self) -> tuple[str, ...] | None:
         """The files; none where it was closed, None while it is open."""

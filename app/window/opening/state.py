@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+LOOKING = ("open", "merge")  # dialogs that show a folder
 MOST_FILES = 300  # of a folder that are shown
 
 

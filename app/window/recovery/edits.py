@@ -53,7 +53,7 @@ def keep(
         save(scene, edits.with_suffix(SCENE_SUFFIX))
     where = None if path is None else str(path)
     about = {"name": name, "path": where, "photos": [list(photo) for photo in photos]}
-    save_history(history, digest, about, edits)
+    save_history(history, scene, about, edits)
     for old in _newest_first()[MOST_KEPT:]:
         forget_file(old)
     return edits

@@ -121,8 +121,8 @@ class RecoveryEffects(Effects):
                 self._restoring, self._wanted, self._restoring_edits = self._wanted, None, edits
             case Reconstruct():
                 self._restoring, self._wanted = self._wanted, None
-            case SceneArrived(info):
-                self._arrived(info, before, state)
+            case SceneArrived(info, replaces=replaces):
+                self._arrived(info, before, state, replaces)
             case SceneSaved(path):
                 self._settle(state)
                 self._hands.perform(Opened(path))
@@ -147,15 +147,16 @@ class RecoveryEffects(Effects):
         if snapshot != self._snapshot:
             self._snapshot, self._keep_at = snapshot, state.now + KEEP_AFTER
 
-    def _arrived(self, info: SceneInfo, before: State, state: State) -> None:
-        self._take_edits(info, before, state)
+    def _arrived(self, info: SceneInfo, before: State, state: State, replaces: bool) -> None:
+        self._take_edits(info, before, state, replaces)
         self._take_session(info)
 
     # Edits
 
-    def _take_edits(self, info: SceneInfo, before: State, state: State) -> None:
-        """Keep those of the scene before; those of the scene that has come are restored or looked for."""
-        if before.info is not None and before.editing.unsaved and before.editing.dirty:
+    def _take_edits(self, info: SceneInfo, before: State, state: State, replaces: bool) -> None:
+        """Keep those of the scene before, unless they are those of the scene that has come as well; those are
+        restored or looked for."""
+        if not replaces and before.info is not None and before.editing.unsaved and before.editing.dirty:
             self._keep_edits(before)
             if before.info.path is None or before.editing.history is None or before.editing.history.done:
                 text = f"The edits of {before.info.name} are kept; go back to it to go on with them."
@@ -168,6 +169,8 @@ class RecoveryEffects(Effects):
                 self._hands.submit(ForgetFile(restored))
         else:
             self._hands.submit(LookForEdits(info.serial, info.scene, info.path))
+        if replaces and before.info is not None:  # once the same edits lie beside the scene that has come
+            self._hands.submit(ForgetEdits(before.info.scene, self._keeper.token))
 
     def _end_offer(self, offer: Offer, restore: bool, forget: bool) -> None:
         if restore:
@@ -212,7 +215,8 @@ class RecoveryEffects(Effects):
         self._copied = False
         if unsaved:
             self._hands.perform(CopyAt(self._keeper.scene_file))
-            self._hands.submit(KeepCopy(info.serial, info.scene, self._keeper.scene_file))
+            first = None if info.history is None else info.history.first
+            self._hands.submit(KeepCopy(info.serial, info.scene, self._keeper.scene_file, first))
         if kept is not None and kept.file is not None:
             self._outlived = kept.file
         if not unsaved:

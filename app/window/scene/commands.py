@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from langflash_core.scene.edits import Marks
+from langflash_core.scene.mask import Mask
 
 from .. import poses
 from ..commands import NOTHING_TO_SAVE, Command, Notify, ShowDialog
@@ -200,9 +201,11 @@ class SaveScene:
 
 @dataclass(frozen=True)
 class OpenPaths:
-    """Paths that behave like a drop (the open dialog, the command line)."""
+    """Paths from the open dialog, the command line, the clipboard; or dropped on the window: a scene that was
+    `dropped` on another may belong to it."""
 
     paths: tuple[str, ...]
+    dropped: bool = False
 
     def apply(self, state: State) -> State:
         return replace(state, dialog=None)
@@ -219,14 +222,16 @@ class Loaded:
 @dataclass(frozen=True)
 class SceneArrived:
     """A scene is ready: show it from its first view, ask every prompt again; the one before is a room to go
-    back to. alone: see `OpenScene`. room: as it was left, where it was on show before."""
+    back to. alone: see `OpenScene`. room: as it was left, where it was on show before. replaces: it is the
+    scene on show with more in it, and that one is no room."""
 
     info: SceneInfo
     alone: bool = False
     room: Room | None = None
+    replaces: bool = False
 
     def apply(self, state: State) -> State:
-        state = replace(self._shown(state), rooms=_rooms(state, self.info))
+        state = replace(self._shown(state), rooms=self._others(state))
         if self.room is None:
             return state
         editing = replace(state.editing, saved=self.room.saved)
@@ -238,10 +243,13 @@ class SceneArrived:
             view=None,
         )
 
+    def _others(self, state: State) -> tuple[Room, ...]:
+        return state.rooms if self.replaces else _rooms(state, self.info)
+
     def _shown(self, state: State) -> State:
         prompts = tuple(replace(p, score=None) for p in state.prompts)
         history = self.info.history
-        saved = None if history is None else history.moved_to(0).marks
+        saved = None if history is None else history.first
         made = state.job is not None and state.job.title == RECONSTRUCTING
         return replace(
             state,
@@ -338,6 +346,77 @@ def dropped(state: State, photos: tuple[Path, ...], new: bool) -> Command:
     wants that at once."""
     taken: tuple[Command, ...] = (*((SetPhotosAside(),) if new else ()), AddPhotos(photos))
     return Instead((*taken, Reconstruct())) if state.preferences.start_at_once else All(taken)
+
+
+@dataclass(frozen=True)
+class AskAboutScene:
+    """A scene was dropped on a scene: is it to be opened, or merged into it?"""
+
+    path: Path
+
+    def apply(self, state: State) -> State:
+        return replace(state, dropped=(self.path,), dialog="drop scene")
+
+
+# Two scenes as one
+
+
+@dataclass(frozen=True)
+class MergeScene:
+    """Put what a scene file holds beside what is on show; replaces a job under way."""
+
+    path: Path
+
+    def apply(self, state: State) -> State:
+        if state.info is None:
+            return Notify(NOTHING_TO_MERGE).apply(state)
+        job = Job(f"Merging {self.path.name}", "reading", started=state.now)
+        return replace(state, job=job, dialog=None)
+
+
+@dataclass(frozen=True)
+class Merged:
+    """The scene with number `serial`, of which there was so much, and another as one scene."""
+
+    serial: int
+    there: tuple[int, int]
+    info: SceneInfo
+    name: str
+
+    def fits(self, state: State) -> bool:
+        """Whether it still holds the scene on show."""
+        marks = state.editing.marks
+        return (
+            state.info is not None
+            and state.info.serial == self.serial
+            and (marks is not None and marks.there == self.there)
+        )
+
+    def apply(self, state: State) -> State:
+        if self.fits(state):
+            return state
+        text = f"{self.name} was not merged, since another scene is on show by now; merge it again."
+        return Notify(text).apply(replace(state, job=None))
+
+    def arrival(self, state: State) -> "SceneArrived":
+        """What brings it into a state that it fits: the merge is one more edit, its things selected."""
+        history, saved = state.editing.history, state.editing.saved
+        assert self.info.history is not None and history is not None
+        whole = self.info.history.marks
+        count = whole.there[0]
+        before = history.of_size(self.there[0], history.marks.atoms[: self.there[1]])
+        before = before.of_size(count, whole.atoms)
+        brought = Mask.full(count) - Mask.first(count, self.there[0])
+        after = replace(before.marks, there=whole.there, selected=brought)
+        after = replace(after, metric_scale=before.marks.metric_scale)
+        history = before.edited(f"Merge {self.name}", after)
+        if saved is not None:
+            saved = saved.of_size(self.there[0], saved.atoms[: self.there[1]]).of_size(count, whole.atoms)
+        room = Room(self.info, state.photos, history, saved, state.pose)
+        return SceneArrived(replace(self.info, history=history), room=room, replaces=True)
+
+
+NOTHING_TO_MERGE = "There is no scene to merge into; open one first."
 
 
 @dataclass(frozen=True)

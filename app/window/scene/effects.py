@@ -9,20 +9,26 @@ from langflash_core.errors import LangFlashError
 from langflash_core.formats import COLOUR_MAPS
 
 from ..commands import Command, Notify
+from ..editing.placing import SetHandle
+from ..editing.state import Handle
 from ..effects import Effects, Hands
 from ..kit.textures import Thumbnails
 from ..state import State
 from ..viewport import Viewport
+from .camera import FrameAll
 from .commands import (
     AddPhotos,
     All,
     AskAboutDrop,
+    AskAboutScene,
     CancelJob,
     ChoosePair,
     GoOn,
     GoToRoom,
     Instead,
     Loaded,
+    Merged,
+    MergeScene,
     OpenPaths,
     OpenScene,
     Reconstruct,
@@ -34,7 +40,7 @@ from .commands import (
 )
 from .drops import sort_drop
 from .state import SceneInfo
-from .work import FindPair, LoadScene, MakeThumbnails, ReconstructPhotos, Thin, WriteScene
+from .work import FindPair, JoinScenes, LoadScene, MakeThumbnails, ReconstructPhotos, Thin, WriteScene
 
 
 class SceneEffects(Effects):
@@ -52,8 +58,10 @@ class SceneEffects(Effects):
         """Jobs and errands of the worker; a scene that has come goes to the renderer."""
         submit = self._hands.submit
         match command:
-            case OpenPaths(paths):
-                self._open(paths, state)
+            case OpenPaths(paths, was_dropped):
+                self._open(paths, was_dropped, state)
+            case MergeScene(path) if state.info is not None and state.editing.marks is not None:
+                submit(JoinScenes(state.info, state.editing.marks, path))
             case AddPhotos(paths):
                 submit(MakeThumbnails(paths))
             case Reconstruct() if state.photos:
@@ -90,6 +98,8 @@ class SceneEffects(Effects):
                 waited = before.pending
             case All(commands):
                 waited = commands
+            case Merged() if command.fits(before):
+                waited = [command.arrival(before), SetHandle(Handle.MOVE), FrameAll()]
             case GoToRoom(serial):
                 rooms = (room for room in state.rooms if room.info.serial == serial)
                 waited = [SceneArrived(replace(r.info, history=r.history), room=r) for r in rooms]
@@ -98,7 +108,7 @@ class SceneEffects(Effects):
         for each in waited:
             self._hands.perform(each)
 
-    def _open(self, paths: Sequence[str], state: State) -> None:
+    def _open(self, paths: Sequence[str], was_dropped: bool, state: State) -> None:
         perform = self._hands.perform
         drop = sort_drop(paths)
         for sentence in drop.rejected:
@@ -107,6 +117,8 @@ class SceneEffects(Effects):
             perform(AskAboutDrop(drop.photos))
         elif drop.photos:
             perform(dropped(state, drop.photos, new=False))
+        elif drop.scenes and was_dropped and state.info is not None:
+            perform(AskAboutScene(drop.scenes[0]))
         elif drop.scenes:
             perform(Instead((OpenScene(drop.scenes[0], alone=True),)))
 

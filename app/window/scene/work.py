@@ -17,7 +17,16 @@ from langflash_core.scene.edits import History, Marks
 from ..commands import Command, ShowPicture
 from ..poses import Vector, from_view, median_reach
 from ..requests import Asked, Errand, Job, SceneErrand
-from .commands import ChoosingFailed, PairChosen, PhotoFailed, PhotoRead, SceneArrived, SceneSaved, Thinned
+from .commands import (
+    ChoosingFailed,
+    Merged,
+    PairChosen,
+    PhotoFailed,
+    PhotoRead,
+    SceneArrived,
+    SceneSaved,
+    Thinned,
+)
 from .state import SceneInfo
 
 if TYPE_CHECKING:
@@ -65,6 +74,25 @@ class LoadScene(Job):
         return SceneArrived(describe_scene(scene, serial, self.path.name, self.path), self.alone)
 
 
+@dataclass(frozen=True)
+class JoinScenes(Job):
+    """Read a scene file and put what it holds beside the scene on show, as far as that is there."""
+
+    info: SceneInfo
+    marks: Marks = field(repr=False)
+    path: Path
+
+    def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> Merged:
+        from langflash_core.export import read as read_scene
+        from langflash_core.scene.edited import there
+        from langflash_core.scene.joining import joined
+
+        own, name = self.info, self.path.name
+        scene = joined(there(own.scene, self.marks), read_scene(self.path), (own.name, name))
+        info = describe_scene(scene, serial, own.name, own.path)
+        return Merged(own.serial, self.marks.there, info, name)
+
+
 def _restored(info: SceneInfo, edits: Path) -> SceneInfo:
     """The scene with the edits of an earlier session, its name and its place.
 
@@ -73,8 +101,7 @@ def _restored(info: SceneInfo, edits: Path) -> SceneInfo:
     """
     from langflash_core.scene.edits_file import load_history, read_about
 
-    assert info.history is not None
-    history = load_history(edits, info.scene, info.history.marks)
+    history = load_history(edits, info.scene)
     about = read_about(edits)[1]
     path = Path(about["path"]) if about.get("path") else None
     return replace(info, name=str(about.get("name", "")), path=path, history=history)

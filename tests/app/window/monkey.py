@@ -35,11 +35,13 @@ PATIENCE = 120.0  # seconds without any sign of life that count as a hang, also 
 STEPS_AT_ONCE = 12
 SLOPE_MB = 8.0  # a minute; a scene that leaked at each opening would be 20, a reconstruction hundreds
 KEYS = (
-    *"wasdqehzfpkvxrbcglonmjt1234567890", "bracketleft", "bracketright", "Delete", "BackSpace", "Escape",
+    *"wasdqehzfpkvxrbcglonmjtyui1234567890", "bracketleft", "bracketright", "Delete", "BackSpace", "Escape",
     "Return", "Tab", "shift+Tab", "Up", "Down", "Left", "Right", "Home", "End", "space", "F1", "F2",
-    "minus", "plus", *(f"ctrl+{letter}" for letter in "zyadisoepqvcf"),
+    "minus", "plus", *(f"ctrl+{letter}" for letter in "zyadisoepqvcftm"),
+    *(f"ctrl+{key}" for key in ("Left", "Right", "Up", "Down", "Prior", "Next")),
     "ctrl+comma", "ctrl+shift+z", "F6", "F11",
 )  # fmt: skip
+SURE = ("Discard", "Open it")  # buttons of the questions before a scene that is opened
 WORDS = (
     "armchair",
     "wall - floor",
@@ -95,6 +97,7 @@ def inside(width: int, height: int) -> None:
             frames, latest = frames + 1, max(latest, session.lag)
         if time.monotonic() - said > 0.5:
             said, state = time.monotonic(), session.state
+            now = items.now()
             line = {
                 "frames": frames,
                 "latest": latest,
@@ -104,7 +107,7 @@ def inside(width: int, height: int) -> None:
                 "gl_errors": session.gl_errors,
                 "dialog": state.dialog,
                 "job": None if state.job is None else state.job.stage,
-                "discard": items.now().get("Discard", [None])[0],
+                "discard": next((now[name][0] for name in SURE if now.get(name)), None),
             }
             sys.stdout.write(json.dumps(line) + "\n")
             sys.stdout.flush()
@@ -272,7 +275,8 @@ class Watched:
                 click(self.last["discard"])
             elif self.last.get("scene") == name:
                 time.sleep(2.0)  # for what follows a scene: words of its atoms, files kept
-                return self.last.get("scene") == name
+                if not self.last.get("discard"):
+                    return self.last.get("scene") == name
             time.sleep(0.2)
         return False
 

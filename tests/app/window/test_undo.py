@@ -16,6 +16,7 @@ from app.window import commands as do
 from app.window.asking import commands as ask
 from app.window.commands import apply
 from app.window.editing import commands as edit
+from app.window.editing import placing
 from app.window.editing import pointing as point
 from app.window.editing.state import Reading, Region
 from app.window.editing.work import ScoreFloaters, request_for
@@ -36,7 +37,7 @@ from langflash_core.scene.edits import Marks, Mask
 from langflash_core.types import Scene
 from tests.app.window.scenes import PHRASES, room
 
-MODULES = (do, show, camera, ask, edit, point, export, keep, film, opening)
+MODULES = (do, show, camera, ask, edit, placing, point, export, keep, film, opening)
 ARRIVES = show.SceneArrived  # another scene; the edits of the one before are kept on the disk
 SAYS_WHICH = {
     "combine": ("replace", "add", "remove"),
@@ -141,7 +142,8 @@ def bits(state: State) -> tuple:
     """All that edits hold."""
     marks = state.editing.marks
     assert marks is not None
-    return marks.deleted.bits, marks.hidden.bits, marks.selected.bits, marks.atoms, state.keys, state.metric
+    masks = marks.deleted.bits, marks.hidden.bits, marks.selected.bits
+    return *masks, marks.atoms, state.keys, state.metric, marks.changes, marks.there
 
 
 @pytest.mark.parametrize("cls", command_classes(), ids=lambda cls: cls.__name__)
@@ -192,9 +194,10 @@ def random_command(chance: np.random.Generator, state: State) -> do.Command:
         edit.EndFloaters("delete"), point.SetThrough(bool(chance.integers(2))),
         edit.RenameAtom(atom, f"thing {key}"), edit.ToggleAtom(atom), edit.MergeAtoms((atom, key)),
         film.AddKey(), film.RemoveKey(key), film.ClearKeys(), point.SetLength(float(chance.uniform(0.1, 2))),
+        placing.Nudge(*chance.uniform(-1, 1, 3).tolist()), placing.BeginTint(),
         edit.Undo(), edit.Redo(), edit.GoTo(int(chance.integers(0, 200))),
     )  # fmt: skip
-    command = choices[chance.integers(len(choices))]
+    command = placing.EndGesture() if state.editing.gesture else choices[chance.integers(len(choices))]
     if isinstance(command, edit.GoTo) and chance.random() < 0.9:
         return edit.Redo()  # rarely: it may take all of them back
     if isinstance(command, edit.Delete) and state.editing.num_selected > 600:
@@ -216,7 +219,7 @@ def test_200_random_edits_undone_give_the_first_state_bit_for_bit(shown: State) 
     assert names >= {
         "SelectRegion", "SelectByPhrase", "SelectAtom", "Grow", "Invert", "SelectAll", "Deselect", "Delete",
         "Hide", "Isolate", "ShowAll", "EndFloaters", "RenameAtom", "ToggleAtom", "MergeAtoms", "AddKey",
-        "RemoveKey", "ClearKeys", "SetLength", "Undo", "Redo",
+        "RemoveKey", "ClearKeys", "SetLength", "Undo", "Redo", "Nudge", "EndGesture",
     }  # fmt: skip
     last, scene = bits(state), shown.info.scene  # type: ignore[union-attr]
     assert last != bits(shown)

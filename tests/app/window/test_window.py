@@ -350,7 +350,8 @@ def test_drops_a_real_drop_and_escape(program: Program, scene_file: Path, tmp_pa
     program.client.drop(program.window, [notes], MIDDLE)
     program.until(lambda s: any("my notes.txt is no photo" in t for t in s["toasts"]), "a toast")
     program.client.drop(program.window, [scene_file], MIDDLE)
-    program.until(lambda s: s["scene"] == "room.langflash", "the dropped scene")
+    program.click("Open it")
+    program.until(lambda s: s["scene"] == "room.langflash" and not s["dialog"] and not s["job"], "the scene")
     broken = tmp_path / "broken photo.jpg"
     broken.write_bytes(b"\xff\xd8\xff\xe0 cut short")
     program.client.drop(program.window, [broken], MIDDLE)

@@ -55,7 +55,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     shown, kept = imgui.begin("Dictionary", True, flags)
     if shown and imgui.begin_tab_bar("##tabs"):
         if imgui.begin_tab_item("Atoms")[0]:
-            issued += _atoms(state, marks.atoms, look)
+            issued += _atoms(state, marks.atoms[: marks.there[1]], look)
             imgui.end_tab_item()
         if imgui.begin_tab_item("Similarity")[0]:
             _similarity(state, marks.atoms, look)
@@ -199,7 +199,7 @@ def _picture(state: State, k: int, look: Look) -> list[do.Command]:
 
 def _shares(insight: Insight | None, atoms: tuple[Atom, ...]) -> np.ndarray:
     """(K,) of the scene, merged atoms counted with their head."""
-    own = np.array(insight.shares) if insight else np.zeros(len(atoms))
+    own = np.array(insight.shares[: len(atoms)]) if insight else np.zeros(len(atoms))
     return np.bincount([atom.into for atom in atoms], own, minlength=len(atoms))
 
 

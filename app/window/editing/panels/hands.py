@@ -4,6 +4,8 @@ import math
 
 from imgui_bundle import ImVec2, imgui
 
+from langflash_core.scene import edits
+
 from ... import commands as do
 from ...kit.look import Look
 from ...state import State
@@ -36,6 +38,18 @@ def ask(look: Look, corner: ImVec2) -> list[do.Command]:
     return [] if slipped.x or slipped.y else [point.Ask(_pointer(corner))]
 
 
+def pick(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
+    """A click without a drag selects the thing that is there."""
+    clicked = ask(look, corner)
+    combine = _combined(state)
+    return [edit.SelectThing(each.at, combine) for each in clicked if isinstance(each, point.Ask)]
+
+
+def _combined(state: State) -> edits.Combine:
+    io = imgui.get_io()
+    return "add" if io.key_shift else "remove" if io.key_ctrl else state.editing.combine
+
+
 def region(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
     """What is being drawn with a selecting tool, and at its end the request to select what it shows."""
     editing, io = state.editing, imgui.get_io()
@@ -50,7 +64,7 @@ def region(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
     path = _path(editing.tool, editing.drag, start, here)
     if held:
         return [] if path == editing.drag else [point.Drag(path)]
-    combine = "add" if io.key_shift else "remove" if io.key_ctrl else editing.combine
+    combine = _combined(state)
     clicked = math.hypot(way.x, way.y) < look.px(CLICK)
     unit = look.scale * pixels.x
     match editing.tool:

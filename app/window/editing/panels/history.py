@@ -27,7 +27,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
         imgui.text_colored(theme.MUTED, "not saved yet")
         widgets.tooltip("Kept across a crash; Ctrl+S writes the edited scene")
     labels = [
-        "As it was opened",
+        f"{history.forgotten:,} older edits" if history.forgotten else "As it was opened",
         *(e.label for e in history.done),
         *(e.label for e in reversed(history.undone)),
     ]
@@ -38,7 +38,10 @@ def draw(state: State, look: Look) -> list[do.Command]:
         colour = theme.TEXT if position <= now else theme.MUTED
         icon = fa.ICON_FA_CARET_RIGHT if position == now else "   "
         with widgets.colours(text=theme.ACCENT if position == now else colour):
-            if imgui.selectable(f"{icon} {label}##{position}", False)[0] and position != now:
+            chosen = imgui.selectable(f"{icon} {label}##{position}", False)[0]
+            if position == 0 and history.forgotten:
+                widgets.tooltip("These stay done: the list holds the last 1,000 edits, or 32 MB of them")
+            if chosen and position != now:
                 issued.append(edit.GoTo(position))
         if position == now and _moved(state, now):
             imgui.set_scroll_here_y(0.6)

@@ -10,8 +10,10 @@ from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State
 from .. import commands as edit
+from .. import placing
 from .. import pointing as point
 from ..state import RADIUS_RANGE, REACH_RANGE, STRICTNESS_RANGE, Floaters, Tool
+from . import placing as placing_bar
 
 _TOOLS = (
     (Tool.MOVE, fa.ICON_FA_ARROWS_UP_DOWN_LEFT_RIGHT, "Move around  (V)"),
@@ -21,6 +23,7 @@ _TOOLS = (
     (Tool.BRUSH, fa.ICON_FA_PAINTBRUSH, "Select with a brush  (B)\n[ and ] change its size"),
     (Tool.SPHERE, fa.ICON_FA_CIRCLE_DOT, "Select with a ball: press on its middle and pull  (O)"),
     (Tool.PICK, fa.ICON_FA_ARROW_POINTER, "Select the thing under a click  (C)"),
+    (Tool.PLACE, fa.ICON_FA_CUBE, "Move, turn or scale the selection  (Y, U, I)"),
     (Tool.RULER, fa.ICON_FA_RULER, "Measure, and tell how large things are: click on both ends  (T)"),
 )
 _COMBINES: tuple[tuple[Combine, str, str], ...] = (
@@ -29,12 +32,12 @@ _COMBINES: tuple[tuple[Combine, str, str], ...] = (
     ("remove", fa.ICON_FA_MINUS, "Take from the selection  (Ctrl)"),
 )
 _BUTTON = 36.0  # design pixels of a tool's side
-_SMALLEST = 22.0
-_GAP = 4.0
+_SMALLEST = 20.0
+_GAP = 3.0
 _AROUND = 34.0  # of the strip, beside its tools: its edge and two lines
 _VIEWS = 92.0  # that the viewpoints below it take
 _MARGIN = 12.0
-_LONG = 610.0  # width of everything a selection can do, in one line
+_LONG = 650.0  # width of everything a selection can do, in one line
 _TALL = 6.0  # height of that in two, in lines of text
 _BAR = (
     widgets.PLAIN | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
@@ -51,8 +54,13 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     bars = []
     if state.editing.tool.selects:
         bars.append(lambda: _options(state, look))
+    if state.editing.tool is Tool.PLACE:
+        bars.append(lambda: placing_bar.draw(state, look))
     if state.editing.num_selected or state.editing.waiting:
         bars.append(lambda: _selection(state, look, room))
+    if state.editing.tint is not None:
+        tint = state.editing.tint
+        bars.append(lambda: placing_bar.draw_tint(state, tint, look))
     if state.editing.floaters is not None:
         found = state.editing.floaters
         bars.append(lambda: _floaters(state, found, look, room))
@@ -106,7 +114,8 @@ def _strip(state: State, look: Look, wide: float) -> list[do.Command]:
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(_GAP, _GAP))
     for tool, icon, tip in _TOOLS:
         if _tool_button(icon, editing.tool is tool, side, tip):
-            issued.append(point.SetTool(tool))
+            taken = tool is Tool.PLACE
+            issued.append(placing.SetHandle(editing.handle) if taken else point.SetTool(tool))
     imgui.separator()
     if _tool_button(
         fa.ICON_FA_WAND_MAGIC_SPARKLES, editing.floaters is not None, side, "Find floaters, with a preview"
@@ -194,6 +203,7 @@ def _actions() -> list[do.Command]:
         (fa.ICON_FA_EYE_SLASH, "Hide", edit.Hide()),
         (fa.ICON_FA_CROP_SIMPLE, "Show this alone", edit.Isolate()),
         (fa.ICON_FA_EXPAND, "Fly to it  (F)", point.FrameSelection()),
+        (fa.ICON_FA_PALETTE, "Recolour  (Ctrl+T)", placing.BeginTint()),
         (fa.ICON_FA_TRASH, "Delete  (Del)", edit.Delete()),
         (fa.ICON_FA_XMARK, "Select nothing  (Ctrl+D)", edit.Deselect()),
     ]

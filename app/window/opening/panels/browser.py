@@ -40,6 +40,8 @@ def _path(state: State) -> tuple[list[do.Command], bool]:
     if imgui.is_window_appearing():
         imgui.set_keyboard_focus_here()
     hint = "a scene, a photo or a folder; or choose below"
+    if state.dialog == "merge":
+        hint = "a scene or a folder; or choose below"
     changed, path = imgui.input_text_with_hint("##path", hint, state.dialog_path)
     confirmed = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
     return ([do.EditDialogPath(path)] if changed else []), confirmed
@@ -76,7 +78,7 @@ def _inside(state: State, folder: Folder, look: Look) -> list[do.Command]:
             issued.append(opening.Choose(path))
     gap, room = look.px(8), imgui.get_content_region_avail().x + look.px(8)
     columns = max(int(room / (look.px(_CELL) + gap)), 1)
-    for place, path in enumerate(folder.photos):
+    for place, path in enumerate(() if state.dialog == "merge" else folder.photos):
         if place % columns:
             imgui.same_line(0, gap)
         issued += _photo(state, path, ImVec2(room / columns - gap, look.px(_CELL)), look)
@@ -114,8 +116,8 @@ def _photo(state: State, path: Path, size: ImVec2, look: Look) -> list[do.Comman
 def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     typed, chosen = state.dialog_path.strip(), state.opening.chosen
-    count = len(chosen)
-    label = "Open" if typed or count < 2 else f"Open {count} files"
+    count, merging = len(chosen), state.dialog == "merge"
+    label = "Merge" if merging else "Open" if typed or count < 2 else f"Open {count} files"
     imgui.begin_disabled(not typed and not chosen)
     pressed = widgets.primary_button(f"{label}###open", look.vec(140, 0))
     imgui.end_disabled()
@@ -125,7 +127,8 @@ def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
     if typed and (pressed or confirmed):
         path = typed_path(typed)
         walks = confirmed and not pressed and os.path.isdir(path) and typed.endswith(os.sep)
-        issued.append(opening.LookInto(path) if walks else show.OpenPaths((str(path),)))
+        merge_or_open = show.MergeScene(path) if merging else show.OpenPaths((str(path),))
+        issued.append(opening.LookInto(path) if walks else merge_or_open)
     elif chosen and pressed:
-        issued.append(show.OpenPaths(tuple(map(str, chosen))))
+        issued.append(show.MergeScene(chosen[-1]) if merging else show.OpenPaths(tuple(map(str, chosen))))
     return issued

@@ -13,7 +13,6 @@ from .. import camera
 SIZE = 84.0  # design pixels
 _ARM, _BALL = 30.0, 8.0
 _RAYS = 28.0  # design pixels, of the button beside them
-_COLOURS = (ImVec4(0.93, 0.36, 0.36, 1), ImVec4(0.55, 0.82, 0.35, 1), ImVec4(0.35, 0.60, 0.96, 1))
 _LETTERS = "XYZ"
 
 
@@ -37,7 +36,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
         ball = ImVec2(middle.x + look.px(_ARM) * at[0], middle.y + look.px(_ARM) * at[1])
         axis = int(np.argmax(np.abs(forward)))
         positive = -sum(forward) > 0  # this end of the axis, seen from which one looks backwards along it
-        colour = _COLOURS[axis]
+        colour = theme.AXES[axis]
         faint = ImVec4(colour.x, colour.y, colour.z, 1.0 if depth <= 0 else 0.55)
         radius = look.px(_BALL)
         if positive:

@@ -70,6 +70,29 @@ def draw_drop(state: State, look: Look) -> list[do.Command]:
     return issued
 
 
+def draw_scene_drop(state: State, look: Look) -> list[do.Command]:
+    """The question what becomes of a dropped scene."""
+    assert state.info is not None
+    if not state.dropped:
+        return [do.ShowDialog(None)]
+    path = state.dropped[0]
+    imgui.text_wrapped(path.name)
+    widgets.muted(f"{state.info.name} is open.")
+    widgets.gap(look.px(4))
+    issued: list[do.Command] = []
+    if widgets.primary_button("Open it", look.vec(130, 0)):
+        issued.append(show.Instead((show.OpenScene(path, alone=True),)))
+    widgets.tooltip("The present scene stays one click away")
+    imgui.same_line()
+    if imgui.button("Merge into this scene", look.vec(190, 0)):
+        issued.append(show.MergeScene(path))
+    widgets.tooltip("Beside what is there, to be put in its place; Ctrl+Z undoes")
+    imgui.same_line()
+    if imgui.button("Cancel", look.vec(110, 0)):
+        issued.append(do.ShowDialog(None))
+    return issued
+
+
 def draw_unsaved(state: State, look: Look) -> list[do.Command]:
     """The question what becomes of edits before another scene takes the place."""
     name = "" if state.info is None else state.info.name

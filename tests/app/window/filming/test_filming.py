@@ -45,7 +45,10 @@ def test_key_frames_are_added_and_removed(shown: State) -> None:
     assert after(state, film.RemoveKey()).keys == state.keys[:-1]
     assert after(state, film.RemoveKey(7)).keys == state.keys
     assert after(state, film.ClearKeys(), film.RemoveKey()).keys == ()
-    assert len(with_keys(shown, MOST_KEYS + 3).keys) == MOST_KEYS
+    full = with_keys(shown, MOST_KEYS)
+    assert len(full.keys) == MOST_KEYS and not full.toasts
+    more = with_keys(full, 3)
+    assert len(more.keys) == MOST_KEYS and more.toasts[-1].text.startswith("A camera path has at most 50")
     assert with_keys(State(), 2).keys == (), "without a scene there is nothing to film"
 
 

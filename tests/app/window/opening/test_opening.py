@@ -136,7 +136,7 @@ def test_the_desktops_own_dialog_is_asked_where_there_is_one(monkeypatch) -> Non
     answers: list[Any] = [None, ("/p/a.jpg", "/p/b.jpg")]
 
     class Dialog:
-        def __init__(self, folder: str) -> None: ...
+        def __init__(self, folder: str, scenes_alone: bool) -> None: ...
 
         def chosen(self):
             return answers.pop(0)
@@ -150,6 +150,11 @@ def test_the_desktops_own_dialog_is_asked_where_there_is_one(monkeypatch) -> Non
     desk.effects.tick(desk.state, 2.0)
     assert desk.performed[-1] == show.OpenPaths(("/p/a.jpg", "/p/b.jpg"))
     assert desk.effects.due == float("inf")
+    answers.append(("/p/c.langflash",))
+    desk.state = shown_scene()
+    desk.perform(opening.OpenFiles(merging=True))
+    desk.effects.tick(desk.state, 3.0)
+    assert desk.performed[-1] == show.MergeScene(Path("/p/c.langflash"))
 
 
 def test_photos_stay_on_show_while_they_are_worked_on() -> None:

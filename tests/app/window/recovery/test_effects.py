@@ -23,7 +23,7 @@ from app.window.recovery.preferences import DEFAULTS
 from app.window.requests import Errand, Job, SceneErrand
 from app.window.scene import commands as show
 from app.window.scene import work as scene_work
-from app.window.scene.work import describe_scene
+from app.window.scene.work import JoinScenes, LoadScene, describe_scene
 from app.window.state import State
 from langflash_core.scene.edits import Mask, delete
 from langflash_core.scene.file import save
@@ -121,6 +121,39 @@ BEFORE = {
              "aspect": 1.25, "shift": [0.0, 0.0]},
 }  # fmt: skip
 """As the version before wrote a session."""
+
+
+def test_a_merge_takes_the_kept_edits_along_and_is_restored(desk: Desk, info, tmp_path: Path) -> None:
+    views = torch.zeros(12_300, dtype=torch.int64)  # of the merged Gaussians nobody knows the view
+    info = replace(info, scene=replace(info.scene, view_ids=views))
+    desk.perform(show.SceneArrived(info))
+    desk.perform(edit.Found(some(), "replace", "here"))
+    desk.perform(edit.Delete())
+    desk.pass_time(2 * KEEP_AFTER)
+    desk.work()
+    first = desk.state.recovery.kept
+    assert first is not None and desk.state.editing.marks is not None and desk.state.info is not None
+    save(info.scene, tmp_path / "b.langflash")
+    request = JoinScenes(desk.state.info, desk.state.editing.marks, tmp_path / "b.langflash")
+    merged = request.run(2, lambda *_: None, lambda: False)
+    desk.perform(merged.arrival(desk.state))
+    desk.work()
+    kept, history = desk.state.recovery.kept, desk.state.editing.history
+    assert kept is not None and not first.exists() and "are kept" not in str(desk.state.toasts)
+    again = LoadScene(kept.with_suffix(".langflash"), kept).run(3, lambda *_: None, lambda: False)
+    assert isinstance(again, show.SceneArrived) and history is not None
+    assert again.info.history == history and len(history.marks.selected) == 12_300
+    assert again.info.scene.view_ids is not None
+    assert torch.equal(again.info.scene.view_ids, torch.cat((views, views - 1)))
+    assert after_restoring(again).editing.unsaved
+    assert not after_restoring(again, *3 * (edit.Undo(),)).editing.unsaved
+
+
+def after_restoring(arrived: show.SceneArrived, *commands: Command) -> State:
+    state = apply(State(), arrived)
+    for command in commands:
+        state = apply(state, command)
+    return state
 
 
 def test_a_session_of_the_version_before_is_restored_with_its_edits(desk: Desk, info) -> None:

@@ -1,0 +1,136 @@
+"""Two scenes as one: the second's Gaussians and atoms behind the first's, in the first's world."""
+
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from langflash_core.errors import InputError
+from langflash_core.scene.changed import changed
+from langflash_core.scene.changes import Moved, Spot
+from langflash_core.scene.mask import Mask
+from langflash_core.types import NO_LANGUAGE, Gaussians, Scene, Semantics
+
+MOST_ATOMS = 960  # that the picture can show together (app/gl/packed.py)
+_GAP = 0.1  # between both, of the first one's width
+_EDGE = 0.02  # share of the places on either side that counts as outliers
+
+
+@dataclass(frozen=True)
+class _Box:
+    """low, high (3,): where nearly all of a scene's Gaussians are."""
+
+    low: Tensor
+    high: Tensor
+
+
+def joined(first: Scene, second: Scene, names: tuple[str, str] = ("this scene", "the other")) -> Scene:
+    """Both as one scene, the second beside the first.
+
+    Rows and atoms of the first keep their numbers; those of the second follow, its names with them.
+    Features stay as they are: f_i = sum_k w_ik d_k with the same w_ik and d_k. The second comes in
+    the first's unit where both know theirs in metres. Views, photos and the rest of the record are the
+    first's: cameras of the second would look at what is somewhere else now.
+
+    Args:
+        names: of both, for people.
+
+    Raises:
+        InputError: their phrases mean different things, or together they have more than `MOST_ATOMS` atoms.
+    """
+    _check(first, second, names)
+    placed = changed(second.gaussians, (beside(first, second),))
+    gaussians = _stacked(first.gaussians, placed)
+    view_ids = None
+    if first.view_ids is not None:
+        view_ids = torch.cat((first.view_ids, first.view_ids.new_full((len(placed),), -1)))
+    scene = replace(
+        first,
+        gaussians=gaussians,
+        semantics=_joined_semantics(first.semantics, second.semantics),
+        view_ids=view_ids,
+        record=replace(first.record, atom_names={}, atom_denials={}, silent_atoms=()),
+    )
+    after, ours, theirs = first.semantics.num_atoms, first.record, second.record
+    return scene.with_record(
+        atom_names={**ours.atom_names, **{k + after: name for k, name in theirs.atom_names.items()}},
+        atom_denials={**ours.atom_denials, **{k + after: words for k, words in theirs.atom_denials.items()}},
+        silent_atoms=(*ours.silent_atoms, *(k + after for k in theirs.silent_atoms)),
+    )
+
+
+def beside(first: Scene, second: Scene) -> Moved:
+    """Where the second comes to: at the first's right, on the same floor, as far away, in its unit."""
+    ratio = 1.0
+    if first.record.metric_scale and second.record.metric_scale:
+        ratio = second.record.metric_scale / first.record.metric_scale
+    ours, theirs = _box(first.gaussians), _box(second.gaussians)
+    gap = _GAP * float(ours.high[0] - ours.low[0])
+    right = float(ours.high[0]) + gap - ratio * float(theirs.low[0])
+    down = float(ours.high[1]) - ratio * float(theirs.high[1])
+    ahead = float(ours.low[2] + ours.high[2] - ratio * (theirs.low[2] + theirs.high[2])) / 2
+    offset: Spot = (right, down, ahead)
+    return Moved(Mask.full(len(second.gaussians)), scale=ratio, offset=offset)
+
+
+def _check(first: Scene, second: Scene, names: tuple[str, str]) -> None:
+    ours, theirs = first.semantics, second.semantics
+    if not len(second.gaussians):
+        raise InputError(f"{names[1]} holds no Gaussian; choose another scene to merge")
+    if NO_LANGUAGE in (ours.space, theirs.space):
+        return
+    if ours.space != theirs.space or ours.dictionary.shape[1] != theirs.dictionary.shape[1]:
+        raise InputError(
+            f"{names[1]} speaks {theirs.space} and {names[0]} speaks {ours.space}, so no phrase could be "
+            "asked of both; merge scenes that the same preset made"
+        )
+    if ours.num_atoms + theirs.num_atoms > MOST_ATOMS:
+        raise InputError(
+            f"{names[0]} and {names[1]} have {ours.num_atoms + theirs.num_atoms:,} groups together, at most "
+            f"{MOST_ATOMS} can be shown; merge groups in the dictionary first"
+        )
+
+
+def _box(gaussians: Gaussians) -> _Box:
+    means = gaussians.means.double()
+    means = means[torch.isfinite(means).all(-1)]
+    if not len(means):
+        return _Box(torch.zeros(3), torch.zeros(3))
+    ordered = means.sort(dim=0).values
+    last = len(ordered) - 1
+    return _Box(ordered[round(_EDGE * last)], ordered[round((1 - _EDGE) * last)])
+
+
+def _stacked(first: Gaussians, second: Gaussians) -> Gaussians:
+    """Both, with as many harmonics as the one that has more; the others' are 0."""
+    bases = max(first.sh.shape[1], second.sh.shape[1])
+    ours, theirs = (replace(some, sh=_padded(some.sh, bases)) for some in (first, second))
+    pairs = (
+        (getattr(ours, name), getattr(theirs, name))
+        for name in ("means", "quats", "scales", "opacities", "sh")
+    )
+    return Gaussians(*(torch.cat((mine, yours.to(mine))) for mine, yours in pairs))
+
+
+def _joined_semantics(first: Semantics, second: Semantics) -> Semantics:
+    """One dictionary; the second's numbers begin behind the first's. Who carries less weights gets zeros."""
+    spoken = second if first.space == NO_LANGUAGE else first
+    channels, most = spoken.dictionary.shape[1], max(first.weight_ids.shape[1], second.weight_ids.shape[1])
+    rows = [
+        each.dictionary if each.num_atoms else each.dictionary.new_zeros(0, channels)
+        for each in (first, second)
+    ]
+    shifted = second.weight_ids + first.num_atoms if second.num_atoms else second.weight_ids
+    values = (_padded(first.weight_values, most), _padded(second.weight_values, most))
+    return Semantics(
+        weight_ids=torch.cat((_padded(first.weight_ids, most), _padded(shifted, most))),
+        weight_values=torch.cat((values[0], values[1].to(values[0]))),
+        dictionary=torch.cat((rows[0], rows[1].to(rows[0]))),
+        space=spoken.space,
+    )
+
+
+def _padded(values: Tensor, columns: int) -> Tensor:
+    """(N, n, ...) with zeros up to so many columns."""
+    more = values.new_zeros(len(values), columns - values.shape[1], *values.shape[2:])
+    return torch.cat((values, more), 1)
