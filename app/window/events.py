@@ -74,8 +74,9 @@ class Events:
                 self._pause(2)
         self._backend.keyboard_callback(window, named, scancode, action, mods)
         if action == glfw.PRESS and (mods & CHORDS or key in ENTER):
-            # Let go at once: held over slow frames it would be pressed again, in the field that it opened.
-            self._backend.keyboard_callback(window, named, scancode, glfw.RELEASE, mods)
+            if key in ENTER or ord("A") <= named <= ord("Z"):
+                # Let go at once: held over slow frames it would be pressed again, in the field it opened.
+                self._backend.keyboard_callback(window, named, scancode, glfw.RELEASE, mods)
             self._pause(FOCUS_FRAMES)  # a new field has the focus before the next letter comes
 
     def _pause(self, frames: int) -> None:

@@ -175,7 +175,7 @@ def _looking() -> Iterable[Entry]:
     for side, forward in camera.SIDES:
         keys = _plain(_SIDE_KEYS[side]) if side in _SIDE_KEYS else ()
         yield Entry(f"Look from {side}", group, _shown(camera.Face(forward)), keys)
-    rays = (*_plain("u"), *_plain("keypad5"))
+    rays = (*_plain("comma"), *_plain("keypad5"))
     yield Entry("Parallel rays (orthographic), or perspective", group, _shown(camera.SwitchRays()), rays)
     yield Entry("Add a key frame", group, _shown(film.AddKey()), _plain("m"))
     yield Entry("Remove the last key frame", group, lambda s: film.RemoveKey() if s.keys else None)

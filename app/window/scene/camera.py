@@ -76,7 +76,7 @@ class SwitchRays:
 
 NOT_SEEN = (
     "No photo looked from there; this is as near as they show it. "
-    'With parallel rays (U), or without "Keep to what the photos saw" (Preferences), you may go on.'
+    'With parallel rays (comma), or without "Keep to what the photos saw" (Preferences), you may go on.'
 )
 
 

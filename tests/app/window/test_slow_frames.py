@@ -10,7 +10,13 @@ from app.window.events import FOCUS_FRAMES, Events
 from tests.app.window.headless import context
 
 SLOW = 0.4  # seconds a frame; ImGui repeats a key after 0.275
-_KEYS = {glfw.KEY_ENTER: imgui.Key.enter, glfw.KEY_KP_ENTER: imgui.Key.keypad_enter, glfw.KEY_V: imgui.Key.v}
+_KEYS = {
+    glfw.KEY_ENTER: imgui.Key.enter,
+    glfw.KEY_KP_ENTER: imgui.Key.keypad_enter,
+    glfw.KEY_LEFT_SHIFT: imgui.Key.left_shift,
+    glfw.KEY_RIGHT: imgui.Key.right_arrow,
+    glfw.KEY_V: imgui.Key.v,
+}
 
 
 def keyboard(io) -> Events:
@@ -85,3 +91,17 @@ def test_a_quick_ctrl_v_pastes_once(monkeypatch) -> None:
             imgui.end()
             imgui.end_frame()
         assert text == "lamp"
+
+
+@pytest.mark.parametrize("key", [glfw.KEY_LEFT_SHIFT, glfw.KEY_RIGHT])
+def test_what_is_held_with_ctrl_stays_down(key: int, monkeypatch) -> None:
+    """Shift, for Ctrl+Shift+Z; arrows, which repeat."""
+    with context((800, 600)):
+        io = imgui.get_io()
+        monkeypatch.setattr("app.window.events._by_letter", lambda key, scancode: key)
+        keyboard(io)._key(None, key, 0, glfw.PRESS, glfw.MOD_CONTROL)
+        for _ in range(FOCUS_FRAMES + 6):
+            io.delta_time = SLOW
+            imgui.new_frame()
+            imgui.end_frame()
+        assert imgui.is_key_down(_KEYS[key])

@@ -40,6 +40,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> tuple[list[do
         return _rest(state), False
     _style(look, size)
     gizmo.set_drawlist(imgui.get_window_draw_list())
+    gizmo.set_orthographic(state.pose.span is not None)
     gizmo.set_rect(place.x, place.y, size.x, size.y)
     context = imgui.get_current_context()
     hovered, context.hovered_id_previous_frame = (
@@ -80,14 +81,18 @@ def view_of(pose: Pose) -> np.ndarray:
 
 def projection_of(pose: Pose, size: ImVec2) -> np.ndarray:
     """Camera in OpenGL's axes to clip space (4, 4), of a picture of `size`, its principal point where the
-    pose has it."""
+    pose has it, its rays as the pose's."""
     K = poses.intrinsics(pose, max(round(size.x), 1), max(round(size.y), 1))
     near, far = poses.NEAREST, _FAR * poses.NEAREST * max(pose.reach, 1.0)
     matrix = np.zeros((4, 4))
-    matrix[0, 0], matrix[0, 2] = 2 * K[0, 0] / size.x, 1 - 2 * K[0, 2] / size.x
-    matrix[1, 1], matrix[1, 2] = 2 * K[1, 1] / size.y, 2 * K[1, 2] / size.y - 1
-    matrix[2, 2], matrix[2, 3] = -(far + near) / (far - near), -2 * far * near / (far - near)
-    matrix[3, 2] = -1
+    matrix[0, 0], matrix[1, 1] = 2 * K[0, 0] / size.x, 2 * K[1, 1] / size.y
+    middle = np.array([2 * K[0, 2] / size.x - 1, 1 - 2 * K[1, 2] / size.y])
+    if pose.span is None:
+        matrix[:2, 2], matrix[3, 2] = -middle, -1
+        matrix[2, 2:] = -(far + near) / (far - near), -2 * far * near / (far - near)
+    else:
+        matrix[:2, 3], matrix[3, 3] = middle, 1
+        matrix[2, 2:] = -2 / (far - near), -(far + near) / (far - near)
     return matrix
 
 

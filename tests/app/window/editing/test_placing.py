@@ -1,10 +1,13 @@
 """Moving, turning, scaling and recolouring what is selected, as pure changes of a frozen state."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 from imgui_bundle import ImVec2
 
+from app.window import poses
 from app.window.asking.commands import AtomsWeighed
 from app.window.asking.work import WeighAtoms
 from app.window.editing import commands as edit
@@ -148,13 +151,13 @@ def test_moved_things_are_found_where_they_are(chosen: State, info) -> None:
     assert seen.flight is not None and seen.flight.end.pivot[0] == pytest.approx(CHAIR[0] + 0.5, abs=0.1)
 
 
-def test_the_gizmo_stands_where_the_picture_shows_the_thing(chosen: State) -> None:
-    """Its projection, with the principal point of the pose, against the camera's own."""
-    from app.window.poses import project
-
+@pytest.mark.parametrize("parallel", [False, True])
+def test_the_gizmo_stands_where_the_picture_shows_the_thing(chosen: State, parallel: bool) -> None:
+    """Its projection, with the principal point and the rays of the pose, against the camera's own."""
     size, points = ImVec2(640, 400), np.array([[0.1, -0.2, 1.5], [-0.3, 0.1, 0.9]])
-    clip = np.c_[points, np.ones(2)] @ (projection_of(chosen.pose, size) @ view_of(chosen.pose)).T
-    seen = project(points, chosen.pose, (640, 400))
+    pose = replace(chosen.pose, shift=(0.1, -0.2), span=3.0 if parallel else None)
+    clip = np.c_[points, np.ones(2)] @ (projection_of(pose, size) @ view_of(pose)).T
+    seen = poses.project(points, pose, (640, 400))
     assert seen is not None
     x = (clip[:, 0] / clip[:, 3] + 1) / 2 * 640
     y = (1 - clip[:, 1] / clip[:, 3]) / 2 * 400

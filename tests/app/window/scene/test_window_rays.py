@@ -16,7 +16,7 @@ def test_a_plan_of_the_room_is_a_key_away(display: str, scene_file: Path) -> Non
     program.until(lambda s: s["scene"] == "room.langflash", "the scene")
     program.xdotool("mousemove", *map(str, MIDDLE))
     perspective, before = program.at_rest(), program.picture()
-    program.xdotool("key", "u")
+    program.xdotool("key", "comma")
     program.until(lambda s: s["span"] is not None, "parallel rays")
     program.until_changed(before, 1.0)
     flat = program.at_rest()
@@ -31,7 +31,7 @@ def test_a_plan_of_the_room_is_a_key_away(display: str, scene_file: Path) -> Non
     hover = program.until(lambda s: s["hover"] is not None, "a place under the pointer")["hover"]
     assert abs(hover[0]) < 0.1, "in the middle of the room, whatever its depth"
     assert hover[1] == pytest.approx(0.4, abs=0.05) or hover[1] < CHAIR[1]  # the floor, or what stands on it
-    program.xdotool("key", "v", "sleep", "0.3", "key", "u")
+    program.xdotool("key", "v", "sleep", "0.3", "key", "comma")
     program.until(lambda s: s["span"] is None, "perspective again")
     program.xdotool("key", "h")
     home = program.until(lambda s: s["view"] == 0 and not s["flying"], "the first photo")
