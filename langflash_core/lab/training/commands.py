@@ -35,7 +35,8 @@ from langflash_core.lab.training.real import JointSet, KeptPhotos, PhotoTargets,
 from langflash_core.lab.training.recipes import Recipe, named_recipe, stages_of
 from langflash_core.lab.training.scenes import SceneSet, SceneSource
 from langflash_core.lab.training.shards import Label
-from langflash_core.lab.training.stages import Stage, Words, guided, taught, untaught
+from langflash_core.lab.training.stages.grouping import taught, untaught
+from langflash_core.lab.training.stages.stage import Stage, Words, guided
 from langflash_core.lab.training.states import LoopState
 from langflash_core.lab.training.trained import begin, load_trained, prepared
 from langflash_core.lab.training.validation import MEASURES, Validator

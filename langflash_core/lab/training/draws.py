@@ -16,7 +16,7 @@ from torch import Tensor
 
 from langflash_core.errors import InputError
 from langflash_core.lab.training.ranks import gathered, rank, world
-from langflash_core.lab.training.stages import Words
+from langflash_core.lab.training.stages.stage import Words
 
 _APART = 1_000_003
 """Between the seeds of two batches of a step."""

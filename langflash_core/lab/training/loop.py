@@ -25,7 +25,7 @@ from langflash_core.lab.training.board import Board
 from langflash_core.lab.training.draws import Draws, all_states, begin_draws, restore_draws
 from langflash_core.lab.training.mixing import loss_of
 from langflash_core.lab.training.ranks import agreed, everywhere, gathered, leads, world
-from langflash_core.lab.training.stages import Stage, Words, modules_of
+from langflash_core.lab.training.stages.stage import Stage, Words, modules_of
 from langflash_core.lab.training.states import (
     LoopState,
     forget_later_rows,

@@ -11,7 +11,7 @@ from typing import Any
 import torch
 
 from langflash_core.lab.training.batches import RoomSet, SceneBatch
-from langflash_core.lab.training.stages import Loss, StageLoss, Words
+from langflash_core.lab.training.stages.stage import Loss, StageLoss, Words
 from langflash_core.network.model import LangFlashNet
 
 

@@ -7,7 +7,8 @@ from torch.nn import functional as F
 from langflash_core.lab.training.losses import language_loss
 from langflash_core.lab.training.measures import confusion
 from langflash_core.lab.training.parts import PartBatch, joined
-from langflash_core.lab.training.stages import Loss, Stage, Words, guided, phrase_bank
+from langflash_core.lab.training.stages.language import phrase_bank
+from langflash_core.lab.training.stages.stage import Loss, Stage, Words, guided
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.semantics.naming import PLACE
 

@@ -21,7 +21,10 @@ from torch import Tensor
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.training.batches import SceneBatch, collate
 from langflash_core.lab.training.shards import Label, open_shards
-from langflash_core.lab.training.stages import group_masks, mostly, nearest, tokens_of
+from langflash_core.lab.training.stages.aggregation import mostly
+from langflash_core.lab.training.stages.grouping import group_masks
+from langflash_core.lab.training.stages.pixels import nearest
+from langflash_core.lab.training.stages.stage import tokens_of
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.semantics.naming import describe, places
 

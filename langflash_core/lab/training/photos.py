@@ -21,7 +21,7 @@ from langflash_core.lab.photos.fitting import FittedPhoto, drawn_window, fitted,
 from langflash_core.lab.training.cache import encode_pictures, photometric
 from langflash_core.lab.training.photo_names import photo_label
 from langflash_core.lab.training.shards import NOTHING, Label, RoomRecord, quantise_tokens, write_shard
-from langflash_core.lab.training.stages import guided
+from langflash_core.lab.training.stages.stage import guided
 from langflash_core.network.checkpoints.files import initial_network
 from langflash_core.network.encoders.shared import Encoder
 from langflash_core.network.presets import PRESETS

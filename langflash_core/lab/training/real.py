@@ -35,17 +35,10 @@ from langflash_core.lab.training.measures import (
     nan_mean,
 )
 from langflash_core.lab.training.photo_names import photo_label
-from langflash_core.lab.training.stages import (
-    Loss,
-    Stage,
-    Words,
-    depth_stage,
-    evenly_drawn,
-    guided,
-    language_stage,
-    nearest,
-    thinned,
-)
+from langflash_core.lab.training.stages.depth import depth_stage
+from langflash_core.lab.training.stages.language import language_stage, thinned
+from langflash_core.lab.training.stages.pixels import evenly_drawn, nearest
+from langflash_core.lab.training.stages.stage import Loss, Stage, Words, guided
 from langflash_core.lab.training.states import LoopState, save_cut
 from langflash_core.lab.training.teacher import Names, Rows, Teacher, hand_over
 from langflash_core.network.guided import GuidedDepthNet

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.lab.training.ranks import leads
-from langflash_core.lab.training.stages import Stage, modules_of
+from langflash_core.lab.training.stages.stage import Stage, modules_of
 from langflash_core.network.model import LangFlashNet
 
 log = logging.getLogger(__name__)

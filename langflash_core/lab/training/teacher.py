@@ -19,7 +19,7 @@ from torch.nn import functional as F
 from langflash_core.lab.photos.names import CLASSES37, class_of
 from langflash_core.lab.training.losses import depth_loss, gradient_loss
 from langflash_core.lab.training.shards import NOTHING, Label
-from langflash_core.lab.training.stages import evenly_drawn, nearest
+from langflash_core.lab.training.stages.pixels import evenly_drawn, nearest
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.presets import GuidedDepth
 from langflash_core.network.semantics.features import LanguageHead, TaughtReader

@@ -7,7 +7,8 @@ from pathlib import Path
 from langflash_core.errors import InputError
 from langflash_core.lab.training.real import MODULES
 from langflash_core.lab.training.recipes import Recipe, stages_of
-from langflash_core.lab.training.stages import Stage, language_stage, modules_of
+from langflash_core.lab.training.stages.language import language_stage
+from langflash_core.lab.training.stages.stage import Stage, modules_of
 from langflash_core.lab.training.states import load_averaged
 from langflash_core.network.build import network_class
 from langflash_core.network.checkpoints.files import initial_network, save_network, start_from

@@ -21,18 +21,12 @@ from langflash_core.lab.training.measures import (
 )
 from langflash_core.lab.training.naming import measure_naming
 from langflash_core.lab.training.parts import PartSet
-from langflash_core.lab.training.stages import (
-    Words,
-    frozen_tokens,
-    group_masks,
-    guided,
-    named_parts,
-    nearest,
-    novel_views,
-    one_scene,
-    scaled_prior,
-    tokens_of,
-)
+from langflash_core.lab.training.stages.aggregation import named_parts
+from langflash_core.lab.training.stages.depth import scaled_prior
+from langflash_core.lab.training.stages.gaussians import novel_views
+from langflash_core.lab.training.stages.grouping import group_masks
+from langflash_core.lab.training.stages.pixels import nearest
+from langflash_core.lab.training.stages.stage import Words, frozen_tokens, guided, one_scene, tokens_of
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.precision import mixed
 

@@ -14,7 +14,7 @@ from torch.nn import functional as F
 
 from langflash_core.lab.training.batches import RoomSet
 from langflash_core.lab.training.shards import Label, RoomRecord, quantise_tokens, write_shard
-from langflash_core.lab.training.stages import Words
+from langflash_core.lab.training.stages.stage import Words
 from langflash_core.lab.training.words import PhraseSampler, build_table
 from langflash_core.network import MINI, GuidedDepthNet
 

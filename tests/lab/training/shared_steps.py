@@ -14,7 +14,8 @@ import torch
 from langflash_core.lab.training.batches import RoomSet
 from langflash_core.lab.training.loop import LoopOptions, train_stage
 from langflash_core.lab.training.ranks import joined
-from langflash_core.lab.training.stages import STAGES, Loss, Stage, Words
+from langflash_core.lab.training.stages.stage import Loss, Stage, Words
+from langflash_core.lab.training.stages.table import STAGES
 from langflash_core.lab.training.words import PhraseSampler, build_table
 from langflash_core.network import MINI, GuidedDepthNet
 from tests.lab.training.conftest import encode

@@ -19,7 +19,7 @@ from langflash_core.lab.photos.writing import FolderWriter
 from langflash_core.lab.training.objects import tracked
 from langflash_core.lab.training.scenes import SceneSource, source_at
 from langflash_core.lab.training.shards import NOTHING
-from langflash_core.lab.training.stages import NamedParts, collected_texts
+from langflash_core.lab.training.stages.aggregation import NamedParts, collected_texts
 from tests.lab.labels.painted import HEIGHT, WIDTH, Counting, Knowing, painted_clip
 from tests.lab.photos.layouts_made import jpeg
 

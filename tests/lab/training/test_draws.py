@@ -5,7 +5,7 @@ import torch
 
 from langflash_core.lab.training.draws import Draws, begin_draws
 from langflash_core.lab.training.loop import LoopOptions, train_stage
-from langflash_core.lab.training.stages import STAGES
+from langflash_core.lab.training.stages.table import STAGES
 
 
 @pytest.fixture

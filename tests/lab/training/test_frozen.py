@@ -13,16 +13,10 @@ from langflash_core.lab.training.grouping import GroupingWeights
 from langflash_core.lab.training.loop import LoopOptions, train_stage
 from langflash_core.lab.training.mixing import Mixed, MixedSet
 from langflash_core.lab.training.recipes import weighted
-from langflash_core.lab.training.stages import (
-    POINT_STAGES,
-    STAGES,
-    STUDENT,
-    named_parts,
-    one_scene,
-    taught,
-    tokens_of,
-    untaught,
-)
+from langflash_core.lab.training.stages.aggregation import named_parts
+from langflash_core.lab.training.stages.grouping import STUDENT, taught, untaught
+from langflash_core.lab.training.stages.stage import one_scene, tokens_of
+from langflash_core.lab.training.stages.table import POINT_STAGES, STAGES
 from langflash_core.network import build_network
 from langflash_core.network.encoders.mobile_sam import MobileSamEncoder
 from tests.network.sizes import TINY

@@ -9,7 +9,8 @@ import torch
 from langflash_core.errors import InputError
 from langflash_core.lab.training.loop import LoopOptions, train_stage
 from langflash_core.lab.training.losses import point_loss
-from langflash_core.lab.training.stages import POINT_STAGES, STAGES, modules_of
+from langflash_core.lab.training.stages.stage import modules_of
+from langflash_core.lab.training.stages.table import POINT_STAGES, STAGES
 from langflash_core.network import PointMapNet, build_network
 from tests.lab.training.test_stages import loss_of
 from tests.network.sizes import TINY

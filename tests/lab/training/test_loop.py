@@ -9,7 +9,8 @@ import pytest
 import torch
 
 from langflash_core.lab.training.loop import LoopOptions, learning_rate, train_stage
-from langflash_core.lab.training.stages import STAGES, Loss
+from langflash_core.lab.training.stages.stage import Loss
+from langflash_core.lab.training.stages.table import STAGES
 from langflash_core.lab.training.states import load_averaged
 
 OPTIONS = LoopOptions(minutes=10, max_steps=2, pictures=2, report_s=0.0, validate_s=0.0, save_s=1e9)

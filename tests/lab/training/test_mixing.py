@@ -15,7 +15,9 @@ from langflash_core.lab.training.loop import LoopOptions
 from langflash_core.lab.training.mixing import Mixed, MixedSet, loss_of
 from langflash_core.lab.training.parts import PartSet
 from langflash_core.lab.training.shards import NOTHING, Label, write_shard
-from langflash_core.lab.training.stages import STAGES, Loss, grouping_stage
+from langflash_core.lab.training.stages.grouping import grouping_stage
+from langflash_core.lab.training.stages.stage import Loss
+from langflash_core.lab.training.stages.table import STAGES
 from langflash_core.lab.training.trained import run_export
 from langflash_core.network import MINI, load_network, save_network
 from langflash_core.network.build import build_network

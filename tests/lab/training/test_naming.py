@@ -10,7 +10,7 @@ from langflash_core.lab.training import naming
 from langflash_core.lab.training.loop import LoopOptions, train_stage
 from langflash_core.lab.training.naming import NAMING, naming_stage
 from langflash_core.lab.training.parts import PartSet, guessed_geometry, joined, parts_of, run_parts
-from langflash_core.lab.training.stages import one_scene
+from langflash_core.lab.training.stages.stage import one_scene
 from langflash_core.lab.training.validation import MEASURES, Validator
 
 

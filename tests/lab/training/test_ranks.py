@@ -14,7 +14,8 @@ import torch
 from langflash_core.errors import InputError, MissingPackageError
 from langflash_core.lab.training.draws import begin_draws
 from langflash_core.lab.training.loop import LoopOptions, train_stage
-from langflash_core.lab.training.stages import STAGES, Loss
+from langflash_core.lab.training.stages.stage import Loss
+from langflash_core.lab.training.stages.table import STAGES
 from tests.lab.training.reference import plain_training
 from tests.lab.training.shared_steps import train
 

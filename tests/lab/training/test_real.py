@@ -128,7 +128,7 @@ def test_a_few_steps_teach_names_and_end_in_a_cut_half(photos, targets, tmp_path
     from langflash_core.lab.training.loop import LoopOptions
     from langflash_core.lab.training.real import MODULES, JointSet, train_late
     from langflash_core.lab.training.shards import Label
-    from langflash_core.lab.training.stages import Words
+    from langflash_core.lab.training.stages.stage import Words
     from langflash_core.lab.training.states import load_averaged
     from langflash_core.lab.training.words import PhraseSampler, build_table
     from langflash_core.network import MINI

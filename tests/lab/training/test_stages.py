@@ -8,15 +8,12 @@ import torch
 from torch.nn import functional as F
 
 from langflash_core.lab.training.loop import LoopOptions, train_stage
-from langflash_core.lab.training.stages import (
-    STAGES,
-    balanced_pixels,
-    group_masks,
-    nearest,
-    perturbed_poses,
-    thinned,
-    tokens_of,
-)
+from langflash_core.lab.training.stages.depth import perturbed_poses
+from langflash_core.lab.training.stages.grouping import group_masks
+from langflash_core.lab.training.stages.language import thinned
+from langflash_core.lab.training.stages.pixels import balanced_pixels, nearest
+from langflash_core.lab.training.stages.stage import tokens_of
+from langflash_core.lab.training.stages.table import STAGES
 from langflash_core.lab.training.validation import MEASURES, Validator
 
 # Steps, learning rate, and the share of the first loss that must be left: about twice what was seen.

@@ -15,13 +15,10 @@ from langflash_core.errors import InputError
 from langflash_core.lab.training.grouping import AggregationWeights, GroupingWeights
 from langflash_core.lab.training.loop import LoopOptions, Optimising
 from langflash_core.lab.training.naming import NAMING
-from langflash_core.lab.training.stages import (
-    POINT_STAGES,
-    STAGES,
-    Stage,
-    aggregation_stage,
-    grouping_stage,
-)
+from langflash_core.lab.training.stages.aggregation import aggregation_stage
+from langflash_core.lab.training.stages.grouping import grouping_stage
+from langflash_core.lab.training.stages.stage import Stage
+from langflash_core.lab.training.stages.table import POINT_STAGES, STAGES
 from langflash_core.network.presets import PRESETS, PointMaps
 
 _FOLDER = Path(__file__).parent
