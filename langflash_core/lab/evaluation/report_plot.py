@@ -8,13 +8,13 @@ from langflash_core.export.colours import label_colours
 from langflash_core.lab.evaluation.report_parts import Plot, Point
 
 WIDTH, HEIGHT = 640, 340
-LEFT, RIGHT, TOP, BOTTOM = 62, 24, 18, 48
-LETTER = 6.2
+LEFT, RIGHT, TOP, BOTTOM = 72, 24, 18, 48
+LETTER = 6.8
 """Width of a letter, about."""
 
 
 def svg(plot: Plot) -> str:
-    """The plot as one <svg> element; seconds are logarithmic where they differ by more than ten times, errors
+    """The plot as one <svg> element; seconds are logarithmic where they differ by more than five times, errors
     where they do by more than a hundred."""
     points = [p for p in plot.points if math.isfinite(p.seconds) and math.isfinite(p.error)]
     if not points:
@@ -22,7 +22,7 @@ def svg(plot: Plot) -> str:
     seconds = [max(p.seconds, 1e-6) for p in points]
     highs = [p.bounds[1] if p.bounds else p.error for p in points]
     lows = [p.bounds[0] if p.bounds else p.error for p in points]
-    x, across = _axis(seconds, 10, (LEFT, WIDTH - RIGHT))
+    x, across = _axis(seconds, 5, (LEFT, WIDTH - RIGHT))
     y, up = _axis([*highs, *lows], 100, (HEIGHT - BOTTOM, TOP))
     parts = [
         f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" role="img" '
@@ -32,7 +32,7 @@ def svg(plot: Plot) -> str:
     for tick in up:
         place = f"{y(tick):.1f}"
         parts.append(f'<line class="grid" x1="{LEFT}" x2="{right}" y1="{place}" y2="{place}"/>')
-        parts.append(f'<text x="{LEFT - 8}" y="{y(tick) + 4:.1f}" text-anchor="end">{tick:.3g}</text>')
+        parts.append(f'<text x="{LEFT - 8}" y="{y(tick) + 4:.1f}" text-anchor="end">{_said(tick)}</text>')
     for tick in across:
         place = f"{x(tick):.1f}"
         parts.append(f'<line class="grid" x1="{place}" x2="{place}" y1="{TOP}" y2="{bottom}"/>')
@@ -43,9 +43,8 @@ def svg(plot: Plot) -> str:
         f'<text transform="translate(14 {(TOP + HEIGHT - BOTTOM) / 2}) rotate(-90)" '
         f'text-anchor="middle">{escape(plot.up)}</text>'
     )
-    levels = _apart(
-        [(*_span(point, x(own)), y(point.error)) for point, own in zip(points, seconds, strict=True)]
-    )
+    marks = [(x(own), y(point.error)) for point, own in zip(points, seconds, strict=True)]
+    levels = _apart([(*_span(point, x), y) for point, (x, y) in zip(points, marks, strict=True)], marks)
     colours = [tuple(colour) for colour in label_colours(len(points)).tolist()]
     for row, (point, own, level) in enumerate(zip(points, seconds, levels, strict=True)):
         parts += _mark(point, x(own), y, level, _dark(colours[row]))
@@ -81,9 +80,12 @@ def _span(point: Point, x: float) -> tuple[float, float]:
     return (x + 9, x + 9 + wide) if _after(point, x) else (x - 9 - wide, x - 9)
 
 
-def _apart(names: Sequence[tuple[float, float, float]], least: float = 15) -> list[float]:
-    """Heights of names (left, right, height), each moved as little as it takes to touch none before it."""
-    placed: list[tuple[float, float, float]] = []
+def _apart(
+    names: Sequence[tuple[float, float, float]], marks: Sequence[tuple[float, float]], least: float = 15
+) -> list[float]:
+    """Heights of names (left, right, height), each moved as little as it takes to touch no mark (x, y) and no
+    name before it."""
+    placed = [(x - 5, x + 5, y) for x, y in marks]
     moved = [0.0] * len(names)
     for place in sorted(range(len(names)), key=lambda place: names[place][2]):
         left, right, wanted = names[place]
@@ -99,6 +101,11 @@ def _apart(names: Sequence[tuple[float, float, float]], least: float = 15) -> li
         )
         placed.append((left, right, moved[place]))
     return moved
+
+
+def _said(tick: float) -> str:
+    """A tick in few letters."""
+    return f"{tick:.0e}".replace("e-0", "e-") if 0 < abs(tick) < 1e-3 else f"{tick:.3g}"
 
 
 def _dark(colour: tuple[int, int, int]) -> str:

@@ -104,7 +104,7 @@ def test_a_plot_holds_its_points_inside():
     places = [tuple(map(float, p)) for p in re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)"', drawn)]
     assert len(places) == 2
     (fast_x, fast_y), (slow_x, slow_y) = places
-    assert 62 <= fast_x < slow_x <= 616 and 18 <= slow_y <= 292 and fast_y < slow_y  # less error is lower
+    assert 72 <= fast_x < slow_x <= 616 and 18 <= slow_y <= 292 and fast_y < slow_y  # less error is lower
     assert svg(Plot("Nothing", "", "", [])) == ""
     assert "<circle" in svg(Plot("One", "", "", [Point("only", 1.0, 0.0)]))
 
@@ -114,7 +114,7 @@ def test_errors_of_many_sizes_stand_on_a_logarithmic_axis():
     drawn = svg(Plot("Speed", "seconds", "error", [Point(str(e), 1.0, e) for e in errors]))
     heights = [float(y) for y in re.findall(r'<circle cx="[\d.]+" cy="([\d.]+)"', drawn)]
     assert heights[0] - heights[1] == pytest.approx(heights[1] - heights[2], abs=0.2)  # written to tenths
-    assert len(re.findall('class="grid" x1="62"', drawn)) == 7  # a line a power of ten
+    assert len(re.findall('class="grid" x1="72"', drawn)) == 7  # a line a power of ten
 
 
 def test_a_gallery_shows_the_worst_first_then_the_best(tmp_path):
