@@ -77,8 +77,8 @@ def order(state: State) -> Order | str:
 
 
 def fades(state: State) -> bool:
-    """Whether the export leaves out, softly, what no photo looked at: as on show, unless said otherwise; never
-    where the file does not say what that is."""
+    """Whether the export leaves out, softly, what no photo looked at: as on show, unless said otherwise;
+    never where the file does not say what that is."""
     form = state.exporting.form
     wanted = keeps_near(state) if form.fade is None else form.fade
     return form.what.fades and wanted and photos_known(state)
