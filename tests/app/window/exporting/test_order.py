@@ -81,13 +81,13 @@ def test_what_no_photo_made_does_not_fade_since_its_file_does_not_say_where_phot
         assert not isinstance(order, str) and "--fade" not in order.words
     state = of_photos()
     assert state.info is not None and state.info.scene.view_ids is not None
-    assert state.editing.marks is not None
+    marks = state.editing.marks
+    assert marks is not None
     merged = state.info.scene.view_ids.clone()
     merged[-9:] = -1
     info = replace(state.info, scene=replace(state.info.scene, view_ids=merged))
     state = replace(state, info=info)
     assert not photos_known(state)
-    marks = state.editing.marks
     undone = replace(marks, there=(len(merged) - 9, marks.there[1]))
     editing = replace(state.editing, history=History(undone))
     assert photos_known(replace(state, editing=editing))
