@@ -25,6 +25,7 @@ from .asking.state import Prompt, margin_span
 from .editing.state import Point, Reading, strongest
 from .governor import SETTLE_AFTER, Governor, Kind, Plan, thinned_shares
 from .poses import START, Pose, to_camera
+from .scene.near import keeps_near
 from .scene.state import Mode
 from .state import State
 
@@ -486,7 +487,7 @@ class Viewport:
             return  # what is on show stays until the answer is there
         active = next((i for i, p in enumerate(asked) if p.key == state.active), 0)
         colours = state.heat_colours
-        faded = state.preferences.near_photos and mode is Mode.RGB and drawn.pose.span is None
+        faded = mode is Mode.RGB and keeps_near(state, drawn.pose)
         colouring = (
             mode,
             active,

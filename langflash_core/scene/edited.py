@@ -9,7 +9,7 @@ from torch.nn.functional import normalize
 
 from langflash_core.scene.changed import changed_scene
 from langflash_core.scene.edits import Atom, Marks
-from langflash_core.types import Scene
+from langflash_core.types import NO_LANGUAGE, Scene, Semantics
 
 
 def edited_dictionary(scene: Scene, atoms: Sequence[Atom]) -> Tensor:
@@ -77,7 +77,11 @@ def there(scene: Scene, marks: Marks) -> Scene:
     if marks.there == (len(scene.gaussians), scene.semantics.num_atoms):
         return scene
     semantics = scene.semantics.rows(torch.arange(num_gaussians))
-    semantics = replace(semantics, dictionary=semantics.dictionary[:num_atoms])
+    if num_atoms:
+        semantics = replace(semantics, dictionary=semantics.dictionary[:num_atoms])
+    else:  # a splat file, into which a scene with language was merged
+        none = semantics.weight_ids[:, :0], semantics.weight_values[:, :0]
+        semantics = Semantics(*none, semantics.dictionary[:0, :0], NO_LANGUAGE)
     record = scene.record
     record = replace(
         record,

@@ -148,6 +148,8 @@ class Edit:
 
     def of_size(self, old: int, new: int) -> "Edit":
         """The same edit of a scene with `new` Gaussians, more or fewer behind the `old` that it is about."""
+        if old == new:
+            return self
         masks = ((name, Mask(old, zlib.decompress(packed)).of_count(new)) for name, packed in self.flips)
         changes = self.changes
         if changes is not None:

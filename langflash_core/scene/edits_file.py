@@ -1,6 +1,6 @@
 """A history of edits as JSON: small, readable, whole or refused.
 
-    {"format": "langflash-edits", "version": 1, "digest": of the scene, "gaussians": N, "atoms": K,
+    {"format": "langflash-edits", "version": 2, "digest": of the scene, "gaussians": N, "atoms": K,
      "about": {...}, "done": [...], "undone": [...]}
 
 An edit is {"label", "flips": {mask: base64 of zlib}, "swaps": [[atom, [into, name, on, denied...], [...]]]},
@@ -8,6 +8,7 @@ where key frames or the scale changed with "told": [[name, before, after]], wher
 recoloured with "changes": [stayed, [went], [came]], each of those [kind, base64 of zlib, numbers].
 What came before the first edit of "done" is in "before": edits without a name, from the scene to the marks
 that its history began with and on to those that can still be undone to; "forgotten" counts the latter.
+Version 1 had neither "changes" nor "before"; who reads only that must not lose them in silence.
 """
 
 import base64
@@ -15,6 +16,7 @@ import hashlib
 import json
 import math
 import zlib
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -27,7 +29,7 @@ from langflash_core.scene.edits import MASKS, TOLD, Atom, Edit, History, differe
 from langflash_core.scene.mask import Mask
 from langflash_core.types import Scene
 
-FORMAT, VERSION = "langflash-edits", 1
+FORMAT, VERSION = "langflash-edits", 2
 _LARGEST = 256 * 2**20  # bytes of one file; a mask of a million Gaussians has 125,000
 
 
@@ -86,6 +88,7 @@ def load_history(path: Path, scene: Scene) -> History:
             tuple(_decoded(entry, count) for entry in content.get(part, ()))
             for part in ("done", "undone", "before")
         )
+        _check_there((*done, *undone, *before), scene)
         passed = [first_marks(scene)]
         for edit in before:
             passed.append(edit.apply(passed[-1]))
@@ -97,6 +100,14 @@ def load_history(path: Path, scene: Scene) -> History:
     except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, zlib.error) as error:
         raise SceneFileError(f"{path.name} is damaged ({error}); edit the scene again") from error
     return whole
+
+
+def _check_there(edits: Iterable[Edit], scene: Scene) -> None:
+    """Raises ValueError: what a merge brought is not in the scene."""
+    most = len(scene.gaussians), scene.semantics.num_atoms
+    for there in (there for edit in edits for name, *pair in edit.told if name == "there" for there in pair):
+        if there[0] > most[0] or there[1] > most[1]:
+            raise ValueError(f"there: expected at most {most[0]} Gaussians and {most[1]} atoms")
 
 
 def _encoded(edit: Edit) -> dict:

@@ -24,7 +24,12 @@ class _Box:
     high: Tensor
 
 
-def joined(first: Scene, second: Scene, names: tuple[str, str] = ("this scene", "the other")) -> Scene:
+def joined(
+    first: Scene,
+    second: Scene,
+    names: tuple[str, str] = ("this scene", "the other"),
+    shown: Scene | None = None,
+) -> Scene:
     """Both as one scene, the second beside the first.
 
     Rows and atoms of the first keep their numbers; those of the second follow, its names with them.
@@ -33,13 +38,14 @@ def joined(first: Scene, second: Scene, names: tuple[str, str] = ("this scene", 
     first's: cameras of the second would look at what is somewhere else now.
 
     Args:
-        names: of both, for people.
+        names: of both, for people. shown: the first as edits changed it, beside which and in whose unit the
+            second comes; None: as it is.
 
     Raises:
         InputError: their phrases mean different things, or together they have more than `MOST_ATOMS` atoms.
     """
     _check(first, second, names)
-    placed = changed(second.gaussians, (beside(first, second),))
+    placed = changed(second.gaussians, (beside(first if shown is None else shown, second),))
     gaussians = _stacked(first.gaussians, placed)
     view_ids = None
     if first.view_ids is not None:

@@ -34,6 +34,8 @@ class Mask:
 
     def of_count(self, count: int) -> "Mask":
         """The same rows of more or fewer; rows that there are no longer are left out."""
+        if count == self.count:
+            return self
         rows = np.zeros(count, bool)
         kept = self.rows()[:count]
         rows[: len(kept)] = kept

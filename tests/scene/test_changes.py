@@ -190,7 +190,7 @@ def test_two_scenes_become_one_whose_undoing_leaves_the_first(tmp_path: Path) ->
     assert back.moved_to(0).marks == first_marks(first)
 
 
-def test_scenes_that_speak_differently_are_refused_and_mute_ones_taken() -> None:
+def test_scenes_that_speak_differently_are_refused_and_mute_ones_taken(tmp_path: Path) -> None:
     first, second = wide_cloud(), wide_cloud(seed=3)
     other = replace(second, semantics=replace(second.semantics, space="clip"))
     with pytest.raises(InputError, match=r"b\.langflash speaks clip and a speaks .*; merge scenes"):
@@ -215,6 +215,9 @@ def test_scenes_that_speak_differently_are_refused_and_mute_ones_taken() -> None
         total = whole.semantics.weight_values.sum(1)
         silent = slice(COUNT, None) if two is mute else slice(0, COUNT)
         assert bool((total[silent] == 0).all())
+    undone = replace(first_marks(joined(mute, first)), there=(COUNT, 0))
+    save(edited_scene(joined(mute, first), undone), tmp_path / "mute.langflash")
+    assert load(tmp_path / "mute.langflash").semantics.space == NO_LANGUAGE
 
 
 def test_a_history_forgets_its_oldest_steps_and_still_knows_what_was_opened(tmp_path: Path) -> None:

@@ -253,9 +253,26 @@ def test_a_history_survives_its_file(scene, tmp_path: Path):
         load_history(path, cloud(200, seed=5))
 
 
+def test_edits_of_the_version_before_open_and_newer_ones_name_their_version(scene, tmp_path: Path):
+    history = History(first_marks(scene))
+    history = history.edited("select", select(history.marks, Mask.of(np.arange(200) % 3 == 0)))
+    path = tmp_path / "edits.json"
+    save_history(history, scene, {}, path)
+    content = json.loads(path.read_text())
+    assert content["version"] == 2, "version 1 was read without moves, which were lost in silence"
+    del content["before"], content["forgotten"]
+    path.write_text(json.dumps({**content, "version": 1}))
+    assert load_history(path, scene) == history
+
+
 def with_done(text: str, **changes) -> str:
     """The file with one more edit in it, of these fields."""
     return json.dumps({**json.loads(text), "done": [{"label": "x", "flips": {}, "swaps": [], **changes}]})
+
+
+def whole(text: str) -> list[int]:
+    """How much there is of the scene of a file."""
+    return [json.loads(text)[part] for part in ("gaussians", "atoms")]
 
 
 @pytest.mark.parametrize(
@@ -276,6 +293,8 @@ def with_done(text: str, **changes) -> str:
         lambda text: with_done(text, told=[["camera_path", [], [3]]]),
         lambda text: with_done(text, told=[["metric_scale", 2.0, 3.0]]),
         lambda text: with_done(text, told=[["metric_scale", 2.0]]),
+        lambda text: with_done(text, told=[["there", whole(text), [999, 1]]]),
+        lambda text: with_done(text, told=[["there", whole(text), [1, 999]]]),
     ],
 )
 def test_a_damaged_history_is_refused(scene, tmp_path: Path, spoil):

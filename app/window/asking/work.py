@@ -135,10 +135,8 @@ class DescribeAtoms(SceneErrand):
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.export.colours import atom_colours
-        from langflash_core.scene.atoms import atom_pictures, atom_places, describe_atoms
-        from langflash_core.scene.changed import changed_scene
+        from langflash_core.scene.atoms import atom_pictures, describe_atoms
 
-        placed = self.scene if self.marks is None else changed_scene(self.scene, self.marks)
         report = describe_atoms(self.scene)
         shares = _shares(self.scene, self.marks)
         colours = atom_colours(self.scene.semantics.dictionary.double().numpy())
@@ -151,7 +149,7 @@ class DescribeAtoms(SceneErrand):
                 colours=tuple((float(r), float(g), float(b)) for r, g, b in colours),
                 order=report.order,
                 similarity=report.similarity,
-                places=tuple(place and Vector(*place) for place in atom_places(placed)),
+                places=_places(self.scene, self.marks),
             )
         )
 
@@ -166,13 +164,7 @@ class WeighAtoms(SceneErrand):
     marks: Marks
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        from langflash_core.scene.atoms import atom_places
-        from langflash_core.scene.changed import changed_scene
-
-        found = atom_places(changed_scene(self.scene, self.marks))
-        yield AtomsWeighed(
-            _shares(self.scene, self.marks), tuple(place and Vector(*place) for place in found)
-        )
+        yield AtomsWeighed(_shares(self.scene, self.marks), _places(self.scene, self.marks))
 
 
 def _shares(scene: "Scene", marks: Marks | None) -> tuple[float, ...]:
@@ -181,3 +173,13 @@ def _shares(scene: "Scene", marks: Marks | None) -> tuple[float, ...]:
     from langflash_core.scene.edited import left
 
     return tuple(map(float, atom_shares(scene if marks is None else left(scene, marks))))
+
+
+def _places(scene: "Scene", marks: Marks | None) -> tuple[Vector | None, ...]:
+    """(K,) where each atom is by now, world; None where nothing of it is left."""
+    from langflash_core.scene.atoms import atom_places
+    from langflash_core.scene.changed import changed_scene
+    from langflash_core.scene.edited import left
+
+    placed = scene if marks is None else left(changed_scene(scene, marks), marks)
+    return tuple(place and Vector(*place) for place in atom_places(placed))

@@ -124,7 +124,7 @@ class Nudge:
         axes = state.pose.axes
         match state.editing.handle:
             case Handle.MOVE:
-                way = axes @ np.array([self.right, self.down, self.ahead]) * STEP * state.pose.reach
+                way = axes @ np.array([self.right, self.down, self.ahead]) * STEP * state.pose.distance
                 gesture = Moved(marks.selected, offset=_spot(way))
             case Handle.TURN:
                 axis = (
@@ -232,8 +232,10 @@ def numbers_of(gesture: Change | None, pivot: Spot, handle: Handle) -> tuple[flo
 
 
 def of_numbers(numbers: tuple[float, ...], marks: Marks, pivot: Spot, handle: Handle) -> Moved:
-    """The gesture that the fields say."""
+    """The gesture that the fields say; none moves where one of them is no number."""
     rows = marks.selected
+    if not all(map(math.isfinite, numbers)):
+        return Moved(rows)
     match handle:
         case Handle.MOVE:
             x, y, z = (min(max(value, -FARTHEST), FARTHEST) for value in numbers)

@@ -11,7 +11,7 @@ from pathlib import Path
 from langflash_core.formats import COLOUR_MAPS
 
 from ..scene.drops import typed_path
-from ..scene.near import keeps_near
+from ..scene.near import keeps_near, photos_known
 from ..state import State
 from .state import ExportForm, What
 
@@ -77,9 +77,11 @@ def order(state: State) -> Order | str:
 
 
 def fades(state: State) -> bool:
-    """Whether the export leaves out, softly, what no photo looked at: as on show, unless said otherwise."""
+    """Whether the export leaves out, softly, what no photo looked at: as on show, unless said otherwise;
+    never where the file does not say what that is."""
     form = state.exporting.form
-    return form.what.fades and (keeps_near(state) if form.fade is None else form.fade)
+    wanted = keeps_near(state) if form.fade is None else form.fade
+    return form.what.fades and wanted and photos_known(state)
 
 
 def _colours(state: State) -> list[str]:

@@ -9,6 +9,7 @@ from .. import commands as do
 from ..filming.state import WAYS
 from ..kit import theme, widgets
 from ..kit.look import Look
+from ..scene.near import photos_known
 from ..state import State
 from . import commands as export
 from . import order as written
@@ -100,7 +101,7 @@ def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
         )
         if changed:
             form = replace(form, seconds=float(round(seconds)))
-    if what.fades:
+    if what.fades and photos_known(state):
         changed, fade = widgets.checkbox("Fade what no photo looked at", written.fades(state))
         if changed:
             form = replace(form, fade=fade)

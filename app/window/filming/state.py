@@ -35,19 +35,27 @@ def stored(keys: Iterable[Pose]) -> tuple[dict[str, Any], ...]:
 def read(entries: Iterable[Mapping[str, Any]]) -> tuple[Pose, ...]:
     """Key frames of a scene's record; none where one is damaged."""
     try:
-        found = [
-            Pose(
-                Vector(*map(float, entry["centre"])),
-                Rotation(*map(float, entry["rotation"])),
-                *(float(entry[name]) for name in ("reach", "fov", "aspect")),
-                shift=(float(entry["shift"][0]), float(entry["shift"][1])),
-                span=None if entry.get("span") is None else float(entry["span"]),
-            )
-            for entry in entries
-        ]
+        return tuple(map(read_pose, entries))[:MOST_KEYS]
     except (KeyError, TypeError, ValueError, IndexError):
         return ()
-    return tuple(found[:MOST_KEYS]) if all(map(_can_look, found)) else ()
+
+
+def read_pose(entry: Mapping[str, Any]) -> Pose:
+    """A pose out of a file; one of an earlier version has no span.
+
+    Raises:
+        KeyError, TypeError, ValueError, IndexError: it is damaged, or no picture can be drawn from there.
+    """
+    pose = Pose(
+        Vector(*map(float, entry["centre"])),
+        Rotation(*map(float, entry["rotation"])),
+        *(float(entry[name]) for name in ("reach", "fov", "aspect")),
+        shift=(float(entry["shift"][0]), float(entry["shift"][1])),
+        span=None if entry.get("span") is None else float(entry["span"]),
+    )
+    if not _can_look(pose):
+        raise ValueError(f"pose: expected one from which a picture can be drawn, received {pose}")
+    return pose
 
 
 def _can_look(pose: Pose) -> bool:

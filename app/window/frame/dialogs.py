@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable
+from itertools import groupby
 
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
@@ -37,7 +38,7 @@ TITLES = {
     "log": "Log",
     "palette": "All commands",
 }
-_HELP, _HANDS, _KEYS = 900.0, 208.0, 150.0  # design pixels of the help, and of its keys
+_HELP, _HANDS, _KEYS = 940.0, 208.0, 170.0  # design pixels of the help, and of its keys
 WIDTHS = {  # design pixels; others 520
     "export": export_panel.WIDTH,
     "settings": 560.0,
@@ -58,7 +59,7 @@ GESTURES = (
     ("Tab, F6", "the next control, the next area"),
     ("Esc", "one step back; cancels a job"),
 )
-_COLUMNS = ((None, "View"), ("File", "Find", "Tools", "Edit", "Program"))  # of help; None: the gestures
+COLUMNS = ((None, "View", "Program"), ("File", "Find", "Tools", "Edit"))  # of help; None: the gestures
 _CLOSING = (
     do.ShowDialog | show.SaveScene | show.OpenPaths | show.Instead | show.All | show.GoOn | show.SaveFirst
     | show.MergeScene
@@ -169,21 +170,37 @@ def _path_field(state: State, label: str) -> tuple[list[do.Command], bool]:
 
 def _help(state: State, look: Look) -> list[do.Command]:
     """Gestures and the keys of the table, by group, in two columns."""
-    for column, groups in enumerate(_COLUMNS):
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(8, 4))
+    for column, groups in enumerate(COLUMNS):
         if column:
             imgui.same_line(look.px(_HELP / 2))
         imgui.begin_group()
         for group in groups:
             _help_group(group, look)
         imgui.end_group()
+    imgui.pop_style_var()
     return []
 
 
+def help_rows(group: str | None) -> list[tuple[str, str]]:
+    """Keys and what they do; a run of commands that are called alike up to a colon is one row."""
+    if group is None:
+        return list(GESTURES)
+    rows = []
+    keyed = (entry for entry in table.ENTRIES if entry.group == group and entry.keys)
+    for family, alike in groupby(keyed, lambda each: each.name.partition(": ")[0]):
+        first, *others = alike
+        keys, meaning = ", ".join(map(str, first.keys)), first.name
+        if others:
+            keys += f" to {others[-1].key}"
+            meaning += others[-1].name.replace(f"{family}: ", " to ")
+        rows.append((keys, meaning))
+    return rows
+
+
 def _help_group(group: str | None, look: Look) -> None:
-    keyed = [entry for entry in table.ENTRIES if entry.group == group and entry.keys]
-    rows = [(", ".join(map(str, entry.keys)), entry.name) for entry in keyed] if group else GESTURES
     imgui.text_colored(theme.ACCENT, group or "Mouse and hands")
-    for keys, meaning in rows:
+    for keys, meaning in help_rows(group):
         imgui.text(keys)
         imgui.same_line(look.px(_KEYS if group else _HANDS))
         imgui.text_colored(theme.MUTED, meaning)

@@ -13,6 +13,7 @@ from langflash_core.scene.edits import History
 
 from ..commands import Command, Log, Notify
 from ..effects import Effects, Hands
+from ..requests import Errand
 from ..scene.commands import OpenScene, Reconstruct, SceneArrived, SceneSaved
 from ..scene.drops import SCENE_SUFFIX
 from ..scene.state import SceneInfo
@@ -55,6 +56,7 @@ class RecoveryEffects(Effects):
         self._copied = False  # whether the copy of an unsaved scene is complete
         self._edits_kept = False  # whether edits of the scene on show lie on the disk
         self._edits_wrote = False  # or have ever, and what removes them may not have come to it
+        self._replaced: list[Errand] = []  # forget what goes once the same edits are written elsewhere
         self._snapshot: tuple = ()
         self._keep_at = self._keep_edits_at = self._save_at = NEVER
 
@@ -130,6 +132,10 @@ class RecoveryEffects(Effects):
                 self._copied = True
                 self._snapshot = ()  # the session now has a scene to name
                 self._drop_outlived()
+            case EditsKept(file) if file is not None:
+                for errand in self._replaced:
+                    self._hands.submit(errand)
+                self._replaced = []
             case EndSessionOffer(restore) if before.recovery.session is not None:
                 self._end_session_offer(before.recovery.session, restore)
             case EndOffer(restore, forget) if before.recovery.edits is not None:
@@ -162,15 +168,16 @@ class RecoveryEffects(Effects):
                 text = f"The edits of {before.info.name} are kept; go back to it to go on with them."
                 self._hands.perform(Notify(text, "info"))
         self._edits_kept, self._edits_wrote, self._keep_edits_at = False, False, NEVER
+        self._replaced = []
         restored, self._restoring_edits = self._restoring_edits, None
         if info.history is not None and info.history.done:  # restored, or a room of this session
             self._write_edits(info, info.history, state)
             if restored is not None and not self._keeper.own(restored):
-                self._hands.submit(ForgetFile(restored))
+                self._replaced.append(ForgetFile(restored))
         else:
             self._hands.submit(LookForEdits(info.serial, info.scene, info.path))
-        if replaces and before.info is not None:  # once the same edits lie beside the scene that has come
-            self._hands.submit(ForgetEdits(before.info.scene, self._keeper.token))
+        if replaces and before.info is not None:  # the same edits are to lie beside the scene that has come
+            self._replaced.append(ForgetEdits(before.info.scene, self._keeper.token))
 
     def _end_offer(self, offer: Offer, restore: bool, forget: bool) -> None:
         if restore:

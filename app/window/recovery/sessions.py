@@ -15,8 +15,8 @@ from typing import BinaryIO
 
 from langflash_core.errors import OutputError
 
+from ..filming.state import read_pose
 from ..places import state_folder
-from ..poses import Pose, Rotation, Vector
 from ..scene.drops import SCENE_SUFFIX, still_there
 from .state import Kept
 
@@ -49,13 +49,7 @@ def read(path: Path) -> Kept | None:
     try:
         content = json.loads(path.read_bytes())
         pose = content.pop("pose")
-        placed = None
-        if pose is not None:
-            centre, rotation = Vector(*map(float, pose["centre"])), Rotation(*map(float, pose["rotation"]))
-            rest = {name: float(pose[name]) for name in ("reach", "fov", "aspect")}
-            shift = (float(pose["shift"][0]), float(pose["shift"][1]))
-            span = None if pose.get("span") is None else float(pose["span"])
-            placed = Pose(centre, rotation, shift=shift, span=span, **rest)
+        placed = None if pose is None else read_pose(pose)
         lists = {name: tuple(content.pop(name)) for name in ("photos", "fovs", "phrases")}
         asked = _asked(content, len(lists["phrases"]))
         kept = Kept(pose=placed, file=path, **asked, **lists, **content)

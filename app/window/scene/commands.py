@@ -408,7 +408,6 @@ class Merged:
         before = before.of_size(count, whole.atoms)
         brought = Mask.full(count) - Mask.first(count, self.there[0])
         after = replace(before.marks, there=whole.there, selected=brought)
-        after = replace(after, metric_scale=before.marks.metric_scale)
         history = before.edited(f"Merge {self.name}", after)
         if saved is not None:
             saved = saved.of_size(self.there[0], saved.atoms[: self.there[1]]).of_size(count, whole.atoms)

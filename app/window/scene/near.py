@@ -1,24 +1,33 @@
 """Where the photos were taken, for whoever keeps to what they saw."""
 
 from .. import poses
-from ..poses import Vector
+from ..poses import Pose, Vector
 from ..state import State
 
 FADING = 30.0  # degrees aside from which the picture fades: `FULL` of langflash_core/scene/trust.py
 
 
-def keeps_near(state: State) -> bool:
-    """Whether the person wants to keep to what the photos saw; parallel rays show all there is."""
-    return state.preferences.near_photos and state.pose.span is None
+def keeps_near(state: State, pose: Pose | None = None) -> bool:
+    """Whether the person wants to keep to what the photos saw, where that is known; parallel rays show all.
+    pose: of the picture, None: as on show."""
+    flat = (pose or state.pose).span is not None
+    return state.preferences.near_photos and not flat and photos_known(state)
+
+
+def photos_known(state: State) -> bool:
+    """Whether photos made all there is: not where a file does not say, nor with what a merge brought, which
+    is behind all else."""
+    info, marks = state.info, state.editing.marks
+    if info is None or info.scene.view_ids is None:
+        return False
+    count = len(info.scene.view_ids) if marks is None else marks.there[0]
+    return count > 0 and int(info.scene.view_ids[count - 1]) >= 0
 
 
 def places_to_keep_to(state: State) -> tuple[Vector, ...]:
-    """Of the photos that the scene was made of; none where nobody knows them, or wants to keep to them,
-    or the picture is a plan."""
+    """Of the photos that the scene was made of; none where nothing keeps to them."""
     info = state.info
-    if info is None or info.scene.view_ids is None or not keeps_near(state):
-        return ()
-    return tuple(view.centre for view in info.views)
+    return () if info is None or not keeps_near(state) else tuple(view.centre for view in info.views)
 
 
 def degrees_from_photos(state: State) -> float:

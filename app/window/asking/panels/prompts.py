@@ -24,11 +24,8 @@ def draw(state: State, look: Look) -> list[do.Command]:
         issued += _row(state, prompt, look)
         imgui.pop_id()
     issued += entry.tools(state, look)
-    if not state.asked:  # what there is to ask comes first until something is asked
-        issued += known.draw(state, look)
+    issued += known.draw(state, look)  # above the scores, which come with an answer and would push it down
     issued += scores.draw(state, look)
-    if state.asked:
-        issued += known.draw(state, look)
     widgets.gap(look.px(2))
     issued += _negatives(state)
     return issued

@@ -104,7 +104,7 @@ def _snap(state: State) -> "gizmo.Matrix3 | None":
     if not imgui.get_io().key_ctrl:
         return None
     step = {
-        Handle.MOVE: _MOVE_SNAP * state.pose.reach,
+        Handle.MOVE: _MOVE_SNAP * state.pose.distance,
         Handle.TURN: _TURN_SNAP,
         Handle.SCALE: _SCALE_SNAP,
     }[state.editing.handle]

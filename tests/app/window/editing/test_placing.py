@@ -1,5 +1,6 @@
 """Moving, turning, scaling and recolouring what is selected, as pure changes of a frozen state."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from app.window.editing.placing import Adjust, BeginTint, EndGesture, Nudge, Set
 from app.window.editing.state import Handle, Tint, Tool
 from app.window.editing.work import FindThing
 from app.window.frame import table
+from app.window.poses import Vector
 from app.window.scene import commands as show
 from app.window.scene.work import describe_scene
 from app.window.state import State
@@ -115,6 +117,20 @@ def test_keys_move_turn_and_scale_by_steps_as_the_picture_shows_it(chosen: State
     assert entry.make(after(chosen, point.SetTool(Tool.MOVE))) is None
 
 
+def test_a_step_of_a_key_is_as_far_by_parallel_rays(chosen: State) -> None:
+    far = poses.orthographic(chosen.pose, Vector(-9.0, -9.0, -9.0), Vector(9.0, 9.0, 9.0))
+    assert far.reach > 5 * chosen.pose.reach, "it stands clear of the scene"
+    flat = means(after(replace(chosen, pose=far), Nudge(right=1))) - means(chosen)
+    plain = means(after(chosen, Nudge(right=1))) - means(chosen)
+    np.testing.assert_allclose(flat, plain, atol=1e-6)  # float32 places
+
+
+def test_a_number_that_is_none_moves_nothing(chosen: State) -> None:
+    assert chosen.editing.marks is not None
+    for handle, numbers in ((Handle.TURN, (math.inf, 0.0, 0.0)), (Handle.SCALE, (math.nan,))):
+        assert placing.of_numbers(numbers, chosen.editing.marks, (0.0, 0.0, 0.0), handle).still
+
+
 def test_a_tint_is_shown_made_undone_and_saved(chosen: State) -> None:
     assert chosen.info is not None and chosen.editing.marks is not None
     luma = placing.luma_of(chosen.info.scene, chosen.editing.marks)
@@ -147,6 +163,8 @@ def test_moved_things_are_found_where_they_are(chosen: State, info) -> None:
     (weighed,) = WeighAtoms(1, info.scene, marks).run(lambda: False)
     assert isinstance(weighed, AtomsWeighed) and weighed.places[0] is not None
     assert weighed.places[0].x == pytest.approx(CHAIR[0] + 0.5, abs=0.05)
+    (weighed,) = WeighAtoms(1, info.scene, core.delete(marks, BLOCK)).run(lambda: False)
+    assert isinstance(weighed, AtomsWeighed) and weighed.places[0] is None, "nothing of it is left"
     seen = after(made, edit.Found(BLOCK, "replace", "here"), point.FrameSelection())
     assert seen.flight is not None and seen.flight.end.pivot[0] == pytest.approx(CHAIR[0] + 0.5, abs=0.1)
 

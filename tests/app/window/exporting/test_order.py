@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import torch
 
 from app.window import commands as do
 from app.window.asking import commands as ask
@@ -19,6 +20,7 @@ from app.window.recovery import commands as keep
 from app.window.recovery.keeper import Keeper
 from app.window.scene import camera
 from app.window.scene import commands as show
+from app.window.scene.near import photos_known
 from app.window.scene.state import Photo
 from app.window.state import State
 from langflash_core.scene.edits import Atom, History, Marks, Mask
@@ -49,9 +51,18 @@ def test_every_kind_says_the_command_that_does_it(what: What) -> None:
     assert ("--segmented" in words) == (what is What.SEGMENTED)
 
 
+def of_photos() -> State:
+    """A scene that knows which photo made what."""
+    state = scene()
+    assert state.info is not None
+    splat = state.info.scene
+    known = replace(splat, view_ids=torch.zeros(len(splat.gaussians), dtype=torch.int64))
+    return replace(state, info=replace(state.info, scene=known))
+
+
 def test_what_fades_on_show_fades_in_files_unless_said_otherwise() -> None:
     def fades(near: bool, **changes) -> bool:
-        state = scene()
+        state = of_photos()
         state = replace(state, preferences=replace(state.preferences, near_photos=near))
         order = export_form.order(form(state, path="/out/a picture", **changes))
         assert not isinstance(order, str)
@@ -60,8 +71,26 @@ def test_what_fades_on_show_fades_in_files_unless_said_otherwise() -> None:
     assert fades(True, what=What.RGB) and fades(True, what=What.VIDEO) and not fades(False, what=What.RGB)
     assert fades(False, what=What.RGB, fade=True) and not fades(True, what=What.RGB, fade=False)
     assert not fades(True, what=What.PLY) and not fades(True, what=What.MASK)
-    plan = after(form(scene(), path="/out/a picture", what=What.RGB), camera.SwitchRays())
+    plan = after(form(of_photos(), path="/out/a picture", what=What.RGB), camera.SwitchRays())
     assert plan.preferences.near_photos and not export_form.fades(plan), "a plan does not fade on show"
+
+
+def test_what_no_photo_made_does_not_fade_since_its_file_does_not_say_where_photos_looked() -> None:
+    for fade in (None, True):
+        order = export_form.order(form(scene(), path="/out/a picture", what=What.RGB, fade=fade))
+        assert not isinstance(order, str) and "--fade" not in order.words
+    state = of_photos()
+    assert state.info is not None and state.info.scene.view_ids is not None
+    marks = state.editing.marks
+    assert marks is not None
+    merged = state.info.scene.view_ids.clone()
+    merged[-9:] = -1
+    info = replace(state.info, scene=replace(state.info.scene, view_ids=merged))
+    state = replace(state, info=info)
+    assert not photos_known(state)
+    undone = replace(marks, there=(len(merged) - 9, marks.there[1]))
+    editing = replace(state.editing, history=History(undone))
+    assert photos_known(replace(state, editing=editing))
 
 
 def wrong(state: State) -> str:

@@ -3,14 +3,18 @@
 from dataclasses import replace
 
 import pytest
+from imgui_bundle import ImVec2, imgui
 
+from app.window.asking.panels import prompts
 from app.window.commands import Command
 from app.window.editing import commands as edit
 from app.window.frame import dialogs, table
+from app.window.kit import theme
 from app.window.scene.state import Mode
 from app.window.state import State
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History, Mask
+from tests.app.window import headless
 from tests.app.window.scenes import after, shown_scene
 
 
@@ -30,7 +34,7 @@ def test_names_and_keys_are_each_given_once() -> None:
 
 
 def test_every_group_is_in_the_help() -> None:
-    shown = {group for column in dialogs._COLUMNS for group in column if group}
+    shown = {group for column in dialogs.COLUMNS for group in column if group}
     assert shown == {entry.group for entry in table.ENTRIES}
 
 
@@ -64,3 +68,38 @@ def test_what_has_nothing_to_do_says_so() -> None:
     assert made("Delete the selection", selected) == edit.Delete()
     assert made("Undo", selected) == edit.Undo() and made("Redo", selected) is None
     assert made("Redo", after(selected, edit.Undo())) == edit.Redo()
+
+
+def test_help_fits_a_window_of_800_lines() -> None:
+    shown = replace(State(), dialog="help")
+    with headless.context((1280, 800)):
+        theme.set_up(1.0)
+        headless.frames(lambda look: dialogs.draw(shown, look), headless.look(), 5)
+        window = imgui.internal.find_window_by_name(dialogs.TITLES["help"])
+        assert window is not None and window.scroll_max.y == 0
+    assert ("1 to 0", "Show: RGB to Features") in dialogs.help_rows("View")
+    assert ("Ctrl+Z", "Undo") in dialogs.help_rows("Edit")
+
+
+def test_what_there_is_to_ask_stays_in_its_place_when_an_answer_comes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    heights, answered = list[float](), list[bool]()
+
+    def chips(state, look) -> list:
+        heights.append(imgui.get_cursor_screen_pos().y)
+        return []
+
+    def histogram(state, look) -> list:
+        imgui.dummy(ImVec2(10, 100 if answered else 0))
+        return []
+
+    monkeypatch.setattr(prompts.known, "draw", chips)
+    monkeypatch.setattr(prompts.scores, "draw", histogram)
+    shown = shown_scene()  # it asks for a door
+    with headless.context((1280, 800)):
+        theme.set_up(1.0)
+        headless.frames(lambda look: prompts.draw(shown, look), headless.look(), 2)
+        answered.append(True)
+        headless.frames(lambda look: prompts.draw(shown, look), headless.look(), 2)
+    assert len(heights) == 4 and heights[-1] == heights[0]

@@ -149,6 +149,24 @@ def test_a_merge_takes_the_kept_edits_along_and_is_restored(desk: Desk, info, tm
     assert not after_restoring(again, *3 * (edit.Undo(),)).editing.unsaved
 
 
+def test_kept_edits_stay_where_those_of_the_merged_scene_cannot_be_written(
+    desk: Desk, info, tmp_path: Path
+) -> None:
+    desk.perform(show.SceneArrived(info))
+    desk.perform(edit.Found(some(), "replace", "here"))
+    desk.perform(edit.Delete())
+    desk.pass_time(2 * KEEP_AFTER)
+    desk.work()
+    first = desk.state.recovery.kept
+    assert first is not None and desk.state.editing.marks is not None and desk.state.info is not None
+    save(info.scene, tmp_path / "b.langflash")
+    request = JoinScenes(desk.state.info, desk.state.editing.marks, tmp_path / "b.langflash")
+    desk.perform(request.run(2, lambda *_: None, lambda: False).arrival(desk.state))
+    desk.asked = [each for each in desk.asked if not isinstance(each, work.KeepEdits)]  # the disk is full
+    desk.work()
+    assert first.exists()
+
+
 def after_restoring(arrived: show.SceneArrived, *commands: Command) -> State:
     state = apply(State(), arrived)
     for command in commands:

@@ -78,6 +78,13 @@ def test_the_camera_comes_back_exactly(folders: Path) -> None:
     assert read is not None and read.pose == kept.pose
 
 
+def test_a_camera_from_which_nothing_can_be_drawn_is_damage(folders: Path) -> None:
+    for pose in (Pose(span=0.0), Pose(span=float("nan")), Pose(reach=0.0)):
+        path = folders / "kept.json"
+        path.write_text(json.dumps(sessions.fields(Kept(phrases=("door",), pose=pose))))
+        assert sessions.read(path) is None
+
+
 def test_damage_and_emptiness_are_passed_over_and_removed(folders: Path) -> None:
     state_folder().mkdir(parents=True)
     for name, content in (

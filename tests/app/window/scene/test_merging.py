@@ -15,6 +15,7 @@ from app.window.scene import commands as show
 from app.window.scene.state import SceneInfo
 from app.window.scene.work import JoinScenes, describe_scene
 from langflash_core.errors import InputError
+from langflash_core.scene.changes import Moved
 from langflash_core.scene.edited import edited_scene
 from langflash_core.scene.file import load, save
 from langflash_core.scene.mask import Mask
@@ -75,6 +76,22 @@ def test_a_merge_is_an_edit_whose_things_are_selected_with_the_gizmo_in_hand(
     again = load(tmp_path / "whole.langflash")
     assert len(again.gaussians) == COUNT - 9 + OTHERS and again.record.atom_names == {3: "crate"}
     assert again.view_ids is None and bool((again.semantics.weight_ids[-OTHERS:] == 3).all())
+
+
+def test_what_is_merged_comes_beside_moved_things_in_the_unit_that_was_told(
+    info: SceneInfo, tmp_path: Path
+) -> None:
+    block = room(torch.eye(3)).rows(torch.arange(OTHERS)).with_record(metric_scale=4.0)
+    save(block, tmp_path / "b.langflash")
+    assert info.history is not None
+    moved = Moved(Mask.full(COUNT), offset=(9.0, 0.0, 0.0))
+    marks = replace(info.history.marks, metric_scale=2.0, changes=(moved,))
+    merged = JoinScenes(info, marks, tmp_path / "b.langflash").run(2, lambda *_: None, lambda: False)
+    means = merged.info.scene.gaussians.means
+    assert torch.equal(means[:COUNT], info.scene.gaussians.means)
+    alone, brought = block.gaussians.means, means[COUNT:]
+    torch.testing.assert_close(brought - brought[0], 2 * (alone - alone[0]), rtol=0, atol=1e-4)
+    assert float(brought[:, 0].min()) > float(means[:COUNT, 0].quantile(0.98)) + 9
 
 
 def test_undoing_a_merge_leaves_the_scene_as_it_was_and_another_can_follow(desk: Desk, block: Path) -> None:
