@@ -10,9 +10,9 @@ from typing import Any
 import torch
 
 from langflash_core.errors import ViewError
+from langflash_core.geometry.reach import median_reach
 from langflash_core.types import Camera, Scene
 
-from ..window.poses import median_reach
 from .files import readable_file
 from .values import LARGEST_SIDE
 

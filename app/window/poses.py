@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pyrr
 
+from langflash_core.geometry.reach import MIN_REACH
+
 if TYPE_CHECKING:
     from langflash_core.types import Camera
 
 UP = np.array([0.0, -1.0, 0.0])
-MIN_REACH = 0.02  # scene units; nearer than this the pivot is inside the lens
 NEAREST = 0.02  # scene units in front of the camera from which something is marked in the picture
 MIN_POLE_DEGREES = 4.0  # how near to straight up or down an orbit may come
 FOV_RANGE = (15.0, 120.0)
@@ -347,24 +348,6 @@ def slerp(start: Rotation, end: Rotation, t: float) -> Rotation:
     """
     a, b = _xyzw(start), _xyzw(end)
     return _rotation(pyrr.quaternion.slerp(a, b if a @ b >= 0 else -b, t))
-
-
-def median_reach(means: np.ndarray, viewmat: np.ndarray, K: np.ndarray, size: tuple[int, int]) -> float:
-    """Median depth of what lies in the middle half of a view: the distance to orbit at.
-
-    Args:
-        means: (N, 3) world. viewmat: (4, 4) world to camera. K: (3, 3). size: (width, height).
-
-    Returns:
-        Depth in scene units; 1, the scene's own unit, when nothing is in front.
-    """
-    pos_c = means @ viewmat[:3, :3].T + viewmat[:3, 3]
-    depths = pos_c[:, 2]
-    safe = np.where(depths > MIN_REACH, depths, np.inf)
-    x = pos_c[:, 0] / safe * K[0, 0] + K[0, 2]
-    y = pos_c[:, 1] / safe * K[1, 1] + K[1, 2]
-    middle = (abs(x / size[0] - 0.5) < 0.25) & (abs(y / size[1] - 0.5) < 0.25) & (depths > MIN_REACH)
-    return float(np.median(depths[middle])) if middle.any() else 1.0
 
 
 def _about(axis: np.ndarray, angle: float) -> np.ndarray:

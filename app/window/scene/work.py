@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from langflash_core.errors import ImageError, LangFlashError
+from langflash_core.geometry.reach import median_reach
 from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command, ShowPicture
-from ..poses import Vector, from_view, median_reach
+from ..poses import Vector, from_view
 from ..requests import Asked, Errand, Job, SceneErrand
 from .commands import (
     ChoosingFailed,

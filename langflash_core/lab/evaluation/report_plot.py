@@ -14,8 +14,8 @@ LETTER = 6.8
 
 
 def svg(plot: Plot) -> str:
-    """The plot as one <svg> element; seconds are logarithmic where they differ by more than five times, errors
-    where they do by more than a hundred."""
+    """The plot as one <svg> element; seconds are logarithmic where they differ by more than five times,
+    errors where they do by more than a hundred."""
     points = [p for p in plot.points if math.isfinite(p.seconds) and math.isfinite(p.error)]
     if not points:
         return ""

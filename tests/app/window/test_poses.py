@@ -11,6 +11,7 @@ from app.window import poses
 from app.window.poses import FOV_RANGE, Pose, Rotation, Vector
 from langflash_core.geometry.cameras import project, transform
 from langflash_core.geometry.quaternions import quats_to_matrices
+from langflash_core.geometry.reach import median_reach
 
 # Poses are float64 and a few operations long; float32 enters only where a Camera is made.
 EXACT, SINGLE = 1e-9, 1e-5
@@ -113,8 +114,8 @@ def test_fov_is_clamped() -> None:
 def test_median_reach_looks_only_at_the_middle_and_the_front() -> None:
     K = np.array([[100.0, 0, 50], [0, 100.0, 50], [0, 0, 1]])
     means = np.array([[0, 0, 2.0], [0, 0.1, 3.0], [0.1, 0, 4.0], [9, 0, 10.0], [0, 0, -5.0]])
-    assert poses.median_reach(means, np.eye(4), K, (100, 100)) == 3.0
-    assert poses.median_reach(np.zeros((0, 3)), np.eye(4), K, (100, 100)) == 1.0
+    assert median_reach(means, np.eye(4), K, (100, 100)) == 3.0
+    assert median_reach(np.zeros((0, 3)), np.eye(4), K, (100, 100)) == 1.0
 
 
 def _angle(a: Rotation, b: Rotation) -> float:

@@ -1,0 +1,24 @@
+"""How far away is what a camera looks at."""
+
+import numpy as np
+
+MIN_REACH = 0.02
+"""Scene units; what is nearer is inside the lens."""
+
+
+def median_reach(means: np.ndarray, viewmat: np.ndarray, K: np.ndarray, size: tuple[int, int]) -> float:
+    """Median depth of what lies in the middle half of a view: the distance to orbit at.
+
+    Args:
+        means: (N, 3) world. viewmat: (4, 4) world to camera. K: (3, 3). size: (width, height).
+
+    Returns:
+        Depth in scene units; 1, the scene's own unit, when nothing is in front.
+    """
+    pos_c = means @ viewmat[:3, :3].T + viewmat[:3, 3]
+    depths = pos_c[:, 2]
+    safe = np.where(depths > MIN_REACH, depths, np.inf)
+    x = pos_c[:, 0] / safe * K[0, 0] + K[0, 2]
+    y = pos_c[:, 1] / safe * K[1, 1] + K[1, 2]
+    middle = (abs(x / size[0] - 0.5) < 0.25) & (abs(y / size[1] - 0.5) < 0.25) & (depths > MIN_REACH)
+    return float(np.median(depths[middle])) if middle.any() else 1.0
