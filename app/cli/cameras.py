@@ -108,7 +108,7 @@ def camera_of(fields: Any, path: str) -> Camera:
         raise ViewError(
             f"{path} has no {missing}; a camera file holds viewmat, K, width and height"
         ) from None
-    except (TypeError, AttributeError):
+    except TypeError:
         raise ViewError(
             f"{path} is not a camera file: expected a JSON object with viewmat, K, width and height"
         ) from None
@@ -132,9 +132,12 @@ def _matrix(rows: Any, side: int) -> Matrix:
     )
     if not shaped:
         raise ValueError(f"expected {side} rows of {side} numbers")
-    matrix = [[float(value) for value in row] for row in rows]
+    try:
+        matrix = torch.tensor([[float(value) for value in row] for row in rows]).tolist()
+    except OverflowError:
+        matrix = [[math.inf]]
     if not all(math.isfinite(value) for row in matrix for value in row):
-        raise ValueError("a number is not finite")
+        raise ValueError("a number is not finite in float32")
     return matrix
 
 
