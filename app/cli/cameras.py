@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 
 from langflash_core.errors import ViewError
@@ -63,7 +64,8 @@ class CameraChoice:
         if not self.ortho or camera.orthographic:
             return camera
         means, K = scene.gaussians.means.double().numpy(), camera.K.double().numpy()
-        depth = median_reach(means, camera.viewmat.double().numpy(), K, (camera.width, camera.height))
+        finite = means[np.isfinite(means).all(1)]
+        depth = median_reach(finite, camera.viewmat.double().numpy(), K, (camera.width, camera.height))
         per_unit = camera.K / camera.K.new_tensor([[depth], [depth], [1.0]])
         per_unit[:2, 2] = camera.K[:2, 2]
         return replace(camera, K=per_unit, orthographic=True)

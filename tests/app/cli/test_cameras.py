@@ -1,6 +1,7 @@
 import json
 import math
 from argparse import Namespace
+from dataclasses import replace
 
 import pytest
 import torch
@@ -76,3 +77,14 @@ def test_numbers_that_float32_does_not_hold_are_refused(tmp_path, number):
     path.write_text(json.dumps({"viewmat": viewmat, "K": K, "width": 320, "height": 240}))
     with pytest.raises(ViewError, match="a number is not finite"):
         read_camera(path)
+
+
+@pytest.mark.filterwarnings("error")
+def test_ortho_looks_past_gaussians_that_are_nowhere():
+    scene = stripes()
+    means = scene.gaussians.means.clone()
+    means[0], means[1] = math.inf, math.nan
+    broken = replace(scene, gaussians=replace(scene.gaussians, means=means))
+    assert float(choice(ortho=True).of(broken).K[0, 0]) > 0
+    nothing = scene.rows(torch.zeros(len(means), dtype=torch.bool))
+    assert torch.equal(choice(ortho=True).of(nothing).K, scene.Ks[0])  # as if all were at 1
