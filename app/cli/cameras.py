@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 
 from langflash_core.errors import ViewError
@@ -63,7 +64,8 @@ class CameraChoice:
         if not self.ortho or camera.orthographic:
             return camera
         means, K = scene.gaussians.means.double().numpy(), camera.K.double().numpy()
-        depth = median_reach(means, camera.viewmat.double().numpy(), K, (camera.width, camera.height))
+        finite = means[np.isfinite(means).all(1)]
+        depth = median_reach(finite, camera.viewmat.double().numpy(), K, (camera.width, camera.height))
         per_unit = camera.K / camera.K.new_tensor([[depth], [depth], [1.0]])
         per_unit[:2, 2] = camera.K[:2, 2]
         return replace(camera, K=per_unit, orthographic=True)
@@ -108,7 +110,7 @@ def camera_of(fields: Any, path: str) -> Camera:
         raise ViewError(
             f"{path} has no {missing}; a camera file holds viewmat, K, width and height"
         ) from None
-    except (TypeError, AttributeError):
+    except TypeError:
         raise ViewError(
             f"{path} is not a camera file: expected a JSON object with viewmat, K, width and height"
         ) from None
@@ -132,9 +134,12 @@ def _matrix(rows: Any, side: int) -> Matrix:
     )
     if not shaped:
         raise ValueError(f"expected {side} rows of {side} numbers")
-    matrix = [[float(value) for value in row] for row in rows]
+    try:
+        matrix = torch.tensor([[float(value) for value in row] for row in rows]).tolist()
+    except OverflowError:
+        matrix = [[math.inf]]
     if not all(math.isfinite(value) for row in matrix for value in row):
-        raise ValueError("a number is not finite")
+        raise ValueError("a number is not finite in float32")
     return matrix
 
 

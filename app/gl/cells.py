@@ -11,12 +11,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from langflash_core.splat.tiles import tiles_touched
+from langflash_core.splat.tiles import num_touched, tiles_touched
 
 from .layout import ATOMS_A_LAYER, LAYERS_A_PASS, num_layers
 from .splats import SplatBuffers
 
 SIDE = 64  # pixels, a tile of llvmpipe
+MOST_PAIRS = 1 << 24  # of splats and cells; sorting so many takes half a GB
 _FARTHEST = 1e9  # keeps the largest footprints inside int64
 
 
@@ -30,10 +31,13 @@ class Cell:
     atoms: np.ndarray = field(repr=False)
 
 
-def cells_of(splats: SplatBuffers, size: tuple[int, int], side: int = SIDE) -> list[Cell]:
-    """Cells of a picture (width, height) that measured splats reach."""
+def cells_of(splats: SplatBuffers, size: tuple[int, int], side: int = SIDE) -> list[Cell] | None:
+    """Cells of a picture (width, height) that measured splats reach; None where so many reach so many that
+    each is better drawn once."""
     boxes = np.nan_to_num(splats.boxes()).clip(-_FARTHEST, _FARTHEST)
     boxes = np.concatenate((np.floor(boxes[:2]), np.ceil(boxes[2:]))).astype(np.int64)
+    if num_touched(boxes.T, *size, side) > MOST_PAIRS:
+        return None
     places, cells, (columns, _) = tiles_touched(boxes.T, *size, side)
     if not len(cells):
         return []

@@ -45,6 +45,7 @@ class SplatBuffers:
         self._owned: list = []
         self._in_software = draws_in_software(ctx)
         self._largest = min(2 * _MARGIN, ctx.info["GL_POINT_SIZE_RANGE"][1])  # sprite
+        self._widest_view = min(ctx.info["GL_MAX_VIEWPORT_DIMS"])
         self.footprints: np.ndarray | None = None
         self.sprites = False
         gaussians = scene.gaussians.map(lambda v: v.detach().cpu().float())
@@ -245,17 +246,16 @@ class SplatBuffers:
             self._measure((camera.width, camera.height))
 
     def _measure(self, size: tuple[int, int]) -> None:
-        """Read the footprints back; whether all that reach the image are small enough for sprites."""
+        """Read the footprints back; whether all that reach the image are small enough for sprites, and the
+        image with its margin for a viewport."""
         chosen = 4 * _PLACE_FLOATS * len(self.order)
         read = np.frombuffer(self.places.read(chosen), np.float32).reshape(-1, _PLACE_FLOATS)
         self.footprints = read[:, :_SHAPE_FLOATS]
-        sides = 2 * np.maximum(*self._reaches())
-        if not (sides < self._largest).all():  # what is broken compares as beside the image
+        small = 2 * np.maximum(*self._reaches()) < self._largest
+        if not small.all():  # what is broken compares as beside the image
             x0, y0, x1, y1 = self.boxes()
-            touching = (x1 > 0) & (y1 > 0) & (x0 < size[0]) & (y0 < size[1])
-            self.sprites = bool((sides[touching] < self._largest).all())
-        else:
-            self.sprites = True
+            small = small[(x1 > 0) & (y1 > 0) & (x0 < size[0]) & (y0 < size[1])]
+        self.sprites = bool(small.all()) and max(size) + 2 * _MARGIN <= self._widest_view
 
     def _reaches(self) -> tuple[np.ndarray, np.ndarray]:
         """Half the sides (n,) of the boxes, pixels."""

@@ -74,8 +74,9 @@ class WeightMaps:
         return self._maps
 
     def _drawn(self, level: Level) -> Maps:
-        if level.splats.footprints is not None:
-            return self._drawn_in_cells(level)
+        measured = level.splats.footprints is not None
+        if measured and (cells := cells_of(level.splats, self._size)) is not None:
+            return self._drawn_in_cells(level, cells)
         atoms = level.splats.active_atoms()
         whole_passes = -(-len(atoms) // ATOMS_A_PASS) * LAYERS_A_PASS
         layers = self._layers.at_least(max(1, whole_passes))
@@ -95,9 +96,8 @@ class WeightMaps:
             splats.draw(program, expanded, count, colour=False)
         self._painter.passes["weights"] += 1
 
-    def _drawn_in_cells(self, level: Level) -> Maps:
+    def _drawn_in_cells(self, level: Level, cells: list[Cell]) -> Maps:
         """The same, each cell of the picture with its own atoms alone (cells.py)."""
-        cells = cells_of(level.splats, self._size)
         atoms = together(cells)
         passes = -(-len(atoms) // ATOMS_A_PASS)
         layers = self._layers.at_least(max(1, passes * LAYERS_A_PASS))

@@ -117,10 +117,7 @@ def tiles_touched(
         rows of tiles there are.
     """
     columns, rows = -(-width // side), -(-height // side)
-    x0, y0, x1, y1 = boxes.T
-    left, top = np.clip(x0, 0, width) // side, np.clip(y0, 0, height) // side
-    wide = np.maximum(-(-np.clip(x1, 0, width) // side) - left, 0)
-    tall = np.maximum(-(-np.clip(y1, 0, height) // side) - top, 0)
+    left, top, wide, tall = _spans(boxes, width, height, side)
     pairs = wide * tall
     members = np.repeat(np.arange(len(pairs), dtype=np.int32), pairs)
     local = np.arange(len(members)) - np.repeat(np.cumsum(pairs) - pairs, pairs)
@@ -130,6 +127,21 @@ def tiles_touched(
         (top[members] + local // across) * columns + left[members] + local % across,
         (columns, rows),
     )
+
+
+def num_touched(boxes: np.ndarray, width: int, height: int, side: int) -> int:
+    """How many pairs `tiles_touched` returns."""
+    _, _, wide, tall = _spans(boxes, width, height, side)
+    return int((wide * tall).sum())
+
+
+def _spans(boxes: np.ndarray, width: int, height: int, side: int) -> tuple[np.ndarray, ...]:
+    """First column and row of the tiles that boxes touch, and how many columns and rows, (n,) each."""
+    x0, y0, x1, y1 = boxes.T
+    left, top = np.clip(x0, 0, width) // side, np.clip(y0, 0, height) // side
+    wide = np.maximum(-(-np.clip(x1, 0, width) // side) - left, 0)
+    tall = np.maximum(-(-np.clip(y1, 0, height) // side) - top, 0)
+    return left, top, wide, tall
 
 
 def _tile_lists(footprints: Footprints, width: int, height: int) -> _Lists:

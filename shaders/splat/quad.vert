@@ -39,7 +39,7 @@ void main() {
 #endif
     centre = in_place.xy;
     whitening = vec4(1.0 / in_shape.x, in_shape.y, 1.0 / in_shape.z, in_place.z);
-    bool broken = any(isnan(pos_px)) || any(isinf(pos_px));
+    bool broken = any(isnan(pos_px + extent)) || any(isinf(pos_px));
     gl_Position = broken ? vec4(2.0, 2.0, 2.0, 1.0) : vec4((2.0 * pos_px - image_size) / viewport, 0.0, 1.0);
 #ifdef LAYERS
     for (int layer = 0; layer < LAYERS; ++layer) weights[layer] = in_weights[layer];

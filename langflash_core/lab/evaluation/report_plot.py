@@ -135,7 +135,7 @@ def _ticks(values: Sequence[float], logarithmic: bool) -> list[float]:
     if logarithmic:
         powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
         steps = (1, 2, 5) if len(powers) < 6 else (1,)
-        marks = [round(m * 10.0**p, 12) for p in powers for m in steps]
+        marks = [float(f"{m}e{p}") for p in powers for m in steps]
         below, above = max(m for m in marks if m <= low), min(m for m in marks if m >= high)
         return [m for m in marks if below <= m <= above]
     reach = (high - low) or abs(high) or 1.0

@@ -4,6 +4,7 @@ Photos have one view, other sizes and holes in their labels, so a step takes a b
 their losses by their shares of the pictures.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -70,7 +71,7 @@ def each_of(batch: SceneBatch | Mixed, change: Callable[[SceneBatch], SceneBatch
 
 
 @dataclass(frozen=True)
-class ToldSet:
+class ToldSet(ABC):
     """A set whose batches bring what `told` adds to them. inner: draws them."""
 
     inner: Any
@@ -87,8 +88,9 @@ class ToldSet:
         """
         return each_of(self.inner.draw(count, views, generator), self.told)
 
+    @abstractmethod
     def told(self, batch: SceneBatch) -> SceneBatch:
-        raise NotImplementedError
+        """The batch with what this set knows of its views."""
 
 
 def loss_of(loss: StageLoss, network: LangFlashNet, batch: Any, words: Words) -> Loss:

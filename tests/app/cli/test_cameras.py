@@ -1,6 +1,7 @@
 import json
 import math
 from argparse import Namespace
+from dataclasses import replace
 
 import pytest
 import torch
@@ -65,3 +66,25 @@ def test_ortho_keeps_the_middle_of_the_picture_as_large():
     depth = float(scene.gaussians.means[:, 2].median())
     assert float(flat.K[0, 0]) == pytest.approx(float(pinhole.K[0, 0]) / depth, rel=0.05)
     assert torch.equal(flat.K[:2, 2], pinhole.K[:2, 2])
+
+
+@pytest.mark.parametrize("number", [10**400, 1e39], ids=["integer", "decimal"])
+def test_numbers_that_float32_does_not_hold_are_refused(tmp_path, number):
+    viewmat = torch.eye(4).tolist()
+    viewmat[0][3] = number
+    K = [[300.0, 0.0, 160.0], [0.0, 300.0, 120.0], [0.0, 0.0, 1.0]]
+    path = tmp_path / "camera.json"
+    path.write_text(json.dumps({"viewmat": viewmat, "K": K, "width": 320, "height": 240}))
+    with pytest.raises(ViewError, match="a number is not finite"):
+        read_camera(path)
+
+
+@pytest.mark.filterwarnings("error")
+def test_ortho_looks_past_gaussians_that_are_nowhere():
+    scene = stripes()
+    means = scene.gaussians.means.clone()
+    means[0], means[1] = math.inf, math.nan
+    broken = replace(scene, gaussians=replace(scene.gaussians, means=means))
+    assert float(choice(ortho=True).of(broken).K[0, 0]) > 0
+    nothing = scene.rows(torch.zeros(len(means), dtype=torch.bool))
+    assert torch.equal(choice(ortho=True).of(nothing).K, scene.Ks[0])  # as if all were at 1

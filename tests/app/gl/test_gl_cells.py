@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from app.gl import cells as cells_module
 from app.gl.cells import Cell, cells_of, chosen_layers, together
 from app.gl.layout import ATOMS_A_LAYER, LAYERS_A_PASS, num_layers
 from langflash_core.graphics import draws_in_software
@@ -49,6 +50,19 @@ def test_cells_are_drawn_as_quads_where_a_splat_is_too_large(gl, software):
     assert not mine[2] and torch.equal(mine[0][3], true[0][3])
 
 
+def test_maps_are_drawn_whole_where_too_many_splats_reach_too_many_cells(gl, software, monkeypatch):
+    scene, view = local(30), camera(200, 150, 170.0)
+    boxes = np.tile(np.array([[0.0], [0.0], [130.0], [100.0]], np.float32), 200)
+    everywhere = Placed(boxes, np.ones((200, 9), bool))
+    monkeypatch.setattr(cells_module, "MOST_PAIRS", 5 * 4 * 200)
+    assert len(cells_of(everywhere, (130, 100), side=32) or ()) == 5 * 4  # pyright: ignore[reportArgumentType]
+    monkeypatch.setattr(cells_module, "MOST_PAIRS", 5 * 4 * 200 - 1)
+    assert cells_of(everywhere, (130, 100), side=32) is None  # pyright: ignore[reportArgumentType]
+    monkeypatch.setattr(cells_module, "MOST_PAIRS", 0)
+    mine, true = drawn(gl, scene, view)[0][3], drawn(gl, scene, view, Quads)[0][3]
+    assert torch.equal(mine, true)
+
+
 class Placed:
     """Splats that know their boxes (4, n) and their atoms (n, K)."""
 
@@ -68,7 +82,9 @@ def test_cells_find_every_splat_that_reaches_them():
     boxes = np.concatenate((low, low + draw.uniform(0, 50, (2, 200)))).astype(np.float32)
     boxes[:, 0], boxes[:, 1] = np.nan, np.inf  # broken, and beside every image
     carried = draw.random((200, 9)) < 0.05
-    found = {cell.box: cell for cell in cells_of(Placed(boxes, carried), (130, 100), side=32)}  # pyright: ignore[reportArgumentType]
+    reached = cells_of(Placed(boxes, carried), (130, 100), side=32)  # pyright: ignore[reportArgumentType]
+    assert reached is not None
+    found = {cell.box: cell for cell in reached}
     for left in range(0, 130, 32):
         for top in range(0, 100, 32):
             box = (left, top, min(32, 130 - left), min(32, 100 - top))

@@ -57,3 +57,22 @@ def test_splats_too_large_for_sprites_are_drawn_as_quads(gl, software):
     mine, true = drawn(gl, scene, camera()), drawn(gl, scene, camera(), Quads)
     assert not mine[2]
     assert all(torch.equal(a, b) for a, b in zip(mine[0], true[0], strict=True))
+
+
+def test_pictures_as_large_as_a_viewport_are_drawn_as_quads(gl, software):
+    scene, view = cloud(20, 1), camera(max(gl.info["GL_MAX_VIEWPORT_DIMS"]), 4, 20.0)
+    mine, true = drawn(gl, scene, view), drawn(gl, scene, view, Quads)
+    assert float(true[0][1].max()) > 0.5
+    assert all(torch.equal(a, b) for a, b in zip(mine[0], true[0], strict=True))
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_a_footprint_beyond_float32_is_no_sprite(gl, software, orthographic):
+    scene = cloud(50, 4)
+    means, scales = scene.gaussians.means.clone(), torch.full_like(scene.gaussians.scales, 1e-2)
+    means[0], scales[0] = torch.tensor([0.0, 0.0, 2.0]), 1e12  # on the axis; its variance ends as inf / inf
+    scene = replace(scene, gaussians=replace(scene.gaussians, means=means, scales=scales))
+    view = camera(64, 48, 1e9)
+    view = replace(view, orthographic=orthographic)
+    mine, true = drawn(gl, scene, view), drawn(gl, scene, view, Quads)
+    assert all(torch.equal(a, b) for a, b in zip(mine[0], true[0], strict=True))

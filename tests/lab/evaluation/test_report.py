@@ -117,6 +117,12 @@ def test_errors_of_many_sizes_stand_on_a_logarithmic_axis():
     assert len(re.findall('class="grid" x1="72"', drawn)) == 7  # a line a power of ten
 
 
+def test_errors_below_any_decimal_that_is_written_still_have_an_axis():
+    drawn = svg(Plot("Speed", "seconds", "error", [Point(str(e), 1.0, e) for e in (3e-14, 1e-5)]))
+    low, high = (float(y) for y in re.findall(r'<circle cx="[\d.]+" cy="([\d.]+)"', drawn))
+    assert 18 <= high < low <= 292
+
+
 def test_a_gallery_shows_the_worst_first_then_the_best(tmp_path):
     gallery = Gallery(tmp_path / "pictures")
     for number in range(6):
