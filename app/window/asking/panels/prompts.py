@@ -24,8 +24,11 @@ def draw(state: State, look: Look) -> list[do.Command]:
         issued += _row(state, prompt, look)
         imgui.pop_id()
     issued += entry.tools(state, look)
-    issued += known.draw(state, look)  # above the scores, which come with an answer and would push it down
+    if not state.asked:  # what there is to ask comes first until something is asked
+        issued += known.draw(state, look)
     issued += scores.draw(state, look)
+    if state.asked:  # answers come first in a low window
+        issued += known.draw(state, look)
     widgets.gap(look.px(2))
     issued += _negatives(state)
     return issued

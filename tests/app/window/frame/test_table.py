@@ -3,9 +3,8 @@
 from dataclasses import replace
 
 import pytest
-from imgui_bundle import ImVec2, imgui
+from imgui_bundle import imgui
 
-from app.window.asking.panels import prompts
 from app.window.commands import Command
 from app.window.editing import commands as edit
 from app.window.frame import dialogs, table
@@ -79,27 +78,3 @@ def test_help_fits_a_window_of_800_lines() -> None:
         assert window is not None and window.scroll_max.y == 0
     assert ("1 to 0", "Show: RGB to Features") in dialogs.help_rows("View")
     assert ("Ctrl+Z", "Undo") in dialogs.help_rows("Edit")
-
-
-def test_what_there_is_to_ask_stays_in_its_place_when_an_answer_comes(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    heights, answered = list[float](), list[bool]()
-
-    def chips(state, look) -> list:
-        heights.append(imgui.get_cursor_screen_pos().y)
-        return []
-
-    def histogram(state, look) -> list:
-        imgui.dummy(ImVec2(10, 100 if answered else 0))
-        return []
-
-    monkeypatch.setattr(prompts.known, "draw", chips)
-    monkeypatch.setattr(prompts.scores, "draw", histogram)
-    shown = shown_scene()  # it asks for a door
-    with headless.context((1280, 800)):
-        theme.set_up(1.0)
-        headless.frames(lambda look: prompts.draw(shown, look), headless.look(), 2)
-        answered.append(True)
-        headless.frames(lambda look: prompts.draw(shown, look), headless.look(), 2)
-    assert len(heights) == 4 and heights[-1] == heights[0]
