@@ -27,7 +27,6 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> tuple[list[do
     """The gizmo on the picture in the present window, and whether the pointer is the gizmo's."""
     editing, info = state.editing, state.info
     marks = editing.marks
-    gizmo.begin_frame()
     if info is None or marks is None or not editing.placing:
         return [], False
     pivot = placing.pivot_of(info.scene, marks)
@@ -39,6 +38,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> tuple[list[do
     if shown is None:
         return _rest(state), False
     _style(look, size)
+    gizmo.begin_frame()
     gizmo.set_drawlist(imgui.get_window_draw_list())
     gizmo.set_orthographic(state.pose.span is not None)
     gizmo.set_rect(place.x, place.y, size.x, size.y)
