@@ -11,7 +11,10 @@ TABLES = {
     "weights": "w",
     "made": "2026",
     "sections": {
-        "rooms": {"scenes": 7, "tables": [{"title": "Some: more", "header": ["a"], "rows": [["0.5"]]}]}
+        "rooms": {
+            "about": "7 rooms.",
+            "tables": [{"title": "Some: more", "header": ["a"], "rows": [["0.5"]]}],
+        }
     },
 }
 TEXT = "before\n<!-- report rooms: Some -->\nold\n<!-- end -->\nafter\n"
@@ -26,7 +29,7 @@ def test_tables_of_documents_are_those_of_the_report(name: str):
 
 def test_a_marked_table_is_replaced_and_nothing_else():
     done = filled(TEXT, TABLES)
-    table = "7 scenes, weights w, 2026:\n\n| a |\n| --- |\n| 0.5 |\n"
+    table = "7 rooms. Weights w, 2026.\n\n| a |\n| --- |\n| 0.5 |\n"
     assert done == f"before\n<!-- report rooms: Some -->\n{table}<!-- end -->\nafter\n"
     assert filled(done, TABLES) == done
     wrong = json.loads(json.dumps(TABLES).replace("0.5", "0.6"))

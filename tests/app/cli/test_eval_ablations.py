@@ -46,8 +46,11 @@ def test_ablations_go_on_from_what_is_kept(cache, tmp_path, capsys, monkeypatch)
 
 
 @pytest.mark.slow
-def test_a_report_of_rooms_has_the_tables_that_documents_ask_for(cache, tmp_path, monkeypatch):
+def test_a_report_of_rooms_and_a_scene_has_the_tables_that_documents_ask_for(
+    cache, scene_file, context, tmp_path, monkeypatch
+):
     words = ["eval", "report", "-o", str(tmp_path / "report"), "--rooms", str(cache), "--limit", "1"]
+    words += ["--scene", str(scene_file)]
     words += ["--weights", str(tmp_path / "mini.safetensors"), "--small", str(tmp_path / "small")]
     monkeypatch.setattr("sys.argv", ["langflash", *words])
     monkeypatch.setattr(study, "judge_room", None)  # the process beside this one does that
