@@ -115,6 +115,18 @@ class Watched(Program):
         return json.loads(self.record.read_text())
 
 
+def orbit(someone: Watched, left: int, turn: int) -> None:
+    """Drag the picture aside; again where a frame was so slow that it took a whole drag for a click."""
+    before, end = someone.state["pose"], time.monotonic() + PATIENCE
+    while someone.state["pose"] == before:
+        assert time.monotonic() < end, "no drag moves the camera"
+        someone.xdotool("mousemove", str(left), str(someone.size[1] // 2), "mousedown", "1")
+        for _ in range(25):
+            someone.xdotool("mousemove_relative", "--", str(6 * turn), "1", "sleep", "0.02")
+        someone.xdotool("mouseup", "1")
+        someone.quiet()
+
+
 def walk(someone: Watched, phrase: str) -> Iterator[tuple[str, float]]:
     """The session; yields what took how long beside the frames."""
     someone.until(lambda s: s["scene"] is not None and s["job"] is None, "the scene")
@@ -139,12 +151,7 @@ def walk(someone: Watched, phrase: str) -> Iterator[tuple[str, float]]:
     someone.phase("orbit")
     left = (someone.size[0] + 330) // 2
     for turn in (1, -1, 1):
-        before = someone.state["pose"]
-        someone.xdotool("mousemove", str(left), str(someone.size[1] // 2), "mousedown", "1")
-        for _ in range(25):
-            someone.xdotool("mousemove_relative", "--", str(6 * turn), "1", "sleep", "0.02")
-        someone.xdotool("mouseup", "1")
-        someone.until(lambda s, before=before: s["pose"] != before, "a camera that orbits")
+        orbit(someone, left, turn)
         time.sleep(2.0)
         someone.xdotool("mousemove", "380", "26", "sleep", "0.4", "mousemove", "420", "26", "sleep", "0.4")
     someone.quiet(2.5)
