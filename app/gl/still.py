@@ -6,7 +6,7 @@ thread may do it, so that no frame waits. A renderer takes the result (`SplatRen
 like its own.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import count
@@ -17,14 +17,16 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import Cancelled
-from langflash_core.language.relevance import CompiledQuery, relevance_maps
+from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
 from langflash_core.splat.projection import ALPHA_MIN, NEAR, drawable_rows, project, view_colours
 from langflash_core.splat.tiles import rasterize_tiles
 from langflash_core.types import LUMA, Camera, Frame, Scene, Semantics
 
+from .answers import in_numbers, temperature_of
+from .host import relevancy
 from .splats import TINTED, TINTS
 
-_PIXELS_AT_ONCE = 1 << 16
+_PIXELS_AT_ONCE = 1 << 13  # 1.3 MB of 40 weights: within a core's cache
 _KEPT = 4  # answers of a picture, the newest
 _HALF_MAX = 65504.0
 _names = count(1)
@@ -43,8 +45,8 @@ class StillMaps:
         return self.weights[y, x].float().numpy()
 
     def relevance(self, compiled: CompiledQuery) -> np.ndarray:
-        """(P, H, W) float32; computed once for a question."""
-        return self._kept(_name(compiled), lambda: relevance_maps(self.weights, compiled).float().numpy())
+        """(P, H, W) float32; computed once for a question, 1 / |F| once for all questions of a dictionary."""
+        return self._kept(_name(compiled), lambda: self._relevance(compiled))
 
     def answers(self, compiled: CompiledQuery) -> bool:
         """Whether the relevance is there already."""
@@ -56,14 +58,43 @@ class StillMaps:
 
     def mixed(self, columns: np.ndarray) -> np.ndarray:
         """sum_k W_k c_k, (H, W, n) float32, for columns c (K, n); computed once for these."""
-        table = torch.from_numpy(np.ascontiguousarray(columns, np.float32))
-        pixels = self.weights.flatten(0, 1).split(_PIXELS_AT_ONCE)
+        table = np.ascontiguousarray(columns, np.float32)
+        height, width = self.weights.shape[:2]
 
         def mix() -> np.ndarray:
-            parts = torch.cat([part.float() @ table for part in pixels])
-            return parts.unflatten(0, self.weights.shape[:2]).numpy()
+            return np.ascontiguousarray(self._products(table).T).reshape(height, width, -1)
 
-        return self._kept(("mixed", table.numpy().tobytes()), mix)
+        return self._kept(("mixed", table.tobytes()), mix)
+
+    def _products(self, table: np.ndarray) -> np.ndarray:
+        """(W T)^T (n, H W) float32 for a table T (K, n)."""
+        columns = torch.from_numpy(np.ascontiguousarray(table.T, np.float32))
+        return torch.cat([columns @ part.T for part in self._parts()], 1).numpy()
+
+    def _parts(self) -> Iterator[Tensor]:
+        """Weights (n, K) float32 of some pixels at a time."""
+        return (part.float() for part in self.weights.flatten(0, 1).split(_PIXELS_AT_ONCE))
+
+    def _relevance(self, compiled: CompiledQuery) -> np.ndarray:
+        """As `relevance_maps`, by W (R t) in float32: the vectors W R are formed for their norms alone."""
+        factor, prompts, negatives = in_numbers(compiled, np.arange(self.weights.shape[-1]))
+        inverse = self._kept(("norms", factor.tobytes()), lambda: self._inverse_norms(factor))
+        cosines = self._products(factor @ np.concatenate((prompts, negatives)).T)  # (P + M, H W)
+        cosines *= inverse
+        np.clip(cosines, -1, 1, out=cosines)
+        answers, against = cosines[: len(prompts)], cosines[len(prompts) :]
+        temperature = temperature_of(compiled)
+        if temperature > 0:
+            worst = np.where(inverse > 0, against.max(0), np.float32(np.inf))
+            for answer in answers:
+                relevancy(answer, worst, temperature)
+        return answers.reshape(-1, *self.weights.shape[:2]).copy()  # the negatives go
+
+    def _inverse_norms(self, factor: np.ndarray) -> np.ndarray:
+        """1 / |W R| (H W,) float32; 0 where |W R| is below `EMPTY_NORM`."""
+        columns = torch.from_numpy(np.ascontiguousarray(factor.T, np.float32))
+        norms = torch.cat([(columns @ part.T).square_().sum(0).sqrt_() for part in self._parts()]).numpy()
+        return np.divide(1, norms, out=np.zeros_like(norms), where=norms >= EMPTY_NORM)
 
     def _kept(self, key: tuple, make: Callable[[], np.ndarray]) -> np.ndarray:
         made = self._made.get(key)

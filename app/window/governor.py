@@ -2,10 +2,11 @@
 
 While the camera moves, a picture should take `MOVING_SECONDS`: one that takes longer sends the next
 ones down a ladder of smaller pictures, for large scenes also of fewer Gaussians once those are made;
-ones that take less than half send them up again, a rung at a time. Colour, colour with the fast mode's
-relevance, and exact maps are paced apart, because they cost so differently. At rest the picture settles:
-at once at full size where that is quick, else smaller first and full after a longer pause, so that neither
-the next drag nor the next keystroke is met by a frozen window.
+ones that take less than three quarters send them up again, a rung at a time, and less than half where the
+next rung is known to take too long. Colour, colour with the fast mode's relevance, and exact maps are paced
+apart, because they cost so differently. At rest the picture settles: at once at full size where that is
+quick, else smaller first and full after a longer pause, so that neither the next drag nor the next keystroke
+is met by a frozen window.
 """
 
 import math
@@ -58,13 +59,13 @@ SIZES_OF_MIDDLING_SCENES = (
     (1.0, 1.0),
     (0.75, 1.0),
     (0.5, 1.0),
-    (0.5, 0.5),
+    (0.35, 1.0),
     (0.35, 0.5),
-    (0.35, 0.25),
+    (0.25, 0.5),
     (0.25, 0.25),
+    (0.18, 0.25),
 )
-"""No half size with a quarter of the Gaussians, which speckles walls with holes: 25 dB of the full picture
-for 38 ms of processor time, where 0.35 with a half is at 28 dB for 40 (two photos of a room, llvmpipe)."""
+"""Pixels go before Gaussians: ARCHITECTURE.md, "What moves", has all combinations."""
 _START = 2  # rung of an unknown machine
 
 
@@ -82,14 +83,15 @@ def thinned_shares(num_gaussians: int, slow: bool) -> tuple[float, ...]:
 @dataclass(frozen=True)
 class Governor:
     """For one scene. slow: where OpenGL runs on the processor. shares: of the Gaussians, that are made; 1
-    always is. full_seconds: what a full picture of a kind
-    cost last, smoothed; rungs: where on the ladder a kind moves."""
+    always is. full_seconds: what a full picture of a kind cost last, smoothed; rungs: where on the ladder a
+    kind moves; tried: seconds that a kind took last on a rung."""
 
     num_gaussians: int = 0
     slow: bool = False
     shares: tuple[float, ...] = ()
     full_seconds: dict[Kind, float] = field(default_factory=dict)
     rungs: dict[Kind, int] = field(default_factory=dict)
+    tried: dict[tuple[Kind, int], float] = field(default_factory=dict)
 
     @property
     def ladder(self) -> tuple[tuple[float, float], ...]:
@@ -100,7 +102,7 @@ class Governor:
     def with_share(self, share: float) -> "Governor":
         """Once that share of the Gaussians is made; with other rungs one begins anew."""
         made = replace(self, shares=tuple({*self.shares, share}))
-        return made if made.ladder == self.ladder else replace(made, rungs={})
+        return made if made.ladder == self.ladder else replace(made, rungs={}, tried={})
 
     def learn(self, plan: Plan, seconds: float, moving: bool = True) -> "Governor":
         """Account for a picture just drawn, while the camera moved or at rest."""
@@ -111,13 +113,15 @@ class Governor:
         if not moving or (plan.scale, plan.share) not in self.ladder:
             return replace(self, full_seconds=full)
         rung = self.ladder.index((plan.scale, plan.share))
-        return replace(self, full_seconds=full, rungs={**self.rungs, plan.kind: self._next(rung, seconds)})
+        rungs = {**self.rungs, plan.kind: self._next(plan.kind, rung, seconds)}
+        return replace(self, full_seconds=full, rungs=rungs, tried={**self.tried, (plan.kind, rung): seconds})
 
-    def _next(self, rung: int, seconds: float) -> int:
+    def _next(self, kind: Kind, rung: int, seconds: float) -> int:
         over = math.log(max(seconds, 1e-6) / MOVING_SECONDS) / math.log(_RUNG_FACTOR)
         if over > 0:
             return min(rung + math.ceil(over), len(self.ladder) - 1)
-        return max(rung - 1, 0) if over < -1.2 else rung
+        too_slow = self.tried.get((kind, rung - 1), 0.0) > MOVING_SECONDS
+        return max(rung - 1, 0) if over < (-1.2 if too_slow else -0.5) else rung
 
     def moving(self, wanted: Kind) -> Plan:
         """What to draw while the camera moves.

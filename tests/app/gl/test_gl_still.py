@@ -7,8 +7,9 @@ import pytest
 import torch
 
 from app.gl import SplatRenderer
-from app.gl.still import draw_still
+from app.gl.still import StillMaps, draw_still
 from app.gl.warming import SIDE, warm_up
+from langflash_core.language.relevance import relevance_maps
 from langflash_core.splat import render
 from tests.app.gl.questions import full_relevance, psnr, question
 from tests.splat.scenes import camera, cloud, maps_of, turned
@@ -99,6 +100,24 @@ def test_an_answer_is_computed_once(scene) -> None:
     assert not maps.answers(asked)
     first = maps.relevance(asked)
     assert maps.answers(asked) and maps.relevance(asked) is first
+
+
+@pytest.mark.parametrize("mode", ["relevancy", "cosine"])
+def test_answers_are_those_of_its_weights(scene, mode: str) -> None:
+    """Two questions one after the other, the second with the norms of the first; empty pixels too."""
+    drawn = draw_still(scene, SEEN).maps
+    assert drawn is not None
+    weights = drawn.weights.clone()
+    weights[:10] = 0
+    maps = StillMaps(weights)
+    for number in (3, 1):
+        asked = question(scene, number, mode)
+        doubled = {name: getattr(asked, name).double() for name in ("factor", "prompts", "negatives")}
+        expected = relevance_maps(weights, replace(asked, **doubled))
+        found = torch.from_numpy(maps.relevance(asked)).double()
+        assert found.shape == expected.shape and not found[:, :10].any()
+        # Sums of 30 products in float32, of which the temperature makes ten times as much.
+        assert (found - expected).abs().max() < 1e-5 and expected[:, 10:].std() > 1e-3
 
 
 def test_shaders_are_compiled_ahead(gl, scene) -> None:
