@@ -87,6 +87,12 @@ def write_sog(scene: Scene, path: Path) -> None:
     write_atomically(path, packed.getvalue())
 
 
+def sog_files(path: Path) -> list[Path]:
+    """The meta.json that `write_sog` wrote, and the pictures beside it that it names."""
+    parts = [part for part in json.loads(path.read_bytes()).values() if isinstance(part, dict)]
+    return [path, *(path.with_name(name) for part in parts for name in part.get("files", ()))]
+
+
 def _file(folder: Path, name: str, most: int) -> bytes:
     with (folder / name).open("rb") as stream:
         return _at_most(stream, most, name)

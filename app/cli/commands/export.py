@@ -174,6 +174,7 @@ def _check_camera_words(args: Namespace, suffix: str) -> None:
 def _write_scene(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:
     from langflash_core.export import export
     from langflash_core.export.language import side_car
+    from langflash_core.export.sog import sog_files
     from langflash_core.files import make_folder
 
     chosen = _selected(args, scene, prompts)
@@ -183,7 +184,9 @@ def _write_scene(args: Namespace, scene: Scene, prompts: list[str], choice: Came
         return f"{scene.num_views} photos in images/ and their poses"
     share = f" of {len(scene.gaussians):,}" if prompts else ""
     beside = f", its language in {side_car(args.output).name}" if _has_side_car(args.output, chosen) else ""
-    return f"{len(chosen.gaussians):,}{share} Gaussians, {args.output.stat().st_size / 1e6:.1f} MB{beside}"
+    files = sog_files(args.output) if kind_of(args.output) == SOG_FOLDER else [args.output]
+    megabytes = sum(file.stat().st_size for file in files) / 1e6
+    return f"{len(chosen.gaussians):,}{share} Gaussians, {megabytes:.1f} MB{beside}"
 
 
 def _write_page(args: Namespace, scene: Scene, prompts: list[str], choice: CameraChoice) -> str:

@@ -72,6 +72,14 @@ def test_a_ply_is_drawn_from_the_camera_that_frames_it(run, ply_file, tmp_path, 
     assert run(*words[:4], "--what", "depth", "--size", "96x72", *TORCH).code == 0
 
 
+def test_the_size_of_a_sog_folder_is_that_of_its_files(run, ply_file, tmp_path):
+    folder = tmp_path / "sog"
+    outcome = run("export", ply_file, "-o", folder / "meta.json")
+    whole = sum(file.stat().st_size for file in folder.iterdir())
+    assert whole > 5 * (folder / "meta.json").stat().st_size
+    assert f"{whole / 1e6:.1f} MB" in outcome.out
+
+
 def test_info_of_a_splat_file(run, ply_file):
     document = run("info", ply_file, "--json").json()
     assert document["gaussians"] == WIDTH * HEIGHT and document["atoms"] == 0
