@@ -30,12 +30,14 @@ from .kit import theme
 from .kit.look import Look
 from .kit.textures import Thumbnails
 from .log import LogEffects
+from .memory import keep_large_apart
 from .opening.effects import OpeningEffects
 from .recovery import preferences
 from .recovery.commands import Prefer
 from .recovery.effects import RecoveryEffects
 from .recovery.keeper import Keeper
 from .recovery.preferences import Preferences
+from .rest import RestEffects
 from .scene.commands import OpenPaths
 from .scene.effects import SceneEffects
 from .state import State, Stats
@@ -63,6 +65,7 @@ class Session:
     def __init__(self, paths: Sequence[str | Path] = (), size: tuple[int, int] | None = None) -> None:
         remembered, complaint = preferences.load()
         sys.setswitchinterval(SWITCH_SECONDS)
+        keep_large_apart()
         self.state = State()
         self.gl_errors: list[str] = []
         self.lag = 0.0  # seconds that the last step took, without its nap and without drawing the scene
@@ -105,6 +108,7 @@ class Session:
             ExportingEffects(hands, keeper),
             FilmingEffects(hands),
             LogEffects(hands),
+            RestEffects(hands),
         )
         recovery.begin(remembered, complaint, empty=not paths)
         if paths:

@@ -23,13 +23,14 @@ from PIL import Image
 from langflash_core.errors import Cancelled, LangFlashError
 
 from .commands import Command, Notify, OfScene
+from .memory import give_back
 from .requests import Errand, Job, SceneErrand
 from .scene.commands import JobCancelled, JobFailed, Loaded, Progressed
 
 log = logging.getLogger(__name__)
 
-AHEAD = ("langflash_core.pipeline",)
-"""What a reconstruction imports, in the order in which one needs the next."""
+AHEAD = ("langflash_core.pipeline", "scipy.spatial.transform")
+"""What the first reconstruction and the first turn of a thing import, in this order."""
 IDLE = 0.5  # seconds without a request until the next of them is imported
 SAVING_SECONDS = 60.0  # that `stop` waits at the most for what a person asked to be saved
 
@@ -179,7 +180,7 @@ class Worker:
             self._busy = self._busy and stale()
         if spoken and outcome is not None:
             self._put(outcome)
-        _give_back_memory()
+        give_back()
 
 
 def _import_heavy() -> None:
@@ -208,7 +209,7 @@ def _link_torch() -> None:
 
 
 def _import_ahead(name: str) -> None:
-    """Import what the first reconstruction would wait for, while nobody waits."""
+    """Import what would be waited for later, while nobody waits."""
     from langflash_core.torchvision_fix import ensure_torchvision
 
     try:
@@ -221,17 +222,6 @@ def _import_ahead(name: str) -> None:
     # What modules hold stays for good. The collector, which stops every thread, need not look at it
     # again: that took a fifth of a second each time.
     gc.freeze()
-
-
-def _give_back_memory() -> None:
-    """What a job held goes back to the system, where the allocator would keep it: five reconstructions in a
-    row kept 500 MB more than one.
-
-    Its tensors are gone by now, without the collector, which would stop the window for a while.
-    """
-    if sys.platform == "linux":
-        with suppress(OSError, AttributeError):
-            ctypes.CDLL(None).malloc_trim(0)
 
 
 def _unexpected(error: Exception) -> str:

@@ -7,11 +7,14 @@ undoing it is exact. Imports no torch.
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from langflash_core.scene.mask import Mask
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 Spot = tuple[float, float, float]
 Turn = tuple[float, float, float, float]  # unit quaternion wxyz
@@ -105,7 +108,7 @@ def checked(kind: str, rows: Mask, numbers: Any) -> Change:
             length = math.hypot(w, x, y, z)
             if length < 0.5 or scale <= 0:
                 raise ValueError("changes: expected a rotation and a scale above 0")
-            turn = (w, x, y, z) if abs(length - 1) < 1e-9 else _unit((w, x, y, z))
+            turn = (w, x, y, z) if abs(length - 1) < 1e-9 else _turn(_rotation((w, x, y, z)))
             return Moved(rows, turn, scale, (right, down, ahead))
         case "recoloured", [_, _, _, _, _, _, _, _, _]:
             return Recoloured(rows, tuple(values))
@@ -125,40 +128,34 @@ def told(change: Change) -> tuple[str, list[float]]:
 def turn_about(axis: Spot, degrees: float) -> Turn:
     """The rotation about an axis, which need not be of length 1."""
     direction = np.array(axis, float)
-    half = math.radians(degrees) / 2
-    x, y, z = (math.sin(half) * direction / np.linalg.norm(direction)).tolist()
-    return (math.cos(half), x, y, z)
+    vector = math.radians(degrees) * direction / np.linalg.norm(direction)
+    return _turn(_rotations().from_rotvec(vector))
 
 
 def turn_matrix(turn: Turn) -> np.ndarray:
-    """R (3, 3) float64 of a unit quaternion; `geometry.quaternions.quats_to_matrices` without torch."""
-    w, x, y, z = turn
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    """R (3, 3) float64 of a unit quaternion."""
+    return _rotation(turn).as_matrix()
 
 
 def product(left: Turn, right: Turn) -> Turn:
     """The unit quaternion of `right` followed by `left`."""
-    a, b, c, d = left
-    e, f, g, h = right
-    return _unit(
-        (
-            a * e - b * f - c * g - d * h,
-            a * f + b * e + c * h - d * g,
-            a * g - b * h + c * e + d * f,
-            a * h + b * g - c * f + d * e,
-        )
-    )
+    return _turn(_rotation(left) * _rotation(right))
 
 
-def _unit(quat: Turn) -> Turn:
-    length = math.hypot(*quat)
-    w, x, y, z = (part / length for part in quat)
+def _rotation(quat: Turn) -> "Rotation":
+    """Of a quaternion of any length above 0."""
+    return _rotations().from_quat(quat, scalar_first=True)
+
+
+def _rotations() -> "type[Rotation]":
+    """Imported by who turns something first: it takes a fifth of a second that no start should wait for."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation
+
+
+def _turn(rotation: "Rotation") -> Turn:
+    w, x, y, z = rotation.as_quat(scalar_first=True).tolist()
     return (w, x, y, z)
 
 

@@ -1,5 +1,9 @@
 """Gaussians moved and recoloured, against a float64 twin; two scenes as one; a history with an end."""
 
+import gc
+import subprocess
+import sys
+import weakref
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,10 +13,19 @@ import torch
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.harmonics import sh_to_colour
-from langflash_core.geometry.quaternions import covariances, quats_to_matrices, unit_quats
+from langflash_core.geometry.quaternions import covariances, multiply_quats, quats_to_matrices, unit_quats
 from langflash_core.scene import edits
 from langflash_core.scene.changed import changed, changed_scene, mean_luma
-from langflash_core.scene.changes import Change, Moved, Recoloured, turn_about, turn_matrix, with_change
+from langflash_core.scene.changes import (
+    Change,
+    Moved,
+    Recoloured,
+    checked,
+    product,
+    turn_about,
+    turn_matrix,
+    with_change,
+)
 from langflash_core.scene.edited import edited_scene, first_marks
 from langflash_core.scene.edits import History
 from langflash_core.scene.edits_file import load_history, save_history
@@ -73,6 +86,41 @@ def test_a_move_is_a_similarity_of_means_covariances_and_colours() -> None:
             sh_to_colour(after.sh[i : i + 1], seen[None])[0], colours[i], atol=1e-9, rtol=0
         )
     assert after.opacities is before.opacities
+
+
+def test_turns_against_the_formulas_of_quaternions() -> None:
+    """Twin: geometry/quaternions.py in float64; 1e-12 is a thousand roundings of numbers up to 1."""
+    generator = np.random.default_rng(4)
+    for degrees in (0.0, 1e-9, -30.0, 180.0, 359.0, 400.0, *generator.uniform(-400, 400, 50)):
+        axis, other = generator.normal(size=(2, 3))
+        one, two = turn_about(tuple(axis), degrees), turn_about(tuple(other), 77.0)
+        half = np.radians(degrees) / 2
+        written = [np.cos(half), *(np.sin(half) * axis / np.linalg.norm(axis))]
+        np.testing.assert_allclose(one, written, atol=1e-12)
+        quats = torch.tensor([one, two], dtype=torch.float64)
+        np.testing.assert_allclose(turn_matrix(one), quats_to_matrices(quats)[0], atol=1e-12)
+        np.testing.assert_allclose(product(one, two), multiply_quats(quats[0], quats[1]), atol=1e-12)
+        rough = checked("moved", some_rows(), [*(3.0 * quats[0]).tolist(), 1.0, 0.0, 0.0, 0.0])
+        assert isinstance(rough, Moved)
+        np.testing.assert_allclose(rough.turn, one, atol=1e-12)
+
+
+def test_who_turns_nothing_waits_for_no_scipy() -> None:
+    code = "import sys, langflash_core.scene.edits; sys.exit('scipy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+def test_what_was_computed_of_a_scene_goes_with_it() -> None:
+    scene = wide_cloud()
+    first = changed_scene(scene, edited(scene, a_move(some_rows())).marks)
+    again = changed_scene(scene, edited(scene, a_move(some_rows())).marks)
+    assert again.gaussians is first.gaussians  # it is remembered
+    kept = weakref.ref(first.gaussians)
+    del first, again
+    assert kept() is not None
+    del scene
+    gc.collect()
+    assert kept() is None
 
 
 def test_what_the_camera_moves_along_with_looks_the_same() -> None:

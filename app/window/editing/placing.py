@@ -7,6 +7,7 @@ A gesture is a change that is shown and not yet made: `Adjust` shows it as often
 import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
+from weakref import ref
 
 import numpy as np
 import pyrr
@@ -149,28 +150,28 @@ def verb(gesture: Change) -> str:
 # What is selected
 
 
-_pivots: list[tuple[object, object, object, Spot | None]] = []  # the last one that was computed
-_lumas: list[tuple[object, object, object, float]] = []
+_pivots: list[tuple["ref[Scene]", object, object, Spot | None]] = []  # the last one that was computed
+_lumas: list[tuple["ref[Scene]", object, object, float]] = []
 
 
 def pivot_of(scene: "Scene", marks: Marks) -> Spot | None:
     """The middle of the box around nearly all that is selected; None where nothing is."""
     for source, selected, changes, found in tuple(_pivots):
-        if source is scene and selected == marks.selected and changes == marks.changes:
+        if source() is scene and selected == marks.selected and changes == marks.changes:
             return found
     from langflash_core.scene.changed import changed_scene
 
     points = changed_scene(scene, marks).gaussians.means.double().numpy()[marks.selected.rows()]
     points = points[np.isfinite(points).all(1)]
     found = _spot(np.quantile(points, _OUTLIERS, axis=0).mean(0)) if len(points) else None
-    _pivots[:] = [(scene, marks.selected, marks.changes, found)]
+    _pivots[:] = [(ref(scene), marks.selected, marks.changes, found)]
     return found
 
 
 def luma_of(scene: "Scene", marks: Marks) -> float:
     """Mean brightness of what is selected."""
     for source, selected, changes, found in tuple(_lumas):
-        if source is scene and selected == marks.selected and changes == marks.changes:
+        if source() is scene and selected == marks.selected and changes == marks.changes:
             return found
     import torch
 
@@ -178,7 +179,7 @@ def luma_of(scene: "Scene", marks: Marks) -> float:
 
     rows = torch.from_numpy(marks.selected.rows())
     found = mean_luma(changed_scene(scene, marks).gaussians, rows)
-    _lumas[:] = [(scene, marks.selected, marks.changes, found)]
+    _lumas[:] = [(ref(scene), marks.selected, marks.changes, found)]
     return found
 
 

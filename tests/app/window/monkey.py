@@ -4,7 +4,8 @@
 
 Ends with 0 when the window lived through it without an exception, an OpenGL error or a hang, and its
 memory stayed. The window can write only in a temporary folder (guarded.py); leaving is refused, so
-that the run goes on. Every minute the same scene is opened, and memory is compared there.
+that the run goes on. Every minute the same scene is opened, and memory is compared there: its file is
+written anew before, since random hands merge scenes into it and save it.
 """
 
 import argparse
@@ -26,6 +27,7 @@ import glfw
 import numpy as np
 
 from app.window.session import Session
+from langflash_core.files import write_atomically
 from tests.app.window.guarded import REFUSED, environment
 from tests.app.window.items import Items
 from tests.app.window.test_window import ROOT, x_server
@@ -102,7 +104,8 @@ def inside(width: int, height: int) -> None:
                 "frames": frames,
                 "latest": latest,
                 "rss": resident_mb(os.getpid()),
-                "scene": state.info.name if state.info and state.job is None else None,
+                "scene": state.info.serial if state.info and state.job is None else None,
+                "gaussians": state.info.num_gaussians if state.info else 0,
                 "unexpected": [t.text for t in state.toasts if "unexpected" in t.text],
                 "gl_errors": session.gl_errors,
                 "dialog": state.dialog,
@@ -129,6 +132,7 @@ class Hands:
         self._random = random.Random(seed)
         self._size = size
         self._scene = scene
+        self._content = scene.read_bytes()
         self._environment = {**os.environ, "DISPLAY": display}
         self._display = display
         self._folder = folder
@@ -183,7 +187,8 @@ class Hands:
             client.drop(self.window, paths, at, PATIENCE)
 
     def open_scene(self) -> None:
-        """The scene of the checkpoints, whatever is going on."""
+        """The scene of the checkpoints as it was at first, whatever is going on."""
+        write_atomically(self._scene, self._content)
         self.drop([self._scene])
         self._xdotool("mousemove", "5", str(self._size[1] - 5))
 
@@ -267,18 +272,22 @@ class Watched:
             found.append(errors[-3000:])
         return found
 
-    def until_scene(self, name: str, click: Callable[[list[int]], None]) -> bool:
-        """Wait for a scene at rest; edits that would be lost are to be discarded with a click."""
+    def until_scene(self, before: int | None, count: int, click: Callable[[list[int]], None]) -> bool:
+        """Wait for another scene than number `before`, of `count` Gaussians, at rest; edits that would be
+        lost are to be discarded with a click."""
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end and self.process.poll() is None:
             if self.last.get("discard"):
                 click(self.last["discard"])
-            elif self.last.get("scene") == name:
+            elif self._has_come(before, count):
                 time.sleep(2.0)  # for what follows a scene: words of its atoms, files kept
                 if not self.last.get("discard"):
-                    return self.last.get("scene") == name
+                    return self._has_come(before, count)
             time.sleep(0.2)
         return False
+
+    def _has_come(self, before: int | None, count: int) -> bool:
+        return self.last.get("scene") not in (None, before) and self.last["gaussians"] == count
 
     def end(self) -> int:
         """Ask the process to end, and wait."""
@@ -297,11 +306,13 @@ class Watched:
         return code
 
 
-def opened(hands: Hands, watched: Watched, name: str) -> bool:
-    """Open the scene, again where random input that still waited has opened another one since."""
+def opened(hands: Hands, watched: Watched, count: int) -> bool:
+    """Open the scene, of `count` Gaussians; again where random input that still waited has opened another one
+    since."""
     for _ in range(3):
+        before = watched.last.get("scene")
         hands.open_scene()
-        if watched.until_scene(name, hands.click):
+        if watched.until_scene(before, count, hands.click):
             return True
     return False
 
@@ -318,7 +329,8 @@ def run(
     with tempfile.TemporaryDirectory(prefix="monkey-") as place, x_server(*size) as display:
         folder = Path(place).resolve()
         scene = folder / "room.langflash"
-        save(room(language_space("minilm").encode(list(PHRASES))), scene)
+        made = room(language_space("minilm").encode(list(PHRASES)))
+        save(made, scene)
         watched = Watched(display, folder, size)
         try:
             hands = Hands(display, folder, scene, size, seed)
@@ -328,7 +340,7 @@ def run(
             while not outcome.problems:
                 now = time.monotonic() - start
                 if now >= checkpoint or now >= seconds:
-                    if not opened(hands, watched, scene.name):
+                    if not opened(hands, watched, len(made.gaussians)):
                         outcome.problems.append(f"the scene did not open: {watched.last}")
                     outcome.checkpoints.append((now / 60, watched.last.get("rss", 0.0)))
                     say(f"{now / 60:5.1f} min  {watched.last.get('rss', 0):6.0f} MB  {outcome.steps} steps")

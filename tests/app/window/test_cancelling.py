@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from app.window.memory import give_back
 from app.window.scene import commands as show
 from app.window.scene import work
-from app.window.worker import Worker, _give_back_memory
+from app.window.worker import Worker
 from langflash_core.resources import asset_path
 from tests.app.window.test_worker import PATIENCE, wait_for
 
@@ -61,7 +62,7 @@ def cancelled_in(worker: Worker, stage: str, wait: float) -> tuple[float, float,
         Seconds until the person hears of it, until the worker is free; and MB that stayed.
     """
     gc.collect()
-    _give_back_memory()
+    give_back()
     before = resident_mb()
     worker.submit(work.ReconstructPhotos(PHOTOS))
     while not any(r.stage == stage for r in worker.poll() if isinstance(r, show.Progressed)):

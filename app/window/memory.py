@@ -1,0 +1,39 @@
+"""What a long session no longer needs goes back to the system.
+
+With the GNU C library alone: elsewhere memory is kept and given back in the system's own way.
+"""
+
+import ctypes
+import sys
+from contextlib import suppress
+
+_MMAP_THRESHOLD, _TRIM_THRESHOLD = -3, -1  # M_* of malloc.h
+LARGE_BYTES = 4 << 20
+"""From here on an array has pages of its own, which go with it.
+
+By itself the library would raise this border, up to 32 MB, with every larger array that is gone: others would
+then lie between small things that stay, and hold the pages around them. After two rounds of opening, merging,
+resizing and asking that was 479 MB in place of 437 (private memory). A smaller border costs time: still
+pictures of 12,300 Gaussians at 640 x 480 take 2 % more of the processor with 4 MB, 11 % with 1 MB (400 MB
+then), 24 % with 256 KB.
+"""
+
+
+def keep_large_apart() -> None:
+    """Give every large array pages of its own, from here on; before any is made."""
+    _call("mallopt", _MMAP_THRESHOLD, LARGE_BYTES)
+    _call("mallopt", _TRIM_THRESHOLD, 2 * LARGE_BYTES)
+
+
+def give_back() -> None:
+    """Return what is free between things that stay: five reconstructions in a row kept 500 MB more than one.
+
+    Tensors that nobody holds are gone without Python's collector, which would stop the window for a while.
+    """
+    _call("malloc_trim", 0)
+
+
+def _call(name: str, *arguments: int) -> None:
+    if sys.platform == "linux":
+        with suppress(OSError, AttributeError):
+            getattr(ctypes.CDLL(None), name)(*arguments)

@@ -1,0 +1,130 @@
+"""What a long session no longer needs goes back to the system."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.window.commands import Measured, Notify, Tick
+from app.window.effects import Hands
+from app.window.rest import REST_SECONDS, RestEffects
+from app.window.state import State, Stats
+from langflash_core.language.spaces import language_space
+from langflash_core.scene.file import save
+from tests.app.window import test_window
+from tests.app.window.guarded import environment
+from tests.app.window.scenes import PHRASES, room
+from tests.app.window.test_window import ROOT, x_server
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="asks the GNU C library")
+FREE_MB = 12  # that a window at rest holds and needs not
+HELD_MB = 100  # of the 300 MB of arrays that are gone; what lies apart leaves a tenth of that
+
+ARRAYS_AMONG_SMALL_THINGS = """
+import sys
+import numpy as np
+from app.window import memory
+
+def resident_mb():
+    lines = open("/proc/self/status").read().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("RssAnon:")) / 1024
+
+if sys.argv[1] == "apart":
+    memory.keep_large_apart()
+np.ones(30 << 20, np.uint8)  # a picture that is gone raises the library's own border to its size
+before, stays = resident_mb(), []
+arrays = []
+for _ in range(60):
+    arrays.append(np.ones(5 << 20, np.uint8))
+    stays.append(bytes(100_000))
+assert resident_mb() - before > 290
+del arrays
+print(resident_mb() - before)
+memory.give_back()
+print(resident_mb() - before)
+"""
+
+
+def held_mb(how: str) -> tuple[float, float]:
+    """MB that stay of arrays which are gone, at once and once they were given back."""
+    program = [sys.executable, "-c", ARRAYS_AMONG_SMALL_THINGS, how]
+    done = subprocess.run(program, cwd=ROOT, capture_output=True, text=True, check=True)
+    at_once, later = map(float, done.stdout.split())
+    return at_once, later
+
+
+def test_large_arrays_leave_nothing_behind() -> None:
+    at_once, _ = held_mb("apart")
+    assert at_once < HELD_MB
+    usual, later = held_mb("as usual")
+    assert usual > 2 * HELD_MB  # what the library does by itself, else this test could not fail
+    assert later < HELD_MB  # what `give_back` is for
+
+
+def test_rest_begins_with_the_last_command() -> None:
+    clock = [5.0]
+    hands = Hands(print, print, print, lambda: None, lambda: clock[0])
+    effects, state = RestEffects(hands), State()
+    effects.follow(Tick(5.0), state, state)
+    effects.follow(Measured(Stats()), state, state)
+    assert effects.due == float("inf")  # every frame has those
+    effects.follow(Notify("here"), state, state)
+    effects.tick(state, clock[0])
+    assert effects.due == clock[0] + REST_SECONDS
+    effects.tick(state, effects.due)
+    assert effects.due == float("inf")
+
+
+ASKING = """
+import ctypes, sys, time
+from pathlib import Path
+from app.window.asking.commands import AddPrompt, EditPrompt
+from app.window.scene.commands import OpenScene
+from app.window.session import Session
+
+session = Session((), (1000, 700))
+
+def until(reached, seconds=240):
+    end = time.monotonic() + seconds
+    while not reached():
+        assert time.monotonic() < end, session.state
+        session.step(0.1)
+
+def resident_mb():
+    lines = open("/proc/self/status").read().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("RssAnon:")) / 1024
+
+def asked(text):
+    session.dispatch(EditPrompt(session.state.prompts[0].key, text))
+    until(lambda: session.state.prompts[0].text == text)
+    until(lambda: session.state.prompts[0].score is not None and not session.state.stats.settling)
+
+session.dispatch(OpenScene(Path(sys.argv[1]), alone=True))
+until(lambda: session.state.info is not None and session.state.job is None)
+if not session.state.prompts:
+    session.dispatch(AddPrompt())
+    until(lambda: session.state.prompts)
+for text in ("armchair", "wall", "floor"):
+    asked(text)
+end = time.monotonic() + 4
+while time.monotonic() < end:
+    session.step(0.1)
+before = resident_mb()
+ctypes.CDLL(None).malloc_trim(0)
+print(before - resident_mb())
+session.close()
+"""
+
+
+@test_window.pytestmark[0]
+def test_a_window_at_rest_holds_little_that_is_free(tmp_path: Path) -> None:
+    scene = tmp_path / "room.langflash"
+    save(room(language_space("minilm").encode(list(PHRASES))), scene)
+    with x_server(1000, 700) as display:
+        own = {**environment(tmp_path, ROOT), "DISPLAY": display}
+        own.pop("WAYLAND_DISPLAY", None)
+        program = [sys.executable, "-c", ASKING, str(scene)]
+        done = subprocess.run(program, cwd=tmp_path, env=own, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout.split()[-1]) < FREE_MB
