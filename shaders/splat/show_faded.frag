@@ -1,35 +1,20 @@
 #version 330 core
 // Purpose: the colour target over a background that takes over where surfaces are seen from far aside of
-//          all photos, opaque, for a screen. Source: langflash_core/scene/trust.py, `trust`.
-// Frames: camera axes are OpenCV's; `eyes` are the photos' places in those of the picture.
-//         MAX_PHOTOS, COS_NONE and COS_FULL are set by the program.
+//          all photos, opaque, for a screen.
+
+#include "gaps.glsl"
+#include "trust.glsl"
 
 uniform sampler2D colour;  // premultiplied
 uniform sampler2D depth;   // sum of T alpha z, sum of T alpha
 uniform vec3 background;
-uniform vec4 pinhole;      // fx, fy, cx, cy
-uniform bool orthographic;
-uniform int num_photos;
-uniform vec3 eyes[MAX_PHOTOS];
 
 out vec4 out_colour;
-
-float trust(vec3 pos_c) {
-    vec3 way = orthographic ? vec3(0.0, 0.0, -1.0) : normalize(-pos_c);
-    float nearest = -1.0;
-    for (int photo = 0; photo < num_photos; ++photo)
-        nearest = max(nearest, dot(normalize(eyes[photo] - pos_c), way));
-    return smoothstep(COS_NONE, COS_FULL, nearest);
-}
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec2 sums = texelFetch(depth, pixel, 0).rg;
-    vec3 rgb = texelFetch(colour, pixel, 0).rgb + (1.0 - sums.g) * background;
-    if (sums.g > 1.0 / 255.0) {
-        float z = sums.r / sums.g;
-        float known = trust(vec3((vec2(pixel) + 0.5 - pinhole.zw) / pinhole.xy * (orthographic ? 1.0 : z), z));
-        rgb = rgb * known + background * (1.0 - known);
-    }
-    out_colour = vec4(clamp(rgb, 0.0, 1.0), 1.0);
+    vec3 rgb = faded(texelFetch(colour, pixel, 0).rgb, sums, pixel, background);
+    vec4 shown = over_gaps(vec4(rgb, sums.g));
+    out_colour = vec4(clamp(shown.rgb + (1.0 - shown.a) * background, 0.0, 1.0), 1.0);
 }
