@@ -13,7 +13,7 @@ from langflash_core.types import Camera, Scene
 
 from .packed import PackedMaps
 from .painter import Painter, Textures, Uniforms
-from .photos import MOST_PHOTOS, SAME, WORST, PhotoDepths, photo_places
+from .photos import MOST_PHOTOS, SAME, WORST, PhotoDepths, lens, photo_places
 from .targets import ColourTarget, LayerTarget
 from .weights import Maps
 
@@ -84,15 +84,23 @@ class Display:
 
     def faded(self, drawn: Drawn, scene: Scene) -> moderngl.Texture:
         """The colours over their background, which takes over where no photo looked from about there."""
-        low, high = COSINES
-        return self._filled(
-            ("faded",),
-            (drawn.key, drawn.background),
-            "show_faded.frag",
-            {**drawn.colour, **drawn.depth},
-            {"background": drawn.background, **photo_places(scene, drawn.camera)},
-            {"MAX_PHOTOS": MOST_PHOTOS, "COS_NONE": low, "COS_FULL": high},
-        )
+
+        def paint(into: moderngl.Framebuffer) -> None:
+            places = photo_places(scene, drawn.camera)
+            eyes = self._painter.ctx.texture((MOST_PHOTOS, 1), 4, dtype="f4")
+            eyes.write(places, viewport=(0, 0, len(places), 1))
+            eyes.filter = (moderngl.NEAREST, moderngl.NEAREST)
+            low, high = COSINES
+            self._painter.fill(
+                into,
+                "show_faded.frag",
+                {**drawn.colour, **drawn.depth, "eyes": eyes},
+                {"background": drawn.background, "num_photos": len(places), **lens(drawn.camera)},
+                {"COS_NONE": low, "COS_FULL": high},
+            )
+            eyes.release()
+
+        return self._picture(("faded",), (drawn.key, drawn.background), paint)
 
     def depth(self, drawn: Drawn, span: Span, colormap: str) -> moderngl.Texture:
         """Depth as a colour of a map; `span`: depths of its first and last colour."""

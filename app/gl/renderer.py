@@ -226,6 +226,11 @@ class SplatRenderer:
         self._scene.change(changes)
 
     @property
+    def canvas(self) -> Canvas:
+        """What it draws with and on."""
+        return self._canvas
+
+    @property
     def in_software(self) -> bool:
         """Whether OpenGL runs on the processor, so that still pictures are drawn better beside it."""
         return draws_in_software(self._ctx)

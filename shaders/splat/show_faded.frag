@@ -1,8 +1,8 @@
 #version 330 core
 // Purpose: the colour target over a background that takes over where surfaces are seen from far aside of
 //          all photos, opaque, for a screen. Source: langflash_core/scene/trust.py, `trust`.
-// Frames: camera axes are OpenCV's; `eyes` are the photos' places in those of the picture.
-//         MAX_PHOTOS, COS_NONE and COS_FULL are set by the program.
+// Frames: camera axes are OpenCV's; `eyes` are the photos' places in those of the picture, a texel each.
+//         COS_NONE and COS_FULL are set by the program.
 
 uniform sampler2D colour;  // premultiplied
 uniform sampler2D depth;   // sum of T alpha z, sum of T alpha
@@ -10,15 +10,17 @@ uniform vec3 background;
 uniform vec4 pinhole;      // fx, fy, cx, cy
 uniform bool orthographic;
 uniform int num_photos;
-uniform vec3 eyes[MAX_PHOTOS];
+uniform sampler2D eyes;
 
 out vec4 out_colour;
 
 float trust(vec3 pos_c) {
-    vec3 way = orthographic ? vec3(0.0, 0.0, -1.0) : normalize(-pos_c);
+    vec3 way = orthographic ? vec3(0.0, 0.0, -1.0) : -pos_c * inversesqrt(dot(pos_c, pos_c));
     float nearest = -1.0;
-    for (int photo = 0; photo < num_photos; ++photo)
-        nearest = max(nearest, dot(normalize(eyes[photo] - pos_c), way));
+    for (int photo = 0; photo < num_photos; ++photo) {
+        vec3 there = texelFetch(eyes, ivec2(photo, 0), 0).xyz - pos_c;
+        nearest = max(nearest, dot(there, way) * inversesqrt(dot(there, there)));
+    }
     return smoothstep(COS_NONE, COS_FULL, nearest);
 }
 
