@@ -60,7 +60,7 @@ class PhotoDepths:
             matrices[photo] = _numbers(seen.viewmat) @ back
         return {
             "num_photos": len(self.cameras),
-            **_lens(camera),
+            **lens(camera),
             "pinholes": pinholes,
             "to_photos": matrices,
         }
@@ -69,13 +69,11 @@ class PhotoDepths:
         self.texture.release()
 
 
-def photo_places(scene: Scene, camera: Camera) -> dict[str, np.ndarray | int]:
-    """Values of show_faded.frag: where the nearest photos stand, in the axes of a picture's camera."""
-    places = (np.linalg.inv(_numbers(scene.viewmats))[:, :, 3] @ _numbers(camera.viewmat).T)[:, :3]
-    near = places[np.argsort(np.linalg.norm(places, axis=1), kind="stable")[:MOST_PHOTOS]]
-    eyes = np.zeros((MOST_PHOTOS, 3))
-    eyes[: len(near)] = near
-    return {"num_photos": len(near), **_lens(camera), "eyes": eyes}
+def photo_places(scene: Scene, camera: Camera) -> np.ndarray:
+    """(n, 4) float32: where the nearest `MOST_PHOTOS` stand, x y z 1 in the axes of a picture's camera."""
+    places = np.linalg.inv(_numbers(scene.viewmats))[:, :, 3] @ _numbers(camera.viewmat).T
+    nearest = np.argsort(np.linalg.norm(places[:, :3], axis=1), kind="stable")[:MOST_PHOTOS]
+    return places[nearest].astype(np.float32)
 
 
 def _small(camera: Camera) -> Camera:
@@ -83,7 +81,8 @@ def _small(camera: Camera) -> Camera:
     return camera.resized(max(1, round(camera.width * ratio)), max(1, round(camera.height * ratio)))
 
 
-def _lens(camera: Camera) -> dict[str, np.ndarray | int]:
+def lens(camera: Camera) -> dict[str, np.ndarray | int]:
+    """A picture's camera, as shaders take it that ask where a pixel's surface is."""
     return {"pinhole": _pinhole(camera), "orthographic": int(camera.orthographic)}
 
 

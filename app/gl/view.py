@@ -80,7 +80,7 @@ class ViewTargets:
 
     def fast(self, question: Question, level: Level) -> LayerTarget:
         """Relevance from numbers beside the colour: all three in one splat pass, unless they are there."""
-        passes = self._fast_passes(question.num_phrases)
+        passes = self.fast_passes(question.num_phrases)
         shown = (level.places_key, question.key)
         if passes.shows != shown:
             numbers = question.numbers(level)
@@ -107,7 +107,8 @@ class ViewTargets:
         self.maps.release()
         self.packed.forget()
 
-    def _fast_passes(self, num_phrases: int) -> FastPasses:
+    def fast_passes(self, num_phrases: int) -> FastPasses:
+        """What so many phrases are splatted into beside the colour; kept for the last number."""
         if self._fast is None or self._fast.num_phrases != num_phrases:
             self._release_fast()
             self._fast = FastPasses(self._painter, self.colour, self._dtype, num_phrases)

@@ -1,5 +1,5 @@
 """Shaders compiled before somebody waits for them: a driver does so at the first drawing, and software
-renderers take a quarter of a second for some."""
+renderers take a tenth of a second for each."""
 
 from collections.abc import Iterator
 
@@ -9,28 +9,42 @@ from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.language.relevance import CompiledQuery
 from langflash_core.types import Camera, Gaussians, Scene, Semantics
 
-from .renderer import SplatRenderer
+from .answers import ShaderAnswers
+from .canvas import Canvas
+from .display import Answer, Drawn
+from .question import Question
+from .scene import LiveScene
 
-_SIDE = 16  # pixels
+SIDE = 36  # pixels; Mesa compiles anew for a texture whose side is not, as this one, beside the powers of two
 
 
-def warm_up(renderer: SplatRenderer) -> Iterator[None]:
-    """Draw one Gaussian in the ways that come first, a way a step; the renderer's scene is lost."""
-    camera = Camera(torch.eye(4), torch.tensor([[16.0, 0, 8], [0, 16, 8], [0, 0, 1]]), _SIDE, _SIDE)
-    renderer.set_scene(_one())
+def warm_up(canvas: Canvas) -> Iterator[None]:
+    """Draw one Gaussian in the ways that come first, a shader a step."""
+    camera = Camera(torch.eye(4), torch.tensor([[36.0, 0, 18], [0, 36, 18], [0, 0, 1]]), SIDE, SIDE)
+    view = canvas.view((SIDE, SIDE))
+    scene = LiveScene(canvas.painter, _one())
+    level = scene.whole
     yield
-    renderer.draw(camera, weight_maps=False)
+    level.prepare(camera)
     yield
-    _ = renderer.rgb_texture
+    view.draw_colour(level)
+    yield
+    drawn = Drawn(view.colour, camera, (0.0, 0.0, 0.0), level.places_key, fill=True)
+    for _ in view.display.gaps.passes(view.colour.colour, view.colour.depth):
+        yield
+    yield
+    view.display.rgb(drawn)
+    yield
+    view.display.faded(drawn, scene.scene)
     yield
     one = torch.ones(1, 1)
-    renderer.ask(CompiledQuery(one, one, one, 1.0, 0.5, "relevancy", ("",)))
-    renderer.draw(camera, weight_maps=False, fast=True)
+    question = Question(CompiledQuery(one, one, one, 1.0, 0.5, "relevancy", ("",)), ShaderAnswers)
+    view.fast_passes(question.num_phrases).run(question.compiled)
     yield
-    renderer.relevance()
+    answer = Answer(view.fast(question, level), question.num_phrases, ())
     yield
-    renderer.heat_texture()
-    renderer.ask(None)
+    view.display.heat(drawn, answer, 0, 0.5, (0.5, 1.0), "turbo", True)
+    scene.release()
 
 
 def _one() -> Scene:
@@ -39,4 +53,4 @@ def _one() -> Scene:
     colour = colour_to_sh(torch.full((1, 3), 0.5))[:, None]
     gaussians = Gaussians(place, quat, torch.full((1, 3), 0.1), torch.ones(1), colour)
     semantics = Semantics(torch.zeros(1, 1, dtype=torch.int64), torch.ones(1, 1), torch.ones(1, 1), "none")
-    return Scene(gaussians, semantics, torch.eye(4)[None], torch.eye(3)[None], (_SIDE, _SIDE))
+    return Scene(gaussians, semantics, torch.eye(4)[None], torch.eye(3)[None], (SIDE, SIDE))

@@ -125,7 +125,8 @@ class Governor:
         Exact maps where even a full picture of them is quick. Else, for relevance (`Kind.FAST`), the
         fast mode, and for atoms (`Kind.MAPS`) smaller maps, or colour where these take too long.
         """
-        if wanted is not Kind.COLOUR and self._expected(Kind.MAPS, MOVING_SECONDS) <= MOVING_SECONDS:
+        unknown = math.inf if self.slow else MOVING_SECONDS
+        if wanted is not Kind.COLOUR and self._expected(Kind.MAPS, unknown) <= MOVING_SECONDS:
             return Plan(Kind.MAPS)
         if wanted is Kind.MAPS:
             smallest = min(scale for scale, _ in SIZES)

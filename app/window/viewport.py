@@ -44,7 +44,7 @@ log = logging.getLogger(__name__)
 BACKGROUND = (0.055, 0.06, 0.07)  # the theme's canvas
 STILLS = (0.5, 1.0)
 """Scales of the still pictures that follow each other where OpenGL runs on the processor."""
-LONG_SECONDS = 0.1  # a picture that took as long is painted in the next frame
+LONG_SECONDS = 0.1  # a picture that took as long is painted in the next frame, and so is a scene's first
 MOST_THREADS = 8  # of a still picture
 RETRY_SECONDS = 5.0  # until a still picture that could not be drawn is tried again
 SHOWN_ALPHA = 0.5  # as in the answers: from here on a pixel shows the scene
@@ -148,7 +148,7 @@ class Viewport:
             if self._warming is None:
                 from ..gl.warming import warm_up
 
-                self._warming = warm_up(self._made())
+                self._warming = warm_up(self._made().canvas)
             return next(self._warming, self) is not self
         except (GraphicsError, moderngl.Error):  # whoever needs that shader will say so
             log.exception("a shader could not be compiled ahead")
@@ -299,8 +299,9 @@ class Viewport:
                 if wanted.plan.kind is Kind.FAST:
                     self._renderer.carry(wanted.plan.share)
                     return 0.0
+            first = self._drawn is None
             self._draw(wanted, moving=True)
-            self._unpainted = self.picture_seconds > LONG_SECONDS
+            self._unpainted = first or self.picture_seconds > LONG_SECONDS
             if self._unpainted:
                 return 0.0
         done = artist.take()
@@ -477,6 +478,7 @@ class Viewport:
         renderer, drawn = self._renderer, self._drawn
         if renderer is None or drawn is None:
             return
+        fill = state.preferences.fill_gaps
         shown = {p.key: p for p in state.prompts}
         asked = [shown[key] for key in self._keys if key in shown]
         mode = state.mode if drawn.plan.covers(replace(drawn.plan, kind=_kind(state))) else Mode.RGB
@@ -493,11 +495,13 @@ class Viewport:
             active,
             state.asking.atom,
             faded,
+            fill,
             tuple((p.colour, p.cut, p.shown_from) for p in asked),
             colours,
         )
         if colouring != self._colouring:
             self._colouring = colouring
+            renderer.fill(fill)
             self._texture = (
                 renderer.faded_texture()
                 if faded

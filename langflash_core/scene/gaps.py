@@ -1,9 +1,9 @@
-"""Gaps of a picture, filled by what is around them: for people to look at, never for answers, depth or cut-outs.
+"""Gaps of a picture, filled by what is around them: to look at, never for answers, depth or cut-outs.
 
 Seen from aside a scene of surface elements opens: where a depth is a little off, and behind things, nothing
 is drawn, and dark cracks catch the eye more than anything else. There the colours of ever coarser pictures
-of what is drawn around show through. They reach about an eighth of the picture; what is farther from everything
-that is drawn stays empty, so nothing is invented where no photo looked.
+of what is drawn around show through. They reach about an eighth of the picture; what is farther from
+everything that is drawn stays empty, so nothing is invented where no photo looked.
 
 Source: the pull-push of Gortler et al. 1996, "The Lumigraph", with a box filter and a linear one. The twin of
 shaders/splat/pull.frag, push.frag and gaps.glsl.
@@ -19,8 +19,8 @@ from torch import Tensor
 from torch.nn import functional as F
 
 REACH = 8
-"""The shorter side is this many times as long as what is filled from one side. Six validation rooms seen from 20
-degrees aside: half the length loses .17 dB, twice as much gains .02."""
+"""The shorter side is this many times as long as what is filled from one side. Six validation rooms seen
+from 20 degrees aside: half the length loses .17 dB, twice as much gains .02."""
 
 
 def num_levels(width: int, height: int) -> int:

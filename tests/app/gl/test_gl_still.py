@@ -1,12 +1,14 @@
 """Pictures drawn beside the window are those that the renderer draws."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
 from app.gl import SplatRenderer
 from app.gl.still import draw_still
-from app.gl.warming import warm_up
+from app.gl.warming import SIDE, warm_up
 from langflash_core.splat import render
 from tests.app.gl.questions import full_relevance, psnr, question
 from tests.splat.scenes import camera, cloud, maps_of, turned
@@ -100,16 +102,28 @@ def test_an_answer_is_computed_once(scene) -> None:
 
 
 def test_shaders_are_compiled_ahead(gl, scene) -> None:
-    """What comes first in a window finds its programs made."""
+    """What comes first in a window finds its programs made: one at a time, a frame between two of them."""
     renderer = SplatRenderer(gl)
-    steps = sum(1 for _ in warm_up(renderer))
-    assert steps >= 4  # one at a time, a frame between two of them
-    programs = renderer._canvas.painter.programs._made
+    programs = renderer.canvas.painter.programs._made
+    counts = [0]
+    for _ in warm_up(renderer.canvas):
+        counts.append(len(programs))
     before = set(programs)
-    renderer.set_scene(cloud(50, degree=0, dtype=torch.float32))
+    counts.append(len(before))
+    assert max(np.diff(counts)) == 1
+    made = cloud(50, degree=0, dtype=torch.float32)
+    made = replace(made, view_ids=torch.zeros(50, dtype=torch.int64))
+    renderer.fill(True)  # as the window does
+    renderer.set_scene(made)
     renderer.draw(SEEN, weight_maps=False)
     _ = renderer.rgb_texture
+    _ = renderer.faded_texture()
+    renderer.ask(question(made, 1))
+    renderer.draw(SEEN, weight_maps=False, fast=True)
+    renderer.heat_texture()
     assert set(programs) == before
+    assert SIDE & (SIDE - 1)  # of textures with such sides Mesa compiles shaders of their own
+    assert gl.error == "GL_NO_ERROR"
     renderer.release()
 
 

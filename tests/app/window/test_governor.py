@@ -91,6 +91,14 @@ def test_what_was_never_drawn_is_expected_to_cost_more_than_colour() -> None:
     assert fast.moving(Kind.FAST) == Plan(Kind.MAPS)
 
 
+def test_on_a_slow_machine_nothing_measured_is_no_reason_to_draw_maps() -> None:
+    """Where fewer Gaussians are made before the first picture, no full one is ever measured."""
+    governor = Governor(MIDDLING_SCENE, slow=True, shares=thinned_shares(MIDDLING_SCENE, True))
+    governor = governor.learn(governor.moving(Kind.COLOUR), 0.05)
+    assert not governor.full_seconds
+    assert governor.moving(Kind.FAST).kind is Kind.FAST
+
+
 def test_what_a_picture_serves() -> None:
     assert Plan(Kind.MAPS).covers(Plan(Kind.FAST, 0.5, 0.25))
     assert Plan(Kind.FAST, 0.5).covers(Plan(Kind.COLOUR, 0.5))
