@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 from langflash_core.errors import GraphicsError, MissingPackageError
@@ -108,16 +109,16 @@ class GlRenderer:
         self._context.release()
 
 
-class Fading:
-    """A renderer whose frames fade where no photo looked from about there; see `scene.trust`."""
+class Shown:
+    """A renderer whose pictures are for people: they fade where no photo looked from about there
+    (`scene.trust`), and their gaps are filled (`scene.gaps`)."""
 
-    def __init__(self, inner: Renderer) -> None:
+    def __init__(self, inner: Renderer, *, fade: bool, fill: bool) -> None:
         self.inner, self.backend = inner, inner.backend
+        self._fade, self._fill = fade, fill
 
     def __call__(self, scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame:
-        from langflash_core.scene.trust import faded
-
-        return faded(self.inner(scene, camera, weight_maps=weight_maps), camera, scene)
+        return self._shown(self.inner(scene, camera, weight_maps=weight_maps), scene, camera)
 
     def colours(self, scene: Scene, camera: Camera) -> "np.ndarray":
         from langflash_core.export.png import to_8bit
@@ -125,16 +126,23 @@ class Fading:
         return to_8bit(self(scene, camera, weight_maps=False).rgb)
 
     def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
+        frame, relevance = self.inner.answered(scene, camera, compiled)
+        shown = self._shown(frame, scene, camera)
+        return shown, relevance * (shown.alphas > 0) if self._fade else relevance
+
+    def _shown(self, frame: Frame, scene: Scene, camera: Camera) -> Frame:
+        from langflash_core.scene.gaps import filled
         from langflash_core.scene.trust import faded
 
-        frame, relevance = self.inner.answered(scene, camera, compiled)
-        shown = faded(frame, camera, scene)
-        return shown, relevance * (shown.alphas > 0)
+        shown = faded(frame, camera, scene) if self._fade else frame
+        return replace(shown, rgb=filled(shown.rgb, frame.alphas)) if self._fill else shown
 
 
 @contextmanager
-def open_renderer(backend: "str | Renderer | None", *, fade: bool = False) -> Iterator[Renderer]:
-    """A renderer for the length of a command; `fade`: as `Fading`.
+def open_renderer(
+    backend: "str | Renderer | None", *, fade: bool = False, fill: bool = False
+) -> Iterator[Renderer]:
+    """A renderer for the length of a command; `fade`, `fill`: as `Shown`.
 
     Args:
         backend: "gl", "torch", or None: gl, and torch with a warning where OpenGL or what speaks it is
@@ -143,9 +151,9 @@ def open_renderer(backend: "str | Renderer | None", *, fade: bool = False) -> It
     Raises:
         GraphicsError, MissingPackageError: "gl" was asked for and is not there.
     """
-    if fade:
+    if fade or fill:
         with open_renderer(backend) as inner:
-            yield Fading(inner)
+            yield Shown(inner, fade=fade, fill=fill)
         return
     if backend is not None and not isinstance(backend, str):
         yield backend

@@ -11,6 +11,7 @@ from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.scene.trust import COSINES
 from langflash_core.types import Camera, Scene
 
+from .gaps import Gaps
 from .packed import PackedMaps
 from .painter import Painter, Textures, Uniforms
 from .photos import MOST_PHOTOS, SAME, WORST, PhotoDepths, lens, photo_places
@@ -30,12 +31,13 @@ Span = tuple[float, float]
 
 @dataclass(frozen=True)
 class Drawn:
-    """Colour and depth of a picture; `key` names their content."""
+    """Colour and depth of a picture; `key` names their content. fill: colours show what is around gaps."""
 
     target: ColourTarget
     camera: Camera
     background: Background
     key: int
+    fill: bool = False
 
     @property
     def colour(self) -> dict[str, moderngl.Texture]:
@@ -69,21 +71,31 @@ class Display:
         self._pictures: dict[tuple, tuple[moderngl.Texture, moderngl.Framebuffer]] = {}
         self._keys: dict[tuple, Hashable] = {}
         self._label_ids: moderngl.Texture | None = None
+        self._gaps: Gaps | None = None
 
     # --- of colour and depth --------------------------------------------------------------------
 
     def rgb(self, drawn: Drawn) -> moderngl.Texture:
         """The colours over their background."""
-        return self._filled(
-            ("rgb",),
-            (drawn.key, drawn.background),
-            "show_rgb.frag",
-            {**drawn.colour, **drawn.depth},
-            {"background": drawn.background},
-        )
+        return self._over_background("rgb", drawn, drawn.target.colour)
 
     def faded(self, drawn: Drawn, scene: Scene) -> moderngl.Texture:
         """The colours over their background, which takes over where no photo looked from about there."""
+        return self._over_background("faded", drawn, self._fading(drawn, scene))
+
+    def _over_background(self, kind: str, drawn: Drawn, colour: moderngl.Texture) -> moderngl.Texture:
+        around, defines = self._around(drawn, colour, kind)
+        return self._filled(
+            (kind,),
+            (drawn.key, drawn.background, drawn.fill),
+            "show_rgb.frag",
+            {"colour": colour, **drawn.depth, **around},
+            {"background": drawn.background},
+            defines,
+        )
+
+    def _fading(self, drawn: Drawn, scene: Scene) -> moderngl.Texture:
+        """The colours, premultiplied, in which the background takes over."""
 
         def paint(into: moderngl.Framebuffer) -> None:
             places = photo_places(scene, drawn.camera)
@@ -93,14 +105,30 @@ class Display:
             low, high = COSINES
             self._painter.fill(
                 into,
-                "show_faded.frag",
+                "fade.frag",
                 {**drawn.colour, **drawn.depth, "eyes": eyes},
                 {"background": drawn.background, "num_photos": len(places), **lens(drawn.camera)},
                 {"COS_NONE": low, "COS_FULL": high},
             )
             eyes.release()
 
-        return self._picture(("faded",), (drawn.key, drawn.background), paint)
+        return self._picture(("fading",), (drawn.key, drawn.background), paint, drawn.target.colour.dtype)
+
+    def _around(
+        self, drawn: Drawn, colour: moderngl.Texture | None = None, kind: str = "rgb"
+    ) -> tuple[dict[str, moderngl.Texture], dict[str, float]]:
+        """Textures and defines of gaps.glsl; none where gaps stay."""
+        if not drawn.fill:
+            return {}, {}
+        key = (drawn.key, kind, drawn.background if kind == "faded" else None)
+        return {"gaps": self.gaps.of(colour or drawn.target.colour, drawn.target.depth, key)}, {"GAPS": 1}
+
+    @property
+    def gaps(self) -> Gaps:
+        """What shows through the gaps of a picture."""
+        if self._gaps is None:
+            self._gaps = Gaps(self._painter, self._size)
+        return self._gaps
 
     def depth(self, drawn: Drawn, span: Span, colormap: str) -> moderngl.Texture:
         """Depth as a colour of a map; `span`: depths of its first and last colour."""
@@ -152,11 +180,12 @@ class Display:
         over_rgb: bool,
     ) -> moderngl.Texture:
         """One prompt's relevance from `threshold` on; `span`: that of the first and the last colour."""
+        around, defines = self._around(drawn)
         return self._filled(
             ("heat", prompt),
-            (*answer.key, threshold, span, colormap, over_rgb),
+            (*answer.key, threshold, span, colormap, over_rgb, drawn.fill),
             "show_heat.frag",
-            {**drawn.colour, **answer.relevance},
+            {**drawn.colour, **answer.relevance, **around},
             {
                 "prompt": prompt,
                 "colour_stops": colour_stops(colormap),
@@ -164,41 +193,43 @@ class Display:
                 "span": span,
                 "opacity": _HEAT_OPACITY if over_rgb else 1.0,
             },
-            _COVERED,
+            {**_COVERED, **defines},
         )
 
     def labels(self, drawn: Drawn, answer: Answer, colours: np.ndarray, threshold: float) -> moderngl.Texture:
         """The best prompt's colour (P, 3) at each pixel; its number, 0 none, 1 + prompt, into `label_ids`."""
         capacity = _capacity(answer.num_phrases)
+        around, defines = self._around(drawn)
 
         def paint(into: moderngl.Framebuffer) -> None:
             both = self._painter.ctx.framebuffer([into.color_attachments[0], self.label_ids])
             self._painter.fill(
                 both,
                 "show_labels.frag",
-                {**drawn.colour, **answer.relevance},
+                {**drawn.colour, **answer.relevance, **around},
                 {
                     "num_prompts": answer.num_phrases,
                     "threshold": threshold,
                     "opacity": _LABEL_OPACITY,
                     "label_colours": _padded(colours, capacity),
                 },
-                {**_COVERED, "MAX_PROMPTS": capacity},
+                {**_COVERED, **defines, "MAX_PROMPTS": capacity},
             )
             both.release()
 
-        return self._picture(("labels",), (*answer.key, threshold, colours.tobytes()), paint)
+        return self._picture(("labels",), (*answer.key, threshold, colours.tobytes(), drawn.fill), paint)
 
     def masks(
         self, drawn: Drawn, answer: Answer, style: str, colours: np.ndarray, thresholds: np.ndarray
     ) -> moderngl.Texture:
         """What passes, in one of `MASK_STYLES`; colours (P, 3) and thresholds (P,) of the prompts."""
         capacity = _capacity(answer.num_phrases)
+        around, defines = self._around(drawn)
         return self._filled(
             ("masks", style),
-            (*answer.key, drawn.background, colours.tobytes(), thresholds.tobytes()),
+            (*answer.key, drawn.background, colours.tobytes(), thresholds.tobytes(), drawn.fill),
             "show_masks.frag",
-            {**drawn.colour, **drawn.depth, **answer.relevance},
+            {**drawn.colour, **drawn.depth, **answer.relevance, **around},
             {
                 "num_prompts": answer.num_phrases,
                 "style": MASK_STYLES.index(style),
@@ -206,7 +237,7 @@ class Display:
                 "thresholds": _padded(thresholds, capacity),
                 "label_colours": _padded(colours, capacity),
             },
-            {**_COVERED, "MAX_PROMPTS": capacity},
+            {**_COVERED, **defines, "MAX_PROMPTS": capacity},
         )
 
     def margin(
@@ -292,11 +323,11 @@ class Display:
         )
 
     def _picture(
-        self, kind: tuple, key: Hashable, paint: Callable[[moderngl.Framebuffer], None]
+        self, kind: tuple, key: Hashable, paint: Callable[[moderngl.Framebuffer], None], dtype: str = "f1"
     ) -> moderngl.Texture:
         """The texture of `kind`; `paint` draws it where `key` differs from the last time."""
         if kind not in self._pictures:
-            texture = self._painter.ctx.texture(self._size, 4)
+            texture = self._painter.ctx.texture(self._size, 4, dtype=dtype)
             self._pictures[kind] = texture, self._painter.ctx.framebuffer([texture])
         texture, framebuffer = self._pictures[kind]
         if self._keys.get(kind) != key:
@@ -318,6 +349,9 @@ class Display:
             texture.release()
         self._pictures.clear()
         self._keys.clear()
+        if self._gaps is not None:
+            self._gaps.release()
+        self._gaps = None
         if self._label_ids is not None:
             self._label_ids.release()
         self._label_ids = None

@@ -9,7 +9,7 @@ Composed of three lifetimes: the scene (scene.py), the picture's size (view.py),
 programs live as long as the context (canvas.py).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
 
@@ -179,6 +179,7 @@ class SplatRenderer:
         self.passes = self._canvas.painter.passes
         place = ("host" if draws_in_software(ctx) else "shader") if queries is None else queries
         self._answers = _ANSWERS[place]
+        self._fill = False
         self._splats = splats
         self._scene: LiveScene | None = None
         self._question: Question | None = None
@@ -274,7 +275,7 @@ class SplatRenderer:
             GraphicsError: the image is larger than the driver's textures, or the context is gone.
         """
         scene, level, view = self._prepared(camera, share)
-        drawn = Drawn(view.colour, camera, background, level.places_key)
+        drawn = Drawn(view.colour, camera, background, level.places_key, self._fill)
         picture = _Picture(scene, level, view, drawn, fast, level.splats.depth_range)
         if self._question is not None and fast and self._question.fits_fast:
             picture.answer(self._question)
@@ -306,8 +307,15 @@ class SplatRenderer:
             raise ValueError("bring: expected set_scene before, received no scene")
         view = self._canvas.view((still.camera.width, still.camera.height))
         view.take(still)
-        drawn = Drawn(view.colour, still.camera, background, still.key)
+        drawn = Drawn(view.colour, still.camera, background, still.key, self._fill)
         self._picture = _StillPicture(self._scene, still, view, drawn)
+
+    def fill(self, gaps: bool) -> None:
+        """Whether pictures of colours show what is around their gaps (scene/gaps.py), from now on and in the
+        one that is drawn; `frame`, answers and depth never do."""
+        self._fill = gaps
+        if self._picture is not None:
+            self._picture = replace(self._picture, drawn=replace(self._picture.drawn, fill=gaps))
 
     def ask(self, compiled: CompiledQuery | None, answers: MakeAnswers | None = None) -> None:
         """Set the phrases; costs no splat pass while the weight maps are drawn.

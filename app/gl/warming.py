@@ -15,12 +15,12 @@ from .display import Answer, Drawn
 from .question import Question
 from .scene import LiveScene
 
-SIDE = 18  # pixels; no power of two: for textures with such sides Mesa compiles shaders of their own
+SIDE = 36  # pixels; no power of two: for textures with such sides Mesa compiles shaders of their own
 
 
 def warm_up(canvas: Canvas) -> Iterator[None]:
     """Draw one Gaussian in the ways that come first, a shader a step."""
-    camera = Camera(torch.eye(4), torch.tensor([[18.0, 0, 9], [0, 18, 9], [0, 0, 1]]), SIDE, SIDE)
+    camera = Camera(torch.eye(4), torch.tensor([[36.0, 0, 18], [0, 36, 18], [0, 0, 1]]), SIDE, SIDE)
     view = canvas.view((SIDE, SIDE))
     scene = LiveScene(canvas.painter, _one())
     level = scene.whole
@@ -29,7 +29,10 @@ def warm_up(canvas: Canvas) -> Iterator[None]:
     yield
     view.draw_colour(level)
     yield
-    drawn = Drawn(view.colour, camera, (0.0, 0.0, 0.0), level.places_key)
+    drawn = Drawn(view.colour, camera, (0.0, 0.0, 0.0), level.places_key, fill=True)
+    for _ in view.display.gaps.passes(view.colour.colour, view.colour.depth):
+        yield
+    yield
     view.display.rgb(drawn)
     yield
     view.display.faded(drawn, scene.scene)

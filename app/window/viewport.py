@@ -478,6 +478,7 @@ class Viewport:
         renderer, drawn = self._renderer, self._drawn
         if renderer is None or drawn is None:
             return
+        fill = state.preferences.fill_gaps
         shown = {p.key: p for p in state.prompts}
         asked = [shown[key] for key in self._keys if key in shown]
         mode = state.mode if drawn.plan.covers(replace(drawn.plan, kind=_kind(state))) else Mode.RGB
@@ -494,11 +495,13 @@ class Viewport:
             active,
             state.asking.atom,
             faded,
+            fill,
             tuple((p.colour, p.cut, p.shown_from) for p in asked),
             colours,
         )
         if colouring != self._colouring:
             self._colouring = colouring
+            renderer.fill(fill)
             self._texture = (
                 renderer.faded_texture()
                 if faded

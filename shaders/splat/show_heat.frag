@@ -3,6 +3,7 @@
 //          COVERED_ALPHA, as in the answers, is set by the program.
 
 #include "colormaps.glsl"
+#include "gaps.glsl"
 #include "luma.glsl"
 
 uniform sampler2D colour;
@@ -18,7 +19,7 @@ void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     float value = texelFetch(relevance, ivec3(pixel, prompt / PHRASES_A_LAYER), 0)[prompt % PHRASES_A_LAYER];
     vec4 photo = texelFetch(colour, pixel, 0);
-    vec3 rgb = clamp(photo.rgb, 0.0, 1.0);
+    vec3 rgb = clamp(over_gaps(photo).rgb, 0.0, 1.0);
     vec3 heat = colour_map((value - span.x) / max(span.y - span.x, 1e-6));
     float grey = luma(rgb);
     vec3 under = mix(rgb, vec3(0.5 * grey), opacity < 1.0 ? 0.6 : 1.0);

@@ -1,6 +1,8 @@
 #version 330 core
 // Purpose: the prompt with the highest relevance, as a colour over the dimmed photo; below the threshold, none.
 
+#include "gaps.glsl"
+
 uniform sampler2D colour;
 uniform sampler2DArray relevance;
 uniform int num_prompts;
@@ -24,7 +26,7 @@ void main() {
             label = prompt;
         }
     }
-    vec3 rgb = clamp(photo.rgb, 0.0, 1.0);
+    vec3 rgb = clamp(over_gaps(photo).rgb, 0.0, 1.0);
     out_colour = vec4(label < 0 ? 0.4 * rgb : mix(rgb, label_colours[max(label, 0)], opacity), 1.0);
     out_label = float(label + 1);
 }

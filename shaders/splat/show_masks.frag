@@ -3,6 +3,7 @@
 //          COVERED_ALPHA, as in the answers, and MAX_PROMPTS are set by the program.
 // Frames: texel = pixel.
 
+#include "gaps.glsl"
 #include "luma.glsl"
 
 uniform sampler2D colour;          // premultiplied
@@ -31,7 +32,8 @@ void main() {
             label = prompt;
         }
     }
-    vec3 rgb = clamp(texelFetch(colour, pixel, 0).rgb + (1.0 - alpha) * background, 0.0, 1.0);
+    vec4 photo = over_gaps(vec4(texelFetch(colour, pixel, 0).rgb, alpha));
+    vec3 rgb = clamp(photo.rgb + (1.0 - photo.a) * background, 0.0, 1.0);
     float grey = luma(rgb);
     bool shown = label >= 0;
     if (style == 0) rgb = shown ? label_colours[max(label, 0)] : background;

@@ -87,7 +87,7 @@ def write_whole(scene: Scene, path: Path, renderer: Renderer, prompts: Sequence[
     looks = ("view", "camera", "size", "ortho")
     unset = dict.fromkeys(("threshold", "what", "seconds", "path", "span", *looks))
     asked = list(prompts) if suffix in (*ANSWERS_OUT, PAGE_OUT) else []
-    off = dict.fromkeys(("with_text", "replace", "fade"), False)
+    off = dict.fromkeys(("with_text", "replace", "fade", "fill"), False)
     said = {"all_views": suffix == ".csv", "colormap": COLOUR_MAPS[0], **off}
     args = Namespace(scene=path.parent, output=path, prompt=asked, backend=renderer, **said, **unset)
     _writer(suffix, None)(args, scene, asked, CameraChoice(0, None, None))
@@ -151,6 +151,9 @@ def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
         raise InputError("--colormap and --span colour heat-maps; add --what heat, or leave them away")
     if args.with_text and suffix != PAGE_OUT:
         raise InputError("--with-text is for web pages; name an .html, or leave it away")
+    plain = suffix == ".png" and args.what is None and not prompts and not args.segmented
+    if args.fill and not (plain or suffix in FILMS_OUT or args.what in ("rgb", "heat")):
+        raise InputError("--fill is for pictures and films to look at; leave it away")
     _check_camera_words(args, suffix)
 
 
@@ -230,7 +233,7 @@ def _write_pictures(args: Namespace, scene: Scene, prompts: list[str], choice: C
     colours = HeatColours(args.colormap, args.span)
     with (
         ProgressBar() as progress,
-        open_renderer(args.backend, fade=args.fade) as renderer,
+        open_renderer(args.backend, fade=args.fade, fill=args.fill) as renderer,
         staged_folder(args.output.parent) as staging,
     ):
         answers = []
@@ -384,7 +387,7 @@ def _write_video(args: Namespace, scene: Scene, prompts: list[str], choice: Came
     asked = video.asked(scene, prompts[0], args.threshold) if heat else None
     with (
         ProgressBar() as progress,
-        open_renderer(args.backend, fade=args.fade) as renderer,
+        open_renderer(args.backend, fade=args.fade, fill=args.fill) as renderer,
         staged_folder(args.output.parent) as staging,
     ):
         colours = HeatColours(args.colormap, args.span)

@@ -21,6 +21,7 @@ from ..scenes import open_scene
 from .query import spoken
 
 NEEDS_PROMPT = ("relevance", "labels")
+OF_COLOURS = ("rgb", *NEEDS_PROMPT)
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -30,6 +31,8 @@ def run(args: Namespace, out: TextIO) -> None:
         LangFlashError: the scene, the camera, a phrase, the atom or the output cannot be used.
     """
     prompts = _prompts_for(args.what[0], args.prompt)
+    if args.fill and args.what[0] not in OF_COLOURS:
+        raise InputError(f"--what {args.what[0]} shows no colours to fill gaps with; leave --fill away")
     choice = chosen_camera(args)
     readable_file(args.scene, "scene", SceneFileError)
     check_output_file(args.output, (".png",), inputs=[args.scene])
@@ -37,7 +40,7 @@ def run(args: Namespace, out: TextIO) -> None:
     scene = open_scene(args.scene)
     _check_atom(args.what, scene)
     camera = choice.of(scene)
-    with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade) as renderer:
+    with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade, fill=args.fill) as renderer:
         progress("drawing", 0.2)
         pixels, more = _draw(
             args.what, prompts, scene, camera, renderer, HeatColours(args.colormap, args.span)

@@ -16,10 +16,10 @@ from .shared import (
     add_backend,
     add_camera,
     add_colours,
-    add_fade,
     add_json,
     add_network,
     add_output,
+    add_shown,
     new_actions,
     new_command,
 )
@@ -172,7 +172,7 @@ def add_render(commands) -> None:
     command.add_argument(
         "--prompt", nargs="+", metavar="PHRASE", help="for relevance (one) and labels (any number)"
     )
-    add_fade(command)
+    add_shown(command)
     add_colours(command)
     add_backend(command)
     add_json(command)
@@ -237,7 +237,7 @@ def add_export(commands) -> None:
         help="also a .json of another kind, and what has the name of a legend or a COCO picture",
     )
     add_camera(command)
-    add_fade(command)
+    add_shown(command)
     add_backend(command)
 
 

@@ -72,10 +72,13 @@ def add_camera(command: argparse.ArgumentParser) -> None:
     )
 
 
-def add_fade(command: argparse.ArgumentParser) -> None:
-    """Whether what no photo looked at fades."""
+def add_shown(command: argparse.ArgumentParser) -> None:
+    """What a picture does where the scene knows little."""
     command.add_argument(
         "--fade", action="store_true", help="leave out what no photo looked at from about there, softly"
+    )
+    command.add_argument(
+        "--fill", action="store_true", help="fill gaps by what is around them, as the window does"
     )
 
 

@@ -59,6 +59,8 @@ def order(state: State) -> Order | str:
         words += ["--prompt", *phrases, *_threshold(state)]
     if fades(state):
         words.append("--fade")
+    if form.what.fills and state.preferences.fill_gaps:
+        words.append("--fill")
     if form.what in (What.HEAT, What.HEAT_VIDEO):
         words += _colours(state)
     seen_from, camera_file = _seen_from(state, target)

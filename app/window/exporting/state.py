@@ -95,6 +95,11 @@ class What(Enum):
         return self.film or self is What.RGB
 
     @property
+    def fills(self) -> bool:
+        """Whether it shows colours to look at, whose gaps are filled as on show."""
+        return self.film or self in (What.RGB, What.HEAT)
+
+    @property
     def sized(self) -> bool:
         """Whether it has a size in pixels."""
         return self.looks or self.film

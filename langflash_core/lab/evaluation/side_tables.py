@@ -9,12 +9,16 @@ from langflash_core.lab.training.measures import nan_mean
 LOOKS = (
     ("PSNR, holes black (dB)", "psnr"),
     ("PSNR of what is covered (dB)", "psnr_covered"),
+    ("PSNR, gaps filled (dB)", "psnr_filled"),
     ("SSIM", "ssim"),
-    ("LPIPS", "lpips"),
+    ("LPIPS, holes black", "lpips"),
+    ("LPIPS, gaps filled", "lpips_filled"),
     ("sheets (% of drawn)", "sheets"),
     ("holes (% of seen)", "holes"),
     ("seen by a photo (%)", "seen"),
 )
+_FILLED = "_filled"
+"""Ends what is measured with gaps filled. A version that did not fill them showed its holes black."""
 _SHARES = ("sheets", "holes", "seen")
 ONCE = (
     ("Depth boundaries in the photos, F1", "boundary_f1"),
@@ -67,7 +71,10 @@ def _looks(pairs: list[tuple[dict, dict]], group: str, key: str) -> Iterator[tup
             grouped({"looks": {name: row["looks"][name] for name in shared}}).get(group, {})
             for row in (old, new)
         ]
-        yield number(means[0].get(key)), number(means[1].get(key))
+        yield (
+            number(means[0].get(key, means[0].get(key.removesuffix(_FILLED)))),
+            number(means[1].get(key)),
+        )
 
 
 def _row(title: str, key: str, values: list[tuple[float, float]]) -> list[str]:

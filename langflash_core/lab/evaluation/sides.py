@@ -41,6 +41,7 @@ from langflash_core.lab.training.losses import ssim_map
 from langflash_core.lab.training.measures import nan_mean, psnr
 from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.running import Progress
+from langflash_core.scene.gaps import filled
 from langflash_core.types import Camera, Frame, Scene
 
 PERCEIVED = ("0", "20")
@@ -184,8 +185,11 @@ def _judged(
         both = shown & torch.from_numpy(depths > 0)
         numbers["psnr_covered"] = psnr(rgb[both], look.rgb[both]) if bool(both.any()) else math.nan
         numbers["ssim"] = float(ssim_map(rgb.clamp(0, 1), look.rgb)[shown].mean())
+        whole = filled(rgb, drawn.frame.alphas.cpu())
+        numbers["psnr_filled"] = psnr(whole[shown], look.rgb[shown])
         if lpips is not None and look.group in PERCEIVED:
             numbers["lpips"] = lpips(rgb[None], look.rgb[None], shown[None])[0]
+            numbers["lpips_filled"] = lpips(whole[None], look.rgb[None], shown[None])[0]
     return numbers
 
 

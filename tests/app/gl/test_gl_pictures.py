@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from app.gl import SplatRenderer
+from langflash_core.scene.gaps import filled
 from langflash_core.scene.trust import faded
 from tests.app.gl.questions import question
 from tests.splat.scenes import camera, cloud, maps_of, parallel, scene_of, splats
@@ -178,6 +179,62 @@ def test_faded_is_the_frame_fading_over_the_background(asked, aside, flat):
 
 def test_nothing_fades_where_nobody_knows_the_photos(asked):
     assert asked.faded_texture() is asked.rgb_texture
+
+
+def from_aside():
+    """Where much of the picture is empty."""
+    viewmat = camera().viewmat.clone()
+    viewmat[0, 3] -= 1.5
+    return dataclasses.replace(camera(), viewmat=viewmat)
+
+
+@pytest.mark.parametrize("fading", [False, True])
+def test_gaps_are_filled_as_the_twin_does(asked, fading):
+    scene = dataclasses.replace(
+        cloud(1500, 12, dtype=torch.float32), view_ids=torch.zeros(1500, dtype=torch.int64)
+    )
+    asked.set_scene(scene)
+    shot, background = from_aside(), torch.tensor((0.0, 0.5, 1.0))
+    asked.draw(shot)
+    frame = asked.frame()
+    asked.draw(shot, background=tuple(background.tolist()))
+    empty = pixels(asked.faded_texture() if fading else asked.rgb_texture)[..., :3]
+    asked.fill(True)
+    shown = pixels(asked.faded_texture() if fading else asked.rgb_texture)[..., :3]
+    under = frame.rgb
+    if fading:  # the background stands in for what is not known, and is around gaps as well
+        near = faded(frame, shot, scene)
+        under = near.rgb + (frame.alphas - near.alphas)[..., None] * background
+    reached = filled(frame.alphas[..., None].expand(-1, -1, 3), frame.alphas)
+    expected = filled(under, frame.alphas) + (1 - reached) * background
+    # Eight bits: half a step; the coarser pictures have eleven bits, and linear filters eight.
+    np.testing.assert_allclose(shown, expected.clamp(0, 1).numpy(), atol=2.5 / 255)
+    assert np.abs(shown - empty).max() > 0.2  # there were gaps
+    asked.fill(False)
+    assert np.array_equal(pixels(asked.faded_texture() if fading else asked.rgb_texture)[..., :3], empty)
+
+
+def test_filled_gaps_change_what_is_seen_and_nothing_that_is_known(asked):
+    def looks() -> dict[str, np.ndarray]:
+        colours, cuts = np.eye(5, 3, dtype=np.float32), np.full(5, 0.5, np.float32)
+        return {
+            "heat": pixels(asked.heat_texture(0)),
+            "labels": pixels(asked.label_texture(colours)),
+            "dim": pixels(asked.mask_texture("dim", colours, cuts)),
+        }
+
+    asked.draw(from_aside())
+    frame, relevance, labels, empty = asked.frame(True), asked.relevance(), asked.labels(), looks()
+    asked.fill(True)
+    after = asked.frame(True)
+    assert torch.equal(frame.rgb, after.rgb) and torch.equal(frame.alphas, after.alphas)
+    assert torch.equal(frame.weight_maps, after.weight_maps) and torch.equal(relevance, asked.relevance())
+    assert torch.equal(labels, asked.labels())
+    open_ = 1 - frame.alphas.numpy()[..., None]
+    for name, picture in looks().items():
+        change = np.abs(picture - empty[name])
+        assert change[open_[..., 0] > 0.9].max() > 0.1, name
+        assert (change <= open_ + 1.01 / 255).all(), name  # and no more than is open, but for rounding
 
 
 def test_the_colours_alone_are_those_of_the_picture(asked):

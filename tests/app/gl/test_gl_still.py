@@ -132,6 +132,7 @@ def test_shaders_are_compiled_ahead(gl, scene) -> None:
     assert max(np.diff(counts)) == 1
     made = cloud(50, degree=0, dtype=torch.float32)
     made = replace(made, view_ids=torch.zeros(50, dtype=torch.int64))
+    renderer.fill(True)  # as the window does
     renderer.set_scene(made)
     renderer.draw(SEEN, weight_maps=False)
     _ = renderer.rgb_texture

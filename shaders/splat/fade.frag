@@ -1,6 +1,6 @@
 #version 330 core
-// Purpose: the colour target over a background that takes over where surfaces are seen from far aside of
-//          all photos, opaque, for a screen. Source: langflash_core/scene/trust.py, `trust`.
+// Purpose: the colour target, premultiplied, in which a background takes over where surfaces are seen from far
+//          aside of all photos. Source: langflash_core/scene/trust.py, `trust`.
 // Frames: camera axes are OpenCV's; `eyes` are the photos' places in those of the picture, a texel each.
 //         COS_NONE and COS_FULL are set by the program.
 
@@ -27,11 +27,11 @@ float trust(vec3 pos_c) {
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec2 sums = texelFetch(depth, pixel, 0).rg;
-    vec3 rgb = texelFetch(colour, pixel, 0).rgb + (1.0 - sums.g) * background;
+    vec3 rgb = texelFetch(colour, pixel, 0).rgb;
     if (sums.g > 1.0 / 255.0) {
         float z = sums.r / sums.g;
         float known = trust(vec3((vec2(pixel) + 0.5 - pinhole.zw) / pinhole.xy * (orthographic ? 1.0 : z), z));
-        rgb = rgb * known + background * (1.0 - known);
+        rgb = mix(sums.g * background, rgb, known);
     }
-    out_colour = vec4(clamp(rgb, 0.0, 1.0), 1.0);
+    out_colour = vec4(rgb, sums.g);
 }

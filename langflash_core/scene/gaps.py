@@ -1,0 +1,64 @@
+"""Gaps of a picture, filled by what is around them: to look at, never for answers, depth or cut-outs.
+
+Seen from aside a scene of surface elements opens: where a depth is a little off, and behind things, nothing
+is drawn, and dark cracks catch the eye more than anything else. There the colours of ever coarser pictures
+of what is drawn around show through. They reach about an eighth of the picture; what is farther from
+everything that is drawn stays empty, so nothing is invented where no photo looked.
+
+Source: the pull-push of Gortler et al. 1996, "The Lumigraph", with a box filter and a linear one. The twin of
+shaders/splat/pull.frag, push.frag and gaps.glsl.
+
+Sizes: H W pixels, h = ceil(H / 2), w = ceil(W / 2).
+"""
+
+import math
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+from torch.nn import functional as F
+
+REACH = 8
+"""The shorter side is this many times as long as what is filled from one side. Six validation rooms seen
+from 20 degrees aside: half the length loses .17 dB, twice as much gains .02."""
+
+
+def num_levels(width: int, height: int) -> int:
+    """Of the coarser pictures, each half the size of the one before; at least one."""
+    return max(1, round(math.log2(max(1.0, min(width, height) / REACH))))
+
+
+def filled(rgb: Float[Tensor, "H W 3"], alphas: Float[Tensor, "H W"]) -> Float[Tensor, "H W 3"]:
+    """The picture where it is covered, and where it is not what is around.
+
+    Args:
+        rgb: over black. alphas: what of each pixel is covered, in [0, 1].
+    """
+    levels = [torch.cat((rgb, alphas[..., None]), -1)]
+    for _ in range(num_levels(rgb.shape[1], rgb.shape[0])):
+        levels.append(pulled(levels[-1]))
+    behind = levels.pop()
+    while levels:
+        behind = pushed(levels.pop(), behind)
+    return behind[..., :3]
+
+
+def pulled(fine: Float[Tensor, "H W 4"]) -> Float[Tensor, "h w 4"]:
+    """Sums of 2 x 2 premultiplied colours, covered at most once."""
+    height, width = fine.shape[:2]
+    even = F.pad(fine, (0, 0, 0, width % 2, 0, height % 2))
+    sums = even.unflatten(0, (-1, 2)).unflatten(2, (-1, 2)).sum((1, 3))
+    return sums / sums[..., 3:].clamp_min(1)
+
+
+def pushed(fine: Float[Tensor, "H W 4"], coarse: Float[Tensor, "h w 4"]) -> Float[Tensor, "H W 4"]:
+    """The coarse picture, interpolated linearly, behind the fine one."""
+    places = [
+        (2 * torch.arange(count, dtype=fine.dtype) + 1) / (2 * other) - 1
+        for count, other in zip(fine.shape[1::-1], coarse.shape[1::-1], strict=True)
+    ]  # of fine pixels in the coarse picture, from -1 to 1
+    grid = torch.stack(torch.meshgrid(*places, indexing="xy"), -1).to(fine)
+    smooth = F.grid_sample(
+        coarse.movedim(-1, 0)[None], grid[None], mode="bilinear", padding_mode="border", align_corners=False
+    )[0].movedim(0, -1)
+    return fine + (1 - fine[..., 3:]) * smooth
