@@ -33,10 +33,12 @@ class Errand(ABC):
 
     saves: a person asked for it to be written, and the end of the program waits for it.
     newest_counts: a newer one of its kind makes an older one pointless.
+    light: needs nothing that the worker loads first, and is not kept waiting for it.
     """
 
     saves: ClassVar[bool] = False
     newest_counts: ClassVar[bool] = False
+    light: ClassVar[bool] = False
 
     @abstractmethod
     def run(self, stopping: Asked) -> Iterable[Command]:

@@ -99,9 +99,10 @@ class Session:
         hands = Hands(self._perform, self._post, self._worker.submit, self._worker.cancel, self._now)
         keeper = Keeper()
         recovery = RecoveryEffects(hands, keeper)
+        opening = OpeningEffects(hands, self._thumbnails, lambda: desktop.clipboard(self._window))
         self._effects = (
             SceneEffects(hands, self._viewport, self._thumbnails, self._entitle),
-            OpeningEffects(hands, self._thumbnails, lambda: desktop.clipboard(self._window)),
+            opening,
             AskingEffects(hands, self._viewport),
             EditingEffects(hands, self._viewport),
             recovery,
@@ -110,6 +111,7 @@ class Session:
             LogEffects(hands),
             RestEffects(hands),
         )
+        opening.begin()
         recovery.begin(remembered, complaint, empty=not paths)
         if paths:
             self.dispatch(OpenPaths(tuple(str(p) for p in paths)))

@@ -113,7 +113,9 @@ class Worker:
 
     def _run(self) -> None:
         try:
-            _import_heavy()
+            for load in (_link_torch, _import_heavy):
+                self._run_errands(light=True)
+                load()
             self._put(Loaded())
         except Exception as error:  # a broken installation: say so, and let each request say it again
             self._put(Notify(_unexpected(error)))
@@ -136,15 +138,15 @@ class Worker:
     def _asked(self) -> bool:
         return bool(self._stopping or self._errands or self._job)
 
-    def _run_errands(self) -> None:
-        """Run what is queued now, oldest first."""
+    def _run_errands(self, light: bool = False) -> None:
+        """Run what is queued now, oldest first. light: only what needs nothing loaded."""
         while True:
             with self._changed:
-                if not self._errands:
-                    self._errand = None
-                    return
-                errand, *self._errands = self._errands
+                errand = next((each for each in self._errands if each.light or not light), None)
                 self._errand = errand
+                if errand is None:
+                    return
+                self._errands.remove(errand)
             try:
                 for command in errand.run(lambda: self._stopping):
                     about = isinstance(errand, SceneErrand)
@@ -185,7 +187,6 @@ class Worker:
 
 def _import_heavy() -> None:
     """Load torch and the renderer's module here, while the window is already up."""
-    _link_torch()
     import torch  # noqa: F401
 
     from .. import gl

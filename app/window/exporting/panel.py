@@ -16,6 +16,7 @@ from . import order as written
 from .state import SECONDS, ExportForm, What
 
 WIDTH = 620.0  # design pixels
+PROGRESS = 112.0
 COLUMNS = 4
 _NAMED = 6  # files that the question before a replacement names
 SIDES = (512, 1024, 1600, 2048, 4096)
@@ -201,10 +202,12 @@ def _copy(line: str) -> list[do.Command]:
 
 
 def draw_progress(state: State, look: Look) -> list[do.Command]:
-    """The export under way, for the side panel; nothing without one."""
+    """The export under way, in a window of its own, `PROGRESS` high; nothing without one."""
     now = state.exporting.running
     if now is None:
         return []
+    imgui.separator()
+    widgets.gap(look.px(2))
     stage = "stopping" if now.cancelling else now.stage
     room = imgui.get_content_region_avail().x - imgui.calc_text_size(f"{stage}   ").x
     imgui.text_unformatted(widgets.shortened(f"Exporting {now.target.name}", room))
@@ -215,7 +218,4 @@ def draw_progress(state: State, look: Look) -> list[do.Command]:
     imgui.begin_disabled(now.cancelling)
     pressed = imgui.button(f"{fa.ICON_FA_STOP}  Stop the export", ImVec2(-1, 0))
     imgui.end_disabled()
-    widgets.gap(look.px(2))
-    imgui.separator()
-    widgets.gap(look.px(2))
     return [export.CancelExport()] if pressed else []

@@ -3,7 +3,7 @@
 from imgui_bundle import ImVec2, imgui
 
 from .. import commands as do
-from ..editing.panels import gizmo, hands
+from ..editing.panels import gizmo, hands, ruler
 from ..editing.state import Tool
 from ..kit.look import Look
 from ..opening.panels import welcome
@@ -28,6 +28,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
         welcome.draw_photos(state, look, corner, size)
         imgui.invisible_button("picture", ImVec2(max(size.x, 1), max(size.y, 1)))
         return []
+    ruler.draw_line(state, look, corner, size)
     placed, taken = gizmo.draw(state, look, corner, size)
     over = placed if taken else placed + in_space.draw(state, look, corner, size)
     if any(isinstance(command, camera.JumpTo) for command in over):

@@ -30,8 +30,12 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
     left, bar, top = splitter.width(state, look, width), look.px(theme.STATUS_HEIGHT), look.px(CANVAS_TOP)
     place, size = ImVec2(left, top), ImVec2(max(width - left, 1), max(height - bar - top, 1))
     issued = _picture(state, look, place, size)
-    with widgets.window("##panel", ImVec2(0, 0), ImVec2(left, height - bar), scrolls=True):
+    foot = look.px(export_panel.PROGRESS) if state.exporting.running is not None else 0.0
+    with widgets.window("##panel", ImVec2(0, 0), ImVec2(left, height - bar - foot), scrolls=True):
         issued += _side(state, look)
+    if foot:  # below the panel, where nothing moves out of its way
+        with widgets.window("##export", ImVec2(0, height - bar - foot), ImVec2(left, foot)):
+            issued += export_panel.draw_progress(state, look)
     with widgets.window("##toolbar", ImVec2(left, 0), ImVec2(size.x, top)):
         imgui.set_cursor_pos_y((top - imgui.get_frame_height()) / 2)
         issued += toolbar.draw(state, look)
@@ -58,8 +62,7 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
 
 def _side(state: State, look: Look) -> list[do.Command]:
     """The panel on the left: photos, phrases, edits."""
-    issued = export_panel.draw_progress(state, look)
-    issued += tray.draw(state, look)
+    issued = tray.draw(state, look)
     widgets.gap(look.px(6))
     imgui.separator()
     widgets.gap(look.px(6))

@@ -8,7 +8,7 @@ from ..commands import Command
 from ..effects import Effects, Hands
 from ..kit.textures import Thumbnails
 from ..scene import samples
-from ..scene.commands import Loaded, MergeScene, OpenPaths
+from ..scene.commands import MergeScene, OpenPaths
 from ..state import State
 from . import native
 from .commands import FolderRead, LookInto, MorePictures, OpenFiles, Paste
@@ -29,6 +29,10 @@ class OpeningEffects(Effects):
         self._dialog: native.NativeDialog | None = None
         self._merging = False  # what was looked for last is to be merged
         self._polled = 0.0
+
+    def begin(self) -> None:
+        """The samples' pictures, the first thing that the worker does."""
+        self._hands.submit(SampleTiles())
 
     @property
     def due(self) -> float:
@@ -65,8 +69,6 @@ class OpeningEffects(Effects):
                 self._hands.submit(SmallPictures(folder, paths))
             case Paste():
                 self._paste()
-            case Loaded() if state.info is None:
-                self._hands.submit(SampleTiles())
             case _:
                 if before.dialog in LOOKING and state.dialog not in LOOKING:
                     self._forget(before)

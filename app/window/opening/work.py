@@ -36,6 +36,7 @@ class ReadFolder(Errand):
     path: Path
 
     newest_counts = True
+    light = True
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         yield FolderRead(listed(self.path))
@@ -49,6 +50,8 @@ class SmallPictures(Errand):
     folder: Path
     paths: tuple[Path, ...]
 
+    light = True
+
     def run(self, stopping: Asked) -> Iterator[Command]:
         for path in self.paths[:_AT_ONCE]:
             with suppress(OSError, ValueError, ImageError):
@@ -60,6 +63,8 @@ class SmallPictures(Errand):
 @dataclass(frozen=True)
 class SampleTiles(Errand):
     """The first photo of each pair that comes with the program."""
+
+    light = True
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         for place, (_, (left, _)) in enumerate(pairs()):

@@ -12,6 +12,7 @@ from .. import commands as ask
 from ..state import Prompt, usable
 from . import entry, known, scores
 
+_HIGH = 760.0  # design pixels of a window in which what there is to ask leaves room for answers
 _SWATCH = imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label | imgui.ColorEditFlags_.no_tooltip
 
 
@@ -24,10 +25,11 @@ def draw(state: State, look: Look) -> list[do.Command]:
         issued += _row(state, prompt, look)
         imgui.pop_id()
     issued += entry.tools(state, look)
-    if not state.asked:  # what there is to ask comes first until something is asked
+    first = not state.asked or imgui.get_io().display_size.y >= look.px(_HIGH)
+    if first:  # what there is to ask
         issued += known.draw(state, look)
     issued += scores.draw(state, look)
-    if state.asked:  # answers come first in a low window
+    if not first:  # in a low window answers, which it would push out
         issued += known.draw(state, look)
     widgets.gap(look.px(2))
     issued += _negatives(state)

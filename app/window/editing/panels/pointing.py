@@ -186,7 +186,7 @@ def _answer(state: State, card: Card, look: Look) -> list[do.Command]:
     if card.reading.point is not None:
         imgui.text_colored(theme.MUTED, _coordinates(card.reading))
     if group is not None:
-        issued += _group(state, group, look)
+        issued += _group(state, card, group, look)
     if card.vector:
         if widgets.primary_button(
             f"{fa.ICON_FA_MAGNIFYING_GLASS}  Find similar", ImVec2(look.px(_CARD - 32), 0)
@@ -208,8 +208,9 @@ def _lessons(card: Card, k: int, word: str, look: Look) -> list[do.Command]:
     return [*issued, point.Ask(card.reading.at)] if issued else []
 
 
-def _group(state: State, k: int, look: Look) -> list[do.Command]:
-    """The strongest group of the place: its name, its voice, its Gaussians."""
+def _group(state: State, card: Card, k: int, look: Look) -> list[do.Command]:
+    """The strongest group of the place: its name, which is asked for again once it is another, its voice, its
+    Gaussians."""
     issued: list[do.Command] = []
     marks = state.editing.marks
     if marks is None or k >= len(marks.atoms):
@@ -218,13 +219,13 @@ def _group(state: State, k: int, look: Look) -> list[do.Command]:
     imgui.separator()
     imgui.push_id(k)
     imgui.set_next_item_width(imgui.get_content_region_avail().x - 2 * look.px(42))
-    hint = f"group {k}: {state.editing.atom_name(k)}"
+    hint = "a name of your own"
     entered, name = imgui.input_text_with_hint(
         "##name", hint, atom.name, imgui.InputTextFlags_.enter_returns_true
     )
-    widgets.tooltip("Give this group a name of your own, which it answers to, and press Enter")
+    widgets.tooltip(f"Call group {k}, {state.editing.atom_name(k)}, otherwise: it answers to that name then")
     if entered or (imgui.is_item_deactivated_after_edit() and name != atom.name):
-        issued.append(edit.RenameAtom(k, name))
+        issued += [edit.RenameAtom(k, name), point.Ask(card.reading.at)]
     imgui.same_line(0, look.px(4))
     voice = fa.ICON_FA_VOLUME_HIGH if atom.on else fa.ICON_FA_VOLUME_XMARK
     if imgui.button(f"{voice}##voice", ImVec2(look.px(38), 0)):

@@ -18,21 +18,27 @@ _BAR = widgets.PLAIN | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags
 
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
-    """The line between both ends with its length; with the ruler in hand, a field for it."""
-    if state.editing.tool is not Tool.RULER or not state.editing.ruler:
-        return []
-    found = poses.project(np.array(state.editing.ruler), state.pose, (size.x, size.y))
-    if found is None:
-        return []
-    ends = [ImVec2(place.x + float(x), place.y + float(y)) for x, y in found[1]]
-    canvas, colour = imgui.get_foreground_draw_list(), widgets.u32(theme.DARK.ACCENT)
-    canvas.push_clip_rect(place, ImVec2(place.x + size.x, place.y + size.y), True)
+    """How long it is between both ends, and a field to tell it."""
+    ends = _ends(state, place, size)
+    return _field(state, look, ends) if len(ends) == 2 else []
+
+
+def draw_line(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
+    """The ends and what joins them, on the picture itself: panels and the field stand over it."""
+    ends, canvas = _ends(state, place, size), imgui.get_window_draw_list()
+    colour = widgets.u32(theme.DARK.ACCENT)
     for end in ends:
         canvas.add_circle_filled(end, look.px(4), colour)
     if len(ends) == 2:
         canvas.add_line(ends[0], ends[1], colour, look.px(2))
-    canvas.pop_clip_rect()
-    return _field(state, look, ends) if len(ends) == 2 else []
+
+
+def _ends(state: State, place: ImVec2, size: ImVec2) -> list[ImVec2]:
+    """On the screen; none without the ruler in hand, or behind the camera."""
+    if state.editing.tool is not Tool.RULER or not state.editing.ruler:
+        return []
+    found = poses.project(np.array(state.editing.ruler), state.pose, (size.x, size.y))
+    return [] if found is None else [ImVec2(place.x + float(x), place.y + float(y)) for x, y in found[1]]
 
 
 def _field(state: State, look: Look, ends: list[ImVec2]) -> list[do.Command]:
@@ -53,9 +59,9 @@ def _field(state: State, look: Look, ends: list[ImVec2]) -> list[do.Command]:
         known = f"{100 * length * state.metric:.1f}" if state.metric else ""
         entered, text = imgui.input_text_with_hint("cm", "?", known, _ENTER)
         with suppress(ValueError):
-            if entered:
+            if entered or imgui.is_item_deactivated_after_edit():
                 issued.append(point.SetLength(float(text.replace(",", ".")) / 100))
-        widgets.tooltip("How long it is in truth, and Enter: the scene and its exports are in metres then")
+        widgets.tooltip("How long it is in truth: the scene and its exports are in metres then")
         imgui.end()
     imgui.pop_style_var(2)
     return issued

@@ -1,6 +1,7 @@
 """Our own dialog for files: folders to walk through, photos as small pictures, several at once."""
 
 import os
+import zlib
 from pathlib import Path
 
 from imgui_bundle import ImVec2, imgui
@@ -27,8 +28,11 @@ def draw(state: State, look: Look) -> list[do.Command]:
         widgets.muted("Reading the folder ...")
     else:
         issued += _way(folder, look)
-    imgui.begin_child("##files", ImVec2(0, look.px(_HEIGHT)), imgui.ChildFlags_.borders)
+    shape = imgui.ChildFlags_.borders | imgui.ChildFlags_.nav_flattened  # keys walk in without a key for it
+    imgui.begin_child("##files", ImVec2(0, look.px(_HEIGHT)), shape)
     if folder is not None:
+        if _walked(folder) and imgui.get_io().nav_visible:  # what had the keys went with the folder before
+            imgui.set_keyboard_focus_here()
         issued += _inside(state, folder, look)
     imgui.end_child()
     return issued + _buttons(state, confirmed, look)
@@ -70,11 +74,11 @@ def _inside(state: State, folder: Folder, look: Look) -> list[do.Command]:
     if folder.problem:
         widgets.muted(folder.problem)
     for path in folder.folders:
-        if imgui.selectable(f"{fa.ICON_FA_FOLDER}  {path.name}##{path}", False)[0]:
+        if imgui.selectable(f"{fa.ICON_FA_FOLDER}  {path.name}##{path}", False)[0] and not _again():
             issued.append(opening.LookInto(path))
     for path in folder.scenes:
         chosen = path in state.opening.chosen
-        if imgui.selectable(f"{fa.ICON_FA_CUBES}  {path.name}##{path}", chosen)[0]:
+        if imgui.selectable(f"{fa.ICON_FA_CUBES}  {path.name}##{path}", chosen)[0] and not _again():
             issued.append(opening.Choose(path))
     gap, room = look.px(8), imgui.get_content_region_avail().x + look.px(8)
     columns = max(int(room / (look.px(_CELL) + gap)), 1)
@@ -87,6 +91,14 @@ def _inside(state: State, folder: Folder, look: Look) -> list[do.Command]:
     if not (folder.folders or folder.photos or folder.scenes or folder.problem):
         widgets.muted("Nothing to open lies here.")
     return issued
+
+
+def _walked(folder: Folder) -> bool:
+    """Whether another folder was on show in the frame before, in this dialog."""
+    storage, key = imgui.get_state_storage(), imgui.get_id("folder")
+    before, now = storage.get_int(key), zlib.crc32(bytes(folder.path))
+    storage.set_int(key, now & 0x7FFFFFFF)
+    return before not in (0, now & 0x7FFFFFFF)
 
 
 def _photo(state: State, path: Path, size: ImVec2, look: Look) -> list[do.Command]:
@@ -110,7 +122,13 @@ def _photo(state: State, path: Path, size: ImVec2, look: Look) -> list[do.Comman
     if chosen:
         end = ImVec2(corner.x + size.x, corner.y + size.y)
         canvas.add_rect(corner, end, widgets.u32(theme.ACCENT), look.px(4), look.px(2))
-    return [opening.Choose(path)] if pressed else []
+    return [opening.Choose(path)] if pressed and not _again() else []
+
+
+def _again() -> bool:
+    """Whether the press was the second of a double click: it would walk into what the first one brought under
+    the pointer, or let go of what that one took."""
+    return imgui.is_mouse_released(0) and imgui.get_io().mouse_clicked_last_count[0] > 1
 
 
 def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:

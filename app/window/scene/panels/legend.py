@@ -36,7 +36,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
 
 def covers_views(width: float, count: int) -> bool:
     """Whether it would lie on the buttons of so many viewpoints, in a picture so wide, design pixels."""
-    return width < _WIDTH + 2 * _MARGIN + 16 + 84 * count + 42
+    return width < _WIDTH + 2 * _MARGIN + 16 + 84 * count + 80
 
 
 def _body(state: State, look: Look) -> None:

@@ -6,6 +6,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from ... import commands as do
+from ...filming import commands as film
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...recovery import commands as keep
@@ -41,7 +42,12 @@ def draw(state: State, look: Look) -> list[do.Command]:
             issued.append(camera.JumpTo(view))
         imgui.pop_id()
     imgui.same_line(0, look.px(12))
-    return issued + _in_space(state, look)
+    issued += _in_space(state, look)
+    imgui.same_line(0, look.px(4))
+    if imgui.button(fa.ICON_FA_VIDEO, look.vec(34, _VIEW + 6)):
+        issued.append(film.AddKey())
+    widgets.tooltip("Begin a film, or go on with it: the present view as a key frame  (M)")
+    return issued
 
 
 def _in_space(state: State, look: Look) -> list[do.Command]:

@@ -1,0 +1,232 @@
+"""What people stumbled on who tried the window for the first time, on a real ImGui context."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from imgui_bundle import ImVec2, imgui
+
+from app.window.asking.panels import known, prompts, scores
+from app.window.commands import Command
+from app.window.editing import commands as edit
+from app.window.editing import pointing as point
+from app.window.editing.panels import pointing as card_panel
+from app.window.editing.panels import ruler
+from app.window.editing.state import Card, Reading, Tool
+from app.window.exporting.state import Running
+from app.window.filming import commands as film
+from app.window.frame import layout
+from app.window.kit.look import Look
+from app.window.opening import commands as opening
+from app.window.opening.panels import browser
+from app.window.opening.state import Folder
+from app.window.opening.work import ReadFolder, SampleTiles
+from app.window.scene.commands import Loaded
+from app.window.scene.panels import views
+from app.window.state import State
+from app.window.worker import Worker
+from langflash_core.scene.edited import first_marks
+from langflash_core.scene.edits import History
+from tests.app.window.headless import box, context, frames, look
+from tests.app.window.items import Items
+from tests.app.window.scenes import shown_scene
+
+SIZE = (1280, 800)
+PATIENCE = 60.0  # seconds
+PLACE, ROOM = ImVec2(348, 52), ImVec2(932, 716)
+Panel = Callable[[Look], list[Command]]
+
+
+class Hands:
+    """A panel in frames, and what was issued; drawn inside a window of its own where it has none."""
+
+    def __init__(self, draw: Panel, bare: bool = False) -> None:
+        self.issued: list[Command] = []
+        self._draw, self._bare = draw, bare
+        self.look = look()
+
+    def frames(self, count: int = 2) -> None:
+        def panel(seen: Look) -> None:
+            if self._bare:
+                imgui.set_next_window_pos(ImVec2(0, 0))
+                imgui.set_next_window_size(ImVec2(760, 600))
+                imgui.begin("panel")
+            self.issued += self._draw(seen)
+            if self._bare:
+                imgui.end()
+
+        frames(panel, self.look, count)
+
+    def click(self, x: float, y: float, times: int = 1) -> None:
+        io = imgui.get_io()
+        io.add_mouse_pos_event(x, y)
+        self.frames()
+        for _ in range(times):
+            for down in (True, False):
+                io.add_mouse_button_event(0, down)
+                self.frames(1)
+        self.frames()
+
+    def key(self, key: imgui.Key) -> None:
+        for down in (True, False):
+            imgui.get_io().add_key_event(key, down)
+            self.frames()
+
+    def of(self, kind: type[Command]) -> list[Command]:
+        return [command for command in self.issued if isinstance(command, kind)]
+
+
+@pytest.fixture
+def items(monkeypatch) -> Items:
+    for name in ("button", "selectable", "input_text", "input_text_with_hint"):
+        monkeypatch.setattr(imgui, name, getattr(imgui, name))  # as it was, afterwards
+    return Items()
+
+
+def middle(items: Items, label: str) -> tuple[float, float]:
+    left, top, right, bottom = next(boxes[0] for name, boxes in items.now().items() if name.endswith(label))
+    return (left + right) / 2, (top + bottom) / 2
+
+
+def browsing(folder: Folder) -> State:
+    return replace(State(), dialog="open", opening=replace(State().opening, folder=folder))
+
+
+def test_a_double_click_walks_into_one_folder(items: Items) -> None:
+    """The second click would fall on what the first one brought under the pointer."""
+    states = [browsing(Folder(Path("/home"), (Path("/home/Pictures"),)))]
+    hands = Hands(lambda seen: browser.draw(states[-1], seen), bare=True)
+    with context(SIZE):
+        hands.frames(4)
+        x, y = middle(items, "##/home/Pictures")
+        hands.click(x, y)
+        states.append(browsing(Folder(Path("/home/Pictures"), (Path("/home/Pictures/toys"),))))
+        hands.click(x, y)
+        assert hands.of(opening.LookInto) == [opening.LookInto(Path("/home/Pictures"))]
+        for _ in range(30):  # half a second later a click is one of its own
+            hands.frames(1)
+        hands.click(x, y)
+    assert hands.of(opening.LookInto)[1:] == [opening.LookInto(Path("/home/Pictures/toys"))]
+
+
+def test_keys_walk_through_folders_and_choose_photos() -> None:
+    photos = (Path("/home/Pictures/a.png"), Path("/home/Pictures/b.png"))
+    states = [browsing(Folder(Path("/home"), (Path("/home/Pictures"),)))]
+    hands = Hands(lambda seen: browser.draw(states[-1], seen), bare=True)
+    with context(SIZE):
+        imgui.get_io().config_flags |= imgui.ConfigFlags_.nav_enable_keyboard
+        hands.frames(4)
+        for _ in range(10):
+            hands.key(imgui.Key.down_arrow)
+            hands.key(imgui.Key.enter)
+            if hands.of(opening.LookInto)[-1:] == [opening.LookInto(Path("/home/Pictures"))]:
+                break
+        assert hands.of(opening.LookInto)[-1:] == [opening.LookInto(Path("/home/Pictures"))]
+        states.append(browsing(Folder(Path("/home/Pictures"), (), photos)))
+        hands.frames(4)
+        hands.key(imgui.Key.space)
+    assert hands.of(opening.Choose) == [opening.Choose(photos[0])]
+
+
+def test_a_card_is_asked_again_once_its_thing_has_another_name(items: Items) -> None:
+    state = shown_scene()
+    assert state.info is not None
+    history = History(first_marks(state.info.scene))
+    card = Card(Reading((300, 200), None, 1.0, ((1, 1.0),)), (("tv stand", 0.93),))
+    state = replace(state, editing=replace(state.editing, history=history, card=card, names=(("a",),) * 3))
+    hands = Hands(lambda seen: card_panel.draw(state, seen, PLACE, ROOM))
+    with context(SIZE):
+        hands.frames(4)
+        hands.click(*middle(items, "##name"))
+        imgui.get_io().add_input_characters_utf8("armchair")
+        hands.frames()
+        hands.key(imgui.Key.enter)
+    assert hands.of(edit.RenameAtom) == [edit.RenameAtom(1, "armchair")]
+    assert hands.of(point.Ask) == [point.Ask((300, 200))]
+
+
+def measuring() -> State:
+    state = shown_scene()
+    spots = ((-0.3, 0.0, 1.0), (0.3, 0.0, 1.0))
+    return replace(state, editing=replace(state.editing, tool=Tool.RULER, ruler=spots))
+
+
+def test_the_rulers_line_is_below_its_field() -> None:
+    """On the picture, not before all panels."""
+    state, before = measuring(), list[int]()
+
+    def draw(seen: Look) -> list[Command]:
+        issued = ruler.draw(state, seen, PLACE, ROOM)
+        before.append(imgui.get_foreground_draw_list().vtx_buffer.size())
+        return issued
+
+    with context(SIZE):
+        Hands(draw).frames(4)
+        box("##ruler")  # is there
+    assert before[-1] == 0
+
+
+def test_a_length_is_taken_when_its_field_is_left(items: Items) -> None:
+    state = measuring()
+    hands = Hands(lambda seen: ruler.draw(state, seen, PLACE, ROOM))
+    with context(SIZE):
+        hands.frames(4)
+        hands.click(*middle(items, "cm"))
+        imgui.get_io().add_input_characters_utf8("120")
+        hands.frames()
+        hands.click(1100, 700)  # beside it
+    assert hands.of(point.SetLength) == [point.SetLength(1.2)]
+
+
+def test_an_export_moves_nothing_in_the_panel(items: Items, monkeypatch) -> None:
+    state = shown_scene()
+    running = replace(state, exporting=replace(state.exporting, running=Running(Path("mask.png"))))
+    monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
+    places = []
+    with context(SIZE):
+        for each in (state, running):
+            hands = Hands(lambda seen, each=each: layout.draw_all(each, seen)[0])
+            hands.frames(6)
+            places.append(middle(items, "##text"))
+        assert any(name.endswith("Stop the export") for name in items.now())
+    assert places[0] == places[1]
+
+
+def test_a_film_begins_with_a_button(items: Items) -> None:
+    state = shown_scene()
+    hands = Hands(lambda seen: views.draw(state, seen), bare=True)
+    with context(SIZE):
+        hands.frames(4)
+        hands.click(*middle(items, views.fa.ICON_FA_VIDEO))
+    assert hands.of(film.AddKey) == [film.AddKey()]
+
+
+@pytest.mark.parametrize(("height", "first"), [(800, "known"), (600, "scores")])
+def test_chips_keep_their_place_where_there_is_room(height: int, first: str, monkeypatch) -> None:
+    drawn = []
+    monkeypatch.setattr(known, "draw", lambda state, look: drawn.append("known") or [])
+    monkeypatch.setattr(scores, "draw", lambda state, look: drawn.append("scores") or [])
+    state = shown_scene()
+    assert state.asked
+    with context((1280, height)):
+        Hands(lambda seen: prompts.draw(state, seen), bare=True).frames(1)
+    assert drawn[0] == first
+
+
+def test_what_needs_nothing_loaded_is_not_kept_waiting(tmp_path: Path) -> None:
+    """The samples' pictures and the first folder come before torch."""
+    worker = Worker(begins=False)
+    worker.submit(SampleTiles())
+    worker.submit(ReadFolder(tmp_path))
+    worker.begin()
+    came: list[Command] = []
+    end = time.monotonic() + PATIENCE
+    while not any(isinstance(each, Loaded) for each in came):
+        assert time.monotonic() < end, came
+        came += worker.poll()
+        time.sleep(0.01)
+    worker.stop()
+    kinds = [type(each).__name__ for each in came]
+    assert kinds[:5] == ["ShowPicture"] * 5 and kinds[5] == "FolderRead"
