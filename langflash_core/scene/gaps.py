@@ -28,11 +28,13 @@ def num_levels(width: int, height: int) -> int:
     return max(1, round(math.log2(max(1.0, min(width, height) / REACH))))
 
 
-def filled(rgb: Float[Tensor, "H W 3"], alphas: Float[Tensor, "H W"]) -> Float[Tensor, "H W 3"]:
-    """The picture where it is covered, and where it is not what is around.
+def filled(
+    rgb: Float[Tensor, "H W 3"], alphas: Float[Tensor, "H W"], background: float | Tensor = 0.0
+) -> Float[Tensor, "H W 3"]:
+    """The picture where it is covered, and where it is not what is around, or else the background.
 
     Args:
-        rgb: over black. alphas: what of each pixel is covered, in [0, 1].
+        rgb: over black. alphas: what of each pixel is covered, in [0, 1]. background: grey, or (3,).
     """
     levels = [torch.cat((rgb, alphas[..., None]), -1)]
     for _ in range(num_levels(rgb.shape[1], rgb.shape[0])):
@@ -40,7 +42,7 @@ def filled(rgb: Float[Tensor, "H W 3"], alphas: Float[Tensor, "H W"]) -> Float[T
     behind = levels.pop()
     while levels:
         behind = pushed(levels.pop(), behind)
-    return behind[..., :3]
+    return behind[..., :3] + (1 - behind[..., 3:]) * background
 
 
 def pulled(fine: Float[Tensor, "H W 4"]) -> Float[Tensor, "h w 4"]:

@@ -80,6 +80,7 @@ def test_far_from_everything_nothing_is_invented() -> None:
 
 def test_an_empty_picture_stays_empty() -> None:
     assert not filled(torch.zeros(20, 30, 3), torch.zeros(20, 30)).any()
+    assert (filled(torch.zeros(20, 30, 3), torch.zeros(20, 30), 0.25) == 0.25).all()
 
 
 def test_the_passes_keep_their_sizes() -> None:

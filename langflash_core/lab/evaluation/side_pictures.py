@@ -9,12 +9,13 @@ from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.evaluation.side_measures import as_array
 from langflash_core.lab.evaluation.side_subjects import Case, carried
 from langflash_core.lab.evaluation.sides import aligned, camera_of, covered_depths
+from langflash_core.scene.gaps import filled
 from langflash_core.types import Camera, Frame, Scene
 
 SHOWN = (0, 15, 30, 45)
 """Degrees around what the first photo looks at."""
 BEHIND = 0.25
-"""Grey of what nothing covers, so that it is told from dark things."""
+"""Grey of what nothing covers, nor is near what is, so that it is told from dark things."""
 UP = np.array([0.0, -1.0, 0.0])
 """Of a scene's world: its first photo was held roughly level."""
 
@@ -45,5 +46,5 @@ def room_pictures(scene: Scene, case: Case, render: Render) -> tuple[list[Tensor
 
 
 def _over_grey(frame: Frame) -> Tensor:
-    """The picture of a frame, which was drawn over black."""
-    return frame.rgb + BEHIND * (1 - frame.alphas[..., None])
+    """The picture of a frame, which was drawn over black, with its gaps filled."""
+    return filled(frame.rgb, frame.alphas, BEHIND)

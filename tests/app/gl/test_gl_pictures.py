@@ -205,8 +205,7 @@ def test_gaps_are_filled_as_the_twin_does(asked, fading):
     if fading:  # the background stands in for what is not known, and is around gaps as well
         near = faded(frame, shot, scene)
         under = near.rgb + (frame.alphas - near.alphas)[..., None] * background
-    reached = filled(frame.alphas[..., None].expand(-1, -1, 3), frame.alphas)
-    expected = filled(under, frame.alphas) + (1 - reached) * background
+    expected = filled(under, frame.alphas, background)
     # Eight bits: half a step; the coarser pictures have eleven bits, and linear filters eight.
     np.testing.assert_allclose(shown, expected.clamp(0, 1).numpy(), atol=2.5 / 255)
     assert np.abs(shown - empty).max() > 0.2  # there were gaps
