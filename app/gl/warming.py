@@ -14,6 +14,7 @@ from .canvas import Canvas
 from .display import Answer, Drawn
 from .question import Question
 from .scene import LiveScene
+from .view import ViewTargets
 
 SIDE = 36  # pixels; no power of two: for textures with such sides Mesa compiles shaders of their own
 
@@ -23,6 +24,13 @@ def warm_up(canvas: Canvas) -> Iterator[None]:
     camera = Camera(torch.eye(4), torch.tensor([[36.0, 0, 18], [0, 36, 18], [0, 0, 1]]), SIDE, SIDE)
     view = canvas.view((SIDE, SIDE))
     scene = LiveScene(canvas.painter, _one())
+    try:
+        yield from _ways(view, scene, camera)
+    finally:  # of a warm-up, too, that a scene puts an end to
+        scene.release()
+
+
+def _ways(view: ViewTargets, scene: LiveScene, camera: Camera) -> Iterator[None]:
     level = scene.whole
     yield
     level.prepare(camera)
@@ -44,7 +52,6 @@ def warm_up(canvas: Canvas) -> Iterator[None]:
     answer = Answer(view.fast(question, level), question.num_phrases, ())
     yield
     view.display.heat(drawn, answer, 0, 0.5, (0.5, 1.0), "turbo", True)
-    scene.release()
 
 
 def _one() -> Scene:

@@ -25,7 +25,7 @@ from .asking.state import Prompt, margin_span
 from .editing.state import Point, Reading, strongest
 from .governor import SETTLE_AFTER, Governor, Kind, Plan, thinned_shares
 from .poses import START, Pose, to_camera
-from .scene.near import keeps_near
+from .scene.near import fills_gaps, keeps_near
 from .scene.state import Mode
 from .state import State
 
@@ -141,7 +141,7 @@ class Viewport:
         return self._renderer
 
     def warm(self) -> bool:
-        """Compile shaders while there is no scene, a few a call; whether there is more to do."""
+        """Compile shaders while there is no scene, one a call at the most; whether there is more to do."""
         if self._serial:
             return False
         try:
@@ -442,6 +442,7 @@ class Viewport:
         if self._artist is not None:
             self._artist.stop()
             self._artist = None
+        self._warming = None
         if self._renderer is not None:
             self._renderer.release()
             self._renderer = None
@@ -478,7 +479,7 @@ class Viewport:
         renderer, drawn = self._renderer, self._drawn
         if renderer is None or drawn is None:
             return
-        fill = state.preferences.fill_gaps
+        fill = fills_gaps(state)
         shown = {p.key: p for p in state.prompts}
         asked = [shown[key] for key in self._keys if key in shown]
         mode = state.mode if drawn.plan.covers(replace(drawn.plan, kind=_kind(state))) else Mode.RGB

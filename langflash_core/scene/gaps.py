@@ -47,20 +47,13 @@ def filled(
 
 def pulled(fine: Float[Tensor, "H W 4"]) -> Float[Tensor, "h w 4"]:
     """Sums of 2 x 2 premultiplied colours, covered at most once."""
-    height, width = fine.shape[:2]
-    even = F.pad(fine, (0, 0, 0, width % 2, 0, height % 2))
-    sums = even.unflatten(0, (-1, 2)).unflatten(2, (-1, 2)).sum((1, 3))
+    pairs = F.avg_pool2d(fine.movedim(-1, 0)[None], 2, ceil_mode=True, divisor_override=1)
+    sums = pairs[0].movedim(0, -1)
     return sums / sums[..., 3:].clamp_min(1)
 
 
 def pushed(fine: Float[Tensor, "H W 4"], coarse: Float[Tensor, "h w 4"]) -> Float[Tensor, "H W 4"]:
     """The coarse picture, interpolated linearly, behind the fine one."""
-    places = [
-        (2 * torch.arange(count, dtype=fine.dtype) + 1) / (2 * other) - 1
-        for count, other in zip(fine.shape[1::-1], coarse.shape[1::-1], strict=True)
-    ]  # of fine pixels in the coarse picture, from -1 to 1
-    grid = torch.stack(torch.meshgrid(*places, indexing="xy"), -1).to(fine)
-    smooth = F.grid_sample(
-        coarse.movedim(-1, 0)[None], grid[None], mode="bilinear", padding_mode="border", align_corners=False
-    )[0].movedim(0, -1)
-    return fine + (1 - fine[..., 3:]) * smooth
+    height, width = fine.shape[:2]
+    smooth = F.interpolate(coarse.movedim(-1, 0)[None], scale_factor=2, mode="bilinear")
+    return fine + (1 - fine[..., 3:]) * smooth[0, :, :height, :width].movedim(0, -1)

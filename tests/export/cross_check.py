@@ -34,10 +34,7 @@ _Convert = Callable[[Path, Path], None]
 _LEFT = {("splat-transform", ".spz"): "RUB", ("gaussforge", ".spz"): "RUB", ("gsply", ".spz"): "RUB"}
 # splat-transform takes bytes of a .splat's rotation for 2 b / 255 - 1, the format's own code for b / 128 - 1.
 _LOOSE = {".splat": {"shapes": 0.05}}
-_MISSING = (
-    ImportError,
-    AttributeError,
-)  # a package that another needs for a format, or another version's names
+_MISSING = (ImportError, AttributeError)  # a package that another needs for a format, or a version's names
 _LIMITS = {"means": 1e-5, "shapes": 2e-3, "opacities": 3e-3, "colours": 1e-4, "rest": 1e-4}
 
 

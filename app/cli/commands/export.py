@@ -151,9 +151,9 @@ def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
         raise InputError("--colormap and --span colour heat-maps; add --what heat, or leave them away")
     if args.with_text and suffix != PAGE_OUT:
         raise InputError("--with-text is for web pages; name an .html, or leave it away")
-    plain = suffix == ".png" and args.what is None and not prompts and not args.segmented
-    if args.fill and not (plain or suffix in FILMS_OUT or args.what in ("rgb", "heat")):
-        raise InputError("--fill is for pictures and films to look at; leave it away")
+    whole = suffix in (".png", *FILMS_OUT) and args.what in (None, "rgb") and not prompts
+    if args.fill and not (whole or args.what == "heat"):
+        raise InputError("--fill is for pictures and films of the whole scene and heat-maps; leave it away")
     _check_camera_words(args, suffix)
 
 

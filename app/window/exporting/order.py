@@ -11,7 +11,7 @@ from pathlib import Path
 from langflash_core.formats import COLOUR_MAPS
 
 from ..scene.drops import typed_path
-from ..scene.near import keeps_near, photos_known
+from ..scene.near import fills_gaps, keeps_near, photos_known
 from ..state import State
 from .state import ExportForm, What
 
@@ -59,7 +59,7 @@ def order(state: State) -> Order | str:
         words += ["--prompt", *phrases, *_threshold(state)]
     if fades(state):
         words.append("--fade")
-    if form.what.fills and state.preferences.fill_gaps:
+    if form.what.fills and fills_gaps(state) and (form.what.of_one_phrase or not phrases):
         words.append("--fill")
     if form.what in (What.HEAT, What.HEAT_VIDEO):
         words += _colours(state)

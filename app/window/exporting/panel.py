@@ -16,7 +16,7 @@ from . import order as written
 from .state import SECONDS, ExportForm, What
 
 WIDTH = 620.0  # design pixels
-PROGRESS = 112.0
+PROGRESS = 112.0  # the same, high: what `draw_progress` needs
 COLUMNS = 4
 _NAMED = 6  # files that the question before a replacement names
 SIDES = (512, 1024, 1600, 2048, 4096)

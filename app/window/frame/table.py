@@ -172,6 +172,7 @@ def _looking() -> Iterable[Entry]:
     yield Entry("Show the photos' cameras", group, _cameras, _plain("k"))
     yield Entry("Names of things in the picture", group, _names, _plain("n"))
     yield Entry("Keep to what the photos saw", group, _near_photos)
+    yield Entry("Fill gaps by what is around them", group, _fill_gaps)
     for side, forward in camera.SIDES:
         keys = _plain(_SIDE_KEYS[side]) if side in _SIDE_KEYS else ()
         yield Entry(f"Look from {side}", group, _shown(camera.Face(forward)), keys)
@@ -208,6 +209,12 @@ def _cameras(state: State) -> do.Command | None:
 def _near_photos(state: State) -> do.Command | None:
     wanted = state.preferences
     prefer = keep.Prefer(replace(wanted, near_photos=not wanted.near_photos))
+    return prefer if state.info is not None else None
+
+
+def _fill_gaps(state: State) -> do.Command | None:
+    wanted = state.preferences
+    prefer = keep.Prefer(replace(wanted, fill_gaps=not wanted.fill_gaps))
     return prefer if state.info is not None else None
 
 

@@ -24,6 +24,16 @@ def photos_known(state: State) -> bool:
     return count > 0 and int(info.scene.view_ids[count - 1]) >= 0
 
 
+def fills_gaps(state: State) -> bool:
+    """Whether the picture shows what is around its gaps. Surfaces made of photos have cracks; splats from
+    elsewhere may be a thing on its own, as is what is left once most is deleted or hidden, and a thing's
+    outline is no gap."""
+    info, marks = state.info, state.editing.marks
+    if not state.preferences.fill_gaps or info is None or info.scene.view_ids is None:
+        return False
+    return marks is None or 2 * len(marks.deleted | marks.hidden) <= marks.deleted.count
+
+
 def places_to_keep_to(state: State) -> tuple[Vector, ...]:
     """Of the photos that the scene was made of; none where nothing keeps to them."""
     info = state.info

@@ -15,6 +15,8 @@ import torch
 from PIL import Image
 
 import langflash_core
+from langflash_core.splat import render
+from langflash_core.types import Camera
 from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS
 
 TORCH = ("--backend", "torch")
@@ -137,6 +139,71 @@ def test_render(run, scene_file, tmp_path, what, backend):
     assert os.listdir(path.parent) == ["a.png"]
 
 
+def aside_of(scene_file: Path, path: Path) -> Camera:
+    """The first photo's camera 0.9 to the left, so that much of its picture is empty; written to `path`."""
+    own = langflash_core.load(scene_file).camera(0)
+    viewmat = own.viewmat.clone()
+    viewmat[0, 3] -= 0.9  # 33 degrees and more aside of what is still in the picture
+    size = {"width": own.width, "height": own.height}
+    path.write_text(json.dumps({"viewmat": viewmat.tolist(), "K": own.K.tolist(), **size}))
+    return replace(own, viewmat=viewmat)
+
+
+@pytest.mark.parametrize("backend", ["gl", "torch"])
+@pytest.mark.parametrize("words", [("render",), ("export",), ("export", "--what", "rgb")])
+def test_gaps_are_filled_and_nothing_else(run, scene_file, tmp_path, backend, words):
+    aside, path = tmp_path / "camera.json", tmp_path / "a.png"
+    alphas = render(langflash_core.load(scene_file), aside_of(scene_file, aside)).alphas.numpy()
+    pictures = []
+    for fill in ([], ["--fill"]):
+        outcome = run(
+            words[0], scene_file, *words[1:], "-o", path, "--camera", aside, *fill, "--backend", backend
+        )
+        assert outcome.code == 0, outcome.err
+        pictures.append(pixels(path).astype(int))
+    plain, filled = pictures
+    empty, covered = alphas < 0.01, alphas > 0.999
+    assert empty.sum() > 100 and covered.sum() > 100
+    assert np.abs(filled - plain)[covered].max() <= 1  # a thousandth shines through, and is rounded
+    assert plain[empty].max() <= 3 and filled[empty].max() > 60  # beside the wall, and
+    assert np.median(filled[empty].max(-1)) < 60  # not far from it
+
+
+def test_filled_gaps_are_under_a_heat_map_and_answer_nothing(run, scene_file, tmp_path):
+    aside, path = tmp_path / "camera.json", tmp_path / "a.png"
+    aside_of(scene_file, aside)
+    words = ("render", scene_file, "-o", path, "--what", "relevance", "--prompt", "armchair", "--json")
+    outcomes, pictures = [], []
+    for fill in ([], ["--fill"]):
+        outcomes.append(run(*words, "--camera", aside, *fill, *TORCH).json())
+        pictures.append(pixels(path).astype(int))
+    assert outcomes[0] == outcomes[1] and (pictures[0] != pictures[1]).any()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("export", "a.png", "--prompt", "armchair"),
+        ("export", "a.png", "--what", "cutout", "--prompt", "armchair"),
+        ("export", "a.png", "--what", "mask", "--prompt", "armchair"),
+        ("export", "a.png", "--what", "depth"),
+        ("export", "a.exr"),
+        ("export", "a.npz"),
+        ("export", "a.ply"),
+        ("export", "a.html"),
+        ("export", "a.mp4", "--prompt", "armchair"),
+        ("export", "folder", "--segmented", "--prompt", "armchair"),
+        ("render", "a.png", "--what", "depth"),
+        ("render", "a.png", "--what", "atoms"),
+    ],
+)
+def test_only_colours_of_the_whole_scene_have_gaps_to_fill(run, scene_file, tmp_path, words):
+    command, name, *more = words
+    outcome = run(command, scene_file, "-o", tmp_path / name, *more, "--fill")
+    assert outcome.code == 2 and len(outcome.err.strip().splitlines()) == 1
+    assert "--fill" in outcome.err and "away" in outcome.err and not (tmp_path / name).exists()
+
+
 @pytest.fixture
 def of_photos(scene_file, tmp_path) -> Path:
     """The scene, of which it is known that the first photo made it."""
@@ -149,13 +216,8 @@ def of_photos(scene_file, tmp_path) -> Path:
 
 @pytest.mark.parametrize("backend", ["gl", "torch"])
 def test_what_no_photo_looked_at_from_there_fades(run, of_photos, tmp_path, backend):
-    scene = langflash_core.load(of_photos)
     plain, aside = tmp_path / "plain.png", tmp_path / "camera.json"
-    own = scene.camera(0)
-    viewmat = own.viewmat.clone()
-    viewmat[0, 3] -= 0.9  # 33 degrees and more aside of what is still in the picture
-    size = {"width": own.width, "height": own.height}
-    aside.write_text(json.dumps({"viewmat": viewmat.tolist(), "K": own.K.tolist(), **size}))
+    aside_of(of_photos, aside)
     pictures = {}
     for place in (["--view", "0"], ["--camera", str(aside)]):
         for fade in ([], ["--fade"]):

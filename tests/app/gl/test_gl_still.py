@@ -1,12 +1,15 @@
 """Pictures drawn beside the window are those that the renderer draws."""
 
+import gc
 from dataclasses import replace
 
+import moderngl
 import numpy as np
 import pytest
 import torch
 
 from app.gl import SplatRenderer
+from app.gl.canvas import Canvas
 from app.gl.still import StillMaps, draw_still
 from app.gl.warming import SIDE, warm_up
 from langflash_core.language.relevance import relevance_maps
@@ -118,6 +121,24 @@ def test_answers_are_those_of_its_weights(scene, mode: str) -> None:
         assert found.shape == expected.shape and not found[:, :10].any()
         # Sums of 30 products in float32, of which the temperature makes ten times as much.
         assert (found - expected).abs().max() < 1e-5 and expected[:, 10:].std() > 1e-3
+
+
+def buffers() -> int:
+    """Of OpenGL, that nobody released."""
+    made = [each for each in gc.get_objects() if type(each) is moderngl.Buffer]
+    return sum(not isinstance(each.mglo, moderngl.InvalidObject) for each in made)
+
+
+def test_a_scene_that_comes_before_all_shaders_leaves_nothing_of_the_warm_up(gl) -> None:
+    canvas = Canvas(gl)
+    before = buffers()
+    warming = warm_up(canvas)
+    for _ in range(3):
+        next(warming)
+    assert buffers() > before
+    del warming
+    canvas.release()
+    assert buffers() == before and gl.error == "GL_NO_ERROR"
 
 
 def test_shaders_are_compiled_ahead(gl, scene) -> None:

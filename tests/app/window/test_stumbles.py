@@ -168,15 +168,31 @@ def test_the_rulers_line_is_below_its_field() -> None:
     assert before[-1] == 0
 
 
-def test_a_length_is_taken_when_its_field_is_left(items: Items) -> None:
-    state = measuring()
-    hands = Hands(lambda seen: ruler.draw(state, seen, PLACE, ROOM))
+@pytest.mark.parametrize("by_key", [False, True])
+def test_a_length_is_taken_once_when_its_field_is_left(items: Items, by_key: bool) -> None:
+    """Every other time would be an edit of its own, to be undone on its own."""
+    states = [measuring()]
+    hands = Hands(lambda seen: ruler.draw(states[-1], seen, PLACE, ROOM))
+
+    def leave() -> None:
+        if by_key:
+            hands.key(imgui.Key.enter)
+        else:
+            hands.click(1100, 700)  # beside it
+        hands.frames(4)
+
     with context(SIZE):
         hands.frames(4)
         hands.click(*middle(items, "cm"))
         imgui.get_io().add_input_characters_utf8("120")
         hands.frames()
-        hands.click(1100, 700)  # beside it
+        leave()
+        assert hands.of(point.SetLength) == [point.SetLength(1.2)]
+        states.append(point.SetLength(1.2).apply(states[0]))
+        assert states[-1].metric
+        hands.frames(4)
+        hands.click(*middle(items, "cm"))
+        leave()  # as it was
     assert hands.of(point.SetLength) == [point.SetLength(1.2)]
 
 

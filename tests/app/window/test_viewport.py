@@ -3,7 +3,9 @@
 import time
 from dataclasses import replace
 
+import numpy as np
 import pytest
+import torch
 
 from app.gl import still
 from app.window.governor import Governor, Kind, Plan
@@ -122,3 +124,27 @@ def test_only_the_picture_on_show_is_scored(context) -> None:
         assert viewport.view(lapsed) is None, "of a question that holds no more"
         assert viewport.view(state) is not None
         viewport.release()
+
+
+def test_gaps_are_filled_as_the_preference_says(context) -> None:
+    """The picture follows it at once, without another drawing."""
+    shown = shown_scene()
+    assert shown.info is not None
+    plain = room(language_space("minilm").encode(list(PHRASES)))
+    scene = replace(plain, view_ids=torch.zeros(len(plain.gaussians), dtype=torch.int64))
+    aside = orbit(shown.pose, 1.0, 0.0)  # beside the wall nothing is drawn
+    state = replace(shown, info=replace(shown.info, scene=scene), pose=aside)
+    with context:
+        viewport = Viewport(context)
+        viewport.set_scene(1, scene)
+        pictures, drawn = [], []
+        for fill in (True, False, True):
+            state = replace(state, preferences=replace(state.preferences, fill_gaps=fill, near_photos=False))
+            for _ in range(4):
+                viewport.update(state, SIZE, touched=0.0)
+            assert viewport.texture is not None
+            pictures.append(np.frombuffer(viewport.texture.read(), np.uint8))
+            drawn.append(viewport.drawn)
+        viewport.release()
+    assert drawn[0] is drawn[1] is drawn[2]
+    assert np.array_equal(pictures[0], pictures[2]) and (pictures[0] != pictures[1]).any()

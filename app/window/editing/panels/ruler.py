@@ -18,7 +18,7 @@ _BAR = widgets.PLAIN | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags
 
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
-    """How long it is between both ends, and a field to tell it."""
+    """A field beside the line that tells its length and takes it."""
     ends = _ends(state, place, size)
     return _field(state, look, ends) if len(ends) == 2 else []
 
@@ -59,7 +59,7 @@ def _field(state: State, look: Look, ends: list[ImVec2]) -> list[do.Command]:
         known = f"{100 * length * state.metric:.1f}" if state.metric else ""
         entered, text = imgui.input_text_with_hint("cm", "?", known, _ENTER)
         with suppress(ValueError):
-            if entered or imgui.is_item_deactivated_after_edit():
+            if (entered or imgui.is_item_deactivated_after_edit()) and text != known:
                 issued.append(point.SetLength(float(text.replace(",", ".")) / 100))
         widgets.tooltip("How long it is in truth: the scene and its exports are in metres then")
         imgui.end()

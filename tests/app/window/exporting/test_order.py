@@ -75,6 +75,20 @@ def test_what_fades_on_show_fades_in_files_unless_said_otherwise() -> None:
     assert plan.preferences.near_photos and not export_form.fades(plan), "a plan does not fade on show"
 
 
+def test_gaps_are_filled_in_files_as_on_show() -> None:
+    def fills(state: State, what: What, **changes) -> bool:
+        order = export_form.order(form(state, path="/out/a picture", what=what, **changes))
+        assert not isinstance(order, str)
+        return "--fill" in order.words
+
+    state = of_photos()
+    kinds = {what for what in What if fills(state, what)}
+    assert kinds == {What.RGB, What.HEAT, What.VIDEO, What.WEBP, What.HEAT_VIDEO}
+    assert not fills(state, What.VIDEO, only_found=True), "around a thing on its own is no gap"
+    assert not fills(replace(state, preferences=replace(state.preferences, fill_gaps=False)), What.RGB)
+    assert not fills(scene(), What.RGB)
+
+
 def test_what_no_photo_made_does_not_fade_since_its_file_does_not_say_where_photos_looked() -> None:
     for fade in (None, True):
         order = export_form.order(form(scene(), path="/out/a picture", what=What.RGB, fade=fade))

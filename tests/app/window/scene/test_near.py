@@ -8,8 +8,11 @@ import torch
 
 from app.window import poses
 from app.window.frame.status import figures
-from app.window.scene.near import FADING, degrees_from_photos, places_to_keep_to
+from app.window.scene.near import FADING, degrees_from_photos, fills_gaps, places_to_keep_to
 from app.window.state import State
+from langflash_core.scene.edited import first_marks
+from langflash_core.scene.edits import History
+from langflash_core.scene.mask import Mask
 from langflash_core.scene.trust import FULL
 from tests.app.window.scenes import VIEWS, shown_scene
 
@@ -40,3 +43,18 @@ def test_nothing_is_kept_to_where_nobody_knows_the_photos_or_wants_to(state: Sta
     free = replace(state, preferences=replace(state.preferences, near_photos=False))
     assert places_to_keep_to(free) == () and degrees_from_photos(free) == 0
     assert places_to_keep_to(shown_scene()) == () == places_to_keep_to(State())
+
+
+def test_gaps_are_filled_in_scenes_of_photos_and_not_around_a_thing(state: State) -> None:
+    assert fills_gaps(state) and not fills_gaps(shown_scene()) and not fills_gaps(State())
+    assert not fills_gaps(replace(state, preferences=replace(state.preferences, fill_gaps=False)))
+    assert state.info is not None
+    marks = first_marks(state.info.scene)
+    count = marks.deleted.count
+
+    def filled(deleted: int, hidden: int) -> bool:
+        gone = replace(marks, deleted=Mask.first(count, deleted), hidden=Mask.first(count, hidden))
+        return fills_gaps(replace(state, editing=replace(state.editing, history=History(gone))))
+
+    assert filled(0, 0) and filled(count // 2, 0) and filled(count // 3, count // 2)
+    assert not filled(count // 2 + 1, 0) and not filled(0, count - 1)
