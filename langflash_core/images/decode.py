@@ -5,11 +5,14 @@ light nor much of an edge; deeper than 8 bits is scaled to 8; an embedded colour
 converted to sRGB; JPEGs much larger than needed are decoded at 1/2, 1/4 or 1/8.
 """
 
+import ctypes
 import io
+import logging
 import struct
 import warnings
 import zlib
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -119,6 +122,8 @@ def _read_bytes(path: Path, name: str) -> bytes:
 def _decode(content: bytes, name: str) -> Photo:
     if content[4:8] == b"ftyp":
         _register_heif()
+    if content[:2] in (b"II", b"MM"):
+        _quiet_tiff()
     Image.init()  # all plug-ins; only the formats named above are let in (no PostScript)
     known = [kind for kind in FORMATS if kind in Image.OPEN]
     with Image.open(io.BytesIO(content), formats=known) as opened:
@@ -145,6 +150,17 @@ def _register_heif() -> None:
     import pillow_heif
 
     pillow_heif.register_heif_opener()
+
+
+@cache
+def _quiet_tiff() -> None:
+    """What is wrong with a TIFF is told once, in the error: libtiff and Pillow's log would write it to the
+    terminal as well. Where libtiff's functions are hidden inside Pillow's own (Windows), it still does."""
+    logging.getLogger("PIL.TiffImagePlugin").setLevel(logging.CRITICAL)
+    library = ctypes.CDLL(Image.core.__file__)  # a look-up goes on into the libraries that it needs
+    for name in ("TIFFSetErrorHandler", "TIFFSetWarningHandler"):
+        if hasattr(library, name):
+            getattr(library, name)(None)
 
 
 def _draft_size(size: tuple[int, int]) -> tuple[int, int]:

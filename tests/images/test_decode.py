@@ -1,5 +1,8 @@
 """Every kind of photo becomes upright 8-bit RGB; everything else one sentence."""
 
+import struct
+import sys
+
 import numpy as np
 import pillow_heif
 import pytest
@@ -170,6 +173,22 @@ def test_what_a_decoder_says_over_several_lines_becomes_one(tmp_path, monkeypatc
     (tmp_path / "a.heic").write_bytes(b"heic")
     with pytest.raises(ImageError, match=r"\(Invalid input: no 'pitm' box\); copy"):
         read_photo(tmp_path / "a.heic")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="libtiff's functions are hidden inside Pillow's own")
+def test_a_bad_tiff_is_told_of_in_the_error_alone(tmp_path, capfd, caplog):
+    """libtiff writes to the terminal by itself, and Pillow logs."""
+    whole = encoded(room_picture(64, 48), "TIFF", compression="tiff_adobe_deflate")
+    pixels_of_it = whole.index(b"\x78\x9c")  # where a zlib stream starts
+    cut = whole[: pixels_of_it + 40] + bytes(20) + whole[pixels_of_it + 60 :]
+    samples = whole.index(struct.pack("<HHI", 277, 3, 1)) + 8
+    many = whole[:samples] + struct.pack("<I", 3072) + whole[samples + 4 :]
+    for content in (cut, many):
+        (tmp_path / "a.tiff").write_bytes(content)
+        with pytest.raises(ImageError):
+            read_photo(tmp_path / "a.tiff")
+    assert capfd.readouterr() == ("", "")
+    assert not caplog.records
 
 
 @pytest.mark.parametrize("kind", ["JPEG", "PNG", "WEBP", "TIFF", "HEIF"])
