@@ -25,8 +25,10 @@ class Renderer(Protocol):
 
     def __call__(self, scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame: ...
 
-    def colours(self, scene: Scene, camera: Camera) -> "np.ndarray":
-        """(H, W, 3) uint8, for pictures that move: gl reads nothing else back."""
+    def colours(
+        self, scene: Scene, camera: Camera, *, fade: bool = False, fill: bool = False
+    ) -> "np.ndarray":
+        """(H, W, 3) uint8, for pictures that move: gl reads nothing else back. fade, fill: as `Shown`."""
         ...
 
     def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
@@ -44,10 +46,13 @@ class TorchRenderer:
 
         return render(scene, camera, weight_maps=weight_maps)
 
-    def colours(self, scene: Scene, camera: Camera) -> "np.ndarray":
+    def colours(
+        self, scene: Scene, camera: Camera, *, fade: bool = False, fill: bool = False
+    ) -> "np.ndarray":
         from langflash_core.export.png import to_8bit
 
-        return to_8bit(self(scene, camera, weight_maps=False).rgb)
+        frame = self(scene, camera, weight_maps=False)
+        return to_8bit(_shown(frame, scene, camera, fade=fade, fill=fill).rgb)
 
     def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
         from langflash_core.language.relevance import relevance_maps
@@ -83,10 +88,16 @@ class GlRenderer:
             self._splats.draw(camera, weight_maps=weight_maps)
             return self._splats.frame(weight_maps=weight_maps)
 
-    def colours(self, scene: Scene, camera: Camera) -> "np.ndarray":
+    def colours(
+        self, scene: Scene, camera: Camera, *, fade: bool = False, fill: bool = False
+    ) -> "np.ndarray":
+        from langflash_core.scene.trust import check_photos
+
+        if fade:
+            check_photos(scene)
         with self._context:
             self._show(scene)
-            return self._splats.colours(camera)
+            return self._splats.colours(camera, fade=fade, fill=fill)
 
     def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
         with self._context:
@@ -118,24 +129,26 @@ class Shown:
         self._fade, self._fill = fade, fill
 
     def __call__(self, scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame:
-        return self._shown(self.inner(scene, camera, weight_maps=weight_maps), scene, camera)
+        frame = self.inner(scene, camera, weight_maps=weight_maps)
+        return _shown(frame, scene, camera, fade=self._fade, fill=self._fill)
 
-    def colours(self, scene: Scene, camera: Camera) -> "np.ndarray":
-        from langflash_core.export.png import to_8bit
-
-        return to_8bit(self(scene, camera, weight_maps=False).rgb)
+    def colours(
+        self, scene: Scene, camera: Camera, *, fade: bool = False, fill: bool = False
+    ) -> "np.ndarray":
+        return self.inner.colours(scene, camera, fade=fade or self._fade, fill=fill or self._fill)
 
     def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
         frame, relevance = self.inner.answered(scene, camera, compiled)
-        shown = self._shown(frame, scene, camera)
+        shown = _shown(frame, scene, camera, fade=self._fade, fill=self._fill)
         return shown, relevance * (shown.alphas > 0) if self._fade else relevance
 
-    def _shown(self, frame: Frame, scene: Scene, camera: Camera) -> Frame:
-        from langflash_core.scene.gaps import filled
-        from langflash_core.scene.trust import faded
 
-        shown = faded(frame, camera, scene) if self._fade else frame
-        return replace(shown, rgb=filled(shown.rgb, frame.alphas)) if self._fill else shown
+def _shown(frame: Frame, scene: Scene, camera: Camera, *, fade: bool, fill: bool) -> Frame:
+    from langflash_core.scene.gaps import filled
+    from langflash_core.scene.trust import faded
+
+    shown = faded(frame, camera, scene) if fade else frame
+    return replace(shown, rgb=filled(shown.rgb, frame.alphas)) if fill else shown
 
 
 @contextmanager

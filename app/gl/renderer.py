@@ -284,17 +284,29 @@ class SplatRenderer:
             view.maps.of(level)
         self._picture = picture
 
-    def colours(self, camera: Camera) -> np.ndarray:
+    def colours(self, camera: Camera, *, fade: bool = False, fill: bool = False) -> np.ndarray:
         """(H, W, 3) uint8, the scene's colours over black and nothing else: for pictures one after the other.
 
         What `draw` showed before is gone.
+
+        Args:
+            fade: as `faded_texture`. fill: as `fill` has it, for this picture.
 
         Raises:
             as `draw`.
         """
         self._picture = None
-        _, level, view = self._prepared(camera, 1.0)
-        return view.colours(level)
+        if not (fade or fill):
+            _, level, view = self._prepared(camera, 1.0)
+            return view.colours(level)
+        asked, self._question = self._question, None
+        before, self._fill = self._fill, fill
+        try:
+            self.draw(camera, weight_maps=False)
+            shown = self.faded_texture() if fade else self.rgb_texture
+        finally:
+            self._picture, self._question, self._fill = None, asked, before
+        return np.frombuffer(shown.read(), np.uint8).reshape(shown.height, shown.width, 4)[..., :3]
 
     def bring(self, still: Still, background: Background = (0.0, 0.0, 0.0)) -> None:
         """Take a picture of the scene that was drawn elsewhere (still.py) instead of drawing one.

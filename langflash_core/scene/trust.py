@@ -44,6 +44,14 @@ def trust(
     return share * share * (3 - 2 * share)
 
 
+def check_photos(scene: Scene) -> None:
+    """Raises:
+    InputError: nobody knows the photos that the scene was made of.
+    """
+    if scene.view_ids is None:
+        raise InputError("this scene does not say which photos it was made of; leave --fade out")
+
+
 def faded(frame: Frame, camera: Camera, scene: Scene) -> Frame:
     """A frame over black that fades where it shows what no photo looked at from about there.
 
@@ -56,8 +64,7 @@ def faded(frame: Frame, camera: Camera, scene: Scene) -> Frame:
     Raises:
         InputError: nobody knows the photos that the scene was made of.
     """
-    if scene.view_ids is None:
-        raise InputError("this scene does not say which photos it was made of; leave --fade out")
+    check_photos(scene)
     pose = invert_rigid(camera.viewmat.to(frame.depths))
     points = transform(
         pose, unproject(frame.depths, camera.K.to(frame.depths), camera.orthographic).flatten(0, 1)

@@ -213,6 +213,21 @@ def test_gaps_are_filled_as_the_twin_does(asked, fading):
     assert np.array_equal(pixels(asked.faded_texture() if fading else asked.rgb_texture)[..., :3], empty)
 
 
+@pytest.mark.parametrize(("fade", "fill"), [(False, True), (True, False), (True, True)])
+def test_pictures_one_after_the_other_fade_and_fill_as_on_show(asked, fade, fill):
+    scene = dataclasses.replace(
+        cloud(1500, 12, dtype=torch.float32), view_ids=torch.zeros(1500, dtype=torch.int64)
+    )
+    asked.set_scene(scene)
+    colours = asked.colours(from_aside(), fade=fade, fill=fill)
+    asked.draw(from_aside())
+    asked.fill(fill)
+    shown = pixels(asked.faded_texture() if fade else asked.rgb_texture)[..., :3]
+    assert np.array_equal(colours, (255 * shown).round().astype(np.uint8))
+    plain = asked.colours(from_aside())  # nothing of it is left
+    assert (plain < colours).any() if fill else (plain > colours).any()
+
+
 def test_filled_gaps_change_what_is_seen_and_nothing_that_is_known(asked):
     def looks() -> dict[str, np.ndarray]:
         colours, cuts = np.eye(5, 3, dtype=np.float32), np.full(5, 0.5, np.float32)
