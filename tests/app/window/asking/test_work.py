@@ -13,6 +13,7 @@ from app.window.asking import work
 from app.window.asking.prompt_sets import read_prompts
 from app.window.asking.state import BINS
 from app.window.asking.work import Encode
+from app.window.editing import work as editing_work
 from app.window.editing.effects import EditingEffects
 from app.window.effects import Hands
 from app.window.scene.commands import SceneArrived
@@ -128,6 +129,7 @@ def test_a_scene_that_has_come_has_the_text_model_loaded_before_a_phrase_is_type
     effects.follow(SceneArrived(info), State(), state)
     minilm.load_minilm.cache_clear()
     encode_cached.cache_clear()
+    editing_work._household.cache_clear()
     for request in asked:
         list(request.run(lambda: False))
     assert minilm.load_minilm.cache_info().currsize == 1
