@@ -105,7 +105,7 @@ def programs(path: Path | None) -> dict[str, tuple[_Convert, tuple[str, ...], tu
         (
             "gaussforge",
             gaussforge,
-            (".spz", ".sog", ".compressed.ply"),
+            (".splat", ".spz", ".sog", ".compressed.ply"),
             (".ksplat", ".spz", ".compressed.ply"),
         ),
         ("gsply", gsply, (".spz", ".sog", ".compressed.ply"), ()),
