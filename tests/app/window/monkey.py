@@ -4,8 +4,9 @@
 
 Ends with 0 when the window lived through it without an exception, an OpenGL error or a hang, and its
 memory stayed. The window can write only in a temporary folder (guarded.py); leaving is refused, so
-that the run goes on. Every minute the same scene is opened, and memory is compared there: its file is
-written anew before, since random hands merge scenes into it and save it.
+that the run goes on. It begins with a reconstruction, so that the network is there from the start and
+not from whichever minute random hands ask for it. Every minute the same scene is opened, and memory is
+compared there: its file is written anew before, since random hands merge scenes into it and save it.
 """
 
 import argparse
@@ -28,6 +29,7 @@ import numpy as np
 
 from app.window.session import Session
 from langflash_core.files import write_atomically
+from langflash_core.resources import asset_path
 from tests.app.window.guarded import REFUSED, environment
 from tests.app.window.items import Items
 from tests.app.window.test_window import ROOT, x_server
@@ -56,7 +58,8 @@ WORDS = (
     "-3",
     "room",
 )
-PHOTOS = ("living_room_left.png", "living_room_right.png", "books_left.jpg")
+PAIR = ("living_room_left.png", "living_room_right.png")
+PHOTOS = (*PAIR, "books_left.jpg")
 
 
 @dataclass
@@ -92,7 +95,7 @@ def inside(width: int, height: int) -> None:
     ended = threading.Event()
     threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
     items = Items()
-    session = Staying((), (width, height))
+    session = Staying(tuple(asset_path(f"photos/{name}") for name in PAIR), (width, height))
     frames, said, latest = 0, 0.0, 0.0
     while not ended.is_set() and not session.should_close:
         if session.step(0.25):
@@ -104,6 +107,7 @@ def inside(width: int, height: int) -> None:
                 "frames": frames,
                 "latest": latest,
                 "rss": resident_mb(os.getpid()),
+                "own": resident_mb(os.getpid(), "RssAnon"),
                 "scene": state.info.serial if state.info and state.job is None else None,
                 "gaussians": state.info.num_gaussians if state.info else 0,
                 "unexpected": [t.text for t in state.toasts if "unexpected" in t.text],
@@ -117,12 +121,12 @@ def inside(width: int, height: int) -> None:
     session.close()
 
 
-def resident_mb(process: int) -> float:
-    """Memory of a process, MB."""
+def resident_mb(process: int, kind: str = "VmRSS") -> float:
+    """Memory of a process, MB. kind: "RssAnon" leaves files out that are mapped."""
     for line in Path(f"/proc/{process}/status").read_text().splitlines():
-        if line.startswith("VmRSS:"):
+        if line.startswith(f"{kind}:"):
             return int(line.split()[1]) / 1024
-    raise ValueError("status: expected a line VmRSS")
+    raise ValueError(f"status: expected a line {kind}")
 
 
 class Hands:
@@ -286,6 +290,15 @@ class Watched:
             time.sleep(0.2)
         return False
 
+    def reconstructs(self) -> bool:
+        """Wait for the scene of the photos that the window was launched with."""
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end and self.process.poll() is None:
+            if self.last.get("scene") is not None:
+                return True
+            time.sleep(0.2)
+        return False
+
     def _has_come(self, before: int | None, count: int) -> bool:
         return self.last.get("scene") not in (None, before) and self.last["gaussians"] == count
 
@@ -335,6 +348,8 @@ def run(
         try:
             hands = Hands(display, folder, scene, size, seed)
             hands.find()
+            if not watched.reconstructs():
+                outcome.problems.append(f"the photos became no scene: {watched.last}")
             start = time.monotonic()
             checkpoint = 0.0
             while not outcome.problems:
@@ -343,7 +358,10 @@ def run(
                     if not opened(hands, watched, len(made.gaussians)):
                         outcome.problems.append(f"the scene did not open: {watched.last}")
                     outcome.checkpoints.append((now / 60, watched.last.get("rss", 0.0)))
-                    say(f"{now / 60:5.1f} min  {watched.last.get('rss', 0):6.0f} MB  {outcome.steps} steps")
+                    rss, own = (watched.last.get(kind, 0.0) for kind in ("rss", "own"))
+                    say(
+                        f"{now / 60:5.1f} min  {rss:6.0f} MB, {own:.0f} of them not of files  {outcome.steps} steps"
+                    )
                     checkpoint = now + every
                 if now >= seconds:
                     break
