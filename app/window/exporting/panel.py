@@ -9,6 +9,7 @@ from .. import commands as do
 from ..filming.state import WAYS
 from ..kit import theme, widgets
 from ..kit.look import Look
+from ..opening import commands as opening
 from ..scene.near import photos_known
 from ..state import State
 from . import commands as export
@@ -16,6 +17,7 @@ from . import order as written
 from .state import SECONDS, ExportForm, What
 
 WIDTH = 620.0  # design pixels
+HEIGHT = 470.0  # of the kinds that need most
 PROGRESS = 112.0  # the same, high: what `draw_progress` needs
 COLUMNS = 4
 _NAMED = 6  # files that the question before a replacement names
@@ -57,11 +59,12 @@ def draw(state: State, look: Look) -> list[do.Command]:
     wanted = _options(state, wanted, look)
     widgets.gap(look.px(4))
     imgui.text("Where to write it")
-    imgui.set_next_item_width(-1)
+    imgui.set_next_item_width(-widgets.folder_room())
     _, path = imgui.input_text("##file", wanted.path)
+    elsewhere: list[do.Command] = [opening.LookForPlace()] if widgets.folder_button() else []
     wanted = replace(wanted, path=path)
     issued: list[do.Command] = [] if wanted == form else [export.EditForm(wanted)]
-    return issued + _order(state, look)
+    return issued + elsewhere + _order(state, look)
 
 
 def _kinds(form: ExportForm, look: Look) -> ExportForm:

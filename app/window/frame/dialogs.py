@@ -13,6 +13,7 @@ from ..exporting import commands as export
 from ..exporting import panel as export_panel
 from ..kit import theme, widgets
 from ..kit.look import Look
+from ..opening import commands as opening
 from ..opening.panels import browser
 from ..recovery import panels as recovery_panels
 from ..scene import commands as show
@@ -29,6 +30,7 @@ TITLES = {
     "drop": "Where do these photos belong?",
     "drop scene": "Open or merge?",
     "merge": "Merge a scene into this one",
+    "place": "Where to write it",
     "unsaved": "Edits are not saved",
     "save prompts": "Save the phrases",
     "load prompts": "Load phrases",
@@ -47,6 +49,7 @@ WIDTHS = {  # design pixels; others 520
     "palette": palette.WIDTH,
     "open": browser.WIDTH,
     "merge": browser.WIDTH,
+    "place": browser.WIDTH,
 }
 GESTURES = (
     ("Left drag", "orbit"),
@@ -62,7 +65,7 @@ GESTURES = (
 COLUMNS = ((None, "View", "Program"), ("File", "Find", "Tools", "Edit"))  # of help; None: the gestures
 _CLOSING = (
     do.ShowDialog | show.SaveScene | show.OpenPaths | show.Instead | show.All | show.GoOn | show.SaveFirst
-    | show.MergeScene
+    | show.MergeScene | opening.LookForPlace | opening.PlaceFound
     | ask.SavePrompts | ask.LoadPrompts | export.Export
 )  # fmt: skip
 
@@ -88,12 +91,17 @@ def draw(state: State, look: Look) -> list[do.Command]:
 
 
 def _place(dialog: str, title: str, look: Look) -> None:
-    """Open it in the middle, as wide as it wants and no higher than the window."""
+    """Open it in the middle, as wide as it wants and no higher than the window. One of many heights begins
+    where the highest would."""
     if not imgui.is_popup_open(title):
         imgui.open_popup(title)
     middle = imgui.get_main_viewport().get_center()
-    imgui.set_next_window_pos(middle, imgui.Cond_.appearing, ImVec2(0.5, 0.5))
     room, margin = imgui.get_io().display_size, look.px(24)
+    if dialog == "export":
+        top = max((room.y - look.px(export_panel.HEIGHT)) / 2, margin / 2)
+        imgui.set_next_window_pos(ImVec2(middle.x, top), imgui.Cond_.appearing, ImVec2(0.5, 0))
+    else:
+        imgui.set_next_window_pos(middle, imgui.Cond_.appearing, ImVec2(0.5, 0.5))
     width = min(look.px(WIDTHS.get(dialog, 520.0)), room.x - margin)
     imgui.set_next_window_size_constraints(ImVec2(width, 0), ImVec2(width, room.y - margin))  # then scrolls
     imgui.set_next_window_size(ImVec2(width, 0))
@@ -109,6 +117,7 @@ def _body(dialog: str) -> Callable[[State, Look], list[do.Command]]:
         "drop": rooms.draw_drop,
         "drop scene": rooms.draw_scene_drop,
         "merge": browser.draw,
+        "place": browser.draw,
         "unsaved": rooms.draw_unsaved,
         "save prompts": _save_prompts,
         "load prompts": _load_prompts,
@@ -121,7 +130,7 @@ def _body(dialog: str) -> Callable[[State, Look], list[do.Command]]:
 
 
 def _save(state: State, look: Look) -> list[do.Command]:
-    issued, confirmed = _path_field(state, "Where to write it")
+    issued, confirmed = _path_field(state, "Where to write it", place=True)
     path = typed_scene(state.dialog_path)
     exists = path is not None and os.path.isfile(path)
     consequence = f"{path} will be replaced." if exists else f"Writes {path}"
@@ -157,15 +166,19 @@ def _load_prompts(state: State, look: Look) -> list[do.Command]:
     return issued
 
 
-def _path_field(state: State, label: str) -> tuple[list[do.Command], bool]:
-    """A path to edit; the second value tells whether Enter was pressed."""
+def _path_field(state: State, label: str, place: bool = False) -> tuple[list[do.Command], bool]:
+    """A path to edit, with a button for its folder if it is a `place` to write to; the second value tells
+    whether Enter was pressed."""
     imgui.text(label)
-    imgui.set_next_item_width(-1)
+    imgui.set_next_item_width(-widgets.folder_room() if place else -1)
     if imgui.is_window_appearing():
         imgui.set_keyboard_focus_here()
     changed, path = imgui.input_text("##path", state.dialog_path)
     confirmed = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
-    return ([do.EditDialogPath(path)] if changed else []), confirmed
+    issued: list[do.Command] = [do.EditDialogPath(path)] if changed else []
+    if place and widgets.folder_button():
+        issued.append(opening.LookForPlace())
+    return issued, confirmed
 
 
 def _help(state: State, look: Look) -> list[do.Command]:

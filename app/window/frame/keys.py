@@ -9,6 +9,7 @@ from ..editing import pointing as point
 from ..editing.panels import gizmo
 from ..editing.state import Tool
 from ..filming import commands as film
+from ..opening import commands as opening
 from ..scene import commands as show
 from ..state import State
 from . import table
@@ -69,7 +70,7 @@ def _escape(state: State) -> list[do.Command]:
     would end the program."""
     editing = state.editing
     if state.dialog:
-        return [do.ShowDialog(None)]
+        return [opening.PlaceFound(None) if state.dialog == "place" else do.ShowDialog(None)]
     if imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
         imgui.internal.close_popups_except_modals()
         return []

@@ -55,7 +55,7 @@ DARK = Palette(
     PRESSED=ImVec4(0.255, 0.272, 0.310, 1.0),
     LINE=ImVec4(0.200, 0.213, 0.240, 1.0),
     SELECTED=ImVec4(0.36, 0.68, 1.0, 1.0),  # near the tint of selected Gaussians
-    POPUP=ImVec4(0.125, 0.135, 0.155, 0.98),
+    POPUP=ImVec4(0.125, 0.135, 0.155, 1.0),
     ON_ACCENT=ImVec4(0.10, 0.07, 0.02, 1.0),
     LINK=ImVec4(0.45, 0.72, 0.98, 1.0),
 )
@@ -72,7 +72,7 @@ LIGHT = Palette(  # text on every ground at 4.5 : 1 or more (WCAG AA); the pictu
     PRESSED=ImVec4(0.780, 0.792, 0.815, 1.0),
     LINE=ImVec4(0.820, 0.830, 0.848, 1.0),
     SELECTED=ImVec4(0.05, 0.40, 0.78, 1.0),
-    POPUP=ImVec4(0.985, 0.988, 0.992, 0.99),
+    POPUP=ImVec4(0.985, 0.988, 0.992, 1.0),
     ON_ACCENT=ImVec4(0.10, 0.07, 0.02, 1.0),
     LINK=ImVec4(0.06, 0.36, 0.68, 1.0),
 )

@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from typing import TypeVar
 
 from imgui_bundle import ImVec2, ImVec4, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
 
 from . import theme
 
@@ -83,6 +84,19 @@ def quiet_button(label: str, tip: str = "") -> bool:
     with colours(button=clear, text=theme.MUTED):
         pressed = imgui.button(label)
     tooltip(tip)
+    return pressed
+
+
+def folder_room() -> float:
+    """What `folder_button` takes beside a field, pixels."""
+    return imgui.get_frame_height() + imgui.get_style().item_spacing.x
+
+
+def folder_button() -> bool:
+    """Beside the field of a path to write to: whether another folder is wanted."""
+    imgui.same_line()
+    pressed = imgui.button(f"{fa.ICON_FA_FOLDER_OPEN}##folder", ImVec2(imgui.get_frame_height(), 0))
+    tooltip("Choose the folder")
     return pressed
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ..commands import ShowDialog
 from ..state import State
-from .state import LOOKING, NO_OPENING, Folder
+from .state import LOOKING, NO_OPENING, Folder, Opening
 
 
 @dataclass(frozen=True)
@@ -23,16 +23,43 @@ class OpenFiles:
 
 @dataclass(frozen=True)
 class LookInto:
-    """Our own dialog, at a folder; None: where one was last. merging: as in `OpenFiles`; it stays so while
-    the dialog is open."""
+    """Our own dialog, at a folder; None: where one was last. It stays `dialog`, one of `LOOKING`, while it is
+    open."""
 
     folder: Path | None = None
-    merging: bool = False
+    dialog: str = "open"
 
     def apply(self, state: State) -> State:
         if state.dialog not in LOOKING:
-            state = ShowDialog("merge" if self.merging else "open").apply(state)
-        return replace(state, opening=NO_OPENING, dialog_path="")
+            state = ShowDialog(self.dialog).apply(state)
+        kept = state.opening if state.dialog == "place" else NO_OPENING
+        return replace(state, opening=replace(kept, folder=None, chosen=()), dialog_path="")
+
+
+@dataclass(frozen=True)
+class LookForPlace:
+    """Look for the folder that the file of the dialog on show is written to."""
+
+    def apply(self, state: State) -> State:
+        wanted = state.exporting.form.path if state.dialog == "export" else state.dialog_path
+        return replace(state, opening=Opening(asker=state.dialog or "", name=Path(wanted).name))
+
+
+@dataclass(frozen=True)
+class PlaceFound:
+    """Back in the dialog that asked, with its file in this folder; None: where it was."""
+
+    folder: Path | None
+
+    def apply(self, state: State) -> State:
+        asked, form = state.opening, state.exporting.form
+        if asked.asker != "export":
+            state = ShowDialog(asked.asker).apply(state)
+            path = Path(state.dialog_path) if self.folder is None else self.folder / asked.name
+            return replace(state, dialog_path=str(path))
+        path = Path(form.path) if self.folder is None else self.folder / asked.name
+        exporting = replace(state.exporting, form=replace(form, path=str(path)))
+        return replace(state, exporting=exporting, dialog="export", dialog_path="")
 
 
 @dataclass(frozen=True)
@@ -42,7 +69,7 @@ class FolderRead:
     folder: Folder
 
     def apply(self, state: State) -> State:
-        if not self.folder.problem:
+        if not self.folder.problem and state.dialog != "place":
             wanted = replace(state.preferences, folder=str(self.folder.path))
             state = replace(state, preferences=wanted)
         return replace(state, opening=replace(state.opening, folder=self.folder))

@@ -9,9 +9,10 @@ from ..effects import Effects, Hands
 from ..kit.textures import Thumbnails
 from ..scene import samples
 from ..scene.commands import MergeScene, OpenPaths
+from ..scene.drops import typed_path
 from ..state import State
 from . import native
-from .commands import FolderRead, LookInto, MorePictures, OpenFiles, Paste
+from .commands import FolderRead, LookForPlace, LookInto, MorePictures, OpenFiles, Paste, PlaceFound
 from .state import LOOKING, small
 from .work import PastePicture, ReadFolder, SampleTiles, SmallPictures
 
@@ -26,7 +27,7 @@ class OpeningEffects(Effects):
         self._hands = hands
         self._thumbnails = thumbnails
         self._clipboard = clipboard
-        self._dialog: native.NativeDialog | None = None
+        self._dialog: native.NativeDialog | native.NativePlace | None = None
         self._merging = False  # what was looked for last is to be merged
         self._polled = 0.0
 
@@ -48,8 +49,14 @@ class OpeningEffects(Effects):
         if chosen is not None:
             self._dialog = None
             if chosen:
-                merging = self._merging and state.info is not None
-                self._hands.dispatch(MergeScene(Path(chosen[0])) if merging else OpenPaths(chosen))
+                self._hands.dispatch(self._wanted(chosen, state))
+
+    def _wanted(self, chosen: tuple[str, ...], state: State) -> Command:
+        """What is to be done with what was chosen in the desktop's dialog."""
+        if state.opening.asker:
+            return PlaceFound(Path(chosen[0]))
+        merging = self._merging and state.info is not None
+        return MergeScene(Path(chosen[0])) if merging else OpenPaths(chosen)
 
     def follow(self, command: Command, before: State, state: State) -> None:
         """Folders are read by the worker; small pictures of one go with its dialog."""
@@ -59,7 +66,13 @@ class OpeningEffects(Effects):
                 if native.is_there():
                     self._dialog = native.NativeDialog(state.preferences.folder, merging)
                 else:
-                    self._hands.perform(LookInto(merging=merging))
+                    self._hands.perform(LookInto(dialog="merge" if merging else "open"))
+            case LookForPlace() if self._dialog is None:
+                beside = _beside(before)
+                if native.is_there():
+                    self._dialog = native.NativePlace(str(beside))
+                else:
+                    self._hands.perform(LookInto(beside, dialog="place"))
             case LookInto(folder):
                 self._forget(before)
                 self._hands.submit(ReadFolder(folder or _start(state)))
@@ -95,6 +108,13 @@ def _start(state: State) -> Path:
     if state.preferences.folder and last.is_dir():
         return last
     return samples.beside(state.photos).parent
+
+
+def _beside(state: State) -> Path:
+    """The folder of the file that the dialog on show writes; at home where it is not there yet."""
+    wanted = state.exporting.form.path if state.dialog == "export" else state.dialog_path
+    folder = typed_path(wanted).parent
+    return folder if folder.is_dir() else Path.home()
 
 
 def pasted_paths(text: str) -> tuple[str, ...]:

@@ -32,3 +32,17 @@ class NativeDialog:
     def chosen(self) -> tuple[str, ...] | None:
         """The files; none where it was closed, None while it is open."""
         return tuple(self._dialog.result()) if self._dialog.ready(0) else None
+
+
+class NativePlace:
+    """A folder to write to, in the same way."""
+
+    def __init__(self, folder: str) -> None:
+        self._dialog = portable_file_dialogs.select_folder("Write it to", folder)
+
+    def chosen(self) -> tuple[str, ...] | None:
+        """The folder; none where it was closed, None while it is open."""
+        if not self._dialog.ready(0):
+            return None
+        folder = self._dialog.result()
+        return (folder,) if folder else ()

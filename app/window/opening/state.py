@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-LOOKING = ("open", "merge")  # dialogs that show a folder
+LOOKING = ("open", "merge", "place")  # dialogs that show a folder
 MOST_FILES = 300  # of a folder that are shown
 
 
@@ -22,10 +22,13 @@ class Folder:
 
 @dataclass(frozen=True)
 class Opening:
-    """The opening half of the state. folder: None while it is read. chosen: in the order of the clicks."""
+    """The opening half of the state. folder: None while it is read. chosen: in the order of the clicks.
+    asker: the dialog that wants a folder for its file. name: of that file."""
 
     folder: Folder | None = None
     chosen: tuple[Path, ...] = ()
+    asker: str = ""
+    name: str = ""
 
 
 NO_OPENING = Opening()

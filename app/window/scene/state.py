@@ -73,6 +73,29 @@ class Photo:
 RECONSTRUCTING, RESTORING = "Reconstructing", "Restoring"
 """Titles of the jobs that make a scene out of the tray, and out of what an earlier session kept."""
 
+_SAID = {
+    "photos": "reading the photos",
+    "weights": "waking the network",
+    "network": "looking at the photos",
+    "encoder": "looking at the photos",
+    "language features": "what each part means",
+    "grouping": "what belongs together",
+    "aggregation": "what each thing is",
+    "depth": "how far everything is",
+    "poses": "where the cameras stood",
+    "point maps": "how far everything is",
+    "refinement": "sharpening edges and surfaces",
+    "Gaussians": "placing the Gaussians",
+    "assemble": "putting it together",
+    "prune": "tidying up",
+    "refine": "fitting it to the photos",
+}
+
+
+def said(stage: str) -> str:
+    """A stage of the reconstruction as people would say it; others are called as they are."""
+    return _SAID.get(stage, stage)
+
 
 @dataclass(frozen=True)
 class Job:

@@ -359,9 +359,8 @@ def run(
                         outcome.problems.append(f"the scene did not open: {watched.last}")
                     outcome.checkpoints.append((now / 60, watched.last.get("rss", 0.0)))
                     rss, own = (watched.last.get(kind, 0.0) for kind in ("rss", "own"))
-                    say(
-                        f"{now / 60:5.1f} min  {rss:6.0f} MB, {own:.0f} of them not of files  {outcome.steps} steps"
-                    )
+                    memory = f"{rss:6.0f} MB, {own:.0f} of them not of files"
+                    say(f"{now / 60:5.1f} min  {memory}  {outcome.steps} steps")
                     checkpoint = now + every
                 if now >= seconds:
                     break

@@ -9,29 +9,35 @@ import pytest
 from imgui_bundle import ImVec2, imgui
 
 from app.window.asking.panels import known, prompts, scores
-from app.window.commands import Command
+from app.window.commands import Command, ShowDialog, apply
 from app.window.editing import commands as edit
 from app.window.editing import pointing as point
 from app.window.editing.panels import pointing as card_panel
-from app.window.editing.panels import ruler
-from app.window.editing.state import Card, Reading, Tool
-from app.window.exporting.state import Running
+from app.window.editing.panels import ruler, tools
+from app.window.editing.state import Card, Editing, Reading, Tool
+from app.window.exporting import commands as export
+from app.window.exporting.state import Running, What
 from app.window.filming import commands as film
-from app.window.frame import layout
+from app.window.frame import dialogs, layout
 from app.window.kit.look import Look
 from app.window.opening import commands as opening
 from app.window.opening.panels import browser
 from app.window.opening.state import Folder
 from app.window.opening.work import ReadFolder, SampleTiles
+from app.window.scene import commands as show
 from app.window.scene.commands import Loaded
 from app.window.scene.panels import views
+from app.window.scene.state import said
 from app.window.state import State
 from app.window.worker import Worker
+from langflash_core.network.guided import GuidedDepthNet
+from langflash_core.network.pointmaps import PointMapNet
+from langflash_core.pipeline import STAGES
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History
 from tests.app.window.headless import box, context, frames, look
 from tests.app.window.items import Items
-from tests.app.window.scenes import shown_scene
+from tests.app.window.scenes import after, shown_scene
 
 SIZE = (1280, 800)
 PATIENCE = 60.0  # seconds
@@ -145,6 +151,87 @@ def test_a_card_is_asked_again_once_its_thing_has_another_name(items: Items) -> 
         hands.key(imgui.Key.enter)
     assert hands.of(edit.RenameAtom) == [edit.RenameAtom(1, "armchair")]
     assert hands.of(point.Ask) == [point.Ask((300, 200))]
+
+
+def test_enter_opens_what_the_space_bar_has_chosen() -> None:
+    """No way leads from the photos to the button by arrows alone that does not pass "Cancel"."""
+    photos = (Path("/home/Pictures/a.png"), Path("/home/Pictures/b.png"))
+    states = [browsing(Folder(Path("/home/Pictures"), (), photos))]
+    hands = Hands(lambda seen: browser.draw(states[-1], seen), bare=True)
+    with context(SIZE):
+        imgui.get_io().config_flags |= imgui.ConfigFlags_.nav_enable_keyboard
+        hands.frames(4)
+        for _ in range(10):
+            hands.key(imgui.Key.down_arrow)
+            hands.key(imgui.Key.space)
+            if hands.of(opening.Choose):
+                break
+        taken = hands.of(opening.Choose)[0]
+        states.append(apply(states[-1], taken))
+        hands.key(imgui.Key.right_arrow)
+        hands.key(imgui.Key.enter)
+    assert taken == opening.Choose(photos[0])
+    assert hands.of(show.OpenPaths) == [show.OpenPaths(tuple(map(str, photos)))]
+    assert hands.of(ShowDialog) == []
+
+
+@pytest.mark.parametrize("asker", ["export", "save"])
+def test_a_file_is_written_to_a_folder_that_was_walked_to(asker: str, items: Items) -> None:
+    first = export.ShowExport() if asker == "export" else ShowDialog("save")
+    states = [after(shown_scene(), first)]
+    hands = Hands(lambda seen: dialogs.draw(states[-1], seen))
+
+    def wanted() -> str:
+        return states[-1].exporting.form.path if asker == "export" else states[-1].dialog_path
+
+    with context(SIZE):
+        hands.frames(6)
+        before = Path(wanted())
+        hands.click(*middle(items, "##folder"))
+        look_at = opening.LookInto(Path("/home"), dialog="place")
+        read = opening.FolderRead(Folder(Path("/home"), (Path("/home/out"),), (Path("/home/a.png"),)))
+        assert hands.of(opening.LookForPlace) == [opening.LookForPlace()]
+        states.append(after(states[-1], opening.LookForPlace(), look_at, read))
+        hands.frames(6)
+        assert not any(name.endswith("a.png") for name in items.now())  # a photo is no place
+        hands.click(*middle(items, "Write here"))
+        assert hands.of(opening.PlaceFound) == [opening.PlaceFound(Path("/home"))]
+        back = opening.PlaceFound(None).apply(states[-1])
+        states.append(after(states[-1], *hands.of(opening.PlaceFound)))
+        hands.frames(6)
+    assert (states[-1].dialog, Path(wanted())) == (asker, Path("/home") / before.name)
+    states.append(back)
+    assert (back.dialog, Path(wanted())) == (asker, before)
+
+
+def test_the_kinds_of_export_are_where_they_were_when_the_dialog_opens_again(items: Items) -> None:
+    places = set()
+    for what in What:
+        state = after(shown_scene(), export.ShowExport())
+        state = after(state, export.EditForm(replace(state.exporting.form, what=what)))
+        with context(SIZE):
+            frames(lambda seen, state=state: dialogs.draw(state, seen), look(), 6)
+        places.add(middle(items, What.RGB.label))
+    assert len(places) == 1
+
+
+def test_buttons_of_a_selection_stay_as_it_grows(items: Items, monkeypatch) -> None:
+    places = set()
+    state = shown_scene()
+    assert state.info is not None
+    state = replace(state, info=replace(state.info, num_gaussians=92_440))
+    for count in (1, 22, 333, 4_444, 92_440):
+        monkeypatch.setattr(Editing, "num_selected", property(lambda editing, count=count: count))
+        with context(SIZE):
+            frames(lambda seen: tools.draw(state, seen, PLACE, ROOM), look(), 6)
+        places.add(middle(items, tools.fa.ICON_FA_TRASH))
+    assert len(places) == 1
+
+
+def test_stages_are_said_in_plain_words() -> None:
+    for stage in (*STAGES, *GuidedDepthNet.stages, *PointMapNet.stages):
+        assert said(stage) != stage
+    assert said("drawing") == "drawing"
 
 
 def measuring() -> State:

@@ -37,7 +37,7 @@ _GAP = 3.0
 _AROUND = 34.0  # of the strip, beside its tools: its edge and two lines
 _VIEWS = 92.0  # that the viewpoints below it take
 _MARGIN = 12.0
-_LONG = 650.0  # width of everything a selection can do, in one line
+_LONG = 680.0  # width of everything a selection can do, in one line
 _TALL = 6.0  # height of that in two, in lines of text
 _BAR = (
     widgets.PLAIN | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
@@ -180,11 +180,13 @@ def _selection(state: State, look: Look, room: float) -> list[do.Command]:
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.SELECTED, fa.ICON_FA_DRAW_POLYGON)
     imgui.same_line()
+    begin = imgui.get_cursor_pos_x()
     imgui.text(f"{editing.waiting} ..." if editing.waiting else f"{editing.num_selected:,} selected")
     if not editing.num_selected:
         return issued
+    count = 0 if state.info is None else state.info.num_gaussians
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
-    imgui.same_line(0, look.px(14))
+    imgui.same_line(begin + imgui.calc_text_size(f"{count:,} selected").x + look.px(14))
     issued += _actions()
     if room < look.px(_LONG):
         imgui.new_line()

@@ -18,6 +18,11 @@ from ..state import Folder, small
 
 WIDTH = 760.0  # design pixels
 _HEIGHT, _CELL = 330.0, 132.0
+_HINTS = {
+    "open": "a scene, a photo or a folder; or choose below",
+    "merge": "a scene or a folder; or choose below",
+    "place": "a folder; or walk to it below",
+}
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
@@ -35,7 +40,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
             imgui.set_keyboard_focus_here()
         issued += _inside(state, folder, look)
     imgui.end_child()
-    return issued + _buttons(state, confirmed, look)
+    return issued + (_place_buttons if state.dialog == "place" else _buttons)(state, confirmed, look)
 
 
 def _path(state: State) -> tuple[list[do.Command], bool]:
@@ -43,9 +48,7 @@ def _path(state: State) -> tuple[list[do.Command], bool]:
     imgui.set_next_item_width(-1)
     if imgui.is_window_appearing():
         imgui.set_keyboard_focus_here()
-    hint = "a scene, a photo or a folder; or choose below"
-    if state.dialog == "merge":
-        hint = "a scene or a folder; or choose below"
+    hint = _HINTS[state.dialog or "open"]
     changed, path = imgui.input_text_with_hint("##path", hint, state.dialog_path)
     confirmed = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
     return ([do.EditDialogPath(path)] if changed else []), confirmed
@@ -71,25 +74,27 @@ def _way(folder: Folder, look: Look) -> list[do.Command]:
 def _inside(state: State, folder: Folder, look: Look) -> list[do.Command]:
     """Folders, scenes, then photos as a grid."""
     issued: list[do.Command] = []
+    scenes = () if state.dialog == "place" else folder.scenes
+    photos = folder.photos if state.dialog == "open" else ()
     if folder.problem:
         widgets.muted(folder.problem)
     for path in folder.folders:
         if imgui.selectable(f"{fa.ICON_FA_FOLDER}  {path.name}##{path}", False)[0] and not _again():
             issued.append(opening.LookInto(path))
-    for path in folder.scenes:
+    for path in scenes:
         chosen = path in state.opening.chosen
         if imgui.selectable(f"{fa.ICON_FA_CUBES}  {path.name}##{path}", chosen)[0] and not _again():
-            issued.append(opening.Choose(path))
+            issued.append(_taken(state, path))
     gap, room = look.px(8), imgui.get_content_region_avail().x + look.px(8)
     columns = max(int(room / (look.px(_CELL) + gap)), 1)
-    for place, path in enumerate(() if state.dialog == "merge" else folder.photos):
+    for place, path in enumerate(photos):
         if place % columns:
             imgui.same_line(0, gap)
         issued += _photo(state, path, ImVec2(room / columns - gap, look.px(_CELL)), look)
     if folder.left_out:
         widgets.muted(f"and {folder.left_out} more; type the path of one of those")
-    if not (folder.folders or folder.photos or folder.scenes or folder.problem):
-        widgets.muted("Nothing to open lies here.")
+    if not (folder.folders or photos or scenes or folder.problem):
+        widgets.muted("No folder lies here." if state.dialog == "place" else "Nothing to open lies here.")
     return issued
 
 
@@ -122,7 +127,24 @@ def _photo(state: State, path: Path, size: ImVec2, look: Look) -> list[do.Comman
     if chosen:
         end = ImVec2(corner.x + size.x, corner.y + size.y)
         canvas.add_rect(corner, end, widgets.u32(theme.ACCENT), look.px(4), look.px(2))
-    return [opening.Choose(path)] if pressed and not _again() else []
+    return [_taken(state, path)] if pressed and not _again() else []
+
+
+def _taken(state: State, path: Path) -> do.Command:
+    """What a press on a file comes to: Enter opens it and what is chosen, the space bar and the mouse take it
+    with the others."""
+    return _opened(state, (*state.opening.chosen, path)) if _enters() else opening.Choose(path)
+
+
+def _enters() -> bool:
+    return any(map(imgui.is_key_pressed, (imgui.Key.enter, imgui.Key.keypad_enter)))
+
+
+def _opened(state: State, paths: tuple[Path, ...]) -> do.Command:
+    """Open files, each once; or merge the last of them."""
+    if state.dialog == "merge":
+        return show.MergeScene(paths[-1])
+    return show.OpenPaths(tuple(map(str, dict.fromkeys(paths))))
 
 
 def _again() -> bool:
@@ -142,11 +164,31 @@ def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
     imgui.same_line()
     if imgui.button("Cancel", look.vec(110, 0)):
         issued.append(do.ShowDialog(None))
+    imgui.same_line(0, look.px(14))
+    imgui.align_text_to_frame_padding()
+    told = "Enter merges it" if merging else "The space bar takes several, Enter opens"
+    imgui.text_colored(theme.MUTED, told)
     if typed and (pressed or confirmed):
         path = typed_path(typed)
         walks = confirmed and not pressed and os.path.isdir(path) and typed.endswith(os.sep)
         merge_or_open = show.MergeScene(path) if merging else show.OpenPaths((str(path),))
         issued.append(opening.LookInto(path) if walks else merge_or_open)
-    elif chosen and pressed:
-        issued.append(show.MergeScene(chosen[-1]) if merging else show.OpenPaths(tuple(map(str, chosen))))
+    elif chosen and (pressed or confirmed):
+        issued.append(_opened(state, chosen))
     return issued
+
+
+def _place_buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
+    """Of the dialog for a folder to write to: the one that was typed, or the one on show."""
+    folder, typed = state.opening.folder, state.dialog_path.strip()
+    imgui.begin_disabled(folder is None or bool(folder.problem and not typed))
+    pressed = widgets.primary_button("Write here", look.vec(140, 0))
+    imgui.end_disabled()
+    imgui.same_line()
+    if imgui.button("Back", look.vec(110, 0)):
+        return [opening.PlaceFound(None)]
+    if typed and confirmed:
+        return [opening.LookInto(typed_path(typed))]
+    if pressed and folder is not None:
+        return [opening.PlaceFound(typed_path(typed) if typed else folder.path)]
+    return []

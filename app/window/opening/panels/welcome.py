@@ -10,7 +10,7 @@ from ...kit import theme, widgets
 from ...kit.look import Look
 from ...scene import commands as show
 from ...scene import samples
-from ...scene.state import RECONSTRUCTING
+from ...scene.state import RECONSTRUCTING, said
 from ...state import State
 from .. import commands as opening
 from ..state import sample
@@ -30,7 +30,8 @@ def working(state: State) -> bool:
 def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Command]:
     """On the canvas at `corner` while there is no scene."""
     if state.job is not None:
-        _line(f"{state.job.title}: {state.job.stage}", ImVec2(corner.x + size.x / 2, corner.y + size.y / 2))
+        doing = f"{state.job.title}: {said(state.job.stage)}"
+        _line(doing, ImVec2(corner.x + size.x / 2, corner.y + size.y / 2))
         return []
     top = corner.y + max(size.y / 2 - look.px(170), look.px(12))
     middle = corner.x + size.x / 2

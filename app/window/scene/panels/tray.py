@@ -13,7 +13,7 @@ from ...opening import commands as opening
 from ...poses import FOV_RANGE
 from ...state import State
 from .. import commands as show
-from ..state import Job, Photo
+from ..state import Job, Photo, said
 from . import rooms, stages
 
 COLUMNS = 3
@@ -274,7 +274,7 @@ def _progress(job: Job, now: float, look: Look) -> list[do.Command]:
     seconds = f"{now - job.started:.1f} s"
     room = width - imgui.calc_text_size(seconds).x - look.px(8)
     imgui.align_text_to_frame_padding()
-    imgui.text(widgets.shortened("stopping" if job.cancelling else job.stage, room))
+    imgui.text(widgets.shortened("stopping" if job.cancelling else said(job.stage), room))
     if imgui.is_item_hovered():
         imgui.set_tooltip(_told(job))
     with widgets.colours(text=theme.MUTED):
@@ -285,7 +285,7 @@ def _progress(job: Job, now: float, look: Look) -> list[do.Command]:
 
 def _told(job: Job) -> str:
     """What is being done, and the finished stages with their seconds."""
-    done = [f"{stage}  {seconds:.1f} s" for stage, seconds in job.done if seconds >= NOTABLE_SECONDS]
+    done = [f"{said(stage)}  {seconds:.1f} s" for stage, seconds in job.done if seconds >= NOTABLE_SECONDS]
     return "\n".join((job.title, *done))
 
 

@@ -152,5 +152,5 @@ def test_without_a_scene_there_is_nothing_to_merge_into(block: Path) -> None:
     desk = Desk()
     desk.perform(show.MergeScene(block))
     assert desk.jobs == [] and desk.state.toasts[-1].text == show.NOTHING_TO_MERGE
-    desk.perform(opening.LookInto(merging=True), do.ShowDialog(None))
+    desk.perform(opening.LookInto(dialog="merge"), do.ShowDialog(None))
     assert desk.state.dialog is None
