@@ -17,7 +17,7 @@ from . import order as written
 from .state import SECONDS, ExportForm, What
 
 WIDTH = 620.0  # design pixels
-HEIGHT = 470.0  # of the kinds that need most
+HEIGHT = 670.0  # of the kinds that need most, with a command of three lines
 PROGRESS = 112.0  # the same, high: what `draw_progress` needs
 COLUMNS = 4
 _NAMED = 6  # files that the question before a replacement names

@@ -12,6 +12,7 @@ from . import theme
 PLAIN = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings
 NO_KEYS = imgui.WindowFlags_.no_nav  # for windows that Tab and the arrows pass by
 _Value = TypeVar("_Value")
+_FOLDER = 1.3  # of a frame's height: the icon is wider than high
 
 
 @contextmanager
@@ -89,13 +90,13 @@ def quiet_button(label: str, tip: str = "") -> bool:
 
 def folder_room() -> float:
     """What `folder_button` takes beside a field, pixels."""
-    return imgui.get_frame_height() + imgui.get_style().item_spacing.x
+    return _FOLDER * imgui.get_frame_height() + imgui.get_style().item_spacing.x
 
 
 def folder_button() -> bool:
     """Beside the field of a path to write to: whether another folder is wanted."""
     imgui.same_line()
-    pressed = imgui.button(f"{fa.ICON_FA_FOLDER_OPEN}##folder", ImVec2(imgui.get_frame_height(), 0))
+    pressed = imgui.button(f"{fa.ICON_FA_FOLDER_OPEN}##folder", ImVec2(_FOLDER * imgui.get_frame_height(), 0))
     tooltip("Choose the folder")
     return pressed
 

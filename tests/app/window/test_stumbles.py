@@ -211,6 +211,7 @@ def test_the_kinds_of_export_are_where_they_were_when_the_dialog_opens_again(ite
         state = after(state, export.EditForm(replace(state.exporting.form, what=what)))
         with context(SIZE):
             frames(lambda seen, state=state: dialogs.draw(state, seen), look(), 6)
+            assert box("Export")[3] <= SIZE[1]
         places.add(middle(items, What.RGB.label))
     assert len(places) == 1
 
