@@ -37,6 +37,7 @@ from tests.app.window.x11 import Client
 
 PATIENCE = 120.0  # seconds without any sign of life that count as a hang, also on a busy machine
 STEPS_AT_ONCE = 12
+WARM_MINUTES = 10.0
 SLOPE_MB = 8.0  # a minute; a scene that leaked at each opening would be 20, a reconstruction hundreds
 KEYS = (
     *"wasdqehzfpkvxrbcglonmjtyui1234567890", "bracketleft", "bracketright", "Delete", "BackSpace", "Escape",
@@ -77,6 +78,15 @@ class Outcome:
         """MB a minute over the checkpoints after the first two, when caches have filled; 0 of fewer."""
         late = np.array(self.checkpoints[2:])
         return float(np.polyfit(late[:, 0], late[:, 1], 1)[0]) if len(late) > 2 else 0.0
+
+    def growth(self) -> float | None:
+        """Of the median memory in the last third of the time after `WARM_MINUTES` over that in its first third;
+        None where there is too little of it. Medians, since what random hands left open comes and goes."""
+        late = np.array([(at, size) for at, size in self.checkpoints if at >= WARM_MINUTES])
+        if len(late) < 6:
+            return None
+        third = len(late) // 3
+        return float(np.median(late[-third:, 1]) / np.median(late[:third, 1]) - 1)
 
 
 class Staying(Session):
@@ -395,6 +405,9 @@ def main() -> int:
 
     outcome = run(60 * args.minutes, args.seed, (width, height), say=say)
     say(f"{outcome.steps} batches, {outcome.frames} frames, the latest by {outcome.latest:.2f} s")
+    growth = outcome.growth()
+    if growth is not None:
+        say(f"memory {100 * growth:+.2f} % from minute {WARM_MINUTES:.0f} to the end")
     say(f"memory {outcome.slope():+.2f} MB a minute; refused outside the folder: {len(outcome.refused)}")
     for line in sorted(set(outcome.refused))[:20]:
         say(f"  {line}")

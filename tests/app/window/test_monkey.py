@@ -48,3 +48,13 @@ pathlib.Path("mine.txt").write_text("mine")
     assert (inside / "mine.txt").read_text() == "mine"
     assert os.listdir(outside) == ["dear.txt"] and (outside / "dear.txt").read_text() == "dear"
     assert len((inside / REFUSED).read_text().splitlines()) == 7
+
+
+def test_memory_that_grows_is_told_from_memory_that_comes_and_goes() -> None:
+    minutes = range(31)
+    flat = [(float(at), 1000.0 + (80.0 if at in (10, 17, 28) else 0.0)) for at in minutes]
+    grown = [(float(at), 1000.0 + max(at - 10, 0)) for at in minutes]  # 2 % in 20 minutes
+    assert monkey.Outcome(checkpoints=flat).growth() == 0.0
+    growth = monkey.Outcome(checkpoints=grown).growth()
+    assert growth is not None and growth > 0.01
+    assert monkey.Outcome(checkpoints=grown[:12]).growth() is None
