@@ -80,8 +80,8 @@ class Outcome:
         return float(np.polyfit(late[:, 0], late[:, 1], 1)[0]) if len(late) > 2 else 0.0
 
     def growth(self) -> float | None:
-        """Of the median memory in the last third of the time after `WARM_MINUTES` over that in its first third;
-        None where there is too little of it. Medians, since what random hands left open comes and goes."""
+        """Of the median memory, from the first third of the time after `WARM_MINUTES` to the last; None where
+        there is too little of it. Medians, since what random hands left open comes and goes."""
         late = np.array([(at, size) for at, size in self.checkpoints if at >= WARM_MINUTES])
         if len(late) < 6:
             return None
