@@ -232,6 +232,11 @@ class SplatRenderer:
         return self._canvas
 
     @property
+    def splats(self) -> MakeSplats:
+        """What makes the buffers of a scene."""
+        return self._splats
+
+    @property
     def in_software(self) -> bool:
         """Whether OpenGL runs on the processor, so that still pictures are drawn better beside it."""
         return draws_in_software(self._ctx)

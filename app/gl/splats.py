@@ -36,10 +36,12 @@ class SplatBuffers:
     large, `sprites` are drawn there in place of quads: the same fragments out of one vertex, 30 % quicker.
 
     Gaussians with a value or a weight that is not finite are left out (`num_dropped`), and those
-    below opacity 1/255, which no pixel can show.
+    below opacity 1/255, which no pixel can show. Footprints end where alpha falls below 1/255 and, where
+    `reach` is given, no further than so many deviations.
     """
 
-    def __init__(self, ctx: moderngl.Context, programs: Programs, scene: Scene):
+    def __init__(self, ctx: moderngl.Context, programs: Programs, scene: Scene, reach: float | None = None):
+        self._defines = {} if reach is None else {"REACH": reach}
         self._ctx = ctx
         self._programs = programs
         self._owned: list = []
@@ -221,7 +223,12 @@ class SplatBuffers:
         """Footprints and colours of the chosen Gaussians into `places`, in draw order."""
         program = self._programs.get(
             "project.vert",
-            defines={"SH_DEGREE": self.sh_degree, "SH_VEC4S": self._sh_vec4s, "TINTED": TINTED},
+            defines={
+                "SH_DEGREE": self.sh_degree,
+                "SH_VEC4S": self._sh_vec4s,
+                "TINTED": TINTED,
+                **self._defines,
+            },
             varyings=("out_place", "out_shape", "out_colour"),
         )
         viewmat = camera.viewmat.detach().cpu().double().numpy()

@@ -13,17 +13,18 @@ from .answers import ShaderAnswers
 from .canvas import Canvas
 from .display import Answer, Drawn
 from .question import Question
-from .scene import LiveScene
+from .scene import LiveScene, MakeSplats
+from .splats import SplatBuffers
 from .view import ViewTargets
 
 SIDE = 36  # pixels; no power of two: for textures with such sides Mesa compiles shaders of their own
 
 
-def warm_up(canvas: Canvas) -> Iterator[None]:
-    """Draw one Gaussian in the ways that come first, a shader a step."""
+def warm_up(canvas: Canvas, splats: MakeSplats = SplatBuffers) -> Iterator[None]:
+    """Draw one Gaussian in the ways that come first, a shader a step. splats: as the renderer has them."""
     camera = Camera(torch.eye(4), torch.tensor([[36.0, 0, 18], [0, 36, 18], [0, 0, 1]]), SIDE, SIDE)
     view = canvas.view((SIDE, SIDE))
-    scene = LiveScene(canvas.painter, _one())
+    scene = LiveScene(canvas.painter, _one(), splats)
     try:
         yield from _ways(view, scene, camera)
     finally:  # of a warm-up, too, that a scene puts an end to

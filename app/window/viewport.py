@@ -16,6 +16,7 @@ import numpy as np
 
 from langflash_core.colormaps import HeatColours
 from langflash_core.errors import GraphicsError
+from langflash_core.graphics import draws_in_software
 from langflash_core.scene.changes import Change, Recoloured
 from langflash_core.scene.edits import Marks
 from langflash_core.scene.mask import Mask
@@ -135,9 +136,10 @@ class Viewport:
     def _made(self) -> "SplatRenderer":
         """The renderer, once torch is loaded."""
         if self._renderer is None:
-            from ..gl import SplatRenderer  # loads torch; the worker has by now
+            from ..gl import SplatRenderer, moving_renderer  # loads torch; the worker has by now
 
-            self._renderer = SplatRenderer(self._ctx)
+            make = moving_renderer if draws_in_software(self._ctx) else SplatRenderer
+            self._renderer = make(self._ctx)
         return self._renderer
 
     def warm(self) -> bool:
@@ -148,7 +150,8 @@ class Viewport:
             if self._warming is None:
                 from ..gl.warming import warm_up
 
-                self._warming = warm_up(self._made().canvas)
+                renderer = self._made()
+                self._warming = warm_up(renderer.canvas, renderer.splats)
             return next(self._warming, self) is not self
         except (GraphicsError, moderngl.Error):  # whoever needs that shader will say so
             log.exception("a shader could not be compiled ahead")

@@ -22,6 +22,11 @@ vec3 coefficient(int base) {
 #ifndef CUT  // the bench compares with one for all
 #define CUT sqrt(2.0 * log(max(in_mean.w / ALPHA_MIN, 1.0)))  // where alpha falls below 1/255
 #endif
+#ifdef REACH  // and no further than so many deviations
+#define RADIUS min(REACH, CUT)
+#else
+#define RADIUS CUT
+#endif
 
 const float HALF_MAX = 65504.0;  // of float16: sums of T alpha c stay finite in every target
 
@@ -47,7 +52,7 @@ void main() {
                              : footprint_root(pos_c, axes_c, pinhole, image_size);
     vec2 centre = pos_c.xy / (orthographic ? 1.0 : pos_c.z);
     out_place = vec4(centre * pinhole.xy + pinhole.zw, in_mean.w, pos_c.z);
-    out_shape = vec4(root, CUT);
+    out_shape = vec4(root, RADIUS);
     vec3 direction = orthographic ? transpose(mat3(viewmat))[2] : normalize(from_eye);
     out_colour = min(sh_colour(direction), HALF_MAX);
     int tint = int(255.0 * in_tint + 0.5);

@@ -22,7 +22,7 @@ from torch import Tensor
 from torch.nn.functional import interpolate
 
 import langflash_core as lf
-from app.gl import SplatRenderer
+from app.gl import SplatRenderer, moving_renderer
 from langflash_core.graphics import offscreen_context
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
@@ -78,9 +78,11 @@ def measured(
     rounds: int = 4,
 ) -> list[Rung]:
     """All combinations, which take turns in every round."""
-    renderer = SplatRenderer(ctx)
-    renderer.set_scene(scene)
-    renderer.ask(compile_query(scene, language_space(scene.semantics.space), [phrase]))
+    query = compile_query(scene, language_space(scene.semantics.space), [phrase])
+    twin, renderer = SplatRenderer(ctx, "float32"), moving_renderer(ctx)
+    for each in (twin, renderer):
+        each.set_scene(scene)
+        each.ask(query)
     for share in shares:
         if share < 1:
             renderer.give_level(scene, share, *thin_with_rows(scene, share))
@@ -94,8 +96,9 @@ def measured(
 
     exact = []
     for place in PLACES:
-        renderer.draw(between(scene, place, size))
-        exact.append(seen(renderer, size))
+        twin.draw(between(scene, place, size))
+        exact.append(seen(twin, size))
+    twin.release()
     errors = {}
     for plan in plans:
         differences = []

@@ -6,7 +6,8 @@ Ends with 0 when the window lived through it without an exception, an OpenGL err
 memory stayed. The window can write only in a temporary folder (guarded.py); leaving is refused, so
 that the run goes on. It begins with a reconstruction, so that the network is there from the start and
 not from whichever minute random hands ask for it. Every minute the same scene is opened, and memory is
-compared there: its file is written anew before, since random hands merge scenes into it and save it.
+compared there, without what the rooms take that the window holds to go back to: which these are is up to
+random hands. The scene's file is written anew before, since they merge scenes into it and save it.
 """
 
 import argparse
@@ -21,8 +22,9 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, is_dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import glfw
 import numpy as np
@@ -65,7 +67,8 @@ PHOTOS = (*PAIR, "books_left.jpg")
 
 @dataclass
 class Outcome:
-    """What a run has seen. checkpoints: (minutes, MB) with the same scene open and at rest."""
+    """What a run has seen. checkpoints: (minutes, MB) with the same scene open and at rest, without
+    the rooms before it."""
 
     steps: int = 0
     frames: int = 0
@@ -117,7 +120,7 @@ def inside(width: int, height: int) -> None:
                 "frames": frames,
                 "latest": latest,
                 "rss": resident_mb(os.getpid()),
-                "own": resident_mb(os.getpid(), "RssAnon"),
+                "rooms": held_mb(state.rooms) if state.rooms else 0.0,
                 "scene": state.info.serial if state.info and state.job is None else None,
                 "gaussians": state.info.num_gaussians if state.info else 0,
                 "unexpected": [t.text for t in state.toasts if "unexpected" in t.text],
@@ -131,12 +134,34 @@ def inside(width: int, height: int) -> None:
     session.close()
 
 
-def resident_mb(process: int, kind: str = "VmRSS") -> float:
-    """Memory of a process, MB. kind: "RssAnon" leaves files out that are mapped."""
+def resident_mb(process: int) -> float:
+    """Memory of a process, MB."""
     for line in Path(f"/proc/{process}/status").read_text().splitlines():
-        if line.startswith(f"{kind}:"):
+        if line.startswith("VmRSS:"):
             return int(line.split()[1]) / 1024
-    raise ValueError(f"status: expected a line {kind}")
+    raise ValueError("status: expected a line VmRSS")
+
+
+def held_mb(value: Any) -> float:
+    """What the arrays and tensors take that a value holds, each once, MB."""
+    import torch  # the window's worker loads it, not its first frame
+
+    sizes: dict[int, int] = {}
+
+    def walk(each: Any) -> None:
+        if isinstance(each, torch.Tensor):
+            storage = each.untyped_storage()
+            sizes[storage.data_ptr()] = storage.nbytes()
+        elif isinstance(each, np.ndarray):
+            sizes[each.ctypes.data] = each.nbytes
+        elif is_dataclass(each):
+            walk(list(vars(each).values()))
+        elif isinstance(each, list | tuple):
+            for part in each:
+                walk(part)
+
+    walk(value)
+    return sum(sizes.values()) / 1e6
 
 
 class Hands:
@@ -367,10 +392,11 @@ def run(
                 if now >= checkpoint or now >= seconds:
                     if not opened(hands, watched, len(made.gaussians)):
                         outcome.problems.append(f"the scene did not open: {watched.last}")
-                    outcome.checkpoints.append((now / 60, watched.last.get("rss", 0.0)))
-                    rss, own = (watched.last.get(kind, 0.0) for kind in ("rss", "own"))
-                    memory = f"{rss:6.0f} MB, {own:.0f} of them not of files"
-                    say(f"{now / 60:5.1f} min  {memory}  {outcome.steps} steps")
+                    rooms = watched.last.get("rooms", 0.0)
+                    memory = watched.last.get("rss", 0.0) - rooms
+                    outcome.checkpoints.append((now / 60, memory))
+                    sizes = f"{memory:6.0f} MB and {rooms:.0f} of rooms"
+                    say(f"{now / 60:5.1f} min  {sizes}  {outcome.steps} steps")
                     checkpoint = now + every
                 if now >= seconds:
                     break

@@ -3,10 +3,13 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+from langflash_core.language.spaces import language_space
 from tests.app.window import monkey, test_window
 from tests.app.window.guarded import REFUSED, environment
+from tests.app.window.scenes import PHRASES, room
 
 pytestmark = test_window.pytestmark
 SECONDS = 15.0
@@ -58,3 +61,10 @@ def test_memory_that_grows_is_told_from_memory_that_comes_and_goes() -> None:
     growth = monkey.Outcome(checkpoints=grown).growth()
     assert growth is not None and growth > 0.01
     assert monkey.Outcome(checkpoints=grown[:12]).growth() is None
+
+
+def test_what_rooms_hold_is_counted_once() -> None:
+    scene = room(language_space("minilm").encode(list(PHRASES)))
+    once = monkey.held_mb(scene)
+    assert once > scene.gaussians.means.nbytes / 1e6
+    assert monkey.held_mb((scene, scene)) == once == monkey.held_mb([replace(scene)])
