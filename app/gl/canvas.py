@@ -19,17 +19,21 @@ _DTYPES = {"float16": "f2", "float32": "f4"}
 class Canvas:
     """Owns both. A renderer has one of its own, or shares one whose maker releases it after the renderers."""
 
-    def __init__(self, ctx: moderngl.Context, precision: Precision = "float16"):
+    def __init__(
+        self, ctx: moderngl.Context, precision: Precision = "float16", maps: Precision | None = None
+    ):
         """
         Args:
             precision: of colour and weight maps; alphas, depth and relevance are always float32.
+            maps: of weight maps, if another.
 
         Raises:
             GraphicsError: the context is older than OpenGL 3.3.
             ValueError: another precision.
         """
-        if precision not in _DTYPES:
-            raise ValueError(f"precision: expected float16 or float32, received {precision!r}")
+        for each in (precision, maps or precision):
+            if each not in _DTYPES:
+                raise ValueError(f"precision: expected float16 or float32, received {each!r}")
         if ctx.version_code < OPENGL:
             raise GraphicsError(
                 f"OpenGL {ctx.version_code / 100:.1f} is too old for splatting, 3.3 is needed; "
@@ -37,6 +41,7 @@ class Canvas:
             )
         self.painter = Painter(ctx)
         self.precision = precision
+        self._dtypes = _DTYPES[precision], _DTYPES[maps or precision]
         self._views: list[ViewTargets] = []  # the newest last
 
     def view(self, size: tuple[int, int]) -> ViewTargets:
@@ -54,7 +59,7 @@ class Canvas:
             _check(size, self.painter.ctx.info["GL_MAX_TEXTURE_SIZE"])
             while len(self._views) >= _KEPT:
                 self._views.pop(0).release()
-            found = ViewTargets(self.painter, size, _DTYPES[self.precision])
+            found = ViewTargets(self.painter, size, *self._dtypes)
         else:
             self._views.remove(found)
         for other in self._views:

@@ -14,7 +14,7 @@ REACH = 2.5
 def moving_renderer(ctx: moderngl.Context) -> SplatRenderer:
     """Colours in three quarters of the time, at about 54 dB against footprints that end at alpha 1/255.
 
-    Every fragment that is not drawn is time won there, and float32 targets cost less than float16, which the
-    processor has to convert.
+    Every fragment that is not drawn is time won there, and float32 colours cost less than float16, which the
+    processor has to convert; weight maps are large and stay in float16.
     """
-    return SplatRenderer(ctx, "float32", splats=partial(SplatBuffers, reach=REACH))
+    return SplatRenderer(ctx, "float32", splats=partial(SplatBuffers, reach=REACH), maps="float16")

@@ -156,6 +156,7 @@ class SplatRenderer:
         queries: Literal["shader", "host"] | None = None,
         splats: MakeSplats = SplatBuffers,
         canvas: Canvas | None = None,
+        maps: Precision | None = None,
     ):
         """
         Args:
@@ -164,6 +165,7 @@ class SplatRenderer:
                 OpenGL runs there too (app/gl/host.py), else in shaders.
             splats: makes the buffers of a scene.
             canvas: of this context and precision, to share with other renderers; None: one of its own.
+            maps: precision of weight maps, if another, of a canvas of its own.
 
         Raises:
             GraphicsError: the context is older than OpenGL 3.3.
@@ -175,7 +177,7 @@ class SplatRenderer:
             raise ValueError(f"canvas: expected {precision}, received {canvas.precision}")
         self._ctx = ctx
         self._own_canvas = canvas is None
-        self._canvas = Canvas(ctx, precision) if canvas is None else canvas
+        self._canvas = Canvas(ctx, precision, maps) if canvas is None else canvas
         self.passes = self._canvas.painter.passes
         place = ("host" if draws_in_software(ctx) else "shader") if queries is None else queries
         self._answers = _ANSWERS[place]
@@ -324,6 +326,7 @@ class SplatRenderer:
             raise ValueError("bring: expected set_scene before, received no scene")
         view = self._canvas.view((still.camera.width, still.camera.height))
         view.take(still)
+        view.forget_maps()  # it has its own
         drawn = Drawn(view.colour, still.camera, background, still.key, self._fill)
         self._picture = _StillPicture(self._scene, still, view, drawn)
 

@@ -22,10 +22,10 @@ class ViewTargets:
     Several renderers may draw into the same: keys are given once, so none takes another's for its own.
     """
 
-    def __init__(self, painter: Painter, size: tuple[int, int], dtype: str):
+    def __init__(self, painter: Painter, size: tuple[int, int], dtype: str, map_dtype: str):
         self.size = size
         self.colour = ColourTarget(painter.ctx, size, dtype)
-        self.maps = WeightMaps(painter, size, dtype)
+        self.maps = WeightMaps(painter, size, map_dtype)
         self.packed = PackedMaps(painter, size)
         self.display = Display(painter, size, self.packed)
         self._painter = painter
