@@ -39,6 +39,7 @@ from tests.app.window.x11 import Client
 
 PATIENCE = 120.0  # seconds without any sign of life that count as a hang, also on a busy machine
 STEPS_AT_ONCE = 12
+IDLE = 10.0  # seconds in which nothing follows another scene
 WARM_MINUTES = 10.0
 SLOPE_MB = 8.0  # a minute; a scene that leaked at each opening would be 20, a reconstruction hundreds
 KEYS = (
@@ -313,9 +314,15 @@ class Watched:
 
     def until_scene(self, before: int | None, count: int, click: Callable[[list[int]], None]) -> bool:
         """Wait for another scene than number `before`, of `count` Gaussians, at rest; edits that would be
-        lost are to be discarded with a click."""
+        lost are to be discarded with a click. Input that waited may have merged it instead: then nothing
+        more comes."""
         end = time.monotonic() + PATIENCE
+        idle = time.monotonic()
         while time.monotonic() < end and self.process.poll() is None:
+            if self.last.get("dialog") or self.last.get("job") or self.last.get("scene") == before:
+                idle = time.monotonic()
+            if time.monotonic() - idle > IDLE:
+                return False
             if self.last.get("discard"):
                 click(self.last["discard"])
             elif self._has_come(before, count):
