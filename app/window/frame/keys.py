@@ -14,7 +14,7 @@ from ..scene import commands as show
 from ..state import State
 from . import table
 
-AREAS = ("##panel", "##toolbar", "##tools", "##views")
+AREAS = ("##panel", "##toolbar", "##tools", "##bar0", "##bar1", "##bar2", "##bar3", "##views")
 """Windows that F6 goes through, by name."""
 
 

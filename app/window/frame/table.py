@@ -1,5 +1,6 @@
 """Every command that has a name: keys, menu, palette and help are made of this one table."""
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
@@ -25,6 +26,7 @@ from ..scene.state import Mode
 from ..state import State
 
 BRUSH_STEP = 1.15  # of its radius, per press of [ or ]
+ORBIT_STEP = math.radians(5.0)
 _DIGITS = "1234567890"
 _SIDE_KEYS = {"the front": "keypad1", "the right": "keypad3", "above": "keypad7"}
 _SIGNS = {
@@ -33,7 +35,8 @@ _SIGNS = {
     imgui.Key.down_arrow: "Down", imgui.Key.page_up: "PgUp", imgui.Key.page_down: "PgDn",
     imgui.Key.delete: "Del", imgui.Key.backspace: "Backspace", imgui.Key.home: "Home",
     imgui.Key.keypad1: "Num 1", imgui.Key.keypad3: "Num 3", imgui.Key.keypad5: "Num 5",
-    imgui.Key.keypad7: "Num 7",
+    imgui.Key.keypad7: "Num 7", imgui.Key.keypad4: "Num 4", imgui.Key.keypad6: "Num 6",
+    imgui.Key.keypad8: "Num 8", imgui.Key.keypad2: "Num 2",
 }  # fmt: skip
 
 
@@ -176,6 +179,10 @@ def _looking() -> Iterable[Entry]:
     for side, forward in camera.SIDES:
         keys = _plain(_SIDE_KEYS[side]) if side in _SIDE_KEYS else ()
         yield Entry(f"Look from {side}", group, _shown(camera.Face(forward)), keys)
+    for way, pad, yaw, pitch in (("left", 4, -1, 0), ("right", 6, 1, 0), ("up", 8, 0, -1), ("down", 2, 0, 1)):
+        keys = (*_plain(f"keypad{pad}"), *_ctrl(f"{way}_arrow", shift=True))
+        turn = camera.Orbit(ORBIT_STEP * yaw, ORBIT_STEP * pitch)
+        yield Entry(f"Orbit: a step {way}", group, _shown(turn), keys, repeats=True)
     rays = (*_plain("comma"), *_plain("keypad5"))
     yield Entry("Parallel rays (orthographic), or perspective", group, _shown(camera.SwitchRays()), rays)
     yield Entry("Add a key frame", group, _shown(film.AddKey()), _plain("m"))
@@ -251,7 +258,7 @@ def _editing() -> Iterable[Entry]:
     yield Entry("Grow the selection", group, _selected(edit.Grow()), _plain("g"))
     deleting = (*_plain("delete"), *_plain("backspace"))
     yield Entry("Delete the selection", group, _selected(edit.Delete()), deleting)
-    yield Entry("Recolour the selection", group, _selected(placing.BeginTint()), _ctrl("t"))
+    yield Entry("Recolour the selection", group, _recolour, _ctrl("t"))
     for name, key, nudge in (
         ("left", "left_arrow", placing.Nudge(right=-1)), ("right", "right_arrow", placing.Nudge(right=1)),
         ("up", "up_arrow", placing.Nudge(down=-1)), ("down", "down_arrow", placing.Nudge(down=1)),
@@ -261,6 +268,13 @@ def _editing() -> Iterable[Entry]:
     yield Entry("Hide the selection", group, _selected(edit.Hide()))
     yield Entry("Show the selection alone", group, _selected(edit.Isolate()))
     yield Entry("Show what is hidden", group, _shown(edit.ShowAll()))
+
+
+def _recolour(state: State) -> do.Command | None:
+    """Choose a colour; once more: it is the one."""
+    if state.editing.tint is not None:
+        return placing.EndGesture()
+    return placing.BeginTint() if state.editing.num_selected else None
 
 
 def _placing(command: do.Command) -> Callable[[State], do.Command | None]:

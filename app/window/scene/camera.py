@@ -110,6 +110,18 @@ class MoveTo:
 
 
 @dataclass(frozen=True)
+class Orbit:
+    """A step around what is looked at, radians; slower and to a stop where photos know nothing more."""
+
+    yaw: float = 0.0
+    pitch: float = 0.0
+
+    def apply(self, state: State) -> State:
+        pose = poses.orbit_near(state.pose, self.yaw, self.pitch, places_to_keep_to(state))
+        return MoveTo(pose).apply(state)
+
+
+@dataclass(frozen=True)
 class SetFov:
     """Another field of view, degrees."""
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from imgui_bundle import ImVec2, imgui
 
@@ -19,6 +20,7 @@ from app.window.exporting import commands as export
 from app.window.exporting.state import Running, What
 from app.window.filming import commands as film
 from app.window.frame import dialogs, layout
+from app.window.frame.table import named
 from app.window.kit.look import Look
 from app.window.opening import commands as opening
 from app.window.opening.panels import browser
@@ -35,6 +37,7 @@ from langflash_core.network.pointmaps import PointMapNet
 from langflash_core.pipeline import STAGES
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History
+from langflash_core.scene.mask import Mask
 from tests.app.window.headless import box, context, frames, look
 from tests.app.window.items import Items
 from tests.app.window.scenes import after, shown_scene
@@ -233,6 +236,36 @@ def test_stages_are_said_in_plain_words() -> None:
     for stage in (*STAGES, *GuidedDepthNet.stages, *PointMapNet.stages):
         assert said(stage) != stage
     assert said("drawing") == "drawing"
+
+
+@pytest.mark.parametrize(
+    ("way", "axis", "sign"), [("left", 0, -1), ("right", 0, 1), ("up", 1, -1), ("down", 1, 1)]
+)
+def test_keys_lead_around_the_scene(way: str, axis: int, sign: int) -> None:
+    state = shown_scene()
+    command = named(f"Orbit: a step {way}").make(state)
+    assert command is not None
+    turned = apply(state, command).pose
+    moved = state.pose.axes.T @ (np.array(turned.centre) - np.array(state.pose.centre))
+    assert sign * moved[axis] > 0.01  # the camera's right and down
+    assert np.allclose(turned.pivot, state.pose.pivot)
+
+
+def test_a_colour_is_chosen_by_the_key_that_began() -> None:
+    state = shown_scene()
+    assert state.info is not None
+    marks = replace(first_marks(state.info.scene), selected=Mask.first(len(state.info.scene.gaussians), 500))
+    state = replace(state, editing=replace(state.editing, history=History(marks)))
+    entry = named("Recolour the selection")
+    begin = entry.make(state)
+    assert begin is not None
+    state = apply(state, begin)
+    assert state.editing.tint is not None
+    end = entry.make(state)
+    assert end is not None
+    state = apply(state, end)
+    assert state.editing.tint is None and state.editing.marks is not None
+    assert [type(change).__name__ for change in state.editing.marks.changes] == ["Recoloured"]
 
 
 def measuring() -> State:

@@ -93,6 +93,7 @@ def draw_tint(state: State, tint: Tint, look: Look) -> list[do.Command]:
         issued.append(placing.ShowTint(wanted, placing.luma_of(info.scene, editing.marks)))
     if widgets.primary_button("Recolour"):
         issued.append(placing.EndGesture())
+    widgets.tooltip("Keep it so  (Ctrl+T)")
     imgui.same_line()
     if imgui.button("Cancel##tint"):
         issued.append(placing.EndGesture(keep=False))
