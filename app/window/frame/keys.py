@@ -14,8 +14,11 @@ from ..scene import commands as show
 from ..state import State
 from . import table
 
-AREAS = ("##panel", "##toolbar", "##tools", "##bar0", "##bar1", "##bar2", "##bar3", "##views")
-"""Windows that F6 goes through, by name."""
+AREAS = (
+    "##session", "##offer", "##panel", "##export", "##toolbar", "##tools", "##bar0", "##bar1", "##bar2",
+    "##bar3", "##card", "##ruler", "##keys", "##views", "Dictionary",
+)  # fmt: skip
+"""Windows that F6 goes through, by name: questions first."""
 
 
 def draw(state: State) -> list[do.Command]:

@@ -1,5 +1,6 @@
 """What people stumbled on who tried the window for the first time, on a real ImGui context."""
 
+import re
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,7 +20,7 @@ from app.window.editing.state import Card, Editing, Reading, Tool
 from app.window.exporting import commands as export
 from app.window.exporting.state import Running, What
 from app.window.filming import commands as film
-from app.window.frame import dialogs, layout
+from app.window.frame import dialogs, keys, layout
 from app.window.frame.table import named
 from app.window.kit.look import Look
 from app.window.opening import commands as opening
@@ -249,6 +250,15 @@ def test_keys_lead_around_the_scene(way: str, axis: int, sign: int) -> None:
     moved = state.pose.axes.T @ (np.array(turned.centre) - np.array(state.pose.centre))
     assert sign * moved[axis] > 0.01  # the camera's right and down
     assert np.allclose(turned.pivot, state.pose.pivot)
+
+
+def test_every_window_with_something_to_press_is_an_area(items: Items) -> None:
+    """F6 leads there; those without are said here."""
+    code = "\n".join(path.read_text() for path in Path(layout.__file__).parents[1].rglob("*.py"))
+    names = set(re.findall(r'(?:imgui\.begin|widgets\.window|_panel)\(f?"([^"]+)"', code))
+    silent = {"##toast{toast.key}", "##splitter", "##status", "##picture", "##legend", "##axes"}
+    bars = {f"##bar{number}" for number in range(4)}
+    assert names - silent - {"##bar{number}"} | bars == set(keys.AREAS)
 
 
 def test_a_colour_is_chosen_by_the_key_that_began() -> None:
