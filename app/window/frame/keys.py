@@ -19,10 +19,12 @@ AREAS = (
     "##bar3", "##card", "##ruler", "##keys", "##views", "Dictionary",
 )  # fmt: skip
 """Windows that F6 goes through, by name: questions first."""
+_ARROWS = (imgui.Key.left_arrow, imgui.Key.right_arrow, imgui.Key.up_arrow, imgui.Key.down_arrow)
 
 
 def draw(state: State) -> list[do.Command]:
     """Keys that work wherever the pointer is, after all that may take them in this frame."""
+    _keep_arrows()
     if imgui.is_key_pressed(imgui.Key.escape, False) and (state.dialog or not typing()):
         return _escape(state)
     if _covered(state):
@@ -30,6 +32,13 @@ def draw(state: State) -> list[do.Command]:
     pressed = [entry for entry in table.ENTRIES if any(_pressed(each, entry.repeats) for each in entry.keys)]
     commands = [entry.make(state) for entry in pressed if entry.in_fields or not typing()]
     return [command for command in commands if command is not None]
+
+
+def _keep_arrows() -> None:
+    """While Ctrl is held the arrows are commands: they do not lead from control to control as well."""
+    if imgui.get_io().key_ctrl and not typing():
+        for key in _ARROWS:
+            imgui.internal.set_key_owner(key, imgui.get_id("commands"))
 
 
 def typing() -> bool:

@@ -28,6 +28,7 @@ from app.window.opening.panels import browser
 from app.window.opening.state import Folder
 from app.window.opening.work import ReadFolder, SampleTiles
 from app.window.scene import commands as show
+from app.window.scene.camera import Orbit
 from app.window.scene.commands import Loaded
 from app.window.scene.panels import views
 from app.window.scene.state import said
@@ -259,6 +260,34 @@ def test_every_window_with_something_to_press_is_an_area(items: Items) -> None:
     silent = {"##toast{toast.key}", "##splitter", "##status", "##picture", "##legend", "##axes"}
     bars = {f"##bar{number}" for number in range(4)}
     assert names - silent - {"##bar{number}"} | bars == set(keys.AREAS)
+
+
+@pytest.mark.parametrize("ctrl", [False, True])
+def test_arrows_with_ctrl_lead_to_no_other_control(ctrl: bool) -> None:
+    state, places = shown_scene(), list[int]()
+
+    def draw(seen: Look) -> list[Command]:
+        imgui.button("left of it")
+        imgui.same_line()
+        imgui.button("first")
+        if imgui.is_window_appearing():
+            imgui.set_keyboard_focus_here(-1)
+        places.append(imgui.get_current_context().nav_id)
+        return keys.draw(state)
+
+    hands = Hands(draw, bare=True)
+    with context(SIZE):
+        imgui.get_io().config_flags |= imgui.ConfigFlags_.nav_enable_keyboard
+        hands.frames(4)
+        if ctrl:
+            imgui.get_io().add_key_event(imgui.Key.mod_ctrl, True)
+            imgui.get_io().add_key_event(imgui.Key.left_ctrl, True)
+            imgui.get_io().add_key_event(imgui.Key.mod_shift, True)
+            hands.frames()
+        before = places[-1]
+        hands.key(imgui.Key.left_arrow)
+    assert (places[-1] == before) == ctrl
+    assert bool(hands.of(Orbit)) == ctrl
 
 
 def test_a_colour_is_chosen_by_the_key_that_began() -> None:

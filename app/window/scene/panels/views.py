@@ -37,7 +37,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
                 imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(3, 3))
                 pressed = imgui.image_button("view", picture[0], ImVec2(round(height * picture[1]), height))
                 imgui.pop_style_var()
-        widgets.tooltip(f"Stand where photo {view} was taken")
+        widgets.tooltip(f"Stand where photo {view + 1} was taken")
         if pressed:
             issued.append(camera.JumpTo(view))
         imgui.pop_id()
