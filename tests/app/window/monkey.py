@@ -3,11 +3,12 @@
     python -m tests.app.window.monkey [--minutes 10] [--seed 1] [--screen 1000x700]
 
 Ends with 0 when the window lived through it without an exception, an OpenGL error or a hang, and its
-memory stayed. The window can write only in a temporary folder (guarded.py); leaving is refused, so
-that the run goes on. It begins with a reconstruction, so that the network is there from the start and
-not from whichever minute random hands ask for it. Every minute the same scene is opened, and memory is
-compared there, without what the rooms take that the window holds to go back to: which these are is up to
-random hands. The scene's file is written anew before, since they merge scenes into it and save it.
+memory stayed. The window can write only in a temporary folder (guarded.py); leaving is refused, so that
+the run goes on. It begins with a reconstruction, a phrase and every mode of the picture, so that the network
+and the shaders are there from the start and not from whichever minute random hands ask for them. Every
+minute the same scene is opened, and memory is compared there, without what the rooms take that the window
+holds to go back to: which these are is up to random hands. The scene's file is written anew before, since
+they merge scenes into it and save it.
 """
 
 import argparse
@@ -20,7 +21,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, is_dataclass, replace
 from pathlib import Path
@@ -29,6 +30,9 @@ from typing import Any
 import glfw
 import numpy as np
 
+from app.window.asking import commands as ask
+from app.window.scene import camera
+from app.window.scene.state import Mode
 from app.window.session import Session
 from langflash_core.files import write_atomically
 from langflash_core.resources import asset_path
@@ -39,6 +43,7 @@ from tests.app.window.x11 import Client
 
 PATIENCE = 120.0  # seconds without any sign of life that count as a hang, also on a busy machine
 STEPS_AT_ONCE = 12
+MODE_SECONDS = 2.0
 IDLE = 10.0  # seconds in which nothing follows another scene
 WARM_MINUTES = 10.0
 SLOPE_MB = 8.0  # a minute; a scene that leaked at each opening would be 20, a reconstruction hundreds
@@ -104,12 +109,14 @@ class Staying(Session):
         return False
 
 
-def inside(width: int, height: int) -> None:
+def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
     """The process of the window: a line of JSON about it twice a second, until stdin ends."""
     ended = threading.Event()
     threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
     items = Items()
-    session = Staying(tuple(asset_path(f"photos/{name}") for name in PAIR), (width, height))
+    session = Staying(photos, (width, height))
+    if photos:
+        _see_everything(session)
     frames, said, latest = 0, 0.0, 0.0
     while not ended.is_set() and not session.should_close:
         if session.step(0.25):
@@ -133,6 +140,22 @@ def inside(width: int, height: int) -> None:
             sys.stdout.write(json.dumps(line) + "\n")
             sys.stdout.flush()
     session.close()
+
+
+def _see_everything(session: Session) -> None:
+    """Wait for the scene of the photos, ask, and look at it in every mode."""
+
+    def goes_on(seconds: float, until: Callable[[], bool]) -> None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end and not until():
+            session.step(0.25)
+
+    goes_on(PATIENCE, lambda: session.state.info is not None)
+    session.dispatch(ask.EditPrompt(session.state.prompts[0].key, "plant"))
+    for mode in Mode:
+        session.dispatch(camera.SetMode(mode))
+        goes_on(MODE_SECONDS, lambda: False)
+    session.dispatch(camera.SetMode(Mode.RGB))
 
 
 def resident_mb(process: int) -> float:
@@ -274,8 +297,8 @@ class Hands:
 class Watched:
     """The window's process and what it says."""
 
-    def __init__(self, display: str, folder: Path, size: tuple[int, int]) -> None:
-        program = [sys.executable, "-m", "tests.app.window.monkey", "--inside", *map(str, size)]
+    def __init__(self, display: str, folder: Path, size: tuple[int, int], photos: Sequence[Path]) -> None:
+        program = [sys.executable, "-m", "tests.app.window.monkey", "--inside", *map(str, (*size, *photos))]
         own = {**environment(folder, ROOT), "DISPLAY": display}
         own.pop("WAYLAND_DISPLAY", None)
         self._errors = (folder / "stderr.txt").open("w+")
@@ -373,9 +396,15 @@ def opened(hands: Hands, watched: Watched, count: int) -> bool:
 
 
 def run(
-    seconds: float, seed: int, size: tuple[int, int], every: float = 60.0, say=lambda text: None
+    seconds: float,
+    seed: int,
+    size: tuple[int, int],
+    every: float = 60.0,
+    photos: Sequence[Path] = (),
+    say=lambda text: None,
 ) -> Outcome:
-    """Random input for some seconds, a checkpoint `every` so many."""
+    """Random input for some seconds, a checkpoint `every` so many. photos: what it begins with, to see
+    everything once before."""
     from langflash_core.language.spaces import language_space
     from langflash_core.scene.file import save
     from tests.app.window.scenes import PHRASES, room
@@ -386,11 +415,11 @@ def run(
         scene = folder / "room.langflash"
         made = room(language_space("minilm").encode(list(PHRASES)))
         save(made, scene)
-        watched = Watched(display, folder, size)
+        watched = Watched(display, folder, size, photos)
         try:
             hands = Hands(display, folder, scene, size, seed)
             hands.find()
-            if not watched.reconstructs():
+            if photos and not watched.reconstructs():
                 outcome.problems.append(f"the photos became no scene: {watched.last}")
             start = time.monotonic()
             checkpoint = 0.0
@@ -423,7 +452,7 @@ def run(
 
 def main() -> int:
     if sys.argv[1:2] == ["--inside"]:
-        inside(*map(int, sys.argv[2:]))
+        inside(int(sys.argv[2]), int(sys.argv[3]), tuple(sys.argv[4:]))
         return 0
     parser = argparse.ArgumentParser(description="Random input into a real window.")
     parser.add_argument("--minutes", type=float, default=10.0)
@@ -436,7 +465,8 @@ def main() -> int:
         sys.stdout.write(text + "\n")
         sys.stdout.flush()
 
-    outcome = run(60 * args.minutes, args.seed, (width, height), say=say)
+    photos = [asset_path(f"photos/{name}") for name in PAIR]
+    outcome = run(60 * args.minutes, args.seed, (width, height), photos=photos, say=say)
     say(f"{outcome.steps} batches, {outcome.frames} frames, the latest by {outcome.latest:.2f} s")
     growth = outcome.growth()
     if growth is not None:
