@@ -42,7 +42,8 @@ class LookForPlace:
 
     def apply(self, state: State) -> State:
         wanted = state.exporting.form.path if state.dialog == "export" else state.dialog_path
-        return replace(state, opening=Opening(asker=state.dialog or "", name=Path(wanted).name))
+        asked = Opening(asker=state.dialog or "", name=Path(wanted).name, pending=state.pending)
+        return replace(state, opening=asked)
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class PlaceFound:
         if asked.asker != "export":
             state = ShowDialog(asked.asker).apply(state)
             path = Path(state.dialog_path) if self.folder is None else self.folder / asked.name
-            return replace(state, dialog_path=str(path))
+            return replace(state, dialog_path=str(path), pending=asked.pending)
         path = Path(form.path) if self.folder is None else self.folder / asked.name
         exporting = replace(state.exporting, form=replace(form, path=str(path)))
         return replace(state, exporting=exporting, dialog="export", dialog_path="")

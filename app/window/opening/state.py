@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 LOOKING = ("open", "merge", "place")  # dialogs that show a folder
 MOST_FILES = 300  # of a folder that are shown
@@ -23,12 +24,14 @@ class Folder:
 @dataclass(frozen=True)
 class Opening:
     """The opening half of the state. folder: None while it is read. chosen: in the order of the clicks.
-    asker: the dialog that wants a folder for its file. name: of that file."""
+    asker: the dialog that wants a folder for its file. name: of that file. pending: commands that wait for
+    that dialog."""
 
     folder: Folder | None = None
     chosen: tuple[Path, ...] = ()
     asker: str = ""
     name: str = ""
+    pending: tuple[Any, ...] = ()
 
 
 NO_OPENING = Opening()

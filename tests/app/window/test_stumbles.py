@@ -196,7 +196,8 @@ def test_a_file_is_written_to_a_folder_that_was_walked_to(asker: str, items: Ite
         look_at = opening.LookInto(Path("/home"), dialog="place")
         read = opening.FolderRead(Folder(Path("/home"), (Path("/home/out"),), (Path("/home/a.png"),)))
         assert hands.of(opening.LookForPlace) == [opening.LookForPlace()]
-        states.append(after(states[-1], opening.LookForPlace(), look_at, read))
+        waiting = replace(states[-1], pending=(show.Reconstruct(),))
+        states.append(after(waiting, opening.LookForPlace(), look_at, read))
         hands.frames(6)
         assert not any(name.endswith("a.png") for name in items.now())  # a photo is no place
         hands.click(*middle(items, "Write here"))
@@ -205,6 +206,8 @@ def test_a_file_is_written_to_a_folder_that_was_walked_to(asker: str, items: Ite
         states.append(after(states[-1], *hands.of(opening.PlaceFound)))
         hands.frames(6)
     assert (states[-1].dialog, Path(wanted())) == (asker, Path("/home") / before.name)
+    if asker == "save":
+        assert back.pending == states[-1].pending == waiting.pending
     states.append(back)
     assert (back.dialog, Path(wanted())) == (asker, before)
 

@@ -189,6 +189,6 @@ def _place_buttons(state: State, confirmed: bool, look: Look) -> list[do.Command
         return [opening.PlaceFound(None)]
     if typed and confirmed:
         return [opening.LookInto(typed_path(typed))]
-    if pressed and folder is not None:
+    if (pressed or confirmed) and folder is not None:
         return [opening.PlaceFound(typed_path(typed) if typed else folder.path)]
     return []
