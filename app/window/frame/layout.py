@@ -34,7 +34,8 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
     with widgets.window("##panel", ImVec2(0, 0), ImVec2(left, height - bar - foot), scrolls=True):
         issued += _side(state, look)
     if foot:  # below the panel, where nothing moves out of its way
-        with widgets.window("##export", ImVec2(0, height - bar - foot), ImVec2(left, foot)):
+        corner, extent = ImVec2(0, height - bar - foot), ImVec2(left, foot)
+        with widgets.window("##export", corner, extent, imgui.WindowFlags_.no_focus_on_appearing):
             issued += export_panel.draw_progress(state, look)
     with widgets.window("##toolbar", ImVec2(left, 0), ImVec2(size.x, top)):
         imgui.set_cursor_pos_y((top - imgui.get_frame_height()) / 2)

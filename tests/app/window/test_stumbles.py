@@ -373,6 +373,22 @@ def test_an_export_moves_nothing_in_the_panel(items: Items, monkeypatch) -> None
     assert places[0] == places[1]
 
 
+def test_an_export_that_begins_takes_no_keys(monkeypatch) -> None:
+    """Enter would stop it."""
+    state = shown_scene()
+    running = replace(state, exporting=replace(state.exporting, running=Running(Path("mask.png"))))
+    states = [state]
+    monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
+    hands = Hands(lambda seen: layout.draw_all(states[-1], seen)[0])
+    with context(SIZE):
+        imgui.get_io().config_flags |= imgui.ConfigFlags_.nav_enable_keyboard
+        hands.frames(6)
+        states.append(running)
+        hands.frames(6)
+        window = imgui.get_current_context().nav_window
+        assert window is None or window.name != "##export"
+
+
 def test_a_film_begins_with_a_button(items: Items) -> None:
     state = shown_scene()
     hands = Hands(lambda seen: views.draw(state, seen), bare=True)
