@@ -68,11 +68,11 @@ def order(state: State) -> Order | str:
     if form.what.sized:
         words += ["--size", "{}x{}".format(*pixels(form.side, state.pose.aspect))]
     if form.what.film:
-        if form.way == "keys":
+        if way(state) == "keys":
             if len(state.keys) < 2:
                 return "A film along key frames needs two of them; fly somewhere and add one (M)."
             camera_file = target.with_name(f"{target.stem}.keys.json")
-        words += ["--path", str(camera_file) if form.way == "keys" else form.way]
+        words += ["--path", str(camera_file) if way(state) == "keys" else way(state)]
         words += ["--seconds", f"{form.seconds:g}"]
     files = (*_written(form, target, len(info.views)), *((camera_file,) if camera_file else ()))
     return Order(tuple(words), target, camera_file, files)
@@ -84,6 +84,11 @@ def fades(state: State) -> bool:
     form = state.exporting.form
     wanted = keeps_near(state) if form.fade is None else form.fade
     return form.what.fades and wanted and photos_known(state)
+
+
+def way(state: State) -> str:
+    """Of a film: along the key frames where there are some, unless said otherwise."""
+    return state.exporting.form.way or ("keys" if len(state.keys) > 1 else "photos")
 
 
 def _colours(state: State) -> list[str]:

@@ -17,7 +17,7 @@ from . import order as written
 from .state import SECONDS, ExportForm, What
 
 WIDTH = 620.0  # design pixels
-HEIGHT = 670.0  # of the kinds that need most, with a command of three lines
+HEIGHT = 740.0  # of the kinds that need most, with a command of three lines
 PROGRESS = 112.0  # the same, high: what `draw_progress` needs
 COLUMNS = 4
 _NAMED = 6  # files that the question before a replacement names
@@ -97,7 +97,9 @@ def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
         imgui.text_colored(theme.MUTED, "px")
     if what.film:
         _label("Goes", look)
-        form = replace(form, way=widgets.choice(WAYS, form.way))
+        shown = written.way(state)
+        chosen = widgets.choice(WAYS, shown)
+        form = replace(form, way=chosen if chosen != shown else form.way)
         _label("Length", look)
         width = imgui.get_content_region_avail().x
         changed, seconds = widgets.slider(

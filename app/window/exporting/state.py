@@ -110,8 +110,8 @@ class ExportForm:
     """all_views: from every photo instead of the view on show. only_found: just what answers the
     phrases. only_selected: just the selection, where Gaussians are written. side: the longer one in
     pixels. fade: leave out what no photo looked at; None: as the window does. way: of a film, of
-    `filming.state.WAYS`. path: as typed; an ending is added. proposed: the path that nobody has typed.
-    serial: of the scene that `path` is for."""
+    `filming.state.WAYS`; empty: `order.way`. path: as typed; an ending is added. proposed: the path that
+    nobody has typed. serial: of the scene that `path` is for."""
 
     what: What = What.RGB
     all_views: bool = False
@@ -120,7 +120,7 @@ class ExportForm:
     side: int = 1024
     seconds: float = 6.0
     fade: bool | None = None
-    way: str = "photos"
+    way: str = ""
     path: str = ""
     proposed: str = ""
     serial: int = 0

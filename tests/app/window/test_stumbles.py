@@ -18,6 +18,7 @@ from app.window.editing.panels import pointing as card_panel
 from app.window.editing.panels import ruler, tools
 from app.window.editing.state import Card, Editing, Reading, Tool
 from app.window.exporting import commands as export
+from app.window.exporting import order
 from app.window.exporting.state import Running, What
 from app.window.filming import commands as film
 from app.window.frame import dialogs, keys, layout
@@ -371,6 +372,16 @@ def test_an_export_moves_nothing_in_the_panel(items: Items, monkeypatch) -> None
             places.append(middle(items, "##text"))
         assert any(name.endswith("Stop the export") for name in items.now())
     assert places[0] == places[1]
+
+
+def test_a_film_follows_the_key_frames_where_there_are_some() -> None:
+    state = after(shown_scene(), export.ShowExport())
+    state = after(state, export.EditForm(replace(state.exporting.form, what=What.VIDEO)))
+    assert order.way(state) == "photos"
+    state = after(state, film.AddKey(), film.AddKey())
+    assert len(state.keys) == 2 and order.way(state) == "keys"
+    state = after(state, export.EditForm(replace(state.exporting.form, way="orbit")))
+    assert order.way(state) == "orbit"
 
 
 def test_an_export_that_begins_takes_no_keys(monkeypatch) -> None:
