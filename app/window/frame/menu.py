@@ -1,15 +1,11 @@
 """The menu behind the button in the upper right: files, samples, preferences, help."""
 
-from pathlib import Path
-
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from .. import commands as do
 from ..kit.look import Look
 from ..recovery import commands as keep
-from ..scene import commands as show
-from ..scene import samples
 from ..state import State
 from . import table
 
@@ -29,7 +25,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
 def _items(state: State) -> list[do.Command]:
     issued = _named(state, "Open ...")
     issued += _recent(state)
-    issued += _samples()
+    issued += _samples(state)
     imgui.separator()
     issued += _named(state, "Save ...", "Export ...", "Merge a scene into this one ...")
     imgui.separator()
@@ -41,23 +37,24 @@ def _items(state: State) -> list[do.Command]:
 
 
 def _named(state: State, *names: str) -> list[do.Command]:
-    """Entries of the table; greyed where there is nothing for them to do."""
-    issued: list[do.Command] = []
-    for entry in map(table.named, names):
-        command = entry.make(state)
-        label = f"{entry.icon}   {entry.name}"
-        if imgui.menu_item(label, entry.key, False, command is not None)[0] and command is not None:
-            issued.append(command)
-    return issued
+    """Entries of the table by their names."""
+    entries = map(table.named, names)
+    return [c for entry in entries for c in _entry(state, entry, f"{entry.icon}   {entry.name}")]
+
+
+def _entry(state: State, entry: table.Entry, label: str) -> list[do.Command]:
+    """One line; greyed where there is nothing for it to do."""
+    command = entry.make(state)
+    pressed = imgui.menu_item(label, entry.key, False, command is not None)[0]
+    return [command] if pressed and command is not None else []
 
 
 def _recent(state: State) -> list[do.Command]:
     issued: list[do.Command] = []
-    recent = state.preferences.recent
-    if imgui.begin_menu(f"{fa.ICON_FA_CLOCK_ROTATE_LEFT}   Recent scenes", bool(recent)):
-        for place, path in enumerate(recent):
-            if imgui.menu_item(f"{Path(path).name}##{place}", "", False, True)[0]:
-                issued.append(show.OpenPaths((path,)))
+    paths = state.preferences.recent
+    if imgui.begin_menu(f"{fa.ICON_FA_CLOCK_ROTATE_LEFT}   Recent scenes", bool(paths)):
+        for path, entry in zip(paths, table.recent(state), strict=True):
+            issued += _entry(state, entry, f"{entry.name}##{path}")
             if imgui.is_item_hovered():
                 imgui.set_tooltip(path)
         imgui.separator()
@@ -67,13 +64,10 @@ def _recent(state: State) -> list[do.Command]:
     return issued
 
 
-def _samples() -> list[do.Command]:
+def _samples(state: State) -> list[do.Command]:
     issued: list[do.Command] = []
     if imgui.begin_menu(f"{fa.ICON_FA_IMAGES}   Sample photos", True):
-        for label, photos in samples.pairs():
-            if imgui.menu_item(label, "", False, True)[0]:
-                issued.append(
-                    show.Instead((show.SetPhotosAside(), show.AddPhotos(photos), show.Reconstruct()))
-                )
+        for entry in table.sample_photos():
+            issued += _entry(state, entry, entry.name)
         imgui.end_menu()
     return issued

@@ -15,7 +15,7 @@ _FLAGS = imgui.InputTextFlags_.callback_history  # keeps Up and Down from leavin
 
 def draw(state: State, look: Look) -> list[do.Command]:
     """The dialog's body."""
-    found = table.matching(state.palette.text)
+    found = table.matching(state.palette.text, state)
     place = min(state.palette.place, max(len(found) - 1, 0))
     text, step, entered = _field(state.palette.text)
     wanted = do.Palette(text, min(max(place + step, 0), max(len(found) - 1, 0)))

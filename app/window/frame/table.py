@@ -1,8 +1,12 @@
-"""Every command that has a name: keys, menu, palette and help are made of this one table."""
+"""Every command that has a name: keys, menu, palette and help are made of this one table.
+
+Beside those that are always there: what can be opened without a look for it.
+"""
 
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from imgui_bundle import icons_fontawesome_6 as fa
 from imgui_bundle import imgui
@@ -18,7 +22,7 @@ from ..exporting import commands as export
 from ..filming import commands as film
 from ..opening import commands as opening
 from ..recovery import commands as keep
-from ..scene import camera
+from ..scene import camera, samples
 from ..scene import commands as show
 from ..scene.panels import in_space
 from ..scene.panels.modes import KEYED
@@ -79,11 +83,25 @@ def named(name: str) -> Entry:
     return next(entry for entry in ENTRIES if entry.name == name)
 
 
-def matching(text: str) -> tuple[Entry, ...]:
+def matching(text: str, state: State) -> tuple[Entry, ...]:
     """Entries with every word of `text` in group or name; names that begin with it come first."""
     words, start = text.lower().split(), text.lower().strip()
-    found = [e for e in ENTRIES if all(word in f"{e.group} {e.name}".lower() for word in words)]
+    entries = (*ENTRIES, *recent(state), *sample_photos())
+    found = [e for e in entries if all(word in f"{e.group} {e.name}".lower() for word in words)]
     return tuple(sorted(found, key=lambda entry: not entry.name.lower().startswith(start)))
+
+
+def recent(state: State) -> Iterable[Entry]:
+    """The scenes that were open last, the newest first."""
+    for path in state.preferences.recent:
+        yield Entry(Path(path).name, "Recent scenes", _always(show.OpenPaths((path,))))
+
+
+def sample_photos() -> Iterable[Entry]:
+    """Pairs that come with the program, each a room of its own."""
+    for label, photos in samples.pairs():
+        trying = show.Instead((show.SetPhotosAside(), show.AddPhotos(photos), show.Reconstruct()))
+        yield Entry(label, "Sample photos", _always(trying))
 
 
 def _plain(name: str) -> tuple[Chord, ...]:

@@ -33,10 +33,15 @@ class Person:
     """One window, the hands on it and the eyes before it."""
 
     def __init__(
-        self, display: str, folder: Path, size: tuple[int, int] = SIZE, words: tuple[str, ...] = ()
+        self,
+        display: str,
+        folder: Path,
+        size: tuple[int, int] = SIZE,
+        words: tuple[str, ...] = (),
+        code: Path = ROOT,
     ) -> None:
         self.size = size
-        self._environment = {**environment(folder, ROOT), "DISPLAY": display}
+        self._environment = {**environment(folder, code), "DISPLAY": display}
         self._environment.pop("WAYLAND_DISPLAY", None)
         self.started = time.perf_counter()
         self.process = subprocess.Popen(
@@ -128,10 +133,10 @@ class Person:
 
 
 @contextmanager
-def person(size: tuple[int, int] = SIZE, words: tuple[str, ...] = ()) -> Iterator[Person]:
-    """A program just launched on a screen of its own, with folders of its own."""
+def person(size: tuple[int, int] = SIZE, words: tuple[str, ...] = (), code: Path = ROOT) -> Iterator[Person]:
+    """A program just launched on a screen of its own, with folders of its own. code: where it is."""
     with tempfile.TemporaryDirectory(prefix="journey-") as place, x_server(*size) as display:
-        someone = Person(display, Path(place).resolve(), size, words)
+        someone = Person(display, Path(place).resolve(), size, words, code)
         try:
             yield someone
         finally:

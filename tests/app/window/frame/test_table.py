@@ -1,6 +1,7 @@
 """The one table of commands, without a window."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from imgui_bundle import imgui
@@ -9,6 +10,8 @@ from app.window.commands import Command
 from app.window.editing import commands as edit
 from app.window.frame import dialogs, table
 from app.window.kit import theme
+from app.window.recovery import commands as keep
+from app.window.scene import commands as show
 from app.window.scene.state import Mode
 from app.window.state import State
 from langflash_core.scene.edited import first_marks
@@ -39,19 +42,34 @@ def test_every_group_is_in_the_help() -> None:
 
 @pytest.mark.parametrize("entry", table.ENTRIES, ids=lambda entry: entry.name)
 def test_every_command_is_found_by_its_name_and_does_something_or_says_no(entry: table.Entry) -> None:
-    assert table.matching(entry.name.upper())[0] is entry or entry in table.matching(entry.name)
+    assert entry in table.matching(entry.name.upper(), State())
     assert table.named(entry.name) is entry
     for state in (State(), with_marks()):
         command = entry.make(state)
         assert command is None or isinstance(after(state, command), State)
 
 
+def found(text: str, state: State = State()) -> list[str]:  # noqa: B008
+    """Names and groups, in the order of the palette."""
+    return [f"{entry.name} ({entry.group})" for entry in table.matching(text, state)]
+
+
 def test_words_narrow_down_in_any_order() -> None:
-    assert table.matching("") == table.ENTRIES
-    assert [entry.name for entry in table.matching("map heat")] == [f"Show: {Mode.HEAT.value}"]
-    assert {entry.group for entry in table.matching("tools")} == {"Tools"}
-    assert table.matching("sel")[0].name.startswith("Sel")  # before "Delete the selection"
-    assert table.matching("no such thing") == ()
+    assert table.matching("", State())[: len(table.ENTRIES)] == table.ENTRIES
+    assert found("map heat") == [f"Show: {Mode.HEAT.value} (View)"]
+    assert {entry.group for entry in table.matching("tools", State())} == {"Tools"}
+    assert found("sel")[0].startswith("Sel")  # before "Delete the selection"
+    assert found("no such thing") == []
+
+
+def test_the_palette_opens_samples_and_recent_scenes() -> None:
+    """Else nobody without a mouse gets at them: the empty window's tiles and the menu take clicks alone."""
+    assert found("sample desk") == ["Desk (Sample photos)"]
+    assert found("recent") == []
+    begun = after(State(), *(keep.Opened(Path(f"/rooms/{name}.langflash")) for name in ("hall", "den")))
+    assert found("recent", begun) == ["den.langflash (Recent scenes)", "hall.langflash (Recent scenes)"]
+    (hall,) = table.matching("hall", begun)
+    assert hall.make(begun) == show.OpenPaths((str(Path("/rooms/hall.langflash")),))
 
 
 def made(name: str, state: State) -> Command | None:
