@@ -79,6 +79,19 @@ def checkbox(label: str, on: bool) -> tuple[bool, bool]:
     return changed
 
 
+def button_width(label: str) -> float:
+    """What a button of this label takes, pixels."""
+    return imgui.calc_text_size(label, True).x + 2 * imgui.get_style().frame_padding.x
+
+
+def go_on(width: float, right: float, gap: float = -1.0) -> None:
+    """Put the next item, of this width, beside the last one, or below where it would end beyond `right`;
+    pixels of the screen. gap: between both; negative: the style's."""
+    imgui.same_line(0, gap)
+    if imgui.get_cursor_screen_pos().x + width > right:
+        imgui.new_line()
+
+
 def quiet_button(label: str, tip: str = "") -> bool:
     """An icon without a frame; `tip` explains it on hover."""
     clear = ImVec4(0, 0, 0, 0)

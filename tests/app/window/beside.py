@@ -19,8 +19,8 @@ from tests.app.window.sheet import Shot, write_sheet
 
 OTHERS = [asset_path(f"photos/books_{side}.jpg") for side in ("left", "right")]
 SMALL = (800, 500)
-THING = (0.23, 0.46)  # of the picture's place: the plant
-AROUND = ((0.14, 0.3), (0.34, 0.3), (0.36, 0.62), (0.12, 0.62), (0.13, 0.32))
+THING = (0.45, 0.42)  # of the picture's place: the plant
+AROUND = ((0.3, 0.25), (0.44, 0.18), (0.6, 0.3), (0.58, 0.56), (0.42, 0.7), (0.3, 0.5), (0.31, 0.27))
 Story = tuple[str, Callable[[Person], None]]
 
 

@@ -78,7 +78,9 @@ class Person:
         self.until(lambda: len(np.unique(self.see()[: self.size[1] // 2, :LEFT])) > 20, "the first frame")
         seconds = time.perf_counter() - self.started
         self.window = int(self.do("search", "--sync", "--name", "LangFlash").split()[0])
-        self.do("windowmove", str(self.window), "0", "0", "windowfocus", "--sync", str(self.window))
+        where = str(self.window)
+        self.do("windowmove", where, "0", "0", "windowsize", where, *map(str, self.size))
+        self.do("windowfocus", "--sync", where)
         return seconds
 
     def rest(self) -> np.ndarray:

@@ -1,9 +1,21 @@
 """Nothing covers anything else where the window is small or the interface large."""
 
-import pytest
+from dataclasses import replace
 
+import pytest
+from imgui_bundle import ImVec2, imgui
+
+from app.window.editing import commands as edit
+from app.window.editing.panels import tools
 from app.window.editing.panels.tools import _GAP, _MARGIN, _TOOLS, tool_side
+from app.window.editing.state import Floaters, Tint, Tool
+from app.window.kit import theme
 from app.window.scene.panels.legend import covers_views
+from app.window.state import State
+from langflash_core.scene.edited import first_marks
+from langflash_core.scene.edits import History
+from tests.app.window.headless import box, context, frames, look
+from tests.app.window.scenes import after, shown_scene
 
 SEPARATORS = 2 * (1 + _GAP) + 12  # two lines, and the strip's padding
 
@@ -19,3 +31,51 @@ def test_the_tools_end_above_the_viewpoints(window: tuple[int, int], scale: floa
 
 def test_the_legend_makes_room_for_the_viewpoints() -> None:
     assert covers_views(452, 2) and not covers_views(932, 2) and covers_views(932, 9)
+
+
+def edited(**changes) -> State:
+    """Everything is selected, as Ctrl+A does."""
+    state = shown_scene()
+    assert state.info is not None
+    marks = first_marks(state.info.scene)
+    state = after(replace(state, editing=replace(state.editing, history=History(marks))), edit.SelectAll())
+    return replace(state, editing=replace(state.editing, **changes))
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+@pytest.mark.parametrize(
+    "state",
+    [
+        edited(tool=Tool.BRUSH),
+        edited(tool=Tool.PLACE),
+        edited(tint=Tint((0.8, 0.2, 0.2), 0.8)),
+        edited(floaters=Floaters(bytes(4 * 12_300))),
+    ],
+    ids=["brush", "gizmo", "tint", "floaters"],
+)
+def test_bars_end_where_the_window_ends(state: State, scale: float) -> None:
+    """At 800 x 500 the selection's bar ended with half a bin, and the way out of it was beyond."""
+    place, size = ImVec2(348 * scale, 52 * scale), ImVec2(800 * scale - 348 * scale, 416 * scale)
+    with context((round(800 * scale), round(500 * scale))):
+        theme.set_up(scale, "dark")
+        frames(lambda seen: tools.draw(state, seen, place, size), look(scale))
+        boxes = [box(f"##bar{number}") for number in range(2)]
+    for _left, _top, right, _bottom in boxes:
+        assert right <= 800 * scale - tools._MARGIN * scale + 1
+    assert boxes[0][3] <= boxes[1][1]
+
+
+def test_small_tools_show_their_whole_icons(monkeypatch) -> None:
+    """Each was half as wide as its button's padding left."""
+    seen: list[tuple[float, float]] = []
+
+    def button(icon: str, chosen: bool, side: ImVec2, tip: str) -> bool:
+        padding = imgui.get_style().frame_padding.x
+        seen.append((imgui.calc_text_size(icon).x + 2 * padding, side.x))
+        return False
+
+    monkeypatch.setattr(tools, "_tool_button", button)
+    with context((800, 500)):
+        theme.set_up(1.0, "dark")
+        frames(lambda at: tools.draw(shown_scene(), at, ImVec2(348, 52), ImVec2(452, 416)), look())
+    assert seen and all(taken <= side for taken, side in seen)

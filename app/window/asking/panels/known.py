@@ -25,10 +25,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     imgui.text_colored(theme.MUTED, "Here are")
     right = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
     for name in found:
-        width = imgui.calc_text_size(name).x + look.px(16)
-        imgui.same_line(0, look.px(6))
-        if imgui.get_cursor_screen_pos().x + width > right:
-            imgui.new_line()
+        widgets.go_on(widgets.button_width(name), right, look.px(6))
         imgui.begin_disabled(name in asked)
         if imgui.button(f"{name}##known"):
             issued.append(ask.AskAgain(name))

@@ -22,8 +22,9 @@ _DIGITS = {Handle.MOVE: "%.3f", Handle.TURN: "%.1f\u00b0", Handle.SCALE: "%.3f \
 _SPEEDS = {Handle.MOVE: 0.002, Handle.TURN: 0.5, Handle.SCALE: 0.005}  # per pixel of a drag
 
 
-def draw(state: State, look: Look) -> list[do.Command]:
-    """What the gizmo does, and by how much: drag a number, or double-click and type it."""
+def draw(state: State, look: Look, right: float) -> list[do.Command]:
+    """What the gizmo does, and by how much: drag a number, or double-click and type it. right: where a line
+    ends."""
     issued: list[do.Command] = []
     editing, info = state.editing, state.info
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
@@ -35,14 +36,16 @@ def draw(state: State, look: Look) -> list[do.Command]:
         imgui.same_line()
     imgui.pop_style_var()
     if editing.marks is None or info is None or not editing.marks.selected:
+        said = "Click on a thing to select it"
+        widgets.go_on(imgui.calc_text_size(said).x, right)
         imgui.align_text_to_frame_padding()
-        imgui.text_colored(theme.MUTED, "Click on a thing to select it")
+        imgui.text_colored(theme.MUTED, said)
         return issued
     pivot = placing.pivot_of(info.scene, editing.marks)
-    return issued if pivot is None else issued + _fields(state, pivot, look)
+    return issued if pivot is None else issued + _fields(state, pivot, look, right)
 
 
-def _fields(state: State, pivot: placing.Spot, look: Look) -> list[do.Command]:
+def _fields(state: State, pivot: placing.Spot, look: Look, right: float) -> list[do.Command]:
     editing = state.editing
     assert editing.marks is not None
     unit = 100 * state.metric if state.metric and editing.handle is Handle.MOVE else 1.0
@@ -50,8 +53,9 @@ def _fields(state: State, pivot: placing.Spot, look: Look) -> list[do.Command]:
     numbers = [unit * each for each in placing.numbers_of(editing.gesture, pivot, editing.handle)]
     changed = False
     for place, number in enumerate(numbers):
-        imgui.same_line(0, look.px(10))
-        if len(numbers) > 1:
+        named = len(numbers) > 1
+        widgets.go_on(look.px(_FIELD + 15 * named), right, look.px(10))
+        if named:
             imgui.align_text_to_frame_padding()
             imgui.text_colored(theme.AXES[place], "xyz"[place])
             imgui.same_line(0, look.px(5))
@@ -68,8 +72,8 @@ def _fields(state: State, pivot: placing.Spot, look: Look) -> list[do.Command]:
     return [placing.Adjust(wanted)] if isinstance(wanted, Moved) else []
 
 
-def draw_tint(state: State, tint: Tint, look: Look) -> list[do.Command]:
-    """Colour and strength, as the picture shows them; made or taken away."""
+def draw_tint(state: State, tint: Tint, look: Look, right: float) -> list[do.Command]:
+    """Colour and strength, as the picture shows them; made or taken away. right: where a line ends."""
     editing, info = state.editing, state.info
     if editing.marks is None or info is None:
         return []
@@ -80,12 +84,10 @@ def draw_tint(state: State, tint: Tint, look: Look) -> list[do.Command]:
     flags = imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label
     repainted, colour = imgui.color_edit3("##tint", list(tint.colour), flags)
     widgets.tooltip("The colour; light and shade stay")
-    imgui.same_line()
-    text = f"{100 * tint.strength:.0f} %"
-    moved, strength = widgets.slider(
-        "##strength", tint.strength, (0.0, 1.0), text, "How much of it", look.px(150)
-    )
-    imgui.same_line(0, look.px(14))
+    text, width = f"{100 * tint.strength:.0f} %", look.px(150)
+    widgets.go_on(width, right)
+    moved, strength = widgets.slider("##strength", tint.strength, (0.0, 1.0), text, "How much of it", width)
+    widgets.go_on(widgets.button_width("Recolour"), right, look.px(14))
     issued: list[do.Command] = []
     if repainted or moved:
         red, green, blue = (min(max(float(each), 0.0), 1.0) for each in colour)
@@ -94,7 +96,7 @@ def draw_tint(state: State, tint: Tint, look: Look) -> list[do.Command]:
     if widgets.primary_button("Recolour"):
         issued.append(placing.EndGesture())
     widgets.tooltip("Keep it so  (Ctrl+T)")
-    imgui.same_line()
+    widgets.go_on(widgets.button_width("Cancel"), right)
     if imgui.button("Cancel##tint"):
         issued.append(placing.EndGesture(keep=False))
     widgets.tooltip("Leave the colours as they are  (Esc)")

@@ -37,33 +37,36 @@ _GAP = 3.0
 _AROUND = 34.0  # of the strip, beside its tools: its edge and two lines
 _VIEWS = 92.0  # that the viewpoints below it take
 _MARGIN = 12.0
-_LONG = 680.0  # width of everything a selection can do, in one line
-_TALL = 6.0  # height of that in two, in lines of text
+_TALL = 6.0  # height of what a selection can do in two lines, in lines of text
+_REACH = 104.0  # width of the slider of how far a selection grows
+_GROWING = _REACH + 130.0  # and of the buttons before it
+_PADDING = 10.0  # of a bar, left and right
 _BAR = (
     widgets.PLAIN | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
 )  # a small window over the picture
 
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
-    """Strip and bars over the picture at `place`."""
+    """Strip and bars over the picture at `place`. Bars go on in a further line where one is too short."""
     corner = ImVec2(place.x + look.px(_MARGIN), place.y + look.px(_MARGIN))
     side = tool_side(size.y / look.scale)
     issued, _ = _panel("##tools", corner, look, lambda: _strip(state, look, side), tight=True)
     corner = ImVec2(corner.x + look.px(_BUTTON + 22), corner.y)
-    room = _beside_dictionary(corner.x, place.x + size.x - look.px(_MARGIN), corner.y) - corner.x
+    end = _beside_dictionary(corner.x, place.x + size.x - look.px(_MARGIN), corner.y)
+    right = end - look.px(_PADDING)
     bars = []
     if state.editing.tool.selects:
-        bars.append(lambda: _options(state, look))
+        bars.append(lambda: _options(state, look, right))
     if state.editing.tool is Tool.PLACE:
-        bars.append(lambda: placing_bar.draw(state, look))
+        bars.append(lambda: placing_bar.draw(state, look, right))
     if state.editing.num_selected or state.editing.waiting:
-        bars.append(lambda: _selection(state, look, room))
+        bars.append(lambda: _selection(state, look, right))
     if state.editing.tint is not None:
         tint = state.editing.tint
-        bars.append(lambda: placing_bar.draw_tint(state, tint, look))
+        bars.append(lambda: placing_bar.draw_tint(state, tint, look, right))
     if state.editing.floaters is not None:
         found = state.editing.floaters
-        bars.append(lambda: _floaters(state, found, look, room))
+        bars.append(lambda: _floaters(state, found, look, right))
     hidden = state.editing.marks is not None and bool(state.editing.marks.hidden)
     if hidden and not state.editing.num_selected:
         bars.append(lambda: _hidden(state))
@@ -98,7 +101,7 @@ def _panel(
     """A rounded window that holds what `body` draws; also its height."""
     imgui.set_next_window_pos(corner)
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
-    imgui.push_style_var(imgui.StyleVar_.window_padding, look.vec(6, 6) if tight else look.vec(10, 7))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, look.vec(6, 6) if tight else look.vec(_PADDING, 7))
     with widgets.colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
         imgui.begin(name, None, _BAR)
         issued, height = body(), imgui.get_window_height()
@@ -112,6 +115,7 @@ def _strip(state: State, look: Look, wide: float) -> list[do.Command]:
     editing = state.editing
     side = look.vec(wide, wide)
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(_GAP, _GAP))
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(0, 0))  # small buttons hold their icons, too
     for tool, icon, tip in _TOOLS:
         if _tool_button(icon, editing.tool is tool, side, tip):
             taken = tool is Tool.PLACE
@@ -136,7 +140,7 @@ def _strip(state: State, look: Look, wide: float) -> list[do.Command]:
     if _tool_button(fa.ICON_FA_ROTATE_RIGHT, False, side, tip):
         issued.append(edit.Redo())
     imgui.end_disabled()
-    imgui.pop_style_var()
+    imgui.pop_style_var(2)
     return issued
 
 
@@ -146,7 +150,7 @@ def _tool_button(icon: str, chosen: bool, side: ImVec2, tip: str) -> bool:
     return pressed
 
 
-def _options(state: State, look: Look) -> list[do.Command]:
+def _options(state: State, look: Look, right: float) -> list[do.Command]:
     """How the selecting tool works."""
     issued: list[do.Command] = []
     editing = state.editing
@@ -158,23 +162,23 @@ def _options(state: State, look: Look) -> list[do.Command]:
         widgets.tooltip(tip)
         imgui.same_line()
     imgui.pop_style_var()
-    imgui.same_line(0, look.px(14))
     label = f"{fa.ICON_FA_LAYER_GROUP}  Through"
+    widgets.go_on(widgets.button_width(label), right, look.px(14))
     if widgets.primary_button(label) if editing.through else imgui.button(label):
         issued.append(point.SetThrough(not editing.through))
     widgets.tooltip("Also select what is hidden behind other things")
     if editing.tool is Tool.BRUSH:
-        imgui.same_line(0, look.px(14))
-        tip = "Radius of the brush, pixels  ([ and ])"
+        tip, width = "Radius of the brush, pixels  ([ and ])", look.px(150)
+        widgets.go_on(width, right, look.px(14))
         text = f"{editing.radius:.0f} px"
-        changed, radius = widgets.slider("##radius", editing.radius, RADIUS_RANGE, text, tip, look.px(150))
+        changed, radius = widgets.slider("##radius", editing.radius, RADIUS_RANGE, text, tip, width)
         if changed:
             issued.append(point.SetRadius(radius))
     return issued
 
 
-def _selection(state: State, look: Look, room: float) -> list[do.Command]:
-    """How much is selected, and what can be done with it; in two lines where `room` is short."""
+def _selection(state: State, look: Look, right: float) -> list[do.Command]:
+    """How much is selected, and what can be done with it."""
     issued: list[do.Command] = []
     editing = state.editing
     imgui.align_text_to_frame_padding()
@@ -187,18 +191,15 @@ def _selection(state: State, look: Look, room: float) -> list[do.Command]:
     count = 0 if state.info is None else state.info.num_gaussians
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
     imgui.same_line(begin + imgui.calc_text_size(f"{count:,} selected").x + look.px(14))
-    issued += _actions()
-    if room < look.px(_LONG):
-        imgui.new_line()
-    else:
-        imgui.same_line(0, look.px(14))
+    issued += _actions(right)
+    widgets.go_on(look.px(_GROWING), right, look.px(14))  # all of it
     issued += _growing(state, look)
     imgui.pop_style_var()
     return issued
 
 
-def _actions() -> list[do.Command]:
-    """What is done with a selection, a button each; the line goes on."""
+def _actions(right: float) -> list[do.Command]:
+    """What is done with a selection, a button each."""
     issued: list[do.Command] = []
     actions: list[tuple[str, str, do.Command]] = [
         (fa.ICON_FA_CIRCLE_HALF_STROKE, "Select the rest instead  (Ctrl+I)", edit.Invert()),
@@ -209,11 +210,12 @@ def _actions() -> list[do.Command]:
         (fa.ICON_FA_TRASH, "Delete  (Del)", edit.Delete()),
         (fa.ICON_FA_XMARK, "Select nothing  (Ctrl+D)", edit.Deselect()),
     ]
-    for icon, tip, command in actions:
+    for place, (icon, tip, command) in enumerate(actions):
+        if place:
+            widgets.go_on(widgets.button_width(icon), right)
         if imgui.button(icon):
             issued.append(command)
         widgets.tooltip(tip)
-        imgui.same_line()
     return issued
 
 
@@ -231,16 +233,14 @@ def _growing(state: State, look: Look) -> list[do.Command]:
             issued.append(edit.Grow(phrase=True))
         widgets.tooltip(f"Grow, only over what is '{active.text.strip()}'")
     imgui.same_line()
-    tip = "How far growing goes, in distances between neighbours"
-    changed, reach = widgets.slider(
-        "##reach", editing.reach, REACH_RANGE, f"{editing.reach:.0f}", tip, look.px(104)
-    )
+    tip, width = "How far growing goes, in distances between neighbours", look.px(_REACH)
+    changed, reach = widgets.slider("##reach", editing.reach, REACH_RANGE, f"{editing.reach:.0f}", tip, width)
     if changed:
         issued.append(point.SetReach(round(reach)))
     return issued
 
 
-def _floaters(state: State, found: Floaters, look: Look, room: float) -> list[do.Command]:
+def _floaters(state: State, found: Floaters, look: Look, right: float) -> list[do.Command]:
     """The preview of floaters, in red in the picture."""
     issued: list[do.Command] = []
     imgui.align_text_to_frame_padding()
@@ -252,34 +252,27 @@ def _floaters(state: State, found: Floaters, look: Look, room: float) -> list[do
         return issued
     count = len(found.mask(marks.visible))
     imgui.text(f"{count:,} floaters")
-    imgui.same_line(0, look.px(14))
-    tip = "How far a Gaussian must stand out from its surroundings; right is stricter"
+    tip, width = "How far a Gaussian must stand out from its surroundings; right is stricter", look.px(170)
+    widgets.go_on(width, right, look.px(14))
     text = f"{found.strictness:.1f}"
-    changed, strictness = widgets.slider(
-        "##strict",
-        found.strictness,
-        STRICTNESS_RANGE,
-        text,
-        tip,
-        look.px(170 if room > look.px(_LONG) else 110),
-    )
+    changed, strictness = widgets.slider("##strict", found.strictness, STRICTNESS_RANGE, text, tip, width)
     if changed:
         issued.append(edit.SetStrictness(strictness))
-    imgui.same_line(0, look.px(14))
-    return issued + _end_floaters(count)
+    return issued + _end_floaters(count, look, right)
 
 
-def _end_floaters(count: int) -> list[do.Command]:
+def _end_floaters(count: int, look: Look, right: float) -> list[do.Command]:
     """The ways out of the preview of so many."""
     issued: list[do.Command] = []
+    widgets.go_on(widgets.button_width("Delete"), right, look.px(14))
     imgui.begin_disabled(count == 0)
     if widgets.primary_button("Delete##floaters"):
         issued.append(edit.EndFloaters("delete"))
-    imgui.same_line()
+    widgets.go_on(widgets.button_width("Select"), right)
     if imgui.button("Select##floaters"):
         issued.append(edit.EndFloaters("select"))
     imgui.end_disabled()
-    imgui.same_line()
+    widgets.go_on(widgets.button_width("Cancel"), right)
     if imgui.button("Cancel##floaters"):
         issued.append(edit.EndFloaters())
     widgets.tooltip("Leave all as it is  (Esc)")
