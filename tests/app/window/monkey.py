@@ -6,9 +6,9 @@ Ends with 0 when the window lived through it without an exception, an OpenGL err
 memory stayed. The window can write only in a temporary folder (guarded.py); leaving is refused, so that
 the run goes on. It begins with a reconstruction, a phrase and every mode of the picture, so that the network
 and the shaders are there from the start and not from whichever minute random hands ask for them. Every
-minute the same scene is opened, and memory is compared there, without what the rooms take that the window
-holds to go back to: which these are is up to random hands. The scene's file is written anew before, since
-they merge scenes into it and save it.
+minute the same scene is opened in a window of the same size, and memory is compared there at rest, without
+what the rooms take that the window holds to go back to: which these are is up to random hands. The scene's
+file is written anew before, since they merge scenes into it and save it.
 """
 
 import argparse
@@ -44,7 +44,9 @@ from tests.app.window.x11 import Client
 PATIENCE = 120.0  # seconds without any sign of life that count as a hang, also on a busy machine
 STEPS_AT_ONCE = 12
 MODE_SECONDS = 2.0
-IDLE = 10.0  # seconds in which nothing follows another scene
+IDLE = 10.0  # seconds in which nothing follows a drop
+AT_REST = 3.0  # seconds without a frame; what is free is given back one second after the last command
+LONGEST_REST = 15.0  # seconds until a window counts that never rests, as where a text cursor blinks
 WARM_MINUTES = 10.0
 SLOPE_MB = 8.0  # a minute; a scene that leaked at each opening would be 20, a reconstruction hundreds
 KEYS = (
@@ -110,9 +112,16 @@ class Staying(Session):
 
 
 def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
-    """The process of the window: a line of JSON about it twice a second, until stdin ends."""
-    ended = threading.Event()
-    threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
+    """The process of the window: a line of JSON about it twice a second, until stdin ends. A line there asks
+    for the size and the picture of the checkpoints."""
+    ended, asked = threading.Event(), threading.Event()
+
+    def listen() -> None:
+        for _ in sys.stdin:
+            asked.set()
+        ended.set()
+
+    threading.Thread(target=listen, daemon=True).start()
     items = Items()
     session = Staying(photos, (width, height))
     if photos:
@@ -121,6 +130,10 @@ def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
     while not ended.is_set() and not session.should_close:
         if session.step(0.25):
             frames, latest = frames + 1, max(latest, session.lag)
+        if asked.is_set():
+            asked.clear()
+            session.dispatch(camera.SetMode(Mode.RGB))
+            glfw.set_window_size(session._window, width, height)
         if time.monotonic() - said > 0.5:
             said, state = time.monotonic(), session.state
             now = items.now()
@@ -337,13 +350,14 @@ class Watched:
 
     def until_scene(self, before: int | None, count: int, click: Callable[[list[int]], None]) -> bool:
         """Wait for another scene than number `before`, of `count` Gaussians, at rest; edits that would be
-        lost are to be discarded with a click. Input that waited may have merged it instead: then nothing
-        more comes."""
+        lost are to be discarded with a click. Input that waited may have merged it instead, or have answered
+        the question: then nothing more comes."""
         end = time.monotonic() + PATIENCE
-        idle = time.monotonic()
+        idle, seen = time.monotonic(), None
         while time.monotonic() < end and self.process.poll() is None:
-            if self.last.get("dialog") or self.last.get("job") or self.last.get("scene") == before:
-                idle = time.monotonic()
+            now = (self.last.get("scene"), self.last.get("dialog"))
+            if self.last.get("job") or now != seen:
+                idle, seen = time.monotonic(), now
             if time.monotonic() - idle > IDLE:
                 return False
             if self.last.get("discard"):
@@ -363,6 +377,19 @@ class Watched:
                 return True
             time.sleep(0.2)
         return False
+
+    def rests(self) -> None:
+        """Ask for the checkpoints' size and picture, and wait until nothing is drawn any more."""
+        assert self.process.stdin is not None
+        with suppress(BrokenPipeError):
+            self.process.stdin.write("\n")
+            self.process.stdin.flush()
+        end = time.monotonic() + LONGEST_REST
+        frames, since = self.last.get("frames"), time.monotonic()
+        while time.monotonic() < min(end, since + AT_REST):
+            time.sleep(0.2)
+            if self.last.get("frames") != frames:
+                frames, since = self.last.get("frames"), time.monotonic()
 
     def _has_come(self, before: int | None, count: int) -> bool:
         return self.last.get("scene") not in (None, before) and self.last["gaussians"] == count
@@ -428,6 +455,7 @@ def run(
                 if now >= checkpoint or now >= seconds:
                     if not opened(hands, watched, len(made.gaussians)):
                         outcome.problems.append(f"the scene did not open: {watched.last}")
+                    watched.rests()
                     rooms = watched.last.get("rooms", 0.0)
                     memory = watched.last.get("rss", 0.0) - rooms
                     outcome.checkpoints.append((now / 60, memory))
