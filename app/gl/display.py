@@ -112,7 +112,9 @@ class Display:
             )
             eyes.release()
 
-        return self._picture(("fading",), (drawn.key, drawn.background), paint, drawn.target.colour.dtype)
+        faded = self._picture(("fading",), (drawn.key, drawn.background), paint, drawn.target.colour.dtype)
+        faded.filter = drawn.target.colour.filter  # Mesa compiles what reads it anew for another one
+        return faded
 
     def _around(
         self, drawn: Drawn, colour: moderngl.Texture | None = None, kind: str = "rgb"

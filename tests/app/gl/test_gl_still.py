@@ -158,6 +158,9 @@ def test_shaders_are_compiled_ahead(gl, scene) -> None:
     renderer.draw(SEEN, weight_maps=False)
     _ = renderer.rgb_texture
     _ = renderer.faded_texture()
+    view = renderer.canvas.view((SEEN.width, SEEN.height))
+    fading, _ = view.display._pictures[("fading",)]
+    assert fading.filter == view.colour.colour.filter  # else Mesa compiles what reads it once more
     renderer.ask(question(made, 1))
     renderer.draw(SEEN, weight_maps=False, fast=True)
     renderer.heat_texture()

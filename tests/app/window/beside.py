@@ -20,6 +20,7 @@ from tests.app.window.sheet import Shot, write_sheet
 OTHERS = [asset_path(f"photos/books_{side}.jpg") for side in ("left", "right")]
 SMALL = (800, 500)
 THING = (0.45, 0.42)  # of the picture's place: the plant
+PLANT = ((0.44, 0.22), (0.44, 0.64))  # its ends
 AROUND = ((0.3, 0.25), (0.44, 0.18), (0.6, 0.3), (0.58, 0.56), (0.42, 0.7), (0.3, 0.5), (0.31, 0.27))
 Story = tuple[str, Callable[[Person], None]]
 
@@ -60,6 +61,20 @@ def draw_around(someone: Person) -> None:
     someone.do("sleep", "0.2", "mouseup", "1")
 
 
+def measure(someone: Person) -> None:
+    """The ruler's key, then a click on both ends of the plant."""
+    press("Escape", "t")(someone)
+    for place in PLANT:
+        someone.do("mousemove", *at(someone, place), "sleep", "0.3", "click", "1", "sleep", "0.5")
+
+
+def look_for_photos(someone: Person) -> None:
+    """A folder's path in what Ctrl+O opens."""
+    press("ctrl+o")(someone)
+    someone.do("type", "--delay", "40", str(PHOTOS[0].parent))
+    press("Return")(someone)
+
+
 def type_plant(someone: Person) -> None:
     press("Escape", "Escape")(someone)
     someone.rest()
@@ -79,9 +94,13 @@ WITH_SCENE: tuple[Story, ...] = (
     ("12. Y: a gizmo moves the selection", press("y")),
     ("12. Ctrl+T recolours it", press("ctrl+t")),
     ("12. M, M: key frames of a camera's path", press("Escape", "ctrl+d", "m", "m")),
+    ("12. T: the ruler", measure),
+    ("12. Num 7: from above", press("Escape", "v", "KP_7")),
+    ("12. Ctrl+M: a scene to merge", press("h", "ctrl+m")),
     ("9. What is this: names to correct", point_with("x")),
     ("4. Ctrl+E: a name of its own for each kind", press("Escape", "ctrl+e")),
     ("10. 'plant': gradation, a legend, colours for all eyes", type_plant),
+    ("3. Everything deleted: what the phrase says", press("Escape", "Escape", "ctrl+a", "Delete")),
     ("2. Photos of another room are dropped", drop_others),
 )
 
@@ -91,6 +110,8 @@ def stories(code: Path) -> Iterator[Shot]:
     with person(code=code) as someone:
         someone.until_first_frame()
         yield Shot("11. The empty window", someone.rest())
+        look_for_photos(someone)
+        yield Shot("11. Ctrl+O and a folder's path", someone.rest())
     with person(words=tuple(map(str, PHOTOS)), code=code) as someone:
         someone.until_first_frame()
         time.sleep(3.0)
