@@ -80,6 +80,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     opened, kept = imgui.begin_popup_modal(title, True, imgui.WindowFlags_.no_resize)
     issued: list[do.Command] = []
     if opened:
+        _keep_inside()
         issued = _body(state.dialog)(state, look)
         if not kept:
             issued.append(do.ShowDialog(None))
@@ -105,6 +106,14 @@ def _place(dialog: str, title: str, look: Look) -> None:
     width = min(look.px(WIDTHS.get(dialog, 520.0)), room.x - margin)
     imgui.set_next_window_size_constraints(ImVec2(width, 0), ImVec2(width, room.y - margin))  # then scrolls
     imgui.set_next_window_size(ImVec2(width, 0))
+
+
+def _keep_inside() -> None:
+    """Move the dialog so that all of it is seen, after a drag or where the window became smaller."""
+    place, size, room = imgui.get_window_pos(), imgui.get_window_size(), imgui.get_io().display_size
+    inside = ImVec2(max(min(place.x, room.x - size.x), 0.0), max(min(place.y, room.y - size.y), 0.0))
+    if (inside.x, inside.y) != (place.x, place.y):
+        imgui.set_window_pos(inside)
 
 
 def _body(dialog: str) -> Callable[[State, Look], list[do.Command]]:

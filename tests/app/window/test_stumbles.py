@@ -360,6 +360,32 @@ def test_a_length_is_taken_once_when_its_field_is_left(items: Items, by_key: boo
     assert hands.of(point.SetLength) == [point.SetLength(1.2)]
 
 
+def test_the_first_length_is_typed_without_a_click() -> None:
+    """Digits would be keys of the modes; once there is a scale they are again."""
+    hands = Hands(lambda seen: ruler.draw(state, seen, PLACE, ROOM))
+    for state in (measuring(), point.SetLength(1.2).apply(measuring())):
+        with context(SIZE):
+            hands.frames(4)
+            assert imgui.get_io().want_text_input == (state.metric is None)
+            imgui.get_io().add_input_characters_utf8("60")
+            hands.frames()
+            hands.key(imgui.Key.enter)
+    assert hands.of(point.SetLength) == [point.SetLength(0.6)]
+
+
+def test_a_dialog_stays_in_the_window() -> None:
+    """Also where it was dragged to its edge, or the window became smaller: its buttons were outside."""
+    state = replace(shown_scene(), dialog="settings")
+    hands = Hands(lambda seen: dialogs.draw(state, seen))
+    with context(SIZE):
+        hands.frames(4)
+        for far in (ImVec2(-300, -200), ImVec2(SIZE[0] - 40, SIZE[1] - 40)):
+            imgui.set_window_pos(dialogs.TITLES["settings"], far)
+            hands.frames(3)
+            left, top, right, bottom = box(dialogs.TITLES["settings"])
+            assert left >= 0 and top >= 0 and right <= SIZE[0] and bottom <= SIZE[1]
+
+
 def test_an_export_moves_nothing_in_the_panel(items: Items, monkeypatch) -> None:
     state = shown_scene()
     running = replace(state, exporting=replace(state.exporting, running=Running(Path("mask.png"))))

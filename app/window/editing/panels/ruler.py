@@ -56,6 +56,8 @@ def _field(state: State, look: Look, ends: list[ImVec2]) -> list[do.Command]:
         imgui.text_colored(theme.MUTED, "this is")
         imgui.same_line()
         imgui.set_next_item_width(look.px(76))
+        if state.metric is None and imgui.is_window_appearing():
+            imgui.set_keyboard_focus_here()  # the digits that follow are meant for it, not for the modes
         known = f"{100 * length * state.metric:.1f}" if state.metric else ""
         entered, text = imgui.input_text_with_hint("cm", "?", known, _ENTER)
         with suppress(ValueError):
