@@ -323,9 +323,11 @@ class Viewport:
         return float("inf") if self._failed is None else max(self._failed[1] + RETRY_SECONDS - state.now, 0.0)
 
     def _order(self, artist: Artist, wanted: _Drawn, kind: Kind, state: State) -> None:
-        """The next still picture, or what the one on show does not tell yet."""
+        """The next still picture, or what the one on show does not tell yet. A moving one is none, however
+        large it is: it ends footprints early."""
         finer = (scale for scale in STILLS if scale >= wanted.plan.scale)  # a coarser one would be drawn over
-        scales = (scale for scale in finer if not self._covers(wanted.at(kind, scale)))
+        moving = self._still is None
+        scales = (scale for scale in finer if moving or not self._covers(wanted.at(kind, scale)))
         scale = next(scales, None)
         if scale is None or self._finished is not None:
             still = self._still if self._finished is None else self._finished[1]

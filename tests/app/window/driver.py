@@ -58,6 +58,7 @@ def summary(session: Session) -> dict:
         "offer": None if state.recovery.edits is None else state.recovery.edits.count,
         "maps": dict(state.stats.passes).get("weights", 0),
         "picture": list(state.stats.picture_size),
+        "settling": state.stats.settling,
         "splats": sum(n for kind, n in state.stats.passes if kind in ("colour", "weights")),
         "gl_errors": session.gl_errors,
         "closed": session.should_close,

@@ -19,6 +19,13 @@ from tests.app.window.scenes import PHRASES, room, shown_scene
 SIZE = (160, 120)
 
 
+class Quick(Governor):
+    """Moves with all pixels, however slow this machine is."""
+
+    def moving(self, wanted: Kind) -> Plan:
+        return Plan(wanted)
+
+
 class Stubborn(Governor):
     """Moves at three quarters of the size, however quick this machine is."""
 
@@ -53,6 +60,32 @@ def test_a_picture_comes_to_rest_in_full(context) -> None:
         viewport.release()
     assert plans[-1] == Plan(Kind.MAPS)
     assert len(plans) <= 3, "the moving one, and what follows it at rest"
+
+
+def test_what_moves_in_full_size_is_followed_by_the_exact_picture(context) -> None:
+    """In a small room it has all pixels, and still ends footprints early: at rest it is not the last one."""
+    shown = shown_scene()
+    scene = room(language_space("minilm").encode(list(PHRASES)))
+    assert shown.info is not None
+    state = replace(shown, prompts=(), info=replace(shown.info, scene=scene))
+    with context:
+        viewport = Viewport(context)
+        viewport.set_scene(1, scene)
+        if viewport._artist is None:
+            pytest.skip("OpenGL here has a graphics card, which draws all pictures itself")
+        plans = []
+        for _ in range(300):
+            viewport.governor = Quick(slow=True)
+            state = replace(state, now=state.now + 0.05)
+            viewport.update(state, SIZE, touched=0.0)
+            plans.append(getattr(viewport.drawn, "plan", None))
+            if viewport._still is not None:
+                break
+            time.sleep(0.01)
+        still = viewport._still
+        viewport.release()
+    assert Plan(Kind.COLOUR) in plans[:-1], "the moving one came first"
+    assert still is not None and (still.camera.width, still.camera.height) == SIZE
 
 
 def test_a_picture_that_could_not_be_drawn_is_told_and_tried_again(context, monkeypatch) -> None:

@@ -115,13 +115,13 @@ class Program:
             return self._lines[-1]
 
     def at_rest(self) -> dict:
-        """Wait until the picture is full and nothing moves: no news for a while."""
+        """Wait until the picture is full and exact and nothing moves: no news for a while."""
         full = [SIZE[0] - LEFT, CANVAS[0].stop - TOP]
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end:
             seen = self.state
             time.sleep(1.2)  # FULL_AFTER and a full picture of this small room
-            if self.state == seen and seen["picture"] == full:
+            if self.state == seen and seen["picture"] == full and not seen["settling"]:
                 return seen
         raise AssertionError(f"no rest; last state {self.state}")
 
