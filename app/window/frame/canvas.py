@@ -3,7 +3,7 @@
 from imgui_bundle import ImVec2, imgui
 
 from .. import commands as do
-from ..editing.panels import gizmo, hands, ruler
+from ..editing.panels import gizmo, hands, pointing, ruler
 from ..editing.state import Tool
 from ..kit.look import Look
 from ..opening.panels import welcome
@@ -31,6 +31,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     ruler.draw_line(state, look, corner, size)
     placed, taken = gizmo.draw(state, look, corner, size)
     over = placed if taken else placed + in_space.draw(state, look, corner, size)
+    pointing.draw_marks(state, look, corner, size)
     if any(isinstance(command, camera.JumpTo) for command in over):
         return over  # the click was on a camera
     buttons = imgui.ButtonFlags_

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -329,6 +330,28 @@ def test_the_rulers_line_is_below_its_field() -> None:
     with context(SIZE):
         Hands(draw).frames(4)
         box("##ruler")  # is there
+    assert before[-1] == 0
+
+
+@pytest.mark.parametrize("mark", ["asked", "card", "region"])
+def test_marks_on_the_picture_are_below_a_dialog(mark: str) -> None:
+    """A dot of the place that was asked about shone through the list of scenes to merge."""
+    state, before = replace(shown_scene(), dialog="help"), list[int]()
+    place, path = (400.0, 300.0), ((400.0, 300.0), (500.0, 420.0))
+    marked = {
+        "asked": replace(state.editing, asked=place),
+        "card": replace(state.editing, card=Card(Reading(place), ())),
+        "region": replace(state.editing, tool=Tool.BOX, drag=path),
+    }
+    shown = replace(look(), picture=SimpleNamespace(glo=1))  # pyright: ignore[reportArgumentType]
+
+    def draw(seen: Look) -> list[Command]:
+        issued, _ = layout.draw_all(replace(state, editing=marked[mark]), shown)
+        before.append(imgui.get_foreground_draw_list().vtx_buffer.size())
+        return issued
+
+    with context(SIZE):
+        Hands(draw).frames(4)
     assert before[-1] == 0
 
 

@@ -1,4 +1,6 @@
-"""At the pointer: the region being drawn, what lies under it, and the answer to "what is this?"."""
+"""At the pointer: the region being drawn, what lies under it, and the answer to "what is this?".
+
+`draw_marks` draws into the picture's own window, so that bars, cards and dialogs are over it."""
 
 import math
 
@@ -19,17 +21,26 @@ _CARD = 312.0  # design pixels wide
 _SHOWN_WORDS = 5
 
 
-def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
-    """What belongs to the pointer and to the place that was asked about."""
+def draw_marks(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
+    """On the picture, in the present window: the region under way, and the place that was asked about."""
     _region(state, look, place, size)
+    editing = state.editing
+    if editing.card is not None:
+        at = _pinned_at(state, editing.card.reading, place, size)
+        if at is not None:
+            _pin(at, look)
+    elif editing.asked is not None:
+        _pin(_on_screen(editing.asked, place), look)
+
+
+def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
+    """What tells of the pointer's place, and of the one that was asked about."""
     editing = state.editing
     quiet = editing.card is not None or editing.asked is not None
     if editing.tool is Tool.POINT and not quiet and editing.hover is not None and editing.hover.point:
         _tooltip(state, editing.hover, look)
     if editing.card is not None:
         return _card(state, editing.card, look, place, size)
-    if editing.asked is not None:
-        _pin(_on_screen(editing.asked, place), look)
     return []
 
 
@@ -43,7 +54,7 @@ def _region(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
     editing = state.editing
     if not editing.tool.selects:
         return
-    io, canvas = imgui.get_io(), imgui.get_foreground_draw_list()
+    io, canvas = imgui.get_io(), imgui.get_window_draw_list()
     canvas.push_clip_rect(place, ImVec2(place.x + size.x, place.y + size.y), True)
     combine = "add" if io.key_shift else "remove" if io.key_ctrl else editing.combine
     colour = theme.BAD if combine == "remove" else theme.SELECTED
@@ -120,7 +131,7 @@ def _bar(share: float, colour: ImVec4, look: Look, line: float | None = None) ->
 
 
 def _pin(at: ImVec2, look: Look) -> None:
-    canvas = imgui.get_foreground_draw_list()
+    canvas = imgui.get_window_draw_list()
     canvas.add_circle_filled(at, look.px(5), widgets.u32(theme.ACCENT))
     canvas.add_circle(at, look.px(7), widgets.u32(ImVec4(0, 0, 0, 0.7)), 0, look.px(1.5))
 
@@ -141,8 +152,6 @@ def _pinned_at(state: State, reading: Reading, place: ImVec2, size: ImVec2) -> I
 def _card(state: State, card: Card, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
     """The answer, beside its place."""
     at = _pinned_at(state, card.reading, place, size)
-    if at is not None:
-        _pin(at, look)
     right = place.x + size.x - look.px(_CARD + 16)
     corner = ImVec2(right, place.y + look.px(12))
     if at is not None:
