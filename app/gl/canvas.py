@@ -71,10 +71,14 @@ class Canvas:
         """Whether these targets are still there to be read."""
         return view in self._views
 
-    def release(self) -> None:
-        """Give everything back; what is drawn next makes it anew."""
+    def forget(self) -> None:
+        """Give all targets back, and no program; what is drawn next makes its own."""
         while self._views:
             self._views.pop().release()
+
+    def release(self) -> None:
+        """Give everything back; what is drawn next makes it anew."""
+        self.forget()
         self.painter.release()
 
 

@@ -158,7 +158,7 @@ class Viewport:
             return False
 
     def set_scene(self, serial: int, scene: "Scene") -> None:
-        """Upload a scene; the first one builds the renderer.
+        """Upload a scene; the first one builds the renderer. What pictures of another took is given back.
 
         Raises:
             GraphicsError: the OpenGL here cannot do it.
@@ -166,6 +166,7 @@ class Viewport:
         self._warming = None
         renderer = self._made()
         renderer.set_scene(scene)
+        renderer.canvas.forget()
         renderer.ask(None)
         self._serial, self._query, self._keys = serial, None, ()
         self._drawn = self._texture = self._colouring = self._answered = None

@@ -31,6 +31,7 @@ import glfw
 import numpy as np
 
 from app.window.asking import commands as ask
+from app.window.filming import commands as film
 from app.window.scene import camera
 from app.window.scene.state import Mode
 from app.window.session import Session
@@ -113,7 +114,7 @@ class Staying(Session):
 
 def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
     """The process of the window: a line of JSON about it twice a second, until stdin ends. A line there asks
-    for the size and the picture of the checkpoints."""
+    for the size and the picture of the checkpoints, without phrases."""
     ended, asked = threading.Event(), threading.Event()
 
     def listen() -> None:
@@ -132,6 +133,8 @@ def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
             frames, latest = frames + 1, max(latest, session.lag)
         if asked.is_set():
             asked.clear()
+            for prompt in session.state.prompts:
+                session.dispatch(ask.RemovePrompt(prompt.key))
             session.dispatch(camera.SetMode(Mode.RGB))
             glfw.set_window_size(session._window, width, height)
         if time.monotonic() - said > 0.5:
@@ -156,7 +159,7 @@ def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
 
 
 def _see_everything(session: Session) -> None:
-    """Wait for the scene of the photos, ask, and look at it in every mode."""
+    """Wait for the scene of the photos, ask, look at it in every mode, and on a way between two places."""
 
     def goes_on(seconds: float, until: Callable[[], bool]) -> None:
         end = time.monotonic() + seconds
@@ -168,6 +171,13 @@ def _see_everything(session: Session) -> None:
     for mode in Mode:
         session.dispatch(camera.SetMode(mode))
         goes_on(MODE_SECONDS, lambda: False)
+    for turn in (0.0, 0.1):
+        session.dispatch(camera.Orbit(turn, 0.0))
+        session.dispatch(film.AddKey())
+    session.dispatch(film.Preview())
+    goes_on(PATIENCE, lambda: session.state.tour is not None)
+    session.dispatch(film.StopTour())
+    session.dispatch(film.ClearKeys())
     session.dispatch(camera.SetMode(Mode.RGB))
 
 
@@ -378,12 +388,16 @@ class Watched:
             time.sleep(0.2)
         return False
 
-    def rests(self) -> None:
-        """Ask for the checkpoints' size and picture, and wait until nothing is drawn any more."""
+    def ask(self) -> None:
+        """Ask for the checkpoints' size and picture."""
         assert self.process.stdin is not None
         with suppress(BrokenPipeError):
             self.process.stdin.write("\n")
             self.process.stdin.flush()
+
+    def rests(self) -> None:
+        """Ask again, since input may have waited, and wait until nothing is drawn any more."""
+        self.ask()
         end = time.monotonic() + LONGEST_REST
         frames, since = self.last.get("frames"), time.monotonic()
         while time.monotonic() < min(end, since + AT_REST):
@@ -453,6 +467,7 @@ def run(
             while not outcome.problems:
                 now = time.monotonic() - start
                 if now >= checkpoint or now >= seconds:
+                    watched.ask()  # a scene comes without what pictures of the one before needed
                     if not opened(hands, watched, len(made.gaussians)):
                         outcome.problems.append(f"the scene did not open: {watched.last}")
                     watched.rests()
