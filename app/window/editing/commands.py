@@ -206,9 +206,9 @@ class RenameAtom:
         if marks is None or not 0 <= self.atom < len(marks.atoms):
             return state
         label = (
-            f"Name atom {self.atom} {self.name.strip()!r}"
+            f"Name group {self.atom} {self.name.strip()!r}"
             if self.name.strip()
-            else f"Unname atom {self.atom}"
+            else f"Unname group {self.atom}"
         )
         return with_edit(state, label, edits.rename_atom(marks, self.atom, self.name))
 
@@ -225,7 +225,7 @@ class DenyAtom:
         if marks is None or not 0 <= self.atom < len(marks.atoms):
             return state
         marks = edits.deny_atom(marks, self.atom, self.text)
-        return with_edit(state, f"Atom {self.atom} is not {self.text.strip()!r}", marks)
+        return with_edit(state, f"Group {self.atom} is not {self.text.strip()!r}", marks)
 
 
 @dataclass(frozen=True)
@@ -238,7 +238,7 @@ class MergeAtoms:
         marks = state.editing.marks
         if marks is None or not self.atoms or not all(0 <= k < len(marks.atoms) for k in self.atoms):
             return state
-        label = "Merge atoms " + ", ".join(map(str, self.atoms))
+        label = "Merge groups " + ", ".join(map(str, self.atoms))
         return with_edit(state, label, edits.merge_atoms(marks, self.atoms))
 
 
@@ -253,7 +253,7 @@ class ToggleAtom:
         if marks is None or not 0 <= self.atom < len(marks.atoms):
             return state
         verb = "Silence" if marks.atoms[self.atom].on else "Wake"
-        return with_edit(state, f"{verb} atom {self.atom}", edits.toggle_atom(marks, self.atom))
+        return with_edit(state, f"{verb} group {self.atom}", edits.toggle_atom(marks, self.atom))
 
 
 @dataclass(frozen=True)

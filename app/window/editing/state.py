@@ -202,7 +202,7 @@ class Editing:
         """What the person calls an atom, or else its nearest word."""
         own = self.history.marks.atoms[k].name if self.history else ""
         words = self.names[k] if k < len(self.names) else ()
-        return own or (words[0] if words else f"atom {k}")
+        return own or (words[0] if words else f"group {k}")
 
 
 NO_EDITING = Editing()

@@ -216,7 +216,7 @@ class FindAtom(Selection):
 
         heads = np.array([atom.into for atom in self.marks.atoms] + [-1])  # the last for "none"
         found = heads[strongest_atoms(self.scene.semantics)] == heads[self.atom]
-        yield Found(Mask.of(found), self.combine, f"of atom {self.atom}")
+        yield Found(Mask.of(found), self.combine, f"of group {self.atom}")
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ def figures(state: State) -> list[str]:
         said += [
             f"picture {1000 * stats.picture_seconds:.0f} ms at {width} x {height}",
             _count(there[0], state.editing.num_deleted),
-            f"{there[1]} atoms",
+            f"{there[1]} groups",
         ]
         hover = state.editing.hover
         if hover is not None and hover.point is not None:

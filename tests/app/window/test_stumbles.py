@@ -355,6 +355,37 @@ def test_marks_on_the_picture_are_below_a_dialog(mark: str) -> None:
     assert before[-1] == 0
 
 
+def test_an_answer_is_over_the_dictionary() -> None:
+    """It lay behind it: its words and buttons could not be reached."""
+    state = shown_scene()
+    wanted = replace(state.preferences, dictionary_open=True, dictionary=(400, 100, 400, 500))
+    states = [replace(state, preferences=wanted)]
+    shown = replace(look(), picture=SimpleNamespace(glo=1))  # pyright: ignore[reportArgumentType]
+
+    def over(x: float, y: float) -> str:
+        imgui.get_io().add_mouse_pos_event(x, y)
+        hands.frames()
+        window = imgui.get_current_context().hovered_window
+        assert window is not None
+        return window.name
+
+    card = Card(Reading((200.0, 100.0)), (("chair", 0.9),))  # of the picture's place
+    answered = replace(states[0], editing=replace(states[0].editing, card=card))
+    with context(SIZE):
+        hands = Hands(lambda seen: layout.draw_all(states[-1], shown)[0])
+        for state in (answered, states[0]):  # the window of answers is older than the dictionary's last click
+            states.append(state)
+            hands.frames(4)
+        hands.click(600, 590)
+        assert over(600, 590).startswith("Dictionary")
+        states.append(answered)
+        hands.frames(4)
+        left, top, right, bottom = box("##card")
+        x, y = (max(left, 400) + right) / 2, (max(top, 100) + bottom) / 2
+        assert left < x < 800 and top < y < 600, "they overlap"
+        assert over(x, y) == "##card"
+
+
 @pytest.mark.parametrize("by_key", [False, True])
 def test_a_length_is_taken_once_when_its_field_is_left(items: Items, by_key: bool) -> None:
     """Every other time would be an edit of its own, to be undone on its own."""

@@ -44,8 +44,8 @@ PATIENCE = 300.0  # seconds
 MODES = (
     (Mode.RGB, "RGB"), (Mode.HEAT, "Heat-map of one phrase"), (Mode.LABELS, "Labels: the best phrase"),
     (Mode.MASKS, "Masks of all phrases"), (Mode.ISOLATE, "Only these"), (Mode.HIDE, "Without these"),
-    (Mode.DIM, "Dim the rest"), (Mode.DEPTH, "Depth"), (Mode.ATOMS, "Atoms, the scene's groups"),
-    (Mode.FEATURES, "Features"), (Mode.WEIGHT, "One atom"), (Mode.TRANSMITTANCE, "Transmittance"),
+    (Mode.DIM, "Dim the rest"), (Mode.DEPTH, "Depth"), (Mode.ATOMS, "The scene's groups"),
+    (Mode.FEATURES, "Features"), (Mode.WEIGHT, "One group"), (Mode.TRANSMITTANCE, "Transmittance"),
     (Mode.COVERAGE, "Coverage: photos that see it"), (Mode.AGREEMENT, "Agreement of the photos"),
     (Mode.MARGIN, "Margin: how sure the best is"),
 )  # fmt: skip

@@ -32,7 +32,7 @@ def button(state: State) -> list[do.Command]:
     label = f"{fa.ICON_FA_BOOK}##dictionary"
     pressed = widgets.primary_button(label) if opened else imgui.button(label)
     imgui.end_disabled()
-    widgets.tooltip("The dictionary: what the scene is made of; name, silence, merge its atoms")
+    widgets.tooltip("The dictionary: what the scene is made of; name, silence, merge its groups")
     return [ask.OpenDictionary(not opened)] if pressed else []
 
 
@@ -54,7 +54,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     issued: list[do.Command] = []
     shown, kept = imgui.begin("Dictionary", True, flags)
     if shown and imgui.begin_tab_bar("##tabs"):
-        if imgui.begin_tab_item("Atoms")[0]:
+        if imgui.begin_tab_item("Groups")[0]:
             issued += _atoms(state, marks.atoms[: marks.there[1]], look)
             imgui.end_tab_item()
         if imgui.begin_tab_item("Similarity")[0]:
@@ -107,11 +107,11 @@ def _atoms(state: State, atoms: tuple[Atom, ...], look: Look) -> list[do.Command
     widgets.gap(look.px(2))
     chosen = tuple(k for k in state.asking.chosen if k in heads)
     imgui.begin_disabled(len(chosen) < 2)
-    text = f"Merge {len(chosen)} atoms" if len(chosen) > 1 else "Merge"
+    text = f"Merge {len(chosen)} groups" if len(chosen) > 1 else "Merge"
     if widgets.primary_button(f"{fa.ICON_FA_OBJECT_GROUP}  {text}"):
         issued += [edit.MergeAtoms(chosen), ask.ChooseNone()]
     imgui.end_disabled()
-    widgets.tooltip("Tick two or more atoms; the first ticked keeps its name.  Ctrl+Z undoes")
+    widgets.tooltip("Tick two or more groups; the first ticked keeps its name.  Ctrl+Z undoes")
     return issued
 
 
@@ -141,7 +141,7 @@ def _name(state: State, k: int, atom: Atom, room: float, look: Look) -> list[do.
         )
     if changed or (imgui.is_item_deactivated_after_edit() and name != atom.name):
         issued.append(edit.RenameAtom(k, name))
-    widgets.tooltip(f"Atom {k}; type to name it")
+    widgets.tooltip(f"Group {k}; type to name it")
     return issued
 
 
@@ -207,9 +207,9 @@ def _similarity(state: State, atoms: tuple[Atom, ...], look: Look) -> None:
     """Cosines of all pairs, alike atoms side by side."""
     insight = state.asking.insight
     if insight is None:
-        widgets.muted("The atoms are being looked over.")
+        widgets.muted("The groups are being looked over.")
         return
-    widgets.muted("Cosine of every pair; alike atoms stand side by side.")
+    widgets.muted("Cosine of every pair; alike groups stand side by side.")
     order = list(insight.order)
     matrix = insight.similarity[np.ix_(order, order)]
     count, room = len(order), imgui.get_content_region_avail()

@@ -167,6 +167,8 @@ def _card(state: State, card: Card, look: Look, place: ImVec2, size: ImVec2) -> 
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     with widgets.colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
         imgui.begin("##card", None, widgets.PLAIN | imgui.WindowFlags_.no_focus_on_appearing)
+        if imgui.is_window_appearing():  # over the dictionary, and without its keys
+            imgui.internal.bring_window_to_display_front(imgui.internal.get_current_window())
         issued = _answer(state, card, look)
         imgui.end()
     imgui.pop_style_var()

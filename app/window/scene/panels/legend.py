@@ -119,7 +119,7 @@ def _prompts(state: State, look: Look) -> None:
 def _atoms(state: State, look: Look) -> None:
     insight = state.asking.insight
     if insight is None or not insight.shares:
-        widgets.muted("Every atom of the dictionary in its own colour.")
+        widgets.muted("Every group of the dictionary in its own colour.")
         return
     largest = sorted(range(len(insight.shares)), key=lambda k: -insight.shares[k])[:_ATOMS_NAMED]
     for k in largest:

@@ -29,7 +29,7 @@ TIPS = {
     Mode.HIDE: "Everything but what passes",
     Mode.DIM: "What passes in full colour, the rest dimmed",
     Mode.FEATURES: "Principal axes of the language features",
-    Mode.WEIGHT: "How much of one atom each pixel carries",
+    Mode.WEIGHT: "How much of one group each pixel carries",
     Mode.TRANSMITTANCE: "The light that passes every splat",
     Mode.COVERAGE: "How many photos saw what is shown",
     Mode.AGREEMENT: "How well the photos agree on depth",
@@ -108,7 +108,7 @@ def _menu(state: State, look: Look) -> list[do.Command]:
 def _missing(mode: Mode) -> str:
     if mode is Mode.AGREEMENT:
         return "This scene does not say which photo made what, or has one photo only"
-    return "This scene has no photos" if mode is Mode.COVERAGE else "This scene has no atoms"
+    return "This scene has no photos" if mode is Mode.COVERAGE else "This scene has no groups"
 
 
 def _key(mode: Mode) -> str:

@@ -180,9 +180,9 @@ def test_what_the_pointer_left_is_forgotten(shown: State) -> None:
 
 def test_atoms_are_named_by_the_person_or_by_words(shown: State) -> None:
     state = after(shown, point.AtomsNamed((("armchair", "sofa"), ("wall",), ())))
-    assert [state.editing.atom_name(k) for k in range(3)] == ["armchair", "wall", "atom 2"]
+    assert [state.editing.atom_name(k) for k in range(3)] == ["armchair", "wall", "group 2"]
     state = after(state, edit.RenameAtom(0, "my chair"), edit.RenameAtom(9, "none"))
-    assert state.editing.atom_name(0) == "my chair" and labels(state) == ["Name atom 0 'my chair'"]
+    assert state.editing.atom_name(0) == "my chair" and labels(state) == ["Name group 0 'my chair'"]
     assert after(state, edit.Undo()).editing.atom_name(0) == "armchair"
 
 
