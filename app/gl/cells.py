@@ -1,37 +1,61 @@
 """Cells of a picture and the atoms that are seen in each: weight maps where OpenGL runs on the processor.
 
 There a pass costs by the layers it blends into, and few of a scene's atoms are in any one part of a picture:
-of 40 some 14 in a cell of 64 x 64 pixels. Each cell is drawn by itself, by the splats that reach it, into
-the layers that hold its atoms; atoms that are seen together share a layer. In the other layers of a
+of 40 some 10 in a cell of 32 x 32 pixels. Each cell is drawn by the splats that reach it alone, and what it
+holds goes to the layers of its atoms; atoms that are seen together share a layer. In the other layers of a
 cell every weight is 0, so the maps are the same to the bit.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from langflash_core.splat.tiles import num_touched, tiles_touched
 
-from .layout import ATOMS_A_LAYER, LAYERS_A_PASS, num_layers
+from .layout import ATOMS_A_LAYER, LAYERS_A_PASS
 from .splats import SplatBuffers
 
-SIDE = 64  # pixels, a tile of llvmpipe
+SIDE = 32  # pixels; half a tile of llvmpipe
 MOST_PAIRS = 1 << 24  # of splats and cells; sorting so many takes half a GB
 _FARTHEST = 1e9  # keeps the largest footprints inside int64
 
 
 @dataclass(frozen=True)
-class Cell:
-    """box: x, y, width, height in pixels. places: in draw order, of the splats that reach it, ascending.
-    atoms: (K,) bool, which they carry."""
+class Cells:
+    """boxes: (n, 4) x, y, width, height, pixels. places: in draw order, of the splats that reach each cell,
+    ascending. atoms: (n, K) bool, which these carry."""
 
-    box: tuple[int, int, int, int]
-    places: np.ndarray = field(repr=False)
+    boxes: np.ndarray
+    places: list[np.ndarray] = field(repr=False)
     atoms: np.ndarray = field(repr=False)
 
 
-def cells_of(splats: SplatBuffers, size: tuple[int, int], side: int = SIDE) -> list[Cell] | None:
+@dataclass(frozen=True)
+class Batch:
+    """Cells that are drawn into as many layers. cells: (b,) numbers. layers: (b, L), where what each one
+    holds belongs."""
+
+    cells: np.ndarray
+    layers: np.ndarray
+
+    def slots(self, atoms: np.ndarray, num_atoms: int) -> np.ndarray:
+        """(b, K): place of each atom in the layers of each cell, 3 L for none.
+
+        Args:
+            atoms: as `together` orders them.
+        """
+        count = self.layers.shape[1]
+        table = np.full((int(self.layers.max()) + 1, ATOMS_A_LAYER), num_atoms)
+        flat = table.ravel()
+        flat[: len(atoms)] = atoms[: len(flat)]
+        slots = np.full((len(self.cells), num_atoms + 1), ATOMS_A_LAYER * count)
+        held = table[self.layers].reshape(len(self.cells), -1)
+        np.put_along_axis(slots, held, np.arange(ATOMS_A_LAYER * count)[None], axis=1)
+        return slots[:, :num_atoms]
+
+
+def cells_of(splats: SplatBuffers, size: tuple[int, int], side: int = SIDE) -> Cells | None:
     """Cells of a picture (width, height) that measured splats reach; None where so many reach so many that
     each is better drawn once."""
     boxes = np.nan_to_num(splats.boxes()).clip(-_FARTHEST, _FARTHEST)
@@ -40,27 +64,27 @@ def cells_of(splats: SplatBuffers, size: tuple[int, int], side: int = SIDE) -> l
         return None
     places, cells, (columns, _) = tiles_touched(boxes.T, *size, side)
     if not len(cells):
-        return []
-    order = np.argsort(cells, kind="stable")
+        return Cells(np.zeros((0, 4), np.int64), [], np.zeros((0, 0), bool))
+    few = int(cells.max()) < 1 << 16
+    order = np.argsort(cells.astype(np.uint16) if few else cells, kind="stable")  # of so many NumPy counts
     places, cells = places[order], cells[order]
     starts = np.flatnonzero(np.diff(cells, prepend=-1))
-    atoms = splats.atoms_of(places, starts)
-    corners = [(side * int(n % columns), side * int(n // columns)) for n in cells[starts]]
-    return [
-        Cell((x, y, min(side, size[0] - x), min(side, size[1] - y)), run, carried)
-        for (x, y), run, carried in zip(corners, np.split(places, starts[1:]), atoms, strict=True)
-    ]
+    low = side * np.stack((cells[starts] % columns, cells[starts] // columns), 1)
+    found = np.concatenate((low, np.minimum(side, np.array(size) - low)), 1)
+    return Cells(found, np.split(places, starts[1:]), splats.atoms_of(places, starts))
 
 
-def together(cells: Sequence[Cell]) -> np.ndarray:
-    """Atoms (Ka,) that are in any cell, layer by layer; those that are in the same cells share one."""
-    if not cells:
-        return np.zeros(0, np.int64)
-    where = np.stack([cell.atoms for cell in cells], 1)  # (K, cells)
+def together(carried: np.ndarray) -> np.ndarray:
+    """Atoms (Ka,) that are in any cell, layer by layer; those that are in the same cells share one.
+
+    Args:
+        carried: (n, K) bool, atoms of cells.
+    """
+    where = carried.T
     counts = where.sum(1)
     left = np.flatnonzero(counts)
     order: list[int] = []
-    covered = np.zeros(len(cells), bool)
+    covered = np.zeros(len(carried), bool)
     while len(left):
         fresh = len(order) % ATOMS_A_LAYER == 0
         if fresh:  # a layer begins with the widest that is left
@@ -73,15 +97,19 @@ def together(cells: Sequence[Cell]) -> np.ndarray:
     return np.array(order, np.int64)
 
 
-def chosen_layers(cell: Cell, atoms: np.ndarray, capacity: int) -> list[list[int]]:
-    """Layers that hold atoms of a cell, at most a pass at a time, an even number so that few programs do.
+def batches(carried: np.ndarray, atoms: np.ndarray, capacity: int) -> Iterator[Batch]:
+    """Each cell's layers, at most a pass at a time, an even number so that few programs do.
 
     Args:
-        atoms: as `together` orders them. capacity: layers there are, an even number.
+        carried: as above. atoms: as `together` orders them. capacity: layers there are, whole passes.
     """
-    carried = np.zeros(ATOMS_A_LAYER * num_layers(len(atoms)), bool)
-    carried[: len(atoms)] = cell.atoms[atoms]
-    needed = np.flatnonzero(carried.reshape(-1, ATOMS_A_LAYER).any(1)).tolist()
-    if len(needed) % 2:
-        needed.append(next(layer for layer in range(capacity) if layer not in needed))
-    return [needed[first : first + LAYERS_A_PASS] for first in range(0, len(needed), LAYERS_A_PASS)]
+    held = np.zeros((len(carried), ATOMS_A_LAYER * capacity), bool)
+    held[:, : len(atoms)] = carried[:, atoms]
+    needed = held.reshape(len(carried), capacity, ATOMS_A_LAYER).any(2)
+    mine_first = np.argsort(~needed, axis=1, kind="stable")
+    count = 2 * -(-needed.sum(1) // 2)
+    for first in range(0, capacity, LAYERS_A_PASS):
+        for width in range(LAYERS_A_PASS, 0, -2):
+            cells = np.flatnonzero(np.clip(count - first, 0, LAYERS_A_PASS) == width)
+            if len(cells):
+                yield Batch(cells, mine_first[cells, first : first + width])

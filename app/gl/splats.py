@@ -1,6 +1,7 @@
 """One scene's Gaussians on the GPU: sorted, projected, and their weights expanded, per camera."""
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import moderngl
@@ -19,6 +20,7 @@ from .targets import as_sprites
 
 _ROW_TEXELS = 4096
 _ROWS_AT_ONCE = 1 << 16  # Gaussians: 12 MB of coefficients of degree 3
+_SPLATS_AT_ONCE = 1 << 17  # of cells: 13 MB of weights
 TINTS = ((0.16, 0.56, 1.0), (1.0, 0.22, 0.20))  # colours of tint 1, selected, and tint 2, to be deleted
 TINTED = 0.75  # share of the tint; the rest and the shading stay, so that shapes can be seen
 _SHAPE_FLOATS = 8  # place (4), shape (4)
@@ -347,38 +349,67 @@ class SplatBuffers:
             self._vaos[key] = self._ctx.vertex_array(program, content)
         self._render(self._vaos[key], len(self.order))
 
-    def draw_some(
-        self, program: moderngl.Program, places: np.ndarray, slots: np.ndarray, num_layers: int
+    def draw_cells(
+        self,
+        program: moderngl.Program,
+        boxes: np.ndarray,
+        places: Sequence[np.ndarray],
+        slots: np.ndarray,
+        num_layers: int,
     ) -> None:
-        """As `draw`, weights alone, of those at these places of the order, whose footprints were read back.
+        """As `draw`, weights alone, in each cell those at its places of the order, whose footprints were read
+        back, within its box. The framebuffer's scissor is the last one's afterwards.
 
         Args:
-            places: ascending. slots: (K,) int64, place of each atom in the layers, 3 `num_layers` for none.
+            boxes: (b, 4) x, y, width, height, pixels. places: of each cell, ascending.
+            slots: (b, K), place of each atom in the layers of each cell, 3 `num_layers` for none.
         """
-        assert self.footprints is not None
-        rows = self.order[places]
-        width = ATOMS_A_LAYER * num_layers
-        dense = np.zeros((len(rows), width + 1), np.float32)  # the last one for atoms of other layers
-        flat, firsts = dense.ravel(), np.arange(len(rows)) * (width + 1)
-        for ids, values in zip(self._ids[rows].T, self._values[rows].T, strict=True):
-            flat[firsts + slots[ids]] += values
-        streams = self.footprints[places], np.ascontiguousarray(dense[:, :width])
-        for buffer, stream in zip((self._some, self._weights), streams, strict=True):
-            buffer.at_least(stream.nbytes).write(stream)
-        key = ("some", program.glo)
+        key = ("cells", program.glo)
         if key not in self._vaos:
             each = "v" if self.sprites else "i"
             content = [
-                (self._some.at_least(0), f"4f 4f/{each}", "in_place", "in_shape"),
-                (self._weights.at_least(0), f"{ATOMS_A_LAYER * num_layers}f/{each}", "in_weights"),
+                (self._some.at_least(1), f"4f 4f/{each}", "in_place", "in_shape"),
+                (self._weights.at_least(1), f"{ATOMS_A_LAYER * num_layers}f 4x/{each}", "in_weights"),
             ]
             self._vaos[key] = self._ctx.vertex_array(program, content)
-        self._render(self._vaos[key], len(rows))
+        counts = [len(each) for each in places]
+        for first, last in self._uploads(counts):
+            self._stream(places[first:last], slots[first:last], ATOMS_A_LAYER * num_layers)
+            at = 0
+            for box, count in zip(boxes[first:last].tolist(), counts[first:last], strict=True):
+                self._ctx.fbo.scissor = tuple(box)
+                self._render(self._vaos[key], count, at)
+                at += count
 
-    def _render(self, vao: moderngl.VertexArray, count: int) -> None:
+    def _uploads(self, counts: Sequence[int]) -> Iterator[tuple[int, int]]:
+        """Cells to draw out of one upload: quads from the first one on, sprites of several."""
+        first, total = 0, 0
+        for cell, count in enumerate(counts):
+            if cell > first and (not self.sprites or total + count > _SPLATS_AT_ONCE):
+                yield first, cell
+                first, total = cell, 0
+            total += count
+        if counts:
+            yield first, len(counts)
+
+    def _stream(self, places: Sequence[np.ndarray], slots: np.ndarray, width: int) -> None:
+        """Footprints and dense weights, `width` a splat, of cells one after the other."""
+        assert self.footprints is not None
+        chosen = np.concatenate(places)
+        rows, (cells, num_atoms) = self.order[chosen], slots.shape
+        ids, values = (torch.from_numpy(each[rows]) for each in (self._ids, self._values))
+        first = np.repeat(num_atoms * np.arange(cells), [len(each) for each in places])
+        held = torch.from_numpy(slots).reshape(-1)[ids + torch.from_numpy(first)[:, None]]
+        dense = torch.zeros(len(rows), width + 1)  # the last one for atoms of other layers
+        dense.scatter_add_(1, held, values)
+        for buffer, stream in ((self._some, self.footprints[chosen]), (self._weights, dense.numpy())):
+            buffer.at_least(stream.nbytes).write(stream)
+
+    def _render(self, vao: moderngl.VertexArray, count: int, first: int = 0) -> None:
+        """first: of sprites alone."""
         if self.sprites:
             with as_sprites(self._ctx, int(_MARGIN)):
-                vao.render(moderngl.POINTS, vertices=count)
+                vao.render(moderngl.POINTS, vertices=count, first=first)
         else:
             vao.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=count)
 

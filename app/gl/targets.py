@@ -1,7 +1,7 @@
 """What is drawn into: float targets, layers of texture arrays, and a scope that leaves no trace."""
 
 import ctypes
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
 import moderngl
@@ -11,6 +11,7 @@ from langflash_core.graphics import bound_framebuffer
 
 _GL_FRAMEBUFFER = 0x8D40
 _GL_COLOR_ATTACHMENT0 = 0x8CE0
+_GL_TEXTURE_2D_ARRAY = 0x8C1A
 NUMPY_TYPES = {"f2": np.float16, "f4": np.float32}
 
 PREMULTIPLIED = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
@@ -118,6 +119,8 @@ class LayerTarget:
         self._framebuffers: dict[tuple, moderngl.Framebuffer] = {}
         arguments = (ctypes.c_uint,) * 3 + (ctypes.c_int,) * 2
         self._attach = gl_function(ctx, "glFramebufferTextureLayer", None, *arguments)
+        self._read_from = gl_function(ctx, "glReadBuffer", None, ctypes.c_uint)
+        self._copy = gl_function(ctx, "glCopyTexSubImage3D", None, ctypes.c_uint, *[ctypes.c_int] * 8)
 
     def layers(
         self, first: int, count: int, beside: tuple[moderngl.Texture, ...] = ()
@@ -141,6 +144,17 @@ class LayerTarget:
             self._attach(_GL_FRAMEBUFFER, _GL_COLOR_ATTACHMENT0 + place, self.array.glo, 0, layer)
         previous.use()
         return framebuffer
+
+    def copy(self, layer: int, into: "LayerTarget", places: Iterable[tuple[Sequence[int], int]]) -> None:
+        """Rectangles (x, y, width, height) of a layer to the same place in these layers of another."""
+        source = self.layers(layer, 1)
+        previous = bound_framebuffer(self._ctx)
+        source.use()
+        self._read_from(_GL_COLOR_ATTACHMENT0)
+        into.array.use(0)
+        for (x, y, width, height), other in places:
+            self._copy(_GL_TEXTURE_2D_ARRAY, 0, x, y, other, x, y, width, height)
+        previous.use()
 
     def texel(self, first: int, count: int, x: int, y: int) -> np.ndarray:
         """(count, 4): one pixel of `count` layers from `first` on."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from langflash_core.graphics import set_uniforms
 
-from .cells import Cell, cells_of, chosen_layers, together
+from .cells import Batch, Cells, batches, cells_of, together
 from .layout import ATOMS_A_LAYER, ATOMS_A_PASS, LAYERS_A_PASS, num_layers
 from .painter import Painter
 from .scene import Level
@@ -61,6 +61,7 @@ class WeightMaps:
         self._painter = painter
         self._size = size
         self._layers = Layers(painter.ctx, size, dtype)
+        self._cells = Layers(painter.ctx, size, dtype)
         self._maps: Maps | None = None
 
     def shows(self, level: Level) -> bool:
@@ -96,35 +97,38 @@ class WeightMaps:
             splats.draw(program, expanded, count, colour=False)
         self._painter.passes["weights"] += 1
 
-    def _drawn_in_cells(self, level: Level, cells: list[Cell]) -> Maps:
-        """The same, each cell of the picture with its own atoms alone (cells.py)."""
-        atoms = together(cells)
+    def _drawn_in_cells(self, level: Level, cells: Cells) -> Maps:
+        """The same, each cell of the picture with its own atoms alone (cells.py).
+
+        Cells that need as many layers are drawn beside each other, into the first ones of an array for that,
+        and go from there to their atoms' layers: a framebuffer for each cell leaves all processors but one
+        without work.
+        """
+        atoms = together(cells.atoms)
         passes = -(-len(atoms) // ATOMS_A_PASS)
         layers = self._layers.at_least(max(1, passes * LAYERS_A_PASS))
         for first in range(0, num_layers(len(atoms)), LAYERS_A_PASS):
             layers.layers(first, LAYERS_A_PASS).clear()
-        for cell in cells:
-            for chosen in chosen_layers(cell, atoms, layers.num_layers):
-                self._draw_cell(level.splats, layers, cell, atoms, chosen)
+        for batch in batches(cells.atoms, atoms, layers.num_layers):
+            self._draw_batch(level.splats, cells, batch, batch.slots(atoms, cells.atoms.shape[1]))
+            boxes = cells.boxes[batch.cells].tolist()
+            for place, chosen in enumerate(batch.layers.T.tolist()):
+                self._cells.at_least(1).copy(place, layers, zip(boxes, chosen, strict=True))
         self._painter.passes["weights"] += passes
         return Maps(layers, atoms, level.order_key)
 
-    def _draw_cell(
-        self, splats: SplatBuffers, layers: LayerTarget, cell: Cell, atoms: np.ndarray, chosen: list[int]
-    ) -> None:
-        count = len(chosen)
+    def _draw_batch(self, splats: SplatBuffers, cells: Cells, batch: Batch, slots: np.ndarray) -> None:
+        count = batch.layers.shape[1]
         program = self._painter.programs.get("quad.vert", "weights.frag", {"LAYERS": count, **splats.defines})
         set_uniforms(program, image_size=tuple(float(n) for n in self._size))
-        slots = np.full(len(cell.atoms), ATOMS_A_LAYER * count)
-        for place, layer in enumerate(chosen):
-            there = atoms[ATOMS_A_LAYER * layer :][:ATOMS_A_LAYER]
-            slots[there] = ATOMS_A_LAYER * place + np.arange(len(there))
-        target = layers.chosen(chosen)
-        target.scissor = cell.box
+        target = self._cells.at_least(count).layers(0, count)
+        target.clear()
         with drawing(target, PREMULTIPLIED):
-            splats.draw_some(program, cell.places, slots, count)
+            places = [cells.places[cell] for cell in batch.cells]
+            splats.draw_cells(program, cells.boxes[batch.cells], places, slots, count)
         target.scissor = (0, 0, *self._size)
 
     def release(self) -> None:
+        self._cells.release()
         self._layers.release()
         self._maps = None
