@@ -62,6 +62,58 @@ def test_large_arrays_leave_nothing_behind() -> None:
     assert later < HELD_MB  # what `give_back` is for
 
 
+A_JOB_OF_CRUMBS = """
+import time
+from app.window.commands import Notify
+from app.window.requests import Job
+from app.window.scene.commands import Loaded
+from app.window.worker import Worker
+
+def resident_mb():
+    lines = open("/proc/self/status").read().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("RssAnon:")) / 1024
+
+class Crumbs(Job):
+    # takes 200 MB in pieces too small to be mapped one by one, and keeps every hundredth
+    kept = []
+
+    def run(self, serial, progress, cancelled):
+        pieces = [bytearray(64_000) for _ in range(3200)]
+        Crumbs.kept = pieces[::100]
+        return Notify(str(resident_mb()))
+
+def heard(kind):
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
+        for command in worker.poll():
+            if isinstance(command, kind):
+                return command
+        time.sleep(0.01)
+    raise SystemExit(f"no {kind}")
+
+worker = Worker()
+heard(Loaded)
+before = resident_mb()
+worker.submit(Crumbs())
+print(float(heard(Notify).text) - before)
+end = time.monotonic() + 10
+while resident_mb() > before + 60 and time.monotonic() < end:
+    time.sleep(0.05)
+print(resident_mb() - before)
+worker.stop()
+"""
+
+
+def test_what_a_finished_job_held_goes_back() -> None:
+    """In a process of its own: what other tests have left free would feed the job."""
+    program = [sys.executable, "-c", A_JOB_OF_CRUMBS]
+    done = subprocess.run(program, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    taken, stayed = map(float, done.stdout.split())
+    assert taken > 150  # of 200 MB
+    assert stayed < 60  # a third of it; allocators round
+
+
 def test_rest_begins_with_the_last_command() -> None:
     clock = [5.0]
     hands = Hands(print, print, print, lambda: None, lambda: clock[0])

@@ -1,7 +1,5 @@
 """The worker thread, for real: files, the text tower, cancel, and latest-wins."""
 
-import os
-import sys
 import time
 from pathlib import Path
 
@@ -10,9 +8,7 @@ from PIL import Image
 
 from app.window.asking import commands as ask
 from app.window.asking.work import Answer, Encode
-from app.window.commands import Notify, OfScene, ShowPicture
-from app.window.memory import give_back
-from app.window.requests import Job
+from app.window.commands import OfScene, ShowPicture
 from app.window.scene import commands as show
 from app.window.scene import work
 from app.window.worker import Worker
@@ -22,7 +18,6 @@ from langflash_core.language.spaces import language_space
 from langflash_core.resources import asset_path
 from langflash_core.scene.file import load, save
 from langflash_core.splat import render
-from tests.app.window.monkey import resident_mb
 from tests.app.window.scenes import PHRASES, room
 
 PATIENCE = 60.0  # seconds; generous because the machine may be busy, never waited for in full
@@ -158,30 +153,3 @@ def test_what_was_to_be_saved_is_saved_before_the_end(scene_file: Path, tmp_path
     worker.stop()
     assert len(load(tmp_path / "saved.langflash").gaussians) == len(scene.gaussians)
     assert not [file for file in tmp_path.iterdir() if file.name != "saved.langflash"]
-
-
-class Crumbs(Job):
-    """Takes 200 MB in pieces too small to be mapped one by one, and keeps every hundredth until the next."""
-
-    kept: list[bytearray] = []  # noqa: RUF012
-
-    def run(self, serial: int, progress, cancelled) -> Notify:
-        pieces = [bytearray(64_000) for _ in range(3200)]
-        Crumbs.kept = pieces[::100]
-        return Notify(f"{resident_mb(os.getpid()):.0f}")
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the allocator keeps to itself")
-def test_what_a_finished_job_held_goes_back_to_the_system(worker: Worker) -> None:
-    wait_for(worker, show.Loaded)
-    give_back()  # or the job would take what other tests have left free, too
-    before = resident_mb(os.getpid())
-    worker.submit(Crumbs())
-    at_most = float(wait_for(worker, Notify)[-1].text)
-    assert at_most > before + 150  # it was taken
-    end = time.monotonic() + PATIENCE
-    while resident_mb(os.getpid()) > before + 60:  # a third; allocators round
-        assert time.monotonic() < end, (
-            f"{resident_mb(os.getpid()):.0f} MB of {at_most:.0f}, {before:.0f} before"
-        )
-        time.sleep(0.05)
