@@ -110,7 +110,6 @@ class Watched(Program):
             )
 
     def end(self) -> dict:
-        self._process.terminate()
         self.leave()
         return json.loads(self.record.read_text())
 

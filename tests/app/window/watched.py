@@ -125,12 +125,13 @@ def main() -> int:
     width, height, record, *paths = sys.argv[1:]
     items = Items()
     launched = time.perf_counter()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))  # the record is written all the same
+    leaving = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: leaving.set())  # the record is written all the same
     session = Session(paths, (int(width), int(height)))
     watch = Watch()
     last = None
     try:
-        while not session.should_close:
+        while not (session.should_close or leaving.is_set()):
             watch.step(session)
             state = session.state
             now = {**summary(session), "items": items.now()}
