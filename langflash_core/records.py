@@ -25,7 +25,8 @@ class Record:
     preset: of the network. source: the splat file it came from. photos: names, one per view.
     warnings: a sentence each. metric_scale: metres per scene unit. network_unit: the network's
     length units per scene unit. counts: Gaussians predicted and left out. pruning: as `prune` left
-    it. refinement: what a fit to the photos brought. calibration: what the network's checkpoint
+    it. refinement: what a fit to the photos brought. detail: what was spent on how fine elements, and what
+    it bought. calibration: what the network's checkpoint
     says about scores, instead of its language space. atom_names: a person's own, by atom, which it
     answers to. atom_denials: what a person said that an atom is not. silent_atoms: those that answer
     no phrase. num_deleted: Gaussians that edits took away. camera_path: the window's key frames.
@@ -41,6 +42,7 @@ class Record:
     counts: Mapping[str, int] = field(default_factory=dict)
     pruning: Mapping[str, int] = field(default_factory=dict)
     refinement: Mapping[str, Any] = field(default_factory=dict)
+    detail: Mapping[str, Any] = field(default_factory=dict)
     calibration: Mapping[str, Any] = field(default_factory=dict)
     atom_names: Mapping[int, str] = field(default_factory=dict)
     atom_denials: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
