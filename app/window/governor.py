@@ -2,6 +2,7 @@
 
 While the camera moves, a picture should take `MOVING_SECONDS`: one that takes longer sends the next
 ones down a ladder of smaller pictures, for large scenes also of fewer Gaussians once those are made;
+where OpenGL runs on the processor, a scene that knows its levels moves as its coarse Gaussians alone;
 ones that take less than three quarters send them up again, a rung at a time, and less than half where the
 next rung is known to take too long. Colour, colour with the fast mode's relevance, and exact maps are paced
 apart, because they cost so differently. At rest the picture settles: at once at full size where that is
@@ -75,29 +76,45 @@ def _ladder(num_gaussians: int, slow: bool) -> tuple[tuple[float, float], ...]:
     return SIZES_OF_MIDDLING_SCENES if slow and num_gaussians >= MIDDLING_SCENE else SIZES
 
 
-def thinned_shares(num_gaussians: int, slow: bool) -> tuple[float, ...]:
-    """Shares of a scene's Gaussians that moving through it wants, the larger first."""
-    return tuple(sorted({share for _, share in _ladder(num_gaussians, slow)} - {1.0}, reverse=True))
+def _of(ladder: tuple[tuple[float, float], ...], share: float) -> tuple[tuple[float, float], ...]:
+    """The ladder of a scene that is itself a share of another."""
+    return tuple((scale, own * share) for scale, own in ladder)
 
 
 @dataclass(frozen=True)
 class Governor:
-    """For one scene. slow: where OpenGL runs on the processor. shares: of the Gaussians, that are made; 1
-    always is. full_seconds: what a full picture of a kind cost last, smoothed; rungs: where on the ladder a
-    kind moves; tried: seconds that a kind took last on a rung."""
+    """For one scene. slow: where OpenGL runs on the processor. coarse: share of its coarse Gaussians, 1 where
+    it has no levels. shares: of the Gaussians, that are made; `share` always is. full_seconds: what a full
+    picture of a kind cost last, smoothed; rungs: where on the ladder a kind moves; tried: seconds that a kind
+    took last on a rung."""
 
     num_gaussians: int = 0
     slow: bool = False
+    coarse: float = 1.0
     shares: tuple[float, ...] = ()
     full_seconds: dict[Kind, float] = field(default_factory=dict)
     rungs: dict[Kind, int] = field(default_factory=dict)
     tried: dict[tuple[Kind, int], float] = field(default_factory=dict)
 
     @property
+    def share(self) -> float:
+        """Of the Gaussians that move where there is time: all, or the coarse ones."""
+        return self.coarse if self.slow and self.num_gaussians >= MIDDLING_SCENE else 1.0
+
+    @property
+    def wants(self) -> tuple[float, ...]:
+        """Shares of the Gaussians that moving through the scene asks to be thinned to, the larger first."""
+        return tuple(sorted({share for _, share in self._best} - {self.share}, reverse=True))
+
+    @property
+    def _best(self) -> tuple[tuple[float, float], ...]:
+        """The ladder once everything is made."""
+        return _of(_ladder(round(self.share * self.num_gaussians), self.slow), self.share)
+
+    @property
     def ladder(self) -> tuple[tuple[float, float], ...]:
         """(scale, share) from dear to cheap."""
-        ladder = _ladder(self.num_gaussians, self.slow)
-        return ladder if {1.0, *self.shares} >= {share for _, share in ladder} else SIZES
+        return self._best if {*self.shares} >= {*self.wants} else _of(SIZES, self.share)
 
     def with_share(self, share: float) -> "Governor":
         """Once that share of the Gaussians is made; with other rungs one begins anew."""
@@ -107,7 +124,7 @@ class Governor:
     def learn(self, plan: Plan, seconds: float, moving: bool = True) -> "Governor":
         """Account for a picture just drawn, while the camera moved or at rest."""
         full = self.full_seconds
-        if plan.share == 1:  # cost goes with the pixels, nearly
+        if plan.share == self.share:  # cost goes with the pixels, nearly
             estimate = seconds / plan.scale**2
             full = {**full, plan.kind: 0.5 * (full.get(plan.kind, estimate) + estimate)}
         if not moving or (plan.scale, plan.share) not in self.ladder:
@@ -131,7 +148,7 @@ class Governor:
         """
         unknown = math.inf if self.slow else MOVING_SECONDS
         if wanted is not Kind.COLOUR and self._expected(Kind.MAPS, unknown) <= MOVING_SECONDS:
-            return Plan(Kind.MAPS)
+            return Plan(Kind.MAPS, share=self.share)
         if wanted is Kind.MAPS:
             smallest = min(scale for scale, _ in SIZES)
             if self._expected(Kind.MAPS, 1.0) * smallest**2 > MOVING_SECONDS:

@@ -14,6 +14,9 @@ _CELLS = 1 << 10  # a side of the grid that orders Gaussians along a space-filli
 def thin(scene: Scene, share: float) -> Scene:
     """About `share` of the Gaussians, widened so that as much is covered as before.
 
+    Of a scene that knows its levels, a share no larger than `coarse_share` is of the coarse Gaussians alone;
+    of just that size it is all of them, as they are.
+
     Gaussian i is kept with probability p_i = min(1, c a_i), a_i its opacity times the area of its two
     longest axes, and its axes grow by p_i^-1/2: what it covers, times p_i, stays a_i. Large ones are
     therefore kept as they are and small ones give way to dots of one size. One draw serves all: along
@@ -38,6 +41,12 @@ def thin_with_rows(scene: Scene, share: float) -> tuple[Scene, np.ndarray]:
     """`thin`, and the rows of the scene that were kept, ascending."""
     if not 0 < share <= 1:
         raise ValueError(f"share: expected a number in (0, 1], received {share}")
+    coarse = coarse_share(scene)
+    if share <= coarse < 1:
+        assert scene.levels is not None
+        closed = (scene.levels == 0).nonzero()[:, 0].cpu()
+        thinned, some = thin_with_rows(scene.rows(closed), share / coarse)
+        return thinned, closed.numpy()[some]
     if share == 1 or not len(scene.gaussians):
         return scene, np.arange(len(scene.gaussians))
     chances = inclusion(covered_areas(scene.gaussians), share * len(scene.gaussians))
@@ -49,6 +58,12 @@ def thin_with_rows(scene: Scene, share: float) -> tuple[Scene, np.ndarray]:
     thinned = scene.rows(kept)
     wider = replace(thinned.gaussians, scales=thinned.gaussians.scales * growth[:, None])
     return replace(thinned, gaussians=wider), rows
+
+
+def coarse_share(scene: Scene) -> float:
+    """Share of the Gaussians that are coarse, in (0, 1]; 1 where nobody knows, or all are one level."""
+    count = 0 if scene.levels is None else int((scene.levels == 0).sum())
+    return count / len(scene.gaussians) if count else 1.0
 
 
 def covered_areas(gaussians: Gaussians) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from langflash_core.scene.thin import covered_areas, inclusion, thin, z_order
+from langflash_core.scene.thin import coarse_share, covered_areas, inclusion, thin, thin_with_rows, z_order
 from langflash_core.splat import render
 from tests.app.gl.questions import psnr
 from tests.splat.scenes import camera, cloud
@@ -106,3 +106,29 @@ def test_nothing_to_thin():
     for share in (0.0, -1.0, 1.5, float("nan")):
         with pytest.raises(ValueError, match="share"):
             thin(scene, share)
+
+
+def test_coarse_gaussians_stand_for_a_scene_with_levels():
+    scene = cloud(1000, 5)
+    levels = (torch.arange(1000) % 4 > 0).to(torch.uint8)
+    known = replace(scene, levels=levels)
+    assert coarse_share(known) == 0.25
+    coarse, rows = thin_with_rows(known, 0.25)
+    assert rows.tolist() == list(range(0, 1000, 4))
+    assert torch.equal(coarse.gaussians.scales, scene.gaussians.scales[::4]), "as wide as they are"
+    half, some = thin_with_rows(known, 0.125)
+    alone, own = thin_with_rows(known.rows(torch.from_numpy(rows)), 0.5)
+    assert (some == rows[own]).all() and torch.equal(half.gaussians.scales, alone.gaussians.scales)
+    more, others = thin_with_rows(known, 0.5)  # more than there are of them
+    assert (others == thin_with_rows(scene, 0.5)[1]).all() and more.levels is not None
+
+
+@pytest.mark.parametrize("level", [0, 1, None])
+def test_one_level_is_none(level):
+    """All coarse, all detail, nobody knows: thinned as ever."""
+    scene = cloud(200, 3)
+    same = None if level is None else torch.full((200,), level, dtype=torch.uint8)
+    known = replace(scene, levels=same)
+    assert coarse_share(known) == 1
+    assert (thin_with_rows(known, 0.25)[1] == thin_with_rows(scene, 0.25)[1]).all()
+    assert coarse_share(known.rows(torch.zeros(200, dtype=torch.bool))) == 1

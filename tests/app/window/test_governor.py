@@ -15,7 +15,6 @@ from app.window.governor import (
     Governor,
     Kind,
     Plan,
-    thinned_shares,
 )
 
 
@@ -102,7 +101,7 @@ def test_what_was_never_drawn_is_expected_to_cost_more_than_colour() -> None:
 
 def test_on_a_slow_machine_nothing_measured_is_no_reason_to_draw_maps() -> None:
     """Where fewer Gaussians are made before the first picture, no full one is ever measured."""
-    governor = Governor(MIDDLING_SCENE, slow=True, shares=thinned_shares(MIDDLING_SCENE, True))
+    governor = Governor(MIDDLING_SCENE, slow=True, shares=(0.5, 0.25))
     governor = governor.learn(governor.moving(Kind.COLOUR), 0.05)
     assert not governor.full_seconds
     assert governor.moving(Kind.FAST).kind is Kind.FAST
@@ -128,8 +127,8 @@ def test_an_unknown_machine_starts_in_the_middle() -> None:
 
 
 def test_thinner_levels_count_once_they_are_made() -> None:
-    assert thinned_shares(LARGE_SCENE, False) == (0.25, 0.0625)
-    assert thinned_shares(MIDDLING_SCENE, True) == (0.5, 0.25) and thinned_shares(MIDDLING_SCENE, False) == ()
+    assert Governor(LARGE_SCENE).wants == (0.25, 0.0625) and Governor(MIDDLING_SCENE).wants == ()
+    assert Governor(MIDDLING_SCENE, slow=True).wants == (0.5, 0.25)
     slow = Governor(MIDDLING_SCENE, slow=True)
     assert slow.ladder == SIZES == slow.with_share(0.5).ladder
     moved = slow.learn(Plan(Kind.COLOUR, 0.5), 0.06).with_share(0.5).with_share(0.25)
@@ -138,3 +137,32 @@ def test_thinner_levels_count_once_they_are_made() -> None:
     assert (slower.scale, slower.share) == (0.35, 1.0), "fewer pixels come before fewer Gaussians"
     half = Governor(LARGE_SCENE).with_share(0.25)
     assert half.ladder == SIZES and half.with_share(0.0625).ladder != SIZES
+
+
+def test_a_scene_with_levels_moves_as_its_coarse_gaussians_on_a_slow_machine() -> None:
+    governor = Governor(4 * MIDDLING_SCENE, slow=True, coarse=0.2)
+    assert governor.share == 0.2 and governor.wants == ()
+    assert governor.ladder == tuple((scale, 0.2) for scale, _ in SIZES)
+    assert governor.moving(Kind.COLOUR) == Plan(Kind.COLOUR, SIZES[-1][0], 0.2), "the cheapest first"
+    governor, plans = settled(governor, Kind.COLOUR, 0.4)
+    assert {plan.share for plan in plans} == {0.2} and plans[-1].scale == 0.35
+    assert governor.moving(Kind.FAST).scale < 0.5, "what colours cost tells of others"
+    quick, _ = settled(governor, Kind.COLOUR, 0.004)
+    assert quick.moving(Kind.FAST) == Plan(Kind.MAPS, 1.0, 0.2)
+    assert not quick.moving(Kind.COLOUR).covers(Plan(Kind.COLOUR, 0.5)), "all of them are still to come"
+    assert quick.moving(Kind.MAPS).share == 0.2
+
+
+def test_who_draws_everything_quickly_knows_no_levels() -> None:
+    card = Governor(4 * MIDDLING_SCENE, coarse=0.2)
+    assert card.share == 1 and card.ladder == SIZES and card.moving(Kind.COLOUR).share == 1
+    small = Governor(MIDDLING_SCENE - 1, slow=True, coarse=0.2)
+    assert small.share == 1 and small.ladder == SIZES
+
+
+def test_many_coarse_gaussians_are_thinned_in_turn() -> None:
+    """Of many photos, or with a splat file merged, all of whose Gaussians are coarse."""
+    governor = Governor(10 * MIDDLING_SCENE, slow=True, coarse=0.25)
+    assert governor.wants == (0.125, 0.0625) and governor.ladder[-1] == (SIZES[-1][0], 0.25)
+    made = governor.with_share(0.125).with_share(0.0625)
+    assert made.ladder == tuple((scale, 0.25 * share) for scale, share in SIZES_OF_MIDDLING_SCENES)
