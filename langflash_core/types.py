@@ -190,6 +190,9 @@ class Scene:
     photos: small JPEG bytes per view, or none. view_ids: (N,) int64 in [0, V), the view that each
     Gaussian was predicted from; None where nobody knows; -1 of those that no photo of this scene made, which
     a merge brought and files do not tell apart.
+    levels: (N,) uint8, 0 of the coarse Gaussians, which are a closed picture of the whole scene on their own,
+    1 of the detail that lies on them; None: all are one level. confidences: (N,) float32 in [0, 1], how sure
+    the depth was where each lies, a number beside the picture and no transparency; None: nobody knows.
 
     Raises:
         ValueError: sizes disagree, or a number names no view or no atom.
@@ -203,6 +206,8 @@ class Scene:
     photos: tuple[bytes, ...] = ()
     view_ids: Tensor | None = None
     record: Record = field(default_factory=Record)
+    levels: Tensor | None = None
+    confidences: Tensor | None = None
 
     def __post_init__(self) -> None:
         count, num_views = len(self.gaussians), len(self.viewmats)
@@ -219,6 +224,12 @@ class Scene:
         if self.view_ids is not None:
             _shape("view_ids", self.view_ids, (count,))
             _names("view_ids", self.view_ids, num_views, lowest=-1)
+        if self.levels is not None:
+            _shape("levels", self.levels, (count,))
+            _names("levels", self.levels, 2, dtype=torch.uint8)
+        if self.confidences is not None:
+            _shape("confidences", self.confidences, (count,))
+            _shares("confidences", self.confidences)
         for name in ("atom_names", "atom_denials", "silent_atoms"):
             atoms = torch.tensor(list(getattr(self.record, name)), dtype=torch.int64)
             _names(name, atoms, self.semantics.num_atoms)
@@ -252,7 +263,9 @@ class Scene:
             self,
             gaussians=self.gaussians.rows(keep),
             semantics=self.semantics.rows(keep),
-            view_ids=None if self.view_ids is None else self.view_ids[keep.to(self.view_ids.device)],
+            view_ids=_picked(self.view_ids, keep),
+            levels=_picked(self.levels, keep),
+            confidences=_picked(self.confidences, keep),
         )
 
     def with_record(self, **changes) -> "Scene":
@@ -373,12 +386,25 @@ def _shape(name: str, values: Tensor, expected: tuple[int, ...]) -> None:
         raise ValueError(f"{name}: expected shape {expected}, received {tuple(values.shape)}")
 
 
-def _names(name: str, ids: Tensor, count: int, lowest: int = 0) -> None:
-    """Numbers int64 in [lowest, count)."""
-    if ids.dtype != torch.int64:
-        raise ValueError(f"{name}: expected int64, received {ids.dtype}")
+def _picked(values: Tensor | None, keep: Tensor) -> Tensor | None:
+    """Some rows of what may not be known."""
+    return None if values is None else values[keep.to(values.device)]
+
+
+def _names(name: str, ids: Tensor, count: int, lowest: int = 0, dtype: torch.dtype = torch.int64) -> None:
+    """Numbers of that type in [lowest, count)."""
+    if ids.dtype != dtype:
+        raise ValueError(f"{name}: expected {str(dtype).removeprefix('torch.')}, received {ids.dtype}")
     if ids.numel() == 0:
         return
     low, high = (int(bound) for bound in ids.aminmax())
     if low < lowest or high >= count:
         raise ValueError(f"{name}: expected values in [{lowest}, {count}), received {low} to {high}")
+
+
+def _shares(name: str, values: Tensor) -> None:
+    """Numbers float32 in [0, 1]."""
+    if values.dtype != torch.float32:
+        raise ValueError(f"{name}: expected float32, received {values.dtype}")
+    if not bool(((values >= 0) & (values <= 1)).all()):  # nor is what is not finite
+        raise ValueError(f"{name}: expected values in [0, 1], received others")

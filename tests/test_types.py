@@ -44,6 +44,8 @@ def made(count: int = 4, **changes) -> Scene:
         "view_size": (4, 3),
         "photos": (b"a", b"b"),
         "view_ids": torch.arange(count) % 2,
+        "levels": (torch.arange(count) % 2).to(torch.uint8),
+        "confidences": torch.arange(count) / max(count, 1),
     }
     return Scene(gaussians, semantics, **{**whole, **changes})
 
@@ -70,7 +72,10 @@ def test_rows_take_every_field_along(keep):
     assert part.semantics.weight_ids[:, 0].tolist() == [row % 3 for row in rows]
     assert part.view_ids is not None and part.view_ids.tolist() == [row % 2 for row in rows]
     assert part.semantics.dictionary is scene.semantics.dictionary and part.photos is scene.photos
-    assert made(view_ids=None).rows(keep).view_ids is None
+    assert part.levels is not None and part.levels.tolist() == [row % 2 for row in rows]
+    assert part.confidences is not None and part.confidences.tolist() == [row / 4 for row in rows]
+    unknown = made(view_ids=None, levels=None, confidences=None).rows(keep)
+    assert unknown.view_ids is None and unknown.levels is None and unknown.confidences is None
 
 
 @pytest.mark.parametrize(
@@ -117,6 +122,13 @@ def _semantics(**changes) -> Semantics:
         (lambda: made(view_ids=torch.zeros(3, dtype=torch.int64)), "view_ids: expected shape"),
         (lambda: made(view_ids=torch.full((4,), 2)), r"view_ids: expected values in \[-1, 2\)"),
         (lambda: made(view_ids=torch.full((4,), -2)), r"view_ids: expected values in \[-1, 2\)"),
+        (lambda: made(levels=torch.zeros(3, dtype=torch.uint8)), "levels: expected shape"),
+        (lambda: made(levels=torch.zeros(4, dtype=torch.int64)), "levels: expected uint8, received"),
+        (lambda: made(levels=torch.full((4,), 2, dtype=torch.uint8)), r"levels: expected values in \[0, 2\)"),
+        (lambda: made(confidences=torch.zeros(5)), "confidences: expected shape"),
+        (lambda: made(confidences=torch.zeros(4, dtype=torch.float64)), "confidences: expected float32"),
+        (lambda: made(confidences=torch.full((4,), 1.01)), r"confidences: expected values in \[0, 1\]"),
+        (lambda: made(confidences=torch.full((4,), torch.nan)), r"confidences: expected values in \[0, 1\]"),
         (lambda: made(record=Record(silent_atoms=(3,))), "silent_atoms: expected values"),
         (lambda: made(record=Record(atom_names={-1: "a"})), "atom_names: expected values"),
     ],

@@ -2,9 +2,10 @@
 
 A .ply gets it as a side-car, NAME.language.safetensors; a .glb carries it inside. Viewers read the
 Gaussians and know nothing of it. Tensors: weight_ids and weight_values (N, m), dictionary (K, C),
-viewmats (V, 4, 4), Ks (V, 3, 3), and the photos; the header's JSON says the language space, the size of
-the views, the scene's record, and the SHA-256 of the Gaussians' positions: who moves, sorts or
-removes some in another program gets the plain splats and a sentence, not words on the wrong things.
+viewmats (V, 4, 4), Ks (V, 3, 3), the photos, and where they are known view_ids, levels and confidences (N,);
+the header's JSON says the language space, the size of the views, the scene's record, and the SHA-256 of the
+Gaussians' positions: who moves, sorts or removes some in another program gets the plain splats and a
+sentence, not words on the wrong things.
 """
 
 import hashlib
@@ -80,6 +81,8 @@ def with_language(scene: Scene, block: bytes, name: str) -> Scene:
             photos=photos,
             view_ids=fields["view_ids"].long() if "view_ids" in fields else None,
             record=from_json(dict(described["metadata"])),
+            levels=fields.get("levels"),
+            confidences=fields["confidences"].float() / 255 if "confidences" in fields else None,
         )
         check_scene(whole)
         return whole

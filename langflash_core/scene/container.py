@@ -15,7 +15,7 @@ from safetensors import SafetensorError
 
 from langflash_core.errors import SceneFileError
 
-FORMAT, VERSION = "langflash-scene", 2
+FORMAT, VERSION = "langflash-scene", 3
 _MAX_HEADER = 64 * 2**20
 _REMEDY = "reconstruct the scene again or copy the whole file"
 _FOREIGN = {

@@ -76,7 +76,8 @@ def there(scene: Scene, marks: Marks) -> Scene:
     num_gaussians, num_atoms = marks.there
     if marks.there == (len(scene.gaussians), scene.semantics.num_atoms):
         return scene
-    semantics = scene.semantics.rows(torch.arange(num_gaussians))
+    first = _first(scene, num_gaussians)
+    semantics = first.semantics
     if num_atoms:
         semantics = replace(semantics, dictionary=semantics.dictionary[:num_atoms])
     else:  # a splat file, into which a scene with language was merged
@@ -89,12 +90,18 @@ def there(scene: Scene, marks: Marks) -> Scene:
         atom_denials={k: words for k, words in record.atom_denials.items() if k < num_atoms},
         silent_atoms=tuple(k for k in record.silent_atoms if k < num_atoms),
     )
+    return replace(first, semantics=semantics, record=record)
+
+
+def _first(scene: Scene, count: int) -> Scene:
+    """So many of the Gaussians. Levels and confidences that tell nothing, as a scene without them is given
+    in a merge, go."""
+    first = scene.rows(torch.arange(count))
+    levels, confidences = first.levels, first.confidences
     return replace(
-        scene,
-        gaussians=scene.gaussians.rows(torch.arange(num_gaussians)),
-        semantics=semantics,
-        view_ids=None if scene.view_ids is None else scene.view_ids[:num_gaussians],
-        record=record,
+        first,
+        levels=None if levels is None or not bool(levels.any()) else levels,
+        confidences=None if confidences is None or bool((confidences == 1).all()) else confidences,
     )
 
 

@@ -4,6 +4,7 @@ float16 rounds by a factor of at most 2^-11 (0.05 %): scales by 0.05 %, colours 
 and opacities by 0.00025, directions of axes by 0.03 degrees. Measured on a wall seen by two
 cameras, pictures before and after agree to 91 dB PSNR and weight maps to 1e-5 on average. Means
 stay float32: at distance 4 float16 would move a point by up to 0.002, half a pixel's footprint.
+Levels are bytes, and so are confidences, in steps of 1/255.
 """
 
 import torch
@@ -17,7 +18,10 @@ REQUIRED = (
     "means", "quats", "scales", "opacities", "sh",
     "weight_ids", "weight_values", "dictionary", "viewmats", "Ks",
 )  # fmt: skip
-_VIEW_IDS = "view_ids"
+_VIEW_IDS, _LEVELS, _CONFIDENCES = "view_ids", "levels", "confidences"
+_OPTIONAL = (_VIEW_IDS, _LEVELS, _CONFIDENCES)
+NEWER = (_LEVELS, _CONFIDENCES)
+"""Of which version 2 of the file knows nothing."""
 _HALF_MAX, _HALF_MIN = 65504.0, 6e-8
 _PHOTO = "photo_{:03d}"
 _DTYPES = {
@@ -44,6 +48,10 @@ def to_fields(scene: Scene) -> dict[str, Tensor]:
     }
     if scene.view_ids is not None:
         fields[_VIEW_IDS] = _narrow(scene.view_ids, scene.num_views)
+    if scene.levels is not None:
+        fields[_LEVELS] = scene.levels
+    if scene.confidences is not None:
+        fields[_CONFIDENCES] = (255 * scene.confidences).round().to(torch.uint8)
     for view, photo in enumerate(scene.photos):
         fields[_PHOTO.format(view)] = torch.frombuffer(bytearray(photo), dtype=torch.uint8)
     return {name: values.detach().cpu().contiguous() for name, values in fields.items()}
@@ -63,7 +71,7 @@ def from_fields(fields: dict[str, Tensor], space: str, view_size: tuple[int, int
         ValueError: a field is missing, unknown, or of another type.
     """
     missing = [name for name in REQUIRED if name not in fields]
-    photos = sorted(name for name in fields if name not in (*REQUIRED, _VIEW_IDS))
+    photos = sorted(name for name in fields if name not in (*REQUIRED, *_OPTIONAL))
     if missing or photos != [_PHOTO.format(view) for view in range(len(photos))]:
         raise ValueError(f"fields: expected {', '.join(REQUIRED)} and photos, received {', '.join(fields)}")
     for name, values in fields.items():
@@ -87,15 +95,17 @@ def from_fields(fields: dict[str, Tensor], space: str, view_size: tuple[int, int
     )
     jpegs = tuple(fields[name].numpy().tobytes() for name in photos)
     view_ids = fields[_VIEW_IDS].long() if _VIEW_IDS in fields else None
+    confidences = fields[_CONFIDENCES].float() / 255 if _CONFIDENCES in fields else None
     return Scene(
-        gaussians, semantics, fields["viewmats"], fields["Ks"], view_size, jpegs, view_ids, record
+        gaussians, semantics, fields["viewmats"], fields["Ks"], view_size, jpegs, view_ids, record,
+        fields.get(_LEVELS), confidences,
     )  # fmt: skip
 
 
 def field_bytes(scene: Scene) -> dict[str, int]:
     """Stored bytes by field, photos together."""
     sizes = {name: values.numel() * values.element_size() for name, values in to_fields(scene).items()}
-    named = {name: size for name, size in sizes.items() if name in (*REQUIRED, _VIEW_IDS)}
+    named = {name: size for name, size in sizes.items() if name in (*REQUIRED, *_OPTIONAL)}
     return {**named, "photos": sum(sizes.values()) - sum(named.values())}
 
 

@@ -1,12 +1,14 @@
 """`scene.langflash`: one safetensors file, no pickle, whole or refused.
 
 The safetensors header's `__metadata__` holds four strings: `format` ("langflash-scene"),
-`version` ("2"), `scene` (JSON: space, view_size, metadata) and `digest`, the SHA-256 of the JSON
+`version`, `scene` (JSON: space, view_size, metadata) and `digest`, the SHA-256 of the JSON
 and of every tensor with its name, type and shape. Tensors: `fields.py`; `metadata`: `record.py`.
 
 Equal scenes give equal bytes: the header is in one order, and nothing of the run that made the
 scene is in the file. Version 1 said in its metadata how many Gaussians each view made, where
-version 2 has the tensor `view_ids`, and held what the run cost.
+version 2 has the tensor `view_ids`, and held what the run cost. Version 3 has the tensors `levels` and
+`confidences`, either or both; a scene without them is written as version 2, which older programs read, where
+they refuse one of version 3 with a sentence that says so.
 """
 
 import json
@@ -21,7 +23,7 @@ from torch import Tensor
 from langflash_core.files import write_atomically
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.container import FORMAT, VERSION, damaged, digest, read_container
-from langflash_core.scene.fields import from_fields, to_fields
+from langflash_core.scene.fields import NEWER, from_fields, to_fields
 from langflash_core.scene.record import counts_per_view, from_json, to_json
 from langflash_core.types import Scene
 
@@ -41,7 +43,8 @@ def save(scene: Scene, path: Path | str) -> None:
         "metadata": to_json(scene.record),
     }
     text = json.dumps(described, allow_nan=False)
-    header = {"format": FORMAT, "version": str(VERSION), "scene": text, "digest": _digest(text, fields)}
+    version = VERSION if any(name in fields for name in NEWER) else 2
+    header = {"format": FORMAT, "version": str(version), "scene": text, "digest": _digest(text, fields)}
     write_atomically(Path(path), _in_order(safetensors.torch.save(fields, header)))
 
 

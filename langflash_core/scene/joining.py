@@ -35,7 +35,8 @@ def joined(
     Rows and atoms of the first keep their numbers; those of the second follow, its names with them.
     Features stay as they are: f_i = sum_k w_ik d_k with the same w_ik and d_k. The second comes in
     the first's unit where both know theirs in metres. Views, photos and the rest of the record are the
-    first's: cameras of the second would look at what is somewhere else now.
+    first's: cameras of the second would look at what is somewhere else now. Where one alone has levels, or
+    confidences, all of the other is coarse, so that it is there in every picture, and sure.
 
     Args:
         names: of both, for people. shown: the first as edits changed it, beside which and in whose unit the
@@ -55,6 +56,8 @@ def joined(
         gaussians=gaussians,
         semantics=_joined_semantics(first.semantics, second.semantics),
         view_ids=view_ids,
+        levels=_known_of_both(first, second, first.levels, second.levels, 0),
+        confidences=_known_of_both(first, second, first.confidences, second.confidences, 1),
         record=replace(first.record, atom_names={}, atom_denials={}, silent_atoms=()),
     )
     after, ours, theirs = first.semantics.num_atoms, first.record, second.record
@@ -63,6 +66,18 @@ def joined(
         atom_denials={**ours.atom_denials, **{k + after: words for k, words in theirs.atom_denials.items()}},
         silent_atoms=(*ours.silent_atoms, *(k + after for k in theirs.silent_atoms)),
     )
+
+
+def _known_of_both(
+    first: Scene, second: Scene, ours: Tensor | None, theirs: Tensor | None, unknown: int
+) -> Tensor | None:
+    """(N,) of what one or the other knows, `unknown` for Gaussians of the one that does not."""
+    known = theirs if ours is None else ours
+    if known is None:
+        return None
+    ours = known.new_full((len(first.gaussians),), unknown) if ours is None else ours
+    theirs = known.new_full((len(second.gaussians),), unknown) if theirs is None else theirs
+    return torch.cat((ours, theirs.to(ours)))
 
 
 def beside(first: Scene, second: Scene) -> Moved:

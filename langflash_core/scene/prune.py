@@ -4,8 +4,8 @@ Four cuts, in this order: Gaussians fainter than 1/255; Gaussians that two photo
 the same piece of surface; weights below 1/255; atoms that no Gaussian carries.
 
 Two Gaussians of different views are duplicates when their means are closer than one pixel of
-either view covers at their depth (the footprint z / f) and their colours agree. Each may absorb
-one Gaussian of each other view at most, so a finely seen surface stays finely covered.
+either view covers at their depth (the footprint z / f), their colours agree, and so do their levels. Each
+may absorb one Gaussian of each other view at most, so a finely seen surface stays finely covered.
 """
 
 import time
@@ -34,6 +34,7 @@ class _Sight:
     views: Tensor  # (N,)
     footprints: Tensor  # (N,) scene units per pixel in its own view
     colours: Tensor  # (N, 3)
+    levels: Tensor | None  # (N,)
 
 
 def prune(scene: Scene, *, merge_radius: float = 1.0, colour_tolerance: float = 0.1) -> Scene:
@@ -79,7 +80,7 @@ def _sight(scene: Scene) -> _Sight:
     focal = (scene.Ks[:, 0, 0] + scene.Ks[:, 1, 1]) / 2
     footprints = depths.clamp_min(0) / focal[views]
     means, colours = gaussians.means.T.contiguous(), gaussians.sh[:, 0] * SH_C0
-    return _Sight(means, gaussians.opacities, views, footprints, colours)
+    return _Sight(means, gaussians.opacities, views, footprints, colours, scene.levels)
 
 
 def _parents(sight: _Sight, scene: Scene, radius: float, colour_tolerance: float) -> Tensor:
@@ -145,6 +146,8 @@ def _pairs(
     rows, there, close, distances = rows[some], there[some], close[some], distances[some]
     colour_gap = (sight.colours[there] - sight.colours[rows, None]).abs().amax(-1)
     same = close & (colour_gap < colour_tolerance)
+    if sight.levels is not None:  # detail that took a coarse one in would open the coarse picture
+        same &= sight.levels[there] == sight.levels[rows, None]
     distances, which = torch.where(same, distances, torch.inf).min(-1)
     matched = torch.isfinite(distances).nonzero().squeeze(1)
     found = there[matched, which[matched]]
@@ -168,7 +171,7 @@ def _first_of_each(keys: Tensor, costs: Tensor, num_keys: int) -> Tensor:
 
 
 def _merged(scene: Scene, parents: Tensor) -> Scene:
-    """Every group becomes one Gaussian in its parent's row.
+    """Every group becomes one Gaussian in its parent's row, of its level and its confidence.
 
     Places, colours, and weights are opacity-weighted means, the shape is the most opaque
     member's, and the opacity is what the layers composite to.

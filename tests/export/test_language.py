@@ -37,6 +37,8 @@ def scene() -> Scene:
         (b"jpeg one", b"jpeg two"),
         view_ids,
         record,
+        (view_ids > 0).to(torch.uint8),
+        torch.arange(50) / 255,
     )
 
 
@@ -50,6 +52,12 @@ def same_language(first: Scene, second: Scene) -> bool:
         and first.view_ids is not None
         and second.view_ids is not None
         and torch.equal(first.view_ids, second.view_ids)
+        and first.levels is not None
+        and second.levels is not None
+        and torch.equal(first.levels, second.levels)
+        and first.confidences is not None
+        and second.confidences is not None
+        and torch.equal(first.confidences, second.confidences)
         and (first.view_size, first.photos, first.record, first.semantics.space)
         == (second.view_size, second.photos, second.record, second.semantics.space)
     )

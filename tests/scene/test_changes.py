@@ -238,6 +238,47 @@ def test_two_scenes_become_one_whose_undoing_leaves_the_first(tmp_path: Path) ->
     assert back.moved_to(0).marks == first_marks(first)
 
 
+def with_levels(scene: Scene) -> Scene:
+    """Every third Gaussian coarse, and sure of nothing."""
+    count = len(scene.gaussians)
+    return replace(
+        scene, levels=(torch.arange(count) % 3 > 0).to(torch.uint8), confidences=torch.linspace(0, 0.9, count)
+    )
+
+
+def test_who_knows_no_level_is_coarse_and_sure_beside_who_does() -> None:
+    plain, second = wide_cloud(), wide_cloud(seed=7, count=90)
+    known = with_levels(second)
+    assert known.levels is not None and known.confidences is not None
+    whole = joined(plain, known)
+    assert whole.levels is not None and whole.confidences is not None
+    assert not bool(whole.levels[:COUNT].any()) and torch.equal(whole.levels[COUNT:], known.levels)
+    assert bool((whole.confidences[:COUNT] == 1).all())
+    assert torch.equal(whole.confidences[COUNT:], known.confidences)
+    other = joined(known, plain)
+    assert other.levels is not None and torch.equal(other.levels[:90], known.levels)
+    assert not bool(other.levels[90:].any())
+    assert joined(plain, second).levels is None and joined(plain, second).confidences is None
+    both = joined(known, with_levels(plain))
+    assert both.levels is not None and int(both.levels.sum()) == 60 + COUNT - -(-COUNT // 3)
+    # Undone, the first scene is what it was.
+    undone = replace(first_marks(whole), there=(COUNT, plain.semantics.num_atoms))
+    alone = edited_scene(whole, undone)
+    assert alone.levels is None and alone.confidences is None
+    undone = replace(first_marks(other), there=(90, known.semantics.num_atoms))
+    alone = edited_scene(other, undone)
+    assert alone.levels is not None and torch.equal(alone.levels, known.levels)
+
+
+def test_edits_keep_levels_and_confidences() -> None:
+    scene = with_levels(wide_cloud())
+    marks = edits.delete(edited(scene, a_move(some_rows())).marks, Mask.first(COUNT, 10))
+    after = edited_scene(scene, marks)
+    assert scene.levels is not None and scene.confidences is not None
+    assert after.levels is not None and torch.equal(after.levels, scene.levels[10:])
+    assert after.confidences is not None and torch.equal(after.confidences, scene.confidences[10:])
+
+
 def test_scenes_that_speak_differently_are_refused_and_mute_ones_taken(tmp_path: Path) -> None:
     first, second = wide_cloud(), wide_cloud(seed=3)
     other = replace(second, semantics=replace(second.semantics, space="clip"))

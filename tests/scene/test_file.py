@@ -13,7 +13,7 @@ import torch
 
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.scene.assemble import assemble
-from langflash_core.scene.fields import REQUIRED
+from langflash_core.scene.fields import REQUIRED, field_bytes
 from langflash_core.scene.file import load, save
 from langflash_core.scene.prune import prune
 from langflash_core.scene.report import describe
@@ -210,8 +210,8 @@ def _resaved(path, **changes) -> None:
 
 
 def test_newer_and_nonsense_versions(path):
-    _resaved(path, version="3")
-    assert "format 3, this program reads format 2" in refused(path)
+    _resaved(path, version="4")
+    assert "format 4, this program reads format 3" in refused(path)
     _resaved(path, version="one")
     assert "version reads 'one'" in refused(path)
 
@@ -254,6 +254,71 @@ def test_a_file_with_a_field_missing_or_of_a_wrong_type_is_refused_even_with_a_r
     assert "view_ids" in rewrite({**fields, "view_ids": fields["view_ids"] + 100})
     assert "view_ids" in rewrite({**fields, "view_ids": fields["view_ids"].float()})
     assert "view_ids" in rewrite({**fields, "view_ids": fields["view_ids"][:-1].clone()})
+
+
+def detailed(scene: Scene) -> Scene:
+    """With levels and confidences."""
+    count = len(scene.gaussians)
+    levels = (torch.arange(count) % 5 > 0).to(torch.uint8)
+    return replace(scene, levels=levels, confidences=torch.linspace(0, 1, count))
+
+
+def version_of(path: Path) -> str:
+    with safetensors.safe_open(path, "pt") as file:
+        return file.metadata()["version"]
+
+
+def test_levels_and_confidences_come_back_in_a_file_of_version_3(path, tmp_path, scene):
+    """Who reads version 2 alone is told so; without them a file is what it always was."""
+    assert version_of(path) == "2" and load(path).levels is None and load(path).confidences is None
+    whole = detailed(scene)
+    assert whole.levels is not None and whole.confidences is not None
+    for names in (("levels",), ("confidences",), ("levels", "confidences")):
+        known = replace(scene, **{name: getattr(whole, name) for name in names})
+        save(known, tmp_path / "b.langflash")
+        read = load(tmp_path / "b.langflash")
+        assert version_of(tmp_path / "b.langflash") == "3" and same(read, load(path))
+        assert (read.levels is None, read.confidences is None) == tuple(
+            name not in names for name in ("levels", "confidences")
+        )
+        if read.levels is not None:
+            assert read.levels.dtype == torch.uint8 and torch.equal(read.levels, whole.levels)
+        if read.confidences is not None:
+            assert float((read.confidences - whole.confidences).abs().max()) <= 0.5 / 255 + 1e-7
+        told = field_bytes(known)
+        assert all(told[name] == len(scene.gaussians) for name in names)
+        assert told["photos"] == field_bytes(scene)["photos"]
+        assert set(names) <= describe(read)["bytes"].keys()
+        save(read, tmp_path / "c.langflash")  # bytes are what they were: 255 (n / 255) rounds to n
+        first, second = (
+            safetensors.torch.load((tmp_path / f"{letter}.langflash").read_bytes()) for letter in "bc"
+        )
+        assert all(torch.equal(first[name], second[name]) for name in names)
+        save(known, tmp_path / "d.langflash")
+        assert (tmp_path / "d.langflash").read_bytes() == (tmp_path / "b.langflash").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong", "words"),
+    [
+        ("levels", lambda values: values + 2, "levels: expected values in [0, 2)"),
+        ("levels", lambda values: values.long(), "levels: expected torch.uint8"),
+        ("levels", lambda values: values[1:].clone(), "levels: expected shape"),
+        ("confidences", lambda values: values.float(), "confidences: expected torch.uint8"),
+        ("confidences", lambda values: values[None].clone(), "confidences: expected shape"),
+    ],
+)
+def test_levels_and_confidences_that_make_no_sense_are_refused(path, scene, name, wrong, words):
+    from langflash_core.scene.file import _digest
+
+    save(detailed(scene), path)
+    with safetensors.safe_open(path, "pt") as file:
+        strings = file.metadata()
+    fields = safetensors.torch.load(path.read_bytes())
+    fields[name] = wrong(fields[name])
+    digest = _digest(strings["scene"], fields)
+    path.write_bytes(safetensors.torch.save(fields, {**strings, "digest": digest}))
+    assert words in refused(path)
 
 
 @pytest.mark.parametrize(
@@ -302,7 +367,7 @@ def test_equal_scenes_give_equal_bytes_whatever_the_run_cost(path, tmp_path, sce
 
 
 KEPT = Path(__file__).parents[1] / "fixtures" / "scenes"
-VERSION_1, VERSION_2 = KEPT / "version_1.langflash", KEPT / "version_2.langflash"
+VERSION_1, VERSION_2, VERSION_3 = (KEPT / f"version_{number}.langflash" for number in (1, 2, 3))
 
 
 def test_a_file_of_version_1_opens_with_all_it_says(tmp_path):
@@ -339,6 +404,18 @@ def test_a_file_of_version_2_opens_with_all_it_says():
     for name, values in tensors_of(old).items():
         # Rows are renormalised on every load, which may move a weight by one step of 2^-11.
         assert torch.allclose(tensors_of(new)[name], values, rtol=2**-9, atol=3e-8), name
+
+
+def test_a_file_of_version_3_opens_with_all_it_says():
+    """The file of version 2 with `detailed`, saved by the first program of format 3."""
+    old, new = load(VERSION_2), load(VERSION_3)
+    assert new.record == old.record and views_of(new) == views_of(old) and new.photos == old.photos
+    for name, values in tensors_of(old).items():
+        assert torch.allclose(tensors_of(new)[name], values, rtol=2**-9, atol=3e-8), name
+    known = detailed(old)
+    assert new.levels is not None and known.levels is not None and torch.equal(new.levels, known.levels)
+    assert new.confidences is not None and known.confidences is not None
+    assert torch.equal((255 * new.confidences).round(), (255 * known.confidences).round())
 
 
 def test_counts_of_version_1_that_do_not_fit_say_nothing(tmp_path):

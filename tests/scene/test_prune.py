@@ -76,6 +76,22 @@ def test_points_of_one_view_other_depths_and_other_colours_stay():
     assert prune(painted, colour_tolerance=0.2).record.pruning["merged"] > 0
 
 
+def test_a_pair_of_two_levels_stays_and_others_keep_their_parents_level_and_confidence():
+    scene = wall_scene()
+    count, half = len(scene.gaussians), len(scene.gaussians) // 2
+    levels = torch.zeros(count, dtype=torch.uint8)
+    levels[half:] = 1
+    assert prune(replace(scene, levels=levels)).record.pruning["merged"] == 0
+    sure = torch.linspace(0, 1, count)
+    alike, known = torch.ones(count, dtype=torch.uint8), prune(scene)
+    small = prune(replace(scene, levels=alike, confidences=sure))
+    assert torch.equal(small.gaussians.means, known.gaussians.means)
+    parents = _parents(_sight(scene), scene, 1.0, 0.1)
+    survivors = parents == torch.arange(count)
+    assert small.levels is not None and torch.equal(small.levels, alike[survivors])
+    assert small.confidences is not None and torch.equal(small.confidences, sure[survivors])
+
+
 def test_every_pair_is_a_duplicate_and_no_parent_has_two_children_of_a_view():
     scene = wall_scene(3, noise=0.002)
     views, sight = scene.view_ids, _sight(scene)
