@@ -11,6 +11,8 @@ from langflash_core.batch.dispatch import Job
 from langflash_core.batch.order import Order
 from langflash_core.errors import ImageError
 from langflash_core.resources import asset_path
+from langflash_core.scene.file import save
+from tests.app.cli.conftest import stripes
 
 PHOTO = asset_path("photos/books_left.jpg")
 
@@ -68,3 +70,21 @@ def test_the_words_of_a_batch_are_its_order(run, tmp_path, monkeypatch):
         ("high", None),
         ("normal", 2000),
     ]
+
+
+def test_info_says_what_it_was_spent_on(run, scene_file, tmp_path):
+    detail = {
+        "level": "high",
+        "elements": 2_352,
+        "by_size": {"1": 2_000, "2": 352},
+        "photos_psnr_db": [31.2, 30.8],
+    }
+    fine = tmp_path / "fine.langflash"
+    save(stripes().with_record(detail=detail), fine)
+    assert run("info", fine, "--json").json()["detail"] == detail
+    (line,) = (line for line in run("info", fine).out.splitlines() if line.startswith("detail"))
+    assert line == (
+        "detail: high, 2,352 Gaussians (1 px 2,000, 2 px 352) · from the photos' places 31.2, 30.8 dB"
+    )
+    assert run("info", scene_file, "--json").json()["detail"] is None
+    assert "detail" not in run("info", scene_file).out
