@@ -24,7 +24,7 @@ def run(args: Namespace, out: TextIO) -> None:
     if args.json:
         write_json(document, out)
     else:
-        print("\n".join(_lines(document)), file=out)
+        print("\n".join(_lines(_for_people(document))), file=out)
 
 
 def _described(path: Path) -> dict[str, Any]:
@@ -37,6 +37,14 @@ def _described(path: Path) -> dict[str, Any]:
     from ..scenes import open_scene
 
     return describe(open_scene(path))
+
+
+def _for_people(document: dict[str, Any]) -> dict[str, Any]:
+    """With the detail as one line, and none where there is nothing to say of it."""
+    from langflash_core.scene.report import detail_line
+
+    said = {**document, "detail": detail_line(document["detail"] or {})}
+    return said if said["detail"] else {name: value for name, value in said.items() if name != "detail"}
 
 
 def _lines(fields: dict[str, Any], indent: str = "") -> list[str]:
