@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from langflash_core.records import Record
+from langflash_core.records import Record, check_light
 from langflash_core.scene.container import damaged, read_container
 from langflash_core.scene.record import from_json
 
@@ -26,8 +26,9 @@ def describe(scene: "Scene") -> dict:
         total}, bounding_box and core_box {min, max} in scene units (None when empty), metric_scale
         (metres per unit or None), counts, pruning (as `prune` left it, with `psnr_db` and
         `relevance_error` where they were measured), refinement (None, or kept, held_out and the PSNR
-        before and after), detail (None, or as `Record` has it), timings {stage: seconds,
-        total} (None where they are not known, as in files), warnings`.
+        before and after), detail (None, or as `Record` has it), light (None, or gains and offsets, a row
+        of red, green and blue per view), timings {stage: seconds, total} (None where they are not known,
+        as in files), warnings`.
     """
     from langflash_core.scene.fields import to_fields  # torch
 
@@ -98,6 +99,7 @@ def _document(
     sizes = {name: values.nbytes for name, values in arrays.items() if not name.startswith(_PHOTO)}
     sizes["photos"] = sum(values.nbytes for name, values in arrays.items() if name.startswith(_PHOTO))
     timings, means = known.cost.timings, arrays["means"]
+    check_light(known.light, len(arrays["viewmats"]))
     return {
         "gaussians": len(means),
         "atoms": len(arrays["dictionary"]),
@@ -118,6 +120,7 @@ def _document(
         "pruning": dict(known.pruning) or None,
         "refinement": dict(known.refinement) or None,
         "detail": dict(known.detail) or None,
+        "light": dict(known.light) or None,
         "timings": {**timings, "total": sum(timings.values())} if timings else None,
         "warnings": list(known.warnings),
     }
