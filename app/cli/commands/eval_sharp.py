@@ -80,7 +80,7 @@ def _check(args: Namespace) -> None:
 def _bench(args: Namespace, render: Render) -> "Bench":
     from langflash_core.lab.evaluation.sharp import WAYS, Bench
 
-    ways = WAYS if args.detail is None else ("plain", *args.detail)
+    ways = WAYS if args.detail is None else ("plain", *dict.fromkeys(args.detail))
     return Bench(
         render,
         args.weights,

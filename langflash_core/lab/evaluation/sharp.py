@@ -33,6 +33,7 @@ from langflash_core.lab.evaluation.sharp_measures import (
     detail,
     flat_windows,
     lattice,
+    let_through,
     on_grid,
     opaque,
     ripple,
@@ -297,7 +298,10 @@ def _scene_row(column: Column, own: Sequence[Truth], kept: Kept | None, bench: B
 def _drawn(scene: Scene, camera: Camera, truth: Truth, bench: Bench) -> tuple[Tensor, dict[str, float]]:
     frame = bench.render(scene, camera)
     rgb = frame.rgb.cpu().float()
-    numbers = _alike(rgb, truth, bench.lpips) | {"opaque": opaque(frame.alphas.cpu().float(), truth.counted)}
+    alphas = frame.alphas.cpu().float()
+    numbers = _alike(rgb, truth, bench.lpips)
+    numbers["opaque"] = opaque(alphas, truth.counted)
+    numbers["through"] = let_through(alphas, truth.counted)
     if truth.counted is not None:
         numbers["seen"] = float(truth.counted.float().mean())
     return rgb, numbers

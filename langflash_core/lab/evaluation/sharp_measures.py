@@ -148,10 +148,22 @@ def opaque(alphas: Float[Tensor, "H W"], counted: Bool[Tensor, "H W"] | None = N
     Raises:
         InputError: there is no pixel, or an alpha is no finite number.
     """
-    if alphas.numel() == 0 or not bool(alphas.isfinite().all()):
-        raise InputError("alphas hold no pixel, or values that are not finite; draw a scene that has some")
+    _check_alphas(alphas)
     kept = alphas if counted is None else alphas[counted]
     return float((kept >= OPAQUE - _ROUNDING).float().mean()) if kept.numel() else math.nan
+
+
+def let_through(alphas: Float[Tensor, "H W"], counted: Bool[Tensor, "H W"] | None = None) -> float:
+    """Mean share of light, in [0, 1], that comes from behind the scene: 1 - alpha, which darkens a picture
+    over black. Says by how much surfaces fail to be `opaque`."""
+    _check_alphas(alphas)
+    kept = alphas if counted is None else alphas[counted]
+    return float((1 - kept).mean()) if kept.numel() else math.nan
+
+
+def _check_alphas(alphas: Tensor) -> None:
+    if alphas.numel() == 0 or not bool(alphas.isfinite().all()):
+        raise InputError("alphas hold no pixel, or values that are not finite; draw a scene that has some")
 
 
 def ripple(crops: Sequence[Float[Tensor, "H W 3"]], spacing: float) -> float:

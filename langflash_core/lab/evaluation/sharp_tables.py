@@ -18,6 +18,7 @@ GROUPS = {
             ("detail in its place, of the photo's", "true_detail", ".3f"),
             ("lattice on flat walls (1/255)", "lattice", ".2f"),
             ("opaque (% of pixels)", "opaque", _SHARE),
+            ("light from behind (%)", "through", _SHARE),
             ("opaque at eight times that size (%)", "opaque_8x", _SHARE),
             ("ripple of flat walls there (1/255)", "ripple", ".2f"),
         ),
@@ -30,6 +31,7 @@ GROUPS = {
             ("detail, of the photo's", "detail", ".3f"),
             ("detail in its place, of the photo's", "true_detail", ".3f"),
             ("opaque (% of pixels)", "opaque", _SHARE),
+            ("light from behind (%)", "through", _SHARE),
             ("seen by a photo (%)", "seen", _SHARE),
         ),
     ),
@@ -41,6 +43,7 @@ GROUPS = {
             ("detail, of the photo's", "detail", ".3f"),
             ("detail in its place, of the photo's", "true_detail", ".3f"),
             ("opaque (% of pixels)", "opaque", _SHARE),
+            ("light from behind (%)", "through", _SHARE),
         ),
     ),
     "once": (
@@ -52,8 +55,8 @@ GROUPS = {
         ),
     ),
 }
-"""Title and measures (text, key, format) of each group. Columns may have further groups; a group that is
-listed here is shown."""
+"""Title and measures (text, key, format) of each group. Means are taken of whatever groups a column has, say
+"borders" of labelled photos; those that are listed here are shown."""
 _TITLES = {GRID: "photo through the grid", OTHER: "other version"}
 
 

@@ -15,6 +15,7 @@ from langflash_core.lab.evaluation.sharp_measures import (
     detail,
     flat_windows,
     lattice,
+    let_through,
     on_grid,
     opaque,
     ripple,
@@ -92,7 +93,7 @@ def test_noise_counts_as_detail_but_not_as_the_photos():
 
 
 @pytest.mark.parametrize("period", [2.0, 2.286, 2.4, 3.0, 4.5])
-def test_a_lattice_is_found_at_its_amplitude(period: int):
+def test_a_lattice_is_found_at_its_amplitude(period: float):
     """A cosine of amplitude A each way: 255 A. Two pixels: cos(pi x + .4) alternates with A cos .4."""
     amplitude = 2 / 255
     drawn = flat() + (wave(period, amplitude) - 0.5) + (wave(period, amplitude, across=False) - 0.5)
@@ -130,7 +131,9 @@ def test_opaque_pixels():
     assert opaque(alphas) == 0.5
     assert opaque(alphas.half().float()) == 0.5  # .99 in half precision is .98975
     assert opaque(alphas, alphas > 0.95) == 0.75
-    assert math.isnan(opaque(alphas, alphas > 2))
+    assert math.isnan(opaque(alphas, alphas > 2)) and math.isnan(let_through(alphas, alphas > 2))
+    assert let_through(alphas) == pytest.approx((1 + 0.1 + 0.015 + 0.01 + 0.005) / 6, abs=1e-6)
+    assert let_through(alphas, alphas > 0.95) == pytest.approx(0.03 / 4, abs=1e-6)
 
 
 def test_a_ripple_is_told_from_shading():
@@ -199,5 +202,6 @@ def test_what_cannot_be_compared_is_refused_in_a_sentence():
     with pytest.raises(InputError, match="a picture of 120 x 95 is beside a photo of 120 x 96"):
         check_pictures(photo[:-1], photo)
     for alphas in (torch.zeros(0, 4), torch.full((2, 2), math.nan)):
-        with pytest.raises(InputError, match="no pixel, or values that are not finite"):
-            opaque(alphas)
+        for measure in (opaque, let_through):
+            with pytest.raises(InputError, match="no pixel, or values that are not finite"):
+                measure(alphas)
