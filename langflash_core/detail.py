@@ -23,8 +23,7 @@ class Detail:
 
 
 DETAILS = {
-    level.name: level
-    for level in (Detail("low", 0.5, 2), Detail("normal", 1.2, 1), Detail("high", 2.4, 1))
+    level.name: level for level in (Detail("low", 0.9, 2), Detail("normal", 2.1, 1), Detail("high", 4.2, 1))
 }
 DEFAULT_DETAIL = "normal"
 

@@ -241,8 +241,8 @@ def _spoken(
         means = scene.gaussians.means.double().numpy()
         nearest = rows[torch.from_numpy(np.asarray(KDTree(means[seen]).query(means[~seen])[1]))]
         ids[hidden], values[hidden] = ids[nearest], values[nearest]
-    # What is known of atoms that are no more.
-    plain = scene.with_record(atom_names={}, atom_denials={}, silent_atoms=())
+    # What is known of atoms and of photos that are no more.
+    plain = scene.with_record(atom_names={}, atom_denials={}, silent_atoms=(), light={})
     lifted = replace(
         plain,
         semantics=Semantics(ids, values, dictionary, PRESETS[PRESET].space),

@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.ahead import Ahead, begin
+from langflash_core.detail import DEFAULT_DETAIL, check_gaussians, chosen_detail
 from langflash_core.errors import InputError, PromptError, ViewError, WeightsError
 from langflash_core.export.html import Phrases, TextModel, write_html
 from langflash_core.geometry.cameras import invert_rigid
@@ -32,6 +33,7 @@ from langflash_core.network.checkpoints.parts import part_folder
 from langflash_core.network.checkpoints.stored import Stored
 from langflash_core.network.model import Atoms, Geometry, Lifted, pooled_weights
 from langflash_core.network.precision import bfloat16_fails, has_bfloat16
+from langflash_core.network.presets import GuidedDepth
 from langflash_core.network.semantics.aggregation import averaged_atoms
 from langflash_core.network.semantics.crops import crop_atoms
 from langflash_core.network.semantics.grouping import Groups
@@ -53,6 +55,7 @@ AGGREGATIONS = ("lfa", "average", "crops")
 GROUPINGS = ("queries", "sam2")
 LARGEST_PICTURE = 8192
 LONGEST_REFINEMENT = 3600  # seconds
+_AS_IT_IS = "the preset '{}' makes one Gaussian a pixel; the detail that was asked for is left out"
 _networks: dict[tuple, LangFlashNet] = {}
 
 
@@ -68,6 +71,8 @@ def reconstruct(
     precision: str = "auto",
     aggregation: str | None = None,
     grouping: str | None = None,
+    detail: str | None = DEFAULT_DETAIL,
+    gaussians: int | None = None,
     refine_seconds: float | None = None,
     viewmats: Tensor | None = None,
     progress: Progress | None = None,
@@ -91,6 +96,9 @@ def reconstruct(
         grouping: where groups come from: "queries" (trained), "sam2" (its masks of each photo, lifted
             to the scene); None: queries where they have weights, else sam2 where it is installed,
             else clusters of the language features.
+        detail: how finely surfaces are covered: "low", "normal", "high"; None: one Gaussian a pixel,
+            as the network makes them. Points of `full` are no surfaces: they stay as they are.
+        gaussians: about so many, instead of as many as the detail has.
         refine_seconds: so long poses and Gaussians are fitted to the photos afterwards, and kept so
             if that brings a view closer that was held out; None: not at all.
         viewmats: poses (V, 4, 4) of the photos, world to camera, in any world and unit: they are not
@@ -111,6 +119,7 @@ def reconstruct(
     """
     run = Run(STAGES, progress, cancelled)
     device = _device(device)
+    _check_detail(detail, gaussians)
     if refine_seconds is not None:
         _check_refinement(refine_seconds, photos)
     with run.stage("photos"):
@@ -129,6 +138,10 @@ def reconstruct(
     with run.stage("network"):
         prediction = _on_cpu(network.predict(views, run.within("network"), cancelled, atoms, groups))
     with run.stage("assemble"), torch.no_grad():
+        if isinstance(PRESETS[preset], GuidedDepth):
+            prediction = _finer(prediction, views, detail, gaussians)
+        elif gaussians is not None or detail not in (None, DEFAULT_DETAIL):
+            prediction = _noted(prediction, _AS_IT_IS.format(preset))
         scene = assemble(prediction, views, preset=preset)
     with run.stage("prune"), torch.no_grad():
         scene = prune(scene)
@@ -332,6 +345,21 @@ def _with_record(scene: Scene, network: LangFlashNet, timings: dict[str, float])
         peak_memory_mb=peak_memory_mb(),
     )
     return scene.with_record(cost=cost, calibration=dict(network.calibration))
+
+
+def _check_detail(detail: str | None, gaussians: int | None) -> None:
+    if detail is not None:
+        chosen_detail(detail)
+    check_gaussians(gaussians)
+
+
+def _finer(prediction: Prediction, views: Views, detail: str | None, gaussians: int | None) -> Prediction:
+    """Surfaces covered as finely as asked; None: by one Gaussian a pixel, as they are."""
+    return prediction
+
+
+def _noted(prediction: Prediction, note: str) -> Prediction:
+    return replace(prediction, warnings=(*prediction.warnings, note))
 
 
 def _check_refinement(seconds: float, photos: Sequence) -> None:

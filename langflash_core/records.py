@@ -1,5 +1,6 @@
 """What is known of a scene besides its tensors. Imports no torch: `langflash info` reads it without."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -26,11 +27,12 @@ class Record:
     warnings: a sentence each. metric_scale: metres per scene unit. network_unit: the network's
     length units per scene unit. counts: Gaussians predicted and left out. pruning: as `prune` left
     it. refinement: what a fit to the photos brought. detail: what was spent on how fine elements, and what
-    it bought. calibration: what the network's checkpoint
-    says about scores, instead of its language space. atom_names: a person's own, by atom, which it
-    answers to. atom_denials: what a person said that an atom is not. silent_atoms: those that answer
-    no phrase. num_deleted: Gaussians that edits took away. camera_path: the window's key frames.
-    others: what a file says under keys that this version does not know.
+    it bought. light: `gains` and `offsets`, a row of
+    red, green and blue for each view, by which `scene.light` brought the photos' colours to one light.
+    calibration: what the network's checkpoint says about scores, instead of its language space. atom_names:
+    a person's own, by atom, which it answers to. atom_denials: what a person said that an atom is not.
+    silent_atoms: those that answer no phrase. num_deleted: Gaussians that edits took away. camera_path:
+    the window's key frames. others: what a file says under keys that this version does not know.
     """
 
     preset: str | None = None
@@ -43,6 +45,7 @@ class Record:
     pruning: Mapping[str, int] = field(default_factory=dict)
     refinement: Mapping[str, Any] = field(default_factory=dict)
     detail: Mapping[str, Any] = field(default_factory=dict)
+    light: Mapping[str, Any] = field(default_factory=dict)
     calibration: Mapping[str, Any] = field(default_factory=dict)
     atom_names: Mapping[int, str] = field(default_factory=dict)
     atom_denials: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
@@ -51,3 +54,29 @@ class Record:
     camera_path: tuple[Mapping[str, Any], ...] = ()
     cost: Cost = Cost()
     others: Mapping[str, Any] = field(default_factory=dict)
+
+
+def check_light(light: Mapping[str, Any], num_views: int) -> None:
+    """Refuse a record's `light` that is not a finite gain above 0 and a finite offset per view and channel.
+
+    Raises:
+        ValueError: says what was expected and what was received.
+    """
+    if not light:
+        return
+    if set(light) != {"gains", "offsets"}:
+        raise ValueError(f"light: expected gains and offsets, received {', '.join(map(str, light))}")
+    for name, rows in light.items():
+        if not isinstance(rows, list) or len(rows) != num_views or not all(map(_is_colour, rows)):
+            expected = f"{num_views} rows of 3 finite numbers"
+            raise ValueError(f"light: expected {name} in {expected}, received {rows!r}")
+    if not all(gain > 0 for row in light["gains"] for gain in row):
+        raise ValueError(f"light: expected gains above 0, received {light['gains']!r}")
+
+
+def _is_colour(row: object) -> bool:
+    return isinstance(row, list) and len(row) == 3 and all(map(_is_finite, row))
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

@@ -27,6 +27,7 @@ from torch import Tensor
 
 from langflash_core.records import Cost as Cost
 from langflash_core.records import Record as Record
+from langflash_core.records import check_light
 
 LUMA = (0.299, 0.587, 0.114)
 """Weights of red, green and blue in grey (ITU-R BT.601, as JPEG has them)."""
@@ -233,6 +234,7 @@ class Scene:
         for name in ("atom_names", "atom_denials", "silent_atoms"):
             atoms = torch.tensor(list(getattr(self.record, name)), dtype=torch.int64)
             _names(name, atoms, self.semantics.num_atoms)
+        check_light(self.record.light, num_views)
 
     @property
     def num_views(self) -> int:

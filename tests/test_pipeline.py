@@ -148,6 +148,10 @@ def test_bad_input_is_one_sentence(weights, photos, tmp_path):
         lf.reconstruct(photos, weights=tmp_path / "none.safetensors")
     with pytest.raises(InputError, match="size 7 is out of range"):
         lf.reconstruct(photos, weights=weights, size=7)
+    with pytest.raises(InputError, match="detail 'fine' is unknown; choose low, normal, high"):
+        lf.reconstruct(["gone.jpg"], detail="fine")  # said before anything is read
+    with pytest.raises(InputError, match="999 Gaussians are out of range"):
+        lf.reconstruct(["gone.jpg"], gaussians=999)
     with pytest.raises(InputError, match="device 'tpu'"):
         lf.reconstruct(photos, weights=weights, device="tpu")
 

@@ -86,6 +86,8 @@ class _Maker:
             preset=order.preset,
             weights=order.weights,
             size=order.size,
+            detail=order.detail,
+            gaussians=order.gaussians,
             fov=order.fov,
             device=order.device,
         )

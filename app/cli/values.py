@@ -4,6 +4,8 @@ import math
 import re
 from argparse import ArgumentTypeError
 
+from langflash_core.detail import FEWEST, MOST
+
 LARGEST_SIDE = 8192  # pixels; GL 3.3 promises no larger texture on most drivers
 PICTURES = ("rgb", "depth", "relevance", "labels", "atoms", "weights")
 
@@ -37,6 +39,11 @@ def seed(text: str) -> int:
 def whole_count(text: str) -> int:
     """How many, at least 1."""
     return _whole(text, 1, 10**9)
+
+
+def gaussian_count(text: str) -> int:
+    """How many Gaussians a scene is to have."""
+    return _whole(text, FEWEST, MOST)
 
 
 def atom_count(text: str) -> int:

@@ -5,6 +5,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from langflash_core.detail import DEFAULT_DETAIL
+
 
 @dataclass(frozen=True)
 class Order:
@@ -18,6 +20,8 @@ class Order:
     preset: str = "mini"
     weights: Path | None = None
     size: int | None = None
+    detail: str = DEFAULT_DETAIL
+    gaussians: int | None = None
     fov: float | None = None
     device: str = "auto"
     prompts: tuple[str, ...] = ()

@@ -11,6 +11,7 @@ from torch.nn import functional as F
 from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.geometry.quaternions import matrices_to_quats
+from langflash_core.geometry.surfels import ellipses, spans
 from langflash_core.network.layers.dpt import DPT
 from langflash_core.network.occlusion import drawn_back, extended, over_edges
 from langflash_core.network.presets import Preset
@@ -19,7 +20,6 @@ from langflash_core.types import Gaussians
 
 _COVER = 0.6  # standard deviation in pixel spacings: neighbours blend into a closed surface
 _THIN = 0.1  # thickness of a surface element over its pixel footprint
-_STRETCH = 5.0  # a surface seen edge-on is not stretched further than this many footprints
 _SCALE_RANGE = 1.0  # the head enlarges a scale by at most e
 _COLOUR_RANGE = 0.1  # and a colour by at most this
 CHANNELS = 1 + 3 + 3  # opacity, three scales, colour
@@ -29,7 +29,7 @@ def footprints(depths: Tensor, Ks: Tensor, edges: Tensor | None = None) -> tuple
     """Surface elements that cover one pixel each.
 
     With tangents t_u, t_v (differences of neighbouring points, the nearer side of a depth jump)
-    the in-plane covariance is s^2 (t_u t_u^T + t_v t_v^T); its 2 x 2 eigenproblem is closed-form.
+    the in-plane covariance is s^2 (t_u t_u^T + t_v t_v^T).
 
     Args:
         depths: (..., H, W), z > 0. Ks: (..., 3, 3) pixels.
@@ -43,33 +43,13 @@ def footprints(depths: Tensor, Ks: Tensor, edges: Tensor | None = None) -> tuple
     """
     pos_c = unproject(depths, Ks)
     footprint = depths / Ks[..., 0, 0, None, None]  # one pixel at this depth, scene units
-    tangent_u = _difference(pos_c, -2, footprint)
-    tangent_v = _difference(pos_c, -3, footprint)
+    tangent_u, tangent_v = spans(pos_c, footprint)
     if edges is not None:
         pos_c, tangent_u, tangent_v = drawn_back(pos_c, tangent_u, tangent_v, edges)
-    normal = F.normalize(torch.linalg.cross(tangent_u, tangent_v), dim=-1)
-    first = F.normalize(tangent_u, dim=-1)
-    second = torch.linalg.cross(normal, first)
-    # In the (first, second) plane t_u = (a, 0), t_v = (b, c).
-    a, b, c = tangent_u.norm(dim=-1), (tangent_v * first).sum(-1), (tangent_v * second).sum(-1)
-    mean, half = (a * a + b * b + c * c) / 2, (a * a + b * b - c * c) / 2
-    radius = torch.hypot(half, b * c)
-    angle = 0.5 * torch.atan2(b * c, half)
-    cosine, sine = angle.cos()[..., None], angle.sin()[..., None]
-    axes = torch.stack((cosine * first + sine * second, cosine * second - sine * first, normal), -1)
-    in_plane = torch.stack((mean + radius, (mean - radius).clamp_min(0)), -1).sqrt() * _COVER
+    axes, deviations = ellipses(tangent_u, tangent_v)
+    in_plane = deviations * _COVER
     thin = (_THIN * footprint)[..., None]
     return pos_c, axes, torch.cat((torch.maximum(in_plane, thin), thin), -1)
-
-
-def _difference(pos_c: Tensor, dim: int, footprint: Tensor) -> Tensor:
-    """Tangent along an image axis: the shorter of the forward and backward differences."""
-    steps = pos_c.diff(dim=dim)
-    before = torch.cat((steps.narrow(dim, 0, 1), steps), dim) if steps.shape[dim] else torch.zeros_like(pos_c)
-    after = torch.cat((steps, steps.narrow(dim, -1, 1)), dim) if steps.shape[dim] else before
-    shorter = torch.where((before.norm(dim=-1) < after.norm(dim=-1))[..., None], before, after)
-    longest = shorter.norm(dim=-1, keepdim=True).clamp_min(1e-12)
-    return shorter * (_STRETCH * footprint[..., None] / longest).clamp_max(1)
 
 
 class GaussianHead(nn.Module):

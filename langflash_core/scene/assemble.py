@@ -42,7 +42,7 @@ def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: st
             f"gaussians: expected {num_views * height * width} of {views.num_views} views, "
             f"received {num_predicted} of {num_views}"
         )
-    prediction, views = _placed(prediction, views)
+    prediction, views = placed_views(prediction, views)
     num_views, num_predicted = views.num_views, len(prediction.gaussians)
     if not bool(torch.isfinite(prediction.viewmats).all()):
         raise ValueError("viewmats: expected finite poses, received others")
@@ -65,9 +65,9 @@ def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: st
         network_unit=unit,
     )
     scene = Scene(
-        gaussians=_normalised(prediction.gaussians.map(lambda values: values[keep]), unit),
+        gaussians=normalised(prediction.gaussians.map(lambda values: values[keep]), unit),
         semantics=_semantics(prediction, keep.view(num_views, -1), top_m),
-        viewmats=_scaled_poses(prediction.viewmats, unit),
+        viewmats=scaled_poses(prediction.viewmats, unit),
         Ks=views.Ks.to(prediction.viewmats).clone(),
         view_size=views.size,
         photos=views.sources,
@@ -78,7 +78,7 @@ def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: st
     return scene.with_record(cost=Cost(timings))
 
 
-def _placed(prediction: Prediction, views: Views) -> tuple[Prediction, Views]:
+def placed_views(prediction: Prediction, views: Views) -> tuple[Prediction, Views]:
     """Both without the views of unknown pose."""
     keep = [v for v in range(views.num_views) if v not in prediction.unplaced]
     if len(keep) == views.num_views:
@@ -150,7 +150,8 @@ def _usable(gaussians: Gaussians) -> Tensor:
     return keep
 
 
-def _normalised(gaussians: Gaussians, unit: float) -> Gaussians:
+def normalised(gaussians: Gaussians, unit: float) -> Gaussians:
+    """In units of `unit`, quaternions of unit norm, scales not below `MIN_SCALE`."""
     norms = gaussians.quats.float().norm(dim=-1, keepdim=True)
     identity = torch.tensor([1.0, 0, 0, 0], device=norms.device)
     quats = torch.where(norms > 1e-6, gaussians.quats.float() / norms.clamp_min(1e-6), identity)
@@ -169,17 +170,28 @@ def _semantics(prediction: Prediction, keep: Tensor, top_m: int) -> Semantics:
 
     View by view: tables of all pixels times all atoms are what memory and time go into.
     """
-    dictionary = prediction.dictionary
-    finite = torch.isfinite(dictionary).all(-1) & (dictionary.norm(dim=-1) > 1e-6)
+    finite = directed(prediction.dictionary)
     of_views = [
         sparse_weights(maps.flatten(1)[finite].T[own], top_m)
         for maps, own in zip(prediction.weights, keep, strict=True)
     ]
+    return semantics_of(prediction, of_views)
+
+
+def directed(dictionary: Tensor) -> Tensor:
+    """(K,) bool: atoms (K, C) that have a direction."""
+    return torch.isfinite(dictionary).all(-1) & (dictionary.norm(dim=-1) > 1e-6)
+
+
+def semantics_of(prediction: Prediction, of_views: list[tuple[Tensor, Tensor]]) -> Semantics:
+    """Over the atoms that have a direction, of ids and values (n, m) of each view's Gaussians over those."""
     ids, values = (torch.cat(parts) for parts in zip(*of_views, strict=True))
-    return Semantics(ids, values, normalize(dictionary[finite].float(), dim=-1), prediction.space)
+    dictionary = prediction.dictionary[directed(prediction.dictionary)]
+    return Semantics(ids, values, normalize(dictionary.float(), dim=-1), prediction.space)
 
 
-def _scaled_poses(viewmats: Tensor, unit: float) -> Tensor:
+def scaled_poses(viewmats: Tensor, unit: float) -> Tensor:
+    """Poses (V, 4, 4) in units of `unit`."""
     scaled = viewmats.float().clone()
     scaled[:, :3, 3] = viewmats[:, :3, 3].float() / unit
     return scaled

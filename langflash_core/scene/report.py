@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from langflash_core.records import Record
+from langflash_core.records import Record, check_light
 from langflash_core.scene.container import damaged, read_container
 from langflash_core.scene.record import from_json
 
@@ -26,8 +26,9 @@ def describe(scene: "Scene") -> dict:
         total}, bounding_box and core_box {min, max} in scene units (None when empty), metric_scale
         (metres per unit or None), counts, pruning (as `prune` left it, with `psnr_db` and
         `relevance_error` where they were measured), refinement (None, or kept, held_out and the PSNR
-        before and after), timings {stage: seconds, total} (None where they are not known, as in files),
-        warnings`.
+        before and after), detail (None, or as `Record` has it), light (None, or gains and offsets, a row
+        of red, green and blue per view), timings {stage: seconds, total} (None where they are not known,
+        as in files), warnings`.
     """
     from langflash_core.scene.fields import to_fields  # torch
 
@@ -48,12 +49,57 @@ def describe_file(path: Path) -> dict:
         raise damaged(path, error) from error
 
 
+def detail_line(detail: Mapping[str, Any]) -> str:
+    """What a scene's detail was spent on and what it bought, for people; "" where nothing is known.
+
+    Args:
+        detail: as `Record` has it: level (a name), elements, coarse, fine (counts), by_size (counts by the
+            side of an element, pixels of the photo), photos_psnr_db and plain_psnr_db (a number a photo,
+            of this scene and of one Gaussian a pixel). What is missing, or is something else, is left out.
+    """
+    level = detail.get("level")
+    spent = _joined(", ", level if isinstance(level, str) else "", _elements(detail))
+    return _joined(" · ", spent, _bought(detail))
+
+
+def _elements(detail: Mapping[str, Any]) -> str:
+    stored = detail.get("by_size")
+    by_size = stored if isinstance(stored, Mapping) else {}
+    total = f"{n} Gaussians" if (n := _count(detail.get("elements"))) else ""
+    kinds = (f"{n} {kind}" for kind in ("coarse", "fine") if (n := _count(detail.get(kind))))
+    sizes = (f"{side} px {n}" for side, value in by_size.items() if (n := _count(value)))
+    parts = _joined("; ", _joined(", ", *kinds), _joined(", ", *sizes))
+    return _joined(" ", total, f"({parts})" if parts else "")
+
+
+def _bought(detail: Mapping[str, Any]) -> str:
+    here, plain = (_decibels(detail.get(name)) for name in ("photos_psnr_db", "plain_psnr_db"))
+    beside = f" ({plain} dB with one Gaussian a pixel)" if plain else ""
+    return f"from the photos' places {here} dB{beside}" if here else ""
+
+
+def _joined(between: str, *parts: str) -> str:
+    return between.join(filter(None, parts))
+
+
+def _count(value: object) -> str:
+    return f"{value:,}" if isinstance(value, int) and not isinstance(value, bool) else ""
+
+
+def _decibels(values: object) -> str:
+    """A number a photo, or one for all; "" where there is something else among them."""
+    each = values if isinstance(values, list | tuple) else [values]
+    numbers = [v for v in each if isinstance(v, int | float) and not isinstance(v, bool)]
+    return ", ".join(f"{v:.1f}" for v in numbers) if len(numbers) == len(each) else ""
+
+
 def _document(
     arrays: Mapping[str, np.ndarray], space: str, view_size: tuple[int, int], known: Record
 ) -> dict:
     sizes = {name: values.nbytes for name, values in arrays.items() if not name.startswith(_PHOTO)}
     sizes["photos"] = sum(values.nbytes for name, values in arrays.items() if name.startswith(_PHOTO))
     timings, means = known.cost.timings, arrays["means"]
+    check_light(known.light, len(arrays["viewmats"]))
     return {
         "gaussians": len(means),
         "atoms": len(arrays["dictionary"]),
@@ -73,6 +119,8 @@ def _document(
         "counts": dict(known.counts),
         "pruning": dict(known.pruning) or None,
         "refinement": dict(known.refinement) or None,
+        "detail": dict(known.detail) or None,
+        "light": dict(known.light) or None,
         "timings": {**timings, "total": sum(timings.values())} if timings else None,
         "warnings": list(known.warnings),
     }

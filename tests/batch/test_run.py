@@ -80,13 +80,16 @@ def test_other_options_are_other_work(place):
     place.run()
     place.order = Order(prompts=("plant",))
     assert len(place.run()) == 1
+    place.order = Order(prompts=("plant",), detail="low")
+    assert len(place.run()) == 1 and place.run() == []
 
 
 def test_the_fingerprint_is_of_photos_and_options(place, tmp_path):
     photo = place.add("a")
     first = fingerprint([photo], Order())
     others = [Order(size=112), Order(prompts=("b",)), Order(exports=(".ply",)), Order(weights=photo)]
-    assert len({first, *(fingerprint([photo], order) for order in others)}) == 5
+    others += [Order(detail="high"), Order(gaussians=5000)]
+    assert len({first, *(fingerprint([photo], order) for order in others)}) == 7
     place.source.rename(tmp_path / "moved")
     assert fingerprint([tmp_path / "moved" / "a" / "a.jpg"], Order()) == first
     assert fingerprint([photo], Order()) != first  # it is gone

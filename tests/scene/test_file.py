@@ -16,10 +16,12 @@ from langflash_core.scene.assemble import assemble
 from langflash_core.scene.fields import REQUIRED, field_bytes
 from langflash_core.scene.file import load, save
 from langflash_core.scene.prune import prune
-from langflash_core.scene.report import describe
+from langflash_core.scene.report import describe, describe_file
 from langflash_core.splat.reference import render
 from langflash_core.types import Cost, Record, Scene
 from tests.scene.plane import wall_prediction
+
+LIGHT = {"gains": [[1.25, 1.0, 0.9], [0.8, 1.0, 1.1]], "offsets": [[0.01, 0.0, 0.0], [-0.01, 0.0, 0.0]]}
 
 
 @pytest.fixture(scope="module")
@@ -332,6 +334,13 @@ def test_levels_and_confidences_that_make_no_sense_are_refused(path, scene, name
         ("silent_atoms", [99], "silent_atoms: expected values in [0, 6), received 99 to 99"),
         ("calibration", [1], "calibration: expected dict"),
         ("edits", {"deleted": "all"}, "deleted: expected int, received 'all'"),
+        ("light", [1], "light: expected dict"),
+        ("light", {"gains": LIGHT["gains"]}, "light: expected gains and offsets, received gains"),
+        ("light", LIGHT | {"gains": 3 * [[1, 1, 1]]}, "light: expected gains in 2 rows of 3 finite numbers"),
+        ("light", LIGHT | {"offsets": [[0, 0, 0], [0, 0]]}, "light: expected offsets in 2 rows"),
+        ("light", LIGHT | {"offsets": [[0, 0, 0], [0, 0, "0"]]}, "light: expected offsets in 2 rows"),
+        ("light", LIGHT | {"offsets": [[0, 0, 0], [0, 0, torch.nan]]}, "light: expected offsets in 2 rows"),
+        ("light", LIGHT | {"gains": [[1, 1, 1], [1, 0, 1]]}, "light: expected gains above 0"),
     ],
 )
 def test_a_record_that_makes_no_sense_is_refused(path, key, value, words):
@@ -347,6 +356,24 @@ def test_a_record_that_makes_no_sense_is_refused(path, key, value, words):
     strings |= {"scene": text, "digest": _digest(text, fields)}
     path.write_bytes(safetensors.torch.save(fields, strings))
     assert words in refused(path)
+    if key == "light":
+        with pytest.raises(SceneFileError) as told:  # without torch
+            describe_file(path)
+        assert words in str(told.value)
+
+
+def test_the_light_of_its_photos_comes_back(scene, tmp_path):
+    lit = scene.with_record(light=LIGHT)
+    save(lit, tmp_path / "a.langflash")
+    assert load(tmp_path / "a.langflash").record.light == LIGHT
+    assert describe_file(tmp_path / "a.langflash")["light"] == describe(lit)["light"] == LIGHT
+    save(scene, tmp_path / "a.langflash")
+    assert b"light" not in (tmp_path / "a.langflash").read_bytes()
+    assert load(tmp_path / "a.langflash").record.light == {} and describe(scene)["light"] is None
+    for views in (1, 3):
+        wrong = {name: (2 * rows)[:views] for name, rows in LIGHT.items()}
+        with pytest.raises(ValueError, match="light: expected gains in 2 rows"):
+            scene.with_record(light=wrong)
 
 
 def test_equal_scenes_give_equal_bytes_whatever_the_run_cost(path, tmp_path, scene):

@@ -82,6 +82,8 @@ def _order(args: Namespace) -> Order:
         preset=args.preset,
         weights=weights,
         size=args.size,
+        detail=args.detail,
+        gaussians=args.gaussians,
         fov=args.fov,
         device=args.device,
         prompts=prompts,

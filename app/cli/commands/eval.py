@@ -22,6 +22,7 @@ from .eval_ablations import ablations
 from .eval_labels import labels
 from .eval_protocol import opened_lpips, protocol
 from .eval_report import report
+from .eval_sharp import sharp
 from .eval_sides import beside, sides
 from .query import spoken
 
@@ -45,6 +46,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "labels": labels,
         "protocol": protocol,
         "report": report,
+        "sharp": sharp,
         "sides": sides,
         "sides-beside": beside,
     }[args.action](args, out)

@@ -47,7 +47,7 @@ def sides(args: Namespace, out: TextIO) -> None:
 
     lpips = None if args.lpips is None else Lpips(readable_file(args.lpips, "LPIPS file", WeightsError))
     with _cases(args) as (cases, count), open_renderer(args.backend) as renderer, ProgressBar() as progress:
-        render = _colour_only(renderer)
+        render = colour_only(renderer)
         result = run_sides(
             cases,
             count,
@@ -143,7 +143,9 @@ def _cases(args: Namespace) -> Iterator[tuple[Iterator, int]]:
         yield room_cases(pack, renderer, kind=args.set, count=count, first=args.first_seed), count
 
 
-def _colour_only(renderer: Renderer) -> Render:
+def colour_only(renderer: Renderer) -> Render:
+    """A renderer without weight maps."""
+
     def render(scene: Scene, camera: Camera) -> Frame:
         return renderer(scene, camera, weight_maps=False)
 

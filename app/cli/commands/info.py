@@ -9,6 +9,8 @@ from langflash_core.errors import SceneFileError
 from ..files import readable_file
 from ..report import write_json
 
+_SHOWS = 1 / 255  # the smallest step of an 8-bit picture
+
 
 def run(args: Namespace, out: TextIO) -> None:
     """Print counts, sizes, timings, and what pruning saved.
@@ -24,7 +26,7 @@ def run(args: Namespace, out: TextIO) -> None:
     if args.json:
         write_json(document, out)
     else:
-        print("\n".join(_lines(document)), file=out)
+        print("\n".join(_lines(_for_people(_in_words(document)))), file=out)
 
 
 def _described(path: Path) -> dict[str, Any]:
@@ -37,6 +39,26 @@ def _described(path: Path) -> dict[str, Any]:
     from ..scenes import open_scene
 
     return describe(open_scene(path))
+
+
+def _for_people(document: dict[str, Any]) -> dict[str, Any]:
+    """With the detail as one line, and none where there is nothing to say of it."""
+    from langflash_core.scene.report import detail_line
+
+    said = {**document, "detail": detail_line(document["detail"] or {})}
+    return said if said["detail"] else {name: value for name, value in said.items() if name != "detail"}
+
+
+def _in_words(fields: dict[str, Any]) -> dict[str, Any]:
+    """Without a light that nobody would see; else with its ranges, for photos are many."""
+    gains, offsets = (
+        [value for row in (fields["light"] or {}).get(name, ()) for value in row]
+        for name in ("gains", "offsets")
+    )
+    if not any(abs(gain - 1) > _SHOWS for gain in gains) and not any(abs(o) > _SHOWS for o in offsets):
+        return {name: value for name, value in fields.items() if name != "light"}
+    ranges = f"gains {min(gains):.2f} to {max(gains):.2f}, offsets {min(offsets):.3f} to {max(offsets):.3f}"
+    return {**fields, "light": ranges}
 
 
 def _lines(fields: dict[str, Any], indent: str = "") -> list[str]:

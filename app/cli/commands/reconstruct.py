@@ -50,6 +50,8 @@ def run(args: Namespace, out: TextIO) -> None:
             precision=args.precision,
             aggregation=args.aggregation,
             grouping=args.grouping,
+            detail=args.detail,
+            gaussians=args.gaussians,
             refine_seconds=args.refine,
             progress=progress,
             ahead=ahead,

@@ -109,6 +109,7 @@ def add_eval(commands) -> None:
     _add_labelled(actions)
     _add_posed(actions)
     _add_sides(actions)
+    _add_sharp(actions)
     _add_labels(actions)
     _add_protocol(actions)
     _add_report(actions)
@@ -173,10 +174,7 @@ def _add_sides(actions) -> None:
         "--posed", type=Path, dest="folder", metavar="FOLDER", help="instead, real photos of known poses"
     )
     add_description(command)
-    command.add_argument(
-        "--set", choices=("held_out", "validation"), default="held_out", help="of rooms (default: held_out)"
-    )
-    command.add_argument("--first-seed", type=seed, metavar="N", help="(default: the set's own range)")
+    _add_room_set(command)
     command.add_argument(
         "--apart", type=whole_count, nargs="+", metavar="N", help="numbers between two (default: 6 12 18 24)"
     )
@@ -195,6 +193,53 @@ def _add_sides(actions) -> None:
     beside.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
     beside.add_argument("--sheet", type=Path, metavar="IMG", help="also six scenes of both, as .png")
     beside.set_defaults(json=False)
+
+
+def _add_sharp(actions) -> None:
+    command = new_command(actions, "sharp", "pictures at the photos' size: PSNR, detail, lattice, opacity")
+    command.add_argument(
+        "photos",
+        nargs="*",
+        type=Path,
+        metavar="PHOTO",
+        help="first and second in turn, or a folder of NAME_left, NAME_right (default: those shipped)",
+    )
+    command.add_argument(
+        "--posed", type=Path, dest="folder", metavar="FOLDER", help="instead, real photos of known poses"
+    )
+    add_description(command)
+    command.add_argument(
+        "--apart", type=whole_count, nargs="+", metavar="N", help="numbers between two (default: 6 12 18 24)"
+    )
+    command.add_argument("--pack", type=Path, metavar="PACK", help="instead, rooms with this furniture")
+    _add_room_set(command)
+    command.add_argument("--limit", type=whole_count, metavar="N", help="pairs, triples (20) or rooms (20)")
+    command.add_argument(
+        "--detail",
+        nargs="+",
+        choices=("low", "normal", "high"),
+        help="scenes made so, beside plain ones, one Gaussian a pixel (default: plain alone)",
+    )
+    command.add_argument(
+        "--beside", type=Path, metavar="FOLDER", help="also scenes of another version, NAME.langflash"
+    )
+    command.add_argument(
+        "--keep", type=Path, metavar="FOLDER", help="write the scenes made, FOLDER/WAY/NAME.langflash"
+    )
+    command.add_argument("--lpips", type=Path, metavar="FILE", help="LPIPS weights of VGG-16, .safetensors")
+    command.add_argument("--results", type=Path, metavar="DIR", help="also keep every scene's numbers")
+    command.add_argument(
+        "--sheet", type=Path, metavar="IMG", help="also photos and scenes at 100 and 300 %%, as .png"
+    )
+    _add_judging(command)
+
+
+def _add_room_set(command: argparse.ArgumentParser) -> None:
+    """Which rooms are made again."""
+    command.add_argument(
+        "--set", choices=("held_out", "validation"), default="held_out", help="of rooms (default: held_out)"
+    )
+    command.add_argument("--first-seed", type=seed, metavar="N", help="(default: the set's own range)")
 
 
 def _add_protocol(actions) -> None:

@@ -16,6 +16,7 @@ from .shared import (
     add_backend,
     add_camera,
     add_colours,
+    add_detail,
     add_json,
     add_network,
     add_output,
@@ -41,6 +42,7 @@ def add_reconstruct(commands) -> None:
     command.add_argument("photos", nargs="+", type=Path, metavar="PHOTO")
     add_output(command, "SCENE", "the scene to write")
     add_network(command)
+    add_detail(command)
     command.add_argument(
         "--aggregation",
         choices=("lfa", "average", "crops"),
@@ -125,6 +127,7 @@ def add_batch(commands) -> None:
         "machines see photos and OUT under the same paths",
     )
     add_network(command)
+    add_detail(command)
     command.add_argument(
         "--fov", type=open_fov, metavar="DEG", help="field of view of the photos' longer side, of all sets"
     )

@@ -3,9 +3,10 @@
 import argparse
 from pathlib import Path
 
+from langflash_core.detail import DEFAULT_DETAIL, DETAILS, FEWEST, MOST
 from langflash_core.formats import COLOUR_MAPS
 
-from ..values import above_zero, crop, intrinsics, pixel_side, size, span, view_index
+from ..values import above_zero, crop, gaussian_count, intrinsics, pixel_side, size, span, view_index
 
 
 def new_command(commands, name: str, purpose: str, **more) -> argparse.ArgumentParser:
@@ -39,6 +40,23 @@ def add_network(command: argparse.ArgumentParser) -> None:
         help="the network sees about PX x PX pixels (default: 224; full: 256)",
     )
     command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
+
+
+def add_detail(command: argparse.ArgumentParser) -> None:
+    """How many Gaussians a scene gets, and so how fine it is."""
+    command.add_argument(
+        "--detail",
+        choices=tuple(DETAILS),
+        default=DEFAULT_DETAIL,
+        help="how fine the scene is: normal has about 120,000 Gaussians for two photos, high twice as many, "
+        f"low less than half; preset mini (default: {DEFAULT_DETAIL})",
+    )
+    command.add_argument(
+        "--gaussians",
+        type=gaussian_count,
+        metavar="N",
+        help=f"about so many Gaussians, {FEWEST:,} to {MOST:,}, instead of as many as --detail has",
+    )
 
 
 def add_colours(command: argparse.ArgumentParser) -> None:

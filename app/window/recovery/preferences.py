@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+from langflash_core.detail import DEFAULT_DETAIL, DETAILS
 from langflash_core.errors import OutputError
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.formats import COLOUR_MAPS
@@ -29,9 +30,10 @@ class Preferences:
     flying, a factor. touch_pad: two fingers turn, with Ctrl they zoom. photos_in_space: the cameras' frusta
     are drawn. near_photos: the picture fades, and orbits slow down, where no photo looked from about
     there. fill_gaps: it shows what is around its gaps. start_at_once: dropped photos are reconstructed
-    without asking. panel_width: design pixels. window: x, y, width, height in screen pixels, or none.
-    dictionary: the same of the dictionary's window inside it, design pixels, and whether it is open.
-    recent: newest first. folder: where files were last looked for."""
+    without asking. detail: of DETAILS, how fine scenes of photos are. panel_width: design pixels. window:
+    x, y, width, height in screen pixels, or none. dictionary: the same of the dictionary's window inside
+    it, design pixels, and whether it is open. recent: newest first. folder: where files were last looked
+    for."""
 
     theme: str = "dark"
     colormap: str = COLOUR_MAPS[0]
@@ -42,6 +44,7 @@ class Preferences:
     near_photos: bool = True
     fill_gaps: bool = True
     start_at_once: bool = True
+    detail: str = DEFAULT_DETAIL
     panel_width: float = 348.0
     window: tuple[int, ...] = ()
     maximised: bool = False
@@ -112,6 +115,8 @@ def _fitting(name: str, value: Any) -> Any:
         return value if value in THEMES else None
     if name == "colormap":
         return value if value in COLOUR_MAPS else None
+    if name == "detail":
+        return value if isinstance(value, str) and value in DETAILS else None
     if name == "folder":
         return value if isinstance(value, str) else None
     if isinstance(default, float):

@@ -65,8 +65,8 @@ class SceneEffects(Effects):
             case AddPhotos(paths):
                 submit(MakeThumbnails(paths))
             case Reconstruct() if state.photos:
-                photos = state.photos
-                submit(ReconstructPhotos(tuple(p.path for p in photos), tuple(p.fov for p in photos)))
+                photos, detail = state.photos, state.preferences.detail
+                submit(ReconstructPhotos(tuple(p.path for p in photos), tuple(p.fov for p in photos), detail))
             case OpenScene(path, edits, alone):
                 submit(LoadScene(path, edits, alone))
             case SaveScene(path) if state.info is not None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from langflash_core.detail import DEFAULT_DETAIL
 from langflash_core.errors import ImageError, LangFlashError
 from langflash_core.geometry.reach import median_reach
 from langflash_core.scene.edits import History, Marks
@@ -42,15 +43,19 @@ THUMBNAIL_SIDE = 320  # pixels of the longer side
 
 @dataclass(frozen=True)
 class ReconstructPhotos(Job):
-    """Make a scene of photos. fovs: degrees of the longer side, one per photo; None: its record."""
+    """Make a scene of photos. fovs: degrees of the longer side, one per photo; None: its record.
+    detail: its name, of `langflash_core.detail`."""
 
     paths: tuple[Path, ...]
     fovs: tuple[float | None, ...] = ()
+    detail: str = DEFAULT_DETAIL
 
     def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> SceneArrived:
         from langflash_core.pipeline import reconstruct
 
-        scene = reconstruct(self.paths, fov=self.fovs or None, progress=progress, cancelled=cancelled)
+        scene = reconstruct(
+            self.paths, fov=self.fovs or None, detail=self.detail, progress=progress, cancelled=cancelled
+        )
         name = " + ".join(path.stem for path in self.paths[:3]) + (" ..." if len(self.paths) > 3 else "")
         return SceneArrived(describe_scene(scene, serial, name))
 

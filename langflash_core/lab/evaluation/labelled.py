@@ -20,7 +20,8 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.images.pictures import centre_box
-from langflash_core.images.views import load_views
+from langflash_core.images.views import load_views, source_pictures
+from langflash_core.lab.evaluation.borders import OTHER, UNKNOWN, border_f1, right_near_borders
 from langflash_core.lab.evaluation.metrics import Presence, calibration_error
 from langflash_core.lab.evaluation.numbers import mask_iou, rounded
 from langflash_core.lab.evaluation.photo_words import (
@@ -66,6 +67,8 @@ DRAWN = 1
 """Scenes are drawn at so many times the size of the network's photo."""
 METHODS = ("atoms", "features")
 """Where names are read from: the drawn atoms, the features of the photo before there is a scene."""
+LARGE = "atoms, large"
+"""The drawn atoms at the photo's size: of these the classes are counted, for one measure."""
 Render = Callable[[Scene, Camera], Frame]
 Progress = Callable[[str, float], None]
 
@@ -246,6 +249,7 @@ def judge_photo(judged: Judged, photo: LabelledPhoto, tally: Tally, look: Look |
     if photo.labels is not None:
         judge_names(judged, drawn, tally)
         overlap_fine(judged, drawn, tally)
+        judge_borders(judged, photo, drawn, tally)
         ask_photo(judged, drawn, int(photo.id) if photo.id.isdigit() else 0, tally)
     if look is not None:
         look(_sight(judged, photo, drawn))
@@ -320,6 +324,25 @@ def judge_names(judged: Judged, drawn: Drawn, tally: Tally) -> None:
             tally.count(method, "fine", fine, words.fine_of[drawn.ids].flatten(), len(words.fine))
 
 
+def judge_borders(judged: Judged, photo: LabelledPhoto, drawn: Drawn, tally: Tally) -> None:
+    """The 37 classes and their borders, drawn again at the size of the photo (768 pixels long at most)."""
+    assert photo.labels is not None
+    height, width = source_pictures(drawn.views)[0].shape[1:]
+    frame = judged.render(drawn.scene, drawn.scene.camera(0, width, height))
+    assert frame.weight_maps is not None
+    words = judged.words
+    maps = relevance_maps(frame.weight_maps, compile_query(drawn.scene, judged.space, words.classes))
+    found = maps.argmax(0).masked_fill((maps == 0).all(0), -1)
+    box = centre_box(photo.image.shape[1], photo.image.shape[0], drawn.scene.view_size)
+    ids = seen_through(photo.labels, box, (width, height))
+    truth = words.classes_of[ids].masked_fill(ids == 0, UNKNOWN)
+    tally.count(LARGE, "classes", found.flatten(), truth.flatten(), len(words.classes))
+    truth = truth.masked_fill((truth < 0) & (ids > 0), OTHER)
+    inside, outside = right_near_borders(found.numpy(), truth.numpy())
+    f1 = border_f1(found.numpy(), truth.numpy())
+    tally.note(border_f1=f1, right_near_borders=inside, right_elsewhere=outside)
+
+
 def ask_photo(judged: Judged, drawn: Drawn, seed: int, tally: Tally) -> None:
     """As many things that are there as things that are not, asked as anybody asks, and the masks of the
     former, where pixels without a label count for nothing."""
@@ -390,8 +413,13 @@ def summary(tally: Tally, words: PhotoWords) -> dict:
             "presence_phrases": float(sum(len(s) for s in tally.scores)),
             "calibration_error": calibration_error(torch.cat(tally.scores), torch.cat(tally.truths)),
         }
+    if (LARGE, "classes") in tally.counts:
+        counts = tally.counts[LARGE, "classes"]
+        measures["large_classes_miou"] = mean_iou(counts, range(len(words.classes)))
     labels: dict[str, dict[str, float]] = {}
     for (method, kind), counts in tally.counts.items():
+        if method not in METHODS:
+            continue
         row = labels.setdefault(method, {})
         row[f"{kind}_accuracy"] = accuracy(counts)
         row[f"{kind}_miou"] = mean_iou(counts, range(len(counts) - 1))

@@ -17,6 +17,10 @@ PHOTOS = (
     ("Phrases asked, half of them absent", "presence_phrases", "", ""),
     ("Calibration error of scores (ECE)", "calibration_error", "", ""),
     ("Border F of 37 classes", "border_f_atoms", "2D features", "border_f_features"),
+    ("At the photo's size: F1 of borders, 4 pixels", "border_f1", "", ""),
+    ("At the photo's size: named right within 8 pixels of a border", "right_near_borders", "", ""),
+    ("At the photo's size: named right elsewhere", "right_elsewhere", "", ""),
+    ("At the photo's size: mIoU of 37 classes", "large_classes_miou", "", ""),
     ("Share of the picture that the scene covers", "covered", "", ""),
     ("Reconstruction, seconds a photo", "seconds", "", ""),
 )

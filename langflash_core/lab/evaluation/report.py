@@ -30,23 +30,29 @@ from langflash_core.lab.evaluation.report_parts import (
     labels_table,
     measures_table,
 )
+from langflash_core.lab.evaluation.report_sharp import Tally as Sharp
+from langflash_core.lab.evaluation.report_sharp import sharp_report_tables, sharp_summary, sharp_tallies
 from langflash_core.lab.evaluation.report_sides import Tally as Sides
 from langflash_core.lab.evaluation.report_sides import side_summary, side_tables, side_tallies
 from langflash_core.lab.evaluation.rooms import run as rooms
 from langflash_core.lab.evaluation.rooms.summary import summary as room_summary
 from langflash_core.lab.evaluation.rooms.tally import Tally as RoomTally
+from langflash_core.lab.evaluation.sharp import WAYS, Bench
+from langflash_core.lab.evaluation.sharp_subjects import Subject, posed_subjects, room_subjects
 from langflash_core.lab.evaluation.sights import Look
 from langflash_core.lab.evaluation.speed import PAPER_MS
 from langflash_core.lab.evaluation.tables import COLUMNS, MEASURES, METHODS
 from langflash_core.lab.evaluation.tallies import Shelf, identity, intervals, merged
 from langflash_core.lab.photos import PhotoFolder
+from langflash_core.lab.rooms import RoomRenderer, load_pack
 from langflash_core.running import Progress
 
 WORST, BEST = 6, 2
 """Scenes shown of a section."""
 DRAWS = 300
-ABLATED, SIDES = 25, 24
-"""At most so many rooms are asked of every rival, and walked around."""
+ABLATED, SIDES, SHARP = 25, 24, 8
+"""At most so many rooms are asked of every rival, so many walked around, and so many scenes of rooms and of
+pairs compared with their photos at the photos' size."""
 PUBLISHED = Table(
     "",
     ("system", "data", "measure", "value"),
@@ -110,8 +116,10 @@ def plans(sources: Sources) -> list[Callable[[Workplace], Section]]:
             judges.append(lambda place: ablations_section(cache, place, limit))
     if pack is not None:
         judges.append(lambda place: sides_section(pack, place, limit))
+        judges.append(lambda place: sharp_rooms_section(pack, place, limit))
     if pairs is not None:
         judges.append(lambda place: posed_section(pairs, place, limit))
+        judges.append(lambda place: sharp_posed_section(pairs, place, limit))
     if photos is not None:
         judges.append(lambda place: photos_section(photos, sources.photo_ids or photos.ids, place))
     return judges
@@ -198,6 +206,49 @@ def sides_section(pack: Path, place: Workplace, limit: int | None = None) -> Sec
         {"scenes": len(kept), **result},
         bounds,
         side_tables(result),
+    )
+
+
+def sharp_rooms_section(pack: Path, place: Workplace, limit: int | None = None) -> Section:
+    """Rooms at the size of photos."""
+    count = min(limit or SHARP, SHARP)
+
+    def subjects() -> Iterator[Subject]:
+        furniture = load_pack(pack)
+        with RoomRenderer(furniture) as renderer:
+            yield from room_subjects(furniture, renderer, count=count)
+
+    shelf = place.shelf("sharp_rooms", Sharp, pack=str(pack.resolve()), ways=WAYS)
+    return _sharp_section("Rooms at the photos' size", subjects(), count, place, shelf)
+
+
+def sharp_posed_section(folder: PhotoFolder, place: Workplace, limit: int | None = None) -> Section:
+    """Pairs of real photos at their own size."""
+    triples = chosen_triples(folder.ids, min(limit or SHARP, SHARP), APART)
+    shelf = place.shelf("sharp_posed", Sharp, **_described(folder), ways=WAYS)
+    subjects = posed_subjects(folder, triples)
+    return _sharp_section("Real photos at their own size", subjects, len(triples), place, shelf)
+
+
+def _sharp_section(
+    title: str, subjects: Iterator[Subject], count: int, place: Workplace, shelf: Shelf
+) -> Section:
+    bench = Bench(place.render, place.weights, place.preset, ways=WAYS, lpips=place.lpips)
+    kept, gallery = _told(place, shelf, count, lambda look: sharp_tallies(subjects, bench, shelf, look))
+    result, bounds = _summed(kept, sharp_summary)
+    about = (
+        f"{len(kept)} pairs; each scene is drawn from its photos' own places, and from that of a kept one "
+        "between, at their size, at most three times the network's grid, beside the photo through that grid."
+    )
+    return Section(
+        shelf.folder.name,
+        title,
+        about,
+        {"scenes": len(kept), **result},
+        bounds,
+        sharp_report_tables(result),
+        (),
+        gallery.shown(list(kept), WORST, BEST),
     )
 
 

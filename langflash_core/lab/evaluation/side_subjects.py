@@ -198,19 +198,20 @@ def posed_cases(folder: PhotoFolder, triples: Sequence[Triple]) -> Iterator[Case
             triple: Triple = triple,
             photos: tuple[LabelledPhoto, ...] = photos,
         ) -> Subject:
-            own = tuple(_photo_look(photo, photos[0], size, "0") for photo in photos)
+            own = tuple(photo_look(photo, photos[0], size, "0") for photo in photos)
             if not (own[0].view.depths > 0).any():
                 raise InputError(
                     f"photo {triple.first} has no depth in metres, which is needed; add it, or --depth-unit"
                 )
-            between = _photo_look(folder.photo(triple.between), photos[0], size, "between")
+            between = photo_look(folder.photo(triple.between), photos[0], size, "between")
             aside = _looks_aside(folder, triple, photos[0], own, size)
             return Subject(own, tuple(_worth([between, *aside], own)))
 
         yield Case(f"{triple.first}-{triple.second}", photos, truth)
 
 
-def _photo_look(photo: LabelledPhoto, first: LabelledPhoto, size: tuple[int, int], group: str) -> Look:
+def photo_look(photo: LabelledPhoto, first: LabelledPhoto, size: tuple[int, int], group: str) -> Look:
+    """A photo of a posed folder at a size (width, height); world: the first photo's camera."""
     seen = as_seen(photo, size)
     view = DepthView(as_array(seen.depths), as_array(relative(first, photo)), as_array(seen.K))
     return Look(photo.id, group, view, seen.rgb.permute(1, 2, 0).float() / 255)
@@ -234,7 +235,7 @@ def _looks_aside(
     for angle in ANGLES:
         nearest = sorted(angles, key=lambda id: (abs(angles[id] - angle), id))[:TRIED]
         fitting = [id for id in nearest if abs(angles[id] - angle) <= NEAR_ANGLE]
-        found = [_photo_look(folder.photo(id), first, size, str(angle)) for id in fitting]
+        found = [photo_look(folder.photo(id), first, size, str(angle)) for id in fitting]
         views = [look.view for look in own]
         looks += sorted(found, key=lambda look: -seen_by(look.view, views).mean())[:1]
     return looks

@@ -120,10 +120,21 @@ def test_lens_given_twice(refused, output, photo):
         ("--size", "4096"),
         ("--device", "abacus"),
         ("--preset", "huge"),
+        ("--detail", "highest"),
+        ("--detail", ""),
+        ("--gaussians", "999"),
+        ("--gaussians", "4000001"),
+        ("--gaussians", "many"),
+        ("--gaussians", "2e5"),
     ],
 )
 def test_bad_option_of_reconstruct(refused, output, photo, option, value):
     assert option in refused("reconstruct", photo, option, value, "-o", output)
+
+
+@pytest.mark.parametrize(("option", "value"), [("--detail", "highest"), ("--gaussians", "0")])
+def test_bad_detail_of_a_batch(refused, photo, tmp_path, option, value):
+    assert option in refused("batch", photo.parent, option, value, "-o", tmp_path / "out")
 
 
 @pytest.mark.parametrize(

@@ -278,6 +278,19 @@ def test_info(run, scene_file):
     assert f"gaussians: {WIDTH * HEIGHT:,}" in text and "space: minilm" in text
 
 
+def test_info_tells_a_light_that_shows(run, scene_file, tmp_path):
+    assert run("info", scene_file, "--json").json()["light"] is None
+    assert "\nlight:" not in run("info", scene_file).out
+    path = tmp_path / "lit.langflash"
+    for change, told in ((0.003, False), (0.1, True)):
+        light = {"gains": [[1 - change] * 3, [1, 1, 1 + change]], "offsets": [[0.001] * 3, [-0.001] * 3]}
+        langflash_core.save(langflash_core.load(scene_file).with_record(light=light), path)
+        assert run("info", path, "--json").json()["light"] == light
+        text = run("info", path).out
+        assert ("\nlight: gains 0.90 to 1.10, offsets -0.001 to 0.001\n" in text) == told
+        assert ("\nlight:" in text) == told
+
+
 def test_json_is_all_of_stdout(scene_file, tmp_path):
     done = subprocess.run(
         [

@@ -44,6 +44,8 @@ def test_the_truth_scores_as_the_truth(folder: PhotoFolder, program):
     measures, atoms = result["measures"], result["labels"]["atoms"]
     assert result["photos"] == 3 and measures["covered"] > 0.98
     assert measures["depth_abs_rel"] < 1e-3 and measures["depth_delta1"] == 1
+    assert measures["border_f1"] > 0.9 and measures["right_elsewhere"] > 0.95  # drawn at twice the size
+    assert measures["large_classes_miou"] > 0.7 and measures["right_near_borders"] > 0.7
     assert measures["depth_scale"] == pytest.approx(1, abs=1e-3)  # network_unit makes metres of it
     assert measures["presence_recall"] == 1 and measures["presence_precision"] > 0.9
     for row in result["labels"].values():  # borders blend, or are cut coarsely

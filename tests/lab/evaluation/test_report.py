@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from langflash_core.colormaps import HEAT_STOPS
-from langflash_core.lab.evaluation import labelled, posed, report_page
+from langflash_core.lab.evaluation import labelled, posed, report_page, sharp
+from langflash_core.lab.evaluation.drawing import drawn_frame
 from langflash_core.lab.evaluation.report import PUBLISHED, Sources, Workplace, plans
 from langflash_core.lab.evaluation.report_parts import Gallery, Plot, Point, Table
 from langflash_core.lab.evaluation.report_plot import svg
@@ -19,6 +20,7 @@ from langflash_core.lab.evaluation.sights import Sight, heat_picture, label_pict
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.network import MINI
 from langflash_core.splat import render
+from langflash_core.types import Camera, Frame, Scene
 from tests.lab.evaluation.real_photos import KnowingNet, knowing, write_folder
 
 
@@ -40,27 +42,36 @@ def program(folder: PhotoFolder, monkeypatch) -> list[list[str]]:
         return knowing([folder.photo(id) for id in ids], folder.names, scale=0.25)
 
     monkeypatch.setitem(labelled.PRESETS, "mini", replace(MINI, native_area=56 * 42))
-    for module in (posed, labelled):
+    for module in (posed, labelled, sharp):
         monkeypatch.setattr(module, "reconstruct", reconstruct)
     monkeypatch.setattr(labelled, "load_network", lambda preset, weights: network)
     return asked
 
 
+def drawn(scene: Scene, camera: Camera) -> Frame:
+    """By tiles where there is no language: the reference takes long at eight times the photo's size."""
+    return render(scene, camera) if scene.semantics.num_atoms else drawn_frame(scene.gaussians, camera)
+
+
 def made(folder: PhotoFolder, work: Path) -> list:
     ids = folder.ids[:2]
-    place = Workplace(render, work)
+    place = Workplace(drawn, work)
     return [judge(place) for judge in plans(Sources(None, None, folder, folder, ids, limit=2))]
 
 
 def test_a_report_holds_every_number_and_goes_on_where_it_stopped(folder, program, tmp_path):
     found = made(folder, tmp_path)
-    assert [section.name for section in found] == ["posed", "photos"]
-    pairs, photos = found
+    assert [section.name for section in found] == ["posed", "sharp_posed", "photos"]
+    pairs, sharp_pairs, photos = found
     assert pairs.result["measures"]["pose_auc_5"] > 0.99 and pairs.result["scenes"] == 2
     low, high = pairs.intervals["measures/psnr"]
     assert low <= pairs.result["measures"]["psnr"] <= high
     assert photos.result["labels"]["atoms"]["classes_accuracy"] > 0.9
-    assert len(pairs.scenes) == len(photos.scenes) == 2
+    plain = sharp_pairs.result["measures"]["plain"]
+    low, high = sharp_pairs.intervals["measures/plain/photos/psnr"]
+    assert low <= plain["photos"]["psnr"] <= high and plain["between"]["seen"] > 0.5
+    assert sharp_pairs.tables[0].header == ("measure", "photo through the grid", "plain")
+    assert len(pairs.scenes) == len(sharp_pairs.scenes) == len(photos.scenes) == 2
     assert pairs.scenes[0].worth <= pairs.scenes[1].worth  # failures first
     before = len(program)
     again = made(folder, tmp_path)
@@ -79,7 +90,7 @@ def test_the_page_needs_nothing_from_elsewhere_and_escapes_what_it_says(folder, 
     page = report_page.html(report)
     assert "<script" not in page and "a &amp; b" in page
     assert not re.findall(r'(?:src|href)="(?!data:|#)', page)
-    assert page.count("<figure>") == 4 and page.count("data:image/jpeg") == 4
+    assert page.count("<figure>") == 6 and page.count("data:image/jpeg") == 6
     document = json.loads(report_page.document(report))
     psnr = document["sections"]["posed"]["measures"]["psnr"]
     assert psnr == found[0].result["measures"]["psnr"]

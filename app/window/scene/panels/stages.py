@@ -1,8 +1,10 @@
-"""What a reconstruction cost, in the stages of the paper's table."""
+"""What a reconstruction cost, in the stages of the paper's table, and what its detail was spent on."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from imgui_bundle import imgui
+
+from langflash_core.scene.report import detail_line
 
 from ...kit import theme, widgets
 from ...kit.look import Look
@@ -29,20 +31,28 @@ def table(timings: Mapping[str, float]) -> list[tuple[str, float]]:
 
 
 def draw(state: State, look: Look) -> None:
-    """The table, folded away until it is asked for."""
-    rows = [] if state.info is None else table(state.info.scene.record.cost.timings)
-    if not rows:
+    """Both, folded away until they are asked for."""
+    if state.info is None:
         return
+    record = state.info.scene.record
+    rows, detail = table(record.cost.timings), detail_line(record.detail)
+    if rows and _opened(f"Made in {rows[-1][1]:.1f} s###cost"):
+        _costs(rows, record.cost.peak_memory_mb)
+    if detail and _opened(f"Detail: {record.detail.get('level', 'its own')}###detail"):
+        with widgets.colours(text=theme.MUTED):
+            imgui.text_wrapped(detail.replace(" · ", "\n"))
+
+
+def _opened(title: str) -> bool:
     shape = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
     with widgets.colours(text=theme.MUTED):
-        opened = imgui.tree_node_ex(f"Made in {rows[-1][1]:.1f} s###cost", shape)
-    if not opened:
-        return
+        return imgui.tree_node_ex(title, shape)
+
+
+def _costs(rows: Sequence[tuple[str, float]], peak: int | None) -> None:
     for name, seconds in rows[:-1]:
         _row(name, f"{1000 * seconds:,.0f} ms", theme.MUTED)
     _row("All", f"{1000 * rows[-1][1]:,.0f} ms", theme.TEXT)
-    assert state.info is not None
-    peak = state.info.scene.record.cost.peak_memory_mb
     if peak:
         _row("Peak memory", f"{peak:,} MB", theme.TEXT)
 

@@ -6,15 +6,19 @@ from pathlib import Path
 
 import pytest
 
-from app.window.recovery import preferences
+from app.window.commands import Command
+from app.window.recovery import panels, preferences
+from app.window.recovery.commands import Prefer
 from app.window.recovery.preferences import DEFAULTS, MOST_RECENT, Preferences
+from app.window.state import State
+from tests.app.window.headless import context, frames, look
 
 
 def test_they_come_back_as_they_were_left(folders: Path) -> None:
     left = Preferences(
         theme="light", scale=1.5, speed=2.0, touch_pad=True, panel_width=420.0,
         window=(-30, 40, 1000, 700), maximised=True, dictionary=(400, 60, 372, 430),
-        dictionary_open=True, recent=("/a b/ä.langflash",),
+        dictionary_open=True, detail="high", recent=("/a b/ä.langflash",),
     )  # fmt: skip
     preferences.save(left)
     assert preferences.load() == (left, "")
@@ -40,7 +44,7 @@ def test_a_damaged_file_gives_defaults_and_a_sentence(folders: Path, content: by
         ("theme", "pink"), ("scale", 9), ("scale", "1"), ("scale", True), ("speed", -1), ("touch_pad", 1),
         ("window", [1, 2, 3]), ("window", [0, 0, 10, 10]), ("window", [1e9, 0, 900, 600]),
         ("dictionary", [0, 0, 300]), ("dictionary_open", 1), ("recent", [1]), ("recent", "room"),
-        ("panel_width", None),
+        ("panel_width", None), ("detail", "highest"), ("detail", 2), ("detail", ["low"]),
     ],
 )  # fmt: skip
 def test_one_bad_value_costs_only_itself(folders: Path, name: str, value: object) -> None:
@@ -50,6 +54,25 @@ def test_one_bad_value_costs_only_itself(folders: Path, name: str, value: object
     loaded, sentence = preferences.load()
     assert loaded == replace(DEFAULTS, maximised=True)
     assert name in sentence
+
+
+def test_a_file_from_before_there_was_a_detail_opens_as_it_was(folders: Path) -> None:
+    preferences.save(replace(DEFAULTS, theme="light"))
+    content = json.loads(preferences.file().read_bytes())
+    assert content.pop("detail") == "normal"
+    preferences.file().write_text(json.dumps(content))
+    assert preferences.load() == (replace(DEFAULTS, theme="light"), "")
+
+
+def test_a_detail_is_chosen_in_the_panel(monkeypatch: pytest.MonkeyPatch) -> None:
+    def chosen(options, old):
+        return "high" if ("High", "high") in options else old
+
+    monkeypatch.setattr(panels.widgets, "choice", chosen)
+    found: list[Command] = []
+    with context((800, 600)):
+        frames(lambda seen: found.extend(panels.draw_settings(State(), seen)), look(), 1)
+    assert found == [Prefer(replace(DEFAULTS, detail="high"))]
 
 
 def test_recent_files_are_few_and_newest_first() -> None:

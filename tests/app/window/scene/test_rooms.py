@@ -16,6 +16,8 @@ from app.window.scene.effects import SceneEffects
 from app.window.scene.state import MOST_ROOMS, Photo, SceneInfo
 from app.window.scene.work import describe_scene
 from app.window.state import State
+from langflash_core import pipeline
+from langflash_core.errors import ImageError
 from langflash_core.scene.edits import Mask
 from langflash_core.scene.file import save
 from tests.app.window.scenes import after, room, shown_scene
@@ -100,6 +102,24 @@ def test_without_a_scene_a_drop_starts_at_once(photo: Path) -> None:
     desk = Desk()
     desk.perform(show.OpenPaths((str(photo),)))
     assert desk.state.dialog is None and desk.jobs == ["ReconstructPhotos"]
+
+
+def test_scenes_have_the_detail_that_is_preferred(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    for detail in ("normal", "high"):
+        wanted = replace(desk.state.preferences, detail=detail)
+        desk.state = replace(desk.state, preferences=wanted, job=None)
+        desk.perform(show.Reconstruct())
+        assert desk.asked[-1].detail == detail
+    told = {}
+
+    def reconstruct(photos, **options):
+        told.update(options)
+        raise ImageError("no scene is wanted")
+
+    monkeypatch.setattr(pipeline, "reconstruct", reconstruct)
+    with pytest.raises(ImageError):
+        desk.asked[-1].run(1, lambda stage, fraction: None, lambda: False)
+    assert told["detail"] == "high"
 
 
 def test_a_person_who_starts_by_hand_still_says_where_photos_belong(edited: Desk, photo: Path) -> None:

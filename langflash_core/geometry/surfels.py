@@ -1,0 +1,55 @@
+"""Flat elements of a surface: what spans them, and the ellipse that two spans make.
+
+Sizes: ... any leading sizes, H W pixels.
+"""
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+STRETCH = 5.0  # a surface seen edge-on is not stretched further than this many footprints
+
+
+def spans(pos_c: Tensor, footprint: Tensor) -> tuple[Tensor, Tensor]:
+    """Tangents (..., H, W, 3) of points (..., H, W, 3) from a pixel to the next, along columns and rows.
+
+    The shorter of the forward and backward differences: the nearer side of a jump of depth.
+
+    Args:
+        footprint: (..., H, W), what a pixel covers at its depth, in the points' unit.
+    """
+    return _difference(pos_c, -2, footprint), _difference(pos_c, -3, footprint)
+
+
+def _difference(pos_c: Tensor, dim: int, footprint: Tensor) -> Tensor:
+    steps = pos_c.diff(dim=dim)
+    before = torch.cat((steps.narrow(dim, 0, 1), steps), dim) if steps.shape[dim] else torch.zeros_like(pos_c)
+    after = torch.cat((steps, steps.narrow(dim, -1, 1)), dim) if steps.shape[dim] else before
+    shorter = torch.where((before.norm(dim=-1) < after.norm(dim=-1))[..., None], before, after)
+    longest = shorter.norm(dim=-1, keepdim=True).clamp_min(1e-12)
+    return shorter * (STRETCH * footprint[..., None] / longest).clamp_max(1)
+
+
+def ellipses(span_u: Tensor, span_v: Tensor) -> tuple[Tensor, Tensor]:
+    """The ellipse whose covariance is t_u t_u^T + t_v t_v^T; its 2 x 2 eigenproblem is closed-form.
+
+    Args:
+        span_u, span_v: (..., 3).
+
+    Returns:
+        Rotations (..., 3, 3) whose columns are the longer axis, the shorter one and the normal, and standard
+        deviations (..., 2) along the first two.
+
+    Source: own derivation; twin: numpy eigh in tests/geometry.
+    """
+    normal = F.normalize(torch.linalg.cross(span_u, span_v), dim=-1)
+    first = F.normalize(span_u, dim=-1)
+    second = torch.linalg.cross(normal, first)
+    # In the (first, second) plane t_u = (a, 0), t_v = (b, c).
+    a, b, c = span_u.norm(dim=-1), (span_v * first).sum(-1), (span_v * second).sum(-1)
+    mean, half = (a * a + b * b + c * c) / 2, (a * a + b * b - c * c) / 2
+    radius = torch.hypot(half, b * c)
+    angle = 0.5 * torch.atan2(b * c, half)
+    cosine, sine = angle.cos()[..., None], angle.sin()[..., None]
+    axes = torch.stack((cosine * first + sine * second, cosine * second - sine * first, normal), -1)
+    return axes, torch.stack((mean + radius, (mean - radius).clamp_min(0)), -1).sqrt()

@@ -1,0 +1,184 @@
+"""Depth to a fraction of the photo's pixel: what is still shifted between two photos tells how far off it is.
+
+A neighbour's photo is brought into a view by the view's own depth and poses. Where depth is right both pictures
+are the same; what optical flow finds between them is a remaining shift, so each pixel has a match in the neighbour
+to a fraction of a pixel, and a depth by triangulation. What flow says counts by how sure it is (there and back, same
+brightness, texture) and by how many pixels the match moves for a change of depth; a smooth correction of
+log depth takes it over, cut where depth jumps (one sparse linear system a view).
+
+Sizes: V views, H W pixels of the maps, h w pixels of the photos.
+
+Source: own derivation; flow: Kroeger, Timofte, Dai, Van Gool 2016, "Fast Optical Flow using Dense Inverse
+Search", of OpenCV.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import scipy.sparse
+import torch
+from scipy.sparse.linalg import cg
+from torch import Tensor
+from torch.nn import functional as F
+
+from langflash_core.geometry.cameras import invert_rigid, pictured, unproject
+from langflash_core.network.stereo.prior import DepthMaps
+from langflash_core.network.stereo.sweep import Neighbours, everyone
+
+_LARGEST = 3  # times the maps' size, at which photos are compared
+_PARTNERS = 2  # neighbours that a view is compared with, of those that share most
+_FLOW_ERROR = 0.7  # pixels of the photo
+_THERE_AND_BACK = 0.7  # pixels by which the way back may miss
+_BRIGHTNESS = 10.0  # of 255, difference that is still the same
+_TEXTURE = 2.0  # squared grey values a pixel, gradient at which flow is half as sure
+_FARTHEST = 0.3  # log depth that a match may ask for
+_EXPECTED = 0.06  # log depth, what the maps may be off
+_ALIKE = 50  # cells that are off together: errors of the maps are slow
+_STIFF = 30.0  # of the correction from a cell to the next
+_JUMP = 0.03  # log depth between cells from which it is cut
+_ITERATIONS = 60
+_MARGIN = 1.0  # pixels at the border that say nothing
+
+
+@dataclass(frozen=True)
+class _Matches:
+    """x, y: (h, w) where each pixel of a view is in the neighbour's photo. sure: (h, w) in [0, 1]."""
+
+    x: np.ndarray
+    y: np.ndarray
+    sure: np.ndarray
+
+
+def registered(
+    maps: DepthMaps,
+    photos: Sequence[np.ndarray],
+    viewmats: Tensor,
+    Ks: Tensor,
+    neighbours: Neighbours | None = None,
+    check: Callable[[], None] = lambda: None,
+) -> DepthMaps:
+    """Maps (V, H, W) whose surfaces show the same in neighbouring photos; the expected errors stay.
+
+    Args:
+        photos: (h, w) uint8, grey, of each view, the maps' picture at its own size.
+        viewmats: (V, 4, 4) of the maps' unit. Ks: (V, 3, 3), pixels of the maps.
+        neighbours: of each view, those that share most first; None: all others.
+        check: called before each comparison; what it raises ends the work.
+    """
+    logs = maps.log_depths
+    near = neighbours or everyone(len(logs))
+    height, width = logs.shape[1:]
+    size = tuple(min(_LARGEST * g, max(p, g)) for p, g in zip(photos[0].shape, (height, width), strict=True))
+    greys = [photo if photo.shape == size else _resized(photo, size) for photo in photos]
+    ratio = torch.tensor([size[1] / width, size[0] / height, 1.0])
+    large = Ks.cpu() * ratio[:, None]
+    corrected = []
+    for view, others in enumerate(near):
+        target, weight = torch.zeros(2, height, width)
+        depths = F.interpolate(logs[view].cpu()[None, None], size=size, mode="bilinear")[0, 0]
+        texture = _texture(greys[view])
+        for other in others[:_PARTNERS]:
+            check()
+            pose = (viewmats[other] @ invert_rigid(viewmats[view])).cpu()
+            matches = _matched(depths, greys[view], greys[other], large[view], large[other], pose)
+            change, moves = _triangulated(depths, matches, large[view], large[other], pose)
+            counts = torch.from_numpy(matches.sure * texture) * (moves / _FLOW_ERROR) ** 2
+            target += _cells(counts * change, (height, width))
+            weight += _cells(counts, (height, width))
+        corrected.append(logs[view] + _smooth(target, weight, logs[view].cpu()).to(logs))
+    return DepthMaps(torch.stack(corrected), maps.log_errors)
+
+
+def _resized(photo: np.ndarray, size: tuple[int, ...]) -> np.ndarray:
+    method = cv2.INTER_AREA if size[0] < photo.shape[0] else cv2.INTER_CUBIC
+    return cv2.resize(photo, (size[1], size[0]), interpolation=method)
+
+
+def _cells(values: Tensor, size: tuple[int, int]) -> Tensor:
+    return F.adaptive_avg_pool2d(values[None, None], size)[0, 0]
+
+
+def _matched(
+    log_depths: Tensor, grey: np.ndarray, other: np.ndarray, K: Tensor, other_K: Tensor, pose: Tensor
+) -> _Matches:
+    height, width = log_depths.shape
+    points = unproject(log_depths.exp(), K).flatten(0, 1).T
+    x, y, z = (along.view(height, width).numpy() for along in pictured(pose, other_K, points))
+    seen = (z > 0) & (x > _MARGIN) & (y > _MARGIN) & (x < width - _MARGIN) & (y < height - _MARGIN)
+    x, y = (np.where(seen, along, -1e4).astype(np.float32) for along in (x, y))
+    brought = _looked_up(other, x - 0.5, y - 0.5)
+    flow = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    there, back = flow.calc(grey, brought, None), flow.calc(brought, grey, None)
+    columns, rows = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
+    columns, rows = columns + there[..., 0], rows + there[..., 1]
+    missed = np.square(there + _looked_up(back, columns, rows)).sum(-1)
+    differs = _looked_up(brought, columns, rows).astype(np.float32) - grey
+    differs -= cv2.blur(differs, (15, 15))
+    differs = cv2.blur(np.square(differs), (5, 5))
+    sure = 1 / (1 + missed / _THERE_AND_BACK**2) ** 2 / (1 + differs / _BRIGHTNESS**2)
+    known = seen & (_looked_up(seen.astype(np.float32), columns, rows, cv2.BORDER_CONSTANT) > 0.999)
+    return _Matches(_looked_up(x, columns, rows), _looked_up(y, columns, rows), np.where(known, sure, 0.0))
+
+
+def _looked_up(
+    values: np.ndarray, columns: np.ndarray, rows: np.ndarray, border: int = cv2.BORDER_REPLICATE
+) -> np.ndarray:
+    return cv2.remap(values, columns, rows, cv2.INTER_LINEAR, borderMode=border)
+
+
+def _texture(grey: np.ndarray) -> np.ndarray:
+    """(h, w) in [0, 1): how sure flow is by what there is to see."""
+    smooth = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), 1)
+    across, down = (cv2.Sobel(smooth, cv2.CV_32F, *way) / 8 for way in ((1, 0), (0, 1)))
+    energy = cv2.blur(np.square(across) + np.square(down), (7, 7))
+    return energy / (energy + _TEXTURE)
+
+
+def _triangulated(
+    log_depths: Tensor, matches: _Matches, K: Tensor, other_K: Tensor, pose: Tensor
+) -> tuple[Tensor, Tensor]:
+    """Changes of log depth (h, w) that bring each pixel nearest to its match, and pixels that the match moves
+    for one unit of it; 0 both where no depth does.
+
+    With the ray a and the shift t in the other's frame, a point at inverse depth r is seen at a + r t: of each
+    coordinate q, (q a_z - a_x) = r (t_x - q t_z), solved for r by least squares over both.
+    """
+    height, width = log_depths.shape
+    ray = unproject(torch.ones_like(log_depths), K) @ pose[:3, :3].T
+    q = [
+        (torch.from_numpy(along).float() - other_K[i, 2]) / other_K[i, i]
+        for i, along in enumerate((matches.x, matches.y))
+    ]
+    known = [q[i] * ray[..., 2] - ray[..., i] for i in (0, 1)]
+    moving = [pose[i, 3] - q[i] * pose[2, 3] for i in (0, 1)]
+    square = moving[0] ** 2 + moving[1] ** 2
+    inverse = (known[0] * moving[0] + known[1] * moving[1]) / square.clamp_min(1e-12)
+    ahead = ray[..., 2] + pose[2, 3] * inverse
+    usable = (inverse > 1e-6) & (ahead > 1e-3) & (square > 1e-12)
+    change = (-inverse.clamp_min(1e-6).log() - log_depths).clamp(-_FARTHEST, _FARTHEST)
+    moves = (-log_depths).exp() * square.sqrt() / ahead.clamp_min(1e-3) * other_K[0, 0]
+    return torch.where(usable, change, 0.0).nan_to_num(), torch.where(usable, moves, 0.0).nan_to_num()
+
+
+def _smooth(target: Tensor, weight: Tensor, log_depths: Tensor) -> Tensor:
+    """The correction x (H, W) that minimises sum w (x - t)^2 + x^2 / s^2 + sum g (x_i - x_j)^2 over cells and
+    their neighbours, g cut where depth jumps; target: w t."""
+    height, width = log_depths.shape
+    across, down = (
+        _STIFF * torch.exp(-((log_depths.diff(dim=dim) / _JUMP) ** 2)).double().numpy() for dim in (1, 0)
+    )
+    cells = np.arange(height * width).reshape(height, width)
+    first = np.concatenate((cells[:, :-1].ravel(), cells[:-1].ravel()))
+    second = np.concatenate((cells[:, 1:].ravel(), cells[1:].ravel()))
+    ties = np.concatenate((across.ravel(), down.ravel()))
+    own = weight.double().numpy().ravel() + 1 / (_ALIKE * _EXPECTED**2)
+    own += np.bincount(first, ties, cells.size) + np.bincount(second, ties, cells.size)
+    places = (np.concatenate((cells.ravel(), first, second)), np.concatenate((cells.ravel(), second, first)))
+    system = scipy.sparse.coo_matrix((np.concatenate((own, -ties, -ties)), places)).tocsr()
+    right = target.double().numpy().ravel()
+    found, _ = cg(
+        system, right, x0=right / own, rtol=1e-3, maxiter=_ITERATIONS, M=scipy.sparse.diags(1 / own)
+    )
+    return torch.from_numpy(found.reshape(height, width)).float()

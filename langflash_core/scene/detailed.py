@@ -1,0 +1,210 @@
+"""From a network's `Prediction` to a `Scene` as fine as its photos: elements where there is detail, once each.
+
+Depth, poses and groups stay those of the network's grid. Every surface is covered by the photo that sees it
+finest (`ownership`), by elements of the size that the photo asks for (`blocks`, `elements`).
+"""
+
+import time
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from langflash_core.detail import Detail
+from langflash_core.geometry.cameras import invert_rigid, unproject
+from langflash_core.scene.assemble import (
+    directed,
+    mean_distance,
+    normalised,
+    placed_views,
+    scaled_poses,
+    semantics_of,
+    sparse_weights,
+)
+from langflash_core.scene.blocks import LEVELS, Tree, grown, leaves, threshold
+from langflash_core.scene.consistency import seen_through
+from langflash_core.scene.elements import COARSE, Elements, ground, joined, of_squares, placed, under
+from langflash_core.scene.ownership import owned
+from langflash_core.scene.upsampling import Upsampled, upsampled
+from langflash_core.types import Camera, Cost, Gaussians, Prediction, Record, Scene, Semantics, Views
+
+MOST_ENLARGED = 3
+"""Times the grid, the size up to which a photo is looked at."""
+
+
+def working_size(photo: tuple[int, int], grid: tuple[int, int]) -> tuple[int, int]:
+    """(height, width) at which a photo of that (height, width) is used: its own, within one and three times
+    the grid's."""
+    high = [min(max(p, g), MOST_ENLARGED * g) for p, g in zip(photo, grid, strict=True)]
+    return high[0], high[1]
+
+
+def working_photos(photos: list[Tensor], grid: tuple[int, int]) -> list[Tensor]:
+    """Photos (3, h, w) in [0, 1] at their working size."""
+    sized = []
+    for photo in photos:
+        size = working_size((photo.shape[-2], photo.shape[-1]), grid)
+        if size != (photo.shape[-2], photo.shape[-1]):
+            photo = F.interpolate(photo[None], size=size, mode="bicubic", antialias=True)[0].clamp(0, 1)
+        sized.append(photo)
+    return sized
+
+
+def assemble_detailed(
+    prediction: Prediction,
+    views: Views,
+    photos: list[Tensor],
+    detail: Detail,
+    *,
+    gaussians: int | None = None,
+    top_m: int = 8,
+    preset: str = "mini",
+) -> Scene:
+    """A scene in scene units, as `assemble` makes it, of elements as fine as the photos.
+
+    Args:
+        photos: (3, h, w) in [0, 1] of every view, `working_photos`, all of one size.
+        gaussians: about as many; None: as `detail` has it.
+
+    Returns:
+        Scene with `levels`, `confidences`, `view_ids` and, in its record, `detail`.
+
+    Raises:
+        InputError: not one usable point in view 0.
+        ValueError: the prediction's poses are not finite.
+    """
+    start = time.perf_counter()
+    photos = [photos[v] for v in range(len(photos)) if v not in prediction.unplaced]
+    prediction, views = placed_views(prediction, views)
+    if not bool(torch.isfinite(prediction.viewmats).all()):
+        raise ValueError("viewmats: expected finite poses, received others")
+    known, keep, unit, through = _kept(prediction, views)
+    sights = [
+        _Sight.of(photo, image, depths.log(), own)
+        for photo, image, depths, own in zip(photos, views.images, known, keep, strict=True)
+    ]
+    trees = [grown(s.photo, s.depth.log_depths, s.wanted, detail.finest) for s in sights]
+    budget = gaussians or round(detail.share * keep[0].numel() * (len(keep) + 3) / 4)
+    limit = _limit(trees, budget)
+    parts = [_of_view(sight, tree, limit) for sight, tree in zip(sights, trees, strict=True)]
+    cameras = [Camera(*of, *views.size) for of in zip(prediction.viewmats, views.Ks, strict=True)]
+    made = [
+        placed(part, sight.log_depths, sight.depth.slopes, camera, sight.size)
+        for part, sight, camera in zip(parts, sights, cameras, strict=True)
+    ]
+    scene = Scene(
+        gaussians=normalised(_together(made), unit),
+        semantics=_semantics(prediction, parts, top_m),
+        viewmats=scaled_poses(prediction.viewmats, unit),
+        Ks=views.Ks.clone(),
+        view_size=views.size,
+        photos=views.sources,
+        view_ids=torch.arange(len(parts)).repeat_interleave(torch.tensor([len(p) for p in parts])),
+        levels=torch.cat([part.levels for part in parts]),
+        confidences=_confidences(prediction, parts),
+        record=Record(
+            preset=preset,
+            photos=views.names,
+            warnings=(*views.warnings, *prediction.warnings),
+            counts={"predicted": keep.numel(), "covered": int(keep.sum()), "seen_through": through},
+            detail=_spent(joined(parts), detail, budget, sights[0].size),
+            network_unit=unit,
+        ),
+    )
+    timings = {**prediction.timings, "assembly": time.perf_counter() - start}
+    return scene.with_record(cost=Cost(timings))
+
+
+@dataclass(frozen=True)
+class _Sight:
+    """One photo (3, h, w), its image (3, H, W) and log depths (H, W) of the grid, those at the photo's size,
+    and what it covers itself, (h, w) bool."""
+
+    photo: Tensor
+    image: Tensor
+    log_depths: Tensor
+    depth: Upsampled
+    wanted: Tensor
+
+    @staticmethod
+    def of(photo: Tensor, image: Tensor, log_depths: Tensor, keep: Tensor) -> "_Sight":
+        wanted = F.interpolate(keep[None, None].float(), size=photo.shape[-2:], mode="nearest")[0, 0] > 0
+        return _Sight(photo, image, log_depths, upsampled(log_depths, image, photo), wanted)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return self.photo.shape[-2], self.photo.shape[-1]
+
+
+def _kept(prediction: Prediction, views: Views) -> tuple[Tensor, Tensor, float, int]:
+    """Depths (V, H, W) with what is no number put right; cells (V, H, W) bool that each photo covers itself;
+    the scene's unit; how many cells others see through."""
+    usable = torch.isfinite(prediction.depths) & (prediction.depths > 0)
+    middle = prediction.depths[usable].median() if bool(usable.any()) else torch.tensor(1.0)
+    depths = torch.where(usable, prediction.depths, middle)
+    Ks = views.Ks.to(depths)
+    poses = invert_rigid(prediction.viewmats)
+    pos_c = unproject(depths, Ks).flatten(1, 2)
+    points = pos_c @ poses[:, :3, :3].transpose(1, 2) + poses[:, None, :3, 3]
+    nowhere = torch.where(usable.flatten(1)[..., None], points, torch.nan)
+    unit = mean_distance(nowhere[0], prediction.viewmats[0])
+    through = seen_through(
+        points.flatten(0, 1), prediction.viewmats, Ks, depths, prediction.confidences
+    ).view_as(usable)
+    keep = usable & owned(depths, prediction.viewmats, Ks) & ~through
+    return depths, keep, unit, int(through.sum())
+
+
+def _limit(trees: list[Tree], budget: int) -> float:
+    """The threshold of all photos' trees, the ground beneath what is parted counted in."""
+    limit = threshold(trees, budget)
+    for _ in range(2):  # the ground is a fifth of all, and nearly the same from one try to the next
+        beneath = sum(len(leaves(tree, limit)[1]) for tree in trees)
+        limit = threshold(trees, max(budget - beneath, 0))
+    return limit
+
+
+def _of_view(sight: _Sight, tree: Tree, limit: float) -> Elements:
+    squares, beneath = leaves(tree, limit)
+    parts = [of_squares(some, sight.photo, sight.depth) for some in squares if len(some)]
+    parts.append(ground(beneath, sight.photo, sight.depth))
+    behind = under(sight.log_depths, sight.image, sight.size)
+    row, column = (behind.cells // sight.image.shape[2], behind.cells % sight.image.shape[2])
+    ratio = [p / g for p, g in zip(sight.size, sight.image.shape[1:], strict=True)]
+    own = sight.wanted[((row + 0.5) * ratio[0]).long(), ((column + 0.5) * ratio[1]).long()]
+    return joined([*parts, behind.rows(own)])
+
+
+def _together(made: list[Gaussians]) -> Gaussians:
+    names = ("means", "quats", "scales", "opacities", "sh")
+    return Gaussians(*(torch.cat([getattr(some, name) for some in made]) for name in names))
+
+
+def _semantics(prediction: Prediction, parts: list[Elements], top_m: int) -> Semantics:
+    known = directed(prediction.dictionary)
+    of_views = [
+        sparse_weights(maps.flatten(1)[known][:, part.cells].T, top_m)
+        for maps, part in zip(prediction.weights, parts, strict=True)
+    ]
+    return semantics_of(prediction, of_views)
+
+
+def _confidences(prediction: Prediction, parts: list[Elements]) -> Tensor:
+    maps = prediction.confidences.flatten(1)
+    return torch.cat([own[part.cells] for own, part in zip(maps, parts, strict=True)]).clamp(0, 1)
+
+
+def _spent(elements: Elements, detail: Detail, budget: int, size: tuple[int, int]) -> dict:
+    """What the record says of it."""
+    coarse = int((elements.levels == COARSE).sum())
+    sides = {str(2**level): int((elements.sides == 2**level).sum()) for level in range(LEVELS + 1)}
+    return {
+        "level": detail.name,
+        "asked": budget,
+        "elements": len(elements),
+        "coarse": coarse,
+        "fine": len(elements) - coarse,
+        "by_size": sides,
+        "photo_size": [size[1], size[0]],
+    }

@@ -1,0 +1,78 @@
+"""Which photo covers which surface: where several see one, the one that sees it finest, and nothing twice.
+
+A pixel of a photo is given up where another photo sees the same surface as finely; of equals the earlier photo
+keeps it. What stands before a surface that another photo knows better is given up as well
+(`consistency.seen_through`).
+
+Sizes: V views, H W cells of the grid.
+"""
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from langflash_core.geometry.cameras import invert_rigid, pictured, unproject
+from langflash_core.geometry.surfels import spans
+
+BEHIND, BEFORE = 0.05, 0.12
+"""Log depth: how far behind and before another photo's surface a pixel still shows the same one."""
+_FINER = 2.0  # area a pixel covers there over here, from which the later photo keeps its own
+
+
+def owned(depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
+    """(V, H, W) bool: the cells of each photo that it covers itself.
+
+    Args:
+        depths: (V, H, W) > 0. viewmats: (V, 4, 4). Ks: (V, 3, 3), pixels of the depth maps.
+    """
+    keep = torch.ones_like(depths, dtype=torch.bool)
+    if len(depths) == 1:
+        return keep
+    logs = depths.log().flatten(1)
+    for view in range(len(depths)):
+        points, normals = _surface(depths[view], viewmats[view], Ks[view])
+        own = _covered_area(points, normals, viewmats[view], Ks[view])
+        for other in range(len(depths)):
+            if other == view:
+                continue
+            same, place = _same(points, viewmats[other], Ks[other], logs[other], depths.shape[1:])
+            ratio = own / _covered_area(points, normals, viewmats[other], Ks[other]).clamp_min(1e-12)
+            finer = ratio < (1 / _FINER if other < view else _FINER)
+            keep[view] &= ~(same & ~finer).view_as(keep[view])
+    return _closed(keep)
+
+
+def _surface(depths: Tensor, viewmat: Tensor, K: Tensor) -> tuple[Tensor, Tensor]:
+    """World points and unit normals (3, H*W)."""
+    pos_c = unproject(depths, K)
+    span_u, span_v = spans(pos_c, depths / K[0, 0])
+    normals = F.normalize(torch.linalg.cross(span_u, span_v), dim=-1)
+    pose = invert_rigid(viewmat)
+    points = pose[:3, :3] @ pos_c.flatten(0, 1).T + pose[:3, 3:]
+    return points, pose[:3, :3] @ normals.flatten(0, 1).T
+
+
+def _covered_area(points: Tensor, normals: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
+    """(n,) of the surface, that one pixel of a view covers; endless where it is seen edge-on."""
+    towards = points - invert_rigid(viewmat)[:3, 3:]
+    distances = towards.norm(dim=0).clamp_min(1e-9)
+    cosines = (towards * normals).sum(0).abs() / distances
+    return (distances / K[0, 0]) ** 2 / cosines.clamp_min(1e-3)
+
+
+def _same(
+    points: Tensor, viewmat: Tensor, K: Tensor, log_depths: Tensor, size: torch.Size
+) -> tuple[Tensor, Tensor]:
+    """(n,) bool: another view sees these points as its surface; and its cell there."""
+    height, width = size
+    x, y, z = pictured(viewmat, K, points)
+    inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    place = torch.where(inside, y.floor() * width + x.floor(), 0.0).long()
+    gap = z.clamp_min(1e-9).log() - log_depths.index_select(0, place)
+    return inside & (gap < BEHIND) & (gap > -BEFORE), place
+
+
+def _closed(keep: Tensor) -> Tensor:
+    """Crumbs go, and what stays goes on by a cell on all sides, so that no seam opens."""
+    some = F.avg_pool2d(keep[:, None].float(), 3, 1, 1, count_include_pad=False) > 0.5
+    return F.max_pool2d(some.float(), 3, 1, 1)[:, 0] > 0

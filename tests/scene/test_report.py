@@ -1,0 +1,77 @@
+"""What is said of a scene's detail, to people and to programs."""
+
+from typing import Any
+
+import pytest
+
+from langflash_core.scene.assemble import assemble
+from langflash_core.scene.file import load, save
+from langflash_core.scene.report import describe, describe_file, detail_line
+from langflash_core.types import Scene
+from tests.scene.plane import wall_prediction
+
+DETAIL = {
+    "level": "normal",
+    "asked": 118_541,
+    "elements": 121_034,
+    "coarse": 20_111,
+    "fine": 100_923,
+    "by_size": {"1": 61_000, "2": 39_923, "4": 15_000, "16": 5_111},
+    "photo_size": [756, 588],
+    "rounds": 3,
+    "photos_psnr_db": [31.23, 30.8],
+    "plain_psnr_db": [28.0, 27.9],
+}
+COUNTS = "121,034 Gaussians (20,111 coarse, 100,923 fine; 1 px 61,000, 2 px 39,923, 4 px 15,000, 16 px 5,111)"
+BOUGHT = "from the photos' places 31.2, 30.8 dB"
+
+
+@pytest.fixture
+def scene() -> Scene:
+    return assemble(*wall_prediction(width=8, height=6))
+
+
+def without(*names: str) -> dict[str, Any]:
+    return {name: value for name, value in DETAIL.items() if name not in names}
+
+
+@pytest.mark.parametrize(
+    ("detail", "said"),
+    [
+        (DETAIL, f"normal, {COUNTS} · {BOUGHT} (28.0, 27.9 dB with one Gaussian a pixel)"),
+        (without("plain_psnr_db"), f"normal, {COUNTS} · {BOUGHT}"),
+        (without("photos_psnr_db"), f"normal, {COUNTS}"),
+        (without("level", "by_size", "photos_psnr_db"), "121,034 Gaussians (20,111 coarse, 100,923 fine)"),
+        (without("elements", "coarse", "fine", "photos_psnr_db"), f"normal, ({COUNTS.split('; ')[1]}"),
+        ({"level": "high"}, "high"),
+        ({"photos_psnr_db": 30}, "from the photos' places 30.0 dB"),
+        ({"asked": 5, "rounds": 3}, ""),
+        ({}, ""),
+    ],
+)  # fmt: skip
+def test_what_people_read(detail, said):
+    assert detail_line(detail) == said
+
+
+@pytest.mark.parametrize("wrong", [None, True, "many", 1.5, [], ["a"], [None], {"1": None}, {"1": "x"}, {}])
+@pytest.mark.parametrize("name", sorted(DETAIL))
+def test_what_another_version_means_otherwise_is_left_out(name, wrong):
+    line = detail_line({**DETAIL, name: wrong})
+    if name == "photos_psnr_db":
+        assert line.startswith(f"normal, {COUNTS}")
+    elif name != "by_size":
+        assert "(20,111 coarse, " in line or name in ("coarse", "fine")
+    assert "None" not in line and "True" not in line
+
+
+def test_a_file_keeps_it_and_programs_read_it_whole(scene, tmp_path):
+    fine = scene.with_record(detail=DETAIL)
+    save(fine, tmp_path / "a.langflash")
+    assert load(tmp_path / "a.langflash").record.detail == DETAIL
+    assert describe(fine)["detail"] == describe_file(tmp_path / "a.langflash")["detail"] == DETAIL
+    assert list(describe_file(tmp_path / "a.langflash")["detail"]["by_size"]) == list(DETAIL["by_size"])
+
+
+def test_a_scene_without_it_says_nothing(scene, tmp_path):
+    save(scene, tmp_path / "a.langflash")
+    assert scene.record.detail == {} and describe_file(tmp_path / "a.langflash")["detail"] is None
