@@ -167,8 +167,7 @@ class Viewport:
 
         self._warming = None
         renderer = self._made()
-        governor = Governor(len(scene.gaussians), renderer.in_software, coarse_share(scene))
-        renderer.set_scene(scene, governor.share)
+        renderer.set_scene(scene)
         renderer.canvas.forget()
         renderer.ask(None)
         self._serial, self._query, self._keys = serial, None, ()
@@ -181,7 +180,7 @@ class Viewport:
             self._artist.drop()
         elif renderer.in_software:
             self._artist = Artist(self._notify)
-        self.governor = governor
+        self.governor = Governor(len(scene.gaussians), self._artist is not None, coarse_share(scene))
 
     @property
     def shares(self) -> tuple[float, ...]:

@@ -45,7 +45,7 @@ def aside() -> Camera:
 def pair(gl, scene) -> Iterator[tuple[SplatRenderer, SplatRenderer]]:
     """Renderers of the scene, and of its coarse Gaussians alone."""
     whole, alone = moving_renderer(gl), moving_renderer(gl)
-    whole.set_scene(scene, coarse_share(scene))
+    whole.set_scene(scene)
     alone.set_scene(scene.rows(rows_of(scene)))
     yield whole, alone
     whole.release()
@@ -61,7 +61,6 @@ def test_colours_depth_and_answers_are_theirs(pair, scene):
     assert first.weight_maps is not None and second.weight_maps is not None
     assert torch.equal(first.weight_maps, second.weight_maps) and bool(first.alphas.any())
     assert torch.equal(pair[0].relevance(), pair[1].relevance())
-    assert set(pair[0]._scene._levels) == {coarse_share(scene)}, "nothing else was uploaded"
     pair[0].draw(aside())
     assert not torch.equal(pair[0].frame().rgb, second.rgb), "and all of them are another picture"
 
@@ -126,10 +125,20 @@ def test_a_gesture_and_its_undoing_reach_them(pair, scene):
     assert torch.equal(pair[0].frame().rgb, before)
 
 
-def test_fewer_of_them_are_they_thinned(pair, scene):
-    share = coarse_share(scene) / 2
+@pytest.mark.parametrize("share", [0.1, 0.5])
+def test_fewer_of_them_and_some_detail_follow_marks_and_changes(pair, scene, share):
     thinned, rows = thin_with_rows(scene, share)
+    shown = np.random.default_rng(3).random(COUNT) < 0.6
+    changes = (
+        Moved(Mask.of(~shown), offset=(0.1, 0.0, 0.0)),
+        Moved(Mask.full(COUNT), offset=(0.0, 0.1, 0.0)),
+    )
     pair[0].give_level(scene, share, thinned, rows)
+    pair[0].mark(shown, np.zeros(COUNT, np.uint8))
+    pair[0].change(changes)
     pair[0].draw(aside(), share=share)
-    pair[1].draw(aside(), share=0.5)
+    moved = changed(thinned.gaussians, changes, torch.from_numpy(rows))
+    pair[1].set_scene(replace(thinned, gaussians=moved))
+    pair[1].mark(shown[rows], np.zeros(len(rows), np.uint8))
+    pair[1].draw(aside())
     assert torch.equal(pair[0].frame().rgb, pair[1].frame().rgb)

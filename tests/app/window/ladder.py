@@ -79,11 +79,13 @@ def measured(
 ) -> list[Rung]:
     """All combinations, which take turns in every round.
 
-    shares: None: `SHARES`, of a scene with levels all Gaussians, and of those that are coarse.
+    shares: None: `SHARES`; of a scene with levels the coarse ones and all, half, a quarter, none of the rest.
     """
     if shares is None:
         coarse = coarse_share(scene)
-        shares = SHARES if coarse == 1 else (1.0, *(coarse * share for share in SHARES[:2]))
+        shares = (
+            SHARES if coarse == 1 else (1.0, *(coarse + part * (1 - coarse) for part in (0.5, 0.25, 0.0)))
+        )
     query = compile_query(scene, language_space(scene.semantics.space), [phrase])
     twin, renderer = SplatRenderer(ctx, "float32"), moving_renderer(ctx)
     for each in (twin, renderer):

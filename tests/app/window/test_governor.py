@@ -5,6 +5,7 @@ import math
 import pytest
 
 from app.window.governor import (
+    COARSER_SIZES,
     FULL_AFTER,
     LARGE_SCENE,
     MIDDLING_SCENE,
@@ -139,18 +140,29 @@ def test_thinner_levels_count_once_they_are_made() -> None:
     assert half.ladder == SIZES and half.with_share(0.0625).ladder != SIZES
 
 
-def test_a_scene_with_levels_moves_as_its_coarse_gaussians_on_a_slow_machine() -> None:
-    governor = Governor(4 * MIDDLING_SCENE, slow=True, coarse=0.2)
-    assert governor.share == 0.2 and governor.wants == ()
-    assert governor.ladder == tuple((scale, 0.2) for scale, _ in SIZES)
-    assert governor.moving(Kind.COLOUR) == Plan(Kind.COLOUR, SIZES[-1][0], 0.2), "the cheapest first"
+def detailed(**known) -> Governor:
+    """Of a scene of levels on a slow machine."""
+    return Governor(3 * MIDDLING_SCENE, slow=True, coarse=0.25, **known)
+
+
+def test_a_scene_with_levels_moves_coarse_until_some_detail_is_chosen() -> None:
+    governor = detailed()
+    assert governor.wants == (0.625, 0.4375) and governor.ladder == tuple((scale, 0.25) for scale, _ in SIZES)
+    assert governor.moving(Kind.COLOUR) == Plan(Kind.COLOUR, SIZES[-1][0], 0.25), "the cheapest first"
     governor, plans = settled(governor, Kind.COLOUR, 0.4)
-    assert {plan.share for plan in plans} == {0.2} and plans[-1].scale == 0.35
-    assert governor.moving(Kind.FAST).scale < 0.5, "what colours cost tells of others"
-    quick, _ = settled(governor, Kind.COLOUR, 0.004)
-    assert quick.moving(Kind.FAST) == Plan(Kind.MAPS, 1.0, 0.2)
-    assert not quick.moving(Kind.COLOUR).covers(Plan(Kind.COLOUR, 0.5)), "all of them are still to come"
-    assert quick.moving(Kind.MAPS).share == 0.2
+    assert {plan.share for plan in plans} == {0.25} and plans[-1].scale == 0.35
+    made = governor.with_share(0.4375).with_share(0.625)
+    assert [share for _, share in made.ladder] == [1, 1, 0.625, 0.625, 0.4375, 0.4375, 0.25, 0.25]
+    assert made.moving(Kind.COLOUR) == Plan(Kind.COLOUR, 0.35, 0.25), "as what is known of it tells"
+    assert made.moving(Kind.FAST) == Plan(Kind.FAST, 0.25, 0.25), "which tells of others, too"
+    _, plans = settled(made, Kind.COLOUR, 0.1, fixed=0.04)
+    assert plans[-1] == Plan(Kind.COLOUR, 0.75, 0.625) and len(set(plans[10:])) == 1
+
+
+def test_who_has_time_moves_through_all_detail_and_never_in_exact_maps_of_less() -> None:
+    governor, plans = settled(detailed(shares=(0.625, 0.4375)), Kind.FAST, 0.004)
+    assert plans[-1] == Plan(Kind.FAST) and governor.resting(Kind.FAST, FULL_AFTER) == Plan(Kind.MAPS)
+    assert not Plan(Kind.COLOUR, 1.0, 0.625).covers(Plan(Kind.COLOUR, 0.5)), "all of them are still to come"
 
 
 def test_who_draws_everything_quickly_knows_no_levels() -> None:
@@ -163,6 +175,7 @@ def test_who_draws_everything_quickly_knows_no_levels() -> None:
 def test_many_coarse_gaussians_are_thinned_in_turn() -> None:
     """Of many photos, or with a splat file merged, all of whose Gaussians are coarse."""
     governor = Governor(10 * MIDDLING_SCENE, slow=True, coarse=0.25)
-    assert governor.wants == (0.125, 0.0625) and governor.ladder[-1] == (SIZES[-1][0], 0.25)
-    made = governor.with_share(0.125).with_share(0.0625)
-    assert made.ladder == tuple((scale, 0.25 * share) for scale, share in SIZES_OF_MIDDLING_SCENES)
+    assert governor.wants == (0.625, 0.4375, 0.125, 0.0625)
+    for share in governor.wants:
+        governor = governor.with_share(share)
+    assert governor.ladder[-2:] == tuple((scale, 0.25 * share) for scale, share in COARSER_SIZES)
