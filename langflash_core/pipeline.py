@@ -17,6 +17,7 @@ from langflash_core.ahead import Ahead, begin
 from langflash_core.detail import DEFAULT_DETAIL, check_gaussians, chosen_detail
 from langflash_core.errors import InputError, PromptError, ViewError, WeightsError
 from langflash_core.export.html import Phrases, TextModel, write_html
+from langflash_core.fine import fine_scene
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.views import load_views, source_pictures
@@ -49,7 +50,7 @@ from langflash_core.splat.refine import Budget, refine
 from langflash_core.types import Camera, Cost, Frame, Prediction, QueryResult, Scene, Views
 
 # Where each stage begins in the whole, from its measured share of the time on two CPU cores.
-STAGES = {"photos": 0.0, "weights": 0.1, "network": 0.2, "assemble": 0.85, "prune": 0.95, "refine": 0.97}
+STAGES = {"photos": 0.0, "weights": 0.08, "network": 0.16, "assemble": 0.66, "refine": 0.97}
 PRECISIONS = ("auto", "float32", "bfloat16")
 AGGREGATIONS = ("lfa", "average", "crops")
 GROUPINGS = ("queries", "sam2")
@@ -135,20 +136,24 @@ def reconstruct(
         atoms = _atoms(network, aggregation, views)
         groups = _groups(network, grouping, device)
         ahead.matched.result()  # key points are found beside the weights
+    finer = None if detail is None or not network.surfaces else chosen_detail(detail)
     with run.stage("network"):
-        prediction = _on_cpu(network.predict(views, run.within("network"), cancelled, atoms, groups))
+        prediction = network.predict(
+            views, run.within("network"), cancelled, atoms, groups, elements=finer is None
+        )
+        prediction = _on_cpu(prediction)
+    images = views.images[[v for v in range(views.num_views) if v not in prediction.unplaced]]
     with run.stage("assemble"), torch.no_grad():
-        if isinstance(PRESETS[preset], GuidedDepth):
-            prediction = _finer(prediction, views, detail, gaussians)
-        elif gaussians is not None or detail not in (None, DEFAULT_DETAIL):
-            prediction = _noted(prediction, _AS_IT_IS.format(preset))
-        scene = assemble(prediction, views, preset=preset)
-    with run.stage("prune"), torch.no_grad():
-        scene = prune(scene)
+        if finer is not None:
+            scene, light = fine_scene(prediction, views, finer, gaussians=gaussians, preset=preset)
+            images = light.corrected(images).clamp(0, 1)
+        else:
+            if gaussians is not None or detail not in (None, DEFAULT_DETAIL):
+                prediction = _noted(prediction, _AS_IT_IS.format(preset))
+            scene = prune(assemble(prediction, views, preset=preset))
     if refine_seconds is not None:
-        placed = [v for v in range(views.num_views) if v not in prediction.unplaced]
         with run.stage("refine"):
-            scene = _refined(scene, views.images[placed], refine_seconds, device, run.within("refine"))
+            scene = _refined(scene, images, refine_seconds, device, run.within("refine"))
         fitting = {**scene.record.cost.timings, "fitting": run.timings["refine"]}
         scene = scene.with_record(cost=Cost(fitting))
     run.check()
@@ -351,11 +356,6 @@ def _check_detail(detail: str | None, gaussians: int | None) -> None:
     if detail is not None:
         chosen_detail(detail)
     check_gaussians(gaussians)
-
-
-def _finer(prediction: Prediction, views: Views, detail: str | None, gaussians: int | None) -> Prediction:
-    """Surfaces covered as finely as asked; None: by one Gaussian a pixel, as they are."""
-    return prediction
 
 
 def _noted(prediction: Prediction, note: str) -> Prediction:

@@ -23,6 +23,7 @@ from langflash_core.scene.assemble import (
     sparse_weights,
 )
 from langflash_core.scene.blocks import LEVELS, Tree, grown, leaves, threshold
+from langflash_core.scene.borders import refined_weights
 from langflash_core.scene.consistency import seen_through
 from langflash_core.scene.elements import COARSE, Elements, ground, joined, of_squares, placed, under
 from langflash_core.scene.ownership import owned
@@ -95,7 +96,7 @@ def assemble_detailed(
     ]
     scene = Scene(
         gaussians=normalised(_together(made), unit),
-        semantics=_semantics(prediction, parts, top_m),
+        semantics=_semantics(prediction, sights, parts, top_m),
         viewmats=scaled_poses(prediction.viewmats, unit),
         Ks=views.Ks.clone(),
         view_size=views.size,
@@ -181,12 +182,14 @@ def _together(made: list[Gaussians]) -> Gaussians:
     return Gaussians(*(torch.cat([getattr(some, name) for some in made]) for name in names))
 
 
-def _semantics(prediction: Prediction, parts: list[Elements], top_m: int) -> Semantics:
+def _semantics(prediction: Prediction, sights: list[_Sight], parts: list[Elements], top_m: int) -> Semantics:
+    """Weights end where the photo has borders (`borders`)."""
     known = directed(prediction.dictionary)
-    of_views = [
-        sparse_weights(maps.flatten(1)[known][:, part.cells].T, top_m)
-        for maps, part in zip(prediction.weights, parts, strict=True)
-    ]
+    of_views = []
+    for maps, sight, part in zip(prediction.weights, sights, parts, strict=True):
+        refined = refined_weights(maps[known], sight.image, sight.photo)
+        width = sight.size[1]
+        of_views.append(sparse_weights(refined.at(part.pixels // width, part.pixels % width), top_m))
     return semantics_of(prediction, of_views)
 
 

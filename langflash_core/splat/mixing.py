@@ -16,27 +16,30 @@ import scipy.sparse
 from langflash_core.splat.projection import ALPHA_MAX, Footprints
 from langflash_core.types import Camera
 
-FAINT = 1 / 64
-"""Alpha below which a pair is left out here: footprints end at 2.9 deviations instead of 3.3."""
+FAINT, SMALL = 1 / 64, 0.01
+"""Alpha, and contribution, below which a pair is left out here: footprints end at 2.9 deviations instead of 3.3, and
+two thirds of all pairs go, 2 % of the light. Pictures of both differ by 0.1 dB where they are 32 dB from a photo."""
 _AT_ONCE = 1 << 18  # pairs in work at once: within a core's cache
 
 
 def mixing(
-    footprints: Footprints, camera: Camera, count: int, faint: float = FAINT
+    footprints: Footprints, camera: Camera, count: int, faint: float = FAINT, small: float = SMALL
 ) -> scipy.sparse.csr_matrix:
     """Contributions (H*W, N) float32 of N Gaussians to the pixels of a view, row by row.
 
     Args:
         footprints: of the Gaussians as the camera sees them. count: N.
-        faint: alpha below which a pair is left out; 1/255 as in pictures, for their twin.
+        faint, small: alpha and contribution below which a pair is left out; 1/255 and 0 as in pictures.
     """
     alphas, pixels, starts = _pairs(footprints, camera, faint)
     num_pixels = camera.width * camera.height
     by_depth = scipy.sparse.csc_matrix((alphas, pixels, starts), shape=(num_pixels, len(starts) - 1))
     rows = by_depth.tocsr()  # columns of a row ascend: front to back
     shares = _composited(rows.data, rows.indptr)
+    kept = shares >= small
+    ends = np.concatenate(([0], np.cumsum(kept, dtype=np.int64)))[rows.indptr]
     ids = footprints.ids.cpu().numpy().astype(np.int32)
-    return scipy.sparse.csr_matrix((shares, ids[rows.indices], rows.indptr), shape=(num_pixels, count))
+    return scipy.sparse.csr_matrix((shares[kept], ids[rows.indices[kept]], ends), shape=(num_pixels, count))
 
 
 def _pairs(footprints: Footprints, camera: Camera, faint: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
