@@ -9,9 +9,11 @@ counting, which keeps their order. float32. Twin: `reference.rasterize`, tests/s
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse
+from torch import Tensor
 
 from langflash_core.splat.projection import ALPHA_MAX, Footprints
 from langflash_core.types import Camera
@@ -23,26 +25,29 @@ _AT_ONCE = 1 << 18  # pairs in work at once: within a core's cache
 
 
 def mixing(
-    footprints: Footprints, camera: Camera, count: int, faint: float = FAINT, small: float = SMALL
+    footprints: Footprints, camera: Camera, count: int, faint: float | Tensor = FAINT, small: float = SMALL
 ) -> scipy.sparse.csr_matrix:
     """Contributions (H*W, N) float32 of N Gaussians to the pixels of a view, row by row.
 
     Args:
         footprints: of the Gaussians as the camera sees them. count: N.
-        faint, small: alpha and contribution below which a pair is left out; 1/255 and 0 as in pictures.
+        faint, small: alpha, also of each Gaussian (N,), and contribution below which a pair is left out; 1/255
+            and 0 as in pictures.
     """
-    alphas, pixels, starts = _pairs(footprints, camera, faint)
+    faint = faint[footprints.ids].cpu().numpy() if isinstance(faint, Tensor) else faint
+    limits = np.broadcast_to(np.asarray(faint, np.float32), len(footprints.ids))
+    alphas, pixels, starts = _pairs(footprints, camera, limits)
     num_pixels = camera.width * camera.height
     by_depth = scipy.sparse.csc_matrix((alphas, pixels, starts), shape=(num_pixels, len(starts) - 1))
     rows = by_depth.tocsr()  # columns of a row ascend: front to back
-    shares = _composited(rows.data, rows.indptr)
-    kept = shares >= small
-    ends = np.concatenate(([0], np.cumsum(kept, dtype=np.int64)))[rows.indptr]
+    shares, columns, ends = _composited(rows, small)
     ids = footprints.ids.cpu().numpy().astype(np.int32)
-    return scipy.sparse.csr_matrix((shares[kept], ids[rows.indices[kept]], ends), shape=(num_pixels, count))
+    return scipy.sparse.csr_matrix((shares, ids[columns], ends), shape=(num_pixels, count))
 
 
-def _pairs(footprints: Footprints, camera: Camera, faint: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _pairs(
+    footprints: Footprints, camera: Camera, faint: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Alphas and pixels of all pairs (M,), footprint by footprint, and where each begins (n + 1,)."""
     table = _Table.of(footprints, camera, faint)
     counts, found = np.zeros(len(table.sides), np.int64), []
@@ -73,7 +78,7 @@ class _Table:
     opacities: np.ndarray
 
     @staticmethod
-    def of(footprints: Footprints, camera: Camera, faint: float) -> "_Table":
+    def of(footprints: Footprints, camera: Camera, faint: np.ndarray) -> "_Table":
         opacities = footprints.opacities.cpu().numpy().astype(np.float32)
         centres, roots = (v.cpu().numpy() for v in (footprints.centres, footprints.roots))
         radii = np.sqrt(2 * np.log(np.maximum(opacities / faint, 1)))
@@ -95,7 +100,7 @@ class _Table:
         return np.split(order, np.flatnonzero(np.diff(self.sides[order])) + 1) if len(order) else []
 
     def pairs(
-        self, rows: np.ndarray, camera: Camera, faint: float
+        self, rows: np.ndarray, camera: Camera, faint: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """How many pixels of each row (n,) are kept, and the alphas and pixels of these."""
         side, corners = int(self.sides[rows[0]]), self.corners[rows]
@@ -112,7 +117,7 @@ class _Table:
         inside = ((lines >= 0) & (lines < camera.height))[:, :, None] & (
             (columns >= 0) & (columns < camera.width)
         )[:, None]
-        kept = (across >= faint) & inside
+        kept = (across >= faint[rows, None, None]) & inside
         pixels = (lines * camera.width)[:, :, None] + columns[:, None]
         return (
             kept.sum((1, 2)),
@@ -121,11 +126,24 @@ class _Table:
         )
 
 
-def _composited(alphas: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """T alpha (M,) of pairs sorted by pixel and depth, pixel p's from `starts[p]` on."""
-    logs = np.log1p(-alphas).astype(np.float64)
-    before = np.cumsum(logs)
-    before -= logs
-    at_start = np.append(before, 0.0)[starts[:-1]]
-    passing = np.exp((before - np.repeat(at_start, np.diff(starts))).astype(np.float32))
-    return alphas * passing
+def _composited(rows: scipy.sparse.csr_matrix, small: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """T alpha of alphas sorted by pixel and depth, their columns, and where each pixel's begin; those below
+    `small` left out. Some pixels at a time, so that what is made on the way stays within a core's cache."""
+    starts = rows.indptr
+    cuts = np.searchsorted(starts, np.arange(0, starts[-1], _AT_ONCE // 4))
+    bounds = np.unique(np.concatenate((cuts, [0, len(starts) - 1])))
+    shares, columns, counts = [], [], []
+    for first, last in pairwise(bounds):
+        some = slice(starts[first], starts[last])
+        alphas, own = rows.data[some], np.diff(starts[first : last + 1])
+        logs = np.log(1 - alphas)
+        before = np.cumsum(logs, dtype=np.float64) - logs
+        places = np.minimum(starts[first:last] - starts[first], max(len(before) - 1, 0))
+        at_start = before[places] if len(before) else np.zeros(len(own))
+        found = alphas * np.exp((before - np.repeat(at_start, own)).astype(np.float32))
+        kept = np.flatnonzero(found >= small)
+        shares.append(found[kept])
+        columns.append(rows.indices[some][kept])
+        counts.append(np.bincount(np.repeat(np.arange(len(own)), own)[kept], minlength=len(own)))
+    ends = np.concatenate(([0], np.cumsum(np.concatenate(counts))))
+    return np.concatenate(shares), np.concatenate(columns), ends
