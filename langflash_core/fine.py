@@ -1,5 +1,6 @@
-"""A prediction to a scene as fine as its photos: one light, elements of the size that each photo asks for, weights
-with the photo's borders, colours solved for. Composes stages; nothing is learned or fitted in shape.
+"""A prediction to a scene as fine as its photos: one light, elements of the size that each photo asks
+for, weights with the photo's borders, colours solved for. Composes stages; nothing is learned or fitted
+in shape.
 """
 
 import time

@@ -34,7 +34,6 @@ from langflash_core.network.checkpoints.parts import part_folder
 from langflash_core.network.checkpoints.stored import Stored
 from langflash_core.network.model import Atoms, Geometry, Lifted, pooled_weights
 from langflash_core.network.precision import bfloat16_fails, has_bfloat16
-from langflash_core.network.presets import GuidedDepth
 from langflash_core.network.semantics.aggregation import averaged_atoms
 from langflash_core.network.semantics.crops import crop_atoms
 from langflash_core.network.semantics.grouping import Groups

@@ -1,8 +1,9 @@
 """Which squares of a photo become one element each: a quadtree, fine where the photo has detail.
 
-A square is parted in four where that brings the photo's colours nearer by enough, where depth jumps inside it,
-and where its middle is off the plane of its corners; so flat walls are covered by few elements and edges by one a
-pixel. What all photos may spend together is shared out by what a parting gains: the largest gains first.
+A square is parted in four where that brings the photo's colours nearer by enough, where depth jumps
+inside it, and where its middle is off the plane of its corners; so flat walls are covered by few elements
+and edges by one a pixel. What all photos may spend together is shared out by what a parting gains: the
+largest gains first.
 
 Sizes: h w pixels of the photo, padded to multiples of `LARGEST`; level l has squares of 2^l pixels.
 

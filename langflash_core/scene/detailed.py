@@ -1,7 +1,8 @@
-"""From a network's `Prediction` to a `Scene` as fine as its photos: elements where there is detail, once each.
+"""From a network's `Prediction` to a `Scene` as fine as its photos: elements where there is detail, once
+each.
 
-Depth, poses and groups stay those of the network's grid. Every surface is covered by the photo that sees it
-finest (`ownership`), by elements of the size that the photo asks for (`blocks`, `elements`).
+Depth, poses and groups stay those of the network's grid. Every surface is covered by the photo that sees
+it finest (`ownership`), by elements of the size that the photo asks for (`blocks`, `elements`).
 """
 
 import time

@@ -1,13 +1,13 @@
 """Squares of a photo become flat Gaussians on the surface that its depth map has there.
 
-Two layers. The coarse one, of squares of four pixels and more, is closed by itself: what is flat needs nothing
-else. Where squares were parted, the coarse layer goes on a little behind as a ground, one element for each
-surface of a square, and the fine elements lie on it: they may be as small and as sharp as the photo's detail,
-since what shines through between them has their own mean colour. Where depth jumps, the farther surface goes on
-under the nearer one, so that no gap opens as soon as one looks from aside.
+Two layers. The coarse one, of squares of four pixels and more, is closed by itself: what is flat needs
+nothing else. Where squares were parted, the coarse layer goes on a little behind as a ground, one element
+for each surface of a square, and the fine elements lie on it: they may be as small and as sharp as the
+photo's detail, since what shines through between them has their own mean colour. Where depth jumps, the
+farther surface goes on under the nearer one, so that no gap opens as soon as one looks from aside.
 
-What passes a flat wall of elements of opacity .99 and deviation s, in spacings, at most, at any zoom: .0013 for
-.85, and .15 and .009 for .5 and .72, .0014 together. Half a step of 1/255 is .0020.
+What passes a flat wall of elements of opacity .99 and deviation s, in spacings, at most, at any zoom:
+.0013 for .85, and .15 and .009 for .5 and .72, .0014 together. Half a step of 1/255 is .0020.
 
 Sizes: H W cells of the grid, h w pixels of the photo, n elements.
 """
@@ -108,7 +108,7 @@ def _means(photo: Tensor, left: Tensor, top: Tensor, side: int) -> Tensor:
 
 
 def ground(squares: Squares, photo: Tensor, depth: Upsampled) -> Elements:
-    """Under squares that were parted: an element for the nearer surface, and one for what is behind a jump."""
+    """Under squares that were parted: an element of the nearer surface, and one of what is behind a jump."""
     rows, columns = (_of_squares(along, squares.side) for along in (squares.top, squares.left))
     height, width = depth.log_depths.shape
     rows, columns = rows[:, :, None].clamp(max=height - 1), columns[:, None].clamp(max=width - 1)
@@ -127,7 +127,7 @@ def _of_squares(first: Tensor, side: int) -> Tensor:
 def _ground_of(
     part: Tensor, depths: Tensor, pixels: Tensor, colours: Tensor, corner: Tensor, cells: Tensor
 ) -> Elements:
-    """Elements with the mean and the spread of some pixels (n, side^2) bool of squares, where there are any."""
+    """Elements with mean and spread of some pixels (n, side^2) bool of squares, where there are any."""
     some, side = part.any(1), math.isqrt(part.shape[1])
     share = part[some].float() / part[some].sum(1, keepdim=True)
     along = torch.arange(side) + 0.5

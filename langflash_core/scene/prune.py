@@ -44,7 +44,8 @@ def prune(
 
     Args:
         scene: with `view_ids`, or nothing is merged.
-        merge: whether Gaussians may be there twice. merge_radius: in pixel footprints. colour_tolerance: largest difference of a channel.
+        merge: whether Gaussians may be there twice. merge_radius: in pixel footprints. colour_tolerance:
+            largest difference of a channel.
 
     Returns:
         Scene with `pruning` in its record: counts and bytes before and after.

@@ -1,13 +1,15 @@
-"""Colours solved for, not copied: those with which the pictures drawn at the photos' places are the photos.
+"""Colours solved for, not copied: those with which the pictures drawn at the photos' places are the
+photos.
 
-What a pixel shows is a mean of several Gaussians, so colours taken from the photo come out blurred. With the
-contributions c_ip of every view (`mixing`), rounds of
+What a pixel shows is a mean of several Gaussians, so colours taken from the photo come out blurred. With
+the contributions c_ip of every view (`mixing`), rounds of
 
     f_i += sum over views and p of t_iv c_ip (photo(p) - F(p)) / sum of t_iv c_ip
 
-lessen sum |photo - F|^2 (Landweber's iteration, the normal matrix lumped onto its diagonal: SART of Andersen and
-Kak 1984 with one subset), each begun a little ahead of the last (Beck and Teboulle 2009, FISTA). Colours stay within
-[0, 1], so nothing rings beyond what a photo can hold. V views, N Gaussians, h w pixels of a photo.
+lessen sum |photo - F|^2 (Landweber's iteration, the normal matrix lumped onto its diagonal: SART of
+Andersen and Kak 1984 with one subset), each begun a little ahead of the last (Beck and Teboulle 2009,
+FISTA). Colours stay within [0, 1], so nothing rings beyond what a photo can hold. V views, N Gaussians, h
+w pixels of a photo.
 """
 
 import math
@@ -74,8 +76,8 @@ def solved_colours(
 
 @dataclass(frozen=True)
 class _View:
-    """contributions: (h w, N), of 1 a pixel where anything is drawn. back: its transpose, times the trust. photo:
-    (h w, 3). sums: (N,) of `back`. shown: (h w, 1), 1 where something is drawn, else 0."""
+    """contributions: (h w, N), of 1 a pixel where anything is drawn. back: its transpose, times the trust.
+    photo: (h w, 3). sums: (N,) of `back`. shown: (h w, 1), 1 where something is drawn, else 0."""
 
     contributions: scipy.sparse.csr_matrix
     back: scipy.sparse.csr_matrix
