@@ -15,7 +15,6 @@ from itertools import pairwise
 
 import numpy as np
 import scipy.sparse
-from torch import Tensor
 
 from langflash_core.splat.projection import ALPHA_MAX, Footprints
 from langflash_core.types import Camera
@@ -28,29 +27,24 @@ _AT_ONCE = 1 << 18  # pairs in work at once: within a core's cache
 
 
 def mixing(
-    footprints: Footprints, camera: Camera, count: int, faint: float | Tensor = FAINT, small: float = SMALL
+    footprints: Footprints, camera: Camera, count: int, faint: float = FAINT, small: float = SMALL
 ) -> scipy.sparse.csr_matrix:
     """Contributions (H*W, N) float32 of N Gaussians to the pixels of a view, row by row.
 
     Args:
         footprints: of the Gaussians as the camera sees them. count: N.
-        faint, small: alpha, also of each Gaussian (N,), and contribution below which a pair is left out; 1/255
-            and 0 as in pictures.
+        faint, small: alpha and contribution below which a pair is left out; 1/255 and 0 as in pictures.
     """
-    faint = faint[footprints.ids].cpu().numpy() if isinstance(faint, Tensor) else faint
-    limits = np.broadcast_to(np.asarray(faint, np.float32), len(footprints.ids))
-    alphas, pixels, starts = _pairs(footprints, camera, limits)
+    alphas, pixels, starts = _pairs(footprints, camera, faint)
     num_pixels = camera.width * camera.height
-    by_depth = scipy.sparse.csc_matrix((alphas, pixels, starts), shape=(num_pixels, len(starts) - 1))
+    by_depth = scipy.sparse.csc_array((alphas, pixels, starts), shape=(num_pixels, len(starts) - 1))
     rows = by_depth.tocsr()  # columns of a row ascend: front to back
     shares, columns, ends = _composited(rows, small)
     ids = footprints.ids.cpu().numpy().astype(np.int32)
     return scipy.sparse.csr_matrix((shares, ids[columns], ends), shape=(num_pixels, count))
 
 
-def _pairs(
-    footprints: Footprints, camera: Camera, faint: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _pairs(footprints: Footprints, camera: Camera, faint: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Alphas and pixels of all pairs (M,), footprint by footprint, and where each begins (n + 1,)."""
     table = _Table.of(footprints, camera, faint)
     counts, found = np.zeros(len(table.sides), np.int64), []
@@ -72,7 +66,7 @@ def _pairs(
 @dataclass(frozen=True)
 class _Table:
     """Of n footprints: corner (n, 2) int32 pixels and side (n,) of a square that holds each, its centre seen
-    from that corner's pixel (n, 2), inverse roots (n, 3) 1 / l11, l21 / l22, 1 / l22, and opacity, float32."""
+    from that corner's pixel (n, 2), inverse roots (n, 3) 1 / l11, l21 / l22, 1 / l22, opacity, float32."""
 
     corners: np.ndarray
     sides: np.ndarray
@@ -81,7 +75,7 @@ class _Table:
     opacities: np.ndarray
 
     @staticmethod
-    def of(footprints: Footprints, camera: Camera, faint: np.ndarray) -> "_Table":
+    def of(footprints: Footprints, camera: Camera, faint: float) -> "_Table":
         opacities = footprints.opacities.cpu().numpy().astype(np.float32)
         centres, roots = (v.cpu().numpy() for v in (footprints.centres, footprints.roots))
         radii = np.sqrt(2 * np.log(np.maximum(opacities / faint, 1)))
@@ -103,7 +97,7 @@ class _Table:
         return np.split(order, np.flatnonzero(np.diff(self.sides[order])) + 1) if len(order) else []
 
     def pairs(
-        self, rows: np.ndarray, camera: Camera, faint: np.ndarray
+        self, rows: np.ndarray, camera: Camera, faint: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """How many pixels of each row (n,) are kept, and the alphas and pixels of these."""
         side, corners = int(self.sides[rows[0]]), self.corners[rows]
@@ -120,7 +114,7 @@ class _Table:
         inside = ((lines >= 0) & (lines < camera.height))[:, :, None] & (
             (columns >= 0) & (columns < camera.width)
         )[:, None]
-        kept = (across >= faint[rows, None, None]) & inside
+        kept = (across >= faint) & inside
         pixels = (lines * camera.width)[:, :, None] + columns[:, None]
         return (
             kept.sum((1, 2)),
@@ -129,7 +123,7 @@ class _Table:
         )
 
 
-def _composited(rows: scipy.sparse.csr_matrix, small: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _composited(rows: scipy.sparse.csr_array, small: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """T alpha of alphas sorted by pixel and depth, their columns, and where each pixel's begin; those below
     `small` left out. Some pixels at a time, so that what is made on the way stays within a core's cache."""
     starts = rows.indptr

@@ -111,7 +111,7 @@ def _matched(
     seen = (z > 0) & (x > _MARGIN) & (y > _MARGIN) & (x < width - _MARGIN) & (y < height - _MARGIN)
     x, y = (np.where(seen, along, -1e4).astype(np.float32) for along in (x, y))
     brought = _looked_up(other, x - 0.5, y - 0.5)
-    flow = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     there, back = flow.calc(grey, brought, None), flow.calc(brought, grey, None)
     columns, rows = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
     columns, rows = columns + there[..., 0], rows + there[..., 1]
