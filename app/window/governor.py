@@ -1,12 +1,13 @@
 """How much to draw, so that a slow machine stays fluent: what the last pictures cost decides.
 
 While the camera moves, a picture should take `MOVING_SECONDS`: one that takes longer sends the next
-ones down a ladder of smaller pictures, for large scenes also of fewer Gaussians once those are made;
-ones that take less than three quarters send them up again, a rung at a time, and less than half where the
-next rung is known to take too long. Colour, colour with the fast mode's relevance, and exact maps are paced
-apart, because they cost so differently. At rest the picture settles: at once at full size where that is
-quick, else smaller first and full after a longer pause, so that neither the next drag nor the next keystroke
-is met by a frozen window.
+ones down a ladder of smaller pictures, for large scenes also of fewer Gaussians once those are made; where
+OpenGL runs on the processor, a scene that knows its levels moves as its coarse Gaussians with less and less
+of the detail on them. Ones that take less than three quarters send them up again, a rung at a time, and less
+than half where the next rung is known to take too long. Colour, colour with the fast mode's relevance, and
+exact maps are paced apart, because they cost so differently. At rest the picture settles: at once at full
+size where that is quick, else smaller first and full after a longer pause, so that neither the next drag nor
+the next keystroke is met by a frozen window.
 """
 
 import math
@@ -69,35 +70,69 @@ SIZES_OF_MIDDLING_SCENES = (
 _START = 2  # rung of an unknown machine
 
 
-def _ladder(num_gaussians: int, slow: bool) -> tuple[tuple[float, float], ...]:
+SIZES_WITH_DETAIL = (
+    (1.0, 1.0),
+    (0.75, 1.0),
+    (0.75, 0.5),
+    (0.5, 0.5),
+    (0.5, 0.25),
+    (0.35, 0.25),
+    (0.35, 0.0),
+    (0.25, 0.0),
+)
+"""(scale, part of the detail that lies on the coarse Gaussians): more pixels than half the sides show
+nothing more of those alone."""
+COARSER_SIZES = ((0.25, 0.5), (0.18, 0.25))
+"""(scale, share of the coarse Gaussians), where these alone are a middling scene."""
+
+
+def _ladder(num_gaussians: int, slow: bool, coarse: float) -> tuple[tuple[float, float], ...]:
+    if slow and num_gaussians >= MIDDLING_SCENE and coarse < 1:
+        detailed = (
+            (scale, part if part == 1 else coarse + part * (1 - coarse)) for scale, part in SIZES_WITH_DETAIL
+        )
+        many = coarse * num_gaussians >= MIDDLING_SCENE
+        return (*detailed, *((scale, coarse * share) for scale, share in COARSER_SIZES if many))
     if num_gaussians >= LARGE_SCENE:
         return SIZES_OF_LARGE_SCENES
     return SIZES_OF_MIDDLING_SCENES if slow and num_gaussians >= MIDDLING_SCENE else SIZES
 
 
-def thinned_shares(num_gaussians: int, slow: bool) -> tuple[float, ...]:
-    """Shares of a scene's Gaussians that moving through it wants, the larger first."""
-    return tuple(sorted({share for _, share in _ladder(num_gaussians, slow)} - {1.0}, reverse=True))
-
-
 @dataclass(frozen=True)
 class Governor:
-    """For one scene. slow: where OpenGL runs on the processor. shares: of the Gaussians, that are made; 1
-    always is. full_seconds: what a full picture of a kind cost last, smoothed; rungs: where on the ladder a
-    kind moves; tried: seconds that a kind took last on a rung."""
+    """For one scene. slow: where OpenGL runs on the processor. coarse: share of its coarse Gaussians, 1 where
+    it has no levels. shares: of the Gaussians, that are made; all of them and the coarse ones always are.
+    full_seconds: what a picture of a kind cost last, smoothed, at full size, of `share`; rungs: where on the
+    ladder a kind moves; tried: seconds that a kind took last on a rung."""
 
     num_gaussians: int = 0
     slow: bool = False
+    coarse: float = 1.0
     shares: tuple[float, ...] = ()
     full_seconds: dict[Kind, float] = field(default_factory=dict)
     rungs: dict[Kind, int] = field(default_factory=dict)
     tried: dict[tuple[Kind, int], float] = field(default_factory=dict)
 
     @property
+    def share(self) -> float:
+        """Of the Gaussians that move before others are made: all, or the coarse ones."""
+        return self.coarse if self.slow and self.num_gaussians >= MIDDLING_SCENE else 1.0
+
+    @property
+    def wants(self) -> tuple[float, ...]:
+        """Shares of the Gaussians that moving through the scene asks to be thinned to, the larger first."""
+        return tuple(sorted({share for _, share in self._best} - {1.0, self.share}, reverse=True))
+
+    @property
+    def _best(self) -> tuple[tuple[float, float], ...]:
+        """The ladder once everything is made."""
+        return _ladder(self.num_gaussians, self.slow, self.coarse)
+
+    @property
     def ladder(self) -> tuple[tuple[float, float], ...]:
         """(scale, share) from dear to cheap."""
-        ladder = _ladder(self.num_gaussians, self.slow)
-        return ladder if {1.0, *self.shares} >= {share for _, share in ladder} else SIZES
+        made = {*self.shares} >= {*self.wants}
+        return self._best if made else tuple((scale, self.share) for scale, _ in SIZES)
 
     def with_share(self, share: float) -> "Governor":
         """Once that share of the Gaussians is made; with other rungs one begins anew."""
@@ -107,7 +142,7 @@ class Governor:
     def learn(self, plan: Plan, seconds: float, moving: bool = True) -> "Governor":
         """Account for a picture just drawn, while the camera moved or at rest."""
         full = self.full_seconds
-        if plan.share == 1:  # cost goes with the pixels, nearly
+        if plan.share == self.share:  # cost goes with the pixels, nearly
             estimate = seconds / plan.scale**2
             full = {**full, plan.kind: 0.5 * (full.get(plan.kind, estimate) + estimate)}
         if not moving or (plan.scale, plan.share) not in self.ladder:
@@ -130,7 +165,8 @@ class Governor:
         fast mode, and for atoms (`Kind.MAPS`) smaller maps, or colour where these take too long.
         """
         unknown = math.inf if self.slow else MOVING_SECONDS
-        if wanted is not Kind.COLOUR and self._expected(Kind.MAPS, unknown) <= MOVING_SECONDS:
+        quick = self.share == 1 and self._expected(Kind.MAPS, unknown) <= MOVING_SECONDS
+        if quick and wanted is not Kind.COLOUR:
             return Plan(Kind.MAPS)
         if wanted is Kind.MAPS:
             smallest = min(scale for scale, _ in SIZES)
@@ -143,7 +179,11 @@ class Governor:
         expected = self._expected(kind, math.inf)
         if expected == math.inf:
             return len(self.ladder) - 1 if self.slow else _START
-        fits = (i for i, (scale, _) in enumerate(self.ladder) if expected * scale**2 <= MOVING_SECONDS)
+        fits = (
+            rung
+            for rung, (scale, share) in enumerate(self.ladder)
+            if share <= self.share and expected * scale**2 <= MOVING_SECONDS
+        )
         return next(fits, len(self.ladder) - 1)
 
     def resting(self, wanted: Kind, still: float) -> Plan | None:

@@ -24,7 +24,7 @@ from langflash_core.scene.mask import Mask
 from .artist import Artist, Asked
 from .asking.state import Prompt, margin_span
 from .editing.state import Point, Reading, strongest
-from .governor import SETTLE_AFTER, Governor, Kind, Plan, thinned_shares
+from .governor import SETTLE_AFTER, Governor, Kind, Plan
 from .poses import START, Pose, to_camera
 from .scene.near import fills_gaps, keeps_near
 from .scene.state import Mode
@@ -163,6 +163,8 @@ class Viewport:
         Raises:
             GraphicsError: the OpenGL here cannot do it.
         """
+        from langflash_core.scene.thin import coarse_share
+
         self._warming = None
         renderer = self._made()
         renderer.set_scene(scene)
@@ -178,12 +180,12 @@ class Viewport:
             self._artist.drop()
         elif renderer.in_software:
             self._artist = Artist(self._notify)
-        self.governor = Governor(len(scene.gaussians), slow=self._artist is not None)
+        self.governor = Governor(len(scene.gaussians), self._artist is not None, coarse_share(scene))
 
     @property
     def shares(self) -> tuple[float, ...]:
         """Of the scene's Gaussians, that moving through it wants; `thin` takes them."""
-        return thinned_shares(self.governor.num_gaussians, self.governor.slow)
+        return self.governor.wants
 
     def thin(self, scene: "Scene", share: float, thinned: "Scene", rows: np.ndarray) -> None:
         """A share of the scene's Gaussians is made."""

@@ -1,9 +1,10 @@
-"""Fewer, wider Gaussians for a moving camera on a slow machine: levels of detail of a scene."""
+"""Fewer Gaussians for a moving camera on a slow machine: wider ones, or coarse ones and some detail."""
 
 from dataclasses import replace
 
 import numpy as np
 import torch
+from scipy.spatial import KDTree
 from torch import Tensor
 
 from langflash_core.types import Gaussians, Scene
@@ -18,6 +19,11 @@ def thin(scene: Scene, share: float) -> Scene:
     longest axes, and its axes grow by p_i^-1/2: what it covers, times p_i, stays a_i. Large ones are
     therefore kept as they are and small ones give way to dots of one size. One draw serves all: along
     a space-filling curve every 1 / p-th is taken, so that neighbours stand in for each other.
+
+    Of a scene that knows its levels all coarse ones stay, and nothing is widened: they are closed, and some
+    of the detail lies on them, of which p_i = min(1, c a_i d_i), d_i the mean difference of its colour and
+    the nearest coarse one's: what changes the picture most. A share of `coarse_share` is the coarse ones
+    alone, a smaller one these thinned as a scene of their own.
 
     Args:
         share: in (0, 1].
@@ -40,15 +46,57 @@ def thin_with_rows(scene: Scene, share: float) -> tuple[Scene, np.ndarray]:
         raise ValueError(f"share: expected a number in (0, 1], received {share}")
     if share == 1 or not len(scene.gaussians):
         return scene, np.arange(len(scene.gaussians))
+    coarse = coarse_share(scene)
+    if coarse < 1:
+        return _leveled(scene, share, coarse)
     chances = inclusion(covered_areas(scene.gaussians), share * len(scene.gaussians))
-    along = z_order(scene.gaussians.means.detach().cpu().numpy())
-    ends = np.floor(np.cumsum(chances[along]) + 1e-9)
-    rows = np.sort(along[np.diff(ends, prepend=0.0) > 0])
+    rows = np.sort(_drawn(chances, scene.gaussians))
     kept = torch.from_numpy(rows)
     growth = torch.from_numpy(chances[rows] ** -0.5).to(scene.gaussians.scales)
     thinned = scene.rows(kept)
     wider = replace(thinned.gaussians, scales=thinned.gaussians.scales * growth[:, None])
     return replace(thinned, gaussians=wider), rows
+
+
+def _leveled(scene: Scene, share: float, coarse: float) -> tuple[Scene, np.ndarray]:
+    """`thin_with_rows` of a scene with levels."""
+    assert scene.levels is not None
+    levels = scene.levels.cpu().numpy()
+    closed, detail = np.flatnonzero(levels == 0), np.flatnonzero(levels)
+    if share <= coarse:
+        thinned, some = thin_with_rows(scene.rows(torch.from_numpy(closed)), share / coarse)
+        return thinned, closed[some]
+    tells = _told(*(scene.gaussians.rows(torch.from_numpy(rows)) for rows in (closed, detail)))
+    chances = inclusion(tells, share * len(levels) - len(closed))
+    chosen = detail[_drawn(chances, scene.gaussians.rows(torch.from_numpy(detail)))]
+    rows = np.sort(np.concatenate((closed, chosen)))
+    return scene.rows(torch.from_numpy(rows)), rows
+
+
+def _told(coarse: Gaussians, detail: Gaussians) -> np.ndarray:
+    """How much each of the detail (n,) changes what the nearest coarse one shows: its area times the mean
+    difference of their colours."""
+    areas = covered_areas(detail)
+    there, own = (_finite(each.means).numpy() for each in (coarse, detail))
+    tells = np.zeros(len(areas))
+    if there.any() and own.any():
+        near = KDTree(coarse.means.cpu().numpy()[there]).query(detail.means.cpu().numpy()[own])[1]
+        colours = detail.sh[:, 0].cpu().numpy()[own] - coarse.sh[:, 0].cpu().numpy()[there][near]
+        tells[own] = areas[own] * np.nan_to_num(abs(colours).mean(1), posinf=0.0)
+    return tells
+
+
+def _drawn(chances: np.ndarray, gaussians: Gaussians) -> np.ndarray:
+    """Rows that one draw along a space-filling curve keeps, each with its chance (N,)."""
+    along = z_order(gaussians.means.detach().cpu().numpy())
+    ends = np.floor(np.cumsum(chances[along]) + 1e-9)
+    return along[np.diff(ends, prepend=0.0) > 0]
+
+
+def coarse_share(scene: Scene) -> float:
+    """Share of the Gaussians that are coarse, in (0, 1]; 1 where nobody knows, or all are one level."""
+    count = 0 if scene.levels is None else int((scene.levels == 0).sum())
+    return count / len(scene.gaussians) if count else 1.0
 
 
 def covered_areas(gaussians: Gaussians) -> np.ndarray:

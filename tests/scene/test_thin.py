@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from langflash_core.scene.thin import covered_areas, inclusion, thin, z_order
+from langflash_core.scene.thin import coarse_share, covered_areas, inclusion, thin, thin_with_rows, z_order
 from langflash_core.splat import render
 from tests.app.gl.questions import psnr
 from tests.splat.scenes import camera, cloud
@@ -106,3 +106,49 @@ def test_nothing_to_thin():
     for share in (0.0, -1.0, 1.5, float("nan")):
         with pytest.raises(ValueError, match="share"):
             thin(scene, share)
+
+
+def test_coarse_gaussians_stand_for_a_scene_with_levels():
+    scene = cloud(1000, 5)
+    levels = (torch.arange(1000) % 4 > 0).to(torch.uint8)
+    known = replace(scene, levels=levels)
+    assert coarse_share(known) == 0.25
+    coarse, rows = thin_with_rows(known, 0.25)
+    assert rows.tolist() == list(range(0, 1000, 4))
+    assert torch.equal(coarse.gaussians.scales, scene.gaussians.scales[::4]), "as wide as they are"
+    half, some = thin_with_rows(known, 0.125)
+    alone, own = thin_with_rows(known.rows(torch.from_numpy(rows)), 0.5)
+    assert (some == rows[own]).all() and torch.equal(half.gaussians.scales, alone.gaussians.scales)
+
+
+def test_some_detail_lies_on_all_that_is_coarse_what_tells_most_first():
+    """A scene of two colours, whose detail on the left is of the other one."""
+    scene = cloud(1000, 5)
+    levels = (torch.arange(1000) % 4 > 0).to(torch.uint8)
+    other = (scene.gaussians.means[:, 0] < 0) & (levels == 1)
+    colours = other.double()[:, None, None].expand_as(scene.gaussians.sh).contiguous()
+    known = replace(scene, levels=levels, gaussians=replace(scene.gaussians, sh=colours))
+    more, rows = thin_with_rows(known, 0.5)
+    assert (np.diff(rows) > 0).all() and {*range(0, 1000, 4)} <= {*rows.tolist()}
+    chosen = torch.from_numpy(rows)
+    assert torch.equal(more.gaussians.scales, known.gaussians.scales[chosen]), "nothing is widened"
+    detail = chosen[levels[chosen] == 1]
+    assert 249 <= len(detail) <= 250 and bool(other[detail].all())
+    everything, _ = thin_with_rows(known, 0.9)
+    assert len(everything.gaussians) == 250 + int(other.sum()), "what changes nothing is never kept"
+    broken = known.gaussians.means.clone()
+    broken[torch.tensor([0, 1, 4, 5])] = torch.nan  # coarse and detail
+    hurt = replace(known, gaussians=replace(known.gaussians, means=broken))
+    some = thin_with_rows(hurt, 0.5)[1].tolist()
+    assert {0, 4} <= {*some} and not {1, 5} & {*some} and 498 <= len(some) <= 500
+
+
+@pytest.mark.parametrize("level", [0, 1, None])
+def test_one_level_is_none(level):
+    """All coarse, all detail, nobody knows: thinned as ever."""
+    scene = cloud(200, 3)
+    same = None if level is None else torch.full((200,), level, dtype=torch.uint8)
+    known = replace(scene, levels=same)
+    assert coarse_share(known) == 1
+    assert (thin_with_rows(known, 0.25)[1] == thin_with_rows(scene, 0.25)[1]).all()
+    assert coarse_share(known.rows(torch.zeros(200, dtype=torch.bool))) == 1

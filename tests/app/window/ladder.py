@@ -26,7 +26,7 @@ from app.gl import SplatRenderer, moving_renderer
 from langflash_core.graphics import offscreen_context
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
-from langflash_core.scene.thin import thin_with_rows
+from langflash_core.scene.thin import coarse_share, thin_with_rows
 from langflash_core.types import Camera, Scene
 
 SCALES = (1.0, 0.75, 0.5, 0.35, 0.25, 0.18)
@@ -74,10 +74,18 @@ def measured(
     phrase: str,
     size: tuple[int, int],
     scales: Sequence[float] = SCALES,
-    shares: Sequence[float] = SHARES,
+    shares: Sequence[float] | None = None,
     rounds: int = 4,
 ) -> list[Rung]:
-    """All combinations, which take turns in every round."""
+    """All combinations, which take turns in every round.
+
+    shares: None: `SHARES`; of a scene with levels the coarse ones and all, half, a quarter, none of the rest.
+    """
+    if shares is None:
+        coarse = coarse_share(scene)
+        shares = (
+            SHARES if coarse == 1 else (1.0, *(coarse + part * (1 - coarse) for part in (0.5, 0.25, 0.0)))
+        )
     query = compile_query(scene, language_space(scene.semantics.space), [phrase])
     twin, renderer = SplatRenderer(ctx, "float32"), moving_renderer(ctx)
     for each in (twin, renderer):
@@ -133,7 +141,7 @@ def main() -> int:
     say("| size | share | PSNR, dB | relevance, mean error | all ms | own ms |\n" + 6 * "| --- " + "|\n")
     for rung in measured(offscreen_context(), scene, given.phrase, (width, height), rounds=given.rounds):
         error = f"{rung.decibels:.1f} | {rung.relevance:.4f}"
-        say(f"| {rung.scale} | {rung.share} | {error} | {rung.all_ms:.0f} | {rung.own_ms:.0f} |\n")
+        say(f"| {rung.scale} | {rung.share:.3g} | {error} | {rung.all_ms:.0f} | {rung.own_ms:.0f} |\n")
     return 0
 
 

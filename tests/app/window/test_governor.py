@@ -5,6 +5,7 @@ import math
 import pytest
 
 from app.window.governor import (
+    COARSER_SIZES,
     FULL_AFTER,
     LARGE_SCENE,
     MIDDLING_SCENE,
@@ -15,7 +16,6 @@ from app.window.governor import (
     Governor,
     Kind,
     Plan,
-    thinned_shares,
 )
 
 
@@ -102,7 +102,7 @@ def test_what_was_never_drawn_is_expected_to_cost_more_than_colour() -> None:
 
 def test_on_a_slow_machine_nothing_measured_is_no_reason_to_draw_maps() -> None:
     """Where fewer Gaussians are made before the first picture, no full one is ever measured."""
-    governor = Governor(MIDDLING_SCENE, slow=True, shares=thinned_shares(MIDDLING_SCENE, True))
+    governor = Governor(MIDDLING_SCENE, slow=True, shares=(0.5, 0.25))
     governor = governor.learn(governor.moving(Kind.COLOUR), 0.05)
     assert not governor.full_seconds
     assert governor.moving(Kind.FAST).kind is Kind.FAST
@@ -128,8 +128,8 @@ def test_an_unknown_machine_starts_in_the_middle() -> None:
 
 
 def test_thinner_levels_count_once_they_are_made() -> None:
-    assert thinned_shares(LARGE_SCENE, False) == (0.25, 0.0625)
-    assert thinned_shares(MIDDLING_SCENE, True) == (0.5, 0.25) and thinned_shares(MIDDLING_SCENE, False) == ()
+    assert Governor(LARGE_SCENE).wants == (0.25, 0.0625) and Governor(MIDDLING_SCENE).wants == ()
+    assert Governor(MIDDLING_SCENE, slow=True).wants == (0.5, 0.25)
     slow = Governor(MIDDLING_SCENE, slow=True)
     assert slow.ladder == SIZES == slow.with_share(0.5).ladder
     moved = slow.learn(Plan(Kind.COLOUR, 0.5), 0.06).with_share(0.5).with_share(0.25)
@@ -138,3 +138,44 @@ def test_thinner_levels_count_once_they_are_made() -> None:
     assert (slower.scale, slower.share) == (0.35, 1.0), "fewer pixels come before fewer Gaussians"
     half = Governor(LARGE_SCENE).with_share(0.25)
     assert half.ladder == SIZES and half.with_share(0.0625).ladder != SIZES
+
+
+def detailed(**known) -> Governor:
+    """Of a scene of levels on a slow machine."""
+    return Governor(3 * MIDDLING_SCENE, slow=True, coarse=0.25, **known)
+
+
+def test_a_scene_with_levels_moves_coarse_until_some_detail_is_chosen() -> None:
+    governor = detailed()
+    assert governor.wants == (0.625, 0.4375) and governor.ladder == tuple((scale, 0.25) for scale, _ in SIZES)
+    assert governor.moving(Kind.COLOUR) == Plan(Kind.COLOUR, SIZES[-1][0], 0.25), "the cheapest first"
+    governor, plans = settled(governor, Kind.COLOUR, 0.4)
+    assert {plan.share for plan in plans} == {0.25} and plans[-1].scale == 0.35
+    made = governor.with_share(0.4375).with_share(0.625)
+    assert [share for _, share in made.ladder] == [1, 1, 0.625, 0.625, 0.4375, 0.4375, 0.25, 0.25]
+    assert made.moving(Kind.COLOUR) == Plan(Kind.COLOUR, 0.35, 0.25), "as what is known of it tells"
+    assert made.moving(Kind.FAST) == Plan(Kind.FAST, 0.25, 0.25), "which tells of others, too"
+    _, plans = settled(made, Kind.COLOUR, 0.1, fixed=0.04)
+    assert plans[-1] == Plan(Kind.COLOUR, 0.75, 0.625) and len(set(plans[10:])) == 1
+
+
+def test_who_has_time_moves_through_all_detail_and_never_in_exact_maps_of_less() -> None:
+    governor, plans = settled(detailed(shares=(0.625, 0.4375)), Kind.FAST, 0.004)
+    assert plans[-1] == Plan(Kind.FAST) and governor.resting(Kind.FAST, FULL_AFTER) == Plan(Kind.MAPS)
+    assert not Plan(Kind.COLOUR, 1.0, 0.625).covers(Plan(Kind.COLOUR, 0.5)), "all of them are still to come"
+
+
+def test_who_draws_everything_quickly_knows_no_levels() -> None:
+    card = Governor(4 * MIDDLING_SCENE, coarse=0.2)
+    assert card.share == 1 and card.ladder == SIZES and card.moving(Kind.COLOUR).share == 1
+    small = Governor(MIDDLING_SCENE - 1, slow=True, coarse=0.2)
+    assert small.share == 1 and small.ladder == SIZES
+
+
+def test_many_coarse_gaussians_are_thinned_in_turn() -> None:
+    """Of many photos, or with a splat file merged, all of whose Gaussians are coarse."""
+    governor = Governor(10 * MIDDLING_SCENE, slow=True, coarse=0.25)
+    assert governor.wants == (0.625, 0.4375, 0.125, 0.0625)
+    for share in governor.wants:
+        governor = governor.with_share(share)
+    assert governor.ladder[-2:] == tuple((scale, 0.25 * share) for scale, share in COARSER_SIZES)

@@ -14,6 +14,10 @@ from app.window.scene.state import Mode
 from app.window.viewport import RETRY_SECONDS, Viewport
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
+from langflash_core.scene.edited import first_marks
+from langflash_core.scene.edits import delete
+from langflash_core.scene.mask import Mask
+from langflash_core.scene.thin import thin_with_rows
 from tests.app.window.scenes import PHRASES, room, shown_scene
 
 SIZE = (160, 120)
@@ -207,3 +211,43 @@ def test_gaps_are_filled_as_the_preference_says(context) -> None:
             pictures.append(np.frombuffer(viewport.texture.read(), np.uint8))
         viewport.release()
     assert np.array_equal(pictures[0], pictures[2]) and (pictures[0] != pictures[1]).any()
+
+
+def test_a_scene_with_levels_moves_coarse_and_rests_whole(context, monkeypatch) -> None:
+    """Where OpenGL runs on the processor, until some detail is chosen."""
+    monkeypatch.setattr("app.window.governor.MIDDLING_SCENE", 10_000)
+    scene = room(language_space("minilm").encode(list(PHRASES)))
+    levels = (torch.arange(len(scene.gaussians)) % 4 > 0).to(torch.uint8)
+    scene = replace(scene, levels=levels)
+    shown = shown_scene()
+    assert shown.info is not None
+    state = replace(shown, prompts=(), info=replace(shown.info, scene=scene))
+    with context:
+        viewport = Viewport(context)
+        viewport.set_scene(1, scene)
+        if viewport._artist is None:
+            assert viewport.governor.share == 1
+            pytest.skip("OpenGL here has a graphics card, which draws all pictures itself")
+        plans = []
+        for turn in range(40):
+            pose = orbit(shown.pose, 0.02 * min(turn, 20), 0.0)
+            state = replace(state, now=state.now + 0.05, pose=pose)
+            viewport.update(state, SIZE, touched=state.now)
+            plans.append(getattr(viewport.drawn, "plan", None))
+            if turn == 20:
+                marks = first_marks(scene)
+                viewport.mark(scene, delete(marks, Mask.first(marks.selected.count, 90)), None)
+        moved = {plan.share for plan in plans if plan is not None}
+        for share in viewport.shares:
+            viewport.thin(scene, share, *thin_with_rows(scene, share))
+        assert viewport.governor.ladder[2:4] == ((0.75, 0.625), (0.5, 0.625))
+        for _ in range(300):
+            state = replace(state, now=state.now + 0.05)
+            viewport.update(state, SIZE, touched=0.0)
+            if viewport.drawn is not None and getattr(viewport.drawn, "plan", None) == Plan(Kind.COLOUR):
+                break
+            time.sleep(0.01)
+        rested = getattr(viewport.drawn, "plan", None)
+        viewport.release()
+    assert 0.25 in moved and moved <= {0.25, 1.0}
+    assert rested == Plan(Kind.COLOUR), "all of them"
