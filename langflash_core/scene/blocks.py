@@ -22,8 +22,6 @@ LEVELS = 4
 LARGEST = 2**LEVELS
 """Pixels, side of the largest squares."""
 _BENT = 0.01  # log depth by which the middle of a square may be off its corners' mean
-LEAST_GAIN = 4e-5
-"""Squared error of three channels, of one more element, below which nothing is parted: noise of 1/255."""
 
 
 @dataclass(frozen=True)
@@ -82,14 +80,15 @@ def grown(photo: Tensor, log_depths: Tensor, wanted: Tensor, finest: int = 1) ->
     return Tree(tuple(gains), tuple(wanteds), size)
 
 
-def threshold(trees: list[Tree], budget: int) -> float:
-    """The gain above which squares are parted, so that all trees together have about `budget` leaves."""
+def threshold(trees: list[Tree], budget: int, least: float) -> float:
+    """The gain above which squares are parted, at least `least`, so that all trees together have at most about
+    `budget` leaves."""
     roots = sum(int(tree.wanted[-1].sum()) for tree in trees)
     gains = torch.cat([gain.flatten() for tree in trees for gain in tree.gains])
-    gains = gains[gains > LEAST_GAIN]
+    gains = gains[gains > least]
     partings = max(0, (budget - roots) // 3)
     if partings >= len(gains):
-        return LEAST_GAIN
+        return least
     if partings == 0:
         return torch.inf
     return float(gains.kthvalue(len(gains) - partings).values)

@@ -87,8 +87,8 @@ def assemble_detailed(
         for photo, image, depths, own in zip(photos, views.images, known, keep, strict=True)
     ]
     trees = [grown(s.photo, s.depth.log_depths, s.wanted, detail.finest) for s in sights]
-    budget = gaussians or round(detail.share * keep[0].numel() * (len(keep) + 3) / 4)
-    limit = _limit(trees, budget)
+    budget = gaussians or round(detail.most * keep[0].numel() * (len(keep) + 3) / 4)
+    limit = _limit(trees, budget, 0.0 if gaussians else detail.gain)
     parts = [_of_view(sight, tree, limit) for sight, tree in zip(sights, trees, strict=True)]
     cameras = [Camera(*of, *views.size) for of in zip(prediction.viewmats, views.Ks, strict=True)]
     made = [
@@ -158,12 +158,12 @@ def _kept(prediction: Prediction, views: Views) -> tuple[Tensor, Tensor, float, 
     return depths, keep, unit, int(through.sum())
 
 
-def _limit(trees: list[Tree], budget: int) -> float:
+def _limit(trees: list[Tree], budget: int, least: float) -> float:
     """The threshold of all photos' trees, the ground beneath what is parted counted in."""
-    limit = threshold(trees, budget)
+    limit = threshold(trees, budget, least)
     for _ in range(2):  # the ground is a fifth of all, and nearly the same from one try to the next
         beneath = sum(len(leaves(tree, limit)[1]) for tree in trees)
-        limit = threshold(trees, max(budget - beneath, 0))
+        limit = threshold(trees, max(budget - beneath, 0), least)
     return limit
 
 
