@@ -30,12 +30,13 @@ from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_netw
 from langflash_core.network.build import network_class
 from langflash_core.network.checkpoints.parts import part_folder
 from langflash_core.network.checkpoints.stored import Stored
-from langflash_core.network.model import Atoms, Geometry, Lifted, pooled_weights
+from langflash_core.network.model import Atoms, Geometry, Lifted, Redrawn, pooled_weights
 from langflash_core.network.precision import bfloat16_fails, has_bfloat16
 from langflash_core.network.semantics.aggregation import averaged_atoms
 from langflash_core.network.semantics.crops import crop_atoms
 from langflash_core.network.semantics.grouping import Groups
 from langflash_core.network.semantics.lifting import lifted_weights
+from langflash_core.network.semantics.outlines import Outlines
 from langflash_core.network.semantics.sam2 import Sam2, sam2_checkpoint
 from langflash_core.resources import asset_path
 from langflash_core.running import Progress, Run
@@ -50,7 +51,7 @@ from langflash_core.types import Camera, Cost, Frame, Prediction, QueryResult, S
 STAGES = {"photos": 0.0, "weights": 0.1, "network": 0.2, "assemble": 0.85, "prune": 0.95, "refine": 0.97}
 PRECISIONS = ("auto", "float32", "bfloat16")
 AGGREGATIONS = ("lfa", "average", "crops")
-GROUPINGS = ("queries", "sam2")
+GROUPINGS = ("queries", "mobile-sam", "sam2")
 LARGEST_PICTURE = 8192
 LONGEST_REFINEMENT = 3600  # seconds
 _networks: dict[tuple, LangFlashNet] = {}
@@ -88,9 +89,10 @@ def reconstruct(
         aggregation: how a group gets its vector: "lfa" (trained), "average" (of dense features),
             "crops" (CLIP on a cut-out; presets of its space); None: lfa where it has weights,
             else average.
-        grouping: where groups come from: "queries" (trained), "sam2" (its masks of each photo, lifted
-            to the scene); None: queries where they have weights, else sam2 where it is installed,
-            else clusters of the language features.
+        grouping: where groups come from: "queries" (trained), "mobile-sam" (the same, redrawn with
+            MobileSAM's outlines in each photo), "sam2" (its masks of each photo, lifted to the scene);
+            None: queries where they have weights, else sam2 where it is installed, else clusters of the
+            language features.
         refine_seconds: so long poses and Gaussians are fitted to the photos afterwards, and kept so
             if that brings a view closer that was held out; None: not at all.
         viewmats: poses (V, 4, 4) of the photos, world to camera, in any world and unit: they are not
@@ -124,10 +126,11 @@ def reconstruct(
     with run.stage("weights"):
         network = _network(preset, weights, device, precision, ahead.stored)
         atoms = _atoms(network, aggregation, views)
-        groups = _groups(network, grouping, device)
+        groups, redrawn = _groups(network, grouping, device), _redrawn(grouping, device)
         ahead.matched.result()  # key points are found beside the weights
     with run.stage("network"):
-        prediction = _on_cpu(network.predict(views, run.within("network"), cancelled, atoms, groups))
+        within = run.within("network")
+        prediction = _on_cpu(network.predict(views, within, cancelled, atoms, groups, redrawn))
     with run.stage("assemble"), torch.no_grad():
         scene = assemble(prediction, views, preset=preset)
     with run.stage("prune"), torch.no_grad():
@@ -417,9 +420,10 @@ def _groups(network: LangFlashNet, way: str | None, device: str) -> Lifted | Non
     """
     if way not in (None, *GROUPINGS):
         raise InputError(f"the grouping '{way}' is unknown; choose {', '.join(GROUPINGS)}")
-    if way == "queries" and not network.grouped:
+    trained = way in ("queries", "mobile-sam")
+    if trained and not network.grouped:
         raise WeightsError("the grouping has no weights here; `langflash weights get langflash` fetches them")
-    if way == "queries" or (way is None and (network.grouped or sam2_checkpoint() is None)):
+    if trained or (way is None and (network.grouped or sam2_checkpoint() is None)):
         return None
     oracle = Sam2(device)
 
@@ -429,6 +433,18 @@ def _groups(network: LangFlashNet, way: str | None, device: str) -> Lifted | Non
         return lifted_weights(groups, geometry, views.Ks)
 
     return lifted
+
+
+def _redrawn(way: str | None, device: str) -> Redrawn | None:
+    """What gives groups finer outlines; None: they stay as they are.
+
+    Raises:
+        WeightsError: no weights for it.
+    """
+    if way != "mobile-sam":
+        return None
+    outlines = Outlines.installed(device)
+    return lambda weights, views: outlines(weights, source_pictures(views))
 
 
 def _bfloat16(preset: str, precision: str, device: str) -> bool:

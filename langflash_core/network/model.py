@@ -19,6 +19,7 @@ from langflash_core.types import Gaussians, Prediction, Views
 
 Atoms = Callable[[Tensor, Tensor], Tensor]
 Lifted = Callable[["Geometry", Views], Tensor]
+Redrawn = Callable[[Tensor, Views], Tensor]
 MEANING_STAGES = ("language features", "grouping", "aggregation")
 
 
@@ -160,6 +161,7 @@ class LangFlashNet(nn.Module):
         cancelled: Callable[[], bool] | None = None,
         atoms: Atoms | None = None,
         groups: Lifted | None = None,
+        redrawn: Redrawn | None = None,
     ) -> Prediction:
         """One scene from V photos of one size (sides multiples of the patch).
 
@@ -167,11 +169,12 @@ class LangFlashNet(nn.Module):
             atoms: weights (V, K, H, W) and features (1, V, C, h, w) to atoms (K, C) of unit norm;
                 None: `dictionary`, with all that was seen.
             groups: geometry and views to w_k(x), (V, K, H, W), sums to 1 over K; None: `parts`.
+            redrawn: w_k(x) and views to finer ones of the same shape; None: they stay.
 
         Raises:
             Cancelled: `cancelled()` became true; asked before every layer and every pair of photos.
         """
-        return self.predict_scenes([views], progress, cancelled, atoms, groups)[0]
+        return self.predict_scenes([views], progress, cancelled, atoms, groups, redrawn)[0]
 
     @torch.inference_mode()
     def predict_scenes(
@@ -181,6 +184,7 @@ class LangFlashNet(nn.Module):
         cancelled: Callable[[], bool] | None = None,
         atoms: Atoms | None = None,
         groups: Lifted | None = None,
+        redrawn: Redrawn | None = None,
     ) -> list[Prediction]:
         """Several scenes of equally many photos of one size: the transformers see them as one batch.
 
@@ -194,10 +198,15 @@ class LangFlashNet(nn.Module):
             raise ValueError(f"scenes: expected one shape of (V, 3, H, W), received {sorted(shapes)}")
         run = Run(evenly(self.stages), progress, cancelled)
         with nullcontext() if cancelled is None else self.stopping(run.check):
-            return self._predict(scenes, run, atoms, groups)
+            return self._predict(scenes, run, atoms, groups, redrawn)
 
     def _predict(
-        self, scenes: Sequence[Views], run: Run, atoms: Atoms | None, groups: Lifted | None
+        self,
+        scenes: Sequence[Views],
+        run: Run,
+        atoms: Atoms | None,
+        groups: Lifted | None,
+        redrawn: Redrawn | None,
     ) -> list[Prediction]:
         """The stages, timed by `run`; B scenes."""
         device = next(self.parameters()).device
@@ -220,6 +229,8 @@ class LangFlashNet(nn.Module):
                 weights = [
                     self.parts(own, x, size, f[None]) for (x, _, own), f in zip(each, features, strict=True)
                 ]
+            if redrawn is not None:
+                weights = [redrawn(own, views) for own, views in zip(weights, scenes, strict=True)]
         with run.stage("aggregation"):
             dictionaries = [
                 self.dictionary(w, f[None], Seen(own, found.depths, found.viewmats, K[0]))
