@@ -81,8 +81,8 @@ def grown(photo: Tensor, log_depths: Tensor, wanted: Tensor, finest: int = 1) ->
 
 
 def threshold(trees: list[Tree], budget: int, least: float) -> float:
-    """The gain above which squares are parted, at least `least`, so that all trees together have at most about
-    `budget` leaves."""
+    """The gain above which squares are parted, at least `least`, so that all trees together have at most
+    about `budget` leaves."""
     roots = sum(int(tree.wanted[-1].sum()) for tree in trees)
     gains = torch.cat([gain.flatten() for tree in trees for gain in tree.gains])
     gains = gains[gains > least]

@@ -110,17 +110,26 @@ class _Table:
         across *= -0.5
         np.exp(across, out=across)
         across *= self.opacities[rows, None, None]
-        columns, lines = corners[:, :1] + np.arange(side), corners[:, 1:] + np.arange(side)
-        inside = ((lines >= 0) & (lines < camera.height))[:, :, None] & (
-            (columns >= 0) & (columns < camera.width)
-        )[:, None]
-        kept = (across >= faint) & inside
-        pixels = (lines * camera.width)[:, :, None] + columns[:, None]
-        return (
-            kept.sum((1, 2)),
-            np.minimum(across[kept], np.float32(ALPHA_MAX)),
-            pixels[kept].astype(np.int32),
-        )
+        kept = across >= faint
+        columns, lines = corners[:, 0], corners[:, 1]
+        if not _inside(columns, side, camera.width) or not _inside(lines, side, camera.height):
+            span = np.arange(side, dtype=np.int32)
+            kept &= _between(lines[:, None] + span, camera.height)[:, :, None]
+            kept &= _between(columns[:, None] + span, camera.width)[:, None]
+        found = np.flatnonzero(kept)
+        which = found // (side * side)
+        offsets = (np.arange(side)[:, None] * camera.width + np.arange(side)).ravel()
+        pixels = (lines * np.int64(camera.width) + columns)[which] + offsets[found - which * (side * side)]
+        alphas = np.minimum(across.ravel()[found], np.float32(ALPHA_MAX))
+        return np.bincount(which, minlength=len(rows)), alphas, pixels.astype(np.int32)
+
+
+def _inside(first: np.ndarray, side: int, size: int) -> bool:
+    return bool(len(first)) and int(first.min()) >= 0 and int(first.max()) + side <= size
+
+
+def _between(places: np.ndarray, size: int) -> np.ndarray:
+    return (places >= 0) & (places < size)
 
 
 def _composited(rows: scipy.sparse.csr_array, small: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
