@@ -14,16 +14,23 @@ FEWEST, MOST = 1_000, 4_000_000
 
 @dataclass(frozen=True)
 class Detail:
-    """One level. share: Gaussians a pixel of the network's grid, of one photo and all others together
-    that see the same surfaces. finest: side of the smallest element, pixels of the photo."""
+    """One level. most: Gaussians a pixel of the network's grid, of one photo and a quarter for each other.
+    gain: squared error of three channels that one more Gaussian must take away from the photo, colours in
+    [0, 1]: count follows what there is to see. finest: side of the smallest element, pixels of the photo."""
 
     name: str
-    share: float
+    most: float
+    gain: float
     finest: int
 
 
 DETAILS = {
-    level.name: level for level in (Detail("low", 0.9, 2), Detail("normal", 2.1, 1), Detail("high", 4.2, 1))
+    level.name: level
+    for level in (
+        Detail("low", 0.95, 1e-3, 2),
+        Detail("normal", 2.4, 2e-4, 1),
+        Detail("high", 4.8, 5e-5, 1),
+    )
 }
 DEFAULT_DETAIL = "normal"
 

@@ -17,6 +17,7 @@ from langflash_core.ahead import Ahead, begin
 from langflash_core.detail import DEFAULT_DETAIL, check_gaussians, chosen_detail
 from langflash_core.errors import InputError, PromptError, ViewError, WeightsError
 from langflash_core.export.html import Phrases, TextModel, write_html
+from langflash_core.fine import fine_scene
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.views import load_views, source_pictures
@@ -31,13 +32,13 @@ from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_netw
 from langflash_core.network.build import network_class
 from langflash_core.network.checkpoints.parts import part_folder
 from langflash_core.network.checkpoints.stored import Stored
-from langflash_core.network.model import Atoms, Geometry, Lifted, pooled_weights
+from langflash_core.network.model import Atoms, Geometry, Lifted, Redrawn, pooled_weights
 from langflash_core.network.precision import bfloat16_fails, has_bfloat16
-from langflash_core.network.presets import GuidedDepth
 from langflash_core.network.semantics.aggregation import averaged_atoms
 from langflash_core.network.semantics.crops import crop_atoms
 from langflash_core.network.semantics.grouping import Groups
 from langflash_core.network.semantics.lifting import lifted_weights
+from langflash_core.network.semantics.outlines import Outlines
 from langflash_core.network.semantics.sam2 import Sam2, sam2_checkpoint
 from langflash_core.resources import asset_path
 from langflash_core.running import Progress, Run
@@ -49,10 +50,10 @@ from langflash_core.splat.refine import Budget, refine
 from langflash_core.types import Camera, Cost, Frame, Prediction, QueryResult, Scene, Views
 
 # Where each stage begins in the whole, from its measured share of the time on two CPU cores.
-STAGES = {"photos": 0.0, "weights": 0.1, "network": 0.2, "assemble": 0.85, "prune": 0.95, "refine": 0.97}
+STAGES = {"photos": 0.0, "weights": 0.08, "network": 0.16, "assemble": 0.66, "refine": 0.97}
 PRECISIONS = ("auto", "float32", "bfloat16")
 AGGREGATIONS = ("lfa", "average", "crops")
-GROUPINGS = ("queries", "sam2")
+GROUPINGS = ("queries", "mobile-sam", "sam2")
 LARGEST_PICTURE = 8192
 LONGEST_REFINEMENT = 3600  # seconds
 _AS_IT_IS = "the preset '{}' makes one Gaussian a pixel; the detail that was asked for is left out"
@@ -93,9 +94,10 @@ def reconstruct(
         aggregation: how a group gets its vector: "lfa" (trained), "average" (of dense features),
             "crops" (CLIP on a cut-out; presets of its space); None: lfa where it has weights,
             else average.
-        grouping: where groups come from: "queries" (trained), "sam2" (its masks of each photo, lifted
-            to the scene); None: queries where they have weights, else sam2 where it is installed,
-            else clusters of the language features.
+        grouping: where groups come from: "queries" (trained), "mobile-sam" (the same, redrawn with
+            MobileSAM's outlines in each photo), "sam2" (its masks of each photo, lifted to the scene);
+            None: queries where they have weights, else sam2 where it is installed, else clusters of the
+            language features.
         detail: how finely surfaces are covered: "low", "normal", "high"; None: one Gaussian a pixel,
             as the network makes them. Points of `full` are no surfaces: they stay as they are.
         gaussians: about so many, instead of as many as the detail has.
@@ -133,22 +135,26 @@ def reconstruct(
     with run.stage("weights"):
         network = _network(preset, weights, device, precision, ahead.stored)
         atoms = _atoms(network, aggregation, views)
-        groups = _groups(network, grouping, device)
+        groups, redrawn = _groups(network, grouping, device), _redrawn(grouping, device)
         ahead.matched.result()  # key points are found beside the weights
+    finer = None if detail is None or not network.surfaces else chosen_detail(detail)
     with run.stage("network"):
-        prediction = _on_cpu(network.predict(views, run.within("network"), cancelled, atoms, groups))
+        prediction = network.predict(
+            views, run.within("network"), cancelled, atoms, groups, redrawn, elements=finer is None
+        )
+        prediction = _on_cpu(prediction)
+    images = views.images[[v for v in range(views.num_views) if v not in prediction.unplaced]]
     with run.stage("assemble"), torch.no_grad():
-        if isinstance(PRESETS[preset], GuidedDepth):
-            prediction = _finer(prediction, views, detail, gaussians)
-        elif gaussians is not None or detail not in (None, DEFAULT_DETAIL):
-            prediction = _noted(prediction, _AS_IT_IS.format(preset))
-        scene = assemble(prediction, views, preset=preset)
-    with run.stage("prune"), torch.no_grad():
-        scene = prune(scene)
+        if finer is not None:
+            scene, light = fine_scene(prediction, views, finer, gaussians=gaussians, preset=preset)
+            images = light.corrected(images).clamp(0, 1)
+        else:
+            if gaussians is not None or detail not in (None, DEFAULT_DETAIL):
+                prediction = _noted(prediction, _AS_IT_IS.format(preset))
+            scene = prune(assemble(prediction, views, preset=preset))
     if refine_seconds is not None:
-        placed = [v for v in range(views.num_views) if v not in prediction.unplaced]
         with run.stage("refine"):
-            scene = _refined(scene, views.images[placed], refine_seconds, device, run.within("refine"))
+            scene = _refined(scene, images, refine_seconds, device, run.within("refine"))
         fitting = {**scene.record.cost.timings, "fitting": run.timings["refine"]}
         scene = scene.with_record(cost=Cost(fitting))
     run.check()
@@ -353,11 +359,6 @@ def _check_detail(detail: str | None, gaussians: int | None) -> None:
     check_gaussians(gaussians)
 
 
-def _finer(prediction: Prediction, views: Views, detail: str | None, gaussians: int | None) -> Prediction:
-    """Surfaces covered as finely as asked; None: by one Gaussian a pixel, as they are."""
-    return prediction
-
-
 def _noted(prediction: Prediction, note: str) -> Prediction:
     return replace(prediction, warnings=(*prediction.warnings, note))
 
@@ -445,9 +446,10 @@ def _groups(network: LangFlashNet, way: str | None, device: str) -> Lifted | Non
     """
     if way not in (None, *GROUPINGS):
         raise InputError(f"the grouping '{way}' is unknown; choose {', '.join(GROUPINGS)}")
-    if way == "queries" and not network.grouped:
+    trained = way in ("queries", "mobile-sam")
+    if trained and not network.grouped:
         raise WeightsError("the grouping has no weights here; `langflash weights get langflash` fetches them")
-    if way == "queries" or (way is None and (network.grouped or sam2_checkpoint() is None)):
+    if trained or (way is None and (network.grouped or sam2_checkpoint() is None)):
         return None
     oracle = Sam2(device)
 
@@ -457,6 +459,18 @@ def _groups(network: LangFlashNet, way: str | None, device: str) -> Lifted | Non
         return lifted_weights(groups, geometry, views.Ks)
 
     return lifted
+
+
+def _redrawn(way: str | None, device: str) -> Redrawn | None:
+    """What gives groups finer outlines; None: they stay as they are.
+
+    Raises:
+        WeightsError: no weights for it.
+    """
+    if way != "mobile-sam":
+        return None
+    outlines = Outlines.installed(device)
+    return lambda weights, views: outlines(weights, source_pictures(views))
 
 
 def _bfloat16(preset: str, precision: str, device: str) -> bool:

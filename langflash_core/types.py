@@ -103,6 +103,11 @@ class Gaussians:
             _shape(name, getattr(self, name), (count, *tail))
         _shape("sh", self.sh, (count, bases, 3))
 
+    @staticmethod
+    def none() -> "Gaussians":
+        """Not a single one."""
+        return Gaussians(*(torch.zeros(0, *tail) for tail in ((3,), (4,), (3,), (), (1, 3))))
+
     def __len__(self) -> int:
         return self.means.shape[0]
 
@@ -163,7 +168,8 @@ class Semantics:
 class Prediction:
     """What a network hands over, whatever its geometry: everything per pixel, view by view.
 
-    gaussians: N = V*H*W of them, order (v h w), world = view 0, network length units.
+    gaussians: N = V*H*W of them, order (v h w), world = view 0, network length units; or none, where depths
+    are to be covered by elements of other sizes.
     weights: (V, K, H, W) softmax over the K surviving groups (K may be 0).
     dictionary: (K, C) unit rows. viewmats (V, 4, 4). depths (V, H, W), z, same unit.
     confidences (V, H, W) in [0, 1]. unplaced: views whose pose is not known (view 0's stands in).

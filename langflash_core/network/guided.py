@@ -25,14 +25,15 @@ from langflash_core.network.semantics.naming import PartNamer, describe, places
 from langflash_core.network.semantics.splitting import split_groups
 from langflash_core.network.stereo.agreement import agreed
 from langflash_core.network.stereo.alignment import Correction
-from langflash_core.network.stereo.keypoints import KeyPoints, match_photos, match_sources
+from langflash_core.network.stereo.keypoints import KeyPoints, decoded, match_photos, match_sources
 from langflash_core.network.stereo.planes import flattened
 from langflash_core.network.stereo.poses import PoseInput, Poses, estimate_poses
 from langflash_core.network.stereo.prior import DepthHead, DepthMaps
+from langflash_core.network.stereo.registration import registered
 from langflash_core.network.stereo.sharpening import sharpened
 from langflash_core.network.stereo.sweep import DepthRefiner
 from langflash_core.running import Run
-from langflash_core.types import Views
+from langflash_core.types import Gaussians, Views
 
 
 class GuidedDepthNet(LangFlashNet):
@@ -46,6 +47,7 @@ class GuidedDepthNet(LangFlashNet):
     frozen = ("encoder", "local")
     compact = True
     bfloat16_on_cpu = False  # a seventh of a second quicker, and a part in forty merges otherwise
+    surfaces = True
     caches_tokens = True
     stages = ("encoder", "depth", "poses", "refinement", "Gaussians", *MEANING_STAGES)
 
@@ -131,7 +133,9 @@ class GuidedDepthNet(LangFlashNet):
         where = places(weights, seen.depths, seen.viewmats, seen.Ks)
         return self.namer(atoms, describe(weights, seen.tokens), where)
 
-    def reconstruct(self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: Run) -> Geometry:
+    def reconstruct(
+        self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: Run, elements: bool = True
+    ) -> Geometry:
         """Depth, poses, refined depth with edges and flat surfaces that agrees between photos, Gaussians."""
         with run.stage("depth"):
             levels = self.levels(tokens, Ks)
@@ -145,7 +149,9 @@ class GuidedDepthNet(LangFlashNet):
             maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)
             sharp = _one_by_one(sharpened, maps.log_depths, images[0])
             maps = replace(maps, log_depths=flattened(sharp, maps.log_errors))
-            maps = _agreed(maps, poses, viewmats[0], Ks[0])
+            maps = _agreed(maps, views, poses, viewmats[0], Ks[0], run)
+        if not elements:
+            return Geometry(Gaussians.none(), viewmats[0], maps.depths, maps.confidences, poses.guessed)
         with run.stage("Gaussians"):
             raw = self.gaussian_head(levels, images)
             gaussians = assemble_gaussians(raw[0], images[0], maps, viewmats[0], Ks[0])
@@ -192,12 +198,18 @@ def _one_by_one(work: Callable[..., Tensor], *of_views: Tensor) -> Tensor:
     return torch.cat([work(*own) for own in zip(*(values.split(1) for values in of_views), strict=True)])
 
 
-def _agreed(maps: DepthMaps, poses: Poses, viewmats: Tensor, Ks: Tensor) -> DepthMaps:
-    """Maps (V, H, W); those of known pose show one surface."""
+def _agreed(maps: DepthMaps, views: Views, poses: Poses, viewmats: Tensor, Ks: Tensor, run: Run) -> DepthMaps:
+    """Maps (V, H, W); those of known pose show one surface, to a fraction of the photos' pixels."""
     placed = [v for v in range(len(viewmats)) if v not in poses.guessed]
+    if len(placed) < 2:
+        return maps
     part = DepthMaps(maps.log_depths[placed], maps.log_errors[placed])
+    near = _neighbours(poses, placed)
+    part = agreed(part, viewmats[placed], Ks[placed], near)
+    photos = _greys(views)
+    part = registered(part, [photos[v] for v in placed], viewmats[placed], Ks[placed], near, run.check)
     log_depths = maps.log_depths.clone()
-    log_depths[placed] = agreed(part, viewmats[placed], Ks[placed], _neighbours(poses, placed)).log_depths
+    log_depths[placed] = part.log_depths
     return replace(maps, log_depths=log_depths)
 
 
@@ -223,5 +235,12 @@ def _key_points(views: Views, run: Run) -> KeyPoints:
     """Of the largest version of the photos at hand."""
     if views.sources:
         return match_sources(views.sources, run.check)
+    return match_photos(_greys(views), run.check)
+
+
+def _greys(views: Views) -> list[np.ndarray]:
+    """The largest version of the photos at hand, (h, w) uint8 each."""
+    if views.sources:
+        return [decoded(source) for source in views.sources]
     photos = (views.images.movedim(1, -1).cpu().numpy() * 255).round().astype(np.uint8)  # (V, H, W, 3)
-    return match_photos([cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY) for rgb in photos], run.check)
+    return [cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY) for rgb in photos]

@@ -19,6 +19,7 @@ from langflash_core.types import Gaussians, Prediction, Views
 
 Atoms = Callable[[Tensor, Tensor], Tensor]
 Lifted = Callable[["Geometry", Views], Tensor]
+Redrawn = Callable[[Tensor, Views], Tensor]
 MEANING_STAGES = ("language features", "grouping", "aggregation")
 
 
@@ -59,6 +60,8 @@ class LangFlashNet(nn.Module):
     """Weights are stored as int8 rows; else as they are."""
     bfloat16_on_cpu: bool = True
     """A processor with instructions for bfloat16 takes it by itself: the time is worth the change."""
+    surfaces: bool
+    """Depth maps are surfaces, which elements of any size may cover; else Gaussians are what they are."""
     caches_tokens: bool
     """Training may read tokens from disk, because nothing that is trained changes them."""
     grouping: nn.Module
@@ -100,8 +103,10 @@ class LangFlashNet(nn.Module):
         """Shared tokens of images (B, V, 3, H, W) in [0, 1]; Ks (B, V, 3, 3) in their pixels."""
 
     @abstractmethod
-    def reconstruct(self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: Run) -> Geometry:
-        """The geometry stages of one scene (B = 1)."""
+    def reconstruct(
+        self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: Run, elements: bool = True
+    ) -> Geometry:
+        """The geometry stages of one scene (B = 1); elements: as `predict`."""
 
     @abstractmethod
     def language(self, tokens: Tokens, images: Tensor) -> Tensor:
@@ -160,6 +165,8 @@ class LangFlashNet(nn.Module):
         cancelled: Callable[[], bool] | None = None,
         atoms: Atoms | None = None,
         groups: Lifted | None = None,
+        redrawn: Redrawn | None = None,
+        elements: bool = True,
     ) -> Prediction:
         """One scene from V photos of one size (sides multiples of the patch).
 
@@ -167,11 +174,14 @@ class LangFlashNet(nn.Module):
             atoms: weights (V, K, H, W) and features (1, V, C, h, w) to atoms (K, C) of unit norm;
                 None: `dictionary`, with all that was seen.
             groups: geometry and views to w_k(x), (V, K, H, W), sums to 1 over K; None: `parts`.
+            redrawn: w_k(x) and views to finer ones of the same shape; None: they stay.
+            elements: one Gaussian a pixel; without them `gaussians` is empty, where depth maps say it all
+                (`surfaces`), and networks without surfaces make them all the same.
 
         Raises:
             Cancelled: `cancelled()` became true; asked before every layer and every pair of photos.
         """
-        return self.predict_scenes([views], progress, cancelled, atoms, groups)[0]
+        return self.predict_scenes([views], progress, cancelled, atoms, groups, redrawn, elements)[0]
 
     @torch.inference_mode()
     def predict_scenes(
@@ -181,6 +191,8 @@ class LangFlashNet(nn.Module):
         cancelled: Callable[[], bool] | None = None,
         atoms: Atoms | None = None,
         groups: Lifted | None = None,
+        redrawn: Redrawn | None = None,
+        elements: bool = True,
     ) -> list[Prediction]:
         """Several scenes of equally many photos of one size: the transformers see them as one batch.
 
@@ -194,10 +206,16 @@ class LangFlashNet(nn.Module):
             raise ValueError(f"scenes: expected one shape of (V, 3, H, W), received {sorted(shapes)}")
         run = Run(evenly(self.stages), progress, cancelled)
         with nullcontext() if cancelled is None else self.stopping(run.check):
-            return self._predict(scenes, run, atoms, groups)
+            return self._predict(scenes, run, atoms, groups, redrawn, elements)
 
     def _predict(
-        self, scenes: Sequence[Views], run: Run, atoms: Atoms | None, groups: Lifted | None
+        self,
+        scenes: Sequence[Views],
+        run: Run,
+        atoms: Atoms | None,
+        groups: Lifted | None,
+        redrawn: Redrawn | None,
+        elements: bool,
     ) -> list[Prediction]:
         """The stages, timed by `run`; B scenes."""
         device = next(self.parameters()).device
@@ -209,7 +227,7 @@ class LangFlashNet(nn.Module):
         language = _beside(lambda: self.language(tokens, images), device)
         each = [(images[b : b + 1], Ks[b : b + 1], tokens.scene(b)) for b in range(len(scenes))]
         geometries = [
-            self.reconstruct(s, x, K, own, run) for s, (x, K, own) in zip(scenes, each, strict=True)
+            self.reconstruct(s, x, K, own, run, elements) for s, (x, K, own) in zip(scenes, each, strict=True)
         ]
         with run.stage("language features"):
             features = language()
@@ -220,6 +238,8 @@ class LangFlashNet(nn.Module):
                 weights = [
                     self.parts(own, x, size, f[None]) for (x, _, own), f in zip(each, features, strict=True)
                 ]
+            if redrawn is not None:
+                weights = [redrawn(own, views) for own, views in zip(weights, scenes, strict=True)]
         with run.stage("aggregation"):
             dictionaries = [
                 self.dictionary(w, f[None], Seen(own, found.depths, found.viewmats, K[0]))

@@ -38,6 +38,7 @@ class PointMapNet(LangFlashNet):
 
     frozen = ("encoder", "language_head")
     compact = False
+    surfaces = False
     caches_tokens = False
     stages = ("encoder", "point maps", "poses", "Gaussians", *MEANING_STAGES)
 
@@ -154,7 +155,9 @@ class PointMapNet(LangFlashNet):
         whole = features.new_ones(len(features), 1, *features.shape[-2:])
         return split_groups(whole, features, replace(self.preset.splitting, agreement=0.0), size)
 
-    def reconstruct(self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: Run) -> Geometry:
+    def reconstruct(
+        self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: Run, elements: bool = True
+    ) -> Geometry:
         """Points, the cameras that see them, Gaussians."""
         with run.stage("point maps"):
             points = self.point_maps(tokens, images)[0]

@@ -85,7 +85,7 @@ def placed_views(prediction: Prediction, views: Views) -> tuple[Prediction, View
         return prediction, views
 
     def kept(values: Tensor) -> Tensor:
-        return values.unflatten(0, (views.num_views, -1))[keep].flatten(0, 1)
+        return values.unflatten(0, (views.num_views, -1))[keep].flatten(0, 1) if len(values) else values
 
     return (
         replace(

@@ -1,8 +1,9 @@
 """Which squares of a photo become one element each: a quadtree, fine where the photo has detail.
 
-A square is parted in four where that brings the photo's colours nearer by enough, where depth jumps inside it,
-and where its middle is off the plane of its corners; so flat walls are covered by few elements and edges by one a
-pixel. What all photos may spend together is shared out by what a parting gains: the largest gains first.
+A square is parted in four where that brings the photo's colours nearer by enough, where depth jumps
+inside it, and where its middle is off the plane of its corners; so flat walls are covered by few elements
+and edges by one a pixel. What all photos may spend together is shared out by what a parting gains: the
+largest gains first.
 
 Sizes: h w pixels of the photo, padded to multiples of `LARGEST`; level l has squares of 2^l pixels.
 
@@ -21,8 +22,6 @@ LEVELS = 4
 LARGEST = 2**LEVELS
 """Pixels, side of the largest squares."""
 _BENT = 0.01  # log depth by which the middle of a square may be off its corners' mean
-LEAST_GAIN = 4e-5
-"""Squared error of three channels, of one more element, below which nothing is parted: noise of 1/255."""
 
 
 @dataclass(frozen=True)
@@ -81,14 +80,15 @@ def grown(photo: Tensor, log_depths: Tensor, wanted: Tensor, finest: int = 1) ->
     return Tree(tuple(gains), tuple(wanteds), size)
 
 
-def threshold(trees: list[Tree], budget: int) -> float:
-    """The gain above which squares are parted, so that all trees together have about `budget` leaves."""
+def threshold(trees: list[Tree], budget: int, least: float) -> float:
+    """The gain above which squares are parted, at least `least`, so that all trees together have at most
+    about `budget` leaves."""
     roots = sum(int(tree.wanted[-1].sum()) for tree in trees)
     gains = torch.cat([gain.flatten() for tree in trees for gain in tree.gains])
-    gains = gains[gains > LEAST_GAIN]
+    gains = gains[gains > least]
     partings = max(0, (budget - roots) // 3)
     if partings >= len(gains):
-        return LEAST_GAIN
+        return least
     if partings == 0:
         return torch.inf
     return float(gains.kthvalue(len(gains) - partings).values)

@@ -1,7 +1,8 @@
-"""From a network's `Prediction` to a `Scene` as fine as its photos: elements where there is detail, once each.
+"""From a network's `Prediction` to a `Scene` as fine as its photos: elements where there is detail, once
+each.
 
-Depth, poses and groups stay those of the network's grid. Every surface is covered by the photo that sees it
-finest (`ownership`), by elements of the size that the photo asks for (`blocks`, `elements`).
+Depth, poses and groups stay those of the network's grid. Every surface is covered by the photo that sees
+it finest (`ownership`), by elements of the size that the photo asks for (`blocks`, `elements`).
 """
 
 import time
@@ -23,6 +24,7 @@ from langflash_core.scene.assemble import (
     sparse_weights,
 )
 from langflash_core.scene.blocks import LEVELS, Tree, grown, leaves, threshold
+from langflash_core.scene.borders import refined_weights
 from langflash_core.scene.consistency import seen_through
 from langflash_core.scene.elements import COARSE, Elements, ground, joined, of_squares, placed, under
 from langflash_core.scene.ownership import owned
@@ -85,8 +87,8 @@ def assemble_detailed(
         for photo, image, depths, own in zip(photos, views.images, known, keep, strict=True)
     ]
     trees = [grown(s.photo, s.depth.log_depths, s.wanted, detail.finest) for s in sights]
-    budget = gaussians or round(detail.share * keep[0].numel() * (len(keep) + 3) / 4)
-    limit = _limit(trees, budget)
+    budget = gaussians or round(detail.most * keep[0].numel() * (len(keep) + 3) / 4)
+    limit = _limit(trees, budget, 0.0 if gaussians else detail.gain)
     parts = [_of_view(sight, tree, limit) for sight, tree in zip(sights, trees, strict=True)]
     cameras = [Camera(*of, *views.size) for of in zip(prediction.viewmats, views.Ks, strict=True)]
     made = [
@@ -95,7 +97,7 @@ def assemble_detailed(
     ]
     scene = Scene(
         gaussians=normalised(_together(made), unit),
-        semantics=_semantics(prediction, parts, top_m),
+        semantics=_semantics(prediction, sights, parts, top_m),
         viewmats=scaled_poses(prediction.viewmats, unit),
         Ks=views.Ks.clone(),
         view_size=views.size,
@@ -156,12 +158,12 @@ def _kept(prediction: Prediction, views: Views) -> tuple[Tensor, Tensor, float, 
     return depths, keep, unit, int(through.sum())
 
 
-def _limit(trees: list[Tree], budget: int) -> float:
+def _limit(trees: list[Tree], budget: int, least: float) -> float:
     """The threshold of all photos' trees, the ground beneath what is parted counted in."""
-    limit = threshold(trees, budget)
+    limit = threshold(trees, budget, least)
     for _ in range(2):  # the ground is a fifth of all, and nearly the same from one try to the next
         beneath = sum(len(leaves(tree, limit)[1]) for tree in trees)
-        limit = threshold(trees, max(budget - beneath, 0))
+        limit = threshold(trees, max(budget - beneath, 0), least)
     return limit
 
 
@@ -181,12 +183,14 @@ def _together(made: list[Gaussians]) -> Gaussians:
     return Gaussians(*(torch.cat([getattr(some, name) for some in made]) for name in names))
 
 
-def _semantics(prediction: Prediction, parts: list[Elements], top_m: int) -> Semantics:
+def _semantics(prediction: Prediction, sights: list[_Sight], parts: list[Elements], top_m: int) -> Semantics:
+    """Weights end where the photo has borders (`borders`)."""
     known = directed(prediction.dictionary)
-    of_views = [
-        sparse_weights(maps.flatten(1)[known][:, part.cells].T, top_m)
-        for maps, part in zip(prediction.weights, parts, strict=True)
-    ]
+    of_views = []
+    for maps, sight, part in zip(prediction.weights, sights, parts, strict=True):
+        refined = refined_weights(maps[known], sight.image, sight.photo)
+        width = sight.size[1]
+        of_views.append(sparse_weights(refined.at(part.pixels // width, part.pixels % width), top_m))
     return semantics_of(prediction, of_views)
 
 

@@ -1,17 +1,18 @@
 """Squares of a photo become flat Gaussians on the surface that its depth map has there.
 
-Two layers. The coarse one, of squares of four pixels and more, is closed by itself: what is flat needs nothing
-else. Where squares were parted, the coarse layer goes on a little behind as a ground, one element for each
-surface of a square, and the fine elements lie on it: they may be as small and as sharp as the photo's detail,
-since what shines through between them has their own mean colour. Where depth jumps, the farther surface goes on
-under the nearer one, so that no gap opens as soon as one looks from aside.
+Two layers. The coarse one, of squares of four pixels and more, is closed by itself: what is flat needs
+nothing else. Where squares were parted, the coarse layer goes on a little behind as a ground, one element
+for each surface of a square, and the fine elements lie on it: they may be as small and as sharp as the
+photo's detail, since what shines through between them has their own mean colour. Where depth jumps, the
+farther surface goes on under the nearer one, so that no gap opens as soon as one looks from aside.
 
-Ripple of a flat wall, elements of opacity `OPACITY` and deviation s, in spacings, over black, at any zoom: what
-passes all of them is at most .0013 for s = .85, and .091 and .018 for .55 and .68, .0016 together: 1/255 has .0039.
+What passes a flat wall of elements of opacity .99 and deviation s, in spacings, at most, at any zoom:
+.0013 for .85, and .15 and .009 for .5 and .72, .0014 together. Half a step of 1/255 is .0020.
 
 Sizes: H W cells of the grid, h w pixels of the photo, n elements.
 """
 
+import math
 from dataclasses import dataclass, fields
 
 import torch
@@ -31,10 +32,10 @@ _FLAT_COVER, _FINE_COVER, _GROUND_COVER = 0.85, 0.5, 0.72
 """Standard deviations in sides of a square: of coarse elements, of fine ones, of the ground under those."""
 _UNIFORM = 12**-0.5  # standard deviation of a square of side 1
 _THIN = 0.1  # thickness over a side
-_BEHIND = 0.004  # log depth by which the ground lies behind, and a slope more
-_REACH = 8.0  # pixels of slope
+_BEHIND = 0.004  # log depth by which the ground lies behind,
+_REACH = 8.0  # and by the slope of so many pixels more: no part of it may come before what lies on it
 _FARTHEST_BEHIND = 0.06
-_COARSE_PUSH = 0.35
+_COARSE_BEHIND = 0.35  # of that, by which other coarse elements lie behind the fine ones beside them
 _UNDER = 10.0  # cells by which a surface goes on under a nearer one (`network/occlusion.py` has why)
 _STEP = 0.2  # log depth from a cell to the next that opens a gap
 
@@ -43,14 +44,15 @@ _STEP = 0.2  # log depth from a cell to the next that opens a gap
 class Elements:
     """n elements of one photo. x, y: (n,) pixels of the photo. roots: (n, 3) lower Cholesky factor
     (l11, l21, l22) of their covariance in the picture, pixels. log_depths (n,). cells (n,) of the grid, whose
-    surface they lie on. colours (n, 3) in [0, 1]. levels (n,) uint8. sides (n,) pixels. hidden (n,) bool: behind
-    others, in the photo that made them."""
+    surface they lie on. pixels (n,) of the photo, row by row, whose meaning they have. colours (n, 3) in
+    [0, 1]. levels (n,) uint8. sides (n,) pixels. hidden (n,) bool: behind others, in their own photo."""
 
     x: Tensor
     y: Tensor
     roots: Tensor
     log_depths: Tensor
     cells: Tensor
+    pixels: Tensor
     colours: Tensor
     levels: Tensor
     sides: Tensor
@@ -79,7 +81,7 @@ def of_squares(squares: Squares, photo: Tensor, depth: Upsampled) -> Elements:
     root = torch.full_like(x, cover)
     return Elements(
         x, y, torch.stack((root, torch.zeros_like(root), root), -1),
-        _middle_depths(depth.log_depths, left, top, side), depth.cells[row, column],
+        _middle_depths(depth.log_depths, left, top, side), depth.cells[row, column], row * width + column,
         _means(photo, left, top, side),
         torch.full_like(column, FINE if side < 4 else COARSE, dtype=torch.uint8),
         torch.full_like(x, side), torch.zeros_like(column, dtype=torch.bool),
@@ -106,16 +108,16 @@ def _means(photo: Tensor, left: Tensor, top: Tensor, side: int) -> Tensor:
 
 
 def ground(squares: Squares, photo: Tensor, depth: Upsampled) -> Elements:
-    """Under squares that were parted: an element for the nearer surface, and one for what is behind a jump."""
+    """Under squares that were parted: an element of the nearer surface, and one of what is behind a jump."""
     rows, columns = (_of_squares(along, squares.side) for along in (squares.top, squares.left))
     height, width = depth.log_depths.shape
     rows, columns = rows[:, :, None].clamp(max=height - 1), columns[:, None].clamp(max=width - 1)
     depths = depth.log_depths[rows, columns].flatten(1)  # (n, 16)
-    cells, colours = depth.cells[rows, columns].flatten(1), photo[:, rows, columns].flatten(2)
+    pixels, colours = (rows * width + columns).flatten(1), photo[:, rows, columns].flatten(2)
     low, high = depths.amin(1, keepdim=True), depths.amax(1, keepdim=True)
     near = (depths <= (low + high) / 2) | (high - low <= JUMP)
     corner = torch.stack((squares.left, squares.top), -1)
-    return joined([_ground_of(part, depths, cells, colours, corner, squares.side) for part in (near, ~near)])
+    return joined([_ground_of(part, depths, pixels, colours, corner, depth.cells) for part in (near, ~near)])
 
 
 def _of_squares(first: Tensor, side: int) -> Tensor:
@@ -123,10 +125,10 @@ def _of_squares(first: Tensor, side: int) -> Tensor:
 
 
 def _ground_of(
-    part: Tensor, depths: Tensor, cells: Tensor, colours: Tensor, corner: Tensor, side: int
+    part: Tensor, depths: Tensor, pixels: Tensor, colours: Tensor, corner: Tensor, cells: Tensor
 ) -> Elements:
-    """Elements with the mean and the spread of some pixels (n, side^2) bool of squares, where there are any."""
-    some = part.any(1)
+    """Elements with mean and spread of some pixels (n, side^2) bool of squares, where there are any."""
+    some, side = part.any(1), math.isqrt(part.shape[1])
     share = part[some].float() / part[some].sum(1, keepdim=True)
     along = torch.arange(side) + 0.5
     places = torch.stack((along.repeat(side), along.repeat_interleave(side)), -1)  # (side^2, 2)
@@ -137,10 +139,11 @@ def _ground_of(
     l21 = xy / l11
     roots = torch.stack((l11, l21, (yy + _UNIFORM**2 - l21**2).clamp_min(_UNIFORM**2).sqrt()), -1)
     nearest = (off.square().sum(-1) + torch.where(part[some], 0.0, torch.inf)).argmin(1, keepdim=True)
+    pixel = pixels[some].gather(1, nearest)[:, 0]
     x, y = (corner[some] + mean).unbind(-1)
     return Elements(
         x, y, roots * (_GROUND_COVER / _UNIFORM), (share * depths[some]).sum(1),
-        cells[some].gather(1, nearest)[:, 0], (colours[:, some] * share).sum(-1).T,
+        cells.flatten()[pixel], pixel, (colours[:, some] * share).sum(-1).T,
         torch.full((len(x),), COARSE, dtype=torch.uint8), torch.full_like(x, side),
         torch.ones(len(x), dtype=torch.bool),
     )  # fmt: skip
@@ -159,9 +162,10 @@ def under(log_depths: Tensor, image: Tensor, size: tuple[int, int]) -> Elements:
     middle = torch.stack((column, row), -1) + 0.5
     x, y = ((middle + _UNDER / 2 * towards) * cell).unbind(-1)
     wide = torch.full_like(x, _UNDER / 2) * cell[0]
+    pixel_x, pixel_y = (middle * cell).long().unbind(-1)
     return Elements(
         x, y, torch.stack((wide, torch.zeros_like(x), wide), -1), log_depths[row, column],
-        row * log_depths.shape[1] + column, image[:, row, column].T,
+        row * log_depths.shape[1] + column, pixel_y * size[1] + pixel_x, image[:, row, column].T,
         torch.full((len(x),), COARSE, dtype=torch.uint8), wide * 2, torch.ones(len(x), dtype=torch.bool),
     )  # fmt: skip
 
@@ -188,12 +192,9 @@ def placed(
     K, ratio = camera.resized(size[1], size[0]).K, log_depths.shape[1] / size[1]
     span_u, span_v = _spans(log_depths, camera, size)
     cells = elements.cells
-    behind = _BEHIND + _REACH * ratio * slopes.flatten()[cells]
-    logs = elements.log_depths + torch.where(
-        elements.hidden,
-        behind.clamp(max=_FARTHEST_BEHIND),
-        torch.where(elements.levels == COARSE, _COARSE_PUSH * behind.clamp(max=_FARTHEST_BEHIND), 0.0),
-    )
+    behind = (_BEHIND + _REACH * ratio * slopes.flatten()[cells]).clamp(max=_FARTHEST_BEHIND)
+    behind = torch.where(elements.hidden, behind, _COARSE_BEHIND * behind)
+    logs = elements.log_depths + torch.where(elements.levels == COARSE, behind, 0.0)
     depths = logs.exp()
     scale = (depths / log_depths.flatten()[cells].exp())[:, None]
     span_u, span_v = span_u[cells] * scale, span_v[cells] * scale

@@ -1,7 +1,8 @@
-"""Which photo covers which surface: where several see one, the one that sees it finest, and nothing twice.
+"""Which photo covers which surface: where several see one, the one that sees it finest, and nothing
+twice.
 
-A pixel of a photo is given up where another photo sees the same surface as finely; of equals the earlier photo
-keeps it. What stands before a surface that another photo knows better is given up as well
+A pixel of a photo is given up where another photo sees the same surface as finely; of equals the earlier
+photo keeps it. What stands before a surface that another photo knows better is given up as well
 (`consistency.seen_through`).
 
 Sizes: V views, H W cells of the grid.
@@ -35,7 +36,7 @@ def owned(depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
         for other in range(len(depths)):
             if other == view:
                 continue
-            same, place = _same(points, viewmats[other], Ks[other], logs[other], depths.shape[1:])
+            same = _same(points, viewmats[other], Ks[other], logs[other], depths.shape[1:])
             ratio = own / _covered_area(points, normals, viewmats[other], Ks[other]).clamp_min(1e-12)
             finer = ratio < (1 / _FINER if other < view else _FINER)
             keep[view] &= ~(same & ~finer).view_as(keep[view])
@@ -60,16 +61,14 @@ def _covered_area(points: Tensor, normals: Tensor, viewmat: Tensor, K: Tensor) -
     return (distances / K[0, 0]) ** 2 / cosines.clamp_min(1e-3)
 
 
-def _same(
-    points: Tensor, viewmat: Tensor, K: Tensor, log_depths: Tensor, size: torch.Size
-) -> tuple[Tensor, Tensor]:
-    """(n,) bool: another view sees these points as its surface; and its cell there."""
+def _same(points: Tensor, viewmat: Tensor, K: Tensor, log_depths: Tensor, size: torch.Size) -> Tensor:
+    """(n,) bool: another view sees these points as its surface."""
     height, width = size
     x, y, z = pictured(viewmat, K, points)
     inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
     place = torch.where(inside, y.floor() * width + x.floor(), 0.0).long()
     gap = z.clamp_min(1e-9).log() - log_depths.index_select(0, place)
-    return inside & (gap < BEHIND) & (gap > -BEFORE), place
+    return inside & (gap < BEHIND) & (gap > -BEFORE)
 
 
 def _closed(keep: Tensor) -> Tensor:

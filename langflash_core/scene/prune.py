@@ -37,12 +37,15 @@ class _Sight:
     levels: Tensor | None  # (N,)
 
 
-def prune(scene: Scene, *, merge_radius: float = 1.0, colour_tolerance: float = 0.1) -> Scene:
+def prune(
+    scene: Scene, *, merge: bool = True, merge_radius: float = 1.0, colour_tolerance: float = 0.1
+) -> Scene:
     """The scene without what no picture of it needs; its order of views is kept.
 
     Args:
         scene: with `view_ids`, or nothing is merged.
-        merge_radius: in pixel footprints. colour_tolerance: largest difference of a channel.
+        merge: whether Gaussians may be there twice. merge_radius: in pixel footprints. colour_tolerance:
+            largest difference of a channel.
 
     Returns:
         Scene with `pruning` in its record: counts and bytes before and after.
@@ -52,7 +55,9 @@ def prune(scene: Scene, *, merge_radius: float = 1.0, colour_tolerance: float = 
     """
     start = time.perf_counter()
     bright = scene.rows(scene.gaussians.opacities >= CUT)
-    merged = _merged(bright, _parents(_sight(bright), bright, merge_radius, colour_tolerance))
+    merged = bright
+    if merge:
+        merged = _merged(bright, _parents(_sight(bright), bright, merge_radius, colour_tolerance))
     small = _sparser(merged)
     report = {
         "gaussians_before": len(scene.gaussians),

@@ -23,20 +23,20 @@ def whole(weights: Tensor) -> bool:
 
 @pytest.mark.parametrize("size", [(20, 27), (1, 9), (9, 1), (1, 1), (2, 2)])
 def test_it_agrees_with_dense_systems_read_pixel_by_pixel(size):
-    """Float32 against float64. All sums are of numbers >= 0, so errors do not grow with lambda: about
-    1e-7 an elimination step, 1e-5 over lines as short as these."""
+    """Float32 against float64. All sums are of numbers >= 0, so errors do not grow with lambda: a few
+    roundings of 6e-8 each; 3e-7 was seen at 252 x 196."""
     height, width = size
     photo = picture(2 * height, 3 * width)
     image = F.interpolate(photo[None], size, mode="area")[0]
     weights = blobs(5, *size)
     refined = refined_weights(weights, image, photo)
     expected = plain_smoothed(weights.numpy(), image.numpy(), refined.rule).transpose(1, 2, 0)
-    assert np.allclose(refined.grid.numpy(), expected, atol=1e-5)
+    assert np.allclose(refined.grid.numpy(), expected, atol=1e-6)
     dense = refined.dense()
     for row in range(0, 2 * height, 3):
         for column in range(0, 3 * width, 5):
             read = plain_read(expected, image, photo, row, column, refined.rule.colour)
-            assert np.allclose(dense[:, row, column].numpy(), read, atol=2e-5)
+            assert np.allclose(dense[:, row, column].numpy(), read, atol=5e-6)
 
 
 def test_a_blob_goes_to_the_edge_that_it_missed():

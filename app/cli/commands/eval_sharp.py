@@ -63,9 +63,6 @@ def _check(args: Namespace) -> None:
     """What can be known before any work."""
     if sum((bool(args.photos), args.folder is not None, args.pack is not None)) > 1:
         raise InputError("give photos, a folder with --posed, or furniture with --pack; not two of them")
-    from langflash_core.lab.evaluation.sharp import check_ways
-
-    check_ways(args.detail or ())
     if args.output is not None:
         check_output_file(args.output, (".md",))
     if args.sheet is not None:
@@ -78,9 +75,9 @@ def _check(args: Namespace) -> None:
 
 
 def _bench(args: Namespace, render: Render) -> "Bench":
-    from langflash_core.lab.evaluation.sharp import WAYS, Bench
+    from langflash_core.lab.evaluation.sharp import PLAIN, WAYS, Bench
 
-    ways = WAYS if args.detail is None else ("plain", *dict.fromkeys(args.detail))
+    ways = WAYS if args.detail is None else (PLAIN, *dict.fromkeys(args.detail))
     return Bench(
         render,
         args.weights,

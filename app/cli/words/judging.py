@@ -218,7 +218,7 @@ def _add_sharp(actions) -> None:
         "--detail",
         nargs="+",
         choices=("low", "normal", "high"),
-        help="scenes made so, beside plain ones, one Gaussian a pixel (default: plain alone)",
+        help="scenes made so, beside plain ones, one Gaussian a pixel (default: normal)",
     )
     command.add_argument(
         "--beside", type=Path, metavar="FOLDER", help="also scenes of another version, NAME.langflash"

@@ -51,9 +51,10 @@ def add_reconstruct(commands) -> None:
     )
     command.add_argument(
         "--grouping",
-        choices=("queries", "sam2"),
-        help="where groups come from: trained queries, or masks of SAM 2 lifted to the scene (default: "
-        "queries where they have weights, else sam2 where it is installed, else the language features)",
+        choices=("queries", "mobile-sam", "sam2"),
+        help="where groups come from: trained queries, the same with MobileSAM's outlines where its weights "
+        "are installed, or masks of SAM 2 lifted to the scene (default: queries where they have weights, "
+        "else sam2 where it is installed, else the language features)",
     )
     command.add_argument(
         "--precision",

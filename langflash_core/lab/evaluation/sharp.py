@@ -22,6 +22,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from langflash_core.detail import DEFAULT_DETAIL
 from langflash_core.errors import InputError
 from langflash_core.files import make_folder
 from langflash_core.lab.evaluation.labelled import Render
@@ -51,11 +52,10 @@ from langflash_core.running import Progress
 from langflash_core.scene.file import load, save
 from langflash_core.types import NO_LANGUAGE, Camera, Record, Scene, Semantics
 
-DETAILS = ("low", "normal", "high")
-WAYS = ("plain",)
-"""How scenes are made where nobody says it; the last one is set against all other columns."""
-MADE = ("plain",)
-"""Ways that `make_scene` knows."""
+PLAIN = "plain"
+WAYS = (PLAIN, DEFAULT_DETAIL)
+"""How scenes are made where nobody says it: one Gaussian a pixel, and in a detail; the last one is set
+against all other columns."""
 GRID, OTHER = "grid", "other"
 ENLARGED = 8
 """Times the photo's size, at which surfaces must still let nothing through."""
@@ -68,24 +68,12 @@ def make_scene(paths: Sequence[Path], way: str, **options) -> Scene:
     """A scene of photos, made in one of the ways.
 
     Args:
-        options: as `reconstruct` has them.
+        way: `PLAIN`, or the name of a detail. options: as `reconstruct` has them.
 
     Raises:
-        InputError: there is no such way yet.
+        InputError: there is no such way.
     """
-    check_ways((way,))
-    return reconstruct(paths, **options)
-
-
-def check_ways(ways: Sequence[str]) -> None:
-    """Prove that scenes can be made so.
-
-    Raises:
-        InputError: one of the ways is not there.
-    """
-    for way in ways:
-        if way not in MADE:
-            raise InputError(f"scenes are not made in {way} detail yet; leave --detail out")
+    return reconstruct(paths, detail=None if way == PLAIN else way, **options)
 
 
 @dataclass(frozen=True)
@@ -146,7 +134,6 @@ def run_sharp(
     Raises:
         InputError: there is no subject, or a way or a scene beside is missing.
     """
-    check_ways(bench.ways)
     rows = []
     for done, subject in enumerate(subjects):
         progress(subject.name, done / max(count, 1))

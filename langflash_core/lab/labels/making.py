@@ -12,7 +12,6 @@ from langflash_core.files import filled_atomically, write_atomically
 from langflash_core.lab.labels.clips import Clip, ClipPlace, open_clip
 from langflash_core.lab.labels.collecting import collect
 from langflash_core.lab.labels.following import MotionPropagator
-from langflash_core.lab.labels.mobile_sam.model import load_mobile_sam
 from langflash_core.lab.labels.motion import NetworkMotion, by_flow
 from langflash_core.lab.labels.network_labels import NetworkGroups, NetworkNames
 from langflash_core.lab.labels.order import LabelOrder
@@ -22,6 +21,7 @@ from langflash_core.lab.labels.report import Quality, as_jpeg, over, report
 from langflash_core.lab.labels.storage import ClipLabels, write_labels
 from langflash_core.language.vocabulary import all_phrases
 from langflash_core.network import LangFlashNet, load_network
+from langflash_core.network.semantics.mobile_sam.model import load_mobile_sam
 from langflash_core.running import Progress
 
 REPORT = "report.html"

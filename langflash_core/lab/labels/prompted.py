@@ -13,17 +13,17 @@ from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
 from langflash_core.lab.labels.protocols import Proposals
+from langflash_core.network.semantics.mobile_sam.rough import agreement, box, middle
 
 _AT_ONCE = 16  # prompts; more need more memory and are no quicker on a processor
 _WOBBLE = 1.0  # by which the border's logit is moved to see whether a mask stands
-_BORDER = 0.06  # of the frame: nearer to its edge, a thing may go on there
 _LOOKS_KEPT = 2
 
 
 @runtime_checkable
 class Prompted(Protocol):
-    """A network of the SAM family, as `mobile_sam.model.MobileSam` says it: what `look` gives is handed back
-    with every question; q is the side of its masks, k how many it gives a prompt."""
+    """A network of the SAM family, as `MobileSam` says it: what `look` gives is handed back with every
+    question; q is the side of its masks, k how many it gives a prompt."""
 
     def look(self, image: UInt8[np.ndarray, "H W 3"]) -> Any: ...
 
@@ -84,12 +84,12 @@ class PromptedSam:
         refined, scores = [np.zeros((0, *image.shape[:2]), bool)], [np.zeros(0)]
         for start in range(0, len(masks), _AT_ONCE):
             rough = masks[start : start + _AT_ONCE]
-            points = torch.tensor(np.stack([_middle(mask) for mask in rough])).float()[:, None]
-            boxes = torch.tensor(np.stack([_box(mask) for mask in rough])).float()
+            points = torch.tensor(np.stack([middle(mask) for mask in rough])).float()[:, None]
+            boxes = torch.tensor(np.stack([box(mask) for mask in rough])).float()
             given = torch.from_numpy(np.where(known, np.where(rough, 1.0, -1.0), 0.0)).float()
             logits, _ = self.model.by_masks(looked, given, points, boxes)
             found = (self.model.on_photo(logits, looked) > 0).numpy()  # (n, 4, H, W)
-            agree = _agreement(found, rough, known)
+            agree = agreement(found, rough, known)
             best = agree.argmax(1)
             rows = np.arange(len(rough))
             refined.append(found[rows, best])
@@ -133,31 +133,3 @@ def stability(logits: Tensor) -> Tensor:
     inner = (logits > _WOBBLE).flatten(1).sum(1)
     outer = (logits > -_WOBBLE).flatten(1).sum(1)
     return inner / outer.clamp_min(1)
-
-
-def _middle(mask: Bool[np.ndarray, "H W"]) -> tuple[float, float]:
-    """The pixel (x, y) that lies deepest inside."""
-    deep = cv2.distanceTransform(np.pad(mask, 1).astype(np.uint8), cv2.DIST_L2, 3)
-    y, x = np.unravel_index(int(deep.argmax()), deep.shape)
-    return x - 0.5, y - 0.5
-
-
-def _box(mask: Bool[np.ndarray, "H W"]) -> tuple[float, float, float, float]:
-    """Left, top, right, bottom, up to the frame's edge where the mask comes near it."""
-    height, width = mask.shape
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    margin = _BORDER * max(mask.shape)
-    left, top, right, bottom = columns[0], rows[0], columns[-1] + 1, rows[-1] + 1
-    return (
-        0.0 if left < margin else float(left),
-        0.0 if top < margin else float(top),
-        float(width) if right > width - margin else float(right),
-        float(height) if bottom > height - margin else float(bottom),
-    )
-
-
-def _agreement(found: np.ndarray, rough: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """IoU (n, 4) of masks (n, 4, H, W) with rough ones (n, H, W), on known pixels."""
-    both = (found & rough[:, None] & known).sum((2, 3))
-    either = ((found | rough[:, None]) & known).sum((2, 3))
-    return both / np.maximum(either, 1)

@@ -29,7 +29,7 @@ def match_sources(sources: tuple[bytes, ...], check: Callable[[], None] = lambda
     """`match_photos` of pictures as JPEG bytes; the last answer is remembered."""
     points = _last.get(sources)
     if points is None:
-        points = match_photos([_decoded(source) for source in sources], check)
+        points = match_photos([decoded(source) for source in sources], check)
         _last.clear()
         _last[sources] = points
     return points
@@ -54,7 +54,8 @@ def match_photos(greys: Sequence[np.ndarray], check: Callable[[], None] = lambda
     return KeyPoints(tuple(positions), pairs)
 
 
-def _decoded(source: bytes) -> np.ndarray:
+def decoded(source: bytes) -> np.ndarray:
+    """A picture (h, w) uint8, grey, of JPEG bytes."""
     grey = cv2.imdecode(np.frombuffer(source, np.uint8), cv2.IMREAD_GRAYSCALE)
     assert grey is not None, "sources are JPEG bytes that images/ wrote"
     return grey

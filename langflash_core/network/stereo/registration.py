@@ -1,10 +1,12 @@
-"""Depth to a fraction of the photo's pixel: what is still shifted between two photos tells how far off it is.
+"""Depth to a fraction of the photo's pixel: what is still shifted between two photos tells how far off it
+is.
 
-A neighbour's photo is brought into a view by the view's own depth and poses. Where depth is right both pictures
-are the same; what optical flow finds between them is a remaining shift, so each pixel has a match in the neighbour
-to a fraction of a pixel, and a depth by triangulation. What flow says counts by how sure it is (there and back, same
-brightness, texture) and by how many pixels the match moves for a change of depth; a smooth correction of
-log depth takes it over, cut where depth jumps (one sparse linear system a view).
+A neighbour's photo is brought into a view by the view's own depth and poses. Where depth is right both
+pictures are the same; what optical flow finds between them is a remaining shift, so each pixel has a
+match in the neighbour to a fraction of a pixel, and a depth by triangulation. What flow says counts by
+how sure it is (there and back, same brightness, texture) and by how many pixels the match moves for a
+change of depth; a smooth correction of log depth takes it over, cut where depth jumps (one sparse linear
+system a view).
 
 Sizes: V views, H W pixels of the maps, h w pixels of the photos.
 
@@ -109,7 +111,7 @@ def _matched(
     seen = (z > 0) & (x > _MARGIN) & (y > _MARGIN) & (x < width - _MARGIN) & (y < height - _MARGIN)
     x, y = (np.where(seen, along, -1e4).astype(np.float32) for along in (x, y))
     brought = _looked_up(other, x - 0.5, y - 0.5)
-    flow = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     there, back = flow.calc(grey, brought, None), flow.calc(brought, grey, None)
     columns, rows = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
     columns, rows = columns + there[..., 0], rows + there[..., 1]
@@ -142,10 +144,9 @@ def _triangulated(
     """Changes of log depth (h, w) that bring each pixel nearest to its match, and pixels that the match moves
     for one unit of it; 0 both where no depth does.
 
-    With the ray a and the shift t in the other's frame, a point at inverse depth r is seen at a + r t: of each
-    coordinate q, (q a_z - a_x) = r (t_x - q t_z), solved for r by least squares over both.
+    With the ray a and the shift t in the other's frame, a point at inverse depth r is seen at a + r t: of
+    each coordinate q, (q a_z - a_x) = r (t_x - q t_z), solved for r by least squares over both.
     """
-    height, width = log_depths.shape
     ray = unproject(torch.ones_like(log_depths), K) @ pose[:3, :3].T
     q = [
         (torch.from_numpy(along).float() - other_K[i, 2]) / other_K[i, i]

@@ -71,6 +71,7 @@ def test_what_cannot_be_done_is_one_sentence(run, checkpoints, tmp_path):
         (("--aggregation", "lfa"), "aggregation has no weights"),
         (("--grouping", "queries"), "grouping has no weights"),
         (("--grouping", "sam2"), "SAM 2 is not at hand"),
+        (("--preset", "mini", "--grouping", "mobile-sam"), "MobileSAM's weights are not at hand"),
         (("--refine", 99999), "out of range"),
         (("--preset", "mini", "--aggregation", "crops"), "crops are embedded by CLIP"),
     ):

@@ -118,7 +118,6 @@ def test_weights_verify_notices_damage(run, checkpoint, tmp_path):
         (["eval", "sharp", TINY_PACK], "photos come in pairs, but these are 1"),
         (["eval", "sharp", "."], "holds no photos NAME_left and NAME_right"),
         (["eval", "sharp", "--pack", "gone.npz"], "no furniture pack at gone.npz"),
-        (["eval", "sharp", "--detail", "high"], "not made in high detail yet"),
         (["eval", "sharp", "--detail", "none"], "--detail"),
         (["eval", "sharp", "--beside", "gone"], "there is no folder gone; make it with --keep"),
         (["eval", "sharp", "--lpips", "gone"], "no LPIPS file at gone"),

@@ -13,7 +13,7 @@ from langflash_core.errors import InputError, SceneFileError
 from langflash_core.lab.evaluation import sharp
 from langflash_core.lab.evaluation.drawing import drawn_frame
 from langflash_core.lab.evaluation.posed import Triple
-from langflash_core.lab.evaluation.sharp import Bench, check_ways, make_scene, run_sharp
+from langflash_core.lab.evaluation.sharp import Bench, make_scene, run_sharp
 from langflash_core.lab.evaluation.sharp_subjects import (
     MOST,
     pair_subjects,
@@ -132,11 +132,8 @@ def test_scenes_of_another_size_are_not_beside(folder, program, tmp_path):
 
 
 def test_ways_that_are_not_there_are_refused(folder, program):
-    for way in ("low", "normal", "high"):
-        with pytest.raises(InputError, match=f"not made in {way} detail yet; leave --detail out"):
-            check_ways((way,))
-        with pytest.raises(InputError, match=way):
-            make_scene([], way)
+    with pytest.raises(InputError, match="the detail 'finest' is unknown"):
+        make_scene([], "finest")
     with pytest.raises(InputError, match="at least one pair"):
         run_sharp([], 0, Bench(render))
 

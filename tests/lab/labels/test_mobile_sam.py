@@ -6,8 +6,8 @@ import torch
 from safetensors.torch import save_file
 
 from langflash_core.errors import WeightsError
-from langflash_core.lab.labels.mobile_sam.model import MobileSam, load_mobile_sam
 from langflash_core.lab.labels.prompted import PromptedSam, grid_points, stability
+from langflash_core.network.semantics.mobile_sam.model import MobileSam, load_mobile_sam
 from tests.network.published import mobile_sam_name
 
 SIDE = 128

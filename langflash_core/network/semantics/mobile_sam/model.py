@@ -13,16 +13,16 @@ from PIL import Image
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from langflash_core.lab.labels.mobile_sam.decoder import MaskDecoder
-from langflash_core.lab.labels.mobile_sam.prompts import (
+from langflash_core.network.checkpoints.importing import read_checkpoint
+from langflash_core.network.encoders.mobile_sam import SIDE, MobileSamEncoder, filled, own_names
+from langflash_core.network.semantics.mobile_sam.decoder import MaskDecoder
+from langflash_core.network.semantics.mobile_sam.prompts import (
     INSIDE,
     LEFT_TOP,
     NO_POINT,
     RIGHT_BOTTOM,
     PromptEncoder,
 )
-from langflash_core.network.checkpoints.importing import read_checkpoint
-from langflash_core.network.encoders.mobile_sam import SIDE, MobileSamEncoder, filled, own_names
 
 _SURE = 10.0
 """Logit of a rough mask that is given as yes or no."""

@@ -1,0 +1,68 @@
+"""A prediction to a scene as fine as its photos: one light, elements of the size that each photo asks
+for, weights with the photo's borders, colours solved for. Composes stages; nothing is learned or fitted
+in shape.
+"""
+
+import time
+from dataclasses import replace
+
+import torch
+
+from langflash_core.detail import Detail
+from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
+from langflash_core.images.views import source_pictures
+from langflash_core.scene.assemble import placed_views
+from langflash_core.scene.detailed import assemble_detailed, working_photos
+from langflash_core.scene.light import Light, photo_light
+from langflash_core.scene.prune import prune
+from langflash_core.splat.colours import ROUNDS, solved_colours
+from langflash_core.types import Cost, Prediction, Scene, Views
+
+
+@torch.no_grad()
+def fine_scene(
+    prediction: Prediction, views: Views, detail: Detail, *, gaussians: int | None, preset: str
+) -> tuple[Scene, Light]:
+    """The scene of a prediction whose depth maps are surfaces, and the light its photos were brought to.
+
+    Args:
+        gaussians: about so many; None: as `detail` has it. preset: recorded.
+
+    Raises:
+        InputError: not one usable point in view 0.
+        ValueError: the prediction's sizes disagree, or its poses are not finite.
+    """
+    start = time.perf_counter()
+    prediction, views = placed_views(prediction, views)
+    light = photo_light(
+        views.images, prediction.depths, prediction.confidences, prediction.viewmats, views.Ks
+    )
+    grid = (views.images.shape[-2], views.images.shape[-1])
+    photos = [
+        light.corrected(photo, view=v).clamp(0, 1)
+        for v, photo in enumerate(working_photos(source_pictures(views), grid))
+    ]
+    views = replace(views, images=light.corrected(views.images).clamp(0, 1))
+    scene = assemble_detailed(prediction, views, photos, detail, gaussians=gaussians, preset=preset)
+    solving = time.perf_counter()
+    height, width = photos[0].shape[-2:]
+    solved = solved_colours(
+        scene.gaussians,
+        sh_to_colour(scene.gaussians.sh, scene.gaussians.means),
+        [scene.camera(v, width, height) for v in range(scene.num_views)],
+        photos,
+    )
+    sh = colour_to_sh(solved.colours)[:, None]
+    scene = replace(scene, gaussians=replace(scene.gaussians, sh=sh))
+    bought = {
+        **scene.record.detail,
+        "rounds": ROUNDS,
+        "photos_psnr_db": [round(after, 2) for _, after in solved.psnr],
+    }
+    timings = {
+        **prediction.timings,
+        "assembly": solving - start,
+        "colours": time.perf_counter() - solving,
+    }
+    scene = scene.with_record(light=light.stored(), detail=bought, cost=Cost(timings))
+    return prune(scene, merge=False), light
