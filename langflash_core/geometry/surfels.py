@@ -38,12 +38,12 @@ def ellipses(span_u: Tensor, span_v: Tensor) -> tuple[Tensor, Tensor]:
 
     Returns:
         Rotations (..., 3, 3) whose columns are the longer axis, the shorter one and the normal, and standard
-        deviations (..., 2) along the first two.
+        deviations (..., 2) along the first two. Spans that are parallel, or 0, have any normal across them.
 
     Source: own derivation; twin: numpy eigh in tests/geometry.
     """
-    normal = F.normalize(torch.linalg.cross(span_u, span_v), dim=-1)
-    first = F.normalize(span_u, dim=-1)
+    first = _direction(torch.where((span_u == 0).all(-1, keepdim=True), span_v, span_u))
+    normal = _normal(first, F.normalize(span_v, dim=-1))
     second = torch.linalg.cross(normal, first)
     # In the (first, second) plane t_u = (a, 0), t_v = (b, c).
     a, b, c = span_u.norm(dim=-1), (span_v * first).sum(-1), (span_v * second).sum(-1)
@@ -53,3 +53,18 @@ def ellipses(span_u: Tensor, span_v: Tensor) -> tuple[Tensor, Tensor]:
     cosine, sine = angle.cos()[..., None], angle.sin()[..., None]
     axes = torch.stack((cosine * first + sine * second, cosine * second - sine * first, normal), -1)
     return axes, torch.stack((mean + radius, (mean - radius).clamp_min(0)), -1).sqrt()
+
+
+def _direction(span: Tensor) -> Tensor:
+    """Unit vectors (..., 3); of 0, the x axis."""
+    x_axis = torch.eye(3).to(span)[0]
+    return F.normalize(torch.where((span == 0).all(-1, keepdim=True), x_axis, span), dim=-1)
+
+
+def _normal(first: Tensor, other: Tensor) -> Tensor:
+    """Unit vectors (..., 3) across two unit vectors; across the first where both are parallel as far as their
+    rounding tells."""
+    normal = torch.linalg.cross(first, other)
+    parallel = normal.norm(dim=-1, keepdim=True) < torch.finfo(first.dtype).eps ** 0.5
+    least = F.one_hot(first.abs().argmin(-1), 3).to(first)
+    return F.normalize(torch.where(parallel, torch.linalg.cross(first, least), normal), dim=-1)

@@ -22,6 +22,7 @@ JUMP = 0.04
 _COLOUR = 0.06  # standard deviation of a channel within one thing
 _REACH = 0.6  # cells, standard deviation of how far a colour's depth goes
 _FARTHEST = 0.1  # relative inverse depth by which a cell's slope may change it
+_STEEPEST = 0.2  # of it, from a cell to the next: a jump, since planes at more than 2 degrees are flatter
 
 
 @dataclass(frozen=True)
@@ -42,21 +43,34 @@ def upsampled(log_depths: Tensor, image: Tensor, photo: Tensor) -> Upsampled:
     """
     height, width = photo.shape[-2:]
     inverse = (-log_depths).exp()
-    across, down = _shorter(inverse, 1), _shorter(inverse, 0)
-    smooth = F.interpolate(inverse[None, None], size=(height, width), mode="bilinear")[0, 0]
+    steps = _shorter(inverse, 1), _shorter(inverse, 0)
+    across, down = (torch.where(step.abs() > _STEEPEST * inverse, 0.0, step) for step in steps)
     rows = _cells_along(height, log_depths.shape[0])
     columns = _cells_along(width, log_depths.shape[1])
     cells = rows[:, None] * log_depths.shape[1] + columns
+    smooth = F.interpolate(inverse[None, None], size=(height, width), mode="bilinear")[0, 0]
+    smooth += down[rows][:, columns] * _past(height, log_depths.shape[0])[:, None]
+    smooth += across[rows][:, columns] * _past(width, log_depths.shape[1])
     y, x = _broken(log_depths, (across.abs() + down.abs()) / inverse)[rows][:, columns].nonzero(as_tuple=True)
     if len(y):
         chosen, values = _chosen(inverse, across, down, image, photo, (y, x), (rows[y], columns[x]))
         smooth[y, x], cells[y, x] = values, chosen
-    slopes = torch.hypot(across, down) / inverse
-    return Upsampled(-smooth.clamp_min(1e-9).log(), cells, slopes)
+    return Upsampled(-smooth.clamp_min(1e-9).log(), cells, torch.hypot(*steps) / inverse)
+
+
+def _middles(pixels: int, cells: int) -> Tensor:
+    """Of pixels, in cells."""
+    return (torch.arange(pixels) + 0.5) * cells / pixels
 
 
 def _cells_along(pixels: int, cells: int) -> Tensor:
-    return ((torch.arange(pixels) + 0.5) * cells / pixels).floor().long().clamp(0, cells - 1)
+    return _middles(pixels, cells).floor().long().clamp(0, cells - 1)
+
+
+def _past(pixels: int, cells: int) -> Tensor:
+    """Cells that pixels lie beyond the middles of the first cell and the last."""
+    middles = _middles(pixels, cells)
+    return middles - middles.clamp(0.5, cells - 0.5)
 
 
 def _shorter(values: Tensor, dim: int) -> Tensor:

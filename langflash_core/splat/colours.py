@@ -52,7 +52,7 @@ def solved_colours(
     Args:
         gaussians: N of them, whose own colours are not looked at.
         start: (N, 3), colours to begin with.
-        cameras: of the photos' size. photos: (3, h, w) in [0, 1].
+        cameras: of the photos' size. photos: (3, h, w) in [0, 1]; pixels that are no numbers say nothing.
         trusts: (N,) >= 0 of each view, what its photo counts for a Gaussian; None: 1.
     """
     views = [
@@ -77,7 +77,8 @@ def solved_colours(
 @dataclass(frozen=True)
 class _View:
     """contributions: (h w, N), of 1 a pixel where anything is drawn. back: its transpose, times the trust.
-    photo: (h w, 3). sums: (N,) of `back`. shown: (h w, 1), 1 where something is drawn, else 0."""
+    photo: (h w, 3). sums: (N,) of `back`. shown: (h w, 1), 1 where something is drawn of what the photo knows,
+    else 0."""
 
     contributions: scipy.sparse.csr_matrix
     back: scipy.sparse.csr_matrix
@@ -90,13 +91,14 @@ class _View:
         footprints = project(gaussians.map(lambda values: values.float()), camera)
         matrix = mixing(footprints, camera, len(gaussians))
         light = np.asarray(matrix.sum(1)).ravel()
-        shown = light >= _LEAST
+        flat = photo.movedim(0, -1).flatten(0, 1).cpu().numpy().astype(np.float32)
+        shown = (light >= _LEAST) & np.isfinite(flat).all(1)
+        flat[~shown] = 0
         rows = np.repeat(shown / np.maximum(light, _LEAST), np.diff(matrix.indptr)).astype(np.float32)
         matrix.data *= rows
         back = matrix.T.tocsr()
         if trust is not None:
             back.data *= np.repeat(trust.cpu().numpy().astype(np.float32), np.diff(back.indptr))
-        flat = np.ascontiguousarray(photo.movedim(0, -1).flatten(0, 1).cpu().numpy(), np.float32)
         return _View(matrix, back, flat, np.asarray(back.sum(1)).ravel(), shown[:, None].astype(np.float32))
 
     def wrong(self, colours: np.ndarray) -> np.ndarray:
