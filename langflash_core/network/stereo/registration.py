@@ -34,13 +34,15 @@ _PARTNERS = 2  # neighbours that a view is compared with, of those that share mo
 _FLOW_ERROR = 0.7  # pixels of the photo
 _THERE_AND_BACK = 0.7  # pixels by which the way back may miss
 _BRIGHTNESS = 10.0  # of 255, difference that is still the same
-_TEXTURE = 2.0  # squared grey values a pixel, gradient at which flow is half as sure
+_TEXTURE = 2.0  # squared grey values a pixel, of gradient along the shift at which flow is half as sure
+_FLAT = 0.1  # of that, noise
+_ONE_SHIFT = 10  # cells of the maps: flow finds one shift for 16 x 16 pixels and more
 _FARTHEST = 0.3  # log depth that a match may ask for
 _EXPECTED = 0.06  # log depth, what the maps may be off
 _ALIKE = 50  # cells that are off together: errors of the maps are slow
-_STIFF = 30.0  # of the correction from a cell to the next
+_STIFF = 3000.0  # of the correction from a cell to the next
 _JUMP = 0.03  # log depth between cells from which it is cut
-_ITERATIONS = 60
+_ITERATIONS = 250
 _MARGIN = 1.0  # pixels at the border that say nothing
 
 
@@ -86,7 +88,9 @@ def registered(
             pose = (viewmats[other] @ invert_rigid(viewmats[view])).cpu()
             matches = _matched(depths, greys[view], greys[other], large[view], large[other], pose)
             change, moves = _triangulated(depths, matches, large[view], large[other], pose)
-            counts = torch.from_numpy(matches.sure * texture) * (moves / _FLOW_ERROR) ** 2
+            length = moves.norm(dim=0)
+            known = _known_along(texture, moves / length.clamp_min(1e-9))
+            counts = torch.from_numpy(matches.sure) * known * (length / _FLOW_ERROR) ** 2 / _ONE_SHIFT
             target += _cells(counts * change, (height, width))
             weight += _cells(counts, (height, width))
         corrected.append(logs[view] + _smooth(target, weight, logs[view].cpu()).to(logs))
@@ -130,19 +134,32 @@ def _looked_up(
     return cv2.remap(values, columns, rows, cv2.INTER_LINEAR, borderMode=border)
 
 
-def _texture(grey: np.ndarray) -> np.ndarray:
-    """(h, w) in [0, 1): how sure flow is by what there is to see."""
+def _texture(grey: np.ndarray) -> Tensor:
+    """Structure tensor (3, h, w), xx, xy, yy: squared grey values a pixel, around each pixel."""
     smooth = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), 1)
     across, down = (cv2.Sobel(smooth, cv2.CV_32F, *way) / 8 for way in ((1, 0), (0, 1)))
-    energy = cv2.blur(np.square(across) + np.square(down), (7, 7))
+    products = (np.square(across), across * down, np.square(down))
+    return torch.from_numpy(np.stack([cv2.blur(product, (7, 7)) for product in products]))
+
+
+def _known_along(texture: Tensor, way: Tensor) -> Tensor:
+    """(h, w) in [0, 1): how sure a shift along `way` (2, h, w), unit, is by what there is to see.
+
+    With S the structure tensor, the variance of a shift is proportional to way^T S^-1 way: along a line that
+    runs that way nothing is known (the aperture problem).
+    """
+    xx, xy, yy = texture[0] + _FLAT, texture[1], texture[2] + _FLAT
+    across = way[0] ** 2 * yy - 2 * way[0] * way[1] * xy + way[1] ** 2 * xx
+    energy = (xx * yy - xy**2) / across.clamp_min(1e-9)
+    energy = (energy - _FLAT).clamp_min(0)
     return energy / (energy + _TEXTURE)
 
 
 def _triangulated(
     log_depths: Tensor, matches: _Matches, K: Tensor, other_K: Tensor, pose: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Changes of log depth (h, w) that bring each pixel nearest to its match, and pixels that the match moves
-    for one unit of it; 0 both where no depth does.
+    """Changes of log depth (h, w) that bring each pixel nearest to its match, and pixels (2, h, w) that the
+    match moves for one unit of it; 0 both where no depth does.
 
     With the ray a and the shift t in the other's frame, a point at inverse depth r is seen at a + r t: of
     each coordinate q, (q a_z - a_x) = r (t_x - q t_z), solved for r by least squares over both.
@@ -159,8 +176,9 @@ def _triangulated(
     ahead = ray[..., 2] + pose[2, 3] * inverse
     usable = (inverse > 1e-6) & (ahead > 1e-3) & (square > 1e-12)
     change = (-inverse.clamp_min(1e-6).log() - log_depths).clamp(-_FARTHEST, _FARTHEST)
-    moves = (-log_depths).exp() * square.sqrt() / ahead.clamp_min(1e-3) * other_K[0, 0]
-    return torch.where(usable, change, 0.0).nan_to_num(), torch.where(usable, moves, 0.0).nan_to_num()
+    pace = torch.where(usable, (-log_depths).exp() / ahead.clamp_min(1e-3) * other_K[0, 0], 0.0)
+    moves = torch.stack(moving) * pace
+    return torch.where(usable, change, 0.0).nan_to_num(), moves.nan_to_num()
 
 
 def _smooth(target: Tensor, weight: Tensor, log_depths: Tensor) -> Tensor:
