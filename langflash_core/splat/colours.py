@@ -77,8 +77,8 @@ def solved_colours(
 @dataclass(frozen=True)
 class _View:
     """contributions: (h w, N), of 1 a pixel where anything is drawn. back: its transpose, times the trust.
-    photo: (h w, 3). sums: (N,) of `back`. shown: (h w, 1), 1 where something is drawn of what the photo knows,
-    else 0."""
+    photo: (h w, 3). sums: (N,) of `back`. shown: (h w, 1), 1 where something is drawn and the photo is a
+    number, else 0."""
 
     contributions: scipy.sparse.csr_matrix
     back: scipy.sparse.csr_matrix

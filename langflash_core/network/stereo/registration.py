@@ -16,6 +16,7 @@ Search", of OpenCV.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -30,10 +31,12 @@ from langflash_core.network.stereo.prior import DepthMaps
 from langflash_core.network.stereo.sweep import Neighbours, everyone
 
 _LARGEST = 3  # times the maps' size, at which photos are compared
+_SMALLEST = 12  # pixels of a photo's side, with which flow works
 _PARTNERS = 2  # neighbours that a view is compared with, of those that share most
 _FLOW_ERROR = 0.7  # pixels of the photo
 _THERE_AND_BACK = 0.7  # pixels by which the way back may miss
 _BRIGHTNESS = 10.0  # of 255, difference that is still the same
+_CHANCE = 0.03  # mean certainty of what a neighbour sees, below which it shows something else
 _TEXTURE = 2.0  # squared grey values a pixel, of gradient along the shift at which flow is half as sure
 _FLAT = 0.1  # of that, noise
 _ONE_SHIFT = 10  # cells of the maps: flow finds one shift for 16 x 16 pixels and more
@@ -78,6 +81,8 @@ def registered(
     greys = [photo if photo.shape == size else _resized(photo, size) for photo in photos]
     ratio = torch.tensor([size[1] / width, size[0] / height, 1.0])
     large = Ks.cpu() * ratio[:, None]
+    if min(size) < _SMALLEST:
+        return maps
     corrected = []
     for view, others in enumerate(near):
         target, weight = torch.zeros(2, height, width)
@@ -116,7 +121,8 @@ def _matched(
     x, y = (np.where(seen, along, -1e4).astype(np.float32) for along in (x, y))
     brought = _looked_up(other, x - 0.5, y - 0.5)
     flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
-    there, back = flow.calc(grey, brought, None), flow.calc(brought, grey, None)
+    none: Any = None  # begins with no flow, which OpenCV's stubs deny
+    there, back = flow.calc(grey, brought, none), flow.calc(brought, grey, none)
     columns, rows = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
     columns, rows = columns + there[..., 0], rows + there[..., 1]
     missed = np.square(there + _looked_up(back, columns, rows)).sum(-1)
@@ -125,7 +131,10 @@ def _matched(
     differs = cv2.blur(np.square(differs), (5, 5))
     sure = 1 / (1 + missed / _THERE_AND_BACK**2) ** 2 / (1 + differs / _BRIGHTNESS**2)
     known = seen & (_looked_up(seen.astype(np.float32), columns, rows, cv2.BORDER_CONSTANT) > 0.999)
-    return _Matches(_looked_up(x, columns, rows), _looked_up(y, columns, rows), np.where(known, sure, 0.0))
+    sure = np.where(known, sure, 0.0)
+    if sure.sum() < _CHANCE * seen.sum():
+        sure[:] = 0
+    return _Matches(_looked_up(x, columns, rows), _looked_up(y, columns, rows), sure)
 
 
 def _looked_up(
@@ -183,10 +192,11 @@ def _triangulated(
 
 def _smooth(target: Tensor, weight: Tensor, log_depths: Tensor) -> Tensor:
     """The correction x (H, W) that minimises sum w (x - t)^2 + x^2 / s^2 + sum g (x_i - x_j)^2 over cells and
-    their neighbours, g cut where depth jumps; target: w t."""
+    their neighbours, g cut where depth jumps or is no number; target: w t."""
     height, width = log_depths.shape
     across, down = (
-        _STIFF * torch.exp(-((log_depths.diff(dim=dim) / _JUMP) ** 2)).double().numpy() for dim in (1, 0)
+        _STIFF * torch.exp(-((log_depths.diff(dim=dim) / _JUMP) ** 2)).nan_to_num().double().numpy()
+        for dim in (1, 0)
     )
     cells = np.arange(height * width).reshape(height, width)
     first = np.concatenate((cells[:, :-1].ravel(), cells[:-1].ravel()))
