@@ -20,6 +20,7 @@ SETTLE_AFTER = 0.12  # seconds since the last motion, key or pointer event
 FULL_AFTER = 0.70
 LARGE_SCENE = 200_000  # Gaussians, from which drawing fewer of them pays
 MIDDLING_SCENE = 30_000  # the same where OpenGL runs on the processor
+MANY_COARSE = 60_000  # coarse Gaussians, from which drawing fewer of these pays there
 _RUNG_FACTOR = 1.8  # about what a rung saves
 
 
@@ -77,13 +78,12 @@ SIZES_WITH_DETAIL = (
     (0.5, 0.5),
     (0.5, 0.25),
     (0.35, 0.25),
-    (0.35, 0.0),
+    (0.25, 0.25),
     (0.25, 0.0),
 )
-"""(scale, part of the detail that lies on the coarse Gaussians): more pixels than half the sides show
-nothing more of those alone."""
+"""(scale, part of the detail on the coarse Gaussians); these alone show nothing more in more pixels."""
 COARSER_SIZES = ((0.25, 0.5), (0.18, 0.25))
-"""(scale, share of the coarse Gaussians), where these alone are a middling scene."""
+"""(scale, share of the coarse Gaussians), where these alone are `MANY_COARSE`."""
 
 
 def _ladder(num_gaussians: int, slow: bool, coarse: float) -> tuple[tuple[float, float], ...]:
@@ -91,7 +91,7 @@ def _ladder(num_gaussians: int, slow: bool, coarse: float) -> tuple[tuple[float,
         detailed = (
             (scale, part if part == 1 else coarse + part * (1 - coarse)) for scale, part in SIZES_WITH_DETAIL
         )
-        many = coarse * num_gaussians >= MIDDLING_SCENE
+        many = coarse * num_gaussians >= MANY_COARSE
         return (*detailed, *((scale, coarse * share) for scale, share in COARSER_SIZES if many))
     if num_gaussians >= LARGE_SCENE:
         return SIZES_OF_LARGE_SCENES

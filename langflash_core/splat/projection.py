@@ -120,27 +120,28 @@ def project(gaussians: Gaussians, camera: Camera, near: float = NEAR) -> Footpri
     depths = view_depths(gaussians, camera)
     ids = (finite & (depths >= near) & (gaussians.opacities >= ALPHA_MIN)).nonzero().squeeze(-1)
     ids = ids[depths.detach()[ids].argsort(stable=True)]
-    centres, roots = _footprint(
-        transform(camera.viewmat.to(dtype), gaussians.means[ids]),
-        gaussians.map(lambda v: v[ids]),
-        camera,
+    means, quats, scales, opacities, depths = (
+        v.index_select(0, ids)
+        for v in (gaussians.means, gaussians.quats, gaussians.scales, gaussians.opacities, depths)
     )
-    sorted_all = Footprints(ids, centres, roots, gaussians.opacities[ids], depths[ids], int((~finite).sum()))
+    pos_c = transform(camera.viewmat.to(dtype), means)
+    centres, roots = _footprint(pos_c, quats, scales, camera)
+    sorted_all = Footprints(ids, centres, roots, opacities, depths, int((~finite).sum()))
     x0, y0, x1, y1 = sorted_all.boxes().unbind(-1)
-    seen = (x1 > 0) & (y1 > 0) & (x0 < camera.width) & (y0 < camera.height)
+    seen = ((x1 > 0) & (y1 > 0) & (x0 < camera.width) & (y0 < camera.height)).nonzero().squeeze(-1)
     return Footprints(
-        *(v[seen] for v in (ids, centres, roots, sorted_all.opacities, sorted_all.depths)),
+        *(v.index_select(0, seen) for v in (ids, centres, roots, opacities, depths)),
         num_dropped=sorted_all.num_dropped,
     )
 
 
-def _footprint(pos_c: Tensor, gaussians: Gaussians, camera: Camera) -> tuple[Tensor, Tensor]:
+def _footprint(pos_c: Tensor, quats: Tensor, scales: Tensor, camera: Camera) -> tuple[Tensor, Tensor]:
     """Centres (n, 2) and Cholesky factors (n, 3), pixels, of Gaussians with means `pos_c` (n, 3)."""
     K = camera.K.to(pos_c)
     focal = torch.stack((K[0, 0], K[1, 1]))
     principal = K[:2, 2]
     rotation = camera.viewmat[:3, :3].to(pos_c)
-    axes_c = rotation @ (quats_to_matrices(gaussians.quats) * gaussians.scales[:, None, :])  # (n, 3, 3)
+    axes_c = rotation @ (quats_to_matrices(quats) * scales[:, None, :])  # (n, 3, 3)
     if camera.orthographic:
         return pos_c[:, :2] * focal + principal, _cholesky(axes_c[:, :2] * focal[:, None])
     size = torch.tensor([camera.width, camera.height]).to(pos_c)

@@ -189,8 +189,8 @@ def _composite(table: _Table, lists: _Lists, tiles: Tensor, images: list[Tensor]
     """Fill some tiles of the images (tiles, 64, F)."""
     columns = lists.grid[0]
     offsets = torch.arange(TILE, dtype=torch.float32) + 0.5
-    xs = (tiles % columns * TILE)[:, None] + offsets  # (B, 8)
-    ys = (tiles // columns * TILE)[:, None] + offsets
+    xs = (tiles % columns * TILE)[:, None] + offsets.repeat(TILE)  # (B, 64)
+    ys = (tiles // columns * TILE)[:, None] + offsets.repeat_interleave(TILE)
     starts, counts = lists.starts[tiles], lists.counts[tiles]
     passing = torch.ones(len(tiles), _PIXELS)
     sums = torch.zeros(len(tiles), _PIXELS, table.features.shape[1])
@@ -198,12 +198,12 @@ def _composite(table: _Table, lists: _Lists, tiles: Tensor, images: list[Tensor]
     first = 0
     while len(tiles):
         place = torch.arange(first, first + _BLOCK)
-        index = lists.members[(starts[:, None] + place).clamp_max_(len(lists.members) - 1)]
+        index = _picked(lists.members, (starts[:, None] + place).clamp_max_(len(lists.members) - 1))
         index.masked_fill_(place >= counts[:, None], nobody)
-        weights = _alphas(table.shapes[index], xs, ys)
+        weights = _alphas(_picked(table.shapes, index), xs, ys)
         for i in range(_BLOCK):
             passing.sub_(weights[:, i].mul_(passing))  # T alpha; T (1 - alpha) = T - T alpha
-        sums.baddbmm_(weights.transpose(1, 2), table.features[index])
+        sums.baddbmm_(weights.transpose(1, 2), _picked(table.features, index))
         first += _BLOCK
         going = (counts > first) & (passing.amax(1) > STOP)
         if int(going.sum()) <= _WORTH_PACKING * len(tiles):
@@ -211,6 +211,11 @@ def _composite(table: _Table, lists: _Lists, tiles: Tensor, images: list[Tensor]
             _put(images, tiles[done], sums[done])
             tiles, xs, ys, starts, counts = (v[going] for v in (tiles, xs, ys, starts, counts))
             passing, sums = passing[going], sums[going]
+
+
+def _picked(values: Tensor, index: Tensor) -> Tensor:
+    """`values[index]` of an index (B, n), which `index_select` finds in half the time."""
+    return values.index_select(0, index.flatten()).unflatten(0, index.shape)
 
 
 def _put(images: list[Tensor], tiles: Tensor, sums: Tensor) -> None:
@@ -222,12 +227,15 @@ def _put(images: list[Tensor], tiles: Tensor, sums: Tensor) -> None:
 
 
 def _alphas(shapes: Tensor, xs: Tensor, ys: Tensor) -> Tensor:
-    """alpha (B, n, 64) of Gaussians (B, n, 6) at the pixels of their tiles, 0 below 1/255."""
+    """alpha (B, n, 64) of Gaussians (B, n, 6) at the pixels (B, 64) of their tiles, 0 below 1/255.
+
+    Columns and rows of a tile are not told apart: sums over 8 x 8 of 8 numbers each, with loops as short as
+    that, take twice as long.
+    """
     x, y, inverse_x, shear, inverse_y, opacity = shapes.unsqueeze(-1).unbind(2)  # (B, n, 1)
-    u = (xs[:, None] - x) * inverse_x  # (B, n, 8)
-    v = (ys[:, None] - y) * inverse_y
-    skew = u * (shear * inverse_y)
-    v = v[..., :, None] - skew[..., None, :]  # rows, columns
-    power = v.square_().add_(u.square()[..., None, :]).mul_(-0.5)
-    alphas = power.exp_().flatten(2).mul_(opacity).clamp_max_(ALPHA_MAX)
+    u = (xs[:, None] - x).mul_(inverse_x)  # (B, n, 64)
+    v = (ys[:, None] - y).mul_(inverse_y)
+    v.sub_(u * (shear * inverse_y))
+    power = v.square_().add_(u.square_()).mul_(-0.5)
+    alphas = power.exp_().mul_(opacity).clamp_max_(ALPHA_MAX)
     return torch.threshold_(alphas, _BELOW_MIN, 0.0)
