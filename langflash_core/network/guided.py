@@ -208,6 +208,7 @@ def _agreed(maps: DepthMaps, views: Views, poses: Poses, viewmats: Tensor, Ks: T
     part = agreed(part, viewmats[placed], Ks[placed], near)
     photos = _greys(views)
     part = registered(part, [photos[v] for v in placed], viewmats[placed], Ks[placed], near, run.check)
+    part = replace(part, log_depths=flattened(part.log_depths, part.log_errors))
     log_depths = maps.log_depths.clone()
     log_depths[placed] = part.log_depths
     return replace(maps, log_depths=log_depths)

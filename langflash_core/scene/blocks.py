@@ -21,6 +21,7 @@ from langflash_core.scene.upsampling import JUMP
 LEVELS = 4
 LARGEST = 2**LEVELS
 """Pixels, side of the largest squares."""
+_CLEAR = (0.5, 1.2)  # sides that must be clear around fine and around coarse squares
 _BENT = 0.01  # log depth by which the middle of a square may be off its corners' mean
 
 
@@ -47,11 +48,12 @@ class Squares:
         return len(self.left)
 
 
-def grown(photo: Tensor, log_depths: Tensor, wanted: Tensor, finest: int = 1) -> Tree:
+def grown(photo: Tensor, log_depths: Tensor, clear: Tensor, wanted: Tensor, finest: int = 1) -> Tree:
     """The whole tree of one photo.
 
     Args:
-        photo: (3, h, w) in [0, 1]. log_depths: (h, w). wanted: (h, w) bool, what is to be covered.
+        photo: (3, h, w) in [0, 1]. log_depths: (h, w). clear: (h, w) of `clearances`. wanted: (h, w) bool,
+            what is to be covered.
         finest: pixels, side of the smallest squares, a power of two.
     """
     size = (photo.shape[-2], photo.shape[-1])
@@ -59,6 +61,7 @@ def grown(photo: Tensor, log_depths: Tensor, wanted: Tensor, finest: int = 1) ->
     needed = padded(wanted[None].float())[0]
     needed[size[0] :], needed[:, size[1] :] = 0, 0
     jumps = (depths.diff(dim=1).abs() > JUMP, depths.diff(dim=0).abs() > JUMP)
+    near = -padded(clear.clamp(max=4 * LARGEST)[None])
     squares, errors = colours.square().sum(0), torch.zeros_like(depths)
     gains: list[Tensor] = []
     wanteds = [needed > 0]
@@ -67,7 +70,12 @@ def grown(photo: Tensor, log_depths: Tensor, wanted: Tensor, finest: int = 1) ->
         colours, squares, needed = _fours(colours), _fours(squares[None])[0], _fours(needed[None])[0]
         finer, errors = errors, (squares - colours.square().sum(0) / side**2).clamp_min(0)
         gain = (errors - _fours(finer[None])[0]) / 3
-        must = _jumping(jumps, level) | (_bent(depths, side) if level > 1 else gain < 0)
+        near = F.max_pool2d(near[None], 2)[0]
+        must = (
+            (-near[0] < _CLEAR[side >= 4] * side)
+            | _jumping(jumps, level)
+            | (_bent(depths, side) if level > 1 else gain < 0)
+        )
         if side > 4:
             must |= (needed > 0) & (needed < side**2)
         gain = torch.where(must, torch.inf, gain)

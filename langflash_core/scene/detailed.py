@@ -25,8 +25,18 @@ from langflash_core.scene.assemble import (
 )
 from langflash_core.scene.blocks import LEVELS, Tree, grown, leaves, threshold
 from langflash_core.scene.borders import refined_weights
+from langflash_core.scene.clearance import clearances
 from langflash_core.scene.consistency import seen_through
-from langflash_core.scene.elements import COARSE, Elements, ground, joined, of_squares, placed, under
+from langflash_core.scene.elements import (
+    COARSE,
+    Elements,
+    drawn_in,
+    ground,
+    joined,
+    of_squares,
+    placed,
+    under,
+)
 from langflash_core.scene.ownership import owned
 from langflash_core.scene.upsampling import Upsampled, upsampled
 from langflash_core.types import Camera, Cost, Gaussians, Prediction, Record, Scene, Semantics, Views
@@ -86,7 +96,7 @@ def assemble_detailed(
         _Sight.of(photo, image, depths.log(), own)
         for photo, image, depths, own in zip(photos, views.images, known, keep, strict=True)
     ]
-    trees = [grown(s.photo, s.depth.log_depths, s.wanted, detail.finest) for s in sights]
+    trees = [grown(s.photo, s.depth.log_depths, s.clear, s.wanted, detail.finest) for s in sights]
     budget = gaussians or round(detail.most * keep[0].numel() * (len(keep) + 3) / 4)
     limit = _limit(trees, budget, 0.0 if gaussians else detail.gain)
     parts = [_of_view(sight, tree, limit) for sight, tree in zip(sights, trees, strict=True)]
@@ -121,18 +131,20 @@ def assemble_detailed(
 @dataclass(frozen=True)
 class _Sight:
     """One photo (3, h, w), its image (3, H, W) and log depths (H, W) of the grid, those at the photo's size,
-    and what it covers itself, (h, w) bool."""
+    how far surfaces go on there (h, w), and what it covers itself, (h, w) bool."""
 
     photo: Tensor
     image: Tensor
     log_depths: Tensor
     depth: Upsampled
+    clear: Tensor
     wanted: Tensor
 
     @staticmethod
     def of(photo: Tensor, image: Tensor, log_depths: Tensor, keep: Tensor) -> "_Sight":
         wanted = F.interpolate(keep[None, None].float(), size=photo.shape[-2:], mode="nearest")[0, 0] > 0
-        return _Sight(photo, image, log_depths, upsampled(log_depths, image, photo), wanted)
+        depth = upsampled(log_depths, image, photo)
+        return _Sight(photo, image, log_depths, depth, clearances(depth.log_depths), wanted)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -171,6 +183,7 @@ def _of_view(sight: _Sight, tree: Tree, limit: float) -> Elements:
     squares, beneath = leaves(tree, limit)
     parts = [of_squares(some, sight.photo, sight.depth) for some in squares if len(some)]
     parts.append(ground(beneath, sight.photo, sight.depth))
+    parts = [drawn_in(part, sight.clear) for part in parts]
     behind = under(sight.log_depths, sight.image, sight.size)
     row, column = (behind.cells // sight.image.shape[2], behind.cells % sight.image.shape[2])
     ratio = [p / g for p, g in zip(sight.size, sight.image.shape[1:], strict=True)]

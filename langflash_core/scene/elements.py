@@ -13,7 +13,7 @@ Sizes: H W cells of the grid, h w pixels of the photo, n elements.
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import torch
 from torch import Tensor
@@ -31,12 +31,13 @@ COARSE, FINE = 0, 1
 _FLAT_COVER, _FINE_COVER, _GROUND_COVER = 0.85, 0.5, 0.72
 """Standard deviations in sides of a square: of coarse elements, of fine ones, of the ground under those."""
 _UNIFORM = 12**-0.5  # standard deviation of a square of side 1
+_NARROWEST = 0.6  # pixels, deviation of what is drawn in
 _THIN = 0.1  # thickness over a side
 _BEHIND = 0.004  # log depth by which the ground lies behind,
 _REACH = 8.0  # and by the slope of so many pixels more: no part of it may come before what lies on it
 _FARTHEST_BEHIND = 0.06
 _COARSE_BEHIND = 0.35  # of that, by which other coarse elements lie behind the fine ones beside them
-_UNDER = 10.0  # cells by which a surface goes on under a nearer one (`network/occlusion.py` has why)
+_UNDER = 7.0  # cells by which a surface goes on under a nearer one (`network/occlusion.py` has why)
 _STEP = 0.2  # log depth from a cell to the next that opens a gap
 
 
@@ -144,6 +145,15 @@ def _ground_of(
         torch.full((len(x),), COARSE, dtype=torch.uint8), torch.full_like(x, side),
         torch.ones(len(x), dtype=torch.bool),
     )  # fmt: skip
+
+
+def drawn_in(elements: Elements, clear: Tensor) -> Elements:
+    """Those that reach over the end of their surface, `clear` (h, w) pixels away, drawn in: two deviations stay
+    on it, of what is wider than a pixel."""
+    l11, l21, l22 = elements.roots.unbind(-1)
+    widest = torch.maximum(l11, torch.hypot(l21, l22))
+    room = (clear.flatten()[elements.pixels] / 2).clamp_min(_NARROWEST)
+    return replace(elements, roots=elements.roots * (room / widest).clamp(max=1)[:, None])
 
 
 def under(log_depths: Tensor, image: Tensor, size: tuple[int, int]) -> Elements:

@@ -1,4 +1,4 @@
-"""Ellipses of two spans against numpy's eigh, and spans against loops: planes, jumps, single rows, nothing."""
+"""Ellipses of two spans against numpy's eigh, spans against loops: planes, jumps, single rows, nothing."""
 
 import itertools
 

@@ -16,6 +16,7 @@ Search", of OpenCV.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -30,17 +31,21 @@ from langflash_core.network.stereo.prior import DepthMaps
 from langflash_core.network.stereo.sweep import Neighbours, everyone
 
 _LARGEST = 3  # times the maps' size, at which photos are compared
+_SMALLEST = 12  # pixels of a photo's side, with which flow works
 _PARTNERS = 2  # neighbours that a view is compared with, of those that share most
 _FLOW_ERROR = 0.7  # pixels of the photo
 _THERE_AND_BACK = 0.7  # pixels by which the way back may miss
 _BRIGHTNESS = 10.0  # of 255, difference that is still the same
-_TEXTURE = 2.0  # squared grey values a pixel, gradient at which flow is half as sure
+_CHANCE = 0.03  # mean certainty of what a neighbour sees, below which it shows something else
+_TEXTURE = 2.0  # squared grey values a pixel, of gradient along the shift at which flow is half as sure
+_FLAT = 0.1  # of that, noise
+_ONE_SHIFT = 10  # cells of the maps: flow finds one shift for 16 x 16 pixels and more
 _FARTHEST = 0.3  # log depth that a match may ask for
 _EXPECTED = 0.06  # log depth, what the maps may be off
 _ALIKE = 50  # cells that are off together: errors of the maps are slow
-_STIFF = 30.0  # of the correction from a cell to the next
+_STIFF = 3000.0  # of the correction from a cell to the next
 _JUMP = 0.03  # log depth between cells from which it is cut
-_ITERATIONS = 60
+_ITERATIONS = 250
 _MARGIN = 1.0  # pixels at the border that say nothing
 
 
@@ -76,6 +81,8 @@ def registered(
     greys = [photo if photo.shape == size else _resized(photo, size) for photo in photos]
     ratio = torch.tensor([size[1] / width, size[0] / height, 1.0])
     large = Ks.cpu() * ratio[:, None]
+    if min(size) < _SMALLEST:
+        return maps
     corrected = []
     for view, others in enumerate(near):
         target, weight = torch.zeros(2, height, width)
@@ -86,7 +93,9 @@ def registered(
             pose = (viewmats[other] @ invert_rigid(viewmats[view])).cpu()
             matches = _matched(depths, greys[view], greys[other], large[view], large[other], pose)
             change, moves = _triangulated(depths, matches, large[view], large[other], pose)
-            counts = torch.from_numpy(matches.sure * texture) * (moves / _FLOW_ERROR) ** 2
+            length = moves.norm(dim=0)
+            known = _known_along(texture, moves / length.clamp_min(1e-9))
+            counts = torch.from_numpy(matches.sure) * known * (length / _FLOW_ERROR) ** 2 / _ONE_SHIFT
             target += _cells(counts * change, (height, width))
             weight += _cells(counts, (height, width))
         corrected.append(logs[view] + _smooth(target, weight, logs[view].cpu()).to(logs))
@@ -112,7 +121,8 @@ def _matched(
     x, y = (np.where(seen, along, -1e4).astype(np.float32) for along in (x, y))
     brought = _looked_up(other, x - 0.5, y - 0.5)
     flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
-    there, back = flow.calc(grey, brought, None), flow.calc(brought, grey, None)
+    none: Any = None  # begins with no flow, which OpenCV's stubs deny
+    there, back = flow.calc(grey, brought, none), flow.calc(brought, grey, none)
     columns, rows = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
     columns, rows = columns + there[..., 0], rows + there[..., 1]
     missed = np.square(there + _looked_up(back, columns, rows)).sum(-1)
@@ -121,7 +131,10 @@ def _matched(
     differs = cv2.blur(np.square(differs), (5, 5))
     sure = 1 / (1 + missed / _THERE_AND_BACK**2) ** 2 / (1 + differs / _BRIGHTNESS**2)
     known = seen & (_looked_up(seen.astype(np.float32), columns, rows, cv2.BORDER_CONSTANT) > 0.999)
-    return _Matches(_looked_up(x, columns, rows), _looked_up(y, columns, rows), np.where(known, sure, 0.0))
+    sure = np.where(known, sure, 0.0)
+    if sure.sum() < _CHANCE * seen.sum():
+        sure[:] = 0
+    return _Matches(_looked_up(x, columns, rows), _looked_up(y, columns, rows), sure)
 
 
 def _looked_up(
@@ -130,19 +143,32 @@ def _looked_up(
     return cv2.remap(values, columns, rows, cv2.INTER_LINEAR, borderMode=border)
 
 
-def _texture(grey: np.ndarray) -> np.ndarray:
-    """(h, w) in [0, 1): how sure flow is by what there is to see."""
+def _texture(grey: np.ndarray) -> Tensor:
+    """Structure tensor (3, h, w), xx, xy, yy: squared grey values a pixel, around each pixel."""
     smooth = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), 1)
     across, down = (cv2.Sobel(smooth, cv2.CV_32F, *way) / 8 for way in ((1, 0), (0, 1)))
-    energy = cv2.blur(np.square(across) + np.square(down), (7, 7))
+    products = (np.square(across), across * down, np.square(down))
+    return torch.from_numpy(np.stack([cv2.blur(product, (7, 7)) for product in products]))
+
+
+def _known_along(texture: Tensor, way: Tensor) -> Tensor:
+    """(h, w) in [0, 1): how sure a shift along `way` (2, h, w), unit, is by what there is to see.
+
+    With S the structure tensor, the variance of a shift is proportional to way^T S^-1 way: along a line that
+    runs that way nothing is known (the aperture problem).
+    """
+    xx, xy, yy = texture[0] + _FLAT, texture[1], texture[2] + _FLAT
+    across = way[0] ** 2 * yy - 2 * way[0] * way[1] * xy + way[1] ** 2 * xx
+    energy = (xx * yy - xy**2) / across.clamp_min(1e-9)
+    energy = (energy - _FLAT).clamp_min(0)
     return energy / (energy + _TEXTURE)
 
 
 def _triangulated(
     log_depths: Tensor, matches: _Matches, K: Tensor, other_K: Tensor, pose: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Changes of log depth (h, w) that bring each pixel nearest to its match, and pixels that the match moves
-    for one unit of it; 0 both where no depth does.
+    """Changes of log depth (h, w) that bring each pixel nearest to its match, and pixels (2, h, w) that the
+    match moves for one unit of it; 0 both where no depth does.
 
     With the ray a and the shift t in the other's frame, a point at inverse depth r is seen at a + r t: of
     each coordinate q, (q a_z - a_x) = r (t_x - q t_z), solved for r by least squares over both.
@@ -159,16 +185,18 @@ def _triangulated(
     ahead = ray[..., 2] + pose[2, 3] * inverse
     usable = (inverse > 1e-6) & (ahead > 1e-3) & (square > 1e-12)
     change = (-inverse.clamp_min(1e-6).log() - log_depths).clamp(-_FARTHEST, _FARTHEST)
-    moves = (-log_depths).exp() * square.sqrt() / ahead.clamp_min(1e-3) * other_K[0, 0]
-    return torch.where(usable, change, 0.0).nan_to_num(), torch.where(usable, moves, 0.0).nan_to_num()
+    pace = torch.where(usable, (-log_depths).exp() / ahead.clamp_min(1e-3) * other_K[0, 0], 0.0)
+    moves = torch.stack(moving) * pace
+    return torch.where(usable, change, 0.0).nan_to_num(), moves.nan_to_num()
 
 
 def _smooth(target: Tensor, weight: Tensor, log_depths: Tensor) -> Tensor:
     """The correction x (H, W) that minimises sum w (x - t)^2 + x^2 / s^2 + sum g (x_i - x_j)^2 over cells and
-    their neighbours, g cut where depth jumps; target: w t."""
+    their neighbours, g cut where depth jumps or is no number; target: w t."""
     height, width = log_depths.shape
     across, down = (
-        _STIFF * torch.exp(-((log_depths.diff(dim=dim) / _JUMP) ** 2)).double().numpy() for dim in (1, 0)
+        _STIFF * torch.exp(-((log_depths.diff(dim=dim) / _JUMP) ** 2)).nan_to_num().double().numpy()
+        for dim in (1, 0)
     )
     cells = np.arange(height * width).reshape(height, width)
     first = np.concatenate((cells[:, :-1].ravel(), cells[:-1].ravel()))
