@@ -19,6 +19,9 @@ from langflash_core.scene.prune import prune
 from langflash_core.splat.colours import ROUNDS, solved_colours
 from langflash_core.types import Cost, Prediction, Scene, Views
 
+_RINGING = 0.3
+"""Of what a photo varies by around a Gaussian, how far its colour may go beyond: blur needs some of it."""
+
 
 @torch.no_grad()
 def fine_scene(
@@ -62,6 +65,7 @@ def fine_scene(
         sh_to_colour(scene.gaussians.sh, scene.gaussians.means),
         [scene.camera(v, width, height) for v in range(scene.num_views)],
         photos,
+        ringing=_RINGING,
     )
     sh = colour_to_sh(solved.colours)[:, None]
     scene = replace(scene, gaussians=replace(scene.gaussians, sh=sh))

@@ -463,9 +463,9 @@ def stable_order(keys: np.ndarray) -> np.ndarray:
 
 def atom_bits(ids: np.ndarray, values: np.ndarray, num_atoms: int) -> np.ndarray:
     """(N, ceil(K / 64)) uint64: which atoms each Gaussian carries with a weight above 0."""
-    bits = np.zeros((len(ids), max(1, -(-num_atoms // 64))), np.uint64)
-    rows = np.arange(len(ids))
-    for column in range(ids.shape[1]):
-        masks = np.uint64(1) << (ids[:, column] % 64).astype(np.uint64)
-        bits[rows, ids[:, column] // 64] |= np.where(values[:, column] > 0, masks, np.uint64(0))
-    return bits
+    bits = np.zeros((max(1, -(-num_atoms // 64)), len(ids)), np.uint64)
+    for column, carries in zip(ids.T, values.T > 0, strict=True):
+        masks = carries.astype(np.uint64) << (column & 63).astype(np.uint64)
+        for number, word in enumerate(bits):
+            word |= masks if len(bits) == 1 else np.where(column >> 6 == number, masks, np.uint64(0))
+    return np.ascontiguousarray(bits.T)

@@ -37,7 +37,7 @@ _BEHIND = 0.004  # log depth by which the ground lies behind,
 _REACH = 8.0  # and by the slope of so many pixels more: no part of it may come before what lies on it
 _FARTHEST_BEHIND = 0.06
 _COARSE_BEHIND = 0.35  # of that, by which other coarse elements lie behind the fine ones beside them
-_UNDER = 10.0  # cells by which a surface goes on under a nearer one (`network/occlusion.py` has why)
+_UNDER = 7.0  # cells by which a surface goes on under a nearer one (`network/occlusion.py` has why)
 _STEP = 0.2  # log depth from a cell to the next that opens a gap
 
 

@@ -16,7 +16,7 @@ from torch.nn import functional as F
 from langflash_core.geometry.cameras import invert_rigid, pictured, unproject
 from langflash_core.geometry.surfels import spans
 
-BEHIND, BEFORE = 0.08, 0.12
+BEHIND, BEFORE = 0.12, 0.12
 """Log depth: how far behind and before another photo's surface a pixel still shows the same one."""
 _FINER = 2.0  # area that a pixel of the earlier photo covers over that of a later one which takes it over
 

@@ -2,7 +2,7 @@
 across.
 
 Where a cell and its neighbours are one surface, inverse depth is interpolated (of a plane, that is
-exact). Where depth jumps, a pixel takes the depth of one cell, the one whose colour it has, continued by
+exact). Where depth jumps or falls steeply, a pixel takes the depth of one cell, the one whose colour it has, continued by
 that cell's own slope.
 
 Sizes: H W cells of the grid, h w pixels of the photo.
@@ -21,6 +21,9 @@ JUMP = 0.04
 """Log depth beyond what a plane has, from which neighbours are no longer one surface."""
 _COLOUR = 0.06  # standard deviation of a channel within one thing
 _REACH = 0.6  # cells, standard deviation of how far a colour's depth goes
+_STEEP = (
+    0.04  # log depth from a cell to the next: a floor has a quarter; more is the way from a thing to a wall
+)
 _FARTHEST = 0.1  # relative inverse depth by which a cell's slope may change it
 _STEEPEST = 0.2  # of it, from a cell to the next: a jump, since planes at more than 2 degrees are flatter
 
@@ -84,10 +87,10 @@ def _shorter(values: Tensor, dim: int) -> Tensor:
 
 
 def _broken(log_depths: Tensor, slope: Tensor) -> Tensor:
-    """(H, W) bool: the cell and its eight neighbours are more than one surface."""
+    """(H, W) bool: the cell and its eight neighbours are more than one surface, or the way between two."""
     wide = F.pad(log_depths[None, None], (1,) * 4, mode="replicate")
     span = F.max_pool2d(wide, 3, 1) + F.max_pool2d(-wide, 3, 1)
-    return span[0, 0] > JUMP + 3 * slope
+    return (span[0, 0] > JUMP + 3 * slope) | (slope > _STEEP)
 
 
 def _chosen(
@@ -104,6 +107,7 @@ def _chosen(
     y = (pixels[0] + 0.5) * height / photo.shape[-2]
     x = (pixels[1] + 0.5) * width / photo.shape[-1]
     colours, grid = photo[:, pixels[0], pixels[1]], image.flatten(1)
+    steep = ((across.square() + down.square()) / (inverse * _STEEP).square()).flatten()
     best, cells, values = torch.full_like(y, torch.inf), torch.zeros_like(own[0]), torch.zeros_like(y)
     for row in (own[0] - 1, own[0], own[0] + 1):
         for column in (own[1] - 1, own[1], own[1] + 1):
@@ -111,7 +115,7 @@ def _chosen(
             cell = at_row * width + at_column
             to_y, to_x = y - at_row - 0.5, x - at_column - 0.5
             differs = (grid[:, cell] - colours).square().sum(0) / (6 * _COLOUR**2)
-            cost = differs + (to_y**2 + to_x**2) / (2 * _REACH**2)
+            cost = differs + (to_y**2 + to_x**2) / (2 * _REACH**2) + steep[cell]
             there = inverse.flatten()[cell]
             value = there + across.flatten()[cell] * to_x + down.flatten()[cell] * to_y
             value = value.clamp(there * (1 - _FARTHEST), there * (1 + _FARTHEST))
