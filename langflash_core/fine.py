@@ -11,6 +11,7 @@ import torch
 from langflash_core.detail import Detail
 from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
 from langflash_core.images.views import source_pictures
+from langflash_core.running import Progress
 from langflash_core.scene.assemble import placed_views
 from langflash_core.scene.detailed import assemble_detailed, working_photos
 from langflash_core.scene.light import Light, photo_light
@@ -24,18 +25,26 @@ _RINGING = 0.3
 
 @torch.no_grad()
 def fine_scene(
-    prediction: Prediction, views: Views, detail: Detail, *, gaussians: int | None, preset: str
+    prediction: Prediction,
+    views: Views,
+    detail: Detail,
+    *,
+    gaussians: int | None,
+    preset: str,
+    progress: Progress,
 ) -> tuple[Scene, Light]:
     """The scene of a prediction whose depth maps are surfaces, and the light its photos were brought to.
 
     Args:
         gaussians: about so many; None: as `detail` has it. preset: recorded.
+        progress: called before each step; what it raises ends the work there.
 
     Raises:
         InputError: not one usable point in view 0.
         ValueError: the prediction's sizes disagree, or its poses are not finite.
     """
     start = time.perf_counter()
+    progress("light", 0.0)
     prediction, views = placed_views(prediction, views)
     light = photo_light(
         views.images, prediction.depths, prediction.confidences, prediction.viewmats, views.Ks
@@ -46,7 +55,9 @@ def fine_scene(
         for v, photo in enumerate(working_photos(source_pictures(views), grid))
     ]
     views = replace(views, images=light.corrected(views.images).clamp(0, 1))
+    progress("elements", 0.1)
     scene = assemble_detailed(prediction, views, photos, detail, gaussians=gaussians, preset=preset)
+    progress("colours", 0.4)
     solving = time.perf_counter()
     height, width = photos[0].shape[-2:]
     solved = solved_colours(
@@ -69,4 +80,5 @@ def fine_scene(
         "colours": time.perf_counter() - solving,
     }
     scene = scene.with_record(light=light.stored(), detail=bought, cost=Cost(timings))
+    progress("prune", 0.9)
     return prune(scene, merge=False), light

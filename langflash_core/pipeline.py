@@ -146,7 +146,10 @@ def reconstruct(
     images = views.images[[v for v in range(views.num_views) if v not in prediction.unplaced]]
     with run.stage("assemble"), torch.no_grad():
         if finer is not None:
-            scene, light = fine_scene(prediction, views, finer, gaussians=gaussians, preset=preset)
+            told = run.within("assemble")
+            scene, light = fine_scene(
+                prediction, views, finer, gaussians=gaussians, preset=preset, progress=told
+            )
             images = light.corrected(images).clamp(0, 1)
         else:
             if gaussians is not None or detail not in (None, DEFAULT_DETAIL):

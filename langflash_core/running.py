@@ -56,7 +56,12 @@ class Run:
             self.progress(name, fraction)
 
     def within(self, name: str) -> Progress:
-        """Progress of a stage's own steps, as a part of the whole."""
+        """Progress of a stage's own steps, as a part of the whole; each may be where the run stops."""
         start = self.begins[name]
         end = min((begin for begin in self.begins.values() if begin > start), default=1.0)
-        return lambda step, fraction: self.report(step, start + (end - start) * fraction)
+
+        def told(step: str, fraction: float) -> None:
+            self.check()
+            self.report(step, start + (end - start) * fraction)
+
+        return told

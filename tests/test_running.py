@@ -40,5 +40,14 @@ def test_a_run_stops_before_the_next_stage():
     assert list(run.timings) == ["one"]
 
 
+def test_a_run_stops_before_the_next_step_of_a_stage():
+    stopped = False
+    step = Run(BEGINS, None, lambda: stopped).within("think")
+    step("first", 0.0)
+    stopped = True
+    with pytest.raises(Cancelled, match="nothing was written"):
+        step("second", 0.5)
+
+
 def test_stages_that_take_equally_long():
     assert evenly(("a", "b", "c", "d")) == {"a": 0.0, "b": 0.25, "c": 0.5, "d": 0.75}

@@ -137,6 +137,22 @@ def test_footprints_larger_than_the_picture(scale, flat):
     agree(gaussians, parallel(camera()) if flat else camera())
 
 
+def test_large_footprints_cost_what_the_picture_has(monkeypatch):
+    """A surface that another photo has close before its lens: 4,900 pixels wide, of which 48 x 40 are looked at,
+    in squares of the next larger class, 64 pixels here."""
+    looked_at = []
+    pairs = module._Table.pairs
+    monkeypatch.setattr(
+        module._Table,
+        "pairs",
+        lambda table, rows, *of: looked_at.append(len(rows) * int(table.sides[rows[0]]) ** 2)
+        or pairs(table, rows, *of),
+    )
+    places = [(0.0, 0, 1.0), (20.0, 0, 1.0), (0, -20.0, 1.1), (-15.0, 15.0, 1.2)]
+    agree(splats(places, 10.0, [0.3, 0.4, 0.5, 0.6]), camera())
+    assert sum(looked_at) <= len(places) * 64**2
+
+
 def test_thin_and_long_footprints():
     """A hundred pixels long, a pixel wide, at 45 degrees: u and v are hundreds and cancel to some units."""
     gaussians = dataclasses.replace(

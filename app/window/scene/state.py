@@ -87,6 +87,9 @@ _SAID = {
     "refinement": "sharpening edges and surfaces",
     "Gaussians": "placing the Gaussians",
     "assemble": "putting it together",
+    "light": "bringing the photos to one light",
+    "elements": "covering surfaces with Gaussians",
+    "colours": "finding their colours",
     "prune": "tidying up",
     "refine": "fitting it to the photos",
 }
