@@ -166,7 +166,7 @@ def _kept(prediction: Prediction, views: Views) -> tuple[Tensor, Tensor, float, 
     through = seen_through(
         points.flatten(0, 1), prediction.viewmats, Ks, depths, prediction.confidences
     ).view_as(usable)
-    keep = usable & owned(depths, prediction.viewmats, Ks) & ~through
+    keep = owned(depths, prediction.viewmats, Ks, usable & ~through)
     return depths, keep, unit, int(through.sum())
 
 
