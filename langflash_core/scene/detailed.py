@@ -37,7 +37,7 @@ from langflash_core.scene.elements import (
     placed,
     under,
 )
-from langflash_core.scene.ownership import owned
+from langflash_core.scene.ownership import covered, owned
 from langflash_core.scene.upsampling import Upsampled, upsampled
 from langflash_core.types import Camera, Cost, Gaussians, Prediction, Record, Scene, Semantics, Views
 
@@ -167,6 +167,7 @@ def _kept(prediction: Prediction, views: Views) -> tuple[Tensor, Tensor, float, 
         points.flatten(0, 1), prediction.viewmats, Ks, depths, prediction.confidences
     ).view_as(usable)
     keep = owned(depths, prediction.viewmats, Ks, usable & ~through)
+    keep |= usable & ~covered(depths, prediction.viewmats, Ks, keep)
     return depths, keep, unit, int(through.sum())
 
 

@@ -46,12 +46,16 @@ def owned(depths: Tensor, viewmats: Tensor, Ks: Tensor, known: Tensor | None = N
             mine = takes if other == view else mine & ~takes
         keep[view] = mine.view_as(keep[view])
     keep = _closed(keep) & known
-    return keep | (known & ~_covered(depths, viewmats, Ks, keep))
+    return keep | (known & ~covered(depths, viewmats, Ks, keep))
 
 
-def _covered(depths: Tensor, viewmats: Tensor, Ks: Tensor, keep: Tensor) -> Tensor:
+def covered(depths: Tensor, viewmats: Tensor, Ks: Tensor, keep: Tensor) -> Tensor:
     """(V, H, W) bool: cells of each photo in which, or beside which, what is kept lies at about their depth or
-    before it."""
+    before it.
+
+    Args:
+        depths, viewmats, Ks: as `owned`. keep: (V, H, W) bool.
+    """
     height, width = depths.shape[1:]
     points = [
         _surface(*of)[0][:, kept.flatten()] for *of, kept in zip(depths, viewmats, Ks, keep, strict=True)
