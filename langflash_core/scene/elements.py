@@ -7,7 +7,7 @@ photo's detail, since what shines through between them has their own mean colour
 farther surface goes on under the nearer one, so that no gap opens as soon as one looks from aside.
 
 What passes a flat wall of elements of opacity .99 and deviation s, in spacings, at most, at any zoom:
-.0013 for .85, and .15 and .009 for .5 and .72, .0014 together. Half a step of 1/255 is .0020.
+.0013 for .85, and .155 and .0103 for .5 and .72, .0016 together. Half a step of 1/255 is .0020.
 
 Sizes: H W cells of the grid, h w pixels of the photo, n elements.
 """
@@ -81,21 +81,16 @@ def of_squares(squares: Squares, photo: Tensor, depth: Upsampled) -> Elements:
     root = torch.full_like(x, cover)
     return Elements(
         x, y, torch.stack((root, torch.zeros_like(root), root), -1),
-        _middle_depths(depth.log_depths, left, top, side), depth.cells[row, column], row * width + column,
+        _middle_depths(depth.log_depths, x, y), depth.cells[row, column], row * width + column,
         _means(photo, left, top, side),
         torch.full_like(column, FINE if side < 4 else COARSE, dtype=torch.uint8),
         torch.full_like(x, side), torch.zeros_like(column, dtype=torch.bool),
     )  # fmt: skip
 
 
-def _middle_depths(log_depths: Tensor, left: Tensor, top: Tensor, side: int) -> Tensor:
-    """(n,) log depths in the middle of squares; of one pixel where the depths there jump."""
-    height, width = log_depths.shape
-    near, far = max(side // 2 - 1, 0), side // 2
-    rows, columns = (
-        [(top + k).clamp(max=height - 1) for k in (near, far)],
-        [(left + k).clamp(max=width - 1) for k in (near, far)],
-    )
+def _middle_depths(log_depths: Tensor, x: Tensor, y: Tensor) -> Tensor:
+    """(n,) log depths at middles of pixels or between them; of one pixel where the depths there jump."""
+    rows, columns = ([(along - back).long() for back in (0.5, 0.0)] for along in (y, x))
     four = torch.stack([log_depths[row, column] for row in rows for column in columns])
     mean = -(-four).exp().mean(0).log()
     return torch.where(four.amax(0) - four.amin(0) > JUMP, four[-1], mean)
@@ -111,13 +106,15 @@ def ground(squares: Squares, photo: Tensor, depth: Upsampled) -> Elements:
     """Under squares that were parted: an element of the nearer surface, and one of what is behind a jump."""
     rows, columns = (_of_squares(along, squares.side) for along in (squares.top, squares.left))
     height, width = depth.log_depths.shape
+    inside = ((rows < height)[:, :, None] & (columns < width)[:, None]).flatten(1)
     rows, columns = rows[:, :, None].clamp(max=height - 1), columns[:, None].clamp(max=width - 1)
     depths = depth.log_depths[rows, columns].flatten(1)  # (n, 16)
     pixels, colours = (rows * width + columns).flatten(1), photo[:, rows, columns].flatten(2)
     low, high = depths.amin(1, keepdim=True), depths.amax(1, keepdim=True)
     near = (depths <= (low + high) / 2) | (high - low <= JUMP)
     corner = torch.stack((squares.left, squares.top), -1)
-    return joined([_ground_of(part, depths, pixels, colours, corner, depth.cells) for part in (near, ~near)])
+    parts = (near & inside, ~near & inside)
+    return joined([_ground_of(part, depths, pixels, colours, corner, depth.cells) for part in parts])
 
 
 def _of_squares(first: Tensor, side: int) -> Tensor:
