@@ -1,8 +1,9 @@
 """Which photo covers which surface: where several see one, the one that sees it finest, and nothing
 twice.
 
-A pixel of a photo is given up where another photo sees the same surface as finely; of equals the earlier
-photo keeps it. What stands before a surface that another photo knows better is given up as well
+Photos come in their order: the first that sees a surface has it, and each later one takes it over where
+it sees it finer by `_FINER` than who has it. So all pixels that show one surface find the same photo, however
+many photos there are. What stands before a surface that another photo knows better is given up as well
 (`consistency.seen_through`).
 
 Sizes: V views, H W cells of the grid.
@@ -17,7 +18,7 @@ from langflash_core.geometry.surfels import spans
 
 BEHIND, BEFORE = 0.05, 0.12
 """Log depth: how far behind and before another photo's surface a pixel still shows the same one."""
-_FINER = 2.0  # area a pixel covers there over here, from which the later photo keeps its own
+_FINER = 2.0  # area that a pixel of the earlier photo covers over that of a later one which takes it over
 
 
 def owned(depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
@@ -32,14 +33,15 @@ def owned(depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
     logs = depths.log().flatten(1)
     for view in range(len(depths)):
         points, normals = _surface(depths[view], viewmats[view], Ks[view])
-        own = _covered_area(points, normals, viewmats[view], Ks[view])
+        finest, mine = torch.full_like(points[0], torch.inf), torch.zeros_like(points[0], dtype=torch.bool)
         for other in range(len(depths)):
-            if other == view:
-                continue
-            same = _same(points, viewmats[other], Ks[other], logs[other], depths.shape[1:])
-            ratio = own / _covered_area(points, normals, viewmats[other], Ks[other]).clamp_min(1e-12)
-            finer = ratio < (1 / _FINER if other < view else _FINER)
-            keep[view] &= ~(same & ~finer).view_as(keep[view])
+            area = _covered_area(points, normals, viewmats[other], Ks[other])
+            takes = _FINER * area < finest
+            if other != view:
+                takes &= _same(points, viewmats[other], Ks[other], logs[other], depths.shape[1:])
+            finest = torch.where(takes, area, finest)
+            mine = takes if other == view else mine & ~takes
+        keep[view] = mine.view_as(keep[view])
     return _closed(keep)
 
 

@@ -1,0 +1,287 @@
+"""Every surface is covered by the photo that sees it finest, and by one."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid, rays, transform, unproject
+from langflash_core.scene import ownership
+from langflash_core.scene.ownership import BEFORE, BEHIND, owned
+
+HEIGHT, WIDTH = 24, 32
+WALL = (0.0, 0.0, 1.0), 3.0  # n x = d, in the world
+
+
+def camera(
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0), turn: tuple[float, float] = (0.0, 0.0)
+) -> Tensor:
+    """viewmat of a camera at `centre`, turned to the right and then down, radians."""
+    right, down = torch.tensor(turn)
+    yaw = torch.tensor([[right.cos(), 0, -right.sin()], [0, 1, 0], [right.sin(), 0, right.cos()]])
+    pitch = torch.tensor([[1, 0, 0], [0, down.cos(), -down.sin()], [0, down.sin(), down.cos()]])
+    viewmat = torch.eye(4)
+    viewmat[:3, :3] = pitch @ yaw
+    viewmat[:3, 3] = -viewmat[:3, :3] @ torch.tensor(centre)
+    return viewmat
+
+
+def lens(views: int, fov: float = 60) -> Tensor:
+    return intrinsics_from_fov(fov, WIDTH, HEIGHT).repeat(views, 1, 1)
+
+
+def depths_of(planes: list[tuple[tuple[float, float, float], float]], viewmat: Tensor, K: Tensor) -> Tensor:
+    """(H, W) of the nearest of some planes (n, d)."""
+    pose, ahead = invert_rigid(viewmat), rays(K, WIDTH, HEIGHT)
+    found = torch.full((HEIGHT, WIDTH), 1e3)
+    for normal, distance in planes:
+        n = torch.tensor(normal)
+        along = ahead @ (pose[:3, :3].T @ n)
+        z = (distance - n @ pose[:3, 3]) / torch.where(along.abs() < 1e-6, 1e-6, along)
+        found = torch.where((z > 0) & (z < found), z, found)
+    return found
+
+
+def seen(viewmats: list[Tensor], planes=(WALL,), fov: float = 60) -> tuple[Tensor, Tensor, Tensor]:
+    """Depths, poses and lenses of views of some planes."""
+    Ks = lens(len(viewmats), fov)
+    maps = [depths_of(list(planes), viewmat, K) for viewmat, K in zip(viewmats, Ks, strict=True)]
+    return torch.stack(maps), torch.stack(viewmats), Ks
+
+
+def inside(depths: Tensor, viewmats: Tensor, Ks: Tensor, view: int, other: int, margin: float = 0) -> Tensor:
+    """(H, W) bool: cells of a view whose surface lies in the picture of another."""
+    points = transform(invert_rigid(viewmats[view]), unproject(depths[view], Ks[view]).flatten(0, 1))
+    pos_c = transform(viewmats[other], points)
+    at = pos_c[:, :2] / pos_c[:, 2:] * Ks[other, 0, 0] + Ks[other, :2, 2]
+    limit = torch.tensor([WIDTH, HEIGHT])
+    return ((pos_c[:, 2] > 0) & (at > margin).all(-1) & (at < limit - margin).all(-1)).view(HEIGHT, WIDTH)
+
+
+def grown(cells: Tensor, by: int = 1) -> Tensor:
+    size = 2 * by + 1
+    return torch.nn.functional.max_pool2d(cells[None].float(), size, 1, by)[0] > 0
+
+
+def without_tips(cells: Tensor) -> Tensor:
+    """Those in a square of 3 x 3 of them: no crumb, and no end of a wedge."""
+    return grown(~grown(~cells))
+
+
+def test_one_photo_owns_all():
+    assert owned(*seen([camera()])).all()
+
+
+@pytest.mark.parametrize("views", [2, 3, 5])
+def test_of_equal_photos_the_first_keeps_all(views):
+    keep = owned(*seen([camera()] * views))
+    assert keep[0].all() and not keep[1:].any()
+
+
+@pytest.mark.parametrize("turn", [0.3, -0.5])
+def test_the_later_one_keeps_what_the_earlier_does_not_see(turn):
+    """And goes on by a cell beyond, so that no seam opens; the border itself may be a cell off."""
+    given = seen([camera(), camera(turn=(turn, 0.0))])
+    keep = owned(*given)
+    unseen = ~inside(*given, view=1, other=0)
+    assert keep[0].all()
+    assert unseen.any() and not unseen.all()
+    assert keep[1][without_tips(unseen)].all() and not keep[1][~grown(unseen, 2)].any()
+    assert (keep[1] & ~unseen).any()
+
+
+@pytest.mark.parametrize("earlier", [True, False])
+@pytest.mark.parametrize(("nearer", "wins"), [(2.2, True), (1.5, True), (1.3, False)])
+def test_the_finer_one_wins_from_twice_the_area_on(earlier, nearer, wins):
+    """At `nearer` times less distance it has that many pixels a length, their square an area: 1.3^2 < 2. A
+    narrow lens: towards the sides both see the wall more from aside, by cosines above .95."""
+    near, far = camera((0.0, 0.0, 3 - 3 / nearer)), camera()
+    given = seen([near, far] if earlier else [far, near], fov=20)
+    keep = owned(*given)
+    near_at, far_at = (0, 1) if earlier else (1, 0)
+    common = inside(*given, view=far_at, other=near_at, margin=1)
+    assert keep[near_at].all() == (earlier or wins)
+    assert keep[far_at][~grown(~common, 2)].any() != (earlier or wins)
+    assert keep[far_at][~common].all()  # what the nearer does not see
+
+
+def test_a_wall_seen_from_aside_is_left_to_the_photo_that_faces_it():
+    given = seen([camera((-6.0, 0.0, 1.0), turn=(1.25, 0.0)), camera()])
+    keep = owned(*given)
+    common = inside(*given, view=0, other=1, margin=1)
+    assert common.sum() > 30 and not keep[0][~grown(~common, 2)].any() and keep[1].all()
+
+
+def test_what_another_photo_cannot_see_is_kept():
+    """A wall behind a screen: the first photo has the screen before it there, the second sees past it."""
+    screen = torch.full((HEIGHT, WIDTH), 3.0)
+    screen[:, 10:22] = 1.0
+    depths = torch.stack((screen, torch.full((HEIGHT, WIDTH), 3.0)))
+    keep = owned(depths, torch.eye(4).repeat(2, 1, 1), lens(2))
+    assert keep[0].all() and keep[1][:, 10:22].all()
+    assert not keep[1][:, :9].any() and not keep[1][:, 23:].any()
+
+
+@pytest.mark.parametrize("gap", [-BEFORE - 0.01, -BEFORE + 0.01, BEHIND - 0.01, BEHIND + 0.01])
+def test_surfaces_are_the_same_within_what_depths_err(gap):
+    """gap: log depth by which the later photo's wall lies behind the earlier's."""
+    depths = torch.tensor([0.0, gap]).exp()[:, None, None].expand(2, HEIGHT, WIDTH) * 3
+    keep = owned(depths, torch.eye(4).repeat(2, 1, 1), lens(2))
+    assert keep[0].all() and keep[1].all() == (not -BEFORE < gap < BEHIND)
+
+
+def test_three_photos_do_not_leave_a_surface_to_each_other():
+    """Areas of 1, .62 and .38 in a row: the second is left to the first, the third to neither: less than half
+    the first. By pairs the first would be left to the third, the third to the second, and so nobody's."""
+    views = [camera((0.0, 0.0, 3 - 3 * share**0.5)) for share in (1.0, 0.62, 0.38)]
+    given = seen(views, fov=20)
+    keep = owned(*given)
+    assert keep[2].all()
+    common = inside(*given, view=0, other=2, margin=1)
+    assert not keep[0][~grown(~common, 2)].any() and keep[0][~inside(*given, view=0, other=1)].all()
+
+
+def drawn_views(seed: int, count: int) -> list[Tensor]:
+    generator = torch.Generator().manual_seed(seed)
+    drawn = torch.rand(count, 5, generator=generator) - 0.5
+    return [camera((2 * x, y, 1.6 * z), turn=(0.8 * a, 0.4 * b)) for x, y, z, a, b in drawn.tolist()]
+
+
+@pytest.mark.parametrize("count", [2, 3, 6])
+@pytest.mark.parametrize("seed", range(8))
+def test_no_surface_that_somebody_sees_is_left_without_an_owner(seed, count, monkeypatch):
+    """A wall, or two that meet: every cell of every photo lies within a cell of one that some photo keeps,
+    since which photo a point belongs to is asked at its cell in one photo and answered for another cell, half
+    a cell away, in the next. Left out are crumbs, cells of which fewer than five of nine stay, where they are
+    narrower than that: the ends of wedges, lines along a picture's edge."""
+    given = seen(drawn_views(seed, count), [WALL, ((0.9, 0.1, 0.42), 1.9)][: 1 + seed % 2])
+    keep = owned(*given)
+    monkeypatch.setattr(ownership, "_closed", lambda cells: cells)
+    asked = owned(*given)
+    assert not without_owner(asked, *given).any()
+    crumbs = asked & ~keep
+    assert all(
+        plain_most(cells.numpy())[gone.numpy()].sum() == 0 for cells, gone in zip(asked, crumbs, strict=True)
+    )
+    assert not without_owner(keep | crumbs, *given).any()
+    assert float(without_owner(keep, *given).float().mean()) < 0.02
+    if count == 6:
+        assert float(keep.float().mean()) < 0.7  # and not everybody keeps all
+
+
+def without_owner(keep: Tensor, depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
+    """(V, H, W) bool: cells whose surface no photo keeps, not even a cell beside it."""
+    wider = torch.stack([grown(cells) for cells in keep])
+    found = wider.clone()
+    for view in range(len(keep)):
+        points = transform(invert_rigid(viewmats[view]), unproject(depths[view], Ks[view]).flatten(0, 1))
+        somebody = found[view].flatten()
+        for other in range(len(keep)):
+            pos_c = transform(viewmats[other], points)
+            at = (pos_c[:, :2] / pos_c[:, 2:] * Ks[other, 0, 0] + Ks[other, :2, 2]).floor().long()
+            there = (pos_c[:, 2] > 0) & (at >= 0).all(-1) & (at < torch.tensor([WIDTH, HEIGHT])).all(-1)
+            column, row = at[there].unbind(-1)
+            near = (depths[other, row, column].log() - pos_c[there, 2].log()).abs() < BEFORE
+            somebody[there] |= wider[other, row, column] & near
+    return ~found
+
+
+def plain_owned(depths: np.ndarray, viewmats: np.ndarray, Ks: np.ndarray) -> np.ndarray:
+    """The rule point by point, before crumbs go and borders grow."""
+    return np.array(
+        [
+            [[plain_owner(depths, viewmats, Ks, v, y, x) == v for x in range(WIDTH)] for y in range(HEIGHT)]
+            for v in range(len(depths))
+        ]
+    )
+
+
+def plain_owner(depths: np.ndarray, viewmats: np.ndarray, Ks: np.ndarray, view: int, y: int, x: int) -> int:
+    """The photo that has the surface of one cell of one photo."""
+    pose = np.linalg.inv(viewmats[view])
+    point = pose[:3, :3] @ point_of(depths[view], Ks[view], y, x) + pose[:3, 3]
+    normal = pose[:3, :3] @ normal_of(depths[view], Ks[view], y, x)
+    owner, finest = -1, math.inf
+    for other in range(len(depths)):
+        at = viewmats[other][:3, :3] @ point + viewmats[other][:3, 3]
+        if other != view and not same_surface(at, depths[other], Ks[other]):
+            continue
+        towards = point - np.linalg.inv(viewmats[other])[:3, 3]
+        distance = np.linalg.norm(towards)
+        area = (distance / Ks[other, 0, 0]) ** 2 / max(abs(towards @ normal) / distance, 1e-3)
+        if 2 * area < finest:
+            owner, finest = other, area
+    return owner
+
+
+def point_of(depths: np.ndarray, K: np.ndarray, y: int, x: int) -> np.ndarray:
+    ray = np.array([(x + 0.5 - K[0, 2]) / K[0, 0], (y + 0.5 - K[1, 2]) / K[1, 1], 1])
+    return ray * depths[y, x]
+
+
+def normal_of(depths: np.ndarray, K: np.ndarray, y: int, x: int) -> np.ndarray:
+    """Of the shorter steps to the neighbours along columns and rows."""
+    here = point_of(depths, K, y, x)
+
+    def shorter(step: Callable[[int], tuple[int, int]]) -> np.ndarray:
+        steps = [
+            sign * (point_of(depths, K, *step(sign)) - here)
+            for sign in (1, -1)
+            if 0 <= step(sign)[0] < HEIGHT and 0 <= step(sign)[1] < WIDTH
+        ]
+        return min(steps, key=lambda s: float(np.linalg.norm(s)))
+
+    crossed = np.cross(shorter(lambda sign: (y, x + sign)), shorter(lambda sign: (y + sign, x)))
+    return crossed / np.linalg.norm(crossed)
+
+
+def same_surface(at: np.ndarray, depths: np.ndarray, K: np.ndarray) -> bool:
+    if at[2] <= 0:
+        return False
+    column, row = (math.floor(at[i] / at[2] * K[i, i] + K[i, 2]) for i in (0, 1))
+    if not (0 <= row < HEIGHT and 0 <= column < WIDTH):
+        return False
+    return -BEFORE < math.log(at[2]) - math.log(depths[row, column]) < BEHIND
+
+
+def around(cells: np.ndarray, y: int, x: int) -> np.ndarray:
+    return cells[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]
+
+
+def plain_most(keep: np.ndarray) -> np.ndarray:
+    """Cells of which most of the nine around stay."""
+    return np.array([[around(keep, y, x).mean() > 0.5 for x in range(WIDTH)] for y in range(HEIGHT)])
+
+
+def plain_closed(keep: np.ndarray) -> np.ndarray:
+    """Those, and what touches them."""
+    most = plain_most(keep)
+    return np.array([[around(most, y, x).any() for x in range(WIDTH)] for y in range(HEIGHT)])
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_it_agrees_with_its_twin_cell_by_cell(seed):
+    """In float64, where none of these cells lies as near to a limit as rounding goes."""
+    depths, viewmats, Ks = seen(drawn_views(seed, 3), [WALL, ((0.9, 0.1, 0.42), 1.9)])
+    generator = torch.Generator().manual_seed(seed)
+    depths = depths.double() * torch.exp(0.03 * torch.randn(depths.shape, generator=generator).double())
+    given = (depths, viewmats.double(), Ks.double())
+    expected = np.array([plain_closed(keep) for keep in plain_owned(*(values.numpy() for values in given))])
+    assert 0.2 < expected.mean() < 0.95
+    assert np.array_equal(owned(*given).numpy(), expected)
+
+
+def test_a_camera_that_sees_nothing_of_the_others_and_points_behind():
+    away = camera(turn=(math.pi, 0.0))
+    given = seen([camera(), away], [WALL, ((0.0, 0.0, -1.0), 3.0)])
+    assert owned(*given).all()
+
+
+def test_depths_of_nobodys_making_do_not_raise():
+    depths = torch.exp(3 * torch.randn(3, HEIGHT, WIDTH, generator=torch.Generator().manual_seed(0)))
+    depths[0, 0, 0], depths[1, 5, 5] = 1e-6, 1e6
+    keep = owned(depths, torch.stack(drawn_views(1, 3)), lens(3))
+    assert keep.shape == depths.shape and keep.dtype == torch.bool
