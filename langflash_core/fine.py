@@ -45,11 +45,10 @@ def fine_scene(
     views = replace(views, images=light.corrected(views.images).clamp(0, 1))
     scene = assemble_detailed(prediction, views, photos, detail, gaussians=gaussians, preset=preset)
     solving = time.perf_counter()
-    height, width = photos[0].shape[-2:]
     solved = solved_colours(
         scene.gaussians,
         sh_to_colour(scene.gaussians.sh, scene.gaussians.means),
-        [scene.camera(v, width, height) for v in range(scene.num_views)],
+        [scene.camera(v, photo.shape[-1], photo.shape[-2]) for v, photo in enumerate(photos)],
         photos,
     )
     sh = colour_to_sh(solved.colours)[:, None]
