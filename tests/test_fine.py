@@ -16,7 +16,7 @@ from langflash_core.scene.light import Light
 from langflash_core.splat.colours import ROUNDS
 from langflash_core.splat.reference import render
 from langflash_core.types import Scene
-from tests.scene.photographed import GRID, Photographed, photographed
+from tests.scene.photographed import GRID, Photographed, photographed, png
 
 NORMAL = DETAILS["normal"]
 
@@ -58,6 +58,20 @@ def test_pictures_at_the_photos_places_are_nearer_to_them_than_with_copied_colou
     assert torch.equal(copied.gaussians.means, scene.gaussians.means)
     for view, photo in enumerate(photos):
         assert difference(scene, view, photo) > difference(copied, view, photo) + 1
+
+
+@pytest.mark.parametrize("edge", [16, 19])
+def test_a_plain_thing_before_a_plain_wall_ends_where_it_ends(edge):
+    """Nothing but the edge asks for small elements. Elements of a pixel blur by one, the ground of 4 pixels
+    below them (.72 sides) by some more; a largest square would reach 40 across."""
+    given = photographed(1, screen=False)
+    depths, photo = torch.full((1, *GRID), 3.0), torch.full((3, 90, 120), 0.8)
+    depths[..., :edge], photo[..., : 3 * edge] = 1.5, 0.2
+    views = replace(given.views, images=photo[None, :, 1::3, 1::3], sources=(png(photo),))
+    scene, _ = made(replace(given, prediction=replace(given.prediction, depths=depths), views=views))
+    drawn = render(scene, scene.camera(0, 120, 90), weight_maps=False).rgb.movedim(-1, 0)
+    off = (drawn - photo).abs().amax(0)[16:-16].mean(0)
+    assert float(off[: 3 * edge - 6].max()) < 0.05 and float(off[3 * edge + 6 : -4].max()) < 0.05
 
 
 def test_a_scene_and_its_record_are_whole(given, fine):

@@ -67,7 +67,7 @@ def photographed(
     )
     images = torch.stack([F.interpolate(photo[None], GRID, mode="area")[0] for photo in photos])
     names = tuple(f"{view}.png" for view in range(num_views))
-    sources = tuple(_png(photo) for photo in photos)
+    sources = tuple(png(photo) for photo in photos)
     return Photographed(
         prediction, Views(images, K.repeat(num_views, 1, 1), names, sources, ("of triage",)), photos
     )
@@ -96,7 +96,7 @@ def _colours(depths: Tensor, points: Tensor, busy: bool) -> Tensor:
     return torch.where(z < (WALL + SCREEN) / 2, thing, wall).clamp(0, 1)
 
 
-def _png(photo: Tensor) -> bytes:
+def png(photo: Tensor) -> bytes:
     stream = io.BytesIO()
     Image.fromarray((photo.movedim(0, -1) * 255).round().numpy().astype(np.uint8)).save(stream, "PNG")
     return stream.getvalue()
