@@ -59,11 +59,10 @@ def fine_scene(
     scene = assemble_detailed(prediction, views, photos, detail, gaussians=gaussians, preset=preset)
     progress("colours", 0.4)
     solving = time.perf_counter()
-    height, width = photos[0].shape[-2:]
     solved = solved_colours(
         scene.gaussians,
         sh_to_colour(scene.gaussians.sh, scene.gaussians.means),
-        [scene.camera(v, width, height) for v in range(scene.num_views)],
+        [scene.camera(v, photo.shape[-1], photo.shape[-2]) for v, photo in enumerate(photos)],
         photos,
         ringing=_RINGING,
     )

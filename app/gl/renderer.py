@@ -189,12 +189,13 @@ class SplatRenderer:
 
     # --- what to draw -----------------------------------------------------------------------
 
-    def set_scene(self, scene: Scene) -> None:
-        """Upload a scene; the same object again does nothing. The query is kept if it still fits."""
+    def set_scene(self, scene: Scene, share: float = 1.0) -> None:
+        """Upload a scene, this share of it now; the same object again does nothing. The query is kept if it
+        still fits."""
         if self._scene is not None and self._scene.scene is scene:
             return
         self._release_scene()
-        self._scene = LiveScene(self._canvas.painter, scene, self._splats)
+        self._scene = LiveScene(self._canvas.painter, scene, self._splats, share)
         asked, self._question = self._question, None
         if asked is not None and asked.compiled.factor.shape[0] == scene.semantics.num_atoms:
             self._question = Question(asked.compiled, asked.answers)
@@ -203,6 +204,11 @@ class SplatRenderer:
         """A level of `scene` that was thinned elsewhere (scene/thin.py), if that is on show."""
         if self._scene is not None and self._scene.scene is scene:
             self._scene.give(share, thinned, rows)
+
+    def upload(self, share: float) -> None:
+        """Bring this share of the Gaussians to the card now, not with the next picture."""
+        if self._scene is not None:
+            self._scene.level(share)
 
     def mark(self, shown: np.ndarray, tints: np.ndarray) -> None:
         """Draw only some Gaussians, and some in a tint (`splats.TINTS`); holds until `set_scene`.
@@ -557,7 +563,7 @@ class SplatRenderer:
         """Depths of the first and the last colour of `depth_texture`, scene units."""
         if self._picture is not None:
             return self._picture.depth_range
-        return (NEAR, 1.0) if self._scene is None else self._scene.whole.splats.depth_range
+        return (NEAR, 1.0)
 
     # --- inside -------------------------------------------------------------------------------
 

@@ -88,7 +88,10 @@ class Level:
 class LiveScene:
     """Owns what of a scene is on the graphics card."""
 
-    def __init__(self, painter: Painter, scene: Scene, make_splats: MakeSplats = SplatBuffers):
+    def __init__(
+        self, painter: Painter, scene: Scene, make_splats: MakeSplats = SplatBuffers, share: float = 1.0
+    ):
+        """share: of the Gaussians, that is uploaded at once; others as they are wanted."""
         self.scene = scene
         self._painter = painter
         self._make_splats = make_splats
@@ -96,7 +99,12 @@ class LiveScene:
         self._changes: tuple[Change, ...] = ()
         self._photos: dict[bool, PhotoDepths] = {}  # by whether each sees its own Gaussians alone
         self._levels: dict[float, Level] = {}  # by share of the Gaussians
-        self.whole = self._made(1.0, scene, np.arange(len(scene.gaussians)))
+        self.level(share)
+
+    @property
+    def whole(self) -> Level:
+        """Of all Gaussians."""
+        return self.level(1.0)
 
     @property
     def num_atoms(self) -> int:
@@ -124,7 +132,8 @@ class LiveScene:
     def level(self, share: float) -> Level:
         """The level of so many Gaussians; made once."""
         if share not in self._levels:
-            self._made(share, *thin_with_rows(self.scene, share))
+            everything = self.scene, np.arange(len(self.scene.gaussians))
+            self._made(share, *(everything if share == 1 else thin_with_rows(self.scene, share)))
         return self._levels[share]
 
     def give(self, share: float, thinned: Scene, rows: np.ndarray) -> None:

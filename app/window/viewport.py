@@ -167,7 +167,8 @@ class Viewport:
 
         self._warming = None
         renderer = self._made()
-        renderer.set_scene(scene)
+        governor = Governor(len(scene.gaussians), renderer.in_software, coarse_share(scene))
+        renderer.set_scene(scene, governor.share)
         renderer.canvas.forget()
         renderer.ask(None)
         self._serial, self._query, self._keys = serial, None, ()
@@ -180,7 +181,7 @@ class Viewport:
             self._artist.drop()
         elif renderer.in_software:
             self._artist = Artist(self._notify)
-        self.governor = Governor(len(scene.gaussians), self._artist is not None, coarse_share(scene))
+        self.governor = governor
 
     @property
     def shares(self) -> tuple[float, ...]:
@@ -468,6 +469,7 @@ class Viewport:
         plan = wanted.plan
         width, height = (max(8, round(side * plan.scale)) for side in wanted.size)
         self._camera = to_camera(wanted.pose, width, height)
+        self._renderer.upload(plan.share)  # once, and no matter of what pictures cost
         start = time.perf_counter()
         self._renderer.draw(
             self._camera,

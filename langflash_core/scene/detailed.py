@@ -37,7 +37,7 @@ from langflash_core.scene.elements import (
     placed,
     under,
 )
-from langflash_core.scene.ownership import owned
+from langflash_core.scene.ownership import covered, owned
 from langflash_core.scene.upsampling import Upsampled, upsampled
 from langflash_core.types import Camera, Cost, Gaussians, Prediction, Record, Scene, Semantics, Views
 
@@ -76,7 +76,7 @@ def assemble_detailed(
     """A scene in scene units, as `assemble` makes it, of elements as fine as the photos.
 
     Args:
-        photos: (3, h, w) in [0, 1] of every view, `working_photos`, all of one size.
+        photos: (3, h, w) in [0, 1] of every view, `working_photos`; each may have its own size.
         gaussians: about as many; None: as `detail` has it.
 
     Returns:
@@ -96,17 +96,10 @@ def assemble_detailed(
         _Sight.of(photo, image, depths.log(), own)
         for photo, image, depths, own in zip(photos, views.images, known, keep, strict=True)
     ]
-    trees = [grown(s.photo, s.depth.log_depths, s.clear, s.wanted, detail.finest) for s in sights]
     budget = gaussians or round(detail.most * keep[0].numel() * (len(keep) + 3) / 4)
-    limit = _limit(trees, budget, 0.0 if gaussians else detail.gain)
-    parts = [_of_view(sight, tree, limit) for sight, tree in zip(sights, trees, strict=True)]
-    cameras = [Camera(*of, *views.size) for of in zip(prediction.viewmats, views.Ks, strict=True)]
-    made = [
-        placed(part, sight.log_depths, sight.depth.slopes, camera, sight.size)
-        for part, sight, camera in zip(parts, sights, cameras, strict=True)
-    ]
+    parts = _parts(sights, detail, budget, 0.0 if gaussians else detail.gain)
     scene = Scene(
-        gaussians=normalised(_together(made), unit),
+        gaussians=normalised(_gaussians(prediction, views, sights, parts), unit),
         semantics=_semantics(prediction, sights, parts, top_m),
         viewmats=scaled_poses(prediction.viewmats, unit),
         Ks=views.Ks.clone(),
@@ -166,8 +159,16 @@ def _kept(prediction: Prediction, views: Views) -> tuple[Tensor, Tensor, float, 
     through = seen_through(
         points.flatten(0, 1), prediction.viewmats, Ks, depths, prediction.confidences
     ).view_as(usable)
-    keep = usable & owned(depths, prediction.viewmats, Ks) & ~through
+    keep = owned(depths, prediction.viewmats, Ks, usable & ~through)
+    keep |= usable & ~covered(depths, prediction.viewmats, Ks, keep)
     return depths, keep, unit, int(through.sum())
+
+
+def _parts(sights: list[_Sight], detail: Detail, budget: int, least: float) -> list[Elements]:
+    """The elements of each photo, at most about `budget` of them together, each of which gains `least`."""
+    trees = [grown(s.photo, s.depth.log_depths, s.clear, s.wanted, detail.finest) for s in sights]
+    limit = _limit(trees, budget, least)
+    return [_of_view(sight, tree, limit) for sight, tree in zip(sights, trees, strict=True)]
 
 
 def _limit(trees: list[Tree], budget: int, least: float) -> float:
@@ -191,7 +192,15 @@ def _of_view(sight: _Sight, tree: Tree, limit: float) -> Elements:
     return joined([*parts, behind.rows(own)])
 
 
-def _together(made: list[Gaussians]) -> Gaussians:
+def _gaussians(
+    prediction: Prediction, views: Views, sights: list[_Sight], parts: list[Elements]
+) -> Gaussians:
+    """All photos' elements in the world, in the prediction's unit."""
+    cameras = [Camera(*of, *views.size) for of in zip(prediction.viewmats, views.Ks, strict=True)]
+    made = [
+        placed(part, sight.log_depths, sight.depth.slopes, camera, sight.size)
+        for part, sight, camera in zip(parts, sights, cameras, strict=True)
+    ]
     names = ("means", "quats", "scales", "opacities", "sh")
     return Gaussians(*(torch.cat([getattr(some, name) for some in made]) for name in names))
 

@@ -2,8 +2,8 @@
 twice.
 
 Photos come in their order: the first that sees a surface has it, and each later one takes it over where
-it sees it finer by `_FINER` than who has it. All pixels that show one surface thus find the same photo, so
-that one of them stays, whatever the number of photos. What stands before a surface that another photo knows better is given up as well
+it sees it finer by `_FINER` than who has it. So all pixels that show one surface find the same photo, however
+many photos there are. What stands before a surface that another photo knows better is given up as well
 (`consistency.seen_through`).
 
 Sizes: V views, H W cells of the grid.
@@ -18,18 +18,21 @@ from langflash_core.geometry.surfels import spans
 
 BEHIND, BEFORE = 0.12, 0.12
 """Log depth: how far behind and before another photo's surface a pixel still shows the same one."""
+_ABOUT = 0.2  # relative depth by which what covers a cell may lie behind it
 _FINER = 2.0  # area that a pixel of the earlier photo covers over that of a later one which takes it over
 
 
-def owned(depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
+def owned(depths: Tensor, viewmats: Tensor, Ks: Tensor, known: Tensor | None = None) -> Tensor:
     """(V, H, W) bool: the cells of each photo that it covers itself.
 
     Args:
         depths: (V, H, W) > 0. viewmats: (V, 4, 4). Ks: (V, 3, 3), pixels of the depth maps.
+        known: (V, H, W) bool, the cells that may cover anything; None: all.
     """
-    keep = torch.ones_like(depths, dtype=torch.bool)
+    known = torch.ones_like(depths, dtype=torch.bool) if known is None else known
     if len(depths) == 1:
-        return keep
+        return known
+    keep = torch.zeros_like(known)
     logs = depths.log().flatten(1)
     for view in range(len(depths)):
         points, normals = _surface(depths[view], viewmats[view], Ks[view])
@@ -38,11 +41,34 @@ def owned(depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
             area = _covered_area(points, normals, viewmats[other], Ks[other])
             takes = _FINER * area < finest
             if other != view:
-                takes &= _same(points, viewmats[other], Ks[other], logs[other], depths.shape[1:])
+                takes &= _same(points, viewmats[other], Ks[other], logs[other], known[other])
             finest = torch.where(takes, area, finest)
             mine = takes if other == view else mine & ~takes
         keep[view] = mine.view_as(keep[view])
-    return _closed(keep)
+    keep = _closed(keep) & known
+    return keep | (known & ~covered(depths, viewmats, Ks, keep))
+
+
+def covered(depths: Tensor, viewmats: Tensor, Ks: Tensor, keep: Tensor) -> Tensor:
+    """(V, H, W) bool: cells of each photo in which, or beside which, what is kept lies at about their depth or
+    before it.
+
+    Args:
+        depths, viewmats, Ks: as `owned`. keep: (V, H, W) bool.
+    """
+    height, width = depths.shape[1:]
+    points = [
+        _surface(*of)[0][:, kept.flatten()] for *of, kept in zip(depths, viewmats, Ks, keep, strict=True)
+    ]
+    everything, found = torch.cat(points, 1), []
+    for own, viewmat, K in zip(depths, viewmats, Ks, strict=True):
+        x, y, z = pictured(viewmat, K, everything)
+        inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
+        hit = torch.zeros(height * width)
+        place, z = (y.floor() * width + x.floor())[inside].long(), z[inside]
+        hit[place[z < (1 + _ABOUT) * own.flatten()[place]]] = 1
+        found.append(F.max_pool2d(hit.view(1, 1, height, width), 3, 1, 1)[0, 0] > 0)
+    return torch.stack(found)
 
 
 def _surface(depths: Tensor, viewmat: Tensor, K: Tensor) -> tuple[Tensor, Tensor]:
@@ -63,14 +89,14 @@ def _covered_area(points: Tensor, normals: Tensor, viewmat: Tensor, K: Tensor) -
     return (distances / K[0, 0]) ** 2 / cosines.clamp_min(1e-3)
 
 
-def _same(points: Tensor, viewmat: Tensor, K: Tensor, log_depths: Tensor, size: torch.Size) -> Tensor:
+def _same(points: Tensor, viewmat: Tensor, K: Tensor, log_depths: Tensor, known: Tensor) -> Tensor:
     """(n,) bool: another view sees these points as its surface."""
-    height, width = size
+    height, width = known.shape
     x, y, z = pictured(viewmat, K, points)
     inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
     place = torch.where(inside, y.floor() * width + x.floor(), 0.0).long()
     gap = z.clamp_min(1e-9).log() - log_depths.index_select(0, place)
-    return inside & (gap < BEHIND) & (gap > -BEFORE)
+    return inside & known.flatten()[place] & (gap < BEHIND) & (gap > -BEFORE)
 
 
 def _closed(keep: Tensor) -> Tensor:

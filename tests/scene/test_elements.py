@@ -160,8 +160,9 @@ def test_fine_elements_lie_on_the_plane_and_face_along_it(normal, ratio):
 @pytest.mark.parametrize("normal", SLANTED)
 @pytest.mark.parametrize("size", [(72, 96), (69, 91), (71, 95)])
 def test_depths_of_all_are_those_of_the_plane_but_for_what_lies_behind(normal, size):
-    """Ground by .004 and 8 pixels of slope, up to .06 of log depth; other coarse ones by .35 of that. A mean of
-    log depths over 4 x 4 pixels is off by their variance, 1.3 slopes^2 and less, a slope being below .03."""
+    """Ground by .004 and 8 pixels of slope, up to .06 of log depth; other coarse ones by .35 of that. A mean
+    of log depths over 4 x 4 pixels is off by their variance, 1.3 slopes^2 and less, a slope being below .03.
+    """
     sight = Sight.of(normal)
     facing = torch.nn.functional.normalize(torch.tensor(normal), dim=0)
     photo = torch.rand(3, *size)
@@ -206,8 +207,8 @@ def test_the_ground_lies_behind_all_that_lie_on_it(normal, side):
 @pytest.mark.parametrize("normal", SLANTED[:3])
 @pytest.mark.parametrize("side", [2, 8])
 def test_footprints_in_the_own_photo_are_round_and_of_the_side(normal, side):
-    """Deviations of .5 and .85 sides. Thickness adds (.1 tan)^2 of a side^2, by 64 degrees
-    and less; what a pinhole bends within an element, a hundredth."""
+    """Deviations of .5 and .85 sides. Thickness adds up to (.1 side)^2, a twenty-fifth of .5^2 side^2, and a
+    pinhole's bend within an element a hundredth."""
     sight = Sight.of(normal)
     made = sight.coarse(side)
     drawn = project(sight.gaussians(made), sight.camera.resized(96, 72))
@@ -331,7 +332,7 @@ def test_the_farther_surface_goes_on_under_the_nearer_one(dim, sign):
 
 
 def test_under_a_corner_and_behind_a_gap():
-    """At a corner one goes on along the diagonal; what is nearer on both sides, on neither; small steps none."""
+    """At a corner one goes on along the diagonal; between nearer ones, and at small steps, none does."""
     log_depths = torch.zeros(20, 20)
     log_depths[:10, :10] = 1.0
     made = under(log_depths, torch.rand(3, 20, 20), (20, 20))

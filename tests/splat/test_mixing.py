@@ -145,8 +145,9 @@ def test_large_footprints_cost_what_the_picture_has(monkeypatch):
     monkeypatch.setattr(
         module._Table,
         "pairs",
-        lambda table, rows, *of: looked_at.append(len(rows) * int(table.sides[rows[0]]) ** 2)
-        or pairs(table, rows, *of),
+        lambda table, rows, *of: (
+            looked_at.append(len(rows) * int(table.sides[rows[0]]) ** 2) or pairs(table, rows, *of)
+        ),
     )
     places = [(0.0, 0, 1.0), (20.0, 0, 1.0), (0, -20.0, 1.1), (-15.0, 15.0, 1.2)]
     agree(splats(places, 10.0, [0.3, 0.4, 0.5, 0.6]), camera())

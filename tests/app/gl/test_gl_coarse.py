@@ -45,7 +45,7 @@ def aside() -> Camera:
 def pair(gl, scene) -> Iterator[tuple[SplatRenderer, SplatRenderer]]:
     """Renderers of the scene, and of its coarse Gaussians alone."""
     whole, alone = moving_renderer(gl), moving_renderer(gl)
-    whole.set_scene(scene)
+    whole.set_scene(scene, coarse_share(scene))
     alone.set_scene(scene.rows(rows_of(scene)))
     yield whole, alone
     whole.release()
@@ -61,6 +61,7 @@ def test_colours_depth_and_answers_are_theirs(pair, scene):
     assert first.weight_maps is not None and second.weight_maps is not None
     assert torch.equal(first.weight_maps, second.weight_maps) and bool(first.alphas.any())
     assert torch.equal(pair[0].relevance(), pair[1].relevance())
+    assert {*pair[0]._scene._levels} == {coarse_share(scene)}, "no others were uploaded"
     pair[0].draw(aside())
     assert not torch.equal(pair[0].frame().rgb, second.rgb), "and all of them are another picture"
 

@@ -238,6 +238,8 @@ def test_a_scene_with_levels_moves_coarse_and_rests_whole(context, monkeypatch) 
                 marks = first_marks(scene)
                 viewport.mark(scene, delete(marks, Mask.first(marks.selected.count, 90)), None)
         moved = {plan.share for plan in plans if plan is not None}
+        live = viewport._made()._scene
+        assert live is not None and {*live._levels} == {0.25}
         for share in viewport.shares:
             viewport.thin(scene, share, *thin_with_rows(scene, share))
         assert viewport.governor.ladder[2:4] == ((0.75, 0.625), (0.5, 0.625))
