@@ -33,6 +33,8 @@ DETAILS = {
     )
 }
 DEFAULT_DETAIL = "normal"
+EXPORT_DETAILS = ("all", "low")
+"""How much of a scene's detail an export keeps: all, or none, the coarse layer alone."""
 
 
 def chosen_detail(name: str) -> Detail:

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from langflash_core.types import Gaussians, Scene
 
+_THIRD = 1 / 3
 _CELLS = 1 << 10  # a side of the grid that orders Gaussians along a space-filling curve
 
 
@@ -56,6 +57,16 @@ def thin_with_rows(scene: Scene, share: float) -> tuple[Scene, np.ndarray]:
     thinned = scene.rows(kept)
     wider = replace(thinned.gaussians, scales=thinned.gaussians.scales * growth[:, None])
     return replace(thinned, gaussians=wider), rows
+
+
+def coarse_level(scene: Scene) -> Scene:
+    """The scene at its least detail: the coarse Gaussians alone, which are closed; of a scene that does not know
+    its levels, or has one alone, a third, wider. One of less than three Gaussians stays as it is."""
+    share = coarse_share(scene)
+    if share < 1:
+        assert scene.levels is not None
+        return scene.rows(torch.nonzero(scene.levels.cpu() == 0)[:, 0])
+    return thin(scene, _THIRD) if len(scene.gaussians) * _THIRD >= 1 else scene
 
 
 def _leveled(scene: Scene, share: float, coarse: float) -> tuple[Scene, np.ndarray]:

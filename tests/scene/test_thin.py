@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 import torch
 
-from langflash_core.scene.thin import coarse_share, covered_areas, inclusion, thin, thin_with_rows, z_order
+from langflash_core.scene.thin import (
+    coarse_level,
+    coarse_share,
+    covered_areas,
+    inclusion,
+    thin,
+    thin_with_rows,
+    z_order,
+)
 from langflash_core.splat import render
 from tests.app.gl.questions import psnr
 from tests.splat.scenes import camera, cloud
@@ -152,3 +160,21 @@ def test_one_level_is_none(level):
     assert coarse_share(known) == 1
     assert (thin_with_rows(known, 0.25)[1] == thin_with_rows(scene, 0.25)[1]).all()
     assert coarse_share(known.rows(torch.zeros(200, dtype=torch.bool))) == 1
+
+
+def test_the_coarse_level_alone():
+    scene = cloud(900, 5)
+    levels = (torch.arange(900) % 4 > 0).to(torch.uint8)
+    coarse = coarse_level(replace(scene, levels=levels))
+    assert torch.equal(coarse.gaussians.means, scene.gaussians.means[::4])
+    assert torch.equal(coarse.gaussians.scales, scene.gaussians.scales[::4])
+    # Of one level alone, or of none that is known, a third: one draw misses its number by less than one.
+    for known in (None, torch.zeros(900, dtype=torch.uint8), torch.ones(900, dtype=torch.uint8)):
+        third = coarse_level(replace(scene, levels=known))
+        assert 299 <= len(third.gaussians) <= 300
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_what_is_too_small_to_be_thinned_stays(count):
+    scene = cloud(3, 5).rows(torch.arange(count))
+    assert coarse_level(scene) is scene

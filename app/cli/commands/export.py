@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TextIO
 
 from langflash_core.colormaps import HeatColours
+from langflash_core.detail import EXPORT_DETAILS
 from langflash_core.errors import InputError, PromptError, SceneFileError
 from langflash_core.formats import (
     ALL_OUT,
@@ -88,7 +89,7 @@ def write_whole(scene: Scene, path: Path, renderer: Renderer, prompts: Sequence[
     unset = dict.fromkeys(("threshold", "what", "seconds", "path", "span", *looks))
     asked = list(prompts) if suffix in (*ANSWERS_OUT, PAGE_OUT) else []
     off = dict.fromkeys(("with_text", "replace", "fade", "fill"), False)
-    said = {"all_views": suffix == ".csv", "colormap": COLOUR_MAPS[0], **off}
+    said = {"all_views": suffix == ".csv", "colormap": COLOUR_MAPS[0], "detail": EXPORT_DETAILS[0], **off}
     args = Namespace(scene=path.parent, output=path, prompt=asked, backend=renderer, **said, **unset)
     _writer(suffix, None)(args, scene, asked, CameraChoice(0, None, None))
 
@@ -151,6 +152,8 @@ def _check_words(args: Namespace, suffix: str, prompts: list[str]) -> None:
         raise InputError("--colormap and --span colour heat-maps; add --what heat, or leave them away")
     if args.with_text and suffix != PAGE_OUT:
         raise InputError("--with-text is for web pages; name an .html, or leave it away")
+    if args.detail == "low" and (args.what or suffix not in (*SCENES_OUT, PAGE_OUT)):
+        raise InputError("--detail low is for splats, scenes and web pages; name one, or leave it away")
     whole = suffix in (".png", *FILMS_OUT) and args.what in (None, "rgb") and not prompts
     if args.fill and not (whole or args.what == "heat"):
         raise InputError("--fill is for pictures and films of the whole scene and heat-maps; leave it away")
@@ -180,12 +183,12 @@ def _write_scene(args: Namespace, scene: Scene, prompts: list[str], choice: Came
     from langflash_core.export.sog import sog_files
     from langflash_core.files import make_folder
 
-    chosen = _selected(args, scene, prompts)
+    chosen = _selected(args, _as_fine(args, scene), prompts)
     make_folder(args.output.parent)
     export(chosen, args.output)
     if kind_of(args.output) in CAMERAS_OUT:
         return f"{scene.num_views} photos in images/ and their poses"
-    share = f" of {len(scene.gaussians):,}" if prompts else ""
+    share = f" of {len(scene.gaussians):,}" if len(chosen.gaussians) < len(scene.gaussians) or prompts else ""
     beside = f", its language in {side_car(args.output).name}" if _has_side_car(args.output, chosen) else ""
     files = sog_files(args.output) if kind_of(args.output) == SOG_FOLDER else [args.output]
     megabytes = sum(file.stat().st_size for file in files) / 1e6
@@ -197,11 +200,12 @@ def _write_page(args: Namespace, scene: Scene, prompts: list[str], choice: Camer
     from langflash_core import pipeline
     from langflash_core.files import make_folder
 
+    shown = _as_fine(args, scene)
     with ProgressBar() as progress:
         progress("reading the vocabulary", 0.2)
         make_folder(args.output.parent)
         phrases = pipeline.web_page(
-            scene,
+            shown,
             args.output,
             prompts,
             threshold=args.threshold,
@@ -210,11 +214,18 @@ def _write_page(args: Namespace, scene: Scene, prompts: list[str], choice: Camer
         )
     known = "any phrase" if args.with_text else f"{len(phrases.texts)} phrases" if phrases else ""
     answers = f", answers {known}" if known else ""
-    return f"{len(scene.gaussians):,} Gaussians, {args.output.stat().st_size / 1e6:.1f} MB{answers}"
+    share = f" of {len(scene.gaussians):,}" if shown is not scene else ""
+    return f"{len(shown.gaussians):,}{share} Gaussians, {args.output.stat().st_size / 1e6:.1f} MB{answers}"
 
 
 def _has_side_car(path: Path, scene: Scene) -> bool:
     return kind_of(path) == ".ply" and scene.semantics.num_atoms > 0
+
+
+def _as_fine(args: Namespace, scene: Scene) -> Scene:
+    from langflash_core.scene.thin import coarse_level
+
+    return coarse_level(scene) if args.detail == "low" else scene
 
 
 def _selected(args: Namespace, scene: Scene, prompts: list[str]) -> Scene:

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from langflash_core.detail import EXPORT_DETAILS
+
 from ..values import (
     above_zero,
     film_seconds,
@@ -227,6 +229,13 @@ def add_export(commands) -> None:
     )
     command.add_argument(
         "--with-text", action="store_true", help="an .html answers any phrase, and is 28 MB larger"
+    )
+    command.add_argument(
+        "--detail",
+        choices=EXPORT_DETAILS,
+        default=EXPORT_DETAILS[0],
+        help="of Gaussians and web pages: low keeps the coarse ones alone, for small files and slow machines; "
+        f"of a scene without levels a third, wider (default: {EXPORT_DETAILS[0]})",
     )
     command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of a video (default: 6)")
     command.add_argument(

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from langflash_core.export import READERS, WRITERS, export, read
 from langflash_core.export.language import side_car
 from langflash_core.formats import ALL_OUT
 from langflash_core.language.spaces import language_space
+from langflash_core.scene.file import save
 from langflash_core.types import Scene
 from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, stripes
 from tests.export.pages import read_page
@@ -374,3 +376,71 @@ def test_memory_grows_by_the_splat_and_not_more(tmp_path):
     parts = 64e6  # file rows read at once, 32 MB, and what is made of them
     assert loaded < 300 * NUM_LARGE + parts
     assert drawn < 1000 * NUM_LARGE + parts
+
+
+def leveled() -> Scene:
+    """Stripes of which every second Gaussian is coarse, and larger."""
+    scene = stripes()
+    levels = (torch.arange(len(scene.gaussians)) % 2).to(torch.uint8)
+    wide = scene.gaussians.scales * torch.where(levels == 0, 1.5, 1.0)[:, None]
+    return replace(scene, levels=levels, gaussians=replace(scene.gaussians, scales=wide))
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".splat", ".langflash", ".html"])
+def test_the_least_detail_is_the_coarse_layer(run, tmp_path, suffix):
+    save(leveled(), tmp_path / "fine.langflash")
+    low, whole = tmp_path / f"low{suffix}", tmp_path / f"whole{suffix}"
+    outcome = run("export", tmp_path / "fine.langflash", "-o", low, "--detail", "low")
+    coarse, count = WIDTH * HEIGHT // 2, WIDTH * HEIGHT
+    assert outcome.code == 0 and f"{coarse:,} of {count:,} Gaussians" in outcome.out, outcome
+    for words in ((), ("--detail", "all")):
+        outcome = run("export", tmp_path / "fine.langflash", "-o", whole, *words)
+        assert outcome.code == 0 and f": {count:,} Gaussians" in outcome.out, outcome
+    assert low.stat().st_size < whole.stat().st_size
+    if suffix == ".html":
+        assert read_page(low).header["count"] == coarse
+    else:
+        again = read(low).gaussians
+        assert torch.equal(again.means, stripes().gaussians.means[::2])
+        assert float(again.scales.min()) == pytest.approx(0.03, rel=2**-11)  # float16 of the scene file
+
+
+def test_the_least_detail_of_what_answers(run, tmp_path):
+    """A third of the stripes is one word's: of its coarse ones all and no other is written."""
+    save(leveled(), tmp_path / "fine.langflash")
+    words = ("--prompt", "armchair", "--detail", "low")
+    outcome = run("export", tmp_path / "fine.langflash", "-o", tmp_path / "low.ply", *words)
+    assert outcome.code == 0, outcome.err
+    armchair = leveled().semantics.weight_ids[::2, 0] == 0
+    assert torch.equal(read(tmp_path / "low.ply").gaussians.means, stripes().gaussians.means[::2][armchair])
+
+
+def test_the_least_detail_of_a_scene_without_levels_is_a_third(run, ply_file, tmp_path):
+    outcome = run("export", ply_file, "-o", tmp_path / "low.ply", "--detail", "low")
+    third = WIDTH * HEIGHT // 3
+    assert outcome.code == 0 and f"{third:,} of {WIDTH * HEIGHT:,} Gaussians" in outcome.out, outcome
+    # Equal ones are kept with equal chances, and cover together what they did: their axes grow by 3 ** 0.5.
+    assert read(tmp_path / "low.ply").gaussians.scales.numpy() == pytest.approx(0.02 * 3**0.5, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("-o", "a.png"),
+        ("-o", "transforms.json"),
+        ("-o", "a.npz"),
+        ("-o", "a.mp4"),
+        ("-o", "a.json", "--prompt", "armchair"),
+        ("-o", "a.glb", "--what", "boxes", "--prompt", "armchair"),
+        ("-o", "a.glb", "--what", "surface", "--prompt", "armchair"),
+        ("-o", "folder", "--segmented", "--prompt", "armchair"),
+    ],
+)
+def test_the_least_detail_is_of_gaussians_alone(refused, scene_file, tmp_path, words):
+    said = refused("export", scene_file, "-o", tmp_path / words[1], *words[2:], "--detail", "low")
+    assert "--detail low is for splats, scenes and web pages" in said
+
+
+def test_a_detail_that_is_unknown_is_named(refused, scene_file, tmp_path):
+    said = refused("export", scene_file, "-o", tmp_path / "a.ply", "--detail", "tiny")
+    assert "tiny" in said and "low" in said
