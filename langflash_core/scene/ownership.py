@@ -3,8 +3,8 @@ twice.
 
 Photos come in their order: the first that sees a surface has it, and each later one takes it over where
 it sees it finer by `_FINER` than who has it. All pixels that show one surface thus find the same photo, so
-that one of them stays, whatever the number of photos. What stands before a surface that another photo knows better is given up as well
-(`consistency.seen_through`).
+that one of them stays, whatever the number of photos. What stands before a surface that another photo
+knows better is given up as well (`consistency.seen_through`).
 
 Sizes: V views, H W cells of the grid.
 """
