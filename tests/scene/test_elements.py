@@ -11,6 +11,7 @@ from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid, r
 from langflash_core.geometry.harmonics import sh_to_colour
 from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.scene.blocks import Squares
+from langflash_core.scene.elements import _UNDER as UNDER
 from langflash_core.scene.elements import (
     COARSE,
     FINE,
@@ -309,7 +310,8 @@ def test_no_square_no_element():
 
 @pytest.mark.parametrize(("dim", "sign"), [(1, 1), (1, -1), (0, 1), (0, -1)])
 def test_the_farther_surface_goes_on_under_the_nearer_one(dim, sign):
-    """One element a cell before the jump, five cells towards the nearer side, in the farther one's depth."""
+    """One element a cell before the jump, half of what it goes on by towards the nearer side, in the farther
+    one's depth."""
     log_depths = torch.full((24, 24), 1.0)
     nearer = torch.arange(24) >= 14 if sign > 0 else torch.arange(24) < 10
     log_depths[:, nearer] = 0.0
@@ -320,7 +322,7 @@ def test_the_farther_surface_goes_on_under_the_nearer_one(dim, sign):
     assert torch.equal(made.log_depths, torch.ones(24))
     before = 13 if sign > 0 else 10
     across, along = (made.x, made.y) if dim == 1 else (made.y, made.x)
-    assert across.tolist() == pytest.approx([3 * (before + 0.5 + sign * 5)] * 24)
+    assert across.tolist() == pytest.approx([3 * (before + 0.5 + sign * UNDER / 2)] * 24)
     assert sorted(along.tolist()) == pytest.approx([3 * (k + 0.5) for k in range(24)])
     row, column = made.cells // 24, made.cells % 24
     assert ((column if dim == 1 else row) == before).all()
@@ -338,8 +340,8 @@ def test_under_a_corner_and_behind_a_gap():
     log_depths[:10, :10] = 1.0
     made = under(log_depths, torch.rand(3, 20, 20), (20, 20))
     corner = int((made.cells == 9 * 20 + 9).nonzero())
-    assert float(made.x[corner]) == pytest.approx(9.5 + 5 / 2**0.5)
-    assert float(made.y[corner]) == pytest.approx(9.5 + 5 / 2**0.5)
+    assert float(made.x[corner]) == pytest.approx(9.5 + UNDER / 2 / 2**0.5)
+    assert float(made.y[corner]) == pytest.approx(9.5 + UNDER / 2 / 2**0.5)
     slit = torch.zeros(20, 20)
     slit[:, 7] = 1.0
     assert len(under(slit, torch.rand(3, 20, 20), (20, 20))) == 0
