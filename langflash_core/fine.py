@@ -31,7 +31,7 @@ def fine_scene(
     *,
     gaussians: int | None,
     preset: str,
-    progress: Progress,
+    progress: Progress = lambda stage, fraction: None,
 ) -> tuple[Scene, Light]:
     """The scene of a prediction whose depth maps are surfaces, and the light its photos were brought to.
 
