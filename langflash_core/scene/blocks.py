@@ -1,9 +1,9 @@
 """Which squares of a photo become one element each: a quadtree, fine where the photo has detail.
 
 A square is parted in four where that brings the photo's colours nearer by enough, where depth jumps
-inside it or less than its side away, and where its middle is off the plane of its corners; so flat walls are
-covered by few elements and edges by one a pixel. What all photos may spend together is shared out by what a
-parting gains: the largest gains first.
+inside it, and where its middle is off the plane of its corners; so flat walls are covered by few elements
+and edges by one a pixel. What all photos may spend together is shared out by what a parting gains: the
+largest gains first.
 
 Sizes: h w pixels of the photo, padded to multiples of `LARGEST`; level l has squares of 2^l pixels.
 
@@ -130,14 +130,12 @@ def _fours(values: Tensor) -> Tensor:
 
 
 def _jumping(jumps: tuple[Tensor, Tensor], level: int) -> Tensor:
-    """Squares of the level inside which depth jumps, or less than a side away: they would reach across."""
+    """Squares of the level inside which depth jumps."""
     side = 2**level
-    kernels = (3 * side, 3 * side - 1), (3 * side - 1, 3 * side)  # jumps lie between two pixels
-    across, down = (
-        F.max_pool2d(along.float()[None], kernel, side, side)[0] > 0
-        for along, kernel in zip(jumps, kernels, strict=True)
-    )
-    return across | down
+    across, down = jumps[0].clone(), jumps[1].clone()
+    across[:, side - 1 :: side], down[side - 1 :: side] = False, False
+    inside = F.pad(across.float(), (0, 1)) + F.pad(down.float(), (0, 0, 0, 1))
+    return F.max_pool2d(inside[None, None], side)[0, 0] > 0
 
 
 def _bent(depths: Tensor, side: int) -> Tensor:

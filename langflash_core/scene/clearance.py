@@ -14,8 +14,8 @@ from langflash_core.scene.upsampling import JUMP
 
 
 def clearances(log_depths: Tensor) -> Tensor:
-    """(h, w) pixels from the middle of each to the nearest end of its own surface, at least a half; of a surface
-    that only ends under nearer ones, endless.
+    """(h, w) pixels from the middle of each to the nearest end of a surface, at least a half; endless where
+    that is the end of a nearer one, behind which its own goes on.
 
     Args:
         log_depths: (h, w).

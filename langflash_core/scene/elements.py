@@ -148,8 +148,8 @@ def _ground_of(
 
 
 def drawn_in(elements: Elements, clear: Tensor) -> Elements:
-    """Those that reach over the end of their surface, `clear` (h, w) pixels away, drawn in: two deviations stay
-    on it, of what is wider than a pixel."""
+    """Those that reach over the end of their surface, `clear` (h, w) pixels away, drawn in: two deviations
+    along rows and columns stay on it, of what is wider than a pixel."""
     l11, l21, l22 = elements.roots.unbind(-1)
     widest = torch.maximum(l11, torch.hypot(l21, l22))
     room = (clear.flatten()[elements.pixels] / 2).clamp_min(_NARROWEST)

@@ -50,8 +50,8 @@ def owned(depths: Tensor, viewmats: Tensor, Ks: Tensor, known: Tensor | None = N
 
 
 def covered(depths: Tensor, viewmats: Tensor, Ks: Tensor, keep: Tensor) -> Tensor:
-    """(V, H, W) bool: cells of each photo in which, or beside which, what is kept lies at about their depth or
-    before it.
+    """(V, H, W) bool: cells of each photo in which, or beside which, what is kept lies at about their depth
+    or before it.
 
     Args:
         depths, viewmats, Ks: as `owned`. keep: (V, H, W) bool.

@@ -60,8 +60,8 @@ def thin_with_rows(scene: Scene, share: float) -> tuple[Scene, np.ndarray]:
 
 
 def coarse_level(scene: Scene) -> Scene:
-    """The scene at its least detail: the coarse Gaussians alone, which are closed; of a scene that does not know
-    its levels, or has one alone, a third, wider. One of less than three Gaussians stays as it is."""
+    """The scene at its least detail: the coarse Gaussians alone, which are closed; of a scene that does not
+    know its levels, or has one alone, a third, wider. One of less than three Gaussians stays as it is."""
     share = coarse_share(scene)
     if share < 1:
         assert scene.levels is not None

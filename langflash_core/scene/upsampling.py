@@ -1,9 +1,8 @@
-"""Depth of the network's grid at the photo's size: guided by the photo, cut at edges, never blended
-across.
+"""Depth of the network's grid at the photo's size: guided by the photo, cut at edges, never blended across.
 
-Where a cell and its neighbours are one surface, inverse depth is interpolated (of a plane, that is
-exact). Where depth jumps or falls steeply, a pixel takes the depth of one cell, the one whose colour it has, continued by
-that cell's own slope.
+Where a cell and its neighbours are one surface, inverse depth is interpolated (of a plane, that is exact).
+Where depth jumps or falls steeply, a pixel takes the depth of one cell, the one whose colour it has,
+continued by that cell's own slope.
 
 Sizes: H W cells of the grid, h w pixels of the photo.
 

@@ -66,7 +66,7 @@ def test_the_record_adds_up(given, scene):
     detail = record.detail
     assert scene.levels is not None
     assert (detail["level"], detail["elements"], detail["photo_size"]) == ("normal", count, [120, 90])
-    assert detail["asked"] == round(NORMAL.share * GRID[0] * GRID[1] * 5 / 4)
+    assert detail["asked"] == round(NORMAL.most * GRID[0] * GRID[1] * 5 / 4)
     assert detail["coarse"] + detail["fine"] == count
     assert detail["fine"] == int(scene.levels.sum()) == detail["by_size"]["1"] + detail["by_size"]["2"]
     goes_on_behind = count - sum(detail["by_size"].values())

@@ -1,6 +1,6 @@
 """Elements close the surfaces they lie on, with the right depth, normal and order."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -11,11 +11,13 @@ from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid, r
 from langflash_core.geometry.harmonics import sh_to_colour
 from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.scene.blocks import Squares
+from langflash_core.scene.elements import _UNDER as UNDER
 from langflash_core.scene.elements import (
     COARSE,
     FINE,
     OPACITY,
     Elements,
+    drawn_in,
     ground,
     joined,
     of_squares,
@@ -161,8 +163,7 @@ def test_fine_elements_lie_on_the_plane_and_face_along_it(normal, ratio):
 @pytest.mark.parametrize("size", [(72, 96), (69, 91), (71, 95)])
 def test_depths_of_all_are_those_of_the_plane_but_for_what_lies_behind(normal, size):
     """Ground by .004 and 8 pixels of slope, up to .06 of log depth; other coarse ones by .35 of that. A mean
-    of log depths over 4 x 4 pixels is off by their variance, 1.3 slopes^2 and less, a slope being below .03.
-    """
+    of log depths over 4 x 4 pixels is off by their variance, up to 1.3 slopes^2, slopes being below .03."""
     sight = Sight.of(normal)
     facing = torch.nn.functional.normalize(torch.tensor(normal), dim=0)
     photo = torch.rand(3, *size)
@@ -207,8 +208,8 @@ def test_the_ground_lies_behind_all_that_lie_on_it(normal, side):
 @pytest.mark.parametrize("normal", SLANTED[:3])
 @pytest.mark.parametrize("side", [2, 8])
 def test_footprints_in_the_own_photo_are_round_and_of_the_side(normal, side):
-    """Deviations of .5 and .85 sides. Thickness adds up to (.1 side)^2, a twenty-fifth of .5^2 side^2, and a
-    pinhole's bend within an element a hundredth."""
+    """Deviations of .5 and .85 sides. Thickness adds (.1 tan)^2 of a side^2, by 64 degrees
+    and less; what a pinhole bends within an element, a hundredth."""
     sight = Sight.of(normal)
     made = sight.coarse(side)
     drawn = project(sight.gaussians(made), sight.camera.resized(96, 72))
@@ -309,7 +310,8 @@ def test_no_square_no_element():
 
 @pytest.mark.parametrize(("dim", "sign"), [(1, 1), (1, -1), (0, 1), (0, -1)])
 def test_the_farther_surface_goes_on_under_the_nearer_one(dim, sign):
-    """One element a cell before the jump, five cells towards the nearer side, in the farther one's depth."""
+    """One element a cell before the jump, half of what it goes on by towards the nearer side, in the farther
+    one's depth."""
     log_depths = torch.full((24, 24), 1.0)
     nearer = torch.arange(24) >= 14 if sign > 0 else torch.arange(24) < 10
     log_depths[:, nearer] = 0.0
@@ -320,7 +322,7 @@ def test_the_farther_surface_goes_on_under_the_nearer_one(dim, sign):
     assert torch.equal(made.log_depths, torch.ones(24))
     before = 13 if sign > 0 else 10
     across, along = (made.x, made.y) if dim == 1 else (made.y, made.x)
-    assert across.tolist() == pytest.approx([3 * (before + 0.5 + sign * 5)] * 24)
+    assert across.tolist() == pytest.approx([3 * (before + 0.5 + sign * UNDER / 2)] * 24)
     assert sorted(along.tolist()) == pytest.approx([3 * (k + 0.5) for k in range(24)])
     row, column = made.cells // 24, made.cells % 24
     assert ((column if dim == 1 else row) == before).all()
@@ -332,13 +334,14 @@ def test_the_farther_surface_goes_on_under_the_nearer_one(dim, sign):
 
 
 def test_under_a_corner_and_behind_a_gap():
-    """At a corner one goes on along the diagonal; between nearer ones, and at small steps, none does."""
+    """At a corner one goes on along the diagonal; what is nearer on both sides, on neither; small steps
+    none."""
     log_depths = torch.zeros(20, 20)
     log_depths[:10, :10] = 1.0
     made = under(log_depths, torch.rand(3, 20, 20), (20, 20))
     corner = int((made.cells == 9 * 20 + 9).nonzero())
-    assert float(made.x[corner]) == pytest.approx(9.5 + 5 / 2**0.5)
-    assert float(made.y[corner]) == pytest.approx(9.5 + 5 / 2**0.5)
+    assert float(made.x[corner]) == pytest.approx(9.5 + UNDER / 2 / 2**0.5)
+    assert float(made.y[corner]) == pytest.approx(9.5 + UNDER / 2 / 2**0.5)
     slit = torch.zeros(20, 20)
     slit[:, 7] = 1.0
     assert len(under(slit, torch.rand(3, 20, 20), (20, 20))) == 0
@@ -370,6 +373,44 @@ def test_numbers_stay_finite(kind):
         assert torch.isfinite(values).all()
     assert (drawn.scales > 0).all() and (drawn.means[:, 2] > 0).all()
     assert torch.allclose(drawn.quats.norm(dim=-1), torch.ones(len(drawn)), atol=FLOAT32)
+
+
+def deviations(made: Elements) -> np.ndarray:
+    """(n, 2) pixels along rows and columns, of the covariances."""
+    l11, l21, l22 = made.roots.double().numpy().T
+    lower = np.stack((np.stack((l11, 0 * l11), -1), np.stack((l21, l22), -1)), -2)
+    return np.sqrt(np.diagonal(lower @ lower.swapaxes(1, 2), axis1=1, axis2=2))
+
+
+@pytest.mark.parametrize("side", [1, 4, 16])
+def test_drawn_in_two_deviations_stay_on_the_surface(side):
+    """Those with room stay to the last bit; others keep their shape, and all but their size; ground too."""
+    sight = Sight.of()
+    made = sight.fine(side) if side == 1 else sight.coarse(side)
+    generator = torch.Generator().manual_seed(0)
+    lean = torch.rand(len(made), generator=generator) * made.roots[:, 0]
+    made = replace(made, roots=torch.stack((made.roots[:, 0], lean, made.roots[:, 2]), -1))
+    clear = 0.5 + 40 * torch.rand(sight.size, generator=generator) ** 2
+    clear[:, 30:60] = torch.inf
+    kept, found = made.roots.clone(), drawn_in(made, clear)
+    room = clear.flatten()[made.pixels].numpy() / 2
+    before, after = deviations(made).max(1), deviations(found).max(1)
+    np.testing.assert_allclose(after, np.minimum(before, np.maximum(room, 0.6)), rtol=FLOAT32)
+    fits = torch.from_numpy(before < np.maximum(room, 0.6) * (1 - FLOAT32))
+    assert fits.any() and (side == 1 or not fits.all())
+    assert torch.equal(found.roots[fits], made.roots[fits])
+    shape = (after / before)[:, None]
+    np.testing.assert_allclose(found.roots.numpy(), made.roots.numpy() * shape, rtol=FLOAT32)
+    for name in vars(made).keys() - {"roots"}:
+        assert getattr(found, name) is getattr(made, name)
+    assert torch.equal(made.roots, kept)
+
+
+def test_drawn_in_nothing_ends_and_nothing_is_there():
+    sight = Sight.of()
+    made, clear = sight.coarse(8), torch.full(sight.size, torch.inf)
+    assert torch.equal(drawn_in(made, clear).roots, made.roots)
+    assert len(drawn_in(made.rows(made.x < 0), clear)) == 0
 
 
 def test_rows_and_joined():

@@ -27,7 +27,7 @@ def two_sides(columns: Tensor, edge: float, near: float = 1.0, far: float = 2.0)
 
 
 @pytest.mark.parametrize(("grid", "size"), SIZES)
-@pytest.mark.parametrize("slopes", [(0.0, 0.0), (0.01, 0.0), (-0.004, 0.02), (0.02, 0.02)])
+@pytest.mark.parametrize("slopes", [(0.0, 0.0), (0.01, 0.0), (-0.004, 0.02), (0.01, 0.01)])
 def test_a_plane_is_exact(grid, size, slopes):
     """To its outermost pixels, whatever the ratio: inverse depth is linear in the picture."""
     depth = upsampled(
@@ -128,7 +128,8 @@ def step(inverse: np.ndarray, row: int, column: int, dim: int) -> float:
 
 def plain_chosen(logs: np.ndarray, image: np.ndarray, photo: np.ndarray, y: int, x: int) -> tuple[int, float]:
     """Cell and inverse depth of one pixel beside a jump: of the nine cells around the one it lies in, the
-    one that is likest in colour and nearest, standard deviations .06 of a channel and .6 cells."""
+    one that is likest in colour and nearest, standard deviations .06 of a channel and .6 cells, and falls
+    least steeply, 4 % a cell."""
     inverse, (height, width) = np.exp(-logs), logs.shape
     at_y, at_x = (y + 0.5) * height / photo.shape[1], (x + 0.5) * width / photo.shape[2]
     best, found = math.inf, (0, 0.0)
@@ -137,9 +138,11 @@ def plain_chosen(logs: np.ndarray, image: np.ndarray, photo: np.ndarray, y: int,
             to_y, to_x = at_y - row - 0.5, at_x - column - 0.5
             cost = ((image[:, row, column] - photo[:, y, x]) ** 2).sum() / 3 / (2 * 0.06**2)
             cost += (to_y**2 + to_x**2) / (2 * 0.6**2)
+            across, down = step(inverse, row, column, 1), step(inverse, row, column, 0)
+            cost += (across**2 + down**2) / (0.04 * inverse[row, column]) ** 2
             if cost < best:
                 there = inverse[row, column]
-                value = there + step(inverse, row, column, 1) * to_x + step(inverse, row, column, 0) * to_y
+                value = there + across * to_x + down * to_y
                 best, found = cost, (row * width + column, min(max(value, 0.9 * there), 1.1 * there))
     return found
 

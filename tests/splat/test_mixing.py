@@ -138,8 +138,8 @@ def test_footprints_larger_than_the_picture(scale, flat):
 
 
 def test_large_footprints_cost_what_the_picture_has(monkeypatch):
-    """A surface that another photo has close before its lens: 4,900 pixels wide, of which 48 x 40 are looked at,
-    in squares of the next larger class, 64 pixels here."""
+    """A surface that another photo has close before its lens: 4,900 pixels wide, of which 48 x 40 are looked
+    at, in squares of the next larger class, 64 pixels here."""
     looked_at = []
     pairs = module._Table.pairs
     monkeypatch.setattr(

@@ -234,7 +234,7 @@ def add_export(commands) -> None:
         "--detail",
         choices=EXPORT_DETAILS,
         default=EXPORT_DETAILS[0],
-        help="of Gaussians and web pages: low keeps the coarse ones alone, for small files and slow machines; "
+        help="of Gaussians and web pages: low keeps the coarse ones alone, for small files, slow machines; "
         f"of a scene without levels a third, wider (default: {EXPORT_DETAILS[0]})",
     )
     command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of a video (default: 6)")

@@ -168,7 +168,7 @@ def _triangulated(
     log_depths: Tensor, matches: _Matches, K: Tensor, other_K: Tensor, pose: Tensor
 ) -> tuple[Tensor, Tensor]:
     """Changes of log depth (h, w) that bring each pixel nearest to its match, and pixels (2, h, w) that the
-    match moves for one unit of it; 0 both where no depth does.
+    match moves for one unit nearer; 0 both where no depth does.
 
     With the ray a and the shift t in the other's frame, a point at inverse depth r is seen at a + r t: of
     each coordinate q, (q a_z - a_x) = r (t_x - q t_z), solved for r by least squares over both.

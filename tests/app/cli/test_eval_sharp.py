@@ -30,17 +30,19 @@ def test_a_pair_is_judged_kept_and_judged_beside_what_was_kept(run, pair, tmp_pa
     (row,) = document["cases"]
     width, height = row["size"]
     assert row["name"] == "toy" and row["grid"][0] < width <= 120 and height <= 90
-    plain, grid = (document["measures"][column]["photos"] for column in ("plain", "grid"))
-    assert 10 < plain["psnr"] < grid["psnr"] and plain["detail"] < 1 and 0 < plain["opaque"] < 1
+    columns = ("plain", "normal", "grid")
+    plain, normal, grid = (document["measures"][column]["photos"] for column in columns)
+    assert 10 < plain["psnr"] < min(normal["psnr"], grid["psnr"])
+    assert plain["detail"] < 1 and 0 < plain["opaque"] < 1
     file = kept / "plain" / "toy.langflash"
     assert document["measures"]["plain"]["once"]["bytes"] == file.stat().st_size
     bands = np.asarray(Image.open(sheet))
-    # Photo, plain, grid; whole and from near, each under a caption.
-    assert bands.shape[1] >= 3 * width and bands.shape[0] > 2 * (height - 3) and bands.std() > 10
+    # Photo, plain, normal, grid; whole and from near, each under a caption.
+    assert bands.shape[1] >= 4 * width and bands.shape[0] > 2 * (height - 3) and bands.std() > 10
     table = tmp_path / "new" / "table.md"
-    again = run(*words[:2], *sorted(pair.iterdir()), *words[3:], "--beside", kept / "plain", "-o", table)
+    again = run(*words[:2], *sorted(pair.iterdir()), *words[3:], "--beside", kept / "normal", "-o", table)
     assert again.code == 0 and again.out == table.read_text()
-    assert "| measure | photo through the grid | plain | other version |" in again.out
+    assert "| measure | photo through the grid | plain | normal | other version |" in again.out
     change = next(line for line in again.out.splitlines() if line.startswith("| The photos' own places"))
     assert change.endswith("| +0.00 |")  # the same version; one pair has no standard error
 

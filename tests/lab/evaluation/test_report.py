@@ -70,7 +70,7 @@ def test_a_report_holds_every_number_and_goes_on_where_it_stopped(folder, progra
     plain = sharp_pairs.result["measures"]["plain"]
     low, high = sharp_pairs.intervals["measures/plain/photos/psnr"]
     assert low <= plain["photos"]["psnr"] <= high and plain["between"]["seen"] > 0.5
-    assert sharp_pairs.tables[0].header == ("measure", "photo through the grid", "plain")
+    assert sharp_pairs.tables[0].header == ("measure", "photo through the grid", "plain", "normal")
     assert len(pairs.scenes) == len(sharp_pairs.scenes) == len(photos.scenes) == 2
     assert pairs.scenes[0].worth <= pairs.scenes[1].worth  # failures first
     before = len(program)

@@ -13,7 +13,7 @@ from langflash_core.errors import InputError, SceneFileError
 from langflash_core.lab.evaluation import sharp
 from langflash_core.lab.evaluation.drawing import drawn_frame
 from langflash_core.lab.evaluation.posed import Triple
-from langflash_core.lab.evaluation.sharp import Bench, make_scene, run_sharp
+from langflash_core.lab.evaluation.sharp import PLAIN, Bench, make_scene, run_sharp
 from langflash_core.lab.evaluation.sharp_subjects import (
     MOST,
     pair_subjects,
@@ -58,7 +58,8 @@ def program(folder: PhotoFolder, monkeypatch):
 
 
 def judged(folder: PhotoFolder, **options) -> dict:
-    return run_sharp(posed_subjects(folder, TRIPLES), 2, Bench(render, **options))
+    """Made in one way: what makes scenes here knows no others."""
+    return run_sharp(posed_subjects(folder, TRIPLES), 2, Bench(render, ways=(PLAIN,), **options))
 
 
 def test_the_truth_is_near_its_photo_and_as_far_as_the_grid(folder, program):
@@ -92,14 +93,15 @@ def test_without_depths_or_a_place_for_the_second_photo(folder, program, tmp_pat
     bare = write_folder(tmp_path / "photos", 7)
     for path in (bare.root / "depths").iterdir():
         path.unlink()
-    row = run_sharp(posed_subjects(bare, TRIPLES[:1]), 1, Bench(render))["measures"]["plain"]
+    bench = Bench(render, ways=(PLAIN,))
+    row = run_sharp(posed_subjects(bare, TRIPLES[:1]), 1, bench)["measures"]["plain"]
     assert row["between"]["psnr"] > 15 and "seen" not in row["between"]  # the whole picture, holes black
     program.change = lambda scene: replace(
         scene.rows(torch.arange(56 * 42)), viewmats=scene.viewmats[:1], Ks=scene.Ks[:1]
     )
     alone = judged(folder)["measures"]["plain"]
     assert alone["photos"]["psnr"] > 20 and alone["between"]["psnr"] > 10
-    without = run_sharp(posed_subjects(bare, TRIPLES[:1]), 1, Bench(render))["measures"]["plain"]
+    without = run_sharp(posed_subjects(bare, TRIPLES[:1]), 1, bench)["measures"]["plain"]
     assert "between" not in without
 
 
@@ -131,7 +133,7 @@ def test_scenes_of_another_size_are_not_beside(folder, program, tmp_path):
         judged(folder, beside=tmp_path / "plain")
 
 
-def test_ways_that_are_not_there_are_refused(folder, program):
+def test_ways_that_are_not_there_are_refused():
     with pytest.raises(InputError, match="the detail 'finest' is unknown"):
         make_scene([], "finest")
     with pytest.raises(InputError, match="at least one pair"):
@@ -141,7 +143,7 @@ def test_ways_that_are_not_there_are_refused(folder, program):
 def test_pictures_are_shown_with_the_photo_first(folder, program):
     seen = {}
     run_sharp(posed_subjects(folder, TRIPLES[:1]), 1, Bench(render), shown=seen.__setitem__)
-    assert list(seen["001-007"]) == ["photo", "plain", "grid"]
+    assert list(seen["001-007"]) == ["photo", "plain", "normal", "grid"]
     assert {tuple(p.shape) for p in seen["001-007"].values()} == {(84, 112, 3)}
 
 
