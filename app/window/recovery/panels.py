@@ -20,8 +20,8 @@ _LABELS = 190.0  # design pixels
 _EDITS_OFFER = 470.0  # design pixels wide
 _OFFER = 480.0  # design pixels
 _DETAIL_TIP = (
-    "How fine the next scene of photos is\nnormal: about 120,000 Gaussians for two photos\n"
-    "high: twice as many, slower to draw\nlow: less than half, quicker to draw"
+    "How fine the next scene of photos is\nnormal: some 140,000 Gaussians for two photos\n"
+    "high: 1.4 times as many, slower to draw\nlow: a third, quicker to draw"
 )
 
 
