@@ -57,7 +57,6 @@ def fine_scene(
     views = replace(views, images=light.corrected(views.images).clamp(0, 1))
     progress("elements", 0.1)
     scene = assemble_detailed(prediction, views, photos, detail, gaussians=gaussians, preset=preset)
-    progress("colours", 0.4)
     solving = time.perf_counter()
     solved = solved_colours(
         scene.gaussians,
@@ -65,6 +64,7 @@ def fine_scene(
         [scene.camera(v, photo.shape[-1], photo.shape[-2]) for v, photo in enumerate(photos)],
         photos,
         ringing=_RINGING,
+        progress=lambda done: progress("colours", 0.4 + 0.5 * done),
     )
     sh = colour_to_sh(solved.colours)[:, None]
     scene = replace(scene, gaussians=replace(scene.gaussians, sh=sh))

@@ -13,7 +13,7 @@ w pixels of a photo.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -31,6 +31,7 @@ _LEAST = 0.5  # of a pixel's light, from which a picture says what is wrong ther
 _WINDOWS, _FINE = (5, 13), 1.5
 """Sides of what is around a Gaussian, pixels, below and from a deviation on."""
 _STEP = 0.5 / 255  # to which the photo is rounded there
+_OF_VIEWS = 0.75  # of the time, for which contributions are listed
 _SEEN = 0.05  # contributions of a Gaussian over all pixels, below which its colour stays
 
 
@@ -51,6 +52,7 @@ def solved_colours(
     trusts: Sequence[Tensor] | None = None,
     rounds: int = ROUNDS,
     ringing: float | None = None,
+    progress: Callable[[float], None] = lambda done: None,
 ) -> Solved:
     """Colours of Gaussians from all their photos.
 
@@ -61,18 +63,22 @@ def solved_colours(
         trusts: (N,) >= 0 of each view, what its photo counts for a Gaussian; None: 1.
         ringing: how far colours may leave what the photos show around a Gaussian, in parts of how much that
             differs; None: within [0, 1], as far as they like.
+        progress: called with the share that is done, before every view and every round; what it raises ends
+            the work there.
     """
-    views = [
-        _View.of(gaussians, camera, photo, trust)
-        for camera, photo, trust in zip(cameras, photos, trusts or [None] * len(photos), strict=True)
-    ]
+    given = list(zip(cameras, photos, trusts or [None] * len(photos), strict=True))
+    views = []
+    for camera, photo, trust in given:
+        progress(_OF_VIEWS * len(views) / len(given))
+        views.append(_View.of(gaussians, camera, photo, trust))
     colours = start.detach().cpu().numpy().astype(np.float32)
     total = np.sum([view.sums for view in views], axis=0)
     scale = np.where(total > _SEEN, 1 / np.maximum(total, _SEEN), 0.0)[:, None].astype(np.float32)
     low, high = _bounds(views, colours, ringing)
     before = [view.error(colours) for view in views]
     ahead, pace = colours, 1.0
-    for _ in range(rounds):
+    for number in range(rounds):
+        progress(_OF_VIEWS + (1 - _OF_VIEWS) * number / rounds)
         step = np.sum([view.carried_back(ahead) for view in views], axis=0)
         found = np.clip(ahead + scale * step, low, high)
         following = (1 + math.sqrt(1 + 4 * pace * pace)) / 2

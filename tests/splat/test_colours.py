@@ -262,3 +262,20 @@ def test_photos_and_cameras_are_as_many():
     gaussians, colours = scene(3)
     with pytest.raises(ValueError, match="zip"):
         solved_colours(gaussians, colours, views(2), [torch.rand(3, 40, 48)])
+
+
+def test_every_view_and_round_is_told_and_may_be_the_last():
+    gaussians, colours = scene(50)
+    cameras = views(2)
+    photos = [picture(gaussians, colours, seen)[0] for seen in cameras]
+    told: list[float] = []
+    solved_colours(gaussians, grey(colours), cameras, photos, progress=told.append)
+    assert len(told) == len(cameras) + ROUNDS and told == sorted(told)
+    assert told[0] == 0 and told[-1] < 1
+
+    def stop(done: float) -> None:
+        if done:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        solved_colours(gaussians, grey(colours), cameras, photos, progress=stop)
