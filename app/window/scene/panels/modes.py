@@ -32,7 +32,7 @@ TIPS = {
     Mode.WEIGHT: "How much of one group each pixel carries",
     Mode.TRANSMITTANCE: "The light that passes every splat",
     Mode.COVERAGE: "How many photos saw what is shown",
-    Mode.AGREEMENT: "How well the photos agree on depth",
+    Mode.AGREEMENT: "How well the photos agree on depth, where more than one covers a surface",
     Mode.MARGIN: "How clear the answer is",
 }
 _RESTING = imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled
