@@ -26,7 +26,7 @@ SIZE = (1280, 800)
 PHOTOS = [asset_path(f"photos/living_room_{side}.png") for side in ("left", "right")]
 PATIENCE = 180.0  # seconds; an upper bound for a busy machine, never waited for in full
 LEFT, TOP = int(theme.PANEL_WIDTH), 52
-REST = 3.0  # seconds without a change; a full picture on a software renderer takes one or two
+REST = 12.0  # seconds without a change; a full picture of a fine scene on a busy software renderer takes six
 
 
 class Person:
