@@ -55,8 +55,15 @@ def fine_scene(
         for v, photo in enumerate(working_photos(source_pictures(views), grid))
     ]
     views = replace(views, images=light.corrected(views.images).clamp(0, 1))
-    progress("elements", 0.1)
-    scene = assemble_detailed(prediction, views, photos, detail, gaussians=gaussians, preset=preset)
+    scene = assemble_detailed(
+        prediction,
+        views,
+        photos,
+        detail,
+        gaussians=gaussians,
+        preset=preset,
+        progress=lambda done: progress("elements", 0.1 + 0.3 * done),
+    )
     solving = time.perf_counter()
     solved = solved_colours(
         scene.gaussians,

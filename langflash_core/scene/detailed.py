@@ -6,7 +6,9 @@ it finest (`ownership`), by elements of the size that the photo asks for (`block
 """
 
 import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import torch
 from torch import Tensor
@@ -72,12 +74,14 @@ def assemble_detailed(
     gaussians: int | None = None,
     top_m: int = 8,
     preset: str = "mini",
+    progress: Callable[[float], None] = lambda done: None,
 ) -> Scene:
     """A scene in scene units, as `assemble` makes it, of elements as fine as the photos.
 
     Args:
         photos: (3, h, w) in [0, 1] of every view, `working_photos`; each may have its own size.
         gaussians: about as many; None: as `detail` has it.
+        progress: called with the share that is done, four times a photo; what it raises ends the work.
 
     Returns:
         Scene with `levels`, `confidences`, `view_ids` and, in its record, `detail`.
@@ -92,15 +96,16 @@ def assemble_detailed(
     if not bool(torch.isfinite(prediction.viewmats).all()):
         raise ValueError("viewmats: expected finite poses, received others")
     known, keep, unit, through = _kept(prediction, views)
+    told = _told(photos, progress, 0.0)
     sights = [
         _Sight.of(photo, image, depths.log(), own)
-        for photo, image, depths, own in zip(photos, views.images, known, keep, strict=True)
+        for photo, image, depths, own in zip(told, views.images, known, keep, strict=True)
     ]
     budget = gaussians or round(detail.most * keep[0].numel() * (len(keep) + 3) / 4)
-    parts = _parts(sights, detail, budget, 0.0 if gaussians else detail.gain)
+    parts = _parts(sights, detail, budget, 0.0 if gaussians else detail.gain, progress)
     scene = Scene(
         gaussians=normalised(_gaussians(prediction, views, sights, parts), unit),
-        semantics=_semantics(prediction, sights, parts, top_m),
+        semantics=_semantics(prediction, _told(sights, progress, 0.75), parts, top_m),
         viewmats=scaled_poses(prediction.viewmats, unit),
         Ks=views.Ks.clone(),
         view_size=views.size,
@@ -119,6 +124,16 @@ def assemble_detailed(
     )
     timings = {**prediction.timings, "assembly": time.perf_counter() - start}
     return scene.with_record(cost=Cost(timings))
+
+
+T = TypeVar("T")
+
+
+def _told(photos: Sequence[T], progress: Callable[[float], None], begin: float) -> Iterator[T]:
+    """One after the other, each told before; a quarter of the whole from `begin` on."""
+    for number, each in enumerate(photos):
+        progress(begin + number / len(photos) / 4)
+        yield each
 
 
 @dataclass(frozen=True)
@@ -164,11 +179,17 @@ def _kept(prediction: Prediction, views: Views) -> tuple[Tensor, Tensor, float, 
     return depths, keep, unit, int(through.sum())
 
 
-def _parts(sights: list[_Sight], detail: Detail, budget: int, least: float) -> list[Elements]:
+def _parts(
+    sights: list[_Sight], detail: Detail, budget: int, least: float, progress: Callable[[float], None]
+) -> list[Elements]:
     """The elements of each photo, at most about `budget` of them together, each of which gains `least`."""
-    trees = [grown(s.photo, s.depth.log_depths, s.clear, s.wanted, detail.finest) for s in sights]
+    trees = [
+        grown(s.photo, s.depth.log_depths, s.clear, s.wanted, detail.finest)
+        for s in _told(sights, progress, 0.25)
+    ]
     limit = _limit(trees, budget, least)
-    return [_of_view(sight, tree, limit) for sight, tree in zip(sights, trees, strict=True)]
+    told = _told(sights, progress, 0.5)
+    return [_of_view(sight, tree, limit) for sight, tree in zip(told, trees, strict=True)]
 
 
 def _limit(trees: list[Tree], budget: int, least: float) -> float:
@@ -205,7 +226,9 @@ def _gaussians(
     return Gaussians(*(torch.cat([getattr(some, name) for some in made]) for name in names))
 
 
-def _semantics(prediction: Prediction, sights: list[_Sight], parts: list[Elements], top_m: int) -> Semantics:
+def _semantics(
+    prediction: Prediction, sights: Iterable[_Sight], parts: list[Elements], top_m: int
+) -> Semantics:
     """Weights end where the photo has borders (`borders`)."""
     known = directed(prediction.dictionary)
     of_views = []

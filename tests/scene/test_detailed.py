@@ -17,9 +17,9 @@ from tests.scene.photographed import GRID, SCREEN, WALL, Photographed, photograp
 LOW, NORMAL, HIGH = (DETAILS[name] for name in ("low", "normal", "high"))
 
 
-def made(given: Photographed, detail: Detail = NORMAL, gaussians: int | None = None) -> Scene:
+def made(given: Photographed, detail: Detail = NORMAL, **options) -> Scene:
     photos = working_photos(given.photos, GRID)
-    return assemble_detailed(given.prediction, given.views, photos, detail, gaussians=gaussians)
+    return assemble_detailed(given.prediction, given.views, photos, detail, **options)
 
 
 @pytest.fixture(scope="module")
@@ -263,3 +263,16 @@ def test_the_unit_of_the_network_does_not_show(given, scene):
     assert other.record.detail == scene.record.detail
     assert torch.allclose(other.gaussians.means, scene.gaussians.means, atol=1e-5)
     assert torch.allclose(other.gaussians.scales, scene.gaussians.scales, atol=1e-5)
+
+
+def test_every_photo_is_told_and_may_be_the_last(given):
+    told: list[float] = []
+    made(given, progress=told.append)
+    assert len(told) == 4 * 2 and told == sorted(told) and told[0] == 0 and told[-1] < 1
+
+    def stop(done: float) -> None:
+        if done:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        made(given, progress=stop)
