@@ -4,9 +4,11 @@ in shape.
 """
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import torch
+from torch import Tensor
 
 from langflash_core.detail import Detail
 from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
@@ -65,26 +67,28 @@ def fine_scene(
         progress=lambda done: progress("elements", 0.1 + 0.3 * done),
     )
     solving = time.perf_counter()
+    scene = _coloured(scene, photos, lambda done: progress("colours", 0.4 + 0.5 * done))
+    timings = {
+        **prediction.timings,
+        "assembly": solving - start,
+        "colours": time.perf_counter() - solving,
+    }
+    scene = scene.with_record(light=light.stored(), cost=Cost(timings))
+    progress("prune", 0.9)
+    return prune(scene, merge=False), light
+
+
+def _coloured(scene: Scene, photos: list[Tensor], progress: Callable[[float], None]) -> Scene:
+    """The scene in the colours that make its photos (3, h, w) again; its record says how near they come."""
     solved = solved_colours(
         scene.gaussians,
         sh_to_colour(scene.gaussians.sh, scene.gaussians.means),
         [scene.camera(v, photo.shape[-1], photo.shape[-2]) for v, photo in enumerate(photos)],
         photos,
         ringing=_RINGING,
-        progress=lambda done: progress("colours", 0.4 + 0.5 * done),
+        progress=progress,
     )
     sh = colour_to_sh(solved.colours)[:, None]
-    scene = replace(scene, gaussians=replace(scene.gaussians, sh=sh))
-    bought = {
-        **scene.record.detail,
-        "rounds": ROUNDS,
-        "photos_psnr_db": [round(after, 2) for _, after in solved.psnr],
-    }
-    timings = {
-        **prediction.timings,
-        "assembly": solving - start,
-        "colours": time.perf_counter() - solving,
-    }
-    scene = scene.with_record(light=light.stored(), detail=bought, cost=Cost(timings))
-    progress("prune", 0.9)
-    return prune(scene, merge=False), light
+    near = [round(after, 2) for _, after in solved.psnr]
+    bought = {**scene.record.detail, "rounds": ROUNDS, "photos_psnr_db": near}
+    return replace(scene, gaussians=replace(scene.gaussians, sh=sh)).with_record(detail=bought)

@@ -12,6 +12,8 @@ Sizes: V views, H W pixels.
 import torch
 from torch import Tensor
 
+from langflash_core.geometry.jumps import steps_along, towards_nearer
+
 _UNDER = 10.0  # pixels: what a gap measures where depth is a twentieth off and the camera 20 degrees aside
 _JUMP = 0.2  # log depth from one pixel to the next
 _END = 0.05  # log depth, where a thing ends: below it, and below twice the step before, it is a slope
@@ -20,13 +22,8 @@ _SHORT = 0.5  # and how long it is, of its length
 
 
 def under_edges(log_depths: Tensor) -> Tensor:
-    """(V, H, W, 2) of -1, 0, 1 along columns and rows: where the nearer side of a jump is from a pixel of the
-    farther one; 0 where it is on both sides."""
-    signs = []
-    for dim in (-1, -2):
-        after, before = _steps(log_depths, dim)
-        signs.append((after < -_JUMP).to(log_depths) - (before < -_JUMP).to(log_depths))
-    return torch.stack(signs, -1)
+    """(V, H, W, 2), as `towards_nearer` has them, of the jumps that a background goes on under."""
+    return towards_nearer(log_depths, _JUMP)
 
 
 def over_edges(log_depths: Tensor) -> Tensor:
@@ -34,18 +31,11 @@ def over_edges(log_depths: Tensor) -> Tensor:
     pixel of the nearer one."""
     signs = []
     for dim in (-1, -2):
-        after, before = _steps(log_depths, dim)
+        after, before = steps_along(log_depths, dim)
         ends = after > (2 * before.abs()).clamp_min(_END)
         begins = before > (2 * after.abs()).clamp_min(_END)
         signs.append(ends.to(log_depths) - begins.to(log_depths))
     return torch.stack(signs, -1)
-
-
-def _steps(log_depths: Tensor, dim: int) -> tuple[Tensor, Tensor]:
-    """From a pixel to the next along an axis, and to the one before it; 0 at the border."""
-    steps = log_depths.diff(dim=dim)
-    none = torch.zeros_like(log_depths.narrow(dim, 0, 1))
-    return torch.cat((steps, none), dim), torch.cat((none, -steps), dim)
 
 
 def drawn_back(

@@ -20,6 +20,7 @@ from torch import Tensor
 
 from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.geometry.harmonics import colour_to_sh
+from langflash_core.geometry.jumps import towards_nearer
 from langflash_core.geometry.quaternions import matrices_to_quats
 from langflash_core.geometry.surfels import ellipses, spans
 from langflash_core.scene.blocks import Squares, padded
@@ -162,7 +163,7 @@ def under(log_depths: Tensor, image: Tensor, size: tuple[int, int]) -> Elements:
     Args:
         image: (3, H, W). size: (h, w) of the photo.
     """
-    signs = _towards_nearer(log_depths)
+    signs = towards_nearer(log_depths, _STEP)
     row, column = (signs.abs().sum(-1) > 0).nonzero(as_tuple=True)
     towards = signs[row, column] / signs[row, column].norm(dim=-1, keepdim=True)
     cell = torch.tensor([size[1] / log_depths.shape[1], size[0] / log_depths.shape[0]])
@@ -175,17 +176,6 @@ def under(log_depths: Tensor, image: Tensor, size: tuple[int, int]) -> Elements:
         row * log_depths.shape[1] + column, pixel_y * size[1] + pixel_x, image[:, row, column].T,
         torch.full((len(x),), COARSE, dtype=torch.uint8), wide * 2, torch.ones(len(x), dtype=torch.bool),
     )  # fmt: skip
-
-
-def _towards_nearer(log_depths: Tensor) -> Tensor:
-    """(H, W, 2) of -1, 0, 1 along columns and rows: where the nearer side of a jump is; 0 where on both."""
-    signs = []
-    for dim in (1, 0):
-        steps = log_depths.diff(dim=dim)
-        none = torch.zeros_like(log_depths.narrow(dim, 0, 1))
-        after, before = torch.cat((steps, none), dim), torch.cat((none, -steps), dim)
-        signs.append((after < -_STEP).float() - (before < -_STEP).float())
-    return torch.stack(signs, -1)
 
 
 def placed(

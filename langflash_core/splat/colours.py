@@ -8,8 +8,9 @@ the contributions c_ip of every view (`mixing`), rounds of
 
 lessen sum |photo - F|^2 (Landweber's iteration, the normal matrix lumped onto its diagonal: SART of
 Andersen and Kak 1984 with one subset), each begun a little ahead of the last (Beck and Teboulle 2009,
-FISTA). Colours stay within [0, 1], so nothing rings beyond what a photo can hold. V views, N Gaussians, h
-w pixels of a photo.
+FISTA). Colours stay within [0, 1] or, with `ringing`, near what the photos show around a Gaussian.
+
+Sizes: V views, N Gaussians, h w pixels of a photo.
 """
 
 import math
