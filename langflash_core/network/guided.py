@@ -26,6 +26,7 @@ from langflash_core.network.semantics.splitting import split_groups
 from langflash_core.network.stereo.agreement import agreed
 from langflash_core.network.stereo.alignment import Correction
 from langflash_core.network.stereo.keypoints import KeyPoints, decoded, match_photos, match_sources
+from langflash_core.network.stereo.partners import partners
 from langflash_core.network.stereo.planes import flattened
 from langflash_core.network.stereo.poses import PoseInput, Poses, estimate_poses
 from langflash_core.network.stereo.prior import DepthHead, DepthMaps
@@ -172,7 +173,7 @@ class GuidedDepthNet(LangFlashNet):
             return maps
         chosen = tokens.views(keep)
         part = DepthMaps(scaled.log_depths[:, keep], scaled.log_errors[:, keep])
-        near = _neighbours(poses, keep)
+        near = partners(part.log_depths[0], viewmats[0, keep], Ks[0, keep])
         refined = self.refiner(
             images[:, keep], chosen, local[keep], part, viewmats[:, keep], Ks[:, keep], near
         )[-1]
@@ -204,19 +205,16 @@ def _agreed(maps: DepthMaps, views: Views, poses: Poses, viewmats: Tensor, Ks: T
     if len(placed) < 2:
         return maps
     part = DepthMaps(maps.log_depths[placed], maps.log_errors[placed])
-    near = _neighbours(poses, placed)
+    near = partners(part.log_depths, viewmats[placed], Ks[placed])
     part = agreed(part, viewmats[placed], Ks[placed], near)
-    photos = _greys(views)
-    part = registered(part, [photos[v] for v in placed], viewmats[placed], Ks[placed], near, run.check)
+    photos, rounds = _greys(views), 1 if len(placed) == 2 else 2
+    part = registered(
+        part, [photos[v] for v in placed], viewmats[placed], Ks[placed], near, run.check, rounds=rounds
+    )
     part = replace(part, log_depths=flattened(part.log_depths, part.log_errors))
     log_depths = maps.log_depths.clone()
     log_depths[placed] = part.log_depths
     return replace(maps, log_depths=log_depths)
-
-
-def _neighbours(poses: Poses, kept: list[int]) -> list[list[int]]:
-    """Of each kept view its neighbours, counted among those that are kept."""
-    return [[kept.index(other) for other in poses.neighbours[view] if other in kept] for view in kept]
 
 
 def _known(views: Views) -> np.ndarray | None:

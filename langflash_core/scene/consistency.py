@@ -2,12 +2,18 @@
 
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import pictured
 
 TOLERANCE = 0.12
 """A Gaussian this much nearer (relative depth) than the surface another photo sees is in its way:
 beyond the depth error of the shipped network, so that double surfaces of good depth merge instead."""
+
+_VOTES = 2
+"""Photos that see through something, one of which may be wrong."""
+_SKIRT = 0.05  # relative depth beyond all of the other's around a place, from which it is another surface
+_AROUND, _JUMP = 5, 0.1  # pixels of a window, and log depth within it from which depth jumps there
 
 
 def seen_through(
@@ -47,3 +53,35 @@ def seen_through(
             outvoted = (theirs > trusts[view]) if other > view else (theirs >= trusts[view])
             blocked[view] |= inside & (z < limits[other].index_select(0, places)) & outvoted
     return blocked.flatten()
+
+
+def outvoted(points: Tensor, viewmats: Tensor, Ks: Tensor, depths: Tensor) -> Tensor:
+    """(V, H, W) bool: what lies beside a jump of depth, where two other photos and more see through it, and
+    more than see it as their surface.
+
+    Where depth jumps, a photo's map has values from between, which lie on no surface: skirts. Other photos
+    look through them from aside. Away from jumps nothing is outvoted: where a near thing's depth is hard,
+    most photos may have it too far, and they would vote down the one that has it right.
+
+    Args:
+        points: (V, H*W, 3) world, of each photo's pixels. viewmats, Ks, depths: as `seen_through`.
+    """
+    num_views, height, width = depths.shape
+    through, same = torch.zeros(2, num_views, height * width, dtype=torch.int16)
+    nearest = -F.max_pool2d(-depths[:, None], 3, 1, 1)[:, 0].flatten(1)
+    farthest = F.max_pool2d(depths[:, None], 3, 1, 1)[:, 0].flatten(1)
+    for view, own in enumerate(points):
+        for other in range(num_views):
+            if other == view:
+                continue
+            x, y, z = pictured(viewmats[other], Ks[other], own.T)
+            inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
+            places = torch.where(inside, y.floor() * width + x.floor(), 0.0).long()
+            before = z < (1 - _SKIRT) * nearest[other].index_select(0, places)
+            behind = z > (1 + _SKIRT) * farthest[other].index_select(0, places)
+            through[view] += inside & before
+            same[view] += inside & ~before & ~behind
+    seen = ((through >= _VOTES) & (through > same)).view_as(depths)
+    logs = depths.log()[:, None]
+    steps = F.max_pool2d(logs, _AROUND, 1, _AROUND // 2) + F.max_pool2d(-logs, _AROUND, 1, _AROUND // 2)
+    return seen & (steps[:, 0] > _JUMP)

@@ -28,7 +28,7 @@ from langflash_core.scene.assemble import (
 from langflash_core.scene.blocks import LEVELS, Tree, grown, leaves, threshold
 from langflash_core.scene.borders import refined_weights
 from langflash_core.scene.clearance import clearances
-from langflash_core.scene.consistency import seen_through
+from langflash_core.scene.consistency import outvoted, seen_through
 from langflash_core.scene.elements import (
     COARSE,
     Elements,
@@ -174,9 +174,10 @@ def _kept(prediction: Prediction, views: Views) -> tuple[Tensor, Tensor, float, 
     through = seen_through(
         points.flatten(0, 1), prediction.viewmats, Ks, depths, prediction.confidences
     ).view_as(usable)
-    keep = owned(depths, prediction.viewmats, Ks, usable & ~through)
-    keep |= usable & ~covered(depths, prediction.viewmats, Ks, keep)
-    return depths, keep, unit, int(through.sum())
+    between = outvoted(points, prediction.viewmats, Ks, depths)
+    keep = owned(depths, prediction.viewmats, Ks, usable & ~through & ~between)
+    keep |= usable & ~covered(depths, prediction.viewmats, Ks, keep, between)
+    return depths, keep, unit, int((through | between).sum())
 
 
 def _parts(

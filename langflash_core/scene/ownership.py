@@ -49,24 +49,30 @@ def owned(depths: Tensor, viewmats: Tensor, Ks: Tensor, known: Tensor | None = N
     return keep | (known & ~covered(depths, viewmats, Ks, keep))
 
 
-def covered(depths: Tensor, viewmats: Tensor, Ks: Tensor, keep: Tensor) -> Tensor:
+def covered(
+    depths: Tensor, viewmats: Tensor, Ks: Tensor, keep: Tensor, anything: Tensor | None = None
+) -> Tensor:
     """(V, H, W) bool: cells of each photo in which, or beside which, what is kept lies at about their depth
     or before it.
 
     Args:
-        depths, viewmats, Ks: as `owned`. keep: (V, H, W) bool.
+        depths, viewmats, Ks: as `owned`. keep: (V, H, W) bool. anything: (V, H, W) bool, cells which what lies
+            at any depth covers.
     """
     height, width = depths.shape[1:]
     points = [
         _surface(*of)[0][:, kept.flatten()] for *of, kept in zip(depths, viewmats, Ks, keep, strict=True)
     ]
     everything, found = torch.cat(points, 1), []
-    for own, viewmat, K in zip(depths, viewmats, Ks, strict=True):
+    farthest = (1 + _ABOUT) * depths
+    if anything is not None:
+        farthest = torch.where(anything, torch.inf, farthest)
+    for limit, viewmat, K in zip(farthest, viewmats, Ks, strict=True):
         x, y, z = pictured(viewmat, K, everything)
         inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
         hit = torch.zeros(height * width)
         place, z = (y.floor() * width + x.floor())[inside].long(), z[inside]
-        hit[place[z < (1 + _ABOUT) * own.flatten()[place]]] = 1
+        hit[place[z < limit.flatten()[place]]] = 1
         found.append(F.max_pool2d(hit.view(1, 1, height, width), 3, 1, 1)[0, 0] > 0)
     return torch.stack(found)
 

@@ -32,7 +32,6 @@ from langflash_core.network.stereo.sweep import Neighbours, everyone
 
 _LARGEST = 3  # times the maps' size, at which photos are compared
 _SMALLEST = 12  # pixels of a photo's side, with which flow works
-_PARTNERS = 2  # neighbours that a view is compared with, of those that share most
 _FLOW_ERROR = 0.7  # pixels of the photo
 _THERE_AND_BACK = 0.7  # pixels by which the way back may miss
 _BRIGHTNESS = 10.0  # of 255, difference that is still the same
@@ -65,14 +64,17 @@ def registered(
     Ks: Tensor,
     neighbours: Neighbours | None = None,
     check: Callable[[], None] = lambda: None,
+    *,
+    rounds: int = 1,
 ) -> DepthMaps:
     """Maps (V, H, W) whose surfaces show the same in neighbouring photos; the expected errors stay.
 
     Args:
         photos: (h, w) uint8, grey, of each view, the maps' picture at its own size.
         viewmats: (V, 4, 4) of the maps' unit. Ks: (V, 3, 3), pixels of the maps.
-        neighbours: of each view, those that share most first; None: all others.
+        neighbours: of each view; None: all others.
         check: called before each comparison; what it raises ends the work.
+        rounds: each starts where the one before ended, so that less is left to find.
     """
     logs = maps.log_depths
     near = neighbours or everyone(len(logs))
@@ -85,20 +87,22 @@ def registered(
         return maps
     corrected = []
     for view, others in enumerate(near):
-        target, weight = torch.zeros(2, height, width)
-        depths = F.interpolate(logs[view].cpu()[None, None], size=size, mode="bilinear")[0, 0]
-        texture = _texture(greys[view])
-        for other in others[:_PARTNERS]:
-            check()
-            pose = (viewmats[other] @ invert_rigid(viewmats[view])).cpu()
-            matches = _matched(depths, greys[view], greys[other], large[view], large[other], pose)
-            change, moves = _triangulated(depths, matches, large[view], large[other], pose)
-            length = moves.norm(dim=0)
-            known = _known_along(texture, moves / length.clamp_min(1e-9))
-            counts = torch.from_numpy(matches.sure) * known * (length / _FLOW_ERROR) ** 2 / _ONE_SHIFT
-            target += _cells(counts * change, (height, width))
-            weight += _cells(counts, (height, width))
-        corrected.append(logs[view] + _smooth(target, weight, logs[view].cpu()).to(logs))
+        texture, own = _texture(greys[view]), logs[view].cpu()
+        for _ in range(rounds):
+            target, weight = torch.zeros(2, height, width)
+            depths = F.interpolate(own[None, None], size=size, mode="bilinear")[0, 0]
+            for other in others:
+                check()
+                pose = (viewmats[other] @ invert_rigid(viewmats[view])).cpu()
+                matches = _matched(depths, greys[view], greys[other], large[view], large[other], pose)
+                change, moves = _triangulated(depths, matches, large[view], large[other], pose)
+                length = moves.norm(dim=0)
+                known = _known_along(texture, moves / length.clamp_min(1e-9))
+                counts = torch.from_numpy(matches.sure) * known * (length / _FLOW_ERROR) ** 2 / _ONE_SHIFT
+                target += _cells(counts * change, (height, width))
+                weight += _cells(counts, (height, width))
+            own = own + _smooth(target, weight, own)
+        corrected.append(own.to(logs))
     return DepthMaps(torch.stack(corrected), maps.log_errors)
 
 
