@@ -7,7 +7,7 @@ render -> query.relevance_maps -> query.answer
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import torch
@@ -57,6 +57,7 @@ GROUPINGS = ("queries", "mobile-sam", "sam2")
 LARGEST_PICTURE = 8192
 LONGEST_REFINEMENT = 3600  # seconds
 _AS_IT_IS = "the preset '{}' makes one Gaussian a pixel; the detail that was asked for is left out"
+_NOT_TOLD = "; these photos do not determine it by themselves"
 _networks: dict[tuple, LangFlashNet] = {}
 
 
@@ -143,6 +144,7 @@ def reconstruct(
             views, run.within("network"), cancelled, atoms, groups, redrawn, elements=finer is None
         )
         prediction = _on_cpu(prediction)
+        views = _through(views, prediction)
     images = views.images[[v for v in range(views.num_views) if v not in prediction.unplaced]]
     with run.stage("assemble"), torch.no_grad():
         if finer is not None:
@@ -160,6 +162,8 @@ def reconstruct(
             scene = _refined(scene, images, refine_seconds, device, run.within("refine"))
         fitting = {**scene.record.cost.timings, "fitting": run.timings["refine"]}
         scene = scene.with_record(cost=Cost(fitting))
+    if prediction.lenses:
+        scene = scene.with_record(lens={"found": [asdict(lens) for lens in prediction.lenses]})
     run.check()
     if viewmats is not None:
         unit = scene.record.network_unit
@@ -320,6 +324,17 @@ def _posed(views: Views, viewmats: Tensor | None, preset: str) -> Views:
         raise InputError(f"{len(viewmats)} poses were given for {views.num_views} photos; give one each")
     relative = viewmats.double() @ invert_rigid(viewmats[0].double())
     return replace(views, viewmats=relative)
+
+
+def _through(views: Views, prediction: Prediction) -> Views:
+    """The views with the lens that was found; the warning that it was assumed goes, or says what is left."""
+    if prediction.Ks is not None:
+        views = replace(views, Ks=prediction.Ks)
+    if views.lenses is None or not views.lenses.note:
+        return views
+    note, settled = views.lenses.note, views.lenses.settled(prediction.lenses)
+    kept = () if settled else ((f"{note}{_NOT_TOLD}",) if views.num_views > 2 else (note,))
+    return replace(views, warnings=(*(w for w in views.warnings if w != note), *kept))
 
 
 def best_pair(

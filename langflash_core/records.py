@@ -20,6 +20,37 @@ class Cost:
 
 
 @dataclass(frozen=True)
+class FoundFocal:
+    """Of one lens: by what its focal length grew, its standard error as a share, photos that told it."""
+
+    growth: float
+    error: float
+    photos: int
+
+
+@dataclass(frozen=True)
+class FoundLens:
+    """What photos told of the lens that they were taken with.
+
+    fov: degrees of the photos' longer side; error: standard error of it, degrees. photos: that told it.
+    said: degrees that were assumed, or that the photos record (`recorded`).
+    """
+
+    fov: float
+    error: float
+    photos: int
+    said: float
+    recorded: bool
+
+    def __str__(self) -> str:
+        whose = "recorded" if self.recorded else "assumed"
+        return (
+            f"{self.fov:.1f} ± {self.error:.1f} degrees, found from {self.photos} photos "
+            f"({whose}: {self.said:.1f})"
+        )
+
+
+@dataclass(frozen=True)
 class Record:
     """What is known of a scene besides its tensors. Mappings hold plain JSON values; empty: unknown.
 
@@ -28,7 +59,8 @@ class Record:
     length units per scene unit. counts: Gaussians predicted and left out. pruning: as `prune` left
     it. refinement: what a fit to the photos brought. detail: what was spent on how fine elements, and what
     it bought. light: `gains` and `offsets`, a row of
-    red, green and blue for each view, by which `scene.light` brought the photos' colours to one light.
+    red, green and blue for each view, by which `scene.light` brought the photos' colours to one light. lens:
+    `found`, a mapping of `FoundLens` for each lens that the photos told.
     calibration: what the network's checkpoint says about scores, instead of its language space. atom_names:
     a person's own, by atom, which it answers to. atom_denials: what a person said that an atom is not.
     silent_atoms: those that answer no phrase. num_deleted: Gaussians that edits took away. camera_path:
@@ -46,6 +78,7 @@ class Record:
     refinement: Mapping[str, Any] = field(default_factory=dict)
     detail: Mapping[str, Any] = field(default_factory=dict)
     light: Mapping[str, Any] = field(default_factory=dict)
+    lens: Mapping[str, Any] = field(default_factory=dict)
     calibration: Mapping[str, Any] = field(default_factory=dict)
     atom_names: Mapping[int, str] = field(default_factory=dict)
     atom_denials: Mapping[int, tuple[str, ...]] = field(default_factory=dict)

@@ -19,13 +19,16 @@ Checks    constructors refuse shapes that disagree and numbers that name nothing
           read and written.
 """
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import torch
 from torch import Tensor
 
 from langflash_core.records import Cost as Cost
+from langflash_core.records import FoundFocal as FoundFocal
+from langflash_core.records import FoundLens as FoundLens
 from langflash_core.records import Record as Record
 from langflash_core.records import check_light
 
@@ -54,13 +57,48 @@ class Camera:
 
 
 @dataclass(frozen=True)
+class Lenses:
+    """What is known of the G lenses of V photos before the photos are compared.
+
+    of: which lens took each photo. fovs: degrees of the longer side of the photos. doubts: standard
+    deviations expected of the logarithm of the focal length; 0: it is given. recorded: the photos' files say
+    it. note: what a person is told while a lens is assumed, or nothing.
+    """
+
+    of: tuple[int, ...]
+    fovs: tuple[float, ...]
+    doubts: tuple[float, ...]
+    recorded: tuple[bool, ...]
+    note: str = ""
+
+    def found(self, told: Sequence[FoundFocal | None]) -> tuple[FoundLens, ...]:
+        """The lenses that photos told."""
+        found = []
+        for lens, own in enumerate(told):
+            if own is None:
+                continue
+            before = math.tan(math.radians(self.fovs[lens] / 2))
+            half = math.atan(before / own.growth)
+            error = math.degrees(math.sin(2 * half) * own.error)  # d(2 atan(a / f)) / d(log f)
+            fov = math.degrees(2 * half)
+            found.append(FoundLens(fov, error, own.photos, self.fovs[lens], self.recorded[lens]))
+        return tuple(found)
+
+    def settled(self, found: Sequence[FoundLens]) -> bool:
+        """Nothing is assumed any more."""
+        return sum(not lens.recorded for lens in found) >= sum(
+            doubt > 0 and not recorded for doubt, recorded in zip(self.doubts, self.recorded, strict=True)
+        )
+
+
+@dataclass(frozen=True)
 class Views:
     """Photos as the network sees them, all of one size.
 
     images: (V, 3, H, W) in [0, 1]. Ks: (V, 3, 3) pixels of these images, after crop and
     resize. names: file names for people. sources: the photos as small JPEG bytes, the same
     crop. warnings: triage, one sentence each. viewmats: (V, 4, 4), world = view 0, in any unit, where
-    poses are given instead of sought.
+    poses are given instead of sought. lenses: what `Ks` rest on; None: they are given.
     """
 
     images: Tensor
@@ -69,6 +107,7 @@ class Views:
     sources: tuple[bytes, ...] = ()
     warnings: tuple[str, ...] = ()
     viewmats: Tensor | None = None
+    lenses: Lenses | None = None
 
     @property
     def num_views(self) -> int:
@@ -173,7 +212,8 @@ class Prediction:
     weights: (V, K, H, W) softmax over the K surviving groups (K may be 0).
     dictionary: (K, C) unit rows. viewmats (V, 4, 4). depths (V, H, W), z, same unit.
     confidences (V, H, W) in [0, 1]. unplaced: views whose pose is not known (view 0's stands in).
-    timings: seconds per stage, in order.
+    timings: seconds per stage, in order. Ks: (V, 3, 3) as they were found, None: those of the views. lenses:
+    what of them the photos told.
     """
 
     gaussians: Gaussians
@@ -186,6 +226,8 @@ class Prediction:
     unplaced: tuple[int, ...] = ()
     warnings: tuple[str, ...] = ()
     timings: dict[str, float] = field(default_factory=dict)
+    Ks: Tensor | None = None
+    lenses: tuple[FoundLens, ...] = ()
 
 
 @dataclass(frozen=True)

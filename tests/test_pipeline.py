@@ -3,18 +3,20 @@
 import math
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import torch
 
 import langflash_core as lf
+from langflash_core import pipeline
 from langflash_core.errors import Cancelled, ImageError, InputError, PromptError, ViewError, WeightsError
 from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS, GuidedDepthNet, build_network, save_network
 from langflash_core.resources import asset_path
 from langflash_core.splat import render
-from langflash_core.types import Camera, Gaussians, Scene, Semantics
+from langflash_core.types import Camera, FoundLens, Gaussians, Lenses, Prediction, Scene, Semantics, Views
 
 SMALL = 112  # pixels: 8 x 8 patches keep a pass below a second
 
@@ -118,6 +120,19 @@ def test_the_lens_is_taken(weights, photos):
     longer = max(wide.view_size)
     # The photo's shape is fitted to whole patches, which crops at most half a patch a side.
     assert wide.Ks[0, 0, 0].item() == pytest.approx(longer / 2, rel=0.15)
+
+
+def test_a_warning_of_an_assumed_lens_goes_when_photos_tell_it():
+    lenses = Lenses((0, 0, 0), (65.0,), (0.35,), (False,), "assumed")
+    Ks, images = torch.eye(3).repeat(3, 1, 1), torch.zeros(3, 3, 14, 14)
+    views = Views(images, Ks, ("a", "b", "c"), warnings=("dark", "assumed"), lenses=lenses)
+    nothing = torch.zeros(0)
+    plain = Prediction(Gaussians.none(), nothing, nothing, "minilm", nothing, nothing, nothing)
+    found = replace(plain, Ks=2 * Ks, lenses=(FoundLens(61.0, 0.5, 3, 65.0, False),))
+    told = pipeline._through(views, found)
+    assert told.warnings == ("dark",) and (told.Ks == 2 * Ks).all()
+    [dark, left] = pipeline._through(views, plain).warnings
+    assert dark == "dark" and left.startswith("assumed;") and (pipeline._through(views, plain).Ks == Ks).all()
 
 
 @pytest.mark.parametrize("patience", [0, 1, 4, 9])

@@ -4,6 +4,7 @@ K (3, 3) in pixels of the upright photo, square pixels, centre of the top-left p
 """
 
 import math
+from collections.abc import Sequence
 
 import torch
 from torch import Tensor
@@ -11,10 +12,14 @@ from torch import Tensor
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import intrinsics_from_fov
 from langflash_core.images.decode import PhotoFacts
+from langflash_core.types import Lenses
 
 ASSUMED_FOV = 65.0  # degrees on the longer side: a phone's main camera (24-28 mm equivalent)
 PLAUSIBLE_FOV = (5.0, 150.0)  # degrees; EXIF that says otherwise is wrong
 FILM_DIAGONAL = math.hypot(36.0, 24.0)  # mm
+_ASSUMED_DOUBT, _RECORDED_DOUBT = 0.35, 0.02
+"""Standard deviations of the logarithm of a focal length: of an assumed one (a wide lens is at -.6, twice the
+zoom at +.7), of a recorded one, which is rounded to a millimetre of some 26 and changes with the focus."""
 _FOCAL_35MM, _FOCAL, _PLANE_X, _PLANE_UNIT = 0xA405, 0x920A, 0xA20E, 0xA210
 _PIXEL_X, _PIXEL_Y = 0xA002, 0xA003
 _UNIT_MM = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}
@@ -68,6 +73,37 @@ def photo_intrinsics(
         return intrinsics_from_fov(ASSUMED_FOV, photo.width, photo.height), True
     centre_x, centre_y = photo.width / 2, photo.height / 2
     return torch.tensor([[focal, 0.0, centre_x], [0.0, focal, centre_y], [0.0, 0.0, 1.0]]), False
+
+
+def known_lenses(
+    photos: Sequence[PhotoFacts],
+    fovs: Sequence[float | None],
+    intrinsics: tuple[float, ...] | None,
+    note: str,
+) -> Lenses | None:
+    """What is known of the photos' lenses; None where all are given.
+
+    Photos of one size (also on their side) whose files record the same focal length, or none, share a lens.
+
+    Args:
+        fovs: given, degrees, one per photo or None. note: the warning that an assumption is worth.
+    """
+    if intrinsics is not None or all(fov is not None for fov in fovs):
+        return None
+    keys: dict[tuple, int] = {}
+    fields, doubts, recorded, of = [], [], [], []
+    for photo, fov in zip(photos, fovs, strict=True):
+        longer = max(photo.width, photo.height)
+        focal = exif_focal(photo) if fov is None else None
+        key = (longer, min(photo.width, photo.height), fov, focal and round(focal, 2))
+        if key not in keys:
+            keys[key] = len(keys)
+            own = fov or ASSUMED_FOV
+            fields.append(own if focal is None else 2 * math.degrees(math.atan(longer / (2 * focal))))
+            doubts.append(0.0 if fov is not None else _ASSUMED_DOUBT if focal is None else _RECORDED_DOUBT)
+            recorded.append(focal is not None)
+        of.append(keys[key])
+    return Lenses(tuple(of), tuple(fields), tuple(doubts), tuple(recorded), note)
 
 
 def exif_focal(photo: PhotoFacts) -> float | None:

@@ -12,7 +12,7 @@ from torch import Tensor
 from langflash_core.errors import InputError
 from langflash_core.images import triage
 from langflash_core.images.decode import PhotoFacts
-from langflash_core.images.lens import ASSUMED_FOV, check_lens, photo_intrinsics
+from langflash_core.images.lens import ASSUMED_FOV, check_lens, known_lenses, photo_intrinsics
 from langflash_core.images.pictures import Box, Picture, photo_names, photo_paths, read_pictures
 from langflash_core.types import Views
 
@@ -69,10 +69,11 @@ def load_views(
         else:
             notes += triage.fov_notes(name, K, photo.width, photo.height)
     notes += triage.identical_notes(names, images)
-    if assumed:
-        notes.append(_assumption(assumed, len(names)))
+    assumption = _assumption(assumed, len(names)) if assumed else ""
+    lenses = known_lenses([picture.photo for picture in read], fovs, intrinsics, assumption)
+    notes += [assumption] if assumed else []
     sources = tuple(picture.source for picture in read)
-    return Views(torch.stack(images), torch.stack(Ks), names, sources, tuple(notes))
+    return Views(torch.stack(images), torch.stack(Ks), names, sources, tuple(notes), lenses=lenses)
 
 
 def source_pictures(views: Views) -> list[Tensor]:

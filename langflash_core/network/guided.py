@@ -23,18 +23,23 @@ from langflash_core.network.semantics.features import LanguageHead
 from langflash_core.network.semantics.grouping import ScratchHead, SemanticGrouping, group_weights, surviving
 from langflash_core.network.semantics.naming import PartNamer, describe, places
 from langflash_core.network.semantics.splitting import split_groups
+from langflash_core.network.stereo.adjustment import Sought
 from langflash_core.network.stereo.agreement import agreed
 from langflash_core.network.stereo.alignment import Correction
+from langflash_core.network.stereo.inputs import grown
 from langflash_core.network.stereo.keypoints import KeyPoints, decoded, match_photos, match_sources
 from langflash_core.network.stereo.partners import partners
 from langflash_core.network.stereo.planes import flattened
-from langflash_core.network.stereo.poses import PoseInput, Poses, estimate_poses
+from langflash_core.network.stereo.poses import PoseInput, Poses, estimate_poses, on_other_maps
 from langflash_core.network.stereo.prior import DepthHead, DepthMaps
 from langflash_core.network.stereo.registration import registered
 from langflash_core.network.stereo.sharpening import sharpened
 from langflash_core.network.stereo.sweep import DepthRefiner
 from langflash_core.running import Run
 from langflash_core.types import Gaussians, Views
+
+_OTHER_LENS = 0.01
+"""Change of the focal length, as a logarithm, from which depth is predicted anew: it is known no better."""
 
 
 class GuidedDepthNet(LangFlashNet):
@@ -143,8 +148,13 @@ class GuidedDepthNet(LangFlashNet):
             prior = self.depth_head(levels, tokens)
         with run.stage("poses"):
             local = _one_by_one(self.local, images[0])
-            inputs = self._pose_inputs(views, prior, local)
-            poses = estimate_poses(inputs, _key_points(views, run), run.check, _known(views))
+            inputs = self._pose_inputs(Ks[0], views.size, prior, local)
+            poses = estimate_poses(inputs, _key_points(views, run), run.check, _known(views), _sought(views))
+            Ks = _with_lens(Ks, poses)
+            if np.abs(np.log(poses.growths)).max() > _OTHER_LENS:
+                levels = self.levels(tokens, Ks)
+                prior = self.depth_head(levels, tokens)
+                poses = on_other_maps(poses, self._pose_inputs(Ks[0], views.size, prior, local))
             viewmats = torch.from_numpy(poses.viewmats).to(images)[None]
         with run.stage("refinement"):
             maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)
@@ -152,11 +162,11 @@ class GuidedDepthNet(LangFlashNet):
             maps = replace(maps, log_depths=flattened(sharp, maps.log_errors))
             maps = _agreed(maps, views, poses, viewmats[0], Ks[0], run)
         if not elements:
-            return Geometry(Gaussians.none(), viewmats[0], maps.depths, maps.confidences, poses.guessed)
+            return _geometry(Gaussians.none(), maps, poses, viewmats[0], Ks[0], views)
         with run.stage("Gaussians"):
             raw = self.gaussian_head(levels, images)
             gaussians = assemble_gaussians(raw[0], images[0], maps, viewmats[0], Ks[0])
-        return Geometry(gaussians, viewmats[0], maps.depths, maps.confidences, poses.guessed)
+        return _geometry(gaussians, maps, poses, viewmats[0], Ks[0], views)
 
     def _refine(self, images, tokens, local, prior: DepthMaps, poses: Poses, viewmats, Ks) -> DepthMaps:
         """Refined maps (V, H, W), in view 0's unit; a view of unknown pose keeps its prior."""
@@ -182,15 +192,15 @@ class GuidedDepthNet(LangFlashNet):
         return DepthMaps(log_depths, log_errors)
 
     @staticmethod
-    def _pose_inputs(views: Views, prior: DepthMaps, local: Tensor) -> list[PoseInput]:
+    def _pose_inputs(Ks: Tensor, size: tuple[int, int], prior: DepthMaps, local: Tensor) -> list[PoseInput]:
         return [
             PoseInput(
-                K=views.Ks[v].double().numpy(),
-                size=views.size,
+                K=K.double().cpu().numpy(),
+                size=size,
                 depth=prior.depths[0, v].cpu().numpy(),
                 local=local[v].cpu().numpy(),
             )
-            for v in range(views.num_views)
+            for v, K in enumerate(Ks)
         ]
 
 
@@ -215,6 +225,27 @@ def _agreed(maps: DepthMaps, views: Views, poses: Poses, viewmats: Tensor, Ks: T
     log_depths = maps.log_depths.clone()
     log_depths[placed] = part.log_depths
     return replace(maps, log_depths=log_depths)
+
+
+def _geometry(
+    gaussians: Gaussians, maps: DepthMaps, poses: Poses, viewmats: Tensor, Ks: Tensor, views: Views
+) -> Geometry:
+    """What is handed over, with the lenses that were found."""
+    found = () if views.lenses is None else views.lenses.found(poses.lenses)
+    depths, confidences = maps.depths, maps.confidences
+    return Geometry(gaussians, viewmats, depths, confidences, poses.guessed, Ks.cpu(), found)
+
+
+def _sought(views: Views) -> Sought | None:
+    """Lenses that are not given."""
+    return None if views.lenses is None else Sought(views.lenses.of, views.lenses.doubts)
+
+
+def _with_lens(Ks: Tensor, poses: Poses) -> Tensor:
+    """Intrinsics (1, V, 3, 3) of the lenses that were found."""
+    if poses.adjusted is None or (poses.growths == 1).all():
+        return Ks
+    return torch.from_numpy(grown(Ks[0].double().cpu().numpy(), poses.growths)).to(Ks)[None]
 
 
 def _known(views: Views) -> np.ndarray | None:

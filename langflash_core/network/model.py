@@ -4,7 +4,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor, nn
@@ -15,7 +15,7 @@ from langflash_core.network.presets import Preset
 from langflash_core.network.semantics.aggregation import Aggregation, averaged_atoms
 from langflash_core.network.semantics.grouping import Groups
 from langflash_core.running import Progress, Run, evenly
-from langflash_core.types import Gaussians, Prediction, Views
+from langflash_core.types import FoundLens, Gaussians, Prediction, Views
 
 Atoms = Callable[[Tensor, Tensor], Tensor]
 Lifted = Callable[["Geometry", Views], Tensor]
@@ -32,6 +32,8 @@ class Geometry:
     depths: Tensor
     confidences: Tensor
     unplaced: tuple[int, ...]
+    Ks: Tensor | None = None
+    lenses: tuple[FoundLens, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -229,6 +231,7 @@ class LangFlashNet(nn.Module):
         geometries = [
             self.reconstruct(s, x, K, own, run, elements) for s, (x, K, own) in zip(scenes, each, strict=True)
         ]
+        scenes = [_through(views, found.Ks) for views, found in zip(scenes, geometries, strict=True)]
         with run.stage("language features"):
             features = language()
         with run.stage("grouping"):
@@ -242,10 +245,12 @@ class LangFlashNet(nn.Module):
                 weights = [redrawn(own, views) for own, views in zip(weights, scenes, strict=True)]
         with run.stage("aggregation"):
             dictionaries = [
-                self.dictionary(w, f[None], Seen(own, found.depths, found.viewmats, K[0]))
+                self.dictionary(w, f[None], Seen(own, found.depths, found.viewmats, views.Ks.to(device)))
                 if atoms is None
                 else atoms(w, f[None])
-                for w, f, found, (_, K, own) in zip(weights, features, geometries, each, strict=True)
+                for w, f, found, views, (_, _, own) in zip(
+                    weights, features, geometries, scenes, each, strict=True
+                )
             ]
         timings = {name: seconds / len(scenes) for name, seconds in run.timings.items()}
         notes = (*self.notes, *_of_another_size(self.trained_side, size))
@@ -261,11 +266,18 @@ class LangFlashNet(nn.Module):
                 unplaced=geometry.unplaced,
                 warnings=(*(_left_out(views.names[v]) for v in geometry.unplaced), *notes),
                 timings=dict(timings),
+                Ks=geometry.Ks,
+                lenses=geometry.lenses,
             )
             for views, geometry, own_weights, dictionary in zip(
                 scenes, geometries, weights, dictionaries, strict=True
             )
         ]
+
+
+def _through(views: Views, Ks: Tensor | None) -> Views:
+    """The views with the intrinsics that were found, None: with their own."""
+    return views if Ks is None else replace(views, Ks=Ks.to(views.Ks))
 
 
 def _beside(work: Callable[[], Tensor], device: torch.device) -> Callable[[], Tensor]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from langflash_core.records import Record, check_light
+from langflash_core.records import FoundLens, Record, check_light
 from langflash_core.scene.container import damaged, read_container
 from langflash_core.scene.record import from_json
 
@@ -27,8 +27,8 @@ def describe(scene: "Scene") -> dict:
         (metres per unit or None), counts, pruning (as `prune` left it, with `psnr_db` and
         `relevance_error` where they were measured), refinement (None, or kept, held_out and the PSNR
         before and after), detail (None, or as `Record` has it), light (None, or gains and offsets, a row
-        of red, green and blue per view), timings {stage: seconds, total} (None where they are not known,
-        as in files), warnings`.
+        of red, green and blue per view), lens (None, or found, as `Record` has it), timings {stage: seconds,
+        total} (None where they are not known, as in files), warnings`.
     """
     from langflash_core.scene.fields import to_fields  # torch
 
@@ -82,6 +82,18 @@ def _joined(between: str, *parts: str) -> str:
     return between.join(filter(None, parts))
 
 
+def lens_line(lens: Mapping[str, Any]) -> str:
+    """What photos told of their lenses, for people; "" where nothing is known, or something else is said.
+
+    Args:
+        lens: as `Record` has it.
+    """
+    try:
+        return "; ".join(str(FoundLens(**found)) for found in lens.get("found", ()))
+    except (TypeError, ValueError):
+        return ""
+
+
 def _count(value: object) -> str:
     return f"{value:,}" if isinstance(value, int) and not isinstance(value, bool) else ""
 
@@ -121,6 +133,7 @@ def _document(
         "refinement": dict(known.refinement) or None,
         "detail": dict(known.detail) or None,
         "light": dict(known.light) or None,
+        "lens": dict(known.lens) or None,
         "timings": {**timings, "total": sum(timings.values())} if timings else None,
         "warnings": list(known.warnings),
     }

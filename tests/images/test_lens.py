@@ -8,7 +8,8 @@ import torch
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import fov_degrees
 from langflash_core.images.decode import read_photo
-from langflash_core.images.lens import check_lens, exif_focal, photo_intrinsics
+from langflash_core.images.lens import ASSUMED_FOV, check_lens, exif_focal, known_lenses, photo_intrinsics
+from langflash_core.types import FoundFocal, Lenses
 from tests.images.pictures import exif, room_picture, saved
 
 TOLERANCE = 1e-4  # EXIF rationals are stored as fractions, float32 in K
@@ -77,3 +78,33 @@ def test_a_principal_point_outside_the_photo_is_refused(tmp_path):
 def test_lenses_that_cannot_be_are_refused(fov, intrinsics, message):
     with pytest.raises(InputError, match=message):
         check_lens(fov, intrinsics)
+
+
+def test_photos_of_one_camera_share_a_lens(tmp_path):
+    plain = photo_with(tmp_path)
+    turned = photo_with(tmp_path, width=300, height=400)
+    smaller = photo_with(tmp_path, width=320, height=240)
+    recorded = photo_with(tmp_path, focal_35mm=26)
+    photos = [plain, turned, smaller, recorded, recorded]
+    lenses = known_lenses(photos, [None] * 5, None, "assumed")
+    assert lenses is not None and lenses.of == (0, 0, 1, 2, 2)
+    assert lenses.fovs == pytest.approx([ASSUMED_FOV, ASSUMED_FOV, 67.3], abs=0.1)
+    assert lenses.recorded == (False, False, True) and lenses.doubts[0] > 10 * lenses.doubts[2] > 0
+    given = known_lenses(photos, [None, 70.0, None, None, None], None, "")
+    assert given is not None and given.doubts[given.of[1]] == 0 and given.fovs[given.of[1]] == 70
+    assert known_lenses(photos, [60.0] * 5, None, "") is None
+    assert known_lenses(photos, [None] * 5, (300, 300, 200, 150), "") is None
+
+
+def test_what_photos_tell_of_a_lens_is_said_in_degrees():
+    lenses = Lenses((0, 0, 1), (65.0, 50.0), (0.35, 0.02), (False, True), "assumed")
+    focal, error = 1.1, 0.01
+    [found] = lenses.found([FoundFocal(focal, error, 8), None])
+    half = math.tan(math.radians(32.5))
+    wider, narrower = (2 * math.degrees(math.atan(half / (focal * (1 + d)))) for d in (-1e-5, 1e-5))
+    assert found.fov == pytest.approx(2 * math.degrees(math.atan(half / focal)))
+    assert found.error == pytest.approx((wider - narrower) / 2e-5 * error, rel=1e-4)
+    assert str(found) == "60.2 ± 0.5 degrees, found from 8 photos (assumed: 65.0)"
+    assert lenses.settled([found]) and not lenses.settled([])
+    [recorded] = lenses.found([None, FoundFocal(1.0, error, 3)])
+    assert "recorded: 50.0" in str(recorded) and not lenses.settled([recorded])

@@ -6,7 +6,7 @@ import pytest
 
 from langflash_core.scene.assemble import assemble
 from langflash_core.scene.file import load, save
-from langflash_core.scene.report import describe, describe_file, detail_line
+from langflash_core.scene.report import describe, describe_file, detail_line, lens_line
 from langflash_core.types import Scene
 from tests.scene.plane import wall_prediction
 
@@ -75,3 +75,9 @@ def test_a_file_keeps_it_and_programs_read_it_whole(scene, tmp_path):
 def test_a_scene_without_it_says_nothing(scene, tmp_path):
     save(scene, tmp_path / "a.langflash")
     assert scene.record.detail == {} and describe_file(tmp_path / "a.langflash")["detail"] is None
+
+
+def test_a_found_lens_is_one_line():
+    found = {"fov": 61.23, "error": 0.81, "photos": 8, "said": 65.0, "recorded": False}
+    assert lens_line({"found": [found]}) == "61.2 ± 0.8 degrees, found from 8 photos (assumed: 65.0)"
+    assert lens_line({}) == lens_line({"found": [{"fov": 1}]}) == lens_line({"found": 3}) == ""

@@ -42,11 +42,11 @@ def _described(path: Path) -> dict[str, Any]:
 
 
 def _for_people(document: dict[str, Any]) -> dict[str, Any]:
-    """With the detail as one line, and none where there is nothing to say of it."""
-    from langflash_core.scene.report import detail_line
+    """With detail and lens as one line each, and none where there is nothing to say of it."""
+    from langflash_core.scene.report import detail_line, lens_line
 
-    said = {**document, "detail": detail_line(document["detail"] or {})}
-    return said if said["detail"] else {name: value for name, value in said.items() if name != "detail"}
+    lines = {"detail": detail_line(document["detail"] or {}), "lens": lens_line(document["lens"] or {})}
+    return {name: lines.get(name, value) for name, value in document.items() if lines.get(name) != ""}
 
 
 def _in_words(fields: dict[str, Any]) -> dict[str, Any]:

@@ -33,17 +33,25 @@ validation pairs changed by at most .03 (rotation) and .11 degrees (direction); 
 
 @dataclass(frozen=True)
 class Matches:
-    """x_i, x_j (n, 2) normalised coordinates; sigma: their standard deviation, same unit."""
+    """x_i, x_j (n, 2) normalised coordinates; sigma: their standard deviation, same unit. rows (n, 2): which
+    key points of both views they are, -1 of what is none; None: nobody asks."""
 
     x_i: np.ndarray
     x_j: np.ndarray
     sigma: float
+    rows: np.ndarray | None = None
+
+    @property
+    def key_points(self) -> np.ndarray:
+        """`rows`, -1 where nobody asked."""
+        return np.full((len(self), 2), -1) if self.rows is None else self.rows
 
     def __len__(self) -> int:
         return len(self.x_i)
 
     def subset(self, keep: np.ndarray) -> "Matches":
-        return Matches(self.x_i[keep], self.x_j[keep], self.sigma)
+        rows = None if self.rows is None else self.rows[keep]
+        return Matches(self.x_i[keep], self.x_j[keep], self.sigma, rows)
 
 
 @dataclass(frozen=True)

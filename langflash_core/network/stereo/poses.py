@@ -1,14 +1,27 @@
 """Poses of V views: relative poses of the pairs that share most, brought together in one adjustment."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from langflash_core.network.stereo.adjustment import (
+    Adjusted,
+    Agreed,
+    Sought,
+    adjusted_photos,
+    log_depths,
+)
 from langflash_core.network.stereo.alignment import NO_CORRECTION, Correction, fit_correction
-from langflash_core.network.stereo.dense import match_cells
 from langflash_core.network.stereo.graph import chosen_pairs, closest, placed, unconnected
-from langflash_core.network.stereo.keypoints import WORKING_SIDE, KeyPoints
+from langflash_core.network.stereo.inputs import (
+    PoseInput,
+    dense_matches,
+    depths_at,
+    key_point_matches,
+    with_dense,
+)
+from langflash_core.network.stereo.keypoints import KeyPoints
 from langflash_core.network.stereo.known import agreeing, depth_scales, log_scales
 from langflash_core.network.stereo.matching import (
     MIN_INLIERS,
@@ -17,6 +30,7 @@ from langflash_core.network.stereo.matching import (
     relative_pose,
     triangulate,
 )
+from langflash_core.records import FoundFocal
 
 _MIN_SHARE = 0.25  # of the matches must agree with a pose
 _MAX_DEPTH_SIGMA = 0.2  # log-depth error beyond which a triangulated match says too little
@@ -24,35 +38,30 @@ _MIN_POINTS = 10  # matches needed to correct a map
 _FEW = 40  # inliers among key points, below which dense matches are asked as well
 _DENSE_COST = 2.75
 """Cost from which dense matches are not believed: on validation rooms the wrong ones began at 2.8."""
-_DENSE_SIGMA = 3.0  # pixels at the working size: a third of a cell
-
-
-@dataclass(frozen=True)
-class PoseInput:
-    """What pose estimation reads of one view.
-
-    K: (3, 3) pixels of the network's image of `size` (width, height). depth: (H, W), z of the
-    monocular map. local: unit descriptors (C, h', w') of `LocalFeatures`.
-    """
-
-    K: np.ndarray
-    size: tuple[int, int]
-    depth: np.ndarray
-    local: np.ndarray
 
 
 @dataclass(frozen=True)
 class Poses:
     """viewmats (V, 4, 4), world = view 0; depth_scales (V,) that bring each view's depth map to
     view 0's unit; corrections: what matches say of each map beyond its scale, on the log depths
-    before scaling; guessed: views that no match supports. neighbours: of each view those that share most
-    with it."""
+    before scaling; guessed: views that no match supports. adjusted: where three and more were placed, what
+    they say together, with the lens."""
 
     viewmats: np.ndarray
     depth_scales: np.ndarray
     corrections: tuple[Correction, ...]
     guessed: tuple[int, ...]
-    neighbours: tuple[tuple[int, ...], ...]
+    adjusted: Adjusted | None = None
+
+    @property
+    def growths(self) -> np.ndarray:
+        """By what each view's focal length (V,) is longer than was said."""
+        return np.ones(len(self.viewmats)) if self.adjusted is None else self.adjusted.growths
+
+    @property
+    def lenses(self) -> tuple[FoundFocal | None, ...]:
+        """What was found of each lens."""
+        return () if self.adjusted is None else self.adjusted.lenses
 
 
 def estimate_poses(
@@ -60,6 +69,7 @@ def estimate_poses(
     points: KeyPoints,
     check: Callable[[], None] = lambda: None,
     known: np.ndarray | None = None,
+    sought: Sought | None = None,
 ) -> Poses:
     """Poses of all views, deterministic.
 
@@ -69,18 +79,22 @@ def estimate_poses(
     Args:
         points: of the same photos, the same crop, in the same order.
         known: poses (V, 4, 4) that are given, world = view 0: only depths are fitted, to their unit.
+        sought: lenses that may be corrected; None: all are given.
 
     Raises:
         InputError: the photos do not fit the poses that are given.
     """
     num_views = len(views)
     told = {edge: rows for edge, rows in points.pairs.items() if not _blank(points, edge)}
-    edges = {edge: _key_point_matches(views, points, *edge) for edge in chosen_pairs(num_views, told)}
+    edges = {edge: key_point_matches(views, points, *edge) for edge in chosen_pairs(num_views, told)}
     if known is None:
         pairs, agreed = _pair_poses(views, edges, check)
         found = placed(num_views, pairs)
-        viewmats, scales, guessed = found.viewmats, found.scales, found.missing
         agreed = {edge: agreed[edge] for edge in found.kept}
+        adjusted = adjusted_photos(views, replace(points, pairs=told), found, agreed, sought, check)
+        if adjusted is not None:
+            return _of_adjusted(adjusted, views, found.missing)
+        viewmats, scales, guessed = found.viewmats, found.scales, found.missing
     else:
         agreed = {}
         for (i, j), matches in edges.items():
@@ -88,8 +102,41 @@ def estimate_poses(
             agreed[i, j] = _agreed(views[i], views[j], matches, known[j] @ np.linalg.inv(known[i]))
         viewmats, scales, guessed = known, _known_scales(views, known, agreed), ()
     corrections = [_correction(v, views[v], viewmats, scales[v], agreed) for v in range(num_views)]
-    shared = {edge: len(matches) for edge, matches in agreed.items()}
-    return Poses(viewmats, scales, tuple(corrections), guessed, closest(num_views, shared))
+    return Poses(viewmats, scales, tuple(corrections), guessed)
+
+
+def on_other_maps(poses: Poses, views: Sequence[PoseInput]) -> Poses:
+    """The poses with other depth maps of the same photos, and the unit of view 0's."""
+    assert poses.adjusted is not None, "lenses are found where photos are adjusted together"
+    return _of_adjusted(poses.adjusted, views, poses.guessed)
+
+
+def _of_adjusted(adjusted: Adjusted, views: Sequence[PoseInput], guessed: tuple[int, ...]) -> Poses:
+    """Scales and corrections of the depth maps from the points that many photos saw.
+
+    The bundle's unit hangs on all maps a little; here it becomes that of view 0's.
+    """
+    tracks, num_views = adjusted.tracks, len(views)
+    priors = log_depths(views, tracks)
+    said = np.log(adjusted.depths) - priors
+    sure = adjusted.depth_errors < _MAX_DEPTH_SIGMA
+    logs, corrections = np.zeros(num_views), []
+    of_views = [np.flatnonzero(tracks.views == v) for v in range(num_views)]
+    for v, own in enumerate(of_views):
+        best = own[sure[own]] if sure[own].sum() >= _MIN_POINTS else own
+        logs[v] = np.median(said[best]) if len(best) else 0.0
+    for v, (view, own) in enumerate(zip(views, of_views, strict=True)):
+        own = own[sure[own]]
+        if len(own) < _MIN_POINTS:
+            corrections.append(NO_CORRECTION)
+            continue
+        x = tracks.pixels[own] / (view.K[0, 0])
+        targets = np.log(adjusted.depths[own]) - logs[v]
+        corrections.append(fit_correction(x, priors[own], targets, adjusted.depth_errors[own]))
+    viewmats = adjusted.viewmats.copy()
+    viewmats[:, :3, 3] /= np.exp(logs[0])
+    scales = np.exp(logs - logs[0])
+    return Poses(viewmats, scales, tuple(corrections), guessed, adjusted)
 
 
 def _blank(points: KeyPoints, edge: tuple[int, int]) -> bool:
@@ -117,7 +164,7 @@ def _pair_poses(
             agreed[i, j] = matches.subset(pose.inliers)
     for i, j in unconnected(len(views), pairs, {edge: len(matches) for edge, matches in edges.items()}):
         check()
-        more = _joined(edges[i, j], _dense_matches(views[i], views[j]))
+        more = with_dense(edges[i, j], dense_matches(views[i], views[j]))
         better = _pair_pose(views[i], views[j], more)
         if better is not None and better.cost < _DENSE_COST:
             pairs[i, j], agreed[i, j] = better, more.subset(better.inliers)
@@ -129,7 +176,7 @@ def _pair_poses(
 def _agreed(view_i: PoseInput, view_j: PoseInput, matches: Matches, relative: np.ndarray) -> Matches:
     """Matches that a known relative pose allows; dense ones as well where few do."""
     own = agreeing(matches, relative)
-    return own if len(own) >= _FEW else agreeing(_joined(matches, _dense_matches(view_i, view_j)), relative)
+    return own if len(own) >= _FEW else agreeing(with_dense(matches, dense_matches(view_i, view_j)), relative)
 
 
 def _known_scales(
@@ -139,7 +186,7 @@ def _known_scales(
     said: list[list[np.ndarray]] = [[np.zeros(0)] for _ in views]
     for (i, j), matches in agreed.items():
         relative = viewmats[j] @ np.linalg.inv(viewmats[i])
-        depths = _depths_at(views[i], matches.x_i), _depths_at(views[j], matches.x_j)
+        depths = depths_at(views[i], matches.x_i), depths_at(views[j], matches.x_j)
         for view, logs in zip((i, j), log_scales(matches, relative, *depths), strict=True):
             said[view].append(logs)
     return np.ones(1) if len(views) == 1 else depth_scales([np.concatenate(own) for own in said])
@@ -147,47 +194,8 @@ def _known_scales(
 
 def _pair_pose(view_i: PoseInput, view_j: PoseInput, matches: Matches) -> RelativePose | None:
     """The pose of the matches, if enough of them agree with it."""
-    pose = relative_pose(matches, _depths_at(view_i, matches.x_i), _depths_at(view_j, matches.x_j))
+    pose = relative_pose(matches, depths_at(view_i, matches.x_i), depths_at(view_j, matches.x_j))
     return pose if pose is not None and pose.num_inliers >= _MIN_SHARE * len(matches) else None
-
-
-def _key_point_matches(views: list[PoseInput], points: KeyPoints, i: int, j: int) -> Matches:
-    rows = points.pairs[i, j]
-    x_i = _without_camera(points.positions[i][rows[:, 0]], views[i], WORKING_SIDE)
-    x_j = _without_camera(points.positions[j][rows[:, 1]], views[j], WORKING_SIDE)
-    return Matches(x_i, x_j, _sigma(views[j], 1.0))
-
-
-def _dense_matches(view_i: PoseInput, view_j: PoseInput) -> Matches:
-    cells_i, cells_j = match_cells(view_i.local, view_j.local)
-    x_i, x_j = (
-        (cells * (np.array(view.size) / view.local.shape[:0:-1]) - view.K[:2, 2]) / view.K.diagonal()[:2]
-        for view, cells in ((view_i, cells_i), (view_j, cells_j))
-    )
-    return Matches(x_i, x_j, _sigma(view_j, _DENSE_SIGMA))
-
-
-def _joined(exact: Matches, dense: Matches) -> Matches:
-    """Both sets, with the tolerance of the coarser."""
-    x_i, x_j = (np.concatenate(both) for both in ((exact.x_i, dense.x_i), (exact.x_j, dense.x_j)))
-    return Matches(x_i, x_j, dense.sigma)
-
-
-def _sigma(view: PoseInput, pixels: float) -> float:
-    """`pixels` at the working size, as normalised coordinates."""
-    return pixels * max(view.size) / WORKING_SIDE / view.K[0, 0]
-
-
-def _without_camera(pixels: np.ndarray, view: PoseInput, side: int) -> np.ndarray:
-    """Pixels of a picture whose longer side is `side` -> normalised coordinates (n, 2)."""
-    own = pixels * (max(view.size) / side)
-    return (own - view.K[:2, 2]) / view.K.diagonal()[:2]
-
-
-def _depths_at(view: PoseInput, x: np.ndarray) -> np.ndarray:
-    pixels = x * view.K.diagonal()[:2] + view.K[:2, 2]
-    columns, rows = np.clip(pixels.astype(int), 0, np.array(view.size) - 1).T
-    return view.depth[rows, columns].astype(np.float64)
 
 
 def _correction(
@@ -209,4 +217,4 @@ def _correction(
     if sum(map(len, points)) < _MIN_POINTS:
         return NO_CORRECTION
     x = np.concatenate(points)
-    return fit_correction(x, np.log(_depths_at(own, x)), np.concatenate(targets), np.concatenate(sigmas))
+    return fit_correction(x, np.log(depths_at(own, x)), np.concatenate(targets), np.concatenate(sigmas))

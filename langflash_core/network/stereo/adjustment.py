@@ -1,0 +1,206 @@
+"""All photos adjusted together: their matches become tracks, and tracks tell poses, points and lenses.
+
+Twice: what the pairs agree on gives poses that then say of every pair of photos which matches agree, also of
+pairs whose own pose nobody asked for.
+
+Sizes: V views, M observations, G lenses.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from langflash_core.network.stereo.bundle import Bundle, Rig, adjusted_bundle
+from langflash_core.network.stereo.graph import Placed
+from langflash_core.network.stereo.inputs import (
+    PoseInput,
+    depths_at,
+    key_point_matches,
+    normalised_sigma,
+    without_camera,
+)
+from langflash_core.network.stereo.keypoints import KeyPoints
+from langflash_core.network.stereo.known import agreeing
+from langflash_core.network.stereo.matching import MIN_INLIERS, Matches
+from langflash_core.network.stereo.tracks import Tracks, joined, no_tracks, with_pairs
+from langflash_core.records import FoundFocal
+
+FEWEST = 3
+"""Photos of one lens from which it is sought, and photos from which all are adjusted together."""
+_ROUNDS = 2
+_SIGMA = 0.4  # pixels at the working size, of a key point
+_AGREES = 2.0  # times the tolerance of pairs, within which matches join once poses are known
+_SHARED = 3.0
+"""Standard errors of a lens are so many times those of independent observations: errors of key points depend
+on what they show, and go together."""
+_KNOWN = 0.03
+"""Standard error of a focal length, of itself, above which it is not taken."""
+_FIELDS = (20.0, 120.0)  # degrees of the longer side: what photos of rooms are taken with
+
+Agreed = dict[tuple[int, int], Matches]
+
+
+@dataclass(frozen=True)
+class Sought:
+    """What may be changed of V cameras. lenses: which of G each has; doubts: of each lens the standard
+    deviation expected of the logarithm of its focal length; 0: it is given."""
+
+    lenses: tuple[int, ...]
+    doubts: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Adjusted:
+    """viewmats (V, 4, 4), world = view 0. tracks: pixels as of focal lengths `growths` (V,) times those that
+    were said. depths (M,): z. depth_errors (M,): of its logarithm. agreed: matches by pairs.
+    lenses: of each lens what was found, None: it stays."""
+
+    viewmats: np.ndarray
+    tracks: Tracks
+    depths: np.ndarray
+    depth_errors: np.ndarray
+    agreed: Agreed
+    growths: np.ndarray
+    lenses: tuple[FoundFocal | None, ...]
+
+
+def adjusted_photos(
+    views: Sequence[PoseInput],
+    points: KeyPoints,
+    start: Placed,
+    agreed: Agreed,
+    sought: Sought | None = None,
+    check: Callable[[], None] = lambda: None,
+) -> Adjusted | None:
+    """Poses of all placed views, and lenses; None where fewer than three are placed.
+
+    A lens that the photos do not tell (too uncertain, or one that nobody takes a room with) stays as it was.
+
+    Args:
+        agreed: matches of pairs that agree with `start`. check: called between steps.
+    """
+    placed = [v for v in range(len(views)) if v not in start.missing]
+    if len(placed) < FEWEST:
+        return None
+    sought = sought or Sought((0,) * len(views), (0.0,))
+    counts = np.bincount(np.array(sought.lenses)[placed], minlength=len(sought.doubts))
+    doubts = np.where(counts >= FEWEST, np.array(sought.doubts), 0.0)
+    while True:
+        adjusted = _adjusted(list(views), points, start, agreed, np.array(sought.lenses), doubts, check)
+        if adjusted is None:
+            return None
+        bundle, matches = adjusted
+        growths = np.exp(bundle.growths)
+        lost = (doubts > 0) & ~_told(views, np.array(sought.lenses), growths, bundle.errors * _SHARED)
+        if not lost.any():
+            break
+        doubts = np.where(lost, 0.0, doubts)
+    lenses = tuple(
+        FoundFocal(float(growth), float(_SHARED * error), int(count)) if doubt else None
+        for growth, error, count, doubt in zip(growths, bundle.errors, counts, doubts, strict=True)
+    )
+    of_views = growths[list(sought.lenses)]
+    return Adjusted(
+        bundle.viewmats, bundle.tracks, bundle.depths, bundle.depth_errors, matches, of_views, lenses
+    )
+
+
+def _told(
+    views: Sequence[PoseInput], lenses: np.ndarray, growths: np.ndarray, errors: np.ndarray
+) -> np.ndarray:
+    """Which lenses (G,) the photos tell."""
+    known = errors < _KNOWN
+    for view, lens in zip(views, lenses, strict=True):
+        field = 2 * np.degrees(np.arctan(max(view.size) / 2 / (view.K[0, 0] * growths[lens])))
+        known[lens] &= _FIELDS[0] < field < _FIELDS[1]
+    return known
+
+
+def _adjusted(
+    views: list[PoseInput],
+    points: KeyPoints,
+    start: Placed,
+    agreed: Agreed,
+    lenses: np.ndarray,
+    doubts: np.ndarray,
+    check: Callable[[], None],
+) -> tuple[Bundle, Agreed] | None:
+    """The last round's bundle, and the matches that agree with it."""
+    logs, growths = np.log(start.scales), np.zeros(len(doubts))
+    doubts = doubts / _SHARED  # what observations say is worth so much less than it seems
+    focals = np.array([view.K[0, 0] for view in views])
+    viewmats, matches, bundle = start.viewmats, agreed, None
+    for _ in range(_ROUNDS):
+        check()
+        tracks = _tracks(views, points, matches)
+        if not len(tracks):
+            return None
+        depths = log_depths(views, tracks)
+        bundle = adjusted_bundle(viewmats, logs, growths, Rig(focals, lenses, doubts), tracks, depths)
+        viewmats, growths = bundle.viewmats, bundle.growths
+        matches = _agreeing(views, points, viewmats, np.exp(growths[lenses]), start.missing, agreed)
+    assert bundle is not None
+    return bundle, matches
+
+
+def log_depths(views: Sequence[PoseInput], tracks: Tracks) -> np.ndarray:
+    """Of the monocular maps where each observation lies, (M,)."""
+    found = np.zeros(len(tracks))
+    for v, view in enumerate(views):
+        own = tracks.views == v
+        found[own] = np.log(depths_at(view, tracks.pixels[own] / view.K[0, 0]))
+    return found
+
+
+def _tracks(views: Sequence[PoseInput], points: KeyPoints, agreed: Agreed) -> Tracks:
+    """Pixels from the principal point, square ones. Dense matches are points that two views saw."""
+    focals = [view.K[0, 0] for view in views]
+    positions = [
+        without_camera(own, view) * focal
+        for own, view, focal in zip(points.positions, views, focals, strict=True)
+    ]
+    sigmas = [_SIGMA * normalised_sigma(view, 1.0) * focal for view, focal in zip(views, focals, strict=True)]
+    exact = {edge: matches.key_points[matches.key_points[:, 0] >= 0] for edge, matches in agreed.items()}
+    tracks = joined(positions, exact, sigmas) if positions else no_tracks()
+    dense = []
+    for (i, j), matches in agreed.items():
+        own = matches.key_points[:, 0] < 0
+        if own.any():
+            sigma = _SIGMA * matches.sigma * focals[j]
+            dense.append((i, j, matches.x_i[own] * focals[i], matches.x_j[own] * focals[j], sigma))
+    return with_pairs(tracks, dense)
+
+
+def _agreeing(
+    views: list[PoseInput],
+    points: KeyPoints,
+    viewmats: np.ndarray,
+    growths: np.ndarray,
+    missing: Sequence[int],
+    agreed: Agreed,
+) -> Agreed:
+    """Matches of all pairs of placed views that the poses allow; pairs that needed dense ones keep theirs.
+
+    In coordinates of the lenses `growths` (V,) times as long as those of `views`; so are the answer's.
+    """
+    found = {}
+    for i, j in points.pairs:
+        if i in missing or j in missing:
+            continue
+        if (i, j) in agreed and (agreed[i, j].key_points[:, 0] < 0).any():
+            found[i, j] = _through(agreed[i, j], growths[i], growths[j])
+        elif len(points.pairs[i, j]) >= MIN_INLIERS:
+            own = _through(key_point_matches(views, points, i, j), growths[i], growths[j])
+            wide = replace(own, sigma=own.sigma * _AGREES)
+            own = replace(agreeing(wide, viewmats[j] @ np.linalg.inv(viewmats[i])), sigma=own.sigma)
+            if len(own) >= MIN_INLIERS // 2:
+                found[i, j] = own
+    return found
+
+
+def _through(matches: Matches, growth_i: float, growth_j: float) -> Matches:
+    """Matches through lenses of so many times the focal length."""
+    return replace(
+        matches, x_i=matches.x_i / growth_i, x_j=matches.x_j / growth_j, sigma=matches.sigma / growth_j
+    )
