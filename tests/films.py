@@ -39,7 +39,7 @@ def smeared(frame: np.ndarray, width: int = 17) -> np.ndarray:
     return cv2.blur(frame, (width, 1))
 
 
-def write(path: Path, frames: Sequence[np.ndarray], rate: float = RATE, *options: str) -> Path:
+def write(path: Path, frames: Sequence[np.ndarray], rate: int = RATE, *options: str) -> Path:
     """Frames (BGR) as H.264."""
     height, width = frames[0].shape[:2]
     writer = imageio_ffmpeg.write_frames(

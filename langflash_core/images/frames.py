@@ -24,14 +24,16 @@ from langflash_core.images.motion import (
     Follower,
     Look,
     Marks,
+    Moved,
     from_one_place,
-    from_one_room,
     look_at,
     marks_of,
+    step_between,
     tiny,
     trackable,
 )
 from langflash_core.images.pictures import MAX_PHOTOS
+from langflash_core.images.still_names import still_name
 from langflash_core.images.strip import (
     BLURRED,
     ELSEWHERE,
@@ -44,18 +46,20 @@ from langflash_core.images.strip import (
     Strip,
     choose,
     read_strip,
-    still_name,
     written,
 )
 from langflash_core.resources import home_folder
 from langflash_core.running import Progress
 
 PIECE = 0.03  # of the side that the picture moves in a piece, of which one frame is kept
+FAST = 0.12  # of the side from one picture to the next: a hand does that, and may then be lost
 MOST_STILLS = 600  # more, and every second one goes
 STILL_SIDE, QUALITY = 1920, 92  # pixels of the longer side of a kept frame, at most
 DARK = 0.08  # a frame whose brightest tenth stays below
 KEPT_FILMS = 8  # of which stills are kept
 STAGE = "film"
+_UNSEEN = 0.3  # of the side that the film is taken to have moved where it was lost in a fast turn
+_NO_GREY = np.zeros((1, 1), np.uint8)  # where no length is asked for
 _MOST_SHOTS, _COMPARED = 12, 3  # shots that are compared with each other, stills of each
 
 
@@ -161,6 +165,8 @@ class _Watch:
         self._judged: list[list[tuple[float, float]]] = []  # frames that each still stands for
         self._rises: list[float] = []  # of each still
         self._base = 0.0  # how far the film had moved at the anchor
+        self._carried = 0.0  # how far the piece had moved at the anchor
+        self._pace = self._at = 0.0  # of the last two pictures, and where the last one is
         self._length = PIECE
         self._shot = -1
         self._following = False
@@ -213,29 +219,46 @@ class _Watch:
                 self._plain += 1
                 return
             self._close()
-            self._lost += self._following
-            self._base += SPACING if self._following else 0.0
-            self._shot += 1
+            step = self._wide_step(look)
+            self._lost += self._following and step is None
+            self._base += SPACING if step is None else step
+            self._pace, self._at = self._pace if step is None else step, self._base
+            self._shot += step is None
             self._following = self._follower.anchor(look.grey)
             self._begin(look, picture, seconds, self._base)
             return
-        place = self._base + moved
-        if self._is_over(moved, seconds):
+        place = self._base + moved.since_anchor
+        self._pace, self._at = abs(place - self._at), place
+        if self._is_over(self._carried + moved.since_mark, seconds):
             self._close()
             self._begin(look, picture, seconds, place)
-            self._base, self._following = place, self._follower.anchor(look.grey)
-            return
-        self._judge(look, picture, seconds, place)
+            self._follower.mark()
+            moved = Moved(moved.since_anchor, 0.0)
+        else:
+            self._judge(look, picture, seconds, place)
+        if self._follower.weak:
+            self._base, self._carried = place, self._carried + moved.since_mark
+            self._following = self._follower.anchor(look.grey)
+
+    def _wide_step(self, look: Look) -> float | None:
+        """How far a picture that cannot be followed is from the last one, where both show one room; so they
+        do where the film was fast just before."""
+        last = self._follower.last
+        if not self._following or last is None or last.shape != look.grey.shape:
+            return None
+        step = step_between(marks_of(last), marks_of(look.grey), last)
+        if step is None:
+            return _UNSEEN if self._pace > FAST else None
+        return max(step, PIECE)
 
     def _is_over(self, gone: float, seconds: float) -> bool:
         """Whether the piece ends before the picture at hand."""
-        if self._follower.weak:
-            return True
         if self._every is not None:
             return self._piece is not None and seconds - self._piece.begin >= self._every - 1e-6
         return gone >= self._length
 
     def _begin(self, look: Look, picture: np.ndarray, seconds: float, place: float) -> None:
+        self._carried = 0.0
         self._piece = _Piece(
             self._shot, seconds, look, picture, seconds, place, [(look.sharpness, look.rise)]
         )
@@ -256,7 +279,7 @@ class _Watch:
             return
         name = still_name(self._reader.film.name, piece.seconds, self._longest)
         write_picture(self._folder / name, piece.picture)
-        # `place` is of the sharpest frame: places never fall back where the hand does.
+        # Places never fall back where the hand does: what is there has been seen.
         place = max(piece.place, self._stills[-1].place if self._stills else 0.0)
         sharpness = piece.sharpest.sharpness
         self._stills.append(Still(name, round(piece.seconds, 3), sharpness, place, len(piece.judged)))
@@ -392,7 +415,7 @@ def _share_a_room(marks: dict[int, Marks], one: list[int], other: list[int]) -> 
     """Whether some stills of two shots show something in common; ends that may follow each other first."""
     pairs = [(a, b) for a in _some(one) for b in _some(other)]
     pairs.sort(key=lambda pair: abs(pair[0] - pair[1]))
-    return any(from_one_room(marks[a], marks[b]) for a, b in pairs)
+    return any(step_between(marks[a], marks[b], _NO_GREY) is not None for a, b in pairs)
 
 
 def _some(indices: list[int]) -> list[int]:

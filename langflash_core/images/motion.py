@@ -21,7 +21,7 @@ WEAK = 0.45  # of those at the anchor: below, fresh ones are taken
 SAME, ALIKE = 0.02, 0.85  # moved, most of what is seen, and correlation of two pictures from one place
 _MOST = 85  # per cent
 EDGE, EDGES, REACH = 30, 40, 15  # steps of grey of an edge that tells of blur, how many, pixels across it
-JOINS = 20  # matches that agree with one motion: two shots show one place
+JOINS, AGREE = 16, 0.5  # matches that agree with one motion, and their share: two pictures show one room
 _TINY = (32, 24)
 _WINDOW, _LEVELS = (21, 21), 3
 
@@ -60,12 +60,20 @@ def _rise(grey: Grey) -> float:
     return float(np.percentile(contrast[edges] / slope[edges], 20))
 
 
+@dataclass(frozen=True)
+class Moved:
+    """How far a picture has moved since the anchor, and since the mark."""
+
+    since_anchor: float
+    since_mark: float
+
+
 class Follower:
-    """Follows a film from its anchor on."""
+    """Follows a film from its anchor on. last: the picture that was followed last."""
 
     def __init__(self) -> None:
-        self._last: np.ndarray | None = None
-        self._anchored = self._now = np.empty((0, 2), np.float32)
+        self.last: np.ndarray | None = None
+        self._anchored = self._marked = self._now = np.empty((0, 2), np.float32)
         self._count = 0  # of corners at the anchor
 
     def anchor(self, grey: Grey) -> bool:
@@ -73,27 +81,33 @@ class Follower:
         points = _corners(grey)
         if len(points) < FEWEST:
             return False
-        self._last, self._anchored, self._now, self._count = grey, points, points, len(points)
+        self.last, self._count = grey, len(points)
+        self._anchored = self._marked = self._now = points
         return True
 
-    def follow(self, grey: Grey) -> float | None:
-        """How far this picture has moved since the anchor; None where it shows another place."""
-        if self._last is None or self._last.shape != grey.shape:
+    def mark(self) -> None:
+        """Tell from here on, too, how far it moves."""
+        self._marked = self._now
+
+    def follow(self, grey: Grey) -> Moved | None:
+        """How far this picture has moved; None where it shows another place."""
+        if self.last is None or self.last.shape != grey.shape:
             return None
-        there, found = _tracked(self._last, grey, self._now)
+        there, found = _tracked(self.last, grey, self._now)
         share = float(found.mean()) if len(found) else 0.0
         if share < WEAK:  # a step too wide for corners: the whole picture tells about where to seek them
-            on, again = _tracked(self._last, grey, self._now, _shift(self._last, grey))
+            on, again = _tracked(self.last, grey, self._now, _shift(self.last, grey))
             if again.sum() > found.sum():
                 there, found, share = on, again, float(again.mean())
         if share < LOST or found.sum() < FEWEST // 2:
             return None
-        self._anchored, self._now, self._last = self._anchored[found], there[found], grey
-        return _gone(self._anchored, self._now, grey)
+        self._anchored, self._marked = self._anchored[found], self._marked[found]
+        self._now, self.last = there[found], grey
+        return Moved(_gone(self._anchored, self._now, grey), _gone(self._marked, self._now, grey))
 
     @property
     def weak(self) -> bool:
-        """Whether few of the corners are left."""
+        """Whether few of the anchor's corners are left."""
         return len(self._now) < WEAK * self._count
 
 
@@ -136,18 +150,22 @@ def marks_of(grey: Grey) -> Marks:
     return Marks(np.array([point.pt for point in points], np.float32), np.asarray(seen, np.float32))
 
 
-def from_one_room(one: Marks, other: Marks) -> bool:
-    """Whether two pictures show something in common, from wherever."""
+def step_between(one: Marks, other: Marks, grey: Grey) -> float | None:
+    """How far what two pictures have in common has moved between them, from wherever they show it; None where
+    there is nothing. grey: one of them."""
     if min(len(one.places), len(other.places)) < JOINS:
-        return False
+        return None
     pairs = cv2.BFMatcher().knnMatch(one.seen, other.seen, k=2)
     good = [pair[0] for pair in pairs if len(pair) == 2 and pair[0].distance < 0.75 * pair[1].distance]
     if len(good) < JOINS:
-        return False
+        return None
     here = one.places[[match.queryIdx for match in good]]
     there = other.places[[match.trainIdx for match in good]]
     _, agree = cv2.findFundamentalMat(here, there, cv2.FM_RANSAC, 1.5, 0.999)
-    return agree is not None and int(agree.sum()) >= JOINS
+    if agree is None or agree.sum() < max(JOINS, AGREE * len(good)):
+        return None
+    kept = agree.ravel() == 1
+    return _gone(here[kept], there[kept], grey)
 
 
 def _shrunk(picture: np.ndarray, side: int) -> np.ndarray:

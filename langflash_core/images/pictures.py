@@ -17,7 +17,7 @@ from PIL import Image
 
 from langflash_core.errors import InputError
 from langflash_core.images.decode import Photo, PhotoFacts, read_photo
-from langflash_core.images.strip import shown_name
+from langflash_core.images.still_names import shown_name
 
 MAX_PHOTOS = 32
 MAX_ASPECT = 2.0

@@ -1,12 +1,11 @@
 """What a film offers to choose from, and the choice: sharp frames, spaced by how far the picture moves.
 
 A `Still` is the sharpest frame of a piece of film that moves by a few hundredths of the picture; a `Strip`
-has those of one film, kept as files. Choosing again, with more or fewer, needs no film. This module knows
-numpy alone.
+has those of one film, kept as files. Choosing again, with more or fewer, needs no film. Neither
+OpenCV nor torch is needed here.
 """
 
 import json
-import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -23,6 +22,7 @@ SPACING = 0.1  # of the side, the root of a picture's area, from one chosen fram
 NARROWEST, WIDEST = 0.4, 0.35  # of the spacing; of the side: nearly half of a picture may then be new
 NEAR = 0.25  # of the side: frames that are compared for sharpness
 BLURRED, SMEARED = 0.4, 1.5  # sharpness below that of the sharpest near; edges that rise over more than usual
+APART = 0.45  # of the side: frames farther from each other may have too little in common
 STANDS = 0.02  # of the side: a film that moves less is a still
 _UNEVEN = 1.5  # what a gap twice as wide as the others costs, in factors of e of sharpness
 REPEAT, ELSEWHERE = "repeat", "elsewhere"
@@ -35,7 +35,6 @@ REASONS = {
     "other_shots": "were of other places",
 }
 """Why frames are left out, for people."""
-_NAME = re.compile(r"(.+ @ )0*(\d+\.\d\d s)\.jpg")
 
 
 @dataclass(frozen=True)
@@ -106,6 +105,7 @@ def choose(strip: Strip, most: int, fewest: int = 2) -> Choice:
     relative = _relative(places, sharpness, usable)
     smears = np.array([still.smear for still in stills], dtype=np.float64)
     taken = _without_blurred(places, relative, smears, usable)
+    blurred = usable & ~taken
     way = float(np.ptp(places[usable])) if usable.any() else 0.0
     if usable.sum() < 2 or way < STANDS:
         raise FilmError(
@@ -118,17 +118,18 @@ def choose(strip: Strip, most: int, fewest: int = 2) -> Choice:
         indices = np.flatnonzero(taken)
         chosen = indices[_best(places[indices], np.log(relative[indices].clip(0.05)), count)]
     gaps = np.diff(places[chosen])
-    left = _left(strip, usable, taken, chosen.tolist())
-    return Choice(tuple(chosen.tolist()), relative, left, float(gaps.max()) if len(gaps) else 0.0)
+    gap = float(gaps.max()) if len(gaps) else 0.0
+    left = _left(strip, blurred, chosen.tolist())
+    return Choice(tuple(chosen.tolist()), relative, left, gap)
 
 
 def notes_on(strip: Strip, choice: Choice) -> tuple[str, ...]:
     """What people should know of a choice, a sentence each."""
     notes = list(strip.notes)
-    if choice.gap > WIDEST and strip.every is None:
+    if choice.gap > APART and strip.every is None:
         notes.append(
             f"frames of {strip.film} lie far apart, {choice.gap:.0%} of the picture; "
-            "take more of them, or film less of the place"
+            "take more of them or, with --from and --to, less of the film"
         )
     return tuple(notes)
 
@@ -205,46 +206,21 @@ def _evenly(indices: Int[np.ndarray, " S"], most: int) -> Int[np.ndarray, " N"]:
     return indices[np.round(np.linspace(0, len(indices) - 1, most)).astype(np.int64)]
 
 
-def _left(
-    strip: Strip, usable: Bool[np.ndarray, " S"], taken: Bool[np.ndarray, " S"], chosen: list[int]
-) -> dict[str, int]:
+def _left(strip: Strip, blurred: Bool[np.ndarray, " S"], chosen: list[int]) -> dict[str, int]:
     """Frames left out, by reason; together with the chosen ones all that were looked at."""
-    stills, left = strip.stills, {"repeats": 0, "other_shots": 0, "blurred": 0}
-    for index, still in enumerate(stills):
+    left = {"repeats": 0, "other_shots": 0, "blurred": 0}
+    for index, still in enumerate(strip.stills):
         if still.why_not:
             left["repeats" if still.why_not == REPEAT else "other_shots"] += still.looks
         else:
-            whole = usable[index] and not taken[index]
-            left["blurred"] += still.looks if whole else still.blurred
+            itself = index in chosen and still.smear > SMEARED
+            left["blurred"] += still.looks if blurred[index] else still.blurred - itself
     left |= {"dark": strip.dark, "plain": strip.plain}
     left["between"] = strip.looked - len(chosen) - sum(left.values())
     return left
 
 
-# Names and files
-
-
-def still_name(film: str, seconds: float, longest: float) -> str:
-    """What the file of a frame is called: names in order are times in order."""
-    width = len(f"{longest:.2f}")
-    return f"{film} @ {seconds:0{width}.2f} s.jpg"
-
-
-def shown_name(name: str) -> str:
-    """`walk.mp4 @ 003.27 s.jpg` is called `walk.mp4 @ 3.27 s`; other files as they are."""
-    found = _NAME.fullmatch(name)
-    return found[1] + found[2] if found else name
-
-
-def film_of(name: str) -> str | None:
-    """The film that a file is a frame of, by its name."""
-    found = _NAME.fullmatch(name)
-    return found[1].removesuffix(" @ ") if found else None
-
-
-def is_still(name: str) -> bool:
-    """Whether a file is named as one of a film's frames."""
-    return _NAME.fullmatch(name) is not None
+# Files
 
 
 def written(strip: Strip) -> bytes:

@@ -9,16 +9,8 @@ import pytest
 from langflash_core.errors import FilmError
 from langflash_core.images import strip as module
 from langflash_core.images.pictures import photo_names
-from langflash_core.images.strip import (
-    Still,
-    Strip,
-    choose,
-    is_still,
-    read_strip,
-    shown_name,
-    still_name,
-    written,
-)
+from langflash_core.images.still_names import is_still, shown_name, still_name
+from langflash_core.images.strip import Still, Strip, choose, read_strip, written
 
 
 def strip(places, sharpness, why_not=None, **more) -> Strip:

@@ -14,7 +14,7 @@ import numpy as np
 from langflash_core.detail import DEFAULT_DETAIL
 from langflash_core.errors import ImageError, LangFlashError
 from langflash_core.geometry.reach import median_reach
-from langflash_core.images.strip import film_of, shown_name
+from langflash_core.images.still_names import film_of, shown_name
 from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command, ShowPicture

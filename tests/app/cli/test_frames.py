@@ -14,7 +14,7 @@ from PIL import Image
 
 from langflash_core.images.film import Reader
 from langflash_core.images.pictures import MAX_PHOTOS, photo_names
-from langflash_core.images.strip import is_still
+from langflash_core.images.still_names import is_still
 from tests import films
 
 

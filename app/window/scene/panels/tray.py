@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
-from langflash_core.images.strip import shown_name
+from langflash_core.images.still_names import shown_name
 
 from ... import commands as do
 from ...kit import theme, widgets

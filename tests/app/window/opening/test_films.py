@@ -96,6 +96,7 @@ def test_a_dropped_film_shows_its_strip(desk: Desk, walk: Path) -> None:
     entry = next(each for each in table.ENTRIES if each.name.startswith("Frames of the film"))
     again = entry.make(desk.state)
     assert again == ShowDialog("film") and entry.make(State()) is None
+    assert again is not None
     desk.perform(again)
     assert isinstance(desk.asked[-1], work.SmallPictures)
 
@@ -142,7 +143,7 @@ def test_beside_photos_and_beside_a_scene(walk: Path, tmp_path: Path) -> None:
     desk.perform(opening.TakeFrames())
     assert len(desk.state.photos) == MAX_PHOTOS and desk.state.photos[0].path == photos[0]
 
-    desk = Desk(shown_scene(State()))
+    desk = Desk(shown_scene())
     desk.perform(show.OpenPaths((str(walk),), dropped=True))
     desk.look_through()
     desk.perform(opening.TakeFrames())
