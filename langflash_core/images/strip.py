@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from langflash_core.errors import FilmError
+from langflash_core.images.pictures import MAX_PHOTOS
 
 FORMAT = 1
 INDEX = "strip.json"
@@ -22,7 +23,7 @@ SPACING = 0.1  # of the side, the root of a picture's area, from one chosen fram
 NARROWEST, WIDEST = 0.4, 0.35  # of the spacing; of the side: nearly half of a picture may then be new
 NEAR = 0.25  # of the side: frames that are compared for sharpness
 BLURRED, SMEARED = 0.4, 1.5  # sharpness below that of the sharpest near; edges that rise over more than usual
-APART = 0.45  # of the side: frames farther from each other may have too little in common
+APART = 0.45  # of the side: frames that are farther from each other have too little in common
 STANDS = 0.02  # of the side: a film that moves less is a still
 _UNEVEN = 1.5  # what a gap twice as wide as the others costs, in factors of e of sharpness
 REPEAT, ELSEWHERE = "repeat", "elsewhere"
@@ -33,6 +34,7 @@ REASONS = {
     "dark": "were dark",
     "plain": "showed nothing to follow",
     "other_shots": "were of other places",
+    "beyond": "came later than one scene can cover",
 }
 """Why frames are left out, for people."""
 
@@ -81,12 +83,14 @@ class Strip:
 @dataclass(frozen=True)
 class Choice:
     """Indices of chosen stills, and the sharpness of all, as a share of the sharpest near each. left: how
-    many frames were left out, by reason. gap: the widest between two, a share of the side."""
+    many frames were left out, by reason. gap: the widest between two, a share of the side. until:
+    the second where the part ends that the photos of one scene can cover; None: all of the film."""
 
     chosen: tuple[int, ...]
     relative: Float[np.ndarray, " S"]
     left: dict[str, int]
     gap: float
+    until: float | None = None
 
 
 def choose(strip: Strip, most: int, fewest: int = 2) -> Choice:
@@ -111,22 +115,32 @@ def choose(strip: Strip, most: int, fewest: int = 2) -> Choice:
         raise FilmError(
             f"{strip.film} stands still, all its frames show the same; walk around the room while filming"
         )
+    until = None
     if strip.every is not None:
         chosen = _evenly(np.flatnonzero(taken), most)
     else:
+        covered = places <= places[usable][0] + APART * (MAX_PHOTOS - 1)
+        if not covered.all():
+            until = stills[int(np.flatnonzero(covered)[-1])].seconds
+            taken, way = taken & covered, APART * (MAX_PHOTOS - 1)
         count = min(max(round(way / SPACING) + 1, fewest), most, int(taken.sum()))
         indices = np.flatnonzero(taken)
         chosen = indices[_best(places[indices], np.log(relative[indices].clip(0.05)), count)]
     gaps = np.diff(places[chosen])
     gap = float(gaps.max()) if len(gaps) else 0.0
-    left = _left(strip, blurred, chosen.tolist())
-    return Choice(tuple(chosen.tolist()), relative, left, gap)
+    left = _left(strip, blurred, until, chosen.tolist())
+    return Choice(tuple(chosen.tolist()), relative, left, gap, until)
 
 
 def notes_on(strip: Strip, choice: Choice) -> tuple[str, ...]:
     """What people should know of a choice, a sentence each."""
     notes = list(strip.notes)
-    if choice.gap > APART and strip.every is None:
+    if choice.until is not None:
+        notes.append(
+            f"{strip.film} shows more than {MAX_PHOTOS} photos can cover, what comes after "
+            f"{choice.until:.1f} s is left out; --from and --to tell another part"
+        )
+    if choice.gap > 2 * APART and strip.every is None:
         notes.append(
             f"frames of {strip.film} lie far apart, {choice.gap:.0%} of the picture; "
             "take more of them or, with --from and --to, less of the film"
@@ -206,12 +220,16 @@ def _evenly(indices: Int[np.ndarray, " S"], most: int) -> Int[np.ndarray, " N"]:
     return indices[np.round(np.linspace(0, len(indices) - 1, most)).astype(np.int64)]
 
 
-def _left(strip: Strip, blurred: Bool[np.ndarray, " S"], chosen: list[int]) -> dict[str, int]:
+def _left(
+    strip: Strip, blurred: Bool[np.ndarray, " S"], until: float | None, chosen: list[int]
+) -> dict[str, int]:
     """Frames left out, by reason; together with the chosen ones all that were looked at."""
-    left = {"repeats": 0, "other_shots": 0, "blurred": 0}
+    left = {"repeats": 0, "other_shots": 0, "beyond": 0, "blurred": 0}
     for index, still in enumerate(strip.stills):
         if still.why_not:
             left["repeats" if still.why_not == REPEAT else "other_shots"] += still.looks
+        elif until is not None and still.seconds > until:
+            left["beyond"] += still.looks
         else:
             itself = index in chosen and still.smear > SMEARED
             left["blurred"] += still.looks if blurred[index] else still.blurred - itself

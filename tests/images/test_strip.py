@@ -77,3 +77,16 @@ def test_an_index_that_is_not_whole_is_none(tmp_path: Path) -> None:
     for content in (b"", b"[]", b"{}", written(kept).replace(b'"format": 1', b'"format": 9')):
         (tmp_path / module.INDEX).write_bytes(content)
         assert read_strip(tmp_path) is None
+
+
+def test_of_a_way_too_long_for_one_scene_the_begin_is_taken() -> None:
+    places = np.linspace(0, 40, 401)
+    long = strip(places, np.ones(401))
+    choice = choose(long, module.MAX_PHOTOS)
+    assert len(choice.chosen) == module.MAX_PHOTOS and choice.gap < 0.7
+    assert choice.until is not None and choice.left["beyond"] == sum(
+        s.seconds > choice.until for s in long.stills
+    )
+    assert sum(choice.left.values()) + len(choice.chosen) == 401
+    assert any("what comes after" in note for note in module.notes_on(long, choice))
+    assert choose(strip(places[:100], np.ones(100)), 32).until is None
