@@ -23,7 +23,7 @@ SPACING = 0.1  # of the side, the root of a picture's area, from one chosen fram
 NARROWEST, WIDEST = 0.4, 0.35  # of the spacing; of the side: nearly half of a picture may then be new
 NEAR = 0.25  # of the side: frames that are compared for sharpness
 BLURRED, SMEARED = 0.4, 1.5  # sharpness below that of the sharpest near; edges that rise over more than usual
-APART = 0.45  # of the side: frames that are farther from each other have too little in common
+APART = 0.3  # of the side: frames that are farther from each other have too little in common
 STANDS = 0.02  # of the side: a film that moves less is a still
 _UNEVEN = 1.5  # what a gap twice as wide as the others costs, in factors of e of sharpness
 REPEAT, ELSEWHERE = "repeat", "elsewhere"
@@ -140,7 +140,7 @@ def notes_on(strip: Strip, choice: Choice) -> tuple[str, ...]:
             f"{strip.film} shows more than {MAX_PHOTOS} photos can cover, what comes after "
             f"{choice.until:.1f} s is left out; --from and --to tell another part"
         )
-    if choice.gap > 2 * APART and strip.every is None:
+    if choice.gap > 3 * APART and strip.every is None:
         notes.append(
             f"frames of {strip.film} lie far apart, {choice.gap:.0%} of the picture; "
             "take more of them or, with --from and --to, less of the film"

@@ -89,4 +89,4 @@ def test_of_a_way_too_long_for_one_scene_the_begin_is_taken() -> None:
     )
     assert sum(choice.left.values()) + len(choice.chosen) == 401
     assert any("what comes after" in note for note in module.notes_on(long, choice))
-    assert choose(strip(places[:100], np.ones(100)), 32).until is None
+    assert choose(strip(places[:80], np.ones(80)), 32).until is None

@@ -26,12 +26,13 @@ def draw(state: State, look: Look) -> list[do.Command]:
         return issued
     height = look.px(_VIEW)
     scrolls = len(state.info.views) > _SCROLLS
+    flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
     if scrolls:  # the switches stay in sight; the photos go by below the wheel
         room = imgui.get_main_viewport().size.x - imgui.get_window_pos().x - look.px(_BESIDE)
         shape = imgui.ChildFlags_.nav_flattened | imgui.ChildFlags_.always_auto_resize
         shape |= imgui.ChildFlags_.auto_resize_x | imgui.ChildFlags_.auto_resize_y
         imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(max(room, height), look.px(_HIGHEST)))
-        imgui.begin_child("##all", ImVec2(0, 0), shape, imgui.WindowFlags_.horizontal_scrollbar)
+        imgui.begin_child("##all", ImVec2(0, 0), shape, flags)
         _roll()
     for view in range(len(state.info.views)):
         if view:
@@ -47,7 +48,9 @@ def draw(state: State, look: Look) -> list[do.Command]:
                 imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(3, 3))
                 pressed = imgui.image_button("view", picture[0], ImVec2(round(height * picture[1]), height))
                 imgui.pop_style_var()
-        widgets.tooltip(f"Stand where photo {view + 1} was taken")
+        widgets.tooltip(
+            f"Stand where photo {view + 1} was taken" + ("; the wheel shows others" if scrolls else "")
+        )
         if pressed:
             issued.append(camera.JumpTo(view))
         imgui.pop_id()
