@@ -6,8 +6,9 @@
     answer = lf.query(scene, ["armchair", "door"], view=0)
     lf.save(scene, "room.langflash")
     scene = lf.load("room.langflash")  # or .ply, .splat: the suffix says which
+    scene = lf.reconstruct(lf.frames("walk.mp4"))  # the sharpest frames of a film
 
-The four functions are read in at first use: importing the package alone costs no torch. It settles
+The five functions are read in at first use: importing the package alone costs no torch. It settles
 how torch's threads will wait (`threads.py`), unless the environment says that already.
 """
 
@@ -19,6 +20,7 @@ from langflash_core.threads import wait_asleep
 if TYPE_CHECKING:
     from langflash_core.export import export as save  # noqa: F401
     from langflash_core.export import read as load  # noqa: F401
+    from langflash_core.images.frames import frames as frames
     from langflash_core.pipeline import query as query
     from langflash_core.pipeline import reconstruct as reconstruct
 
@@ -28,6 +30,7 @@ wait_asleep()
 
 _HOMES = {
     "reconstruct": ("pipeline", "reconstruct"),
+    "frames": ("images.frames", "frames"),
     "query": ("pipeline", "query"),
     "save": ("export", "export"),
     "load": ("export", "read"),

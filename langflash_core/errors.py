@@ -21,6 +21,10 @@ class ImageError(InputError):
     """A photo is missing, unreadable, or too small."""
 
 
+class FilmError(InputError):
+    """A film is missing, cannot be decoded, or shows nothing that a scene can be made of."""
+
+
 class SceneFileError(InputError):
     """A scene file is missing, truncated, foreign, or of another version."""
 

@@ -15,6 +15,22 @@ SCENES_OUT = (".langflash", ".ply", COMPRESSED_PLY, ".splat", ".spz", ".sog", SO
 CAMERAS_OUT = ("cameras.txt", "transforms.json")  # and the photos, in images/ beside
 ANSWERS_OUT = (".json", ".csv")  # of phrases
 FILMS_OUT = (".mp4", ".webp")
+FILMS_IN = (
+    ".mp4",
+    ".mov",
+    ".m4v",
+    ".mkv",
+    ".webm",
+    ".avi",
+    ".3gp",
+    ".mts",
+    ".m2ts",
+    ".mpg",
+    ".mpeg",
+    ".wmv",
+    ".ogv",
+)
+"""Films that scenes are made of."""
 DEPTH_OUT = ".exr"
 PAGE_OUT = ".html"  # the whole scene, to be looked at and asked; no program reads it back
 ALL_OUT = (".png", *SCENES_OUT, *CAMERAS_OUT, *ANSWERS_OUT, *FILMS_OUT, ".npz", DEPTH_OUT, PAGE_OUT)
@@ -28,6 +44,11 @@ def kind_of(path: Path) -> str:
     if name in (SOG_FOLDER, *CAMERAS_OUT):
         return name
     return COMPRESSED_PLY if name.endswith(COMPRESSED_PLY) else path.suffix.lower()
+
+
+def is_film(path: Path) -> bool:
+    """Whether the name says that it is a film."""
+    return path.suffix.lower() in FILMS_IN
 
 
 COLOUR_MAPS = ("heat", "viridis", "cividis", "inferno", "turbo", "grey")

@@ -11,6 +11,7 @@ from .words.judging import add_bench, add_bench_network, add_eval
 from .words.scenes import (
     add_batch,
     add_export,
+    add_frames,
     add_info,
     add_lift,
     add_query,
@@ -50,6 +51,7 @@ def build_parser() -> Parser:
     for add in (
         add_view,
         add_reconstruct,
+        add_frames,
         add_batch,
         add_query,
         add_render,

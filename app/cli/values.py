@@ -84,6 +84,19 @@ def film_seconds(text: str) -> float:
     return value
 
 
+def film_time(text: str) -> float:
+    """Seconds from the begin of a film."""
+    value = _number(text)
+    if value < 0:
+        raise ArgumentTypeError(f"expected seconds, not below 0, received {text}")
+    return value
+
+
+def frame_count(text: str) -> int:
+    """How many frames of a film, at least 2."""
+    return _whole(text, 2, 10_000)
+
+
 def open_fov(text: str) -> float:
     """Degrees, between 1 and 179."""
     value = _number(text)

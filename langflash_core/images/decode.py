@@ -19,6 +19,7 @@ import numpy as np
 from PIL import Image, ImageCms
 
 from langflash_core.errors import ImageError
+from langflash_core.formats import is_film
 
 FORMATS = ("JPEG", "MPO", "PNG", "WEBP", "TIFF", "HEIF", "AVIF", "JPEG2000", "BMP", "GIF", "PPM")
 MIN_SIDE = 32
@@ -80,6 +81,8 @@ def read_photo(path: Path, name: str | None = None) -> Photo:
             32 pixels a side; one sentence that names the file and a remedy.
     """
     name = name or path.name
+    if is_film(path):
+        raise ImageError(f"{name} is a film; `langflash frames` takes photos out of it")
     content = _read_bytes(path, name)
     try:
         with warnings.catch_warnings():

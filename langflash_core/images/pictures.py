@@ -17,6 +17,7 @@ from PIL import Image
 
 from langflash_core.errors import InputError
 from langflash_core.images.decode import Photo, PhotoFacts, read_photo
+from langflash_core.images.still_names import shown_name
 
 MAX_PHOTOS = 32
 MAX_ASPECT = 2.0
@@ -105,8 +106,9 @@ def photo_paths(photos: Sequence[Path | str]) -> list[Path]:
 
 
 def photo_names(paths: list[Path]) -> tuple[str, ...]:
-    """File names; with their folder where different files share a name."""
-    plain = [path.name or str(path) for path in paths]
+    """File names, of a film's frames the film and the time; with their folder where different files share a
+    name."""
+    plain = [shown_name(path.name) or str(path) for path in paths]
     clashing = {a.name for a in paths for b in paths if a.name == b.name and a != b}
     return tuple(
         f"{path.parent.name}/{name}" if path.name in clashing and path.parent.name else name

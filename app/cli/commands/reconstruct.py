@@ -1,4 +1,4 @@
-"""`langflash reconstruct`: photos to a scene file."""
+"""`langflash reconstruct`: photos, or a film, to a scene file."""
 
 import time
 from argparse import Namespace
@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import TextIO
 
 from langflash_core.errors import ImageError, InputError, WeightsError
+from langflash_core.formats import is_film
 
 from ..files import check_output_file, readable_file
+from ..films import with_frames
 from ..report import ProgressBar, say_warnings, write_json
 
 
@@ -19,12 +21,17 @@ def run(args: Namespace, out: TextIO) -> None:
     """
     start = time.perf_counter()
     for photo in args.photos:
-        readable_file(photo, "photo", ImageError)
+        if not is_film(photo):
+            readable_file(photo, "photo", ImageError)
     if args.weights is not None:
         readable_file(args.weights, "checkpoint", WeightsError)
     check_output_file(args.output, (".langflash",), inputs=args.photos)
     if args.poses and (args.fov is not None or args.intrinsics is not None):
         raise InputError("--poses says the lens too; leave --fov and --intrinsics away")
+    with ProgressBar() as progress:
+        args.photos, films, notes = with_frames(
+            args.photos, progress, most=args.frames, start=args.start, end=args.end
+        )
     from langflash_core.ahead import begin
 
     ahead = begin(args.photos, preset=args.preset, weights=args.weights, size=args.size)
@@ -59,12 +66,13 @@ def run(args: Namespace, out: TextIO) -> None:
         progress("writing", 1.0)
         args.output.parent.mkdir(parents=True, exist_ok=True)
         save(scene, args.output)
-    say_warnings(scene.record.warnings)
+    say_warnings((*notes, *scene.record.warnings))
     document = {
         "scene": str(args.output),
         **describe(scene),
         "file_bytes": args.output.stat().st_size,
         "seconds": round(time.perf_counter() - start, 3),
+        **({"films": films} if films else {}),
     }
     if args.json:
         write_json(document, out)

@@ -7,6 +7,7 @@ from langflash_core.detail import EXPORT_DETAILS
 from ..values import (
     above_zero,
     film_seconds,
+    frame_count,
     intrinsics,
     kept_fraction,
     open_fov,
@@ -19,6 +20,7 @@ from .shared import (
     add_camera,
     add_colours,
     add_detail,
+    add_film_part,
     add_json,
     add_network,
     add_output,
@@ -34,15 +36,30 @@ WHATS = (
 
 def add_view(commands) -> None:
     """`langflash view`."""
-    view = new_command(commands, "view", "open the window; photos and scenes can be dropped on it")
-    view.add_argument("paths", nargs="*", type=Path, metavar="PHOTO|SCENE", help="photos, or one scene")
+    view = new_command(commands, "view", "open the window; photos, films and scenes can be dropped on it")
+    view.add_argument(
+        "paths", nargs="*", type=Path, metavar="PHOTO|FILM|SCENE", help="photos, a film, or one scene"
+    )
 
 
 def add_reconstruct(commands) -> None:
     """`langflash reconstruct`."""
-    command = new_command(commands, "reconstruct", "photos of one place to a scene file")
-    command.add_argument("photos", nargs="+", type=Path, metavar="PHOTO")
+    command = new_command(commands, "reconstruct", "photos of one place, or a film of it, to a scene file")
+    command.add_argument(
+        "photos",
+        nargs="+",
+        type=Path,
+        metavar="PHOTO|FILM",
+        help="of a film its sharpest frames are taken, as `langflash frames` chooses them",
+    )
     add_output(command, "SCENE", "the scene to write")
+    command.add_argument(
+        "--frames",
+        type=frame_count,
+        metavar="N",
+        help="of a film, at most so many (default: as many as photos are taken)",
+    )
+    add_film_part(command)
     add_network(command)
     add_detail(command)
     command.add_argument(
@@ -86,6 +103,33 @@ def add_reconstruct(commands) -> None:
         help="a transforms.json or COLMAP text model with the photos' poses and lenses: they are not sought, "
         "and the scene is in their world and unit",
     )
+    add_json(command)
+
+
+def add_frames(commands) -> None:
+    """`langflash frames`."""
+    command = new_command(
+        commands,
+        "frames",
+        "the sharpest frames of a film as photos, spaced by how far the picture moves",
+        epilog="A film that was looked at is not decoded again. Frames are at most 1920 pixels long.",
+    )
+    command.add_argument("film", type=Path, metavar="FILM", help=".mp4, .mov, .mkv, .webm, .avi and others")
+    add_output(command, "FOLDER", "gets the frames, named by their times, and frames.json")
+    command.add_argument(
+        "--most",
+        type=frame_count,
+        metavar="N",
+        help="at most so many (default: as many as `langflash reconstruct` takes)",
+    )
+    add_film_part(command)
+    command.add_argument(
+        "--every",
+        type=above_zero,
+        metavar="S",
+        help="the sharpest frame of every so many seconds, however far the picture moves",
+    )
+    command.add_argument("--sheet", type=Path, metavar="IMG", help="a .png or .jpg that shows all of them")
     add_json(command)
 
 

@@ -6,7 +6,17 @@ from pathlib import Path
 from langflash_core.detail import DEFAULT_DETAIL, DETAILS, FEWEST, MOST
 from langflash_core.formats import COLOUR_MAPS
 
-from ..values import above_zero, crop, gaussian_count, intrinsics, pixel_side, size, span, view_index
+from ..values import (
+    above_zero,
+    crop,
+    film_time,
+    gaussian_count,
+    intrinsics,
+    pixel_side,
+    size,
+    span,
+    view_index,
+)
 
 
 def new_command(commands, name: str, purpose: str, **more) -> argparse.ArgumentParser:
@@ -40,6 +50,21 @@ def add_network(command: argparse.ArgumentParser) -> None:
         help="the network sees about PX x PX pixels (default: 224; full: 256)",
     )
     command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
+
+
+def add_film_part(command: argparse.ArgumentParser) -> None:
+    """Which part of a film counts."""
+    command.add_argument(
+        "--from",
+        dest="start",
+        type=film_time,
+        default=0.0,
+        metavar="S",
+        help="seconds of the film to leave out first",
+    )
+    command.add_argument(
+        "--to", dest="end", type=film_time, metavar="S", help="the film's second that is the last to count"
+    )
 
 
 def add_detail(command: argparse.ArgumentParser) -> None:

@@ -14,7 +14,7 @@ from ..exporting import panel as export_panel
 from ..kit import theme, widgets
 from ..kit.look import Look
 from ..opening import commands as opening
-from ..opening.panels import browser
+from ..opening.panels import browser, strip
 from ..recovery import panels as recovery_panels
 from ..scene import commands as show
 from ..scene.drops import typed_path, typed_scene
@@ -31,6 +31,7 @@ TITLES = {
     "drop scene": "Open or merge?",
     "merge": "Merge a scene into this one",
     "place": "Where to write it",
+    "film": "Frames of a film",
     "unsaved": "Edits are not saved",
     "save prompts": "Save the phrases",
     "load prompts": "Load phrases",
@@ -50,6 +51,7 @@ WIDTHS = {  # design pixels; others 520
     "open": browser.WIDTH,
     "merge": browser.WIDTH,
     "place": browser.WIDTH,
+    "film": strip.WIDTH,
 }
 GESTURES = (
     ("Left drag", "orbit"),
@@ -65,7 +67,7 @@ GESTURES = (
 COLUMNS = ((None, "View", "Program"), ("File", "Find", "Tools", "Edit"))  # of help; None: the gestures
 _CLOSING = (
     do.ShowDialog | show.SaveScene | show.OpenPaths | show.Instead | show.All | show.GoOn | show.SaveFirst
-    | show.MergeScene | opening.LookForPlace | opening.PlaceFound
+    | show.MergeScene | opening.LookForPlace | opening.PlaceFound | opening.TakeFrames
     | ask.SavePrompts | ask.LoadPrompts | export.Export
 )  # fmt: skip
 
@@ -127,6 +129,7 @@ def _body(dialog: str) -> Callable[[State, Look], list[do.Command]]:
         "drop scene": rooms.draw_scene_drop,
         "merge": browser.draw,
         "place": browser.draw,
+        "film": strip.draw,
         "unsaved": rooms.draw_unsaved,
         "save prompts": _save_prompts,
         "load prompts": _load_prompts,

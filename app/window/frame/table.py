@@ -130,6 +130,7 @@ def _files() -> Iterable[Entry]:
     group, dialog = "File", do.ShowDialog
     looking = _always(opening.OpenFiles())
     yield Entry("Open ...", group, looking, _ctrl("o"), fa.ICON_FA_FOLDER_OPEN, in_fields=True)
+    yield Entry("Frames of the film ...", group, _frames, icon=fa.ICON_FA_FILM)
     yield Entry("Paste photos", group, _always(opening.Paste()), _ctrl("v"), fa.ICON_FA_PASTE)
     yield Entry("Save ...", group, _shown(dialog("save")), _ctrl("s"), fa.ICON_FA_FLOPPY_DISK, in_fields=True)
     exporting = fa.ICON_FA_FILE_EXPORT
@@ -144,6 +145,11 @@ def _files() -> Iterable[Entry]:
     yield Entry(
         "Leave", group, _always(do.Leave()), _ctrl("q"), fa.ICON_FA_RIGHT_FROM_BRACKET, in_fields=True
     )
+
+
+def _frames(state: State) -> do.Command | None:
+    free = state.opening.film is not None and state.job is None
+    return do.ShowDialog("film") if free else None
 
 
 def _room_before(state: State) -> do.Command | None:

@@ -3,9 +3,14 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..commands import ShowDialog
+from langflash_core.errors import FilmError
+from langflash_core.images.strip import Strip, choose, notes_on
+
+from ..commands import Notify, ShowDialog
+from ..scene.drops import MAX_PHOTOS
+from ..scene.state import LOOKING_THROUGH, Job, Photo
 from ..state import State
-from .state import LOOKING, NO_OPENING, Folder, Opening
+from .state import LOOKING, NO_OPENING, Film, Folder
 
 
 @dataclass(frozen=True)
@@ -32,7 +37,7 @@ class LookInto:
     def apply(self, state: State) -> State:
         if state.dialog not in LOOKING:
             state = ShowDialog(self.dialog).apply(state)
-        kept = state.opening if state.dialog == "place" else NO_OPENING
+        kept = state.opening if state.dialog == "place" else replace(NO_OPENING, film=state.opening.film)
         return replace(state, opening=replace(kept, folder=None, chosen=()), dialog_path="")
 
 
@@ -42,7 +47,13 @@ class LookForPlace:
 
     def apply(self, state: State) -> State:
         wanted = state.exporting.form.path if state.dialog == "export" else state.dialog_path
-        asked = Opening(asker=state.dialog or "", name=Path(wanted).name, pending=state.pending)
+        asked = replace(
+            NO_OPENING,
+            asker=state.dialog or "",
+            name=Path(wanted).name,
+            pending=state.pending,
+            film=state.opening.film,
+        )
         return replace(state, opening=asked)
 
 
@@ -105,3 +116,104 @@ class Paste:
 
     def apply(self, state: State) -> State:
         return state
+
+
+# Films
+
+
+@dataclass(frozen=True)
+class OpenFilm:
+    """Look through a film; replaces a job under way."""
+
+    path: Path
+
+    def apply(self, state: State) -> State:
+        job = Job(f"Opening {self.path.name}", LOOKING_THROUGH, started=state.now)
+        return replace(state, job=job, dialog=None)
+
+
+@dataclass(frozen=True)
+class FilmRead:
+    """A film was looked through: its strip is shown, with the frames that are proposed."""
+
+    path: Path
+    strip: Strip
+
+    def apply(self, state: State) -> State:
+        state = replace(state, job=None)
+        try:
+            film = proposed(self.path, self.strip, room_for_frames(state))
+        except FilmError as error:
+            return Notify(str(error)).apply(state)
+        state = replace(state, opening=replace(state.opening, film=film))
+        return ShowDialog("film").apply(state)
+
+
+@dataclass(frozen=True)
+class ProposeFrames:
+    """Choose the film's frames anew: at most so many, or exactly."""
+
+    most: int
+    exactly: bool = False
+
+    def apply(self, state: State) -> State:
+        film = state.opening.film
+        if film is None:
+            return state
+        most = min(max(2, self.most), room_for_frames(state))
+        return _with_film(state, proposed(film.path, film.strip, most, most if self.exactly else 2))
+
+
+@dataclass(frozen=True)
+class SwitchFrame:
+    """Take a frame of the film with the others, or no longer."""
+
+    index: int
+
+    def apply(self, state: State) -> State:
+        film = state.opening.film
+        if film is None or not 0 <= self.index < len(film.strip.stills):
+            return state
+        chosen = set(film.chosen) ^ {self.index}
+        if len(chosen) > room_for_frames(state):
+            text = f"At most {room_for_frames(state)} frames make one scene; take another one out first."
+            return Notify(text).apply(state)
+        return _with_film(state, replace(film, chosen=tuple(sorted(chosen))))
+
+
+@dataclass(frozen=True)
+class TakeFrames:
+    """The chosen frames become photos in the tray, beside those that are not of this film, or alone for a new
+    room where a scene is on show; and a scene is made of them."""
+
+    def apply(self, state: State) -> State:
+        if state.info is None:
+            state = replace(state, photos=beside_frames(state))
+        return replace(state, dialog=None)
+
+
+def proposed(path: Path, strip: Strip, most: int, fewest: int = 2) -> Film:
+    """The film with the frames that the program would take.
+
+    Raises:
+        FilmError: it has none to take.
+    """
+    choice = choose(strip, most, fewest)
+    return Film(path, strip, choice.chosen, tuple(choice.left.items()), notes_on(strip, choice))
+
+
+def room_for_frames(state: State) -> int:
+    """How many frames of a film fit into one scene with the photos in the tray."""
+    return max(MAX_PHOTOS - len(beside_frames(state)), 2)
+
+
+def beside_frames(state: State) -> tuple[Photo, ...]:
+    """Photos in the tray that stay with a film's frames: none where these make a new room."""
+    film = state.opening.film
+    if state.info is not None:
+        return ()
+    return tuple(photo for photo in state.photos if film is None or photo.path.parent != film.strip.folder)
+
+
+def _with_film(state: State, film: Film) -> State:
+    return replace(state, opening=replace(state.opening, film=film))

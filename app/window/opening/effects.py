@@ -8,13 +8,23 @@ from ..commands import Command
 from ..effects import Effects, Hands
 from ..kit.textures import Thumbnails
 from ..scene import samples
-from ..scene.commands import MergeScene, OpenPaths
+from ..scene.commands import AddPhotos, Instead, MergeScene, OpenPaths, Reconstruct, SetPhotosAside
 from ..scene.drops import typed_path
 from ..state import State
 from . import native
-from .commands import FolderRead, LookForPlace, LookInto, MorePictures, OpenFiles, Paste, PlaceFound
+from .commands import (
+    FolderRead,
+    LookForPlace,
+    LookInto,
+    MorePictures,
+    OpenFiles,
+    OpenFilm,
+    Paste,
+    PlaceFound,
+    TakeFrames,
+)
 from .state import LOOKING, small
-from .work import PastePicture, ReadFolder, SampleTiles, SmallPictures
+from .work import LookThrough, PastePicture, ReadFolder, SampleTiles, SmallPictures
 
 POLL_SECONDS = 0.1  # of the desktop's dialog
 _LONGEST = 20_000  # letters of pasted paths
@@ -78,13 +88,37 @@ class OpeningEffects(Effects):
                 self._hands.submit(ReadFolder(folder or _start(state)))
             case FolderRead(folder):
                 self._hands.submit(SmallPictures(folder.path, folder.photos))
-            case MorePictures(folder, paths) if state.dialog in LOOKING and _is_at(state, folder):
+            case MorePictures(folder, paths) if _shows(state, folder):
                 self._hands.submit(SmallPictures(folder, paths))
             case Paste():
                 self._paste()
+            case OpenFilm(path):
+                self._hands.submit(LookThrough(path))
+            case TakeFrames() if before.opening.film is not None:
+                self._take(state)
             case _:
                 if before.dialog in LOOKING and state.dialog not in LOOKING:
                     self._forget(before)
+        self._show_film(before, state)
+
+    def _take(self, state: State) -> None:
+        """Frames into the tray, and a scene of them."""
+        film = state.opening.film
+        assert film is not None
+        aside = () if state.info is None else (SetPhotosAside(),)
+        self._hands.perform(Instead((*aside, AddPhotos(film.frames), Reconstruct())))
+
+    def _show_film(self, before: State, state: State) -> None:
+        """Small pictures of a film's frames, as long as its dialog is open."""
+        film, was = state.opening.film, before.opening.film
+        opened = state.dialog == "film" and (before.dialog != "film" or film != was)
+        same = was is not None and film is not None and was.strip is film.strip and before.dialog == "film"
+        if opened and film is not None and not same:
+            paths = tuple(map(film.strip.path, range(len(film.strip.stills))))
+            self._hands.submit(SmallPictures(film.strip.folder, paths))
+        if before.dialog == "film" and state.dialog != "film" and was is not None:
+            for index in range(len(was.strip.stills)):
+                self._thumbnails.drop(small(was.strip.path(index)))
 
     def _paste(self) -> None:
         paths = pasted_paths(self._clipboard())
@@ -98,8 +132,12 @@ class OpeningEffects(Effects):
             self._thumbnails.drop(small(path))
 
 
-def _is_at(state: State, folder: Path) -> bool:
-    return state.opening.folder is not None and state.opening.folder.path == folder
+def _shows(state: State, folder: Path) -> bool:
+    """Whether small pictures of what lies in a folder are on show."""
+    looked, film = state.opening.folder, state.opening.film
+    if state.dialog == "film":
+        return film is not None and film.strip.folder == folder
+    return state.dialog in LOOKING and looked is not None and looked.path == folder
 
 
 def _start(state: State) -> Path:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from imgui_bundle import portable_file_dialogs
 
-from ..scene.drops import PHOTO_SUFFIXES, SCENE_SUFFIXES
+from ..scene.drops import FILM_SUFFIXES, PHOTO_SUFFIXES, SCENE_SUFFIXES
 
 _HELPERS = ("zenity", "matedialog", "qarma", "kdialog")  # what portable-file-dialogs calls on Linux
 
@@ -20,11 +20,11 @@ class NativeDialog:
     """One dialog; it is open until `chosen` says something. Main thread only."""
 
     def __init__(self, folder: str, scenes_alone: bool = False) -> None:
-        suffixes = SCENE_SUFFIXES if scenes_alone else {*PHOTO_SUFFIXES, *SCENE_SUFFIXES}
+        suffixes = SCENE_SUFFIXES if scenes_alone else {*PHOTO_SUFFIXES, *FILM_SUFFIXES, *SCENE_SUFFIXES}
         endings = " ".join(f"*{suffix}" for suffix in sorted(suffixes))
         start = folder if Path(folder).is_dir() else str(Path.home())
-        filters = ["Scenes" if scenes_alone else "Photos and scenes", endings, "All files", "*"]
-        title = "Merge a scene into this one" if scenes_alone else "Open photos or a scene"
+        filters = ["Scenes" if scenes_alone else "Photos, films and scenes", endings, "All files", "*"]
+        title = "Merge a scene into this one" if scenes_alone else "Open photos, a film or a scene"
         options = portable_file_dialogs.opt
         several = options.none if scenes_alone else options.multiselect
         self._dialog = portable_file_dialogs.open_file(title, start, filters, several)

@@ -1,8 +1,10 @@
-"""What opening adds to the state: the folder that is looked at, and what is chosen there."""
+"""What opening adds to the state: the folder that is looked at, and what is chosen there; a film's strip."""
 
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from langflash_core.images.strip import Strip
 
 LOOKING = ("open", "merge", "place")  # dialogs that show a folder
 MOST_FILES = 300  # of a folder that are shown
@@ -10,28 +12,47 @@ MOST_FILES = 300  # of a folder that are shown
 
 @dataclass(frozen=True)
 class Folder:
-    """What lies in a folder, by name. left_out: photos and scenes beyond `MOST_FILES`. problem: a sentence
-    where it cannot be read."""
+    """What lies in a folder, by name. left_out: photos, films and scenes beyond `MOST_FILES`. problem: a
+    sentence where it cannot be read."""
 
     path: Path
     folders: tuple[Path, ...] = ()
     photos: tuple[Path, ...] = ()
+    films: tuple[Path, ...] = ()
     scenes: tuple[Path, ...] = ()
     left_out: int = 0
     problem: str = ""
 
 
 @dataclass(frozen=True)
+class Film:
+    """A film that was looked through. chosen: indices of its stills, in order. left: frames left out, by
+    reason, of the choice that was proposed. notes: sentences."""
+
+    path: Path
+    strip: Strip
+    chosen: tuple[int, ...]
+    left: tuple[tuple[str, int], ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def frames(self) -> tuple[Path, ...]:
+        """The chosen frames as files."""
+        return tuple(self.strip.path(index) for index in self.chosen)
+
+
+@dataclass(frozen=True)
 class Opening:
     """The opening half of the state. folder: None while it is read. chosen: in the order of the clicks.
     asker: the dialog that wants a folder for its file. name: of that file. pending: commands that wait for
-    that dialog."""
+    that dialog. film: the one that was looked through last."""
 
     folder: Folder | None = None
     chosen: tuple[Path, ...] = ()
     asker: str = ""
     name: str = ""
     pending: tuple[Any, ...] = ()
+    film: Film | None = None
 
 
 NO_OPENING = Opening()

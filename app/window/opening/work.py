@@ -1,8 +1,9 @@
-"""The worker's side of opening: folders read, photos made small, pictures taken from the clipboard."""
+"""The worker's side of opening: folders read, photos made small, films looked through, pictures taken from
+the clipboard."""
 
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,16 +11,17 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageGrab
 
-from langflash_core.errors import ImageError, LangFlashError
+from langflash_core.errors import Cancelled, ImageError, LangFlashError
 from langflash_core.files import make_folder, write_atomically
+from langflash_core.formats import is_film
 
 from ..commands import Command, ShowPicture
 from ..places import state_folder
-from ..requests import Asked, Errand
+from ..requests import Asked, Errand, Job
 from ..scene.commands import OpenPaths
 from ..scene.drops import PHOTO_SUFFIXES, SCENE_SUFFIXES
 from ..scene.samples import pairs
-from .commands import FolderRead, MorePictures
+from .commands import FilmRead, FolderRead, MorePictures
 from .state import MOST_FILES, Folder, sample, small
 
 SIDE = 160  # pixels of a small picture's longer side
@@ -27,6 +29,22 @@ _TILE_SIDE = 240
 _AT_ONCE = 3
 _KEPT = 20  # pasted pictures
 _NOTHING = "The clipboard holds no photo; copy a picture, files or a path first."
+
+
+@dataclass(frozen=True)
+class LookThrough(Job):
+    """Find the frames of a film that a scene may be made of."""
+
+    path: Path
+
+    def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> FilmRead:
+        from langflash_core.images.frames import strip_of
+
+        def check() -> None:
+            if cancelled():
+                raise Cancelled("the film was not looked through to its end")
+
+        return FilmRead(self.path, strip_of(self.path, progress=progress, check=check))
 
 
 @dataclass(frozen=True)
@@ -106,7 +124,7 @@ def _kept(picture: Image.Image) -> Path:
 
 
 def listed(path: Path) -> Folder:
-    """A folder's folders, photos and scenes, hidden ones left out."""
+    """A folder's folders, photos, films and scenes, hidden ones left out."""
     try:
         with os.scandir(path) as found:
             entries = [(entry.name, entry.is_dir()) for entry in found if not entry.name.startswith(".")]
@@ -116,9 +134,11 @@ def listed(path: Path) -> Folder:
     files = [path / name for name, folder in names if not folder]
     photos = [file for file in files if file.suffix.lower() in PHOTO_SUFFIXES]
     scenes = [file for file in files if file.suffix.lower() in SCENE_SUFFIXES]
+    films = [file for file in files if is_film(file)]
     folders = [path / name for name, folder in names if folder]
-    shown = (tuple(some[:MOST_FILES]) for some in (folders, photos, scenes))
-    return Folder(path, *shown, left_out=sum(max(len(some) - MOST_FILES, 0) for some in (photos, scenes)))
+    shown = (tuple(some[:MOST_FILES]) for some in (folders, photos, films, scenes))
+    left_out = sum(max(len(some) - MOST_FILES, 0) for some in (photos, films, scenes))
+    return Folder(path, *shown, left_out=left_out)
 
 
 def _small(path: Path, side: int = SIDE) -> np.ndarray:

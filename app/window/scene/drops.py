@@ -1,4 +1,4 @@
-"""What a person drops on the window, sorted: photos, folders of photos, scenes, the rest.
+"""What a person drops on the window, sorted: photos, folders of photos, films, scenes, the rest.
 
 `os.path` asks the disk here, because people type paths that `Path` would raise on: too long, say.
 """
@@ -8,21 +8,23 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from langflash_core.formats import DROPPED
+from langflash_core.formats import DROPPED, FILMS_IN, is_film
+from langflash_core.images.pictures import MAX_PHOTOS as MAX_PHOTOS
 
 PHOTO_SUFFIXES = frozenset(
     {".jpg", ".jpeg", ".png", ".webp", ".heic", ".heif", ".tif", ".tiff", ".bmp", ".avif"}
 )
 SCENE_SUFFIX = ".langflash"
 SCENE_SUFFIXES = frozenset(DROPPED)
-MAX_PHOTOS = 8  # what the network was shaped for
+FILM_SUFFIXES = frozenset(FILMS_IN)
 
 
 @dataclass(frozen=True)
 class Drop:
-    """Sorted paths; `rejected` holds one sentence with a remedy per path that is neither."""
+    """Sorted paths; `rejected` holds one sentence with a remedy per path that is none of these."""
 
     photos: tuple[Path, ...] = ()
+    films: tuple[Path, ...] = ()
     scenes: tuple[Path, ...] = ()
     rejected: tuple[str, ...] = ()
 
@@ -54,8 +56,10 @@ def typed_scene(text: str) -> Path | None:
 
 
 def sort_drop(paths: Iterable[str | Path]) -> Drop:
-    """Sort paths by what they are; a folder stands for the photos and scenes directly in it."""
+    """Sort paths by what they are; a folder stands for the photos directly in it, else for its films,
+    else for its scenes."""
     photos: list[Path] = []
+    films: list[Path] = []
     scenes: list[Path] = []
     rejected: list[str] = []
     for path in map(Path, paths):
@@ -67,19 +71,26 @@ def sort_drop(paths: Iterable[str | Path]) -> Drop:
                 continue
             found = [p for p in inside if p.suffix.lower() in PHOTO_SUFFIXES]
             kept = [p for p in inside if p.suffix.lower() in SCENE_SUFFIXES]
-            if not found and not kept:
+            filmed = [p for p in inside if is_film(p)]
+            if not found and not filmed and not kept:
                 rejected.append(f"The folder {path.name} holds no photo; drop a folder of JPEG or PNG files.")
             photos += found
-            scenes += [] if found else kept
+            films += [] if found else filmed
+            scenes += [] if found or filmed else kept
         elif not os.path.exists(path):
             rejected.append(f"{path} does not exist; check the path.")
         elif path.suffix.lower() in SCENE_SUFFIXES:
             scenes.append(path)
         elif path.suffix.lower() in PHOTO_SUFFIXES:
             photos.append(path)
+        elif is_film(path):
+            films.append(path)
         else:
             rejected.append(
-                f"{path.name} is no photo and no scene; drop JPEG, PNG, .langflash or .ply files."
+                f"{path.name} is no photo, film or scene; drop JPEG, PNG, .mp4, .langflash or .ply files."
             )
-    unique = tuple(dict.fromkeys(p.resolve() for p in photos))
-    return Drop(unique, tuple(dict.fromkeys(p.resolve() for p in scenes)), tuple(rejected))
+    return Drop(_each_once(photos), _each_once(films), _each_once(scenes), tuple(rejected))
+
+
+def _each_once(paths: Iterable[Path]) -> tuple[Path, ...]:
+    return tuple(dict.fromkeys(path.resolve() for path in paths))

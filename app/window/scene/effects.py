@@ -13,6 +13,7 @@ from ..editing.placing import SetHandle
 from ..editing.state import Handle
 from ..effects import Effects, Hands
 from ..kit.textures import Thumbnails
+from ..opening.commands import OpenFilm
 from ..state import State
 from ..viewport import Viewport
 from .camera import FrameAll
@@ -113,13 +114,19 @@ class SceneEffects(Effects):
         drop = sort_drop(paths)
         for sentence in drop.rejected:
             perform(Notify(sentence))
+        if drop.films:
+            perform(OpenFilm(drop.films[0]))
+        if len(drop.films) > 1:
+            perform(Notify(f"Only {drop.films[0].name} was opened; drop one film at a time."))
         if drop.photos and state.info is not None:
             perform(AskAboutDrop(drop.photos))
+        elif drop.photos and drop.films:
+            perform(AddPhotos(drop.photos))
         elif drop.photos:
             perform(dropped(state, drop.photos, new=False))
         elif drop.scenes and was_dropped and state.info is not None:
             perform(AskAboutScene(drop.scenes[0]))
-        elif drop.scenes:
+        elif drop.scenes and not drop.films:
             perform(Instead((OpenScene(drop.scenes[0], alone=True),)))
 
     def _show(self, info: SceneInfo) -> None:

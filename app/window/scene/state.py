@@ -73,7 +73,11 @@ class Photo:
 RECONSTRUCTING, RESTORING = "Reconstructing", "Restoring"
 """Titles of the jobs that make a scene out of the tray, and out of what an earlier session kept."""
 
+LOOKING_THROUGH = "film"
+"""The one stage of looking through a film, as the core calls it: what remains of it can be told."""
+
 _SAID = {
+    LOOKING_THROUGH: "looking through the film",
     "photos": "reading the photos",
     "weights": "waking the network",
     "network": "looking at the photos",

@@ -4,7 +4,7 @@ Heavy imports wait until they are needed: the window makes these requests before
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +14,7 @@ import numpy as np
 from langflash_core.detail import DEFAULT_DETAIL
 from langflash_core.errors import ImageError, LangFlashError
 from langflash_core.geometry.reach import median_reach
+from langflash_core.images.still_names import film_of, shown_name
 from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command, ShowPicture
@@ -56,8 +57,15 @@ class ReconstructPhotos(Job):
         scene = reconstruct(
             self.paths, fov=self.fovs or None, detail=self.detail, progress=progress, cancelled=cancelled
         )
-        name = " + ".join(path.stem for path in self.paths[:3]) + (" ..." if len(self.paths) > 3 else "")
-        return SceneArrived(describe_scene(scene, serial, name))
+        return SceneArrived(describe_scene(scene, serial, called(self.paths)))
+
+
+def called(photos: Sequence[Path]) -> str:
+    """What a scene of these photos is called: as they are, or as the film that all are of."""
+    films = {film_of(path.name) for path in photos}
+    if len(films) == 1 and (film := films.pop()) is not None:
+        return Path(film).stem
+    return " + ".join(path.stem for path in photos[:3]) + (" ..." if len(photos) > 3 else "")
 
 
 @dataclass(frozen=True)
@@ -200,7 +208,7 @@ def _thumbnail(path: Path) -> Iterator[Command]:
     from langflash_core.images.decode import read_photo
 
     try:
-        photo = read_photo(path)
+        photo = read_photo(path, shown_name(path.name))
     except ImageError as error:
         yield PhotoFailed(path, str(error))
         return

@@ -19,7 +19,7 @@ from ..state import Folder, small
 WIDTH = 760.0  # design pixels
 _HEIGHT, _CELL = 330.0, 132.0
 _HINTS = {
-    "open": "a scene, a photo or a folder; or choose below",
+    "open": "a scene, a photo, a film or a folder; or choose below",
     "merge": "a scene or a folder; or choose below",
     "place": "a folder; or walk to it below",
 }
@@ -75,15 +75,15 @@ def _inside(state: State, folder: Folder, look: Look) -> list[do.Command]:
     """Folders, scenes, then photos as a grid."""
     issued: list[do.Command] = []
     scenes = () if state.dialog == "place" else folder.scenes
-    photos = folder.photos if state.dialog == "open" else ()
+    photos, films = (folder.photos, folder.films) if state.dialog == "open" else ((), ())
     if folder.problem:
         widgets.muted(folder.problem)
     for path in folder.folders:
         if imgui.selectable(f"{fa.ICON_FA_FOLDER}  {path.name}##{path}", False)[0] and not _again():
             issued.append(opening.LookInto(path))
-    for path in scenes:
-        chosen = path in state.opening.chosen
-        if imgui.selectable(f"{fa.ICON_FA_CUBES}  {path.name}##{path}", chosen)[0] and not _again():
+    for path in (*scenes, *films):
+        chosen, icon = path in state.opening.chosen, fa.ICON_FA_FILM if path in films else fa.ICON_FA_CUBES
+        if imgui.selectable(f"{icon}  {path.name}##{path}", chosen)[0] and not _again():
             issued.append(_taken(state, path))
     gap, room = look.px(8), imgui.get_content_region_avail().x + look.px(8)
     columns = max(int(room / (look.px(_CELL) + gap)), 1)
@@ -93,7 +93,7 @@ def _inside(state: State, folder: Folder, look: Look) -> list[do.Command]:
         issued += _photo(state, path, ImVec2(room / columns - gap, look.px(_CELL)), look)
     if folder.left_out:
         widgets.muted(f"and {folder.left_out} more; type the path of one of those")
-    if not (folder.folders or photos or scenes or folder.problem):
+    if not (folder.folders or photos or films or scenes or folder.problem):
         widgets.muted("No folder lies here." if state.dialog == "place" else "Nothing to open lies here.")
     return issued
 

@@ -37,7 +37,7 @@ def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Comm
     middle = corner.x + size.x / 2
     _line(fa.ICON_FA_CUBES, ImVec2(middle, top + look.px(40)), theme.LINE, 3.0)
     _line("Drop photos of a room here", ImVec2(middle, top + look.px(72)), theme.TEXT, 1.25)
-    hint = "two or more, taken a step apart; or a scene, or splats"
+    hint = "two or more, taken a step apart; or a film, a scene, or splats"
     _line(hint, ImVec2(middle, top + look.px(98)))
     issued = _buttons(ImVec2(middle, top + look.px(112)), look)
     issued += _samples(ImVec2(middle, top + look.px(176)), size.x, look)
@@ -60,7 +60,7 @@ def draw_photos(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
     canvas, gap = imgui.get_window_draw_list(), look.px(_GAP)
     end = ImVec2(corner.x + size.x, corner.y + size.y)
     canvas.add_rect_filled(corner, end, widgets.u32(theme.CANVAS))
-    columns = 1 if len(shown) == 1 else 2 if len(shown) <= 4 else 4
+    columns = 1 if len(shown) == 1 else 2 if len(shown) <= 4 else 4 if len(shown) <= 12 else 6
     rows = -(-len(shown) // columns)
     wide, tall = (size.x - (columns + 1) * gap) / columns, (size.y - (rows + 1) * gap) / rows
     for place, (picture, aspect) in enumerate(shown):
@@ -91,7 +91,7 @@ def _buttons(at: ImVec2, look: Look) -> list[do.Command]:
     imgui.set_cursor_screen_pos(ImVec2(at.x - width - gap / 2, at.y))
     if widgets.primary_button(f"{fa.ICON_FA_FOLDER_OPEN}  Photos ...", ImVec2(width, 0)):
         issued.append(opening.OpenFiles())
-    widgets.tooltip("Several at once, or a folder  (Ctrl+O)")
+    widgets.tooltip("Several at once, a folder, or a film  (Ctrl+O)")
     imgui.same_line(0, gap)
     if imgui.button(f"{fa.ICON_FA_PASTE}  Paste", ImVec2(width, 0)):
         issued.append(opening.Paste())

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from langflash_core.images.still_names import shown_name
+
 from ... import commands as do
 from ...kit import theme, widgets
 from ...kit.look import Look
@@ -13,10 +15,10 @@ from ...opening import commands as opening
 from ...poses import FOV_RANGE
 from ...state import State
 from .. import commands as show
-from ..state import Job, Photo, said
+from ..state import LOOKING_THROUGH, Job, Photo, said
 from . import rooms, stages
 
-COLUMNS = 3
+COLUMNS, MORE = 3, 5  # photos side by side; the second where there are over 12
 _CANCEL = 104.0  # design pixels
 NOTABLE_SECONDS = 0.05  # of a finished stage; a shorter one is only a heading of others
 ASSUMED_FOV = 65.0  # degrees, as the core assumes where neither file nor person says
@@ -77,7 +79,7 @@ def _hint(look: Look) -> None:
     canvas.add_rect_filled(corner, end, widgets.u32(theme.CANVAS), look.px(8))
     canvas.add_rect(corner, end, widgets.u32(theme.LINE), look.px(8), look.px(1.5))
     lines = ((fa.ICON_FA_IMAGES, theme.ACCENT), ("Drop two or more photos of a room", theme.TEXT))
-    lines = (*lines, ("or a folder, a scene, or a .ply of splats", theme.MUTED))
+    lines = (*lines, ("or a folder, a film, a scene, or a .ply of splats", theme.MUTED))
     step = height / (len(lines) + 1)
     for row, (text, colour) in enumerate(lines, start=1):
         size = imgui.calc_text_size(text)
@@ -89,10 +91,11 @@ def _hint(look: Look) -> None:
 def _tray(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     spacing = imgui.get_style().item_spacing.x
-    width = (imgui.get_content_region_avail().x - (COLUMNS - 1) * spacing) / COLUMNS
+    columns = COLUMNS if len(state.photos) <= 12 else MORE
+    width = (imgui.get_content_region_avail().x - (columns - 1) * spacing) / columns
     size = ImVec2(width, width * 0.75)
     for index, photo in enumerate(state.photos):
-        if index % COLUMNS:
+        if index % columns:
             imgui.same_line()
         imgui.push_id(str(photo.path))
         removed = _card(look, photo, size, state.job is None)
@@ -134,7 +137,7 @@ def _card(look: Look, photo: Photo, size: ImVec2, open_for_change: bool) -> bool
     imgui.invisible_button("card", size)
     hovered = imgui.is_item_hovered()
     if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip):
-        imgui.set_tooltip(f"{photo.path.name}\nClick for its lens, drag to put it elsewhere")
+        imgui.set_tooltip(f"{shown_name(photo.path.name)}\nClick for its lens, drag to put it elsewhere")
     picture = look.thumbnails.get(str(photo.path))
     canvas.add_rect_filled(corner, end, widgets.u32(theme.RAISED), look.px(6))
     if picture is not None:
@@ -191,7 +194,7 @@ def _details(state: State, index: int, photo: Photo, look: Look) -> list[do.Comm
     imgui.set_next_window_size(ImVec2(look.px(330), 0))
     if not imgui.begin_popup("lens"):
         return issued
-    widgets.heading(photo.path.name)
+    widgets.heading(shown_name(photo.path.name))
     if photo.fov is not None:
         source = "your own"
     else:
@@ -271,7 +274,7 @@ def _progress(job: Job, now: float, look: Look) -> list[do.Command]:
     widgets.tooltip("Stop it  (Esc)")
     imgui.same_line()
     corner, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
-    seconds = f"{now - job.started:.1f} s"
+    seconds = _seconds(job, now)
     room = width - imgui.calc_text_size(seconds).x - look.px(8)
     imgui.align_text_to_frame_padding()
     imgui.text(widgets.shortened("stopping" if job.cancelling else said(job.stage), room))
@@ -281,6 +284,14 @@ def _progress(job: Job, now: float, look: Look) -> list[do.Command]:
         widgets.at_right_edge(seconds)
     _bar(job.fraction, ImVec2(corner.x, corner.y + imgui.get_frame_height()), width, look)
     return [show.CancelJob()] if pressed else []
+
+
+def _seconds(job: Job, now: float) -> str:
+    """Of the stage so far; of a film, whose pictures take equally long, those that are left."""
+    gone = now - job.started
+    if job.stage == LOOKING_THROUGH and job.fraction > 0.05 and gone > 1:
+        return f"{gone * (1 - job.fraction) / job.fraction:.0f} s left"
+    return f"{gone:.1f} s"
 
 
 def _told(job: Job) -> str:

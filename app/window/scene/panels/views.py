@@ -15,6 +15,8 @@ from .. import camera
 from . import in_space
 
 _VIEW = 54.0  # of a photo to jump to
+_SCROLLS = 8  # photos; more may be wider than the window
+_BESIDE, _HIGHEST = 116.0, 62.0  # the switches' room at their right, and their height
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
@@ -23,6 +25,15 @@ def draw(state: State, look: Look) -> list[do.Command]:
     if state.info is None:
         return issued
     height = look.px(_VIEW)
+    scrolls = len(state.info.views) > _SCROLLS
+    flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
+    if scrolls:  # the switches stay in sight; the photos go by below the wheel
+        room = imgui.get_main_viewport().size.x - imgui.get_window_pos().x - look.px(_BESIDE)
+        shape = imgui.ChildFlags_.nav_flattened | imgui.ChildFlags_.always_auto_resize
+        shape |= imgui.ChildFlags_.auto_resize_x | imgui.ChildFlags_.auto_resize_y
+        imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(max(room, height), look.px(_HIGHEST)))
+        imgui.begin_child("##all", ImVec2(0, 0), shape, flags)
+        _roll()
     for view in range(len(state.info.views)):
         if view:
             imgui.same_line()
@@ -37,10 +48,14 @@ def draw(state: State, look: Look) -> list[do.Command]:
                 imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(3, 3))
                 pressed = imgui.image_button("view", picture[0], ImVec2(round(height * picture[1]), height))
                 imgui.pop_style_var()
-        widgets.tooltip(f"Stand where photo {view + 1} was taken")
+        widgets.tooltip(
+            f"Stand where photo {view + 1} was taken" + ("; the wheel shows others" if scrolls else "")
+        )
         if pressed:
             issued.append(camera.JumpTo(view))
         imgui.pop_id()
+    if scrolls:
+        imgui.end_child()
     imgui.same_line(0, look.px(12))
     issued += _in_space(state, look)
     imgui.same_line(0, look.px(4))
@@ -48,6 +63,13 @@ def draw(state: State, look: Look) -> list[do.Command]:
         issued.append(film.AddKey())
     widgets.tooltip("Begin a film, or go on with it: the present view as a key frame  (M)")
     return issued
+
+
+def _roll() -> None:
+    """The wheel moves the photos sideways."""
+    wheel = imgui.get_io().mouse_wheel
+    if wheel and imgui.is_window_hovered():
+        imgui.set_scroll_x(imgui.get_scroll_x() - 2 * wheel * imgui.get_text_line_height())
 
 
 def _in_space(state: State, look: Look) -> list[do.Command]:

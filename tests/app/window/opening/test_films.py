@@ -1,0 +1,192 @@
+"""A film in the window: looked through, its strip shown and changed, its frames made a scene."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from imgui_bundle import imgui
+
+from app.window.commands import Command, ShowDialog, ShowPicture, apply
+from app.window.effects import Effects, Hands
+from app.window.frame import dialogs, table
+from app.window.kit import theme
+from app.window.opening import commands as opening
+from app.window.opening import effects, work
+from app.window.opening.panels import strip as panel
+from app.window.opening.state import Film
+from app.window.scene import commands as show
+from app.window.scene.drops import MAX_PHOTOS, sort_drop
+from app.window.scene.effects import SceneEffects
+from app.window.scene.panels import tray
+from app.window.scene.state import Job
+from app.window.scene.work import ReconstructPhotos
+from app.window.state import State
+from langflash_core.errors import Cancelled, FilmError
+from tests import films
+from tests.app.window import headless
+from tests.app.window.scenes import shown_scene
+
+
+@pytest.fixture(autouse=True)
+def home(monkeypatch, tmp_path_factory) -> None:
+    monkeypatch.setenv("LANGFLASH_HOME", str(tmp_path_factory.getbasetemp() / "films home"))
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory) -> Path:
+    return films.write(tmp_path_factory.mktemp("film") / "walk.mp4", films.walk(40, 10.0))
+
+
+class Desk:
+    """Opening and scene with hands that note what was asked, and a state that follows."""
+
+    def __init__(self, state: State | None = None) -> None:
+        self.state, self.asked, self.dropped = state or State(), list[Any](), list[str]()
+        self.performed: list[Command] = []
+        hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: 0.0)
+        world: Any = self
+        self.effects: tuple[Effects, ...] = (
+            SceneEffects(hands, world, world, lambda title: None),
+            effects.OpeningEffects(hands, world, lambda: ""),
+        )
+
+    def drop(self, key: str) -> None:
+        self.dropped.append(key)
+
+    def perform(self, command: Command) -> None:
+        before, self.state = self.state, apply(self.state, command)
+        self.performed.append(command)
+        for each in self.effects:
+            each.follow(command, before, self.state)
+
+    def look_through(self) -> None:
+        """What the worker does with the film, and with its small pictures."""
+        job = self.asked.pop(0)
+        assert isinstance(job, work.LookThrough)
+        self.perform(
+            job.run(1, lambda stage, share: self.perform(show.Progressed(stage, share)), lambda: False)
+        )
+        while self.asked and isinstance(self.asked[0], work.SmallPictures):
+            for command in self.asked.pop(0).run(lambda: False):
+                self.perform(command)
+
+    @property
+    def film(self) -> Film:
+        assert self.state.opening.film is not None
+        return self.state.opening.film
+
+
+@pytest.fixture
+def desk(walk: Path) -> Desk:
+    made = Desk()
+    made.perform(show.OpenPaths((str(walk),), dropped=True))
+    assert made.state.job is not None and made.state.job.title == "Opening walk.mp4"
+    made.look_through()
+    return made
+
+
+def test_a_dropped_film_shows_its_strip(desk: Desk, walk: Path) -> None:
+    assert desk.state.dialog == "film" and desk.state.job is None and desk.film.path == walk
+    assert 10 < len(desk.film.chosen) <= MAX_PHOTOS and desk.state.photos == ()
+    pictures = [command for command in desk.performed if isinstance(command, ShowPicture)]
+    assert len(pictures) == len(desk.film.strip.stills)
+    assert "Of 40 frames" in panel.told(desk.film) and "lay between them" in panel.told(desk.film)
+    desk.perform(ShowDialog(None))
+    assert len(desk.dropped) == len(pictures), "small pictures go with the dialog"
+    entry = next(each for each in table.ENTRIES if each.name.startswith("Frames of the film"))
+    again = entry.make(desk.state)
+    assert again == ShowDialog("film") and entry.make(State()) is None
+    assert again is not None
+    desk.perform(again)
+    assert isinstance(desk.asked[-1], work.SmallPictures)
+
+
+def test_frames_are_put_in_and_taken_out(desk: Desk) -> None:
+    first, *others = desk.film.chosen
+    desk.perform(opening.SwitchFrame(first))
+    assert desk.film.chosen == tuple(others)
+    desk.perform(opening.SwitchFrame(first))
+    assert desk.film.chosen == (first, *others)
+    desk.perform(opening.SwitchFrame(999))
+    desk.perform(opening.ProposeFrames(5, exactly=True))
+    assert len(desk.film.chosen) == 5
+    desk.perform(opening.ProposeFrames(6, exactly=True))
+    assert len(desk.film.chosen) == 6
+    desk.perform(opening.ProposeFrames(MAX_PHOTOS))
+    assert desk.film.chosen == (first, *others)
+    assert not desk.asked, "nothing is decoded or read for that"
+
+
+def test_the_chosen_frames_become_a_scene(desk: Desk) -> None:
+    desk.perform(opening.ProposeFrames(4, exactly=True))
+    desk.perform(opening.TakeFrames())
+    assert desk.state.dialog is None and desk.state.job is not None
+    assert tuple(photo.path for photo in desk.state.photos) == desk.film.frames
+    job = next(each for each in desk.asked if isinstance(each, ReconstructPhotos))
+    assert job.paths == desk.film.frames and len(job.paths) == 4
+    desk.perform(opening.ProposeFrames(3, exactly=True))
+    desk.perform(opening.TakeFrames())
+    assert len(desk.state.photos) == 3, "frames of the same film that were in the tray before are not"
+
+
+def test_beside_photos_and_beside_a_scene(walk: Path, tmp_path: Path) -> None:
+    photos = tuple(tmp_path / f"{number}.jpg" for number in range(MAX_PHOTOS - 3))
+    desk = Desk()
+    desk.perform(show.AddPhotos(photos))
+    desk.asked.clear()
+    desk.perform(show.OpenPaths((str(walk),)))
+    desk.look_through()
+    assert len(desk.film.chosen) == 3
+    left = next(index for index in range(40) if index not in desk.film.chosen)
+    desk.perform(opening.SwitchFrame(left))
+    assert len(desk.film.chosen) == 3 and "At most 3 frames" in desk.state.toasts[-1].text
+    desk.perform(opening.TakeFrames())
+    assert len(desk.state.photos) == MAX_PHOTOS and desk.state.photos[0].path == photos[0]
+
+    desk = Desk(shown_scene())
+    desk.perform(show.OpenPaths((str(walk),), dropped=True))
+    desk.look_through()
+    desk.perform(opening.TakeFrames())
+    assert desk.state.aside is not None, "the scene's own photos come back if this fails"
+    assert tuple(photo.path for photo in desk.state.photos) == desk.film.frames
+
+
+def test_what_cannot_be_used_is_said(tmp_path: Path, walk: Path) -> None:
+    broken = tmp_path / "broken.mp4"
+    broken.write_bytes(b"no film")
+    with pytest.raises(FilmError):
+        work.LookThrough(broken).run(1, lambda stage, share: None, lambda: False)
+    with pytest.raises(Cancelled):
+        path = films.write(tmp_path / "other.mp4", films.walk(20))
+        work.LookThrough(path).run(1, lambda stage, share: None, lambda: True)
+    desk = Desk()
+    still = films.write(tmp_path / "still.mp4", [films.seen(0)] * 10)
+    desk.perform(show.OpenPaths((str(still), str(walk))))
+    assert "one film at a time" in desk.state.toasts[-1].text
+    desk.look_through()
+    assert (
+        desk.state.dialog is None and desk.state.job is None and "stands still" in desk.state.toasts[-1].text
+    )
+
+
+def test_films_are_found(tmp_path: Path, walk: Path) -> None:
+    (tmp_path / "a.MOV").touch()
+    assert sort_drop([tmp_path]).films == ((tmp_path / "a.MOV").resolve(),)
+    (tmp_path / "a.jpg").touch()
+    assert sort_drop([tmp_path]).films == () and len(sort_drop([tmp_path]).photos) == 1
+    assert [path.name for path in work.listed(tmp_path).films] == ["a.MOV"]
+
+
+def test_the_dialog_fits_and_switches(desk: Desk) -> None:
+    with headless.context((900, 600)):
+        theme.set_up(1.0)
+        headless.frames(lambda look: dialogs.draw(desk.state, look), headless.look())
+        box = headless.box(dialogs.TITLES["film"])
+        assert box[0] >= 0 and box[1] >= 0 and box[2] <= 900 and box[3] <= 600
+        assert imgui.is_popup_open("", imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level)
+
+
+def test_what_remains_of_a_film_is_told() -> None:
+    job = Job("Opening walk.mp4", "film", 0.25, started=10.0)
+    assert tray._seconds(job, 14.0) == "12 s left" and tray._seconds(job, 10.5) == "0.5 s"
+    assert tray._seconds(Job("x", "network", 0.25, started=10.0), 14.0) == "4.0 s"

@@ -1,0 +1,190 @@
+"""Which frames of a film are taken: sharp ones, spaced by what moves; and what is not decoded twice."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from langflash_core.errors import Cancelled, FilmError
+from langflash_core.images import frames
+from langflash_core.images.film import Reader
+from langflash_core.images.frames import remaining, strip_of
+from langflash_core.images.strip import Choice, Strip, choose, notes_on
+from tests import films
+
+
+@pytest.fixture(autouse=True)
+def home(monkeypatch, tmp_path: Path) -> Path:
+    monkeypatch.setenv("LANGFLASH_HOME", str(tmp_path / "home"))
+    return tmp_path / "home"
+
+
+def chosen(path: Path, most: int = 32, **options) -> tuple[Strip, Choice]:
+    strip = strip_of(path, **options)
+    choice = choose(strip, most)
+    assert sum(choice.left.values()) + len(choice.chosen) == strip.looked
+    return strip, choice
+
+
+def times(strip: Strip, choice: Choice) -> np.ndarray:
+    return np.array([strip.stills[index].seconds for index in choice.chosen])
+
+
+def test_frames_are_spaced_by_what_moves_and_not_by_time(tmp_path: Path) -> None:
+    """Two seconds slow, two seconds still with a hand that shakes, two seconds fast."""
+    rng = np.random.default_rng(0)
+    ways = [np.linspace(0, 120, 30), 120 + rng.normal(0, 0.7, 30), np.linspace(120, 840, 30)]
+    path = films.write(tmp_path / "walk.mp4", [films.seen(x) for x in np.concatenate(ways)])
+    strip, choice = chosen(path)
+    of = [int(((times(strip, choice) >= a) & (times(strip, choice) < a + 2)).sum()) for a in (0, 2, 4)]
+    assert of[1] <= 1 and of[0] >= 3 and of[2] > 3 * of[0], of
+    gaps = np.diff([strip.stills[index].place for index in choice.chosen])
+    assert gaps.min() > 0.06 and gaps.max() < 0.2
+    assert choice.left["repeats"] == 0 and strip.shots == 1 and not notes_on(strip, choice)
+
+
+def test_blurred_frames_are_left_out_and_counted(tmp_path: Path) -> None:
+    pictures = [film if i % 3 == 1 else films.smeared(film) for i, film in enumerate(films.walk(60))]
+    strip, choice = chosen(films.write(tmp_path / "walk.mp4", pictures))
+    sharp = np.round(times(strip, choice) * films.RATE).astype(int) % 3 == 1
+    assert sharp.mean() > 0.9 and choice.left["blurred"] > 20
+    assert choice.relative[list(choice.chosen)].min() > 0.4
+
+
+def test_where_all_is_blurred_something_is_taken_still(tmp_path: Path) -> None:
+    """Else what is seen there would be missing."""
+    pictures = [films.smeared(film) if 20 <= i < 45 else film for i, film in enumerate(films.walk(65, 12.0))]
+    strip, choice = chosen(films.write(tmp_path / "walk.mp4", pictures))
+    assert ((times(strip, choice) > 22 / 15) & (times(strip, choice) < 43 / 15)).any()
+    assert choice.gap < 0.4
+
+
+def test_there_and_back_is_taken_once(tmp_path: Path) -> None:
+    there = films.walk(30, 12.0)
+    _, choice = chosen(films.write(tmp_path / "walk.mp4", [*there, *there[::-1]]))
+    _, alone = chosen(films.write(tmp_path / "there.mp4", there))
+    assert choice.left["repeats"] >= 10 and len(choice.chosen) <= len(alone.chosen) + 1
+
+
+def test_of_two_places_the_longer_one_is_taken(tmp_path: Path) -> None:
+    other = films.wall(7)
+    pictures = [films.seen(9.0 * i, picture=other) for i in range(15)] + films.walk(40)
+    strip, choice = chosen(films.write(tmp_path / "walk.mp4", pictures))
+    assert strip.shots == 2 and choice.left["other_shots"] == 15 and times(strip, choice).min() >= 1.0
+    (note,) = notes_on(strip, choice)
+    assert "2 places" in note and "--from" in note
+
+
+def test_a_flash_or_a_fast_turn_parts_no_room(tmp_path: Path) -> None:
+    pictures = films.walk(40)
+    pictures[20] = np.random.default_rng(0).integers(0, 255, pictures[20].shape).astype(np.uint8)
+    strip, choice = chosen(films.write(tmp_path / "walk.mp4", pictures))
+    taken = times(strip, choice)
+    assert taken.min() < 0.5 and taken.max() > 2.2 and not np.isclose(taken, 20 / 15, atol=0.01).any()
+    turn = [films.seen(x) for x in (*range(0, 160, 8), *range(260, 460, 8))]
+    strip, choice = chosen(films.write(tmp_path / "turn.mp4", turn))
+    assert strip.shots == 1 and choice.left["other_shots"] == 0
+
+
+def test_number_and_part(tmp_path: Path) -> None:
+    path = films.write(tmp_path / "walk.mp4", films.walk(60))
+    strip, choice = chosen(path, 5)
+    assert len(choice.chosen) == 5 and np.diff(times(strip, choice)).std() < 0.2
+    assert len(choose(strip, 32, 24).chosen) == 24, "more than are needed, if asked for"
+    part, choice = chosen(path, start=1.0, end=2.0)
+    assert times(part, choice).min() >= 1 and times(part, choice).max() <= 2.01
+    strip, choice = chosen(path, every=0.5)
+    assert len(choice.chosen) == 8 and np.all(np.abs(np.diff(times(strip, choice)) - 0.5) < 0.5)
+    few = films.write(tmp_path / "wide.mp4", [films.seen(70.0 * i) for i in range(18)])
+    assert any("far apart" in note for note in notes_on(*chosen(few, 3)))
+
+
+def test_what_shows_nothing_is_a_sentence(tmp_path: Path, home: Path) -> None:
+    rng = np.random.default_rng(0)
+    black, wall = np.zeros((240, 320, 3), np.uint8), np.full((240, 320, 3), 170, np.uint8)
+    noisy = [np.clip(14 + rng.normal(0, 3, black.shape), 0, 255).astype(np.uint8) for _ in range(20)]
+    for name, pictures, said in (
+        ("still.mp4", [films.seen(0)] * 20, "stands still"), ("black.mp4", [black] * 20, "too dark"),
+        ("dark.mp4", noisy, "too dark"), ("wall.mp4", [wall] * 20, "bare wall"),
+        ("one.mp4", [films.seen(0)], "single picture"),
+    ):  # fmt: skip
+        with pytest.raises(FilmError, match=said):
+            chosen(films.write(tmp_path / name, pictures))
+    with pytest.raises(FilmError, match="nothing from 9 s on"):
+        chosen(tmp_path / "still.mp4", start=9.0)
+    assert len(list((home / "films").iterdir())) == 1, "nothing of those is kept but the still's frame"
+
+
+def test_a_film_that_ends_too_early_says_so(tmp_path: Path) -> None:
+    path = films.write(tmp_path / "walk.mp4", films.walk(60), films.RATE, "-movflags", "+faststart")
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    strip, choice = chosen(path)
+    assert any("cannot be decoded" in note for note in notes_on(strip, choice))
+
+
+def test_nothing_is_decoded_twice(tmp_path: Path, home: Path, monkeypatch) -> None:
+    path = films.write(tmp_path / "walk.mp4", films.walk(30))
+    first = strip_of(path)
+    with monkeypatch.context() as patch:
+        patch.setattr(Reader, "pictures", None)
+        assert strip_of(path) == first
+    assert all(path.is_file() for path in map(first.path, range(len(first.stills))))
+    first.path(0).unlink()
+    assert strip_of(path) == first and first.path(0).is_file(), "what is not whole is made again"
+    films.write(path, films.walk(40))
+    assert strip_of(path).looked > first.looked, "another film of the same name"
+
+
+def test_only_the_last_films_are_kept(tmp_path: Path, home: Path, monkeypatch) -> None:
+    monkeypatch.setattr(frames, "KEPT_FILMS", 2)
+    for name in ("a", "b", "c"):
+        last = strip_of(films.write(tmp_path / f"{name}.mp4", films.walk(8)))
+    assert len(list((home / "films").iterdir())) == 2 and last.folder.is_dir()
+
+
+def test_whoever_stops_it_leaves_nothing(tmp_path: Path, home: Path) -> None:
+    path, seen = films.write(tmp_path / "walk.mp4", films.walk(40)), list[float]()
+
+    def stop() -> None:
+        if seen and seen[-1] > 0.5:
+            raise Cancelled("enough")
+
+    with pytest.raises(Cancelled):
+        strip_of(path, progress=lambda stage, share: seen.append(share), check=stop)
+    assert seen == sorted(seen) and list((home / "films").iterdir()) == []
+
+
+def test_a_long_film_keeps_a_bounded_number(tmp_path: Path, monkeypatch) -> None:
+    path = films.write(tmp_path / "walk.mp4", films.walk(90))
+    many = strip_of(path)
+    monkeypatch.setattr(frames, "MOST_STILLS", 10)
+    few = strip_of(path, start=1e-9)  # another key of the cache
+    assert len(few.stills) <= 10 < len(many.stills) and few.looked == many.looked
+    assert len(list(few.folder.glob("*.jpg"))) == len(few.stills)
+    assert choose(few, 32).gap < 1.0
+
+
+def test_large_pictures_are_kept_smaller(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(frames, "STILL_SIDE", 160)
+    strip = strip_of(films.write(tmp_path / "walk.mp4", films.walk(20)))
+    kept = cv2.imread(str(strip.path(0)))
+    assert kept is not None and kept.shape == (120, 160, 3)
+
+
+def test_the_same_film_gives_the_same_frames(tmp_path: Path, home: Path) -> None:
+    path = films.write(tmp_path / "walk.mp4", films.walk(40))
+    first = strip_of(path)
+    first.folder.rename(home / "films" / "elsewhere")
+    second = strip_of(path)
+    assert replace(second, folder=first.folder) == first
+    for index in range(len(first.stills)):
+        elsewhere = home / "films" / "elsewhere" / first.stills[index].file
+        assert elsewhere.read_bytes() == second.path(index).read_bytes()
+
+
+def test_what_remains_is_told_once_it_is_known() -> None:
+    assert remaining(0.01, 0.0, 10.0) == "" and remaining(0.5, 0.0, 0.5) == ""
+    assert remaining(0.25, 0.0, 10.0) == ", 30 s left"
