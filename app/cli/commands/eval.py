@@ -24,6 +24,7 @@ from .eval_protocol import opened_lpips, protocol
 from .eval_report import report
 from .eval_sharp import sharp
 from .eval_sides import beside, sides
+from .eval_walk import walk
 from .query import spoken
 
 
@@ -49,6 +50,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "sharp": sharp,
         "sides": sides,
         "sides-beside": beside,
+        "walk": walk,
     }[args.action](args, out)
 
 

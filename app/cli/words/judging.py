@@ -110,6 +110,7 @@ def add_eval(commands) -> None:
     _add_posed(actions)
     _add_sides(actions)
     _add_sharp(actions)
+    _add_walk(actions)
     _add_labels(actions)
     _add_protocol(actions)
     _add_report(actions)
@@ -231,6 +232,67 @@ def _add_sharp(actions) -> None:
     command.add_argument(
         "--sheet", type=Path, metavar="IMG", help="also photos and scenes at 100 and 300 %%, as .png"
     )
+    _add_judging(command)
+
+
+def _add_walk(actions) -> None:
+    command = new_command(
+        actions, "walk", "the same place in 2, 4, 8 ... photos: cameras, depth, pictures between, size, time"
+    )
+    command.add_argument(
+        "pack", type=Path, nargs="?", metavar="PACK", help="walks through rooms with this furniture"
+    )
+    command.add_argument(
+        "--posed",
+        type=Path,
+        dest="folder",
+        metavar="FOLDER",
+        help="instead, stretches of real photos of known poses",
+    )
+    add_description(command)
+    command.add_argument(
+        "--photos", type=whole_count, nargs="+", metavar="N", help="of each scene (default: 2 4 8 16 32)"
+    )
+    command.add_argument(
+        "--growing",
+        action="store_true",
+        help="more photos go farther, always as far apart, instead of nearer together",
+    )
+    command.add_argument(
+        "--step",
+        type=whole_count,
+        default=1,
+        metavar="N",
+        help="of --posed: photos from frame to frame (default: 1)",
+    )
+    command.add_argument(
+        "--kept", type=whole_count, metavar="N", help="frames kept from the scenes (default: 8)"
+    )
+    command.add_argument(
+        "--limit", type=whole_count, metavar="N", help="walks (default: 20 rooms or 4 stretches)"
+    )
+    command.add_argument(
+        "--way",
+        choices=("aside", "round"),
+        default="aside",
+        help="of the camera through a room (default: aside)",
+    )
+    _add_room_set(command)
+    command.add_argument(
+        "--exposure", type=above_zero, metavar="EV", help="each photo of a room off by up to so many stops"
+    )
+    command.add_argument(
+        "--blur",
+        type=above_zero,
+        metavar="DEG",
+        help="a hand turns by so many degrees in each photo of a room",
+    )
+    command.add_argument("--assume-lens", action="store_true", help="say nothing of the lens")
+    command.add_argument("--given-poses", action="store_true", help="say where the photos were taken")
+    command.add_argument(
+        "--no-own", action="store_true", help="without the scenes of a kept frame's own two photos"
+    )
+    _add_fitting(command)
     _add_judging(command)
 
 
