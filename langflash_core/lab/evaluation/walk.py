@@ -105,7 +105,7 @@ def judge(
     ones."""
     alone: dict[tuple[tuple[int, int], int], dict[str, float]] = {}
     plan, rows, done = walk.plan, {}, 0
-    pictured = set(plan.kept[len(plan.kept) // (2 * SHOWN) :: max(1, len(plan.kept) // SHOWN)][:SHOWN])
+    pictured = set(plan.kept[:: max(1, len(plan.kept) // SHOWN)][:SHOWN])
     for photos, frames in sorted(plan.chosen.items()):
         progress(f"{photos} photos", done / sum(plan.chosen))
         made = made_of(walk, frames, bench, memory=bench.memory)
