@@ -14,8 +14,8 @@ from torch import Tensor
 from langflash_core.lab.evaluation.side_measures import Similarity
 
 _ROUNDS = 20
-_LEAST = 1e-4
-"""Error, in spreads of the walk plus radians, below which a camera pulls no harder."""
+_LEAST = 5e-3
+"""Error, in spreads of the walk or in radians, below which a camera pulls no harder."""
 
 
 @dataclass(frozen=True)
@@ -39,10 +39,10 @@ def walked(viewmats: Float[np.ndarray, "V 4 4"]) -> float:
 def fitted_cameras(found: Float[np.ndarray, "V 4 4"], truth: Float[np.ndarray, "V 4 4"]) -> Similarity:
     """The similarity from the scene's world to the true one that fits cameras best, places and directions.
 
-    Places alone leave the turn about a straight walk open, and two of them any turn about their line; so the
-    covariance of the centres, each side over its spread, and that of the cameras' axes are added before the
-    rotation is taken from them. Scale and shift are those of the places. Least absolute errors keep one
-    camera that is wrong from pulling the others away.
+    Places alone leave the turn about a straight walk open, and two that are near each other tell none at all;
+    so the least sum over cameras of both errors is sought: of the place, over the spread of the true places,
+    and of the direction, in radians. Squares of both are minimised together, each weighted by one over what
+    was left of it: what is wrong pulls nothing else, be it one camera, or where two stand.
 
     Args:
         found: of the scene, at least one. truth: of the same photos.
@@ -50,35 +50,36 @@ def fitted_cameras(found: Float[np.ndarray, "V 4 4"], truth: Float[np.ndarray, "
     Returns:
         A scale of 1 where the cameras of either side stand in one place.
 
-    Source: Umeyama 1991, with iteratively reweighted least squares.
+    Source: Umeyama 1991, with the scale of Horn 1987, the ratio of both spreads, which does not shrink where
+    places disagree; iteratively reweighted least squares.
     """
-    places, true_places = centres_of(found), centres_of(truth)
-    axes = np.einsum("vji,vjk->vik", truth[:, :3, :3], found[:, :3, :3])  # truth^T found, scene to true
-    weights = np.ones(len(found))
+    axes = np.einsum("vji,vjk->vik", truth[:, :3, :3], found[:, :3, :3])  # scene to true, of each camera
+    places = directions = np.ones(len(found))
     fit = Similarity(1.0, np.eye(3), np.zeros(3))
     for _ in range(_ROUNDS):
-        fit, spread = _weighted(places, true_places, axes, weights / weights.sum())
+        fit, spread = _weighted(centres_of(found), centres_of(truth), axes, places, directions)
         errors = camera_errors(found, truth, fit)
-        pulled = errors.places / max(spread, 1e-9) + np.radians(errors.rotations)
-        weights = 1 / np.maximum(pulled, _LEAST)
+        places = 1 / np.maximum(errors.places / max(spread, 1e-9), _LEAST)
+        directions = 1 / np.maximum(np.radians(errors.rotations), _LEAST)
     return fit
 
 
 def _weighted(
-    places: np.ndarray, truth: np.ndarray, axes: np.ndarray, shares: np.ndarray
+    found: np.ndarray, truth: np.ndarray, axes: np.ndarray, places: np.ndarray, directions: np.ndarray
 ) -> tuple[Similarity, float]:
-    """The fit, and the spread of the true places."""
-    middle, true_middle = shares @ places, shares @ truth
-    centred, true_centred = places - middle, truth - true_middle
+    """The fit under weights of places and directions, and the spread of the true places."""
+    shares = places / places.sum()
+    middle, true_middle = shares @ found, shares @ truth
+    centred, true_centred = found - middle, truth - true_middle
     own, true = (math.sqrt(float(shares @ (c**2).sum(1))) for c in (centred, true_centred))
+    moving = min(own, true) > 1e-9
     covariance = (true_centred * shares[:, None]).T @ centred
-    together = np.einsum("v,vij->ij", shares, axes)
-    if min(own, true) > 1e-9:
-        together = together + covariance / (own * true)
+    together = np.einsum("v,vij->ij", directions, axes)
+    if moving:
+        together = together + covariance * (places.sum() / (own * true))
     u, _, vt = np.linalg.svd(together)
     rotation = (u * np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])) @ vt
-    scale = float(np.trace(rotation.T @ covariance)) / own**2 if min(own, true) > 1e-9 else 1.0
-    scale = scale if scale > 1e-9 else 1.0  # a walk that was found backwards
+    scale = true / own if moving else 1.0
     return Similarity(scale, rotation, true_middle - scale * rotation @ middle), true
 
 

@@ -68,6 +68,17 @@ def test_one_camera_that_is_wrong_pulls_no_other():
     assert errors.places[4] == pytest.approx(0.5, abs=0.01)
 
 
+def test_two_cameras_that_stand_wrong_are_still_turned_right():
+    """Near each other, a place is easily found on the wrong side."""
+    truth = straight(2)
+    for degrees in (60, 180):
+        places = centres_of(truth) @ Rotation.from_euler("y", degrees, True).as_matrix().T
+        found = cameras(places, Rotation.from_matrix(truth[:, :3, :3]))
+        fit = fitted_cameras(found, truth)
+        errors = camera_errors(found, truth, fit)
+        assert errors.rotations.max() < 1 and errors.places.min() > 0.04 and fit.scale == pytest.approx(1)
+
+
 def test_errors_are_metres_and_degrees():
     truth = straight(3)
     found = truth.copy()
