@@ -193,7 +193,7 @@ def room_walks(
 def _room_walk(
     staged: StagedRoom, renderer: RoomRenderer, way: Way, plan: Plan, camcorder: Camcorder
 ) -> Walk:
-    """Frames are drawn when they are asked for, and remembered."""
+    """Frames are drawn when they are asked for, which is while `renderer` has this room, and remembered."""
     known: dict[tuple[int, bool], LabelledPhoto] = {}
     grey = staged.grey
 
