@@ -33,7 +33,6 @@ from langflash_core.lab.evaluation.walk_colmap import mapped
 from langflash_core.lab.evaluation.walk_measures import camera_errors, fitted_cameras, lens_error, lit
 from langflash_core.lab.evaluation.walk_scenes import Bench, Made, files_of, made_of, true_cameras
 from langflash_core.lab.evaluation.walk_subjects import Walk
-from langflash_core.lab.photos import LabelledPhoto
 from langflash_core.lab.photos.fitting import FittedPhoto
 from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, nan_mean, psnr
 from langflash_core.language.answers import COVERED_ALPHA
@@ -112,14 +111,14 @@ def judge(
         once = {**once_of(made, bench.render), **(_colmap(made, bench) if bench.colmap else {})}
         kept: dict[str, dict[str, float]] = {}
         for frame in plan.between(photos):
-            rgb, kept[str(frame)] = pictured_at(made, walk.kept(frame), bench)
+            rgb, kept[str(frame)] = pictured_at(made, walk, frame, bench)
             if frame in pictured:
                 shown(walk.name, frame, str(photos), rgb)
         for frame in plan.between(photos) if bench.alone else ():
             pair = plan.own(photos, frame)
             if (pair, frame) not in alone:
                 own = made if photos == 2 else made_of(walk, pair, bench)
-                rgb, alone[pair, frame] = _alone(own, walk.kept(frame), bench)
+                rgb, alone[pair, frame] = _alone(own, walk, frame, bench)
                 if frame in pictured:
                     shown(walk.name, frame, OWN, rgb)
             kept[str(frame)] |= alone[pair, frame]
@@ -131,11 +130,11 @@ def judge(
     return {"name": walk.name, "photos": rows}
 
 
-def _alone(own: Made, target: LabelledPhoto, bench: Bench) -> tuple[Tensor, dict[str, float]]:
+def _alone(own: Made, walk: Walk, frame: int, bench: Bench) -> tuple[Tensor, dict[str, float]]:
     """What the two photos around a kept frame bring without the others."""
     kept = ("depth_abs_rel", "placed", "gaussians", "seconds")
     once = once_of(own, bench.render)
-    rgb, numbers = pictured_at(own, target, bench)
+    rgb, numbers = pictured_at(own, walk, frame, bench)
     found = {f"photos_{key}": once[key] for key in kept} | numbers
     return rgb, {ALONE + key: value for key, value in found.items()}
 
@@ -207,13 +206,12 @@ def _colmap(made: Made, bench: Bench) -> dict[str, float]:
 
 
 @torch.no_grad()
-def pictured_at(made: Made, target: LabelledPhoto, bench: Bench) -> tuple[Tensor, dict[str, float]]:
+def pictured_at(made: Made, walk: Walk, frame: int, bench: Bench) -> tuple[Tensor, dict[str, float]]:
     """The scene from where a frame was kept: the picture at the photo's size, and numbers at both sizes."""
-    scene, numbers = made.scene, {}
-    place = torch.from_numpy(made.fit.viewmat(true_cameras([target])[0])).float()
+    scene, numbers, target = made.scene, {}, walk.kept(frame)
     small, large = (as_seen(target, size) for size in (scene.view_size, size_of(target, scene.view_size)))
     rgb = _rgb(large)
-    for how, viewmat in _places(scene, place, small, bench):
+    for how, viewmat in _places(made, walk, frame, small, bench):
         for name, photo in (("", small), ("large_", large)):
             camera = Camera(viewmat, photo.K, photo.rgb.shape[2], photo.rgb.shape[1])
             rgb, found = _alike(scene, camera, photo, made.fit, bench)
@@ -221,12 +219,19 @@ def pictured_at(made: Made, target: LabelledPhoto, bench: Bench) -> tuple[Tensor
     return rgb, numbers
 
 
-def _places(scene: Scene, place: Tensor, photo: FittedPhoto, bench: Bench) -> Iterator[tuple[str, Tensor]]:
-    """Where the frame was kept, and, if that is asked for, the pose near it that fits the photo."""
-    yield "", place
+def _places(
+    made: Made, walk: Walk, frame: int, photo: FittedPhoto, bench: Bench
+) -> Iterator[tuple[str, Tensor]]:
+    """Where the frame was kept, and, if that is asked for, the pose that fits the photo, sought from there or
+    from where its neighbours alone say that it was, whichever looks more like it."""
+    scene, truth = made.scene, _rgb(photo)
+    fits = (made.fit, made.fit_near(frame)) if bench.align else (made.fit,)
+    starts = [torch.from_numpy(fit.viewmat(walk.camera(frame))).float() for fit in fits]
+    yield "", starts[0]
     if bench.align:
-        camera = Camera(place, photo.K, *scene.view_size)
-        yield "aligned_", aligned_camera(lambda at: bench.render(scene, at), camera, _rgb(photo)).viewmat
+        cameras = [Camera(start, photo.K, *scene.view_size) for start in starts]
+        best = max(cameras, key=lambda at: psnr(bench.render(scene, at).rgb.cpu().float(), truth))
+        yield "aligned_", aligned_camera(lambda at: bench.render(scene, at), best, truth).viewmat
 
 
 def _rgb(photo: FittedPhoto) -> Tensor:

@@ -66,10 +66,12 @@ class Cost:
 
 @dataclass(frozen=True)
 class Made:
-    """A scene without its language. photos: all it was to be made of; views: which of them were placed, in
-    the scene's order; fit: to the true world; length: of the walk from the first photo to the last, m."""
+    """A scene without its language. frames, photos: all it was to be made of; views: which of them were
+    placed, in the scene's order; fit: to the true world; length: of the walk from the first photo to the
+    last, m."""
 
     scene: Scene
+    frames: tuple[int, ...]
     photos: tuple[LabelledPhoto, ...]
     views: tuple[int, ...]
     fit: Similarity
@@ -79,6 +81,16 @@ class Made:
     @property
     def placed(self) -> list[LabelledPhoto]:
         return [self.photos[view] for view in self.views]
+
+    def fit_near(self, frame: int) -> Similarity:
+        """To the true world by the two cameras around a frame alone: a walk that bends does not matter."""
+        numbers = [self.frames[view] for view in self.views]
+        before = [row for row, number in enumerate(numbers) if number < frame][-1:]
+        after = [row for row, number in enumerate(numbers) if number > frame][:1]
+        if not (before and after):
+            return self.fit
+        rows = before + after
+        return fitted_cameras(as_array(self.scene.viewmats)[rows], true_cameras(self.placed)[rows])
 
 
 def made_of(walk: Walk, frames: Sequence[int], bench: Bench, *, memory: bool = False) -> Made:
@@ -105,7 +117,7 @@ def made_of(walk: Walk, frames: Sequence[int], bench: Bench, *, memory: bool = F
     views = tuple(view for view, photo in enumerate(photos) if photo.id in placed)
     fit = fitted_cameras(np.stack([as_array(placed[photos[v].id]) for v in views]), truth[list(views)])
     length = walked(np.stack([walk.camera(frame) for frame in range(frames[0], frames[-1] + 1)]))
-    made = Made(_wordless(scene), photos, views, fit, length, cost)
+    made = Made(_wordless(scene), tuple(frames), photos, views, fit, length, cost)
     return replace(made, fit=_scaled(made, bench.render)) if len(views) < 2 else made
 
 

@@ -148,11 +148,21 @@ def test_a_place_that_is_off_is_found_in_the_picture(folder: PhotoFolder, monkey
     true_scenes(folder, monkeypatch)
     (walk,) = posed_walks(folder, planned((2,)), 1)
     made = made_of(walk, (0, 2), BENCH)
+    right = pictured_at(made, walk, 1, BENCH)[1]["psnr"]
     shift = made.fit.shift + np.array([0.03, 0, 0])  # three quarters of a pixel
-    off = replace(made, fit=replace(made.fit, shift=shift))
-    right = pictured_at(made, walk.kept(1), BENCH)[1]["psnr"]
-    numbers = pictured_at(off, walk.kept(1), replace(BENCH, align=True))[1]
+    off = replace(made, views=(0,), fit=replace(made.fit, shift=shift))  # and no neighbour that knows better
+    numbers = pictured_at(off, walk, 1, replace(BENCH, align=True))[1]
     assert numbers["psnr"] < right - 2 and numbers["aligned_psnr"] > numbers["psnr"] + 1.5
+
+
+def test_neighbours_know_a_place_where_the_walk_bends(folder: PhotoFolder, monkeypatch):
+    """The fit is off by metres, so that no picture tells the way back."""
+    true_scenes(folder, monkeypatch)
+    (walk,) = posed_walks(folder, planned((2,)), 1)
+    made = made_of(walk, (0, 2), BENCH)
+    off = replace(made, fit=replace(made.fit, shift=made.fit.shift + np.array([5.0, 0, 0])))
+    numbers = pictured_at(off, walk, 1, replace(BENCH, align=True))[1]
+    assert numbers["psnr"] < 10 and numbers["aligned_psnr"] > 20
 
 
 def test_a_single_photo_in_place_has_the_scale_of_its_depth(folder: PhotoFolder, monkeypatch):
