@@ -51,23 +51,27 @@ def walk_sheet(folders: Sequence[tuple[str, Path]]) -> Image.Image:
     if not shared:
         raise InputError(f"{folders[0][1]} holds no pictures; make them with eval walk --results")
     step = max(1, -(-len(shared) // MOST))
-    bands = [_band(stem, folders) for stem in shared[::step]]
+    numbers = {path.stem.split("_")[-1] for _, folder in folders for path in folder.glob("*.png")}
+    titles = [*sorted((title for title in numbers if title.isdigit()), key=int), OWN]
+    bands = [_band(stem, folders, titles) for stem in shared[::step]]
     width = max(band.shape[1] for band in bands)
     return Image.fromarray(
         np.concatenate([np.pad(b, ((0, 0), (0, width - b.shape[1]), (0, 0))) for b in bands])
     )
 
 
-def _band(stem: str, folders: Sequence[tuple[str, Path]]) -> np.ndarray:
-    cells = [_cell(folders[0][1] / f"{stem}_{TRUTH}.png", f"{stem.replace('_', ', frame ')}")]
+def _band(stem: str, folders: Sequence[tuple[str, Path]], titles: Sequence[str]) -> np.ndarray:
+    """Black where a frame lies beyond the photos of a scene."""
+    cells = [_cell(folders[0][1] / f"{stem}_{TRUTH}.png", stem.replace("_", ", frame "))]
+    height, width = cells[0].shape[:2]
     for version, folder in folders:
-        titles = [path.stem.removeprefix(f"{stem}_") for path in folder.glob(f"{stem}_*.png")]
-        numbers = sorted((title for title in titles if title.isdigit()), key=int)
         said = f" ({version})" if len(folders) > 1 else ""
-        cells.append(np.zeros((cells[-1].shape[0], _GAP, 3), dtype=np.uint8))
-        cells += [_cell(folder / f"{stem}_{n}.png", f"{n} photos{said}") for n in numbers]
-        if OWN in titles:
-            cells.append(_cell(folder / f"{stem}_{OWN}.png", f"its own two photos{said}"))
+        cells.append(np.zeros((height, _GAP, 3), dtype=np.uint8))
+        for title in titles:
+            path = folder / f"{stem}_{title}.png"
+            name = "its own two photos" if title == OWN else f"{title} photos"
+            known = path.is_file()
+            cells.append(_cell(path, name + said) if known else np.zeros((height, width, 3), np.uint8))
     return np.concatenate(cells, axis=1)
 
 

@@ -13,7 +13,7 @@ Sizes: H W pixels; "large" is the photo's size, at most three times the network'
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -207,31 +207,34 @@ def _colmap(made: Made, bench: Bench) -> dict[str, float]:
 
 @torch.no_grad()
 def pictured_at(made: Made, walk: Walk, frame: int, bench: Bench) -> tuple[Tensor, dict[str, float]]:
-    """The scene from where a frame was kept: the picture at the photo's size, and numbers at both sizes."""
-    scene, numbers, target = made.scene, {}, walk.kept(frame)
+    """The scene from where a frame was kept: the picture at the photo's size, and numbers at both sizes.
+
+    "aligned_" is from that place or from the pose that fits the photo, whichever looks more like it.
+    """
+    scene, target = made.scene, walk.kept(frame)
     small, large = (as_seen(target, size) for size in (scene.view_size, size_of(target, scene.view_size)))
-    rgb = _rgb(large)
-    for how, viewmat in _places(made, walk, frame, small, bench):
-        for name, photo in (("", small), ("large_", large)):
-            camera = Camera(viewmat, photo.K, photo.rgb.shape[2], photo.rgb.shape[1])
-            rgb, found = _alike(scene, camera, photo, made.fit, bench)
-            numbers |= {name + how + key: value for key, value in found.items()}
+    places = [torch.from_numpy(made.fit.viewmat(walk.camera(frame))).float()]
+    if bench.align:
+        places.append(_fitted_place(made, walk, frame, small, bench))
+    rgb, numbers = _rgb(large), {}
+    for name, photo in (("", small), ("large_", large)):
+        cameras = [Camera(place, photo.K, photo.rgb.shape[2], photo.rgb.shape[1]) for place in places]
+        drawn = [_alike(scene, camera, photo, made.fit, bench) for camera in cameras]
+        numbers |= {name + key: value for key, value in drawn[0][1].items()}
+        rgb, best = max(drawn, key=lambda found: found[1]["psnr"])
+        if bench.align:
+            numbers |= {f"{name}aligned_{key}": value for key, value in best.items()}
     return rgb, numbers
 
 
-def _places(
-    made: Made, walk: Walk, frame: int, photo: FittedPhoto, bench: Bench
-) -> Iterator[tuple[str, Tensor]]:
-    """Where the frame was kept, and, if that is asked for, the pose that fits the photo, sought from there or
-    from where its neighbours alone say that it was, whichever looks more like it."""
+def _fitted_place(made: Made, walk: Walk, frame: int, photo: FittedPhoto, bench: Bench) -> Tensor:
+    """The pose that fits the photo, sought from its place or from where its neighbours alone say that it was,
+    whichever looks more like it."""
     scene, truth = made.scene, _rgb(photo)
-    fits = (made.fit, made.fit_near(frame)) if bench.align else (made.fit,)
-    starts = [torch.from_numpy(fit.viewmat(walk.camera(frame))).float() for fit in fits]
-    yield "", starts[0]
-    if bench.align:
-        cameras = [Camera(start, photo.K, *scene.view_size) for start in starts]
-        best = max(cameras, key=lambda at: psnr(bench.render(scene, at).rgb.cpu().float(), truth))
-        yield "aligned_", aligned_camera(lambda at: bench.render(scene, at), best, truth).viewmat
+    starts = [fit.viewmat(walk.camera(frame)) for fit in (made.fit, made.fit_near(frame))]
+    cameras = [Camera(torch.from_numpy(start).float(), photo.K, *scene.view_size) for start in starts]
+    best = max(cameras, key=lambda at: psnr(bench.render(scene, at).rgb.cpu().float(), truth))
+    return aligned_camera(lambda at: bench.render(scene, at), best, truth).viewmat
 
 
 def _rgb(photo: FittedPhoto) -> Tensor:
