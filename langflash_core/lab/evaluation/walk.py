@@ -14,7 +14,7 @@ Sizes: H W pixels; "large" is the photo's size, at most three times the network'
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -30,7 +30,7 @@ from langflash_core.lab.evaluation.side_measures import Similarity, as_array
 from langflash_core.lab.evaluation.sides import number
 from langflash_core.lab.evaluation.tallies import Shelf, collected
 from langflash_core.lab.evaluation.walk_colmap import mapped
-from langflash_core.lab.evaluation.walk_measures import camera_errors, fitted_cameras, lens_error, lit
+from langflash_core.lab.evaluation.walk_measures import camera_errors, fitted_cameras, lit
 from langflash_core.lab.evaluation.walk_scenes import Bench, Made, files_of, made_of, true_cameras
 from langflash_core.lab.evaluation.walk_subjects import Walk
 from langflash_core.lab.photos.fitting import FittedPhoto
@@ -148,7 +148,7 @@ def once_of(made: Made, render: Render) -> dict[str, float]:
     return {
         "placed": len(placed) / len(made.photos),
         **_cameras(as_array(scene.viewmats), true_cameras(placed), made.fit, made.length),
-        "focal": lens_error(list(scene.Ks), [photo.K for photo in seen]),
+        "focal": abs(made.lens - 1),
         **{key: nan_mean(row[key] for row in depth) for key in depth[0]},
         "gaussians": float(len(scene.gaussians)),
         "coarse": float((scene.levels == 0).sum()) if scene.levels is not None else math.nan,
@@ -209,10 +209,12 @@ def _colmap(made: Made, bench: Bench) -> dict[str, float]:
 def pictured_at(made: Made, walk: Walk, frame: int, bench: Bench) -> tuple[Tensor, dict[str, float]]:
     """The scene from where a frame was kept: the picture at the photo's size, and numbers at both sizes.
 
+    It is drawn through the lens that the scene takes the photos to have: the same camera took the frame.
     "aligned_" is from that place or from the pose that fits the photo, whichever looks more like it.
     """
     scene, target = made.scene, walk.kept(frame)
-    small, large = (as_seen(target, size) for size in (scene.view_size, size_of(target, scene.view_size)))
+    sizes = (scene.view_size, size_of(target, scene.view_size))
+    small, large = (_through(made.lens, as_seen(target, size)) for size in sizes)
     places = [torch.from_numpy(made.fit.viewmat(walk.camera(frame))).float()]
     if bench.align:
         places.append(_fitted_place(made, walk, frame, small, bench))
@@ -225,6 +227,11 @@ def pictured_at(made: Made, walk: Walk, frame: int, bench: Bench) -> tuple[Tenso
         if bench.align:
             numbers |= {f"{name}aligned_{key}": value for key, value in best.items()}
     return rgb, numbers
+
+
+def _through(lens: float, photo: FittedPhoto) -> FittedPhoto:
+    """With focal lengths that many times as long."""
+    return replace(photo, K=photo.K * torch.tensor([[lens, 1, 1], [1, lens, 1], [1, 1, 1]]).to(photo.K))
 
 
 def _fitted_place(made: Made, walk: Walk, frame: int, photo: FittedPhoto, bench: Bench) -> Tensor:

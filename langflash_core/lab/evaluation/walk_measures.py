@@ -108,7 +108,7 @@ def lit(drawn: Float[Tensor, "P 3"], photo: Float[Tensor, "P 3"]) -> Float[Tenso
     return gains * centred + true_middle
 
 
-def lens_error(Ks: Sequence[Tensor], truth: Sequence[Tensor]) -> float:
-    """Mean |f / f* - 1| over cameras, f the mean of both focal lengths in pixels."""
-    focal = [(float(K[0, 0] + K[1, 1]), float(T[0, 0] + T[1, 1])) for K, T in zip(Ks, truth, strict=True)]
-    return sum(abs(own / true - 1) for own, true in focal) / len(focal)
+def lens_ratio(Ks: Sequence[Tensor], truth: Sequence[Tensor]) -> float:
+    """f / f*, mean over cameras, f the mean of both focal lengths in pixels."""
+    pairs = zip(Ks, truth, strict=True)
+    return float(np.mean([float((K[0, 0] + K[1, 1]) / (T[0, 0] + T[1, 1])) for K, T in pairs]))

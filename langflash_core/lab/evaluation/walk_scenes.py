@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -23,7 +24,7 @@ from langflash_core.lab.evaluation.posed import as_seen
 from langflash_core.lab.evaluation.side_measures import Similarity, as_array
 from langflash_core.lab.evaluation.sides import covered_depths
 from langflash_core.lab.evaluation.stretches import placed_views
-from langflash_core.lab.evaluation.walk_measures import centres_of, fitted_cameras, walked
+from langflash_core.lab.evaluation.walk_measures import centres_of, fitted_cameras, lens_ratio, walked
 from langflash_core.lab.evaluation.walk_subjects import Walk
 from langflash_core.lab.photos import LabelledPhoto
 from langflash_core.pipeline import reconstruct
@@ -81,6 +82,12 @@ class Made:
     @property
     def placed(self) -> list[LabelledPhoto]:
         return [self.photos[view] for view in self.views]
+
+    @cached_property
+    def lens(self) -> float:
+        """Focal length that the scene takes the photos to have, over the true one."""
+        seen = [as_seen(photo, self.scene.view_size).K for photo in self.placed]
+        return lens_ratio(list(self.scene.Ks), seen)
 
     def fit_near(self, frame: int) -> Similarity:
         """To the true world by the two cameras around a frame alone: a walk that bends does not matter."""

@@ -76,6 +76,7 @@ def true_scenes(
         eyes = torch.stack([-v[:3, :3].T @ v[:3, 3] for v in scene.viewmats])
         eyes = eyes.repeat_interleave(len(scene.gaussians) // len(names), 0)
         means = eyes + nearer * (scene.gaussians.means - eyes)
+        means[:, 2] *= lens  # all look along z: as deep as the lens is long
         Ks = scene.Ks * torch.tensor([lens, lens, 1.0])[:, None] ** torch.tensor(
             [[1, 1, 0], [1, 1, 0], [0, 0, 0]]
         )
@@ -141,7 +142,10 @@ def test_what_is_wrong_is_told(folder: PhotoFolder, monkeypatch):
     assert near["frames"]["3"]["depth"] == pytest.approx(0.3, abs=0.02)
     assert near["frames"]["3"]["psnr_covered"] < right["frames"]["3"]["psnr_covered"] - 1
     true_scenes(folder, monkeypatch, lens=1.2)
-    assert judge(walk, replace(BENCH, alone=False))["photos"]["4"]["focal"] == pytest.approx(0.2, abs=1e-3)
+    long = judge(walk, replace(BENCH, alone=False))["photos"]["4"]
+    assert long["focal"] == pytest.approx(0.2, abs=1e-3)
+    # The same camera took the frame, so it is drawn through that lens, too.
+    assert long["frames"]["3"]["psnr_covered"] == pytest.approx(right["frames"]["3"]["psnr_covered"], abs=0.5)
 
 
 def test_a_place_that_is_off_is_found_in_the_picture(folder: PhotoFolder, monkeypatch):
@@ -150,7 +154,9 @@ def test_a_place_that_is_off_is_found_in_the_picture(folder: PhotoFolder, monkey
     made = made_of(walk, (0, 2), BENCH)
     right = pictured_at(made, walk, 1, BENCH)[1]["psnr"]
     shift = made.fit.shift + np.array([0.03, 0, 0])  # three quarters of a pixel
-    off = replace(made, views=(0,), fit=replace(made.fit, shift=shift))  # and no neighbour that knows better
+    off = replace(
+        made, frames=(-2, 0), fit=replace(made.fit, shift=shift)
+    )  # and no neighbour that knows better
     numbers = pictured_at(off, walk, 1, replace(BENCH, align=True))[1]
     assert numbers["psnr"] < right - 2 and numbers["aligned_psnr"] > numbers["psnr"] + 1.5
 

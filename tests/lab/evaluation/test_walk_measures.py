@@ -16,7 +16,7 @@ from langflash_core.lab.evaluation.walk_measures import (
     camera_errors,
     centres_of,
     fitted_cameras,
-    lens_error,
+    lens_ratio,
     lit,
     walked,
 )
@@ -106,8 +106,8 @@ def test_a_gain_and_an_offset_are_taken_out_and_nothing_else():
 
 
 def test_a_lens_is_judged_by_its_mean_focal_length():
-    Ks = [torch.diag(torch.tensor([f, f, 1.0])) for f in (110.0, 95.0)]
-    assert lens_error(Ks, [torch.diag(torch.tensor([100.0, 100.0, 1.0]))] * 2) == pytest.approx(0.075)
+    Ks = [torch.diag(torch.tensor([f, f, 1.0])) for f in (110.0, 96.0)]
+    assert lens_ratio(Ks, [torch.diag(torch.tensor([101.0, 99.0, 1.0]))] * 2) == pytest.approx(1.03)
 
 
 class FakeColmap(SimpleNamespace):
