@@ -21,6 +21,7 @@ EXTRAS = {
     "ray": "cluster",
     "tensorboard": "board",
     "transformers": "sam2",
+    "pycolmap": "colmap",
 }
 """Top-level import name -> extra in pyproject.toml."""
 

@@ -24,6 +24,8 @@ from .eval_protocol import opened_lpips, protocol
 from .eval_report import report
 from .eval_sharp import sharp
 from .eval_sides import beside, sides
+from .eval_walk import beside as walk_beside
+from .eval_walk import walk
 from .query import spoken
 
 
@@ -49,6 +51,8 @@ def run(args: Namespace, out: TextIO) -> None:
         "sharp": sharp,
         "sides": sides,
         "sides-beside": beside,
+        "walk": walk,
+        "walk-beside": walk_beside,
     }[args.action](args, out)
 
 

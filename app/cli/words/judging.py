@@ -110,6 +110,7 @@ def add_eval(commands) -> None:
     _add_posed(actions)
     _add_sides(actions)
     _add_sharp(actions)
+    _add_walk(actions)
     _add_labels(actions)
     _add_protocol(actions)
     _add_report(actions)
@@ -232,6 +233,72 @@ def _add_sharp(actions) -> None:
         "--sheet", type=Path, metavar="IMG", help="also photos and scenes at 100 and 300 %%, as .png"
     )
     _add_judging(command)
+
+
+def _add_walk(actions) -> None:
+    command = new_command(
+        actions, "walk", "the same place in 2, 4, 8 ... photos: cameras, depth, pictures between, size, time"
+    )
+    command.add_argument("pack", type=Path, nargs="?", metavar="PACK", help="rooms, with this furniture")
+    command.add_argument(
+        "--posed", type=Path, dest="folder", metavar="FOLDER", help="instead, real photos of known poses"
+    )
+    add_description(command)
+    _add_walked(command)
+    _add_room_set(command)
+    command.add_argument(
+        "--way",
+        choices=("aside", "round"),
+        default="aside",
+        help="through a room: sideways, or round its middle, which takes 8 photos (default: aside)",
+    )
+    command.add_argument(
+        "--exposure", type=above_zero, metavar="EV", help="each photo of a room is off by up to so many stops"
+    )
+    command.add_argument(
+        "--blur", type=above_zero, metavar="DEG", help="a hand turns so far in each photo of a room"
+    )
+    command.add_argument("--assume-lens", action="store_true", help="do not say which lens the photos have")
+    command.add_argument("--given-poses", action="store_true", help="say where the photos were taken")
+    command.add_argument(
+        "--no-own", action="store_true", help="leave out what a kept frame's own two photos bring alone"
+    )
+    command.add_argument(
+        "--memory", action="store_true", help="each scene in a process of its own, whose memory is told"
+    )
+    command.add_argument("--colmap", action="store_true", help="COLMAP's cameras beside; needs pycolmap")
+    _add_fitting(command)
+    command.add_argument(
+        "--results",
+        type=Path,
+        metavar="DIR",
+        help="keep every walk there, for walk-beside, and go on from it; one folder for each version",
+    )
+    command.add_argument("--sheet", type=Path, metavar="IMG", help="also kept frames and scenes, as .png")
+    _add_judging(command)
+    beside = new_command(actions, "walk-beside", "two results of walk on the same walks, beside each other")
+    beside.add_argument("before", type=Path, metavar="BEFORE", help="folder of --results")
+    beside.add_argument("after", type=Path, metavar="AFTER", help="folder of --results")
+    beside.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
+    beside.add_argument("--sheet", type=Path, metavar="IMG", help="also kept frames of both, as .png")
+    beside.set_defaults(json=False)
+
+
+def _add_walked(command: argparse.ArgumentParser) -> None:
+    """Which frames of a walk are photos, and which are kept."""
+    command.add_argument(
+        "--photos", type=whole_count, nargs="+", metavar="N", help="of a scene (default: 2 4 8 16 32)"
+    )
+    command.add_argument(
+        "--growing", action="store_true", help="more photos go farther, instead of nearer together"
+    )
+    command.add_argument(
+        "--step", type=whole_count, default=1, metavar="N", help="of --posed: every N-th photo (default: 1)"
+    )
+    command.add_argument("--kept", type=whole_count, metavar="N", help="frames kept from scenes (default: 8)")
+    command.add_argument(
+        "--limit", type=whole_count, metavar="N", help="walks (default: 20 rooms, or 4 stretches)"
+    )
 
 
 def _add_room_set(command: argparse.ArgumentParser) -> None:

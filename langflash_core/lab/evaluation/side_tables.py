@@ -1,7 +1,7 @@
 """Results of `langflash eval sides` as markdown: one version, or two on the same rooms and pairs."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from langflash_core.lab.evaluation.sides import grouped, number
 from langflash_core.lab.training.measures import nan_mean
@@ -81,12 +81,17 @@ def _row(title: str, key: str, values: list[tuple[float, float]]) -> list[str]:
     kept = [(old, new) for old, new in values if not (math.isnan(old) or math.isnan(new))]
     if not kept:
         return []
-    changes = [new - old for old, new in kept]
-    mean = nan_mean(changes)
-    spread = math.sqrt(sum((c - mean) ** 2 for c in changes) / max(len(changes) - 1, 1) / len(changes))
+    mean, spread = mean_change(kept)
     old, new = (nan_mean(side) for side in zip(*kept, strict=True))
     cells = (told(key, old), told(key, new), f"{told(key, mean, '+')} ± {told(key, spread)}")
     return [f"| {title} | " + " | ".join(cells) + " |"]
+
+
+def mean_change(pairs: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Mean of after - before over at least one pair, and its standard error, 0 of a single one."""
+    changes = [new - old for old, new in pairs]
+    mean = nan_mean(changes)
+    return mean, math.sqrt(sum((c - mean) ** 2 for c in changes) / max(len(changes) - 1, 1) / len(changes))
 
 
 def place_name(group: str) -> str:

@@ -1,5 +1,6 @@
 """rooms, train, eval, weights: words in, files out; what they compute is tested where it lives."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -113,6 +114,14 @@ def test_weights_verify_notices_damage(run, checkpoint, tmp_path):
         (["eval", "sides", "p.npz", "--lpips", "gone"], "no LPIPS file at gone"),
         (["eval", "sides", "p.npz", "--lpips", TINY_PACK], "is no safetensors file"),
         (["eval", "sides-beside", "gone", "gone"], "no result of eval sides at gone/sides.json"),
+        (["eval", "walk"], "give either a furniture pack or a folder with --posed"),
+        (["eval", "walk", "p.npz", "--posed", "."], "not both"),
+        (["eval", "walk", "gone.npz"], "no furniture pack at gone.npz"),
+        (["eval", "walk", "p.npz", "--photos", "1"], "two photos or more"),
+        (["eval", "walk", "--posed", ".", "--blur", "1"], "leave them out with --posed"),
+        (["eval", "walk", "p.npz", "--sheet", "a.png"], "give --results, too"),
+        (["eval", "walk", "p.npz", "-o", "table.txt"], "this command writes .md"),
+        (["eval", "walk-beside", "gone", "gone"], "no result of eval walk at gone/walk.json"),
         (["eval", "sharp", "a.png", "--pack", "p.npz"], "give photos, a folder with --posed, or furniture"),
         (["eval", "sharp", "gone.png", "gone.png"], "no photo at gone.png"),
         (["eval", "sharp", TINY_PACK], "photos come in pairs, but these are 1"),
@@ -266,10 +275,53 @@ def test_posed_photos_are_judged_from_aside(run, checkpoint, tmp_path):
     assert "has no depth in metres" in run("eval", "sides", "--posed", posed, *words).err
 
 
+def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_path):
+    posed = write_folder(tmp_path / "posed", 5).root
+    sheet, kept = tmp_path / "new" / "sheet.png", tmp_path / "kept"
+    words = (
+        "--weights",
+        checkpoint,
+        "--size",
+        "56",
+        "--photos",
+        "2",
+        "3",
+        "--kept",
+        "1",
+        "--limit",
+        "1",
+    )
+    words = ("eval", "walk", "--posed", posed, *words, "--results", kept)
+    outcome = run(*words, "--sheet", sheet, "--json")
+    assert outcome.code == 0, outcome.err
+    document = outcome.json()
+    assert document == json.loads((kept / "walk.json").read_text())
+    (row,) = document["cases"]
+    assert row["name"] == "001-005" and list(row["photos"]) == ["2", "3"]
+    assert row["photos"]["3"]["gaussians"] > 0 and row["photos"]["3"]["frames"]["3"]["alone_psnr"] > 5
+    assert {path.stem.split("_")[-1] for path in (kept / "pictures").iterdir()} == {
+        "truth",
+        "2",
+        "3",
+        "own two",
+    }
+    assert np.asarray(Image.open(sheet)).std() > 10
+    # Gone on from: nothing is left to do, even without the photos.
+    for photo in (posed / "images").iterdir():
+        photo.write_bytes(b"")
+    assert "| PSNR between, whole (dB) |" in run(*words).out
+    table, both = tmp_path / "new" / "table.md", tmp_path / "both.png"
+    beside = run("eval", "walk-beside", kept, kept, "-o", table, "--sheet", both)
+    assert beside.code == 0 and beside.out == table.read_text()
+    assert "| 3 photos: PSNR between, whole (dB) |" in beside.out and "+0.00 ± 0.00" in beside.out
+    assert np.asarray(Image.open(both)).shape[1] > np.asarray(Image.open(sheet)).shape[1]
+
+
 @pytest.mark.parametrize(
     ("words", "hint"),
     [
         (["eval", "sides", "--posed", "PHOTOS"], "has no poses.txt"),
+        (["eval", "walk", "--posed", "PHOTOS"], "has no poses.txt"),
         (["eval", "sharp", "--posed", "PHOTOS"], "has no poses.txt"),
         (["eval", "photos-labelled", "gone"], "there is no folder gone/images"),
         (["eval", "photos-labelled", "PHOTOS", "--only", "7-9"], "none of the 2 photos is chosen"),

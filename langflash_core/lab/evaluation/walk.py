@@ -1,0 +1,293 @@
+"""`langflash eval walk`: the same place in 2, 4, 8 ... photos, and what every further photo brings.
+
+A scene is made of the photos of a walk (`walk_subjects` says which), and brought into the true world by the
+similarity that fits its cameras best (`fitted_cameras`). Then its cameras, its depth in every photo and its
+pictures where frames were kept are compared with the truth. Beside each kept frame stands the picture of the
+scene that its own two photos make alone, brought into the world by their own two cameras.
+
+Pictures are compared whole (what nothing covers is black), where the scene covers them, and there in the
+photo's light, since a kept photo has an exposure of its own. A place that is a pixel off costs decibels that
+nobody sees, so the same picture is also judged from the pose that fits it (`alignment`).
+
+Sizes: H W pixels; "large" is the photo's size, at most three times the network's grid.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from langflash_core.errors import InputError
+from langflash_core.lab.evaluation.alignment import aligned_camera
+from langflash_core.lab.evaluation.labelled import Render
+from langflash_core.lab.evaluation.numbers import rounded
+from langflash_core.lab.evaluation.posed import as_seen
+from langflash_core.lab.evaluation.sharp_subjects import size_of
+from langflash_core.lab.evaluation.side_measures import Similarity, as_array
+from langflash_core.lab.evaluation.sides import number
+from langflash_core.lab.evaluation.tallies import Shelf, collected
+from langflash_core.lab.evaluation.walk_colmap import mapped
+from langflash_core.lab.evaluation.walk_measures import camera_errors, fitted_cameras, lit
+from langflash_core.lab.evaluation.walk_scenes import Bench, Made, files_of, made_of, true_cameras
+from langflash_core.lab.evaluation.walk_subjects import Walk
+from langflash_core.lab.photos.fitting import FittedPhoto
+from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, nan_mean, psnr
+from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.running import Progress
+from langflash_core.types import Camera, Scene
+
+ALONE = "alone_"
+"""Begins what the scene of a kept frame's own two photos shows."""
+TRUTH, OWN = "truth", "own two"
+"""Titles of pictures, beside numbers of photos."""
+SHOWN = 3
+"""So many kept frames of a walk are shown."""
+Shown = Callable[[str, int, str, Tensor], None]
+"""Is given a walk's name, a kept frame, a title and a picture (H, W, 3) at the photo's size."""
+
+
+@dataclass
+class Tally:
+    """Numbers of one walk."""
+
+    row: dict
+
+
+def run_walks(
+    walks: Iterable[Walk],
+    count: int,
+    bench: Bench,
+    *,
+    shelf: Shelf | None = None,
+    progress: Progress = lambda stage, fraction: None,
+    shown: Shown = lambda name, frame, title, rgb: None,
+) -> dict:
+    """Judge the code that makes scenes by walks.
+
+    Args:
+        count: of the walks. shelf: where walks are kept; those on it are not judged again.
+
+    Returns:
+        Plain JSON: "cases" with the numbers of each walk, "by_photos" their means.
+
+    Raises:
+        InputError: there is no walk. WeightsError: the checkpoint does not fit.
+    """
+    done = 0
+
+    def judged(walk: Walk) -> Tally:
+        def told(stage: str, fraction: float) -> None:
+            progress(f"{walk.name}: {stage}", (done + fraction) / max(count, 1))
+
+        return Tally(judge(walk, bench, told, shown))
+
+    rows = []
+    for _, tally in collected(((walk.name, walk) for walk in walks), judged, shelf):
+        rows.append(tally.row)
+        done += 1
+    if not rows:
+        raise InputError("there is nothing to judge; give furniture or a folder with --posed")
+    made_with = str(bench.weights) if bench.weights else bench.preset
+    return {"weights": made_with, **summary(rows)}
+
+
+def judge(
+    walk: Walk,
+    bench: Bench,
+    progress: Progress = lambda stage, fraction: None,
+    shown: Shown = lambda name, frame, title, rgb: None,
+) -> dict:
+    """Numbers of one walk: "photos" by their number, each with what its scene has once and "frames", the kept
+    ones."""
+    alone: dict[tuple[tuple[int, int], int], dict[str, float]] = {}
+    plan, rows, done = walk.plan, {}, 0
+    pictured = set(plan.kept[:: max(1, len(plan.kept) // SHOWN)][:SHOWN])
+    for photos, frames in sorted(plan.chosen.items()):
+        progress(f"{photos} photos", done / sum(plan.chosen))
+        made = made_of(walk, frames, bench, memory=bench.memory)
+        once = {**once_of(made, bench.render), **(_colmap(made, bench) if bench.colmap else {})}
+        kept: dict[str, dict[str, float]] = {}
+        for frame in plan.between(photos):
+            rgb, kept[str(frame)] = pictured_at(made, walk, frame, bench)
+            if frame in pictured:
+                shown(walk.name, frame, str(photos), rgb)
+        for frame in plan.between(photos) if bench.alone else ():
+            pair = plan.own(photos, frame)
+            if (pair, frame) not in alone:
+                own = made if photos == 2 else made_of(walk, pair, bench)
+                rgb, alone[pair, frame] = _alone(own, walk, frame, bench)
+                if frame in pictured:
+                    shown(walk.name, frame, OWN, rgb)
+            kept[str(frame)] |= alone[pair, frame]
+        rows[str(photos)] = {**rounded(once), "frames": {name: rounded(row) for name, row in kept.items()}}
+        done += photos
+    for frame in pictured:
+        target = walk.kept(frame)
+        shown(walk.name, frame, TRUTH, _rgb(as_seen(target, size_of(target, made.scene.view_size))))
+    return {"name": walk.name, "photos": rows}
+
+
+def _alone(own: Made, walk: Walk, frame: int, bench: Bench) -> tuple[Tensor, dict[str, float]]:
+    """What the two photos around a kept frame bring without the others."""
+    kept = ("depth_abs_rel", "placed", "gaussians", "seconds")
+    once = once_of(own, bench.render)
+    rgb, numbers = pictured_at(own, walk, frame, bench)
+    found = {f"photos_{key}": once[key] for key in kept} | numbers
+    return rgb, {ALONE + key: value for key, value in found.items()}
+
+
+@torch.no_grad()
+def once_of(made: Made, render: Render) -> dict[str, float]:
+    """What a scene has once: cameras, lens, depth in its photos, size and cost."""
+    scene, placed = made.scene, made.placed
+    seen = [as_seen(photo, scene.view_size) for photo in placed]
+    depth = [_depth(scene, view, photo, made.fit, render) for view, photo in enumerate(seen)]
+    return {
+        "placed": len(placed) / len(made.photos),
+        **_cameras(as_array(scene.viewmats), true_cameras(placed), made.fit, made.length),
+        "focal": abs(made.lens - 1),
+        **{key: nan_mean(row[key] for row in depth) for key in depth[0]},
+        "gaussians": float(len(scene.gaussians)),
+        "coarse": float((scene.levels == 0).sum()) if scene.levels is not None else math.nan,
+        "seconds": made.cost.seconds,
+        "cpu_seconds": made.cost.cpu_seconds,
+        "memory_mb": made.cost.memory_mb,
+        "length": made.length,
+    }
+
+
+def _cameras(found: np.ndarray, truth: np.ndarray, fit: Similarity, length: float) -> dict[str, float]:
+    """Errors of cameras after the fit, NaN of a single one, which has none."""
+    if len(found) < 2:
+        return dict.fromkeys(("places", "places_most", "rotation"), math.nan)
+    errors = camera_errors(found, truth, fit)
+    return {
+        "places": float(errors.places.mean()) / length,
+        "places_most": float(errors.places.max()) / length,
+        "rotation": float(errors.rotations.mean()),
+    }
+
+
+def _depth(scene: Scene, view: int, photo: FittedPhoto, fit: Similarity, render: Render) -> dict[str, float]:
+    """Drawn depth of one photo: by the scene's one scale, and by one of its own."""
+    frame = render(scene, scene.camera(view))
+    truth = torch.where(frame.alphas.cpu() >= COVERED_ALPHA, photo.depths, 0.0)
+    drawn = frame.depths.cpu().float()
+    return {
+        "depth_abs_rel": abs_rel(drawn * fit.scale, truth),
+        "depth_delta1": delta1(drawn * fit.scale, truth),
+        "depth_own_scale": abs_rel(align_scale(drawn, truth), truth),
+    }
+
+
+def _colmap(made: Made, bench: Bench) -> dict[str, float]:
+    """COLMAP's cameras of the same photos, and the scene's own where COLMAP has some, too."""
+    with files_of(made.photos) as paths:
+        intrinsics = None if bench.assume_lens else made.photos[0].intrinsics
+        rival = mapped(paths, intrinsics, torch.get_num_threads())
+    known = [view for view, photo in enumerate(made.photos) if photo.id in rival.viewmats]
+    numbers = {"placed": len(known) / len(made.photos), "seconds": rival.seconds}
+    if known:
+        found = np.stack([rival.viewmats[made.photos[view].id] for view in known])
+        truth = true_cameras([made.photos[view] for view in known])
+        numbers |= _cameras(found, truth, fitted_cameras(found, truth), made.length)
+    if rival.focal is not None and made.photos[0].K is not None:
+        numbers["focal"] = abs(rival.focal / float(made.photos[0].K[[0, 1], [0, 1]].mean()) - 1)
+    both = [(own, view) for own, view in enumerate(made.views) if view in known]
+    if both:
+        found = as_array(made.scene.viewmats)[[own for own, _ in both]]
+        truth = true_cameras([made.photos[view] for _, view in both])
+        ours = _cameras(found, truth, fitted_cameras(found, truth), made.length)
+        numbers |= {f"ours_{key}": value for key, value in ours.items()}
+    return {f"colmap_{key}": value for key, value in numbers.items()}
+
+
+@torch.no_grad()
+def pictured_at(made: Made, walk: Walk, frame: int, bench: Bench) -> tuple[Tensor, dict[str, float]]:
+    """The scene from where a frame was kept: the picture at the photo's size, and numbers at both sizes.
+
+    It is drawn through the lens that the scene takes the photos to have: the same camera took the frame.
+    "aligned_" is from that place or from the pose that fits the photo, whichever looks more like it.
+    """
+    scene, target = made.scene, walk.kept(frame)
+    sizes = (scene.view_size, size_of(target, scene.view_size))
+    small, large = (_through(made.lens, as_seen(target, size)) for size in sizes)
+    places = [torch.from_numpy(made.fit.viewmat(walk.camera(frame))).float()]
+    if bench.align:
+        places.append(_fitted_place(made, walk, frame, small, bench))
+    rgb, numbers = _rgb(large), {}
+    for name, photo in (("", small), ("large_", large)):
+        cameras = [Camera(place, photo.K, photo.rgb.shape[2], photo.rgb.shape[1]) for place in places]
+        drawn = [_alike(scene, camera, photo, made.fit, bench) for camera in cameras]
+        numbers |= {name + key: value for key, value in drawn[0][1].items()}
+        rgb, best = max(drawn, key=lambda found: found[1]["psnr"])
+        if bench.align:
+            numbers |= {f"{name}aligned_{key}": value for key, value in best.items()}
+    return rgb, numbers
+
+
+def _through(lens: float, photo: FittedPhoto) -> FittedPhoto:
+    """With focal lengths that many times as long."""
+    return replace(photo, K=photo.K * torch.tensor([[lens, 1, 1], [1, lens, 1], [1, 1, 1]]).to(photo.K))
+
+
+def _fitted_place(made: Made, walk: Walk, frame: int, photo: FittedPhoto, bench: Bench) -> Tensor:
+    """The pose that fits the photo, sought from its place or from where its neighbours alone say that it was,
+    whichever looks more like it."""
+    scene, truth = made.scene, _rgb(photo)
+    starts = [fit.viewmat(walk.camera(frame)) for fit in (made.fit, made.fit_near(frame))]
+    cameras = [Camera(torch.from_numpy(start).float(), photo.K, *scene.view_size) for start in starts]
+    best = max(cameras, key=lambda at: psnr(bench.render(scene, at).rgb.cpu().float(), truth))
+    return aligned_camera(lambda at: bench.render(scene, at), best, truth).viewmat
+
+
+def _rgb(photo: FittedPhoto) -> Tensor:
+    return photo.rgb.permute(1, 2, 0).float() / 255
+
+
+def _alike(
+    scene: Scene, camera: Camera, photo: FittedPhoto, fit: Similarity, bench: Bench
+) -> tuple[Tensor, dict[str, float]]:
+    """A drawn picture, and how near it is: whole, where the scene covers it, there in the photo's light."""
+    frame = bench.render(scene, camera)
+    rgb, truth, shown = frame.rgb.cpu().float(), _rgb(photo), frame.alphas.cpu() >= COVERED_ALPHA
+    numbers = {"psnr": psnr(rgb, truth), "covered": float(shown.float().mean())}
+    if bool(shown.any()):
+        numbers["psnr_covered"] = psnr(rgb[shown], truth[shown])
+        numbers["psnr_lit"] = psnr(lit(rgb[shown], truth[shown]), truth[shown])
+        depths = torch.where(shown, photo.depths, 0.0)
+        numbers["depth"] = abs_rel(frame.depths.cpu().float() * fit.scale, depths)
+    if bench.lpips is not None:
+        numbers["lpips"] = bench.lpips.whole(rgb[None], truth[None])[0]
+    return rgb, numbers
+
+
+def summary(rows: Sequence[Mapping]) -> dict:
+    """Means over walks by number of photos; frames' within their walk first, so that each counts alike."""
+    by_photos: dict[str, dict] = {}
+    for photos in sorted({int(name) for row in rows for name in row["photos"]}):
+        means = [flat(row["photos"], str(photos)) for row in rows if str(photos) in row["photos"]]
+        keys = dict.fromkeys(key for found in means for key in found)
+        mean = {key: nan_mean(found.get(key, math.nan) for found in means) for key in keys}
+        by_photos[str(photos)] = {"walks": len(means), **rounded(mean)}
+    return {"by_photos": by_photos, "cases": list(rows)}
+
+
+def flat(photos: Mapping[str, Mapping], name: str) -> dict[str, float]:
+    """Numbers of one scene of a walk. "between_": means over its kept frames; "gain_": of their differences
+    to the same frames in the next fewer photos."""
+    row = photos[name]
+    found = {key: number(value) for key, value in row.items() if key != "frames"}
+    frames = row["frames"]
+    keys = dict.fromkeys(key for values in frames.values() for key in values)
+    found |= {f"between_{key}": nan_mean(number(row.get(key)) for row in frames.values()) for key in keys}
+    fewer = max((int(other) for other in photos if int(other) < int(name)), default=None)
+    if fewer is not None:
+        before = photos[str(fewer)]["frames"]
+        for key in (key for key in keys if "psnr" in key and not key.startswith(ALONE)):
+            changes = (number(frames[f].get(key)) - number(before[f].get(key)) for f in frames if f in before)
+            found[f"gain_{key}"] = nan_mean(changes)
+    return found

@@ -1,0 +1,158 @@
+"""A camera that somebody carries through a rendered room: smooth, free of walls and furniture.
+
+Two ways to walk. "aside": some two metres sideways around what the first photo looks at, looking about, so
+that even the first and the last picture share what they show; "round": most of the way around the middle of
+the room, looking across it, so that eight photos on the way overlap, each with the next.
+
+Worlds: the room's (y up), metres; T places on the way; H W pixels.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.ndimage import gaussian_filter1d
+
+from langflash_core.lab.evaluation.side_subjects import centre_depth
+from langflash_core.lab.rooms import RoomRenderer, StagedRoom
+from langflash_core.lab.rooms.cameras import (
+    MIN_MEDIAN_DEPTH,
+    MIN_OVERLAP,
+    look_at,
+    overlap_fraction,
+    stands_free,
+)
+
+WAYS = ("aside", "round")
+SHARING = {"aside": 2, "round": 8}
+"""So many photos, spread over the way, must share `MIN_OVERLAP` of their pictures each with the next."""
+TRIES = 40
+_LOOKED = 33  # places at which the way is proven
+_SMALL = 96  # pixels of the longer side, to prove what cameras see
+
+Way = Callable[[float], Float[np.ndarray, "4 4"]]
+"""World of the room to the camera, by the share of the way in [0, 1]."""
+
+
+@dataclass(frozen=True)
+class _Lens:
+    K: np.ndarray
+    size: tuple[int, int]  # (height, width)
+
+
+def found_way(staged: StagedRoom, renderer: RoomRenderer, kind: str, seed: int) -> Way | None:
+    """A way through the room that `renderer` was last given; None where none of `TRIES` is free."""
+    rng = np.random.default_rng([seed, 35, WAYS.index(kind)])
+    draft = {"aside": _aside, "round": _round}[kind]
+    lens = _small_lens(staged)
+    for attempt in range(TRIES):
+        way = draft(staged, rng, 0.97**attempt)
+        if _free(staged, way) and _shares(renderer, way, lens, SHARING[kind]):
+            return way
+    return None
+
+
+def _aside(staged: StagedRoom, rng: np.random.Generator, shrunk: float) -> Way:
+    """An arc around what the sample's first photo looks at; the eye sways up, down, near and far."""
+    first = staged.home
+    eye, forward = -first[:3, :3].T @ first[:3, 3], first[2, :3]
+    reach = float(np.clip(centre_depth(staged.views.depths[0].astype(float)), 1.0, 4.0))
+    pivot = eye + forward * reach
+    length = float(rng.uniform(1.4, 2.6)) * shrunk
+    turn = min(length / reach, math.radians(75)) * float(rng.choice([-1.0, 1.0]))
+    start = float(rng.uniform(-0.75, -0.25))  # of the arc, so that the first photo lies on it
+    phases = rng.uniform(0, 2 * math.pi, 5)
+    near, high = float(rng.uniform(0.08, 0.2)), float(rng.uniform(0.05, 0.15))
+    yaw, pitch, roll = (math.radians(d) for d in rng.uniform((5, 2, 0.5), (11, 5, 2.0)))
+    flat = eye - pivot
+
+    def way(share: float) -> np.ndarray:
+        angle = turn * (share + start)
+        wave = np.sin(2 * math.pi * share * np.array([0.8, 1.1, 1.0, 0.7, 1.3]) + phases)
+        cos, sin = math.cos(angle), math.sin(angle)
+        arm = np.array([cos * flat[0] + sin * flat[2], flat[1], cos * flat[2] - sin * flat[0]])
+        place = pivot + arm * np.array([1 + near * wave[0], 1.0, 1 + near * wave[0]])
+        place[1] += high * wave[1]
+        target = _turned(pivot - place, yaw * wave[2], pitch * wave[3])
+        return look_at(place, place + target, roll * wave[4])
+
+    return way
+
+
+def _round(staged: StagedRoom, rng: np.random.Generator, shrunk: float) -> Way:
+    """An ellipse around the middle of the room; the eye looks across it."""
+    shell = staged.room.shell
+    middle = np.array([shell.size[0] / 2, 0.0, shell.size[1] / 2])
+    middle += np.array([shell.size[0], 0.0, shell.size[1]]) * rng.uniform(-0.08, 0.08, 3)
+    radii = np.array(shell.size) * rng.uniform(0.12, 0.3, 2) * shrunk
+    begin, turn = float(rng.uniform(0, 2 * math.pi)), math.radians(float(rng.uniform(230, 320)))
+    turn *= float(rng.choice([-1.0, 1.0]))
+    high, phases = float(rng.uniform(1.35, 1.65)), rng.uniform(0, 2 * math.pi, 4)
+    yaw, pitch, roll = (math.radians(d) for d in rng.uniform((4, 2, 0.5), (10, 5, 2.0)))
+
+    def way(share: float) -> np.ndarray:
+        angle = begin + turn * share
+        wave = np.sin(2 * math.pi * share * np.array([2.0, 3.0, 2.5, 3.5]) + phases)
+        out = np.array([math.cos(angle), 0.0, math.sin(angle)])
+        place = middle + out * np.array([radii[0], 0.0, radii[1]]) * (1 + 0.1 * wave[0])
+        place[1] = high + 0.08 * wave[1]
+        target = _turned(-out, yaw * wave[2], pitch * wave[3] - math.radians(12))
+        return look_at(place, place + target, roll * wave[0])
+
+    return way
+
+
+def _turned(direction: np.ndarray, yaw: float, pitch: float) -> np.ndarray:
+    """A direction (y up) swung aside and tilted up."""
+    flat = math.hypot(direction[0], direction[2])
+    bearing = math.atan2(direction[2], direction[0]) + yaw
+    rise = math.atan2(direction[1], flat) + pitch
+    return np.array([math.cos(rise) * math.cos(bearing), math.sin(rise), math.cos(rise) * math.sin(bearing)])
+
+
+def _free(staged: StagedRoom, way: Way) -> bool:
+    """Whether a camera fits everywhere on the way."""
+    views = [way(share) for share in np.linspace(0, 1, _LOOKED)]
+    return all(stands_free(staged.room, -view[:3, :3].T @ view[:3, 3]) for view in views)
+
+
+def _small_lens(staged: StagedRoom) -> _Lens:
+    height, width = staged.views.depths.shape[1:]
+    factor = _SMALL / max(height, width)
+    size = (round(height * factor), round(width * factor))
+    scales = np.array([size[1] / width, size[0] / height, 1.0])
+    return _Lens(staged.views.Ks[0].astype(float) * scales[:, None], size)
+
+
+def _shares(renderer: RoomRenderer, way: Way, lens: _Lens, photos: int) -> bool:
+    """Whether no picture is blocked, and each of so many photos shares enough with the next, both ways."""
+    views = np.stack([way(share) for share in np.linspace(0, 1, photos)])
+    depths = np.stack([renderer.draw(view, lens.K, lens.size).depth for view in views])
+    if any(np.median(d[d > 0]) < MIN_MEDIAN_DEPTH if (d > 0).any() else True for d in depths):
+        return False
+    Ks = np.repeat(lens.K[None], 2, axis=0)
+    return all(
+        overlap_fraction(depths[list(pair)], views[list(pair)], Ks) >= MIN_OVERLAP
+        for k in range(photos - 1)
+        for pair in ((k, k + 1), (k + 1, k))
+    )
+
+
+def shaken(
+    way: Way, share: float, step: float, rng: np.random.Generator, degrees: float, moments: int
+) -> list[np.ndarray]:
+    """Cameras at moments of one exposure, evenly: the walk goes on by `step` of the way, and the hand turns
+    by about `degrees` about two axes, smoothly."""
+    turns = gaussian_filter1d(rng.normal(0, 1, (2 * moments, 2)), moments / 3, axis=0)[:moments]
+    turns = (turns - turns.mean(0)) / max(float(np.abs(turns - turns.mean(0)).max()), 1e-9)
+    turns *= math.radians(degrees) / 2
+    views = []
+    for k, (yaw, pitch) in enumerate(turns):
+        view = way(min(max(share + step * ((k + 0.5) / moments - 0.5), 0.0), 1.0)).copy()
+        cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
+        turn = np.array([[cy, 0, sy], [sp * sy, cp, -sp * cy], [-cp * sy, sp, cp * cy]])
+        view[:3] = turn @ view[:3]
+        views.append(view)
+    return views

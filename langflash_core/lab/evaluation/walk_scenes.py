@@ -1,0 +1,196 @@
+"""Scenes of the photos of a walk, with the similarity that brings them into the true world. V photos."""
+
+import math
+import multiprocessing
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from PIL import Image
+
+from langflash_core.errors import InputError
+from langflash_core.lab.evaluation.labelled import Render
+from langflash_core.lab.evaluation.lpips import Lpips
+from langflash_core.lab.evaluation.posed import as_seen
+from langflash_core.lab.evaluation.side_measures import Similarity, as_array
+from langflash_core.lab.evaluation.sides import covered_depths
+from langflash_core.lab.evaluation.stretches import placed_views
+from langflash_core.lab.evaluation.walk_measures import centres_of, fitted_cameras, lens_ratio, walked
+from langflash_core.lab.evaluation.walk_subjects import Walk
+from langflash_core.lab.photos import LabelledPhoto
+from langflash_core.pipeline import reconstruct
+from langflash_core.scene.file import load, save
+from langflash_core.types import NO_LANGUAGE, Record, Scene, Semantics
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What scenes are made and judged with.
+
+    render: draws one. weights, preset, size: as `reconstruct` has them. assume_lens: it is told nothing of
+    the lens. given_poses: it is told where the photos were taken. alone: kept frames' own two photos stand
+    beside. align: also from poses fitted to the pictures. lpips: None leaves it out. memory: each scene is
+    made in a process of its own, whose memory is told. colmap: its cameras stand beside.
+    """
+
+    render: Render
+    weights: Path | None = None
+    preset: str = "mini"
+    size: int | None = None
+    assume_lens: bool = False
+    given_poses: bool = False
+    alone: bool = True
+    align: bool = False
+    lpips: Lpips | None = None
+    memory: bool = False
+    colmap: bool = False
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Seconds on the wall and of the processor; the most memory of a process, MB, NaN where it did more than
+    this."""
+
+    seconds: float
+    cpu_seconds: float
+    memory_mb: float = math.nan
+
+
+@dataclass(frozen=True)
+class Made:
+    """A scene without its language. frames, photos: all it was to be made of; views: which of them were
+    placed, in the scene's order; fit: to the true world; length: of the walk from the first photo to the
+    last, m."""
+
+    scene: Scene
+    frames: tuple[int, ...]
+    photos: tuple[LabelledPhoto, ...]
+    views: tuple[int, ...]
+    fit: Similarity
+    length: float
+    cost: Cost
+
+    @property
+    def placed(self) -> list[LabelledPhoto]:
+        return [self.photos[view] for view in self.views]
+
+    @cached_property
+    def lens(self) -> float:
+        """Focal length that the scene takes the photos to have, over the true one."""
+        seen = [as_seen(photo, self.scene.view_size).K for photo in self.placed]
+        return lens_ratio(list(self.scene.Ks), seen)
+
+    def fit_near(self, frame: int) -> Similarity:
+        """To the true world by the two cameras around a frame alone: a walk that bends does not matter."""
+        numbers = [self.frames[view] for view in self.views]
+        before = [row for row, number in enumerate(numbers) if number < frame][-1:]
+        after = [row for row, number in enumerate(numbers) if number > frame][:1]
+        if not (before and after):
+            return self.fit
+        rows = before + after
+        return fitted_cameras(as_array(self.scene.viewmats)[rows], true_cameras(self.placed)[rows])
+
+
+def made_of(walk: Walk, frames: Sequence[int], bench: Bench, *, memory: bool = False) -> Made:
+    """A scene of some frames of a walk.
+
+    Args:
+        memory: in a process of its own, whose memory is told; its seconds hold the reading of the weights.
+
+    Raises:
+        InputError: a photo has no pose.
+    """
+    photos = tuple(walk.photo(frame) for frame in frames)
+    truth = true_cameras(photos)
+    options = {
+        "preset": bench.preset,
+        "weights": bench.weights,
+        "intrinsics": None if bench.assume_lens else photos[0].intrinsics,
+        "size": bench.size,
+        "viewmats": torch.from_numpy(truth).float() if bench.given_poses else None,
+    }
+    with files_of(photos) as paths:
+        scene, cost = (_made_apart if memory else _made)(paths, options)
+    placed = placed_views(scene)
+    views = tuple(view for view, photo in enumerate(photos) if photo.id in placed)
+    fit = fitted_cameras(np.stack([as_array(placed[photos[v].id]) for v in views]), truth[list(views)])
+    length = walked(np.stack([walk.camera(frame) for frame in range(frames[0], frames[-1] + 1)]))
+    made = Made(_wordless(scene), tuple(frames), photos, views, fit, length, cost)
+    return replace(made, fit=_scaled(made, bench.render)) if len(views) < 2 else made
+
+
+@contextmanager
+def files_of(photos: Sequence[LabelledPhoto]) -> Iterator[list[Path]]:
+    """The photos as files of one folder, which goes."""
+    with TemporaryDirectory() as folder:
+        paths = [Path(folder) / f"{photo.id}.png" for photo in photos]
+        for path, photo in zip(paths, photos, strict=True):
+            Image.fromarray(photo.image).save(path, "PNG", compress_level=1)
+        yield paths
+
+
+def _made(paths: Sequence[Path], options: dict[str, Any]) -> tuple[Scene, Cost]:
+    start, cpu = time.perf_counter(), time.process_time()
+    scene = reconstruct(paths, **options)
+    return scene, Cost(time.perf_counter() - start, time.process_time() - cpu)
+
+
+def _made_apart(paths: Sequence[Path], options: dict[str, Any]) -> tuple[Scene, Cost]:
+    context = multiprocessing.get_context("spawn")
+    with TemporaryDirectory() as folder, ProcessPoolExecutor(1, context) as pool:
+        file = Path(folder) / "scene.langflash"
+        cost = pool.submit(_saved, paths, options, file, torch.get_num_threads()).result()
+        return load(file), cost
+
+
+def _saved(paths: Sequence[Path], options: dict[str, Any], file: Path, threads: int) -> Cost:
+    """In a process of its own."""
+    torch.set_num_threads(threads)
+    scene, cost = _made(paths, options)
+    save(scene, file)
+    memory = scene.record.cost.peak_memory_mb
+    return cost if memory is None else replace(cost, memory_mb=float(memory))
+
+
+def true_cameras(photos: Sequence[LabelledPhoto]) -> Float[np.ndarray, "V 4 4"]:
+    """World to camera.
+
+    Raises:
+        InputError: one has no pose.
+    """
+    found = []
+    for photo in photos:
+        if photo.pose is None:
+            raise InputError(
+                f"photo {photo.id} has no line in poses.txt; add it, or take the photo out of the folder"
+            )
+        found.append(np.linalg.inv(as_array(photo.pose)))
+    return np.stack(found)
+
+
+def _wordless(scene: Scene) -> Scene:
+    """The scene without language, which costs memory and time to draw."""
+    count = len(scene.gaussians)
+    ids = torch.zeros(count, 0, dtype=torch.int64)
+    nothing = Semantics(ids, torch.zeros(count, 0), torch.zeros(0, 0), NO_LANGUAGE)
+    return replace(scene, semantics=nothing, record=Record())
+
+
+def _scaled(made: Made, render: Render) -> Similarity:
+    """The fit of a single camera, with the scale that the depth of its photo has, where that is known."""
+    scene, fit = made.scene, made.fit
+    drawn = covered_depths(render(scene, scene.camera(0)))
+    truth = as_array(as_seen(made.placed[0], scene.view_size).depths)
+    both = (drawn > 0) & (truth > 0)
+    scale = float(np.median(truth[both] / drawn[both])) if both.any() else 1.0
+    centre = fit.rotation @ centres_of(as_array(scene.viewmats[:1]))[0]
+    return Similarity(scale, fit.rotation, fit.scale * centre + fit.shift - scale * centre)
