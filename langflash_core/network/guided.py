@@ -217,10 +217,8 @@ def _agreed(maps: DepthMaps, views: Views, poses: Poses, viewmats: Tensor, Ks: T
     part = DepthMaps(maps.log_depths[placed], maps.log_errors[placed])
     near = partners(part.log_depths, viewmats[placed], Ks[placed])
     part = agreed(part, viewmats[placed], Ks[placed], near)
-    photos, rounds = _greys(views), 1 if len(placed) == 2 else 2
-    part = registered(
-        part, [photos[v] for v in placed], viewmats[placed], Ks[placed], near, run.check, rounds=rounds
-    )
+    photos = _greys(views)
+    part = registered(part, [photos[v] for v in placed], viewmats[placed], Ks[placed], near, run.check)
     part = replace(part, log_depths=flattened(part.log_depths, part.log_errors))
     log_depths = maps.log_depths.clone()
     log_depths[placed] = part.log_depths

@@ -101,7 +101,7 @@ def assemble_detailed(
         _Sight.of(photo, image, depths.log(), own)
         for photo, image, depths, own in zip(told, views.images, known, keep, strict=True)
     ]
-    budget = gaussians or round(detail.most * keep[0].numel() * (len(keep) + 3) / 4)
+    budget = gaussians or round(detail.most * _area(keep))
     parts = _parts(sights, detail, budget, 0.0 if gaussians else detail.gain, progress)
     scene = Scene(
         gaussians=normalised(_gaussians(prediction, views, sights, parts), unit),
@@ -157,6 +157,14 @@ class _Sight:
     @property
     def size(self) -> tuple[int, int]:
         return self.photo.shape[-2], self.photo.shape[-1]
+
+
+def _area(keep: Tensor) -> float:
+    """Cells of surface (V, H, W) that a budget counts: what photos cover themselves, and not more than a
+    quarter of each further photo, of many."""
+    views, area = len(keep), keep[0].numel()
+    usual = area * (views + 3) / 4
+    return usual if views <= 2 else min(usual, float(keep.sum()))
 
 
 def _kept(prediction: Prediction, views: Views) -> tuple[Tensor, Tensor, float, int]:

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from langflash_core.geometry.cameras import invert_rigid, project, transform, unproject
-from langflash_core.scene.consistency import TOLERANCE, seen_through
+from langflash_core.scene.consistency import TOLERANCE, outvoted, seen_through
 
 K = torch.tensor([[30.0, 0, 16], [0, 30.0, 12], [0, 0, 1]])
 
@@ -94,3 +94,43 @@ def test_several_views_equal_their_twin():
             expected[view, i] |= bool(z < (1 - TOLERANCE) * depths[other, int(y), int(x)] and outvoted)
     blocked = seen_through(torch.cat(means), viewmats, Ks, depths, confidences)
     assert expected.any() and torch.equal(blocked, expected.flatten())
+
+
+def _three_views(depths: torch.Tensor) -> torch.Tensor:
+    """`outvoted` of three cameras side by side with these depths (3, 24, 32)."""
+    viewmats = torch.eye(4).repeat(3, 1, 1)
+    viewmats[1, 0, 3], viewmats[2, 0, 3] = -0.2, 0.2
+    points = unproject(depths, K.expand(3, 3, 3)).flatten(1, 2)
+    world = torch.stack([transform(invert_rigid(m), p) for m, p in zip(viewmats, points, strict=True)])
+    return outvoted(world, viewmats, K.expand(3, 3, 3), depths)
+
+
+def test_a_skirt_that_two_others_see_through_goes():
+    depths = torch.full((3, 24, 32), 2.0)
+    depths[0, :, 15:17] = 1.5  # between a thing and the wall: nobody else has it
+    found = _three_views(depths)
+    assert found[0, 4:20, 15:17].all()
+    found[0, :, 15:17] = False
+    assert not found.any()
+
+
+def test_a_thing_that_another_photo_has_as_well_stays():
+    depths = torch.full((3, 24, 32), 2.0)
+    depths[0, :, 12:20] = 1.5
+    shift = 0.2 * 30 / 1.5  # pixels, of what stands at 1.5
+    depths[1, :, 12 - int(shift) : 20 - int(shift)] = 1.5
+    assert not _three_views(depths)[0].any()
+
+
+def test_far_from_jumps_nothing_is_outvoted():
+    """Two photos that have a near thing too far do not vote down the one that has it right."""
+    depths = torch.full((3, 24, 32), 2.0)
+    depths[0] = 1.5
+    assert not _three_views(depths).any()
+
+
+def test_two_photos_cannot_outvote():
+    depths = torch.full((2, 24, 32), 2.0)
+    depths[0, :, 15:17] = 1.5
+    points = unproject(depths, K.expand(2, 3, 3)).flatten(1, 2)
+    assert not outvoted(points, torch.eye(4).repeat(2, 1, 1), K.expand(2, 3, 3), depths).any()

@@ -32,6 +32,10 @@ from langflash_core.network.stereo.sweep import Neighbours, everyone
 
 _LARGEST = 3  # times the maps' size, at which photos are compared
 _SMALLEST = 12  # pixels of a photo's side, with which flow works
+_ROUNDS = (2, 4)
+"""Neighbours that a view is compared with, round by round, each from where the one before ended: of many
+photos; a second photo alone says all it can at once. On two rendered walks the median error of depth fell from
+2.6 % to 1.2 (2), 1.0 (4), 1.0 (2 and 2), .84 (2 and 4), .80 % (4 and 4)."""
 _FLOW_ERROR = 0.7  # pixels of the photo
 _THERE_AND_BACK = 0.7  # pixels by which the way back may miss
 _BRIGHTNESS = 10.0  # of 255, difference that is still the same
@@ -64,17 +68,14 @@ def registered(
     Ks: Tensor,
     neighbours: Neighbours | None = None,
     check: Callable[[], None] = lambda: None,
-    *,
-    rounds: int = 1,
 ) -> DepthMaps:
     """Maps (V, H, W) whose surfaces show the same in neighbouring photos; the expected errors stay.
 
     Args:
         photos: (h, w) uint8, grey, of each view, the maps' picture at its own size.
         viewmats: (V, 4, 4) of the maps' unit. Ks: (V, 3, 3), pixels of the maps.
-        neighbours: of each view; None: all others.
+        neighbours: of each view, the best first; None: all others.
         check: called before each comparison; what it raises ends the work.
-        rounds: each starts where the one before ended, so that less is left to find.
     """
     logs = maps.log_depths
     near = neighbours or everyone(len(logs))
@@ -88,10 +89,10 @@ def registered(
     corrected = []
     for view, others in enumerate(near):
         texture, own = _texture(greys[view]), logs[view].cpu()
-        for _ in range(rounds):
+        for partners in _ROUNDS if len(others) > 1 else (1,):
             target, weight = torch.zeros(2, height, width)
             depths = F.interpolate(own[None, None], size=size, mode="bilinear")[0, 0]
-            for other in others:
+            for other in others[:partners]:
                 check()
                 pose = (viewmats[other] @ invert_rigid(viewmats[view])).cpu()
                 matches = _matched(depths, greys[view], greys[other], large[view], large[other], pose)
