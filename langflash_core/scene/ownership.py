@@ -56,7 +56,7 @@ def covered(
     or before it.
 
     Args:
-        depths, viewmats, Ks: as `owned`. keep: (V, H, W) bool. anything: (V, H, W) bool, cells which what lies
+        depths, viewmats, Ks: as `owned`. keep: (V, H, W) bool. anything: (V, H, W) bool, cells that what lies
             at any depth covers.
     """
     height, width = depths.shape[1:]

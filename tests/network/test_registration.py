@@ -131,8 +131,8 @@ def kept(seen: Room, cost: float) -> float:
     """The share of an error that stays, of one whose correction costs so much a cell.
 
     Of weight w the least of w (x - t)^2 + cost x^2 is x = t w / (w + cost). On this texture flow is .45 sure
-    and more, so that w is .45 (moves / FLOW_ERROR)^2 / ONE_SHIFT for each of the neighbours. Each round begins
-    with what the one before left.
+    and more, so that w is .45 (moves / FLOW_ERROR)^2 / ONE_SHIFT for each of the neighbours. Each round
+    begins with what the one before left.
     """
     others = len(seen.photos) - 1
     slowest = min(moves(seen, view) for view in range(len(seen.photos)))

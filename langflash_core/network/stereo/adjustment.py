@@ -23,12 +23,13 @@ from langflash_core.network.stereo.inputs import (
 from langflash_core.network.stereo.keypoints import KeyPoints
 from langflash_core.network.stereo.known import agreeing
 from langflash_core.network.stereo.matching import MIN_INLIERS, Matches
-from langflash_core.network.stereo.tracks import Tracks, joined, no_tracks, with_pairs
+from langflash_core.network.stereo.tracks import Tracks, joined, no_tracks, thinned, with_pairs
 from langflash_core.records import FoundFocal
 
 FEWEST = 3
 """Photos of one lens from which it is sought, and photos from which all are adjusted together."""
-_ROUNDS = 2
+_OBSERVATIONS = (150, 400)
+"""Of each view, in the first round and in the second: more change nothing but the time."""
 _SIGMA = 0.4  # pixels at the working size, of a key point
 _AGREES = 2.0  # times the tolerance of pairs, within which matches join once poses are known
 _SHARED = 3.0
@@ -50,6 +51,11 @@ class Sought:
     doubts: tuple[float, ...]
 
 
+def given_lenses(num_views: int) -> Sought:
+    """Nothing may be changed."""
+    return Sought((0,) * num_views, (0.0,))
+
+
 @dataclass(frozen=True)
 class Adjusted:
     """viewmats (V, 4, 4), world = view 0. tracks: pixels as of focal lengths `growths` (V,) times those that
@@ -64,14 +70,22 @@ class Adjusted:
     growths: np.ndarray
     lenses: tuple[FoundFocal | None, ...]
 
+    def after(self, growths: np.ndarray, lenses: Sequence[int]) -> "Adjusted":
+        """The same where focal lengths had grown by `growths` (V,) before; lenses: as `Sought` has them."""
+        by_lens = dict(zip(lenses, growths.tolist(), strict=True))
+        found = tuple(
+            lens and replace(lens, growth=lens.growth * by_lens[g]) for g, lens in enumerate(self.lenses)
+        )
+        return replace(self, growths=self.growths * growths, lenses=found)
+
 
 def adjusted_photos(
     views: Sequence[PoseInput],
     points: KeyPoints,
     start: Placed,
     agreed: Agreed,
-    sought: Sought | None = None,
-    check: Callable[[], None] = lambda: None,
+    sought: Sought,
+    check: Callable[[], None],
 ) -> Adjusted | None:
     """Poses of all placed views, and lenses; None where fewer than three are placed.
 
@@ -83,7 +97,6 @@ def adjusted_photos(
     placed = [v for v in range(len(views)) if v not in start.missing]
     if len(placed) < FEWEST:
         return None
-    sought = sought or Sought((0,) * len(views), (0.0,))
     counts = np.bincount(np.array(sought.lenses)[placed], minlength=len(sought.doubts))
     doubts = np.where(counts >= FEWEST, np.array(sought.doubts), 0.0)
     while True:
@@ -131,9 +144,9 @@ def _adjusted(
     doubts = doubts / _SHARED  # what observations say is worth so much less than it seems
     focals = np.array([view.K[0, 0] for view in views])
     viewmats, matches, bundle = start.viewmats, agreed, None
-    for _ in range(_ROUNDS):
+    for most in _OBSERVATIONS:
         check()
-        tracks = _tracks(views, points, matches)
+        tracks = thinned(_tracks(views, points, matches), most)
         if not len(tracks):
             return None
         depths = log_depths(views, tracks)

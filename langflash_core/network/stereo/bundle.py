@@ -22,7 +22,9 @@ photos the turns were wrong by .15, .11, .53, 1.0 degrees with 1, by .13, .38, .
 _CAUCHY = 2.0  # sigmas
 _OUTLIER = 4.0  # sigmas beyond which an observation is none
 _ITERATIONS, _ROUNDS = 25, 2
-_CONVERGED = 1e-5  # share of the cost
+_CONVERGED, _NEARLY = 1e-4, 1e-3
+"""Share of the cost below which a step's gain ends the search: at last, and before outliers are left out."""
+_DAMPED = 1e-2  # damping above which a small gain says nothing of what is left
 _NEARER = 0.3  # a step leaves each point this share of its depth, in any camera
 _POSE = 7  # turn, shift, log scale of the depth map
 
@@ -117,7 +119,7 @@ def adjusted_bundle(
     state = _State(viewmats, logs, np.zeros((0, 3)), growths)
     state = replace(state, points=_first_points(state, problem))
     for left in reversed(range(_ROUNDS)):
-        state = _solved(state, problem)
+        state = _solved(state, problem, _NEARLY if left else _CONVERGED)
         if left:
             state, problem = _without_outliers(state, problem)
     spread, errors, unsure = _errors(state, problem)
@@ -126,7 +128,7 @@ def adjusted_bundle(
     return Bundle(state.viewmats, state.points, state.growths, errors, problem.tracks, depths, depth_errors)
 
 
-def _solved(state: _State, problem: _Problem) -> _State:
+def _solved(state: _State, problem: _Problem, converged: float) -> _State:
     damping, cost = 1e-3, _cost(state, problem)
     for _ in range(_ITERATIONS):
         system, gain = _System.of(state, problem), 0.0
@@ -137,7 +139,7 @@ def _solved(state: _State, problem: _Problem) -> _State:
         if not gain > 0:
             break
         state, cost = trial, cost - gain
-        if gain < _CONVERGED * cost:
+        if gain < converged * cost and damping < _DAMPED:
             break
     return state
 

@@ -9,7 +9,6 @@ Sizes: V views, E edges.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import combinations
 
 import cv2
 import numpy as np
@@ -91,11 +90,12 @@ def confirmed(pairs: Pairs) -> dict[tuple[int, int], int]:
     """How many matches speak for each edge: its own, and in every triangle whose turns close, the fewest
     of the three."""
     counts = {edge: pose.num_inliers for edge, pose in pairs.items()}
-    views = sorted({v for edge in pairs for v in edge})
-    for i, j, k in combinations(views, 3):
+    later: dict[int, set[int]] = {}
+    for i, j in pairs:
+        later.setdefault(i, set()).add(j)
+    loops = [(i, j, third) for i, j in pairs for third in later[i] & later.get(j, set())]
+    for i, j, k in sorted(loops):
         loop = ((i, j), (j, k), (i, k))
-        if not all(edge in pairs for edge in loop):
-            continue
         first, second, direct = (pairs[edge].rotation for edge in loop)
         if _degrees(second @ first @ direct.T) < _LOOP:
             least = min(pairs[edge].num_inliers for edge in loop)

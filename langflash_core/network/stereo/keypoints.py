@@ -3,15 +3,15 @@ while torch is still being imported."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import cv2
 import numpy as np
 
 from langflash_core.network.stereo.matching import detect, match_descriptors
+from langflash_core.network.stereo.retrieval import likely_pairs
 
 WORKING_SIDE = 768  # pixels of the longer side at which photos are matched
-_MANY_VIEWS = 4  # beyond this, fewer features keep the V (V - 1) / 2 pairs affordable
+_MANY_VIEWS = 4  # beyond this, fewer features keep the pairs affordable
 _FEATURES = {True: 1500, False: 4000}  # of many views, of few
 _last: dict[tuple[bytes, ...], "KeyPoints"] = {}
 
@@ -19,7 +19,7 @@ _last: dict[tuple[bytes, ...], "KeyPoints"] = {}
 @dataclass(frozen=True)
 class KeyPoints:
     """positions: per view (n, 2), pixels of the photo scaled to `WORKING_SIDE`. pairs: per pair of
-    views i < j, rows of both (m, 2) that correspond."""
+    views i < j that may show the same, rows of both (m, 2) that correspond."""
 
     positions: tuple[np.ndarray, ...]
     pairs: dict[tuple[int, int], np.ndarray]
@@ -48,7 +48,7 @@ def match_photos(greys: Sequence[np.ndarray], check: Callable[[], None] = lambda
         positions.append(own_positions)
         descriptors.append(own_descriptors)
     pairs = {}
-    for i, j in combinations(range(len(greys)), 2):
+    for i, j in likely_pairs(descriptors):
         check()
         pairs[i, j] = match_descriptors(descriptors[i], descriptors[j])
     return KeyPoints(tuple(positions), pairs)

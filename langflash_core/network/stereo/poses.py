@@ -1,19 +1,21 @@
 """Poses of V views: relative poses of the pairs that share most, brought together in one adjustment."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from langflash_core.network.stereo.adjustment import (
+    FEWEST,
     Adjusted,
     Agreed,
     Sought,
     adjusted_photos,
+    given_lenses,
     log_depths,
 )
 from langflash_core.network.stereo.alignment import NO_CORRECTION, Correction, fit_correction
-from langflash_core.network.stereo.graph import chosen_pairs, closest, placed, unconnected
+from langflash_core.network.stereo.graph import Placed, chosen_pairs, placed, unconnected
 from langflash_core.network.stereo.inputs import (
     PoseInput,
     dense_matches,
@@ -36,6 +38,9 @@ _MIN_SHARE = 0.25  # of the matches must agree with a pose
 _MAX_DEPTH_SIGMA = 0.2  # log-depth error beyond which a triangulated match says too little
 _MIN_POINTS = 10  # matches needed to correct a map
 _FEW = 40  # inliers among key points, below which dense matches are asked as well
+_FIRST = 8  # photos that tell the lens first
+_ENOUGH = 100  # matches with one of them
+_OTHER_LENS = 0.05  # change of a focal length, as a logarithm, from which pairs are looked at again
 _DENSE_COST = 2.75
 """Cost from which dense matches are not believed: on validation rooms the wrong ones began at 2.8."""
 
@@ -86,23 +91,101 @@ def estimate_poses(
     """
     num_views = len(views)
     told = {edge: rows for edge, rows in points.pairs.items() if not _blank(points, edge)}
+    if known is None and num_views >= FEWEST:
+        return _together(views, replace(points, pairs=told), sought or given_lenses(num_views), check)
     edges = {edge: key_point_matches(views, points, *edge) for edge in chosen_pairs(num_views, told)}
     if known is None:
         pairs, agreed = _pair_poses(views, edges, check)
         found = placed(num_views, pairs)
-        agreed = {edge: agreed[edge] for edge in found.kept}
-        adjusted = adjusted_photos(views, replace(points, pairs=told), found, agreed, sought, check)
-        if adjusted is not None:
-            return _of_adjusted(adjusted, views, found.missing)
-        viewmats, scales, guessed = found.viewmats, found.scales, found.missing
-    else:
-        agreed = {}
-        for (i, j), matches in edges.items():
-            check()
-            agreed[i, j] = _agreed(views[i], views[j], matches, known[j] @ np.linalg.inv(known[i]))
-        viewmats, scales, guessed = known, _known_scales(views, known, agreed), ()
-    corrections = [_correction(v, views[v], viewmats, scales[v], agreed) for v in range(num_views)]
-    return Poses(viewmats, scales, tuple(corrections), guessed)
+        return _of_pairs(views, found, {edge: agreed[edge] for edge in found.kept})
+    agreed = {}
+    for (i, j), matches in edges.items():
+        check()
+        agreed[i, j] = _agreed(views[i], views[j], matches, known[j] @ np.linalg.inv(known[i]))
+    scales = _known_scales(views, known, agreed)
+    return _of_pairs(views, Placed(known, scales, (), tuple(agreed)), agreed)
+
+
+def _of_pairs(views: list[PoseInput], found: Placed, agreed: Agreed) -> Poses:
+    """Corrections from the matches of pairs."""
+    corrections = tuple(
+        _correction(v, own, found.viewmats, found.scales[v], agreed) for v, own in enumerate(views)
+    )
+    return Poses(found.viewmats, found.scales, corrections, found.missing)
+
+
+def _together(views: list[PoseInput], points: KeyPoints, sought: Sought, check: Callable[[], None]) -> Poses:
+    """Poses of three views and more, and lenses.
+
+    A few photos tell a lens first: pairs through a wrong one start the adjustment of all at wrong places,
+    from where it does not come back.
+    """
+    growths, solved = np.ones(len(views)), None
+    if max(sought.doubts) > 0:
+        few = _few(len(views), {edge: len(rows) for edge, rows in points.pairs.items()})
+        first = _solved(*_part(views, points, sought, few), check)
+        growths = _other_lenses(first[2], sought)
+        solved = first if len(few) == len(views) and (growths == 1).all() else None
+    seen = [view.through(growth) for view, growth in zip(views, growths, strict=True)]
+    found, agreed, adjusted = solved or _solved(seen, points, sought, check)
+    if (growths != 1).any() and (adjusted is None or None in adjusted.lenses):  # all of them tell it no more
+        return _together(views, points, replace(sought, doubts=(0.0,) * len(sought.doubts)), check)
+    if adjusted is None:
+        return _of_pairs(views, found, agreed)
+    adjusted = adjusted.after(growths, sought.lenses)
+    seen = [view.through(growth) for view, growth in zip(views, adjusted.growths, strict=True)]
+    return _of_adjusted(adjusted, seen, found.missing)
+
+
+def _solved(
+    views: list[PoseInput], points: KeyPoints, sought: Sought, check: Callable[[], None]
+) -> tuple[Placed, Agreed, Adjusted | None]:
+    """Poses by pairs, the matches that agree with them, and what all say together."""
+    chosen = chosen_pairs(len(views), points.pairs)
+    edges = {edge: key_point_matches(views, points, *edge) for edge in chosen}
+    pairs, agreed = _pair_poses(views, edges, check)
+    found = placed(len(views), pairs)
+    agreed = {edge: agreed[edge] for edge in found.kept}
+    return found, agreed, adjusted_photos(views, points, found, agreed, sought, check)
+
+
+def _few(num_views: int, counts: Mapping[tuple[int, int], int]) -> list[int]:
+    """Views that tell a lens best: each shares enough with one before it, and no more than it must."""
+    if num_views <= _FIRST:
+        return list(range(num_views))
+    shared = np.zeros((num_views, num_views), int)
+    for (i, j), count in counts.items():
+        shared[i, j] = shared[j, i] = count
+    few = [int(shared.sum(1).argmax())]
+    while len(few) < _FIRST:
+        best = shared[few].max(0)
+        best[few] = -1
+        enough = np.flatnonzero(best >= _ENOUGH)
+        few.append(int(enough[best[enough].argmin()]) if len(enough) else int(best.argmax()))
+    return sorted(few)
+
+
+def _part(
+    views: list[PoseInput], points: KeyPoints, sought: Sought, few: list[int]
+) -> tuple[list[PoseInput], KeyPoints, Sought]:
+    """Some of the views, numbered anew."""
+    numbers = {view: number for number, view in enumerate(few)}
+    pairs = {
+        (numbers[i], numbers[j]): rows
+        for (i, j), rows in points.pairs.items()
+        if i in numbers and j in numbers
+    }
+    own = KeyPoints(tuple(points.positions[v] for v in few), pairs)
+    return [views[v] for v in few], own, replace(sought, lenses=tuple(sought.lenses[v] for v in few))
+
+
+def _other_lenses(adjusted: Adjusted | None, sought: Sought) -> np.ndarray:
+    """By what focal lengths (V,) grow that were said much too wrongly; 1 of all others."""
+    growths = np.ones(len(sought.doubts))
+    for lens, found in enumerate(adjusted.lenses if adjusted else ()):
+        if found is not None and abs(np.log(found.growth)) > _OTHER_LENS:
+            growths[lens] = found.growth
+    return growths[list(sought.lenses)]
 
 
 def on_other_maps(poses: Poses, views: Sequence[PoseInput]) -> Poses:

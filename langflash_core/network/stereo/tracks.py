@@ -41,6 +41,21 @@ class Tracks:
         return Tracks(numbers[self.points[rows]], *parts), rows, np.flatnonzero(stays)
 
 
+def thinned(tracks: Tracks, most: int) -> Tracks:
+    """Points that most views saw, so many that each view has `most` observations, or all of its own."""
+    if len(tracks) == 0:
+        return tracks
+    lengths = np.bincount(tracks.points)
+    ends = np.cumsum(lengths)
+    kept, seen = np.zeros(len(lengths), bool), np.zeros(int(tracks.views.max()) + 1, int)
+    for point in np.argsort(-lengths, kind="stable"):
+        views = tracks.views[ends[point] - lengths[point] : ends[point]]
+        if seen[views].min() < most:
+            kept[point] = True
+            seen[views] += 1
+    return tracks.subset(kept[tracks.points])[0]
+
+
 def no_tracks() -> Tracks:
     """Not one."""
     return Tracks(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)), np.zeros(0))
