@@ -45,6 +45,9 @@ from langflash_core.types import Camera, Cost, Gaussians, Prediction, Record, Sc
 
 MOST_ENLARGED = 3
 """Times the grid, the size up to which a photo is looked at."""
+_FINENESS = 1.25
+"""Many photos cover what they see more finely than one. Of 17 photos round a room 1.0 gave 412,000 Gaussians
+and 27.2 dB between the photos, 1.5 and no bound 535,000 and 27.4."""
 
 
 def working_size(photo: tuple[int, int], grid: tuple[int, int]) -> tuple[int, int]:
@@ -160,11 +163,10 @@ class _Sight:
 
 
 def _area(keep: Tensor) -> float:
-    """Cells of surface (V, H, W) that a budget counts: what photos cover themselves, and not more than a
-    quarter of each further photo, of many."""
-    views, area = len(keep), keep[0].numel()
-    usual = area * (views + 3) / 4
-    return usual if views <= 2 else min(usual, float(keep.sum()))
+    """Cells (V, H, W) that a budget counts: a photo and a quarter of each further one, but of many not more
+    than `_FINENESS` times what they cover: photos that show the same again need no more Gaussians."""
+    usual = keep[0].numel() * (len(keep) + 3) / 4
+    return usual if len(keep) <= 2 else min(usual, _FINENESS * float(keep.sum()))
 
 
 def _kept(prediction: Prediction, views: Views) -> tuple[Tensor, Tensor, float, int]:

@@ -9,7 +9,7 @@ from torch import Tensor
 from langflash_core.detail import DETAILS, Detail
 from langflash_core.errors import InputError
 from langflash_core.scene.checks import check_scene
-from langflash_core.scene.detailed import assemble_detailed, working_photos, working_size
+from langflash_core.scene.detailed import _FINENESS, _area, assemble_detailed, working_photos, working_size
 from langflash_core.splat.reference import render
 from langflash_core.types import Camera, Scene
 from tests.scene.photographed import GRID, SCREEN, WALL, Photographed, photographed
@@ -276,3 +276,14 @@ def test_every_photo_is_told_and_may_be_the_last(given):
 
     with pytest.raises(KeyboardInterrupt):
         made(given, progress=stop)
+
+
+def test_a_budget_counts_surface_and_not_photos():
+    """Two photos count as they did; forty that show the same count as what they cover."""
+    height, width = GRID
+    first = torch.zeros(40, height, width, dtype=torch.bool)
+    first[0] = True
+    assert _area(first) == _FINENESS * height * width
+    assert _area(first[:2]) == 1.25 * height * width
+    everywhere = torch.ones_like(first)
+    assert _area(everywhere) == height * width * 43 / 4  # each covers a place of its own
