@@ -5,11 +5,13 @@ A picture is linear in its colours: with c_ip = T_i(p) alpha_i(p), F(p) = sum_i 
 the c_ip of a view as a matrix (pixels, Gaussians), so that drawing with other colours, and carrying what
 is wrong in a picture back to the Gaussians, are products with it and its transpose.
 
-Pairs of a Gaussian and a pixel are made front to back for all Gaussians at once and turned into rows by
-pixel by counting, which keeps their order. float32. Twin: `reference.rasterize`,
-tests/splat/test_mixing.py.
+Pairs of a Gaussian and a pixel are made front to back for a slab of Gaussians at once and turned into rows
+by pixel by counting, which keeps their order. What lies wholly behind pixels that let nothing pass any more
+is not looked at. float32. Twin: `reference.rasterize`, tests/splat/test_mixing.py.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -25,6 +27,13 @@ FAINT, SMALL = 1 / 64, 0.01
 where they are 32 dB from a photo."""
 _WIDE = 128  # pixels, a side from which footprints are cut to the picture
 _AT_ONCE = 1 << 18  # pairs in work at once: within a core's cache
+_SLABS, _LEAST_SLAB = 8, 8192  # of Gaussians by depth, and how many one has at least
+_CELLS = (
+    8,
+    16,
+    32,
+    64,
+)  # pixels, in which pixels that still let light pass are sought for a footprint's square
 
 
 def mixing(
@@ -36,23 +45,57 @@ def mixing(
         footprints: of the Gaussians as the camera sees them. count: N.
         faint, small: alpha and contribution below which a pair is left out; 1/255 and 0 as in pictures.
     """
-    alphas, pixels, starts = _pairs(footprints, camera, faint)
-    num_pixels = camera.width * camera.height
-    by_depth = scipy.sparse.csc_array((alphas, pixels, starts), shape=(num_pixels, len(starts) - 1))
-    rows = by_depth.tocsr()  # columns of a row ascend: front to back
-    shares, columns, ends = _composited(rows, small)
-    ids = footprints.ids.cpu().numpy().astype(np.int32)
-    return scipy.sparse.csr_matrix((shares, ids[columns], ends), shape=(num_pixels, count))
-
-
-def _pairs(footprints: Footprints, camera: Camera, faint: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Alphas and pixels of all pairs (M,), footprint by footprint, and where each begins (n + 1,)."""
     table = _Table.of(footprints, camera, faint)
-    counts, found = np.zeros(len(table.sides), np.int64), []
-    for rows in table.alike():
-        step = max(1, _AT_ONCE // int(table.sides[rows[0]]) ** 2)
-        for some in np.split(rows, range(step, len(rows), step)):
-            kept, alphas, pixels = table.pairs(some, camera, faint)
+    light = np.zeros(camera.width * camera.height)  # logarithm of what passes all slabs so far
+    layers = []
+    for rows in np.array_split(np.arange(len(table.sides)), _slabs(len(table.sides))):
+        clear = light >= math.log(small) if small > 0 and layers else None
+        if clear is not None:
+            rows = rows[table.seen(rows, clear.reshape(camera.height, camera.width))]
+        alphas, pixels, starts = _pairs(table, rows, camera, faint, clear)
+        by_depth = scipy.sparse.csc_array((alphas, pixels, starts), shape=(len(light), len(rows)))
+        by_pixel = by_depth.tocsr()  # columns of a row ascend: front to back
+        shares, columns, counts = _composited(by_pixel, small, light)
+        layers.append((shares, rows[columns], counts))
+    shares, columns, ends = _joined(layers)
+    ids = footprints.ids.cpu().numpy().astype(np.int32)
+    return scipy.sparse.csr_matrix((shares, ids[columns], ends), shape=(len(light), count))
+
+
+def _slabs(count: int) -> int:
+    """How many slabs are gone through: of few Gaussians one."""
+    return min(max(count // _LEAST_SLAB, 1), _SLABS)
+
+
+def _joined(
+    layers: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows of slabs one behind the other: shares, columns, and where each pixel's begin.
+
+    layers: shares, columns and how many of each pixel, slab by slab."""
+    if len(layers) == 1:
+        shares, columns, counts = layers[0]
+        return shares, columns, np.concatenate(([0], np.cumsum(counts)))
+    ends = np.concatenate(([0], np.cumsum(np.sum([counts for *_, counts in layers], axis=0))))
+    shares, columns = np.empty(ends[-1], np.float32), np.empty(ends[-1], np.int64)
+    begins = ends[:-1].copy()
+    for own_shares, own_columns, counts in layers:
+        places = np.arange(len(own_shares)) + np.repeat(begins - (np.cumsum(counts) - counts), counts)
+        shares[places], columns[places] = own_shares, own_columns
+        begins += counts
+    return shares, columns, ends
+
+
+def _pairs(
+    table: "_Table", rows: np.ndarray, camera: Camera, faint: float, clear: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Alphas and pixels of all pairs (M,) of some footprints (n,), one by one, and where each begins
+    (n + 1,); of pixels (H W,) that are `clear`."""
+    counts, found = np.zeros(len(rows), np.int64), []
+    for places in table.alike(rows):
+        step = max(1, _AT_ONCE // int(table.sides[rows[places[0]]]) ** 2)
+        for some in np.split(places, range(step, len(places), step)):
+            kept, alphas, pixels = table.pairs(rows[some], camera, faint, clear)
             counts[some] = kept
             found.append((some, alphas, pixels))
     starts = np.concatenate(([0], np.cumsum(counts)))
@@ -97,13 +140,32 @@ class _Table:
             (centres - low - 0.5).astype(np.float32), inverse.astype(np.float32), opacities,
         )  # fmt: skip
 
-    def alike(self) -> list[np.ndarray]:
-        """Rows of the same side."""
-        order = np.argsort(self.sides, kind="stable")
-        return np.split(order, np.flatnonzero(np.diff(self.sides[order])) + 1) if len(order) else []
+    def alike(self, rows: np.ndarray) -> list[np.ndarray]:
+        """Places among some rows of those that have the same side."""
+        sides = self.sides[rows]
+        order = np.argsort(sides, kind="stable")
+        return np.split(order, np.flatnonzero(np.diff(sides[order])) + 1) if len(order) else []
+
+    def seen(self, rows: np.ndarray, clear: np.ndarray) -> np.ndarray:
+        """(n,) bool: the square of each row may hold a pixel that is `clear`, (H, W) bool."""
+        found, sides = np.ones(len(rows), bool), self.sides[rows]
+        for cell in _CELLS:
+            some = np.flatnonzero((sides <= cell) & (sides > cell // 2))
+            if len(some) == 0:
+                continue
+            # Of cells as large as a square, it touches two by two at most; one more on all sides.
+            high, wide = (-(-size // cell) for size in clear.shape)
+            cells = np.zeros((high * cell, wide * cell), bool)
+            cells[: clear.shape[0], : clear.shape[1]] = clear
+            grid = np.zeros((high + 3, wide + 3), bool)
+            grid[1:-2, 1:-2] = cells.reshape(high, cell, wide, cell).any((1, 3))
+            touched = grid[:-1, :-1] | grid[1:, :-1] | grid[:-1, 1:] | grid[1:, 1:]
+            x, y = (np.clip(self.corners[rows[some]] // cell, -1, (wide, high)) + 1).T
+            found[some] = touched[y, x]
+        return found
 
     def pairs(
-        self, rows: np.ndarray, camera: Camera, faint: float
+        self, rows: np.ndarray, camera: Camera, faint: float, clear: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """How many pixels of each row (n,) are kept, and the alphas and pixels of these."""
         side, corners = int(self.sides[rows[0]]), self.corners[rows]
@@ -126,6 +188,9 @@ class _Table:
         which = found // (side * side)
         offsets = (np.arange(side)[:, None] * camera.width + np.arange(side)).ravel()
         pixels = (lines * np.int64(camera.width) + columns)[which] + offsets[found - which * (side * side)]
+        if clear is not None:
+            open_ones = np.flatnonzero(clear[pixels])
+            found, which, pixels = found[open_ones], which[open_ones], pixels[open_ones]
         alphas = np.minimum(across.ravel()[found], np.float32(ALPHA_MAX))
         return np.bincount(which, minlength=len(rows)), alphas, pixels.astype(np.int32)
 
@@ -138,9 +203,12 @@ def _between(places: np.ndarray, size: int) -> np.ndarray:
     return (places >= 0) & (places < size)
 
 
-def _composited(rows: scipy.sparse.csr_array, small: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """T alpha of alphas sorted by pixel and depth, their columns, and where each pixel's begin; those below
-    `small` left out. Some pixels at a time, so that what is made on the way stays within a core's cache."""
+def _composited(
+    rows: scipy.sparse.csr_array, small: float, light: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """T alpha of alphas sorted by pixel and depth, their columns, and how many each pixel has; those below
+    `small` left out. `light`: (H W,) log T before them, and behind them afterwards. Some pixels at a time, so
+    that what is made on the way stays within a core's cache."""
     starts = rows.indptr
     cuts = np.searchsorted(starts, np.arange(0, starts[-1], _AT_ONCE // 4))
     bounds = np.unique(np.concatenate((cuts, [0, len(starts) - 1])))
@@ -148,14 +216,13 @@ def _composited(rows: scipy.sparse.csr_array, small: float) -> tuple[np.ndarray,
     for first, last in pairwise(bounds):
         some = slice(starts[first], starts[last])
         alphas, own = rows.data[some], np.diff(starts[first : last + 1])
-        logs = np.log(1 - alphas)
-        before = np.cumsum(logs, dtype=np.float64) - logs
-        places = np.minimum(starts[first:last] - starts[first], max(len(before) - 1, 0))
-        at_start = before[places] if len(before) else np.zeros(len(own))
-        found = alphas * np.exp((before - np.repeat(at_start, own)).astype(np.float32))
+        sums = np.concatenate(([0.0], np.cumsum(np.log(1 - alphas), dtype=np.float64)))
+        places = starts[first : last + 1] - starts[first]
+        at_start = sums[places[:-1]] - light[first:last]
+        found = alphas * np.exp((sums[:-1] - np.repeat(at_start, own)).astype(np.float32))
+        light[first:last] = sums[places[1:]] - at_start
         kept = np.flatnonzero(found >= small)
         shares.append(found[kept])
         columns.append(rows.indices[some][kept])
         counts.append(np.bincount(np.repeat(np.arange(len(own)), own)[kept], minlength=len(own)))
-    ends = np.concatenate(([0], np.cumsum(np.concatenate(counts))))
-    return np.concatenate(shares), np.concatenate(columns), ends
+    return np.concatenate(shares), np.concatenate(columns), np.concatenate(counts)

@@ -227,3 +227,25 @@ def test_what_small_leaves_out_is_below_it():
     left = (whole - part).tocoo()
     assert part.nnz < whole.nnz and np.abs(left.data).max() < SMALL
     assert part.data.min() >= SMALL and np.isin(part.data, whole.data).all()
+
+
+@pytest.mark.parametrize("small", [0.0, SMALL, 0.1])
+def test_slabs_by_depth_change_nothing(monkeypatch, small):
+    """What lies behind opaque pixels is not looked at, and would have been left out."""
+    opaque = dataclasses.replace(cloud(3000, size=0.08).gaussians, opacities=torch.full((3000,), 0.95))
+    gaussians, seen = opaque.map(lambda v: v.double()), camera(150, 130, focal=120.0)
+    footprints = project(gaussians, seen)
+    whole = mixing(footprints, seen, 3000, small=small)
+    looked_at, pairs = [], module._Table.pairs
+
+    def counted(table, rows, *of):
+        looked_at.append(len(rows))
+        return pairs(table, rows, *of)
+
+    monkeypatch.setattr(module._Table, "pairs", counted)
+    monkeypatch.setattr(module, "_LEAST_SLAB", 300)
+    parts = mixing(footprints, seen, 3000, small=small)
+    assert np.array_equal(parts.indptr, whole.indptr) and np.array_equal(parts.indices, whole.indices)
+    # Sums of logs begin elsewhere, in float64: the last digit of float32.
+    np.testing.assert_allclose(parts.data, whole.data, rtol=1e-6)
+    assert small == 0 or sum(looked_at) < 0.7 * len(footprints.ids)
