@@ -10,7 +10,7 @@ from torch import Tensor
 
 from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid, rays, transform, unproject
 from langflash_core.scene import ownership
-from langflash_core.scene.ownership import BEFORE, BEHIND, owned
+from langflash_core.scene.ownership import BEFORE, BEHIND, covered, owned
 
 HEIGHT, WIDTH = 24, 32
 WALL = (0.0, 0.0, 1.0), 3.0  # n x = d, in the world
@@ -285,3 +285,57 @@ def test_depths_of_nobodys_making_do_not_raise():
     depths[0, 0, 0], depths[1, 5, 5] = 1e-6, 1e6
     keep = owned(depths, torch.stack(drawn_views(1, 3)), lens(3))
     assert keep.shape == depths.shape and keep.dtype == torch.bool
+
+
+def many(count: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Cameras here and there before a wall with a step, near and far: depths, viewmats, Ks."""
+    g = torch.Generator().manual_seed(3)
+    K = torch.tensor([[40.0, 0.0, 24.0], [0.0, 40.0, 20.0], [0.0, 0.0, 1.0]])
+    viewmats = torch.eye(4).repeat(count, 1, 1)
+    viewmats[:, :3, 3] = torch.rand(count, 3, generator=g) * torch.tensor([2.0, 0.6, 1.5]) - torch.tensor(
+        [1.0, 0.3, 0.0]
+    )
+    x = (torch.arange(48) + 0.5 - 24) / 40
+    depths = []
+    for pose in viewmats:
+        back, near = 3.0 + pose[2, 3], 2.6 + pose[2, 3]
+        depth = torch.where(x * near - pose[0, 3] > 0.1, near, back)  # a pillar from x = .1 on
+        depths.append(depth.expand(40, 48))
+    return torch.stack(depths), viewmats, K.repeat(count, 1, 1)
+
+
+def test_of_many_photos_few_are_compared_cell_by_cell(monkeypatch):
+    """Nearly the same cells as where all are compared with all; no surface loses its cover."""
+    depths, viewmats, Ks = many(14)
+    looked_at = []
+    same = ownership._same
+    monkeypatch.setattr(ownership, "_same", lambda *of: looked_at.append(of) or same(*of))
+    some = owned(depths, viewmats, Ks)
+    few = len(looked_at)
+    monkeypatch.setattr(ownership, "_ALL", 100)
+    every = owned(depths, viewmats, Ks)
+    assert few < 0.7 * (len(looked_at) - few) and len(looked_at) - few == 14 * 13
+    # Of 40 x 48 cells 30 are tried; of 224 x 224 they are 784, and .999 the same in a room of 32 photos.
+    assert (some == every).float().mean() > 0.96
+    assert covered(depths, viewmats, Ks, some).all()
+
+
+def test_up_to_eight_photos_all_are_compared():
+    """Exactly as one by one: the choice at every eighth cell has no part in it."""
+    depths, viewmats, Ks = many(8)
+    few = owned(depths, viewmats, Ks)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ownership, "_holders", None)
+        assert torch.equal(owned(depths, viewmats, Ks), few)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.5])
+def test_blocks_beside_a_picture_cover_nothing(share):
+    """The same as with all points, however few are kept."""
+    depths, viewmats, Ks = many(6)
+    keep = torch.rand(depths.shape, generator=torch.Generator().manual_seed(1)) < share
+    found = covered(depths, viewmats, Ks, keep)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ownership._Blocks, "before", lambda blocks, *_: blocks.points.flatten(1))
+        assert torch.equal(covered(depths, viewmats, Ks, keep), found)
+    assert bool(found.any()) == (share > 0)
