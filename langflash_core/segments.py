@@ -35,6 +35,7 @@ from langflash_core.types import Camera, Frame, Record, Scene, SegmentedView, Se
 
 Render = Callable[..., Frame]  # (scene, camera, weight_maps=True)
 _LEAST = 1 / 255  # of a matte that has a colour
+_SAMPLES = 20_000  # of a surface, at most: quantiles need no more
 
 
 def segment(scene: Scene, prompts: Sequence[str], *, threshold: float | None = None) -> Segments:
@@ -96,9 +97,22 @@ def _scores(relevance: Tensor, shares: Tensor) -> Tensor:
 
 
 def boxes(scene: Scene, segments: Segments) -> list[dict]:
-    """Oriented box (`oriented_box`) of every connected thing's centres, in the order of `things`."""
-    means = scene.gaussians.means.detach().cpu()
-    return [oriented_box(means[segments.instances[phrase] == number]) for phrase, number in segments.things]
+    """Oriented box (`oriented_box`) of every connected thing's surface, in the order of `things`."""
+    means, areas = scene.gaussians.means.detach().cpu(), covered_areas(scene.gaussians)
+    found = []
+    for phrase, number in segments.things:
+        rows = (segments.instances[phrase] == number).numpy().nonzero()[0]
+        found.append(oriented_box(means[torch.from_numpy(rows[_evenly(areas[rows])])]))
+    return found
+
+
+def _evenly(areas: np.ndarray) -> np.ndarray:
+    """Rows, each as often as its area (n,) has it: their quantiles are those of the surface. Where all areas
+    are the same, or 0, each of few rows once."""
+    ends = np.cumsum(areas if areas.sum() > 0 else np.ones_like(areas))
+    count = min(_SAMPLES, len(areas) * max(1, _SAMPLES // 10 // len(areas)))
+    places = (np.arange(count) + 0.5) / count * ends[-1]
+    return np.searchsorted(ends, places).clip(max=len(areas) - 1)
 
 
 def segmented_view(scene: Scene, segments: Segments, camera: Camera, render: Render) -> SegmentedView:

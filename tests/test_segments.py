@@ -221,3 +221,13 @@ def test_what_a_merge_brought_counts_by_its_surface():
     assert scene.view_ids is not None
     ids = torch.where(torch.arange(len(scene.view_ids)) < 22500, 0, -1)
     assert segments.segment(replace(scene, view_ids=ids), ["lamp"]).counts == (1,)
+
+
+def test_boxes_hold_the_surface_however_its_elements_are_spread():
+    """A table top of large elements, fine detail on a hundredth of it: all of the top is in the box."""
+    top = (square(0, 0, 1, 1.0, 0.1), 0.07, 1)
+    detail = (square(0.4, 0.4, 0.999, 0.1, 0.001), 0.0005, 1)
+    scene = sized(stripes(), ["armchair", "table"], [top, detail])
+    (box,) = segments.boxes(scene, segments.segment(scene, ["table"]))
+    assert box["size"][:2] == pytest.approx([0.9, 0.9], abs=0.01)  # from the middles of the outer ones
+    assert box["center"][:2] == pytest.approx([0, 0], abs=0.01)
