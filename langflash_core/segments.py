@@ -22,23 +22,28 @@ from langflash_core.language.answers import (
     BOX_QUANTILES,
     COVERED_ALPHA,
     MIN_AREA,
+    TOP_FRACTION,
     oriented_box,
-    presence_scores,
 )
 from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.instances import disc_radii, instances
+from langflash_core.scene.thin import covered_areas
+from langflash_core.splat.visibility import seen_shares
 from langflash_core.types import Camera, Frame, Record, Scene, SegmentedView, Segments, Semantics
 
 Render = Callable[..., Frame]  # (scene, camera, weight_maps=True)
 _LEAST = 1 / 255  # of a matte that has a colour
+_SAMPLES = 20_000  # of a surface, at most: quantiles need no more
 
 
 def segment(scene: Scene, prompts: Sequence[str], *, threshold: float | None = None) -> Segments:
     """The Gaussians that answer each phrase, and the connected things among them.
 
-    A phrase is found where a connected thing answers it; of what is not found, nothing is a member.
+    A phrase is found where some photo shows what answers it with `MIN_AREA` of its pixels. Connected things
+    that no photo shows so large are no things, be they small or hidden behind others; but the one that is
+    shown best always is. Of what is not found, nothing is a member.
 
     Args:
         threshold: relevancy in [0, 1]; None: the scene's calibration.
@@ -51,18 +56,63 @@ def segment(scene: Scene, prompts: Sequence[str], *, threshold: float | None = N
     if not 0 <= limit <= 1:
         raise PromptError(f"the threshold {limit} is out of range; relevancy needs 0 to 1")
     relevance = gaussian_relevance(scene.semantics, compiled)  # (P, N)
-    members = (relevance >= limit) & (scene.semantics.num_atoms > 0)
-    least = MIN_AREA * scene.view_size[0] * scene.view_size[1]  # Gaussians are about a photo's pixel large
-    members &= (members.sum(1) >= least)[:, None]
-    scores = presence_scores(relevance[:, None], torch.ones_like(relevance[:1], dtype=torch.bool))
-    numbers = [torch.from_numpy(instances(scene.gaussians, row.cpu().numpy())) for row in members]
-    return Segments(compiled.texts, tuple(scores.tolist()), float(limit), members.cpu(), torch.stack(numbers))
+    members = ((relevance >= limit) & (scene.semantics.num_atoms > 0)).cpu()
+    shares = _shares(scene)  # (V, N)
+    numbers = torch.stack([_things(scene, row, shares) for row in members])
+    members &= (numbers > 0).any(1, keepdim=True)
+    scores = _scores(relevance.cpu(), shares.mean(0))
+    return Segments(compiled.texts, tuple(scores.tolist()), float(limit), members, numbers)
+
+
+def _shares(scene: Scene) -> Tensor:
+    """(V, N) of the photos that each Gaussian makes up; of the scene's surface, (1 or V, N), what no photo is
+    known of."""
+    areas = torch.from_numpy(covered_areas(scene.gaussians)).float()
+    areas = (areas / areas.sum().clamp_min(1e-30))[None]
+    if scene.view_ids is None:
+        return areas
+    return torch.where(scene.view_ids.cpu() < 0, areas, seen_shares(scene))
+
+
+def _things(scene: Scene, members: Tensor, shares: Tensor) -> Tensor:
+    """(N,) numbers of `instances`, without those that no photo shows well enough; 0 where that is all."""
+    numbers = torch.from_numpy(instances(scene.gaussians, members.numpy()))
+    if not numbers.any() or float(shares[:, members].sum(1).max()) < MIN_AREA:
+        return torch.zeros_like(numbers)
+    shown = shares.new_zeros(len(shares), int(numbers.max()) + 1).index_add_(1, numbers, shares).amax(0)
+    kept = shown >= min(MIN_AREA, float(shown[1:].max()))
+    kept[0] = False  # of no thing
+    return torch.where(kept, kept.cumsum(0), 0)[numbers]
+
+
+def _scores(relevance: Tensor, shares: Tensor) -> Tensor:
+    """(P,) mean relevancy of what answers best, as much as makes up `TOP_FRACTION` of all shares (N,)."""
+    if not float(shares.sum()) > 0:
+        return relevance.new_zeros(len(relevance))
+    best, order = relevance.sort(dim=1, descending=True)
+    own = shares[order]
+    left = TOP_FRACTION * shares.sum() - (own.cumsum(1) - own)
+    taken = torch.minimum(own, left.clamp_min(0))
+    return (best * taken).sum(1) / taken.sum(1)
 
 
 def boxes(scene: Scene, segments: Segments) -> list[dict]:
-    """Oriented box (`oriented_box`) of every connected thing's centres, in the order of `things`."""
-    means = scene.gaussians.means.detach().cpu()
-    return [oriented_box(means[segments.instances[phrase] == number]) for phrase, number in segments.things]
+    """Oriented box (`oriented_box`) of every connected thing's surface, in the order of `things`."""
+    means, areas = scene.gaussians.means.detach().cpu(), covered_areas(scene.gaussians)
+    found = []
+    for phrase, number in segments.things:
+        rows = (segments.instances[phrase] == number).numpy().nonzero()[0]
+        found.append(oriented_box(means[torch.from_numpy(rows[_evenly(areas[rows])])]))
+    return found
+
+
+def _evenly(areas: np.ndarray) -> np.ndarray:
+    """Rows, each as often as its area (n,) has it: their quantiles are those of the surface. Where all areas
+    are the same, or 0, each of few rows once."""
+    ends = np.cumsum(areas if areas.sum() > 0 else np.ones_like(areas))
+    count = min(_SAMPLES, len(areas) * max(1, _SAMPLES // 10 // len(areas)))
+    places = (np.arange(count) + 0.5) / count * ends[-1]
+    return np.searchsorted(ends, places).clip(max=len(areas) - 1)
 
 
 def segmented_view(scene: Scene, segments: Segments, camera: Camera, render: Render) -> SegmentedView:

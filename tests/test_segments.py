@@ -1,6 +1,7 @@
 """Phrases as parts of a scene: one membership for all views, edges without a neighbour's colour."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import torch
 from langflash_core import segments
 from langflash_core.errors import PromptError
 from langflash_core.geometry.harmonics import SH_C0
+from langflash_core.language.spaces import language_space
 from langflash_core.splat import render
 from langflash_core.types import Camera, Gaussians, Scene, Segments, Semantics
 from tests.app.cli.conftest import HEIGHT, WIDTH, stripes
@@ -151,3 +153,81 @@ def test_a_surface_is_where_the_thing_is():
     assert area == pytest.approx(0.28**2, rel=0.25)  # half a voxel at each rim
     assert np.abs(mesh.colours.mean(0) - 255 * COLOURS[2].numpy()).max() < 3
     assert math.isfinite(float(mesh.vertices.sum()))
+
+
+def sized(scene: Scene, words: list[str], parts: list[tuple[torch.Tensor, float, int]]) -> Scene:
+    """The scene's cameras, of more pixels, before discs that face them: means, radius, atom of each part."""
+    means = torch.cat([places for places, _, _ in parts])
+    scales = torch.cat([torch.tensor([[r, r, 0.1 * r]]).repeat(len(places), 1) for places, r, _ in parts])
+    atoms = torch.cat([torch.full((len(places), 1), atom) for places, _, atom in parts])
+    count = len(means)
+    gaussians = Gaussians(
+        means,
+        torch.tensor([1.0, 0, 0, 0]).repeat(count, 1),
+        scales,
+        torch.full((count,), 0.99),
+        torch.zeros(count, 1, 3),
+    )
+    dictionary = language_space("minilm").encode(words)
+    semantics = Semantics(atoms, torch.ones(count, 1), dictionary, "minilm")
+    ids = torch.zeros(count, dtype=torch.int64)
+    Ks = torch.stack([scene.camera(view, 160, 120).K for view in range(2)])
+    return replace(scene, gaussians=gaussians, semantics=semantics, view_ids=ids, view_size=(160, 120), Ks=Ks)
+
+
+def square(x: float, y: float, z: float, side: float, step: float) -> torch.Tensor:
+    """Centres of a square's elements, its middle given."""
+    along = (torch.arange(round(side / step)) + 0.5) * step - side / 2
+    ys, xs = torch.meshgrid(along, along, indexing="ij")
+    return torch.stack((x + xs, y + ys, torch.full_like(xs, z)), -1).reshape(-1, 3)
+
+
+def test_a_flat_thing_of_few_large_elements_is_found_beside_a_textured_one():
+    """One element of 30 x 30 pixels in a photo of 160 x 120: what pixels say, not how many elements."""
+    wall = (square(0, 0, 1, 2.0, 0.02), 0.014, 0)
+    lamp = (torch.tensor([[0.2, 0.2, 0.9]]), 0.1, 1)
+    scene = sized(stripes(), ["armchair", "lamp"], [wall, lamp])
+    parts = segments.segment(scene, ["lamp", "armchair"])
+    assert parts.counts == (1, 1) and int(parts.members[0].sum()) == 1
+    assert parts.scores[0] > parts.threshold
+
+
+def test_many_elements_smaller_than_a_pixel_are_not_more_than_they_show():
+    """A hundred of them on a part of a pixel are noise."""
+    wall = (square(0, 0, 1, 2.0, 0.02), 0.014, 0)
+    dust = (square(0.2, 0.2, 0.9, 2e-3, 2e-4), 1.4e-4, 1)
+    scene = sized(stripes(), ["armchair", "lamp"], [wall, dust])
+    parts = segments.segment(scene, ["lamp"])
+    assert parts.counts == (0,) and not parts.members.any() and parts.scores[0] < parts.threshold
+
+
+def test_what_no_photo_sees_is_no_thing():
+    """A second lamp hides behind the wall; it stays a part of the phrase, but has no number."""
+    wall = (square(0, 0, 1, 3.0, 0.02), 0.014, 0)
+    seen = (square(-0.2, 0, 0.8, 0.2, 0.02), 0.014, 1)
+    hidden = (square(0.3, 0, 1.6, 0.4, 0.02), 0.014, 1)
+    parts = segments.segment(sized(stripes(), ["armchair", "lamp"], [wall, seen, hidden]), ["lamp"])
+    assert parts.counts == (1,) and int(parts.members.sum()) == 500
+    assert set(parts.instances[0].nonzero()[:, 0].tolist()) == set(range(22500, 22600))
+    alone = segments.segment(sized(stripes(), ["armchair", "lamp"], [wall, hidden]), ["lamp"])
+    assert alone.counts == (0,) and not alone.members.any()
+
+
+def test_what_a_merge_brought_counts_by_its_surface():
+    """No photo of the scene shows it, and no photo could."""
+    wall = (square(0, 0, 1, 3.0, 0.02), 0.014, 0)
+    brought = (square(0.3, 0, 1.6, 0.4, 0.02), 0.014, 1)
+    scene = sized(stripes(), ["armchair", "lamp"], [wall, brought])
+    assert scene.view_ids is not None
+    ids = torch.where(torch.arange(len(scene.view_ids)) < 22500, 0, -1)
+    assert segments.segment(replace(scene, view_ids=ids), ["lamp"]).counts == (1,)
+
+
+def test_boxes_hold_the_surface_however_its_elements_are_spread():
+    """A table top of large elements, fine detail on a hundredth of it: all of the top is in the box."""
+    top = (square(0, 0, 1, 1.0, 0.1), 0.07, 1)
+    detail = (square(0.4, 0.4, 0.999, 0.1, 0.001), 0.0005, 1)
+    scene = sized(stripes(), ["armchair", "table"], [top, detail])
+    (box,) = segments.boxes(scene, segments.segment(scene, ["table"]))
+    assert box["size"][:2] == pytest.approx([0.9, 0.9], abs=0.01)  # from the middles of the outer ones
+    assert box["center"][:2] == pytest.approx([0, 0], abs=0.01)

@@ -10,6 +10,7 @@ from PIL import Image
 from torch.nn.functional import normalize
 
 from langflash_core.scene.selection import strongest_atoms
+from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Scene
 
 CELL = 4  # pixels of a photo as the network saw it, along a side
@@ -19,7 +20,7 @@ NEAR_ENOUGH = 1.05  # of the nearest depth in a cell: what lies behind is hidden
 
 @dataclass(frozen=True)
 class AtomsReport:
-    """shares: (K,) of the scene's opacity, sum 1. order: (K,) rows, alike atoms side by side.
+    """shares: (K,) of the scene's surface, sum 1. order: (K,) rows, alike atoms side by side.
     similarity: (K, K) cosines."""
 
     shares: np.ndarray = field(repr=False)
@@ -37,7 +38,7 @@ def describe_atoms(scene: Scene) -> AtomsReport:
 
 
 def atom_shares(scene: Scene) -> np.ndarray:
-    """(K,) of the scene's opacity, sum 1; zeros where there is none."""
+    """(K,) of the scene's surface, opacity times area, sum 1; zeros where there is none."""
     masses = _carried(scene)
     return masses / max(masses.sum(), 1e-12)
 
@@ -77,8 +78,8 @@ def alike_order(similarity: np.ndarray) -> tuple[int, ...]:
 
 
 def _carried(scene: Scene) -> np.ndarray:
-    """(K,) opacity with which the Gaussians carry each atom."""
-    shares = (scene.semantics.weight_values * scene.gaussians.opacities[:, None]).double().numpy()
+    """(K,) of the Gaussians' opacity times area that carries each atom."""
+    shares = scene.semantics.weight_values.double().numpy() * covered_areas(scene.gaussians)[:, None]
     ids, finite = scene.semantics.weight_ids.numpy(), np.nan_to_num(shares, posinf=0)
     return np.bincount(ids.ravel(), finite.ravel(), minlength=scene.semantics.num_atoms)
 

@@ -43,6 +43,7 @@ from langflash_core.scene.ownership import covered, owned
 from langflash_core.scene.upsampling import Upsampled, upsampled
 from langflash_core.types import Camera, Cost, Gaussians, Prediction, Record, Scene, Semantics, Views
 
+GROUND = 4  # pixels, side of the squares under what was parted
 MOST_ENLARGED = 3
 """Times the grid, the size up to which a photo is looked at."""
 _FINENESS = 1.25
@@ -258,7 +259,8 @@ def _confidences(prediction: Prediction, parts: list[Elements]) -> Tensor:
 def _spent(elements: Elements, detail: Detail, budget: int, size: tuple[int, int]) -> dict:
     """What the record says of it."""
     coarse = int((elements.levels == COARSE).sum())
-    sides = {str(2**level): int((elements.sides == 2**level).sum()) for level in range(LEVELS + 1)}
+    squares = elements.sides[~elements.hidden | (elements.sides <= GROUND)]  # not what goes on under others
+    sides = {str(2**level): int((squares == 2**level).sum()) for level in range(LEVELS + 1)}
     return {
         "level": detail.name,
         "asked": budget,

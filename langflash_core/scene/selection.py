@@ -11,11 +11,19 @@ _MAD_TO_DEVIATION = 1.4826  # of a normal distribution
 _LEAST_DEVIATION = 0.1  # of a logarithm: a perfect grid has spread 0, and tenths there are no news
 
 
-def grow(means: np.ndarray, selected: np.ndarray, allowed: np.ndarray, distance: float) -> np.ndarray:
+def grow(
+    means: np.ndarray,
+    selected: np.ndarray,
+    allowed: np.ndarray,
+    distance: float,
+    radii: np.ndarray | None = None,
+) -> np.ndarray:
     """The selection with everything allowed that lies within `distance` of it.
 
     Args:
-        means: (N, 3). selected, allowed: (N,) bool. distance: scene units.
+        means: (N, 3). selected, allowed: (N,) bool. distance: scene units; of Gaussians of the median of the
+            allowed ones' `radii` (N,), and of wider ones as much more as they, and what is selected beside
+            them, are wider: else a wall of large ones would never grow.
 
     Returns:
         (N,) bool, a superset of `selected`.
@@ -24,10 +32,12 @@ def grow(means: np.ndarray, selected: np.ndarray, allowed: np.ndarray, distance:
     around = np.flatnonzero(allowed & ~selected)
     if not selected.any() or not len(around):
         return grown
-    nearest, _ = KDTree(means[selected]).query(
-        means[around], distance_upper_bound=np.nextafter(distance, np.inf)
-    )
-    grown[around[np.isfinite(nearest)]] = True
+    nearest, which = KDTree(means[selected]).query(means[around])
+    far: np.ndarray | float = distance
+    if radii is not None:
+        typical = max(float(np.median(radii[allowed])), 1e-12)
+        far = distance * np.maximum(1, (radii[around] + radii[selected][which]) / (2 * typical))
+    grown[around[nearest <= far]] = True
     return grown
 
 

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 from PIL import Image
 
 from langflash_core.language.spaces import language_space
-from langflash_core.scene.atoms import alike_order, atom_pictures
+from langflash_core.scene.atoms import alike_order, atom_pictures, atom_shares
 from tests.app.window.scenes import CHAIR, PHRASES, room
 
 
@@ -41,3 +42,14 @@ def test_alike_rows_stand_side_by_side() -> None:
     vectors = np.array([[1, 0], [0, 1], [0.99, 0.14], [0.14, 0.99]])
     order = alike_order(vectors @ vectors.T)
     assert abs(order.index(0) - order.index(2)) == abs(order.index(1) - order.index(3)) == 1
+
+
+def test_shares_are_of_the_surface_not_of_the_count(scene) -> None:
+    """Every Gaussian of an atom cut in four of half the size: it covers what it covered."""
+    fine = scene.semantics.weight_ids[:, 0] == 1
+    rows = torch.cat((torch.nonzero(~fine)[:, 0], *[torch.nonzero(fine)[:, 0]] * 4))
+    cut = scene.rows(rows)
+    halved = torch.where(fine[rows][:, None], 0.5, 1.0) * cut.gaussians.scales
+    cut = replace(cut, gaussians=replace(cut.gaussians, scales=halved))
+    assert 0 < atom_shares(scene)[1] < 1
+    np.testing.assert_allclose(atom_shares(cut), atom_shares(scene), rtol=1e-6)

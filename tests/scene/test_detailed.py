@@ -9,7 +9,15 @@ from torch import Tensor
 from langflash_core.detail import DETAILS, Detail
 from langflash_core.errors import InputError
 from langflash_core.scene.checks import check_scene
-from langflash_core.scene.detailed import _FINENESS, _area, assemble_detailed, working_photos, working_size
+from langflash_core.scene.detailed import (
+    _FINENESS,
+    _area,
+    _spent,
+    assemble_detailed,
+    working_photos,
+    working_size,
+)
+from langflash_core.scene.elements import under
 from langflash_core.splat.reference import render
 from langflash_core.types import Camera, Scene
 from tests.scene.photographed import GRID, SCREEN, WALL, Photographed, photographed
@@ -77,6 +85,13 @@ def test_the_record_adds_up(given, scene):
     assert record.photos == ("0.png", "1.png")
     assert record.warnings == ("of triage", "a note of the network")
     assert list(record.cost.timings) == ["encoder", "assembly"]
+
+
+def test_what_goes_on_under_others_is_no_square_of_a_size():
+    """Of seven cells of 16 / 7 pixels each it is 16 pixels wide, as the largest squares are."""
+    behind = under(torch.ones(7, 7).triu().log1p(), torch.rand(3, 7, 7), (16, 16))
+    assert len(behind) and torch.allclose(behind.sides, torch.tensor(16.0))
+    assert not any(_spent(behind, NORMAL, 1, (16, 16))["by_size"].values())
 
 
 def test_a_wall_alone_needs_nothing_behind_it():

@@ -70,6 +70,21 @@ def test_growing_equals_brute_force():
     assert (grow(means, np.zeros(300, bool), allowed, 0.1) == 0).all()
 
 
+def test_growing_goes_on_among_wide_ones():
+    """A row of fine ones, then one of wide ones ten times as far apart, whose reach is as much longer."""
+    along = np.concatenate((0.1 * np.arange(40), 4.4 + np.arange(10)))
+    means = np.stack((along, 0 * along, 0 * along), -1)
+    radii = np.where(along < 4, 0.07, 0.7)
+    selected, everyone = along < 4, np.ones(50, bool)
+    assert int(grow(means, selected, everyone, 0.2).sum()) == 40
+    grown = grow(means, selected, everyone, 0.2, radii)
+    assert grown[:41].all() and int(grown.sum()) == 41
+    grown = grow(means, grown, everyone, 0.2, radii)
+    assert 42 <= int(grown.sum()) < 45  # two spacings at a time, not ten
+    fine = grow(means, along < 0.05, everyone, 0.2, radii)
+    assert int(fine.sum()) == 3  # where all are of one size, as ever
+
+
 def test_spacing_of_a_grid_is_its_step():
     grid = np.stack(np.meshgrid(*[np.arange(20) * 0.25] * 3), -1).reshape(-1, 3)
     assert spacing(grid) == 0.25 and spacing(grid[:1]) == 0.0

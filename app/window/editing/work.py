@@ -222,19 +222,21 @@ class FindAtom(Selection):
 @dataclass(frozen=True)
 class GrowSelection(Selection):
     """What lies within `reach` spacings of the selection, a spacing being the median one of what is
-    shown; `within`: of what a phrase means."""
+    shown, and as much more of wide Gaussians as they are wider; `within`: of what a phrase means."""
 
     reach: float
     within: FindByPhrase | None
 
     def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.scene.instances import disc_radii
         from langflash_core.scene.selection import grow, spacing
 
-        means = self.placed().means.numpy()
+        placed = self.placed()
+        means, radii = placed.means.numpy(), disc_radii(placed)
         visible = self.marks.visible.rows()
         allowed = visible & self.within.meant() if self.within else visible
         distance = self.reach * spacing(means[visible])
-        found = grow(means, self.marks.selected.rows(), allowed, distance)
+        found = grow(means, self.marks.selected.rows(), allowed, distance, radii)
         yield Found(Mask.of(found), "add", f"around, {self.within.text!r}" if self.within else "around")
 
 

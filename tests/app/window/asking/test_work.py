@@ -26,6 +26,7 @@ from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import encode_cached, language_space
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import Mask, delete
+from langflash_core.scene.thin import covered_areas
 from langflash_core.splat import render
 from langflash_core.types import Semantics
 from tests.app.window.asking.test_prompt_sets import a_set
@@ -71,6 +72,11 @@ def test_histograms_count_covered_pixels_by_score(scene) -> None:
     assert made.histograms[0].counts[-1] > 0 == made.histograms[1].counts[-1]
 
 
+def surfaces(scene) -> np.ndarray:
+    """(3,) opacity times area, each Gaussian of one atom."""
+    return np.bincount(scene.semantics.weight_ids[:, 0].numpy(), covered_areas(scene.gaussians))
+
+
 def test_atoms_are_described(scene) -> None:
     *pictures, found = work.DescribeAtoms(6, scene).run(lambda: False)
     assert [each.key for each in pictures if isinstance(each, do.ShowPicture)] == [
@@ -78,9 +84,7 @@ def test_atoms_are_described(scene) -> None:
     ]
     assert isinstance(found, ask.AtomsDescribed)
     mine = found.insight
-    ids = scene.semantics.weight_ids[:, 0]
-    shares = [(ids == k).float().mean().item() for k in range(3)]  # all of one opacity
-    np.testing.assert_allclose(mine.shares, shares, atol=1e-6)
+    np.testing.assert_allclose(mine.shares, surfaces(scene) / surfaces(scene).sum(), atol=1e-6)
     unit = scene.semantics.dictionary.double().numpy()
     cosines = [[float(a @ b / np.linalg.norm(a) / np.linalg.norm(b)) for b in unit] for a in unit]
     np.testing.assert_allclose(mine.similarity, cosines, atol=1e-12)
@@ -94,7 +98,8 @@ def test_atoms_are_weighed_by_what_is_left(scene) -> None:
     (found,) = work.WeighAtoms(6, scene, half).run(lambda: False)
     *_, described = work.DescribeAtoms(6, scene, half).run(lambda: False)
     assert isinstance(found, ask.AtomsWeighed) and isinstance(described, ask.AtomsDescribed)
-    np.testing.assert_allclose(found.shares, (2500 / 7400, 0.0, 4900 / 7400), atol=1e-6)
+    chair, _, floor = surfaces(scene)
+    np.testing.assert_allclose(found.shares, np.array((chair, 0, floor)) / (chair + floor), atol=1e-6)
     assert described.insight.shares == found.shares
     nothing = delete(marks, Mask.full(len(scene.gaussians)))
     (empty,) = work.WeighAtoms(6, scene, nothing).run(lambda: False)
