@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 
 import torch
@@ -20,6 +21,7 @@ from langflash_core.export.html import Phrases, TextModel, write_html
 from langflash_core.fine import fine_scene
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.images.decode import grey_photo
+from langflash_core.images.straight import after, straightened
 from langflash_core.images.views import load_views, source_pictures
 from langflash_core.language.answers import answer
 from langflash_core.language.clip import load_clip_images
@@ -40,6 +42,7 @@ from langflash_core.network.semantics.grouping import Groups
 from langflash_core.network.semantics.lifting import lifted_weights
 from langflash_core.network.semantics.outlines import Outlines
 from langflash_core.network.semantics.sam2 import Sam2, sam2_checkpoint
+from langflash_core.records import BentLens
 from langflash_core.resources import asset_path
 from langflash_core.running import Progress, Run
 from langflash_core.scene.assemble import assemble
@@ -56,6 +59,7 @@ AGGREGATIONS = ("lfa", "average", "crops")
 GROUPINGS = ("queries", "mobile-sam", "sam2")
 LARGEST_PICTURE = 8192
 LONGEST_REFINEMENT = 3600  # seconds
+_STRAIGHTENED = 3  # times, at most
 _AS_IT_IS = "the preset '{}' makes one Gaussian a pixel; the detail that was asked for is left out"
 _NOT_TOLD = "; these photos do not determine it by themselves"
 _networks: dict[tuple, LangFlashNet] = {}
@@ -140,9 +144,16 @@ def reconstruct(
         ahead.matched.result()  # key points are found beside the weights
     finer = None if detail is None or not network.surfaces else chosen_detail(detail)
     with run.stage("network"):
-        prediction = network.predict(
-            views, run.within("network"), cancelled, atoms, groups, redrawn, elements=finer is None
+        predict = partial(
+            network.predict,
+            progress=run.within("network"),
+            cancelled=cancelled,
+            atoms=atoms,
+            groups=groups,
+            redrawn=redrawn,
+            elements=finer is None,
         )
+        prediction, views = _straight(predict, views)
         prediction = _on_cpu(prediction)
         views = _through(views, prediction)
     images = views.images[[v for v in range(views.num_views) if v not in prediction.unplaced]]
@@ -324,6 +335,28 @@ def _posed(views: Views, viewmats: Tensor | None, preset: str) -> Views:
         raise InputError(f"{len(viewmats)} poses were given for {views.num_views} photos; give one each")
     relative = viewmats.double() @ invert_rigid(viewmats[0].double())
     return replace(views, viewmats=relative)
+
+
+def _straight(predict: Callable[[Views], Prediction], views: Views) -> tuple[Prediction, Views]:
+    """A prediction, and the views it is of: straightened where their lenses bend lines.
+
+    The first round sees a strong bend only where the photos hardly show it, so the photos are straightened by
+    what all rounds say together, until nothing is left of it.
+    """
+    taken = views
+    for left in reversed(range(_STRAIGHTENED + 1)):
+        if views.lenses is not None and not left:
+            views = replace(views, lenses=replace(views.lenses, straight=True))
+        try:
+            return predict(views), views
+        except BentLens as bent:
+            assert views.lenses is not None, "bends are sought of lenses that are known"
+            before = views.lenses.straightened or (None,) * len(bent.found)
+            found = [
+                new if new is None else after(old, new) for old, new in zip(before, bent.found, strict=True)
+            ]
+            views = straightened(taken, found)
+    raise AssertionError("the last round seeks no bends")
 
 
 def _through(views: Views, prediction: Prediction) -> Views:

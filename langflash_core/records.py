@@ -21,11 +21,27 @@ class Cost:
 
 @dataclass(frozen=True)
 class FoundFocal:
-    """Of one lens: by what its focal length grew, its standard error as a share, photos that told it."""
+    """Of one lens: by what its focal length grew, its standard error as a share, photos that told it.
+
+    bend: Brown's first radial term, k of (1 + k r^2) r, with its standard error; 0: lines are straight.
+    """
 
     growth: float
     error: float
     photos: int
+    bend: float = 0.0
+    bend_error: float = 0.0
+
+
+class BentLens(Exception):
+    """Photos bend straight lines, so they are to be straightened before they are looked at again.
+
+    found: of each lens what was found, None: nothing.
+    """
+
+    def __init__(self, found: tuple[FoundFocal | None, ...]):
+        super().__init__("photos are to be straightened")
+        self.found = found
 
 
 @dataclass(frozen=True)
@@ -33,7 +49,8 @@ class FoundLens:
     """What photos told of the lens that they were taken with.
 
     fov: degrees of the photos' longer side; error: standard error of it, degrees. photos: that told it.
-    said: degrees that were assumed, or that the photos record (`recorded`).
+    said: degrees that were assumed, or that the photos record (`recorded`). bend: Brown's first radial term,
+    by which the photos were straightened, with its standard error; 0: they are as they were taken.
     """
 
     fov: float
@@ -41,12 +58,15 @@ class FoundLens:
     photos: int
     said: float
     recorded: bool
+    bend: float = 0.0
+    bend_error: float = 0.0
 
     def __str__(self) -> str:
         whose = "recorded" if self.recorded else "assumed"
+        straightened = f", straightened by k1 = {self.bend:.3f} ± {self.bend_error:.3f}" if self.bend else ""
         return (
             f"{self.fov:.1f} ± {self.error:.1f} degrees, found from {self.photos} photos "
-            f"({whose}: {self.said:.1f})"
+            f"({whose}: {self.said:.1f}){straightened}"
         )
 
 

@@ -62,7 +62,9 @@ class Lenses:
 
     of: which lens took each photo. fovs: degrees of the longer side of the photos. doubts: standard
     deviations expected of the logarithm of the focal length; 0: it is given. recorded: the photos' files say
-    it. note: what a person is told while a lens is assumed, or nothing.
+    it. note: what a person is told while a lens is assumed, or nothing. straightened: of each lens, as
+    what the photos were straightened; nothing, or None: they are as they were taken. straight: nobody seeks
+    more bends.
     """
 
     of: tuple[int, ...]
@@ -70,6 +72,8 @@ class Lenses:
     doubts: tuple[float, ...]
     recorded: tuple[bool, ...]
     note: str = ""
+    straightened: tuple[FoundFocal | None, ...] = ()
+    straight: bool = False
 
     def found(self, told: Sequence[FoundFocal | None]) -> tuple[FoundLens, ...]:
         """The lenses that photos told."""
@@ -81,7 +85,9 @@ class Lenses:
             half = math.atan(before / own.growth)
             error = math.degrees(math.sin(2 * half) * own.error)  # d(2 atan(a / f)) / d(log f)
             fov = math.degrees(2 * half)
-            found.append(FoundLens(fov, error, own.photos, self.fovs[lens], self.recorded[lens]))
+            bent = self.straightened[lens] if self.straightened else None
+            bend = (0.0, 0.0) if bent is None else (bent.bend, bent.bend_error)
+            found.append(FoundLens(fov, error, own.photos, self.fovs[lens], self.recorded[lens], *bend))
         return tuple(found)
 
     def settled(self, found: Sequence[FoundLens]) -> bool:

@@ -12,8 +12,10 @@ import torch
 import langflash_core as lf
 from langflash_core import pipeline
 from langflash_core.errors import Cancelled, ImageError, InputError, PromptError, ViewError, WeightsError
+from langflash_core.images.straight import straightened
 from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS, GuidedDepthNet, build_network, save_network
+from langflash_core.records import BentLens, FoundFocal
 from langflash_core.resources import asset_path
 from langflash_core.splat import render
 from langflash_core.types import Camera, FoundLens, Gaussians, Lenses, Prediction, Scene, Semantics, Views
@@ -133,6 +135,36 @@ def test_a_warning_of_an_assumed_lens_goes_when_photos_tell_it():
     assert told.warnings == ("dark",) and (told.Ks == 2 * Ks).all()
     [dark, left] = pipeline._through(views, plain).warnings
     assert dark == "dark" and left.startswith("assumed;") and (pipeline._through(views, plain).Ks == Ks).all()
+
+
+@pytest.mark.parametrize("rounds", [0, 1, 9])
+def test_photos_are_straightened_until_nothing_bends(rounds):
+    """Always from the photos as they were taken, and the last round seeks no bends."""
+    lenses = Lenses((0, 0), (65.0,), (0.35,), (False,), "assumed")
+    K = torch.tensor([[50.0, 0, 32], [0, 50, 24], [0, 0, 1]])
+    taken = Views(torch.rand(2, 3, 48, 64), K.expand(2, 3, 3), ("a", "b"), lenses=lenses)
+    nothing, seen = torch.zeros(0), list[Views]()
+    plain = Prediction(Gaussians.none(), nothing, nothing, "minilm", nothing, nothing, nothing)
+
+    def predict(views: Views) -> Prediction:
+        seen.append(views)
+        assert views.lenses is not None
+        if len(seen) <= rounds and not views.lenses.straight:
+            raise BentLens((FoundFocal(1.0, 0.01, 2, -0.05 / 4 ** len(seen), 0.001),))
+        return replace(plain, viewmats=torch.eye(4).expand(len(seen), 4, 4))
+
+    predicted, views = pipeline._straight(predict, taken)
+    assert len(predicted.viewmats) == len(seen) and views is seen[-1] and len(seen) == min(rounds, 3) + 1
+    assert views.lenses is not None and views.lenses.straight == (rounds > 3)
+    if not rounds:
+        assert views is taken
+        return
+    [bend] = views.lenses.straightened
+    total = sum(0.05 / 4 ** (i + 1) for i in range(min(rounds, 3)))
+    assert bend is not None and bend.bend == pytest.approx(-total)
+    assert torch.equal(views.images, straightened(taken, [bend]).images)
+    [told] = views.lenses.found([FoundFocal(1.0, 0.01, 2)])
+    assert told.bend == bend.bend and "straightened by k1 = -0.0" in str(told)
 
 
 @pytest.mark.parametrize("patience", [0, 1, 4, 9])

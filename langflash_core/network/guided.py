@@ -236,7 +236,11 @@ def _geometry(
 
 def _sought(views: Views) -> Sought | None:
     """Lenses that are not given."""
-    return None if views.lenses is None else Sought(views.lenses.of, views.lenses.doubts)
+    return (
+        None
+        if views.lenses is None
+        else Sought(views.lenses.of, views.lenses.doubts, not views.lenses.straight)
+    )
 
 
 def _with_lens(Ks: Tensor, poses: Poses) -> Tensor:

@@ -14,6 +14,7 @@ from langflash_core.network.stereo.inputs import PoseInput
 from langflash_core.network.stereo.keypoints import WORKING_SIDE, KeyPoints
 from langflash_core.network.stereo.poses import Poses, estimate_poses, on_other_maps
 from langflash_core.network.stereo.tracks import Tracks, joined, with_pairs
+from langflash_core.records import BentLens
 
 SIZE, FOCAL = (224, 168), 200.0  # 58.5 degrees
 
@@ -27,10 +28,11 @@ def _walk(num_views: int, *, step=(0.25, 0.02, 0.05), turn=(0.01, -0.07, 0.0)) -
     return viewmats
 
 
-def _seen(viewmats: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _seen(viewmats: np.ndarray, points: np.ndarray, bend: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Pixels (V, P, 2) from the principal point, and z (V, P)."""
     pos = np.einsum("vij,pj->vpi", viewmats[:, :3, :3], points) + viewmats[:, None, :3, 3]
-    return FOCAL * pos[..., :2] / pos[..., 2:], pos[..., 2]
+    q = pos[..., :2] / pos[..., 2:]
+    return FOCAL * q * (1 + bend * (q**2).sum(-1, keepdims=True)), pos[..., 2]
 
 
 def _room(seed: int, count: int) -> np.ndarray:
@@ -44,11 +46,11 @@ def _inside(pixels: np.ndarray, z: np.ndarray) -> np.ndarray:
     return (z > 0.3) & (np.abs(pixels) < np.array(SIZE) / 2 - 2).all(-1)
 
 
-def _problem(num_views: int, *, count=60, noise=0.1, seed=0, **way):
+def _problem(num_views: int, *, count=60, noise=0.1, seed=0, bend=0.0, **way):
     """Tracks with noise, true poses and log depths of maps that are smaller by a half."""
     rng = np.random.default_rng(seed)
     viewmats, points = _walk(num_views, **way), _room(seed, count)
-    pixels, z = _seen(viewmats, points)
+    pixels, z = _seen(viewmats, points, bend)
     inside = _inside(pixels, z)
     of, views = np.nonzero(inside.T)
     shown = pixels[views, of] + rng.normal(0, noise, (len(of), 2))
@@ -57,8 +59,9 @@ def _problem(num_views: int, *, count=60, noise=0.1, seed=0, **way):
     return tracks, viewmats, logs
 
 
-def _rig(num_views: int, wrong: float = 1.0, doubt: float = 0.0) -> Rig:
-    return Rig(np.full(num_views, FOCAL * wrong), np.zeros(num_views, int), np.array([doubt]))
+def _rig(num_views: int, wrong: float = 1.0, doubt: float = 0.0, bend_doubt: float = 0.0) -> Rig:
+    lenses = np.zeros(num_views, int)
+    return Rig(np.full(num_views, FOCAL * wrong), lenses, np.array([doubt]), np.array([bend_doubt]))
 
 
 def _adjusted(tracks, viewmats, logs, rig) -> Bundle:
@@ -115,20 +118,22 @@ def _soft(residuals: np.ndarray) -> np.ndarray:
     return residuals * np.sqrt(np.log1p((lengths / 2) ** 2)) / lengths
 
 
-def test_the_adjustment_reaches_the_optimum_of_scipy(monkeypatch):
-    """Poses, points, scales and the lens of four photos at once, wrong matches among them.
+@pytest.mark.parametrize("bend", [0.0, -0.15])
+def test_the_adjustment_reaches_the_optimum_of_scipy(monkeypatch, bend):
+    """Poses, points, scales and the lens of four photos at once, wrong matches among them; a lens that bends
+    lines, and one that must not.
 
     Both minimise one robust cost. The fast one reweights, so it nears the minimum by a share a step; so it is
     let run on here, and both end where a step changes the cost by rounding alone.
     """
-    tracks, true, log_depths = _problem(4, count=30)
+    tracks, true, log_depths = _problem(4, count=30, bend=bend)
     wrong = tracks.pixels.copy()
     wrong[::17] += 3.0
     tracks = replace(tracks, pixels=wrong)
     monkeypatch.setattr(bundles, "_ROUNDS", 1)
     monkeypatch.setattr(bundles, "_CONVERGED", 1e-12)
     monkeypatch.setattr(bundles, "_ITERATIONS", 300)
-    rig = _rig(4, 1.1, 0.35)
+    rig = _rig(4, 1.1, 0.35, 0.15 if bend else 0.0)
     found = _adjusted(tracks, _shaken(true), log_depths, rig)
 
     def unpacked(x):
@@ -136,31 +141,34 @@ def test_the_adjustment_reaches_the_optimum_of_scipy(monkeypatch):
         viewmats = np.repeat(np.eye(4)[None], 4, 0)
         viewmats[:, :3, :3] = Rotation.from_rotvec(poses[:, :3]).as_matrix()
         viewmats[:, :3, 3] = poses[:, 3:]
-        return viewmats, np.append(0.0, x[18:21]), x[22:].reshape(-1, 3), x[21:22]
+        return viewmats, np.append(0.0, x[18:21]), x[23:].reshape(-1, 3), x[21:22], x[22:23]
 
     def residuals(x):
-        viewmats, logs, points, growth = unpacked(x)
+        viewmats, logs, points, growth, k = unpacked(x)
+        k = k if bend else np.zeros(1)
         pos = np.einsum("mij,mj->mi", viewmats[tracks.views, :3, :3], points[tracks.points])
         pos = pos + viewmats[tracks.views, :3, 3]
         z = np.maximum(pos[:, 2], 1e-6)
-        shown = FOCAL * 1.1 * np.exp(growth) * pos[:, :2] / z[:, None]
+        q = pos[:, :2] / z[:, None]
+        shown = FOCAL * 1.1 * np.exp(growth) * q * (1 + k * (q**2).sum(1, keepdims=True))
         seen = (shown - tracks.pixels) / tracks.sigmas[:, None]
         depth = (np.log(z) - log_depths - logs[tracks.views]) / 0.25
         shares = np.minimum(1, 1 / np.bincount(tracks.views))[tracks.views]
         soft = (_soft(seen), np.sqrt(shares) * _soft(depth[:, None])[:, 0])
-        return np.concatenate((soft[0].ravel(), soft[1], logs / 0.3 / 2, growth / 0.35 / 2))
+        return np.concatenate((soft[0].ravel(), soft[1], logs / 0.3 / 2, growth / 0.35 / 2, k / 0.15 / 2))
 
     turns = Rotation.from_matrix(found.viewmats[1:, :3, :3]).as_rotvec()
     poses = np.column_stack((turns, found.viewmats[1:, :3, 3])).ravel()
-    start = np.concatenate((poses, np.zeros(3), found.growths, found.points.ravel()))
+    start = np.concatenate((poses, np.zeros(3), found.growths, found.bends, found.points.ravel()))
     rng = np.random.default_rng(0)
     start = start + rng.normal(0, 1e-3, len(start))
     twin = least_squares(residuals, start, jac="3-point", x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
     rng = np.random.default_rng(0)
-    viewmats, _, points, growth = unpacked(twin.x)
+    viewmats, _, points, growth, k = unpacked(twin.x)
     assert _turned(found.viewmats, viewmats) < 5e-3
     np.testing.assert_allclose(found.viewmats[:, :3, 3], viewmats[:, :3, 3], atol=2e-4)
     np.testing.assert_allclose(found.growths, growth, atol=3e-4)
+    np.testing.assert_allclose(found.bends, k if bend else 0.0, atol=1e-3)
     np.testing.assert_allclose(found.points, points, atol=2e-3)
 
 
@@ -174,6 +182,20 @@ def test_the_lens_is_found_within_its_error():
     ratios, sizes = np.array(errors).T
     assert 0.5 < np.sqrt((ratios**2).mean()) < 1.7  # a chi of 12 degrees of freedom lies there in 99.9 %
     assert sizes.max() < 0.02
+
+
+@pytest.mark.parametrize("bend", [-0.06, 0.05])
+def test_a_bend_is_found_within_its_error(bend):
+    """From where straight lines lead, whose focal length is off by a tenth and more. Thrice the error is what
+    `adjustment` tells of it."""
+    for seed in range(3):
+        tracks, true, logs = _problem(6, seed=seed, bend=bend, count=120)
+        straight = _adjusted(tracks, _shaken(true, seed), logs, _rig(6, 0.95, 0.35))
+        rig = _rig(6, 0.95, 0.35, 0.15)
+        found = adjusted_bundle(straight.viewmats, np.zeros(6), straight.growths, rig, tracks, logs)
+        assert straight.bends[0] == straight.bend_errors[0] == 0
+        assert abs(found.bends[0] - bend) < 3 * found.bend_errors[0] < 0.05
+        assert _turned(found.viewmats, true) < 0.5 * _turned(straight.viewmats, true)
 
 
 def test_a_known_lens_stays_and_wrong_matches_are_left_out():
@@ -211,11 +233,11 @@ def test_walking_ahead_tells_no_lens(flat):
     assert found.errors[0] > 0.05
 
 
-def _photos(viewmats: np.ndarray, *, said: float = 1.0, count: int = 300, seed: int = 0):
+def _photos(viewmats: np.ndarray, *, said: float = 1.0, count: int = 300, seed: int = 0, bend: float = 0.0):
     """What pose estimation reads of photos of a room: lenses that are said to be `said` times as long."""
     rng = np.random.default_rng(seed)
     points = _room(seed, count)
-    pixels, z = _seen(viewmats, points)
+    pixels, z = _seen(viewmats, points, bend)
     K = np.array([[FOCAL * said, 0, SIZE[0] / 2], [0, FOCAL * said, SIZE[1] / 2], [0, 0, 1]])
     ratio, middle = WORKING_SIDE / max(SIZE), np.array(SIZE) / 2
     views, positions, numbers = [], [], []
@@ -249,6 +271,28 @@ def test_photos_tell_poses_and_lens():
     told = estimate_poses(views, points)
     assert told.lenses == (None,) and (told.growths == 1).all()
     assert _turned(told.viewmats, true) > 2 * _turned(found.viewmats, true)
+
+
+@pytest.mark.parametrize("bend", [-0.1, 0.06])
+def test_photos_tell_a_lens_that_bends_lines(bend):
+    """Before anything is made of poses that rest on straight lines."""
+    views, points = _photos(_walk(8, step=(0.15, 0.01, 0.02), turn=(0.01, -0.05, 0)), said=0.95, bend=bend)
+    sought = Sought((0,) * 8, (0.35,), bends=True)
+    with pytest.raises(BentLens) as caught:
+        estimate_poses(views, points, sought=sought)
+    [lens] = caught.value.found
+    assert lens is not None and lens.photos == 8
+    assert abs(lens.bend - bend) < max(0.015, 3 * lens.bend_error) and lens.bend_error < 0.03
+    assert abs(lens.growth * 0.95 - 1) < 0.02
+    estimate_poses(views, points, sought=replace(sought, bends=False))
+
+
+def test_a_lens_that_bends_nothing_is_taken_for_straight():
+    views, points = _photos(_walk(8, step=(0.15, 0.01, 0.02), turn=(0.01, -0.05, 0)), said=0.95)
+    free = estimate_poses(views, points, sought=Sought((0,) * 8, (0.35,), bends=True))
+    held = estimate_poses(views, points, sought=Sought((0,) * 8, (0.35,)))
+    [lens] = free.lenses
+    assert lens is not None and lens.bend == 0 and (free.viewmats == held.viewmats).all()
 
 
 def test_two_photos_are_as_they_were_and_tell_no_lens():

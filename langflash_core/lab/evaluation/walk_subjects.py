@@ -151,10 +151,12 @@ class Camcorder:
 
     exposure: stops by which each photo's exposure may differ, either way, white balance by a sixth of it.
     blur: degrees by which a hand turns while a photo is taken. times: the network's grid a photo is large.
+    bend: Brown's first radial term of the lens; kept frames are as a straight one takes them.
     """
 
     exposure: float = 0.0
     blur: float = 0.0
+    bend: float = 0.0
     times: int = MOST
 
 

@@ -20,7 +20,7 @@ from langflash_core.network.stereo.inputs import (
     normalised_sigma,
     without_camera,
 )
-from langflash_core.network.stereo.keypoints import KeyPoints
+from langflash_core.network.stereo.keypoints import WORKING_SIDE, KeyPoints
 from langflash_core.network.stereo.known import agreeing
 from langflash_core.network.stereo.matching import MIN_INLIERS, Matches
 from langflash_core.network.stereo.tracks import Tracks, joined, no_tracks, thinned, with_pairs
@@ -38,6 +38,12 @@ on what they show, and go together."""
 _KNOWN = 0.03
 """Standard error of a focal length, of itself, above which it is not taken."""
 _FIELDS = (20.0, 120.0)  # degrees of the longer side: what photos of rooms are taken with
+_BEND_DOUBT = 0.15  # standard deviation expected of a bend: action cameras have as much
+_BEND_SURE = 3.0  # standard errors from which a bend is one
+_BEND_SEEN = 4.0
+"""Pixels at the working size by which a bend moves a photo's corner, at least: the focal length makes up for
+three quarters of that, and key points are sure to the rest."""
+_STEEPEST = 0.1  # of a straight lens: what a bent one magnifies a photo's corner along the radius, at least
 
 Agreed = dict[tuple[int, int], Matches]
 
@@ -45,10 +51,12 @@ Agreed = dict[tuple[int, int], Matches]
 @dataclass(frozen=True)
 class Sought:
     """What may be changed of V cameras. lenses: which of G each has; doubts: of each lens the standard
-    deviation expected of the logarithm of its focal length; 0: it is given."""
+    deviation expected of the logarithm of its focal length; 0: it is given. bends: those in doubt may bend
+    lines."""
 
     lenses: tuple[int, ...]
     doubts: tuple[float, ...]
+    bends: bool = False
 
 
 def given_lenses(num_views: int) -> Sought:
@@ -113,6 +121,9 @@ def adjusted_photos(
         FoundFocal(float(growth), float(_SHARED * error), int(count)) if doubt else None
         for growth, error, count, doubt in zip(growths, bundle.errors, counts, doubts, strict=True)
     )
+    if sought.bends and any(lenses):
+        check()
+        lenses = _with_bends(lenses, list(views), points, bundle, matches, np.array(sought.lenses), doubts)
     of_views = growths[list(sought.lenses)]
     return Adjusted(
         bundle.viewmats, bundle.tracks, bundle.depths, bundle.depth_errors, matches, of_views, lenses
@@ -128,6 +139,38 @@ def _told(
         field = 2 * np.degrees(np.arctan(max(view.size) / 2 / (view.K[0, 0] * growths[lens])))
         known[lens] &= _FIELDS[0] < field < _FIELDS[1]
     return known
+
+
+def _with_bends(
+    found: tuple[FoundFocal | None, ...],
+    views: list[PoseInput],
+    points: KeyPoints,
+    straight: Bundle,
+    agreed: Agreed,
+    lenses: np.ndarray,
+    doubts: np.ndarray,
+) -> tuple[FoundFocal | None, ...]:
+    """The lenses (G,) with their bends, where photos show some: adjusted again, from straight lines on."""
+    tracks = thinned(_tracks(views, points, agreed), _OBSERVATIONS[-1])
+    focals = np.array([view.K[0, 0] for view in views])
+    rig = Rig(focals, lenses, doubts / _SHARED, np.where(doubts > 0, _BEND_DOUBT / _SHARED, 0.0))
+    depths = log_depths(views, tracks)
+    bent = adjusted_bundle(straight.viewmats, np.zeros(len(views)), straight.growths, rig, tracks, depths)
+    errors = bent.bend_errors * _SHARED
+    corners = np.zeros(len(doubts))  # |q| there
+    for view, lens in zip(views, lenses, strict=True):
+        focal = view.K[0, 0] * np.exp(bent.growths[lens])
+        corners[lens] = max(corners[lens], np.hypot(*view.size) / 2 / focal)
+    diagonal = WORKING_SIDE * np.hypot(*views[0].size) / max(views[0].size)
+    moved = np.abs(bent.bends) * corners**2 * diagonal / 2
+    shown = (np.abs(bent.bends) > _BEND_SURE * errors) & (moved > _BEND_SEEN)
+    shown &= 1 + 3 * bent.bends * corners**2 > _STEEPEST
+    return tuple(
+        replace(own, growth=float(np.exp(growth)), bend=float(bend), bend_error=float(error))
+        if own and seen
+        else own
+        for own, growth, bend, error, seen in zip(found, bent.growths, bent.bends, errors, shown, strict=True)
+    )
 
 
 def _adjusted(

@@ -1,8 +1,9 @@
 """One adjustment over all photos: poses, points and lenses, so that every point is where all photos see it.
 
 Sizes: V views, M observations of P points, G lenses, C unknowns of poses and lenses. A camera sees
-pos_c = R pos_w + t at p = f exp(g) pos_c / z, pixels from the principal point: f is the focal length that it
-was said to have, g what it differs by.
+pos_c = R pos_w + t, q = pos_c / z, at p = f exp(g) (1 + k |q|^2) q, pixels from the principal point: f is the
+focal length that it was said to have, g what it differs by, k by how much it bends straight lines (Brown's
+first radial term).
 
 The unit of length, and depth where parallax says nothing, rest on the monocular depth maps.
 """
@@ -32,24 +33,34 @@ _POSE = 7  # turn, shift, log scale of the depth map
 @dataclass(frozen=True)
 class Rig:
     """focals (V,): f, pixels. lenses (V,): which lens each camera has. doubts (G,): standard deviations
-    expected of g; 0: the lens stays as it is said to be."""
+    expected of g; 0: the lens stays as it is said to be. bend_doubts (G,): of k; 0, or None: lines are
+    straight."""
 
     focals: np.ndarray
     lenses: np.ndarray
     doubts: np.ndarray
+    bend_doubts: np.ndarray | None = None
+
+    @property
+    def lens_doubts(self) -> np.ndarray:
+        """Of all g, then of all k, (2 G,)."""
+        bends = np.zeros_like(self.doubts) if self.bend_doubts is None else self.bend_doubts
+        return np.concatenate((self.doubts, bends))
 
 
 @dataclass(frozen=True)
 class Bundle:
     """viewmats (V, 4, 4); points (P, 3), world. growths (G,): g; errors (G,): its standard errors, from the
-    inverse Hessian, scaled by the residuals, 0 of what was not sought. tracks: observations that agree.
-    depths (M,): of those, z; depth_errors (M,): of its logarithm, by the other views and by what is known of
-    where they stand."""
+    inverse Hessian, scaled by the residuals, 0 of what was not sought; bends, bend_errors (G,): k likewise.
+    tracks: observations that agree. depths (M,): of those, z; depth_errors (M,): of its logarithm, by the
+    other views and by what is known of where they stand."""
 
     viewmats: np.ndarray
     points: np.ndarray
     growths: np.ndarray
     errors: np.ndarray
+    bends: np.ndarray
+    bend_errors: np.ndarray
     tracks: Tracks
     depths: np.ndarray
     depth_errors: np.ndarray
@@ -61,6 +72,12 @@ class _State:
     logs: np.ndarray
     points: np.ndarray
     growths: np.ndarray
+    bends: np.ndarray
+
+    @property
+    def lenses(self) -> np.ndarray:
+        """All g, then all k, (2 G,)."""
+        return np.concatenate((self.growths, self.bends))
 
 
 @dataclass(frozen=True)
@@ -82,18 +99,23 @@ class _Problem:
     def sought(self) -> np.ndarray:
         """Which of the C unknowns are: all poses but the first, and the lenses in doubt."""
         poses = np.arange(_POSE * len(self.rig.focals)) >= _POSE
-        return np.concatenate((poses, self.rig.doubts > 0))
+        return np.concatenate((poses, self.rig.lens_doubts > 0))
 
     @property
     def columns(self) -> np.ndarray:
-        """The unknowns of each observation, (M, 8)."""
-        lenses = _POSE * len(self.rig.focals) + self.rig.lenses[self.tracks.views]
-        return np.column_stack((_POSE * self.tracks.views[:, None] + np.arange(_POSE), lenses))
+        """The unknowns of each observation, (M, 9)."""
+        growths = _POSE * len(self.rig.focals) + self.rig.lenses[self.tracks.views]
+        poses = _POSE * self.tracks.views[:, None] + np.arange(_POSE)
+        return np.column_stack((poses, growths, growths + len(self.rig.doubts)))
 
     def focals(self, state: _State) -> np.ndarray:
         """Of the camera of each observation, in sigmas of the observation."""
         views = self.tracks.views
         return self.rig.focals[views] * np.exp(state.growths[self.rig.lenses[views]]) / self.tracks.sigmas
+
+    def bends(self, state: _State) -> np.ndarray:
+        """Of the lens of each observation."""
+        return state.bends[self.rig.lenses[self.tracks.views]]
 
 
 def adjusted_bundle(
@@ -107,7 +129,7 @@ def adjusted_bundle(
     """The poses, points and lenses that all observations say; view 0 stays where it is.
 
     Levenberg-Marquardt with Cauchy weights; points are eliminated (Schur complement), so that a step solves a
-    system of 7 V + G numbers. What does not agree is left out once, and the rest adjusted again.
+    system of 7 V + 2 G numbers. What does not agree is left out once, and the rest adjusted again.
 
     Args:
         viewmats (V, 4, 4), logs (V,), growths (G,): to start from; logs are of the depth maps' scales.
@@ -116,7 +138,7 @@ def adjusted_bundle(
     Source: Triggs et al. 2000; twin: scipy.optimize.least_squares in tests/network/test_bundle.py.
     """
     problem = _Problem.of(rig, tracks, log_depths)
-    state = _State(viewmats, logs, np.zeros((0, 3)), growths)
+    state = _State(viewmats, logs, np.zeros((0, 3)), growths, np.zeros_like(growths))
     state = replace(state, points=_first_points(state, problem))
     for left in reversed(range(_ROUNDS)):
         state = _solved(state, problem, _NEARLY if left else _CONVERGED)
@@ -125,7 +147,8 @@ def adjusted_bundle(
     spread, errors, unsure = _errors(state, problem)
     depths, depth_errors = _depths(state, problem)
     depth_errors = np.hypot(depth_errors * spread, unsure)
-    return Bundle(state.viewmats, state.points, state.growths, errors, problem.tracks, depths, depth_errors)
+    found = (state.viewmats, state.points, state.growths, errors[0], state.bends, errors[1])
+    return Bundle(*found, problem.tracks, depths, depth_errors)
 
 
 def _solved(state: _State, problem: _Problem, converged: float) -> _State:
@@ -178,7 +201,8 @@ def _residuals(state: _State, problem: _Problem) -> np.ndarray:
     tracks = problem.tracks
     pos = _turned(state, problem) + state.viewmats[tracks.views, :3, 3]
     z = np.maximum(pos[:, 2], 1e-6)
-    scale = problem.focals(state) / z
+    bent = 1 + problem.bends(state) * (pos[:, :2] ** 2).sum(1) / z**2
+    scale = problem.focals(state) / z * bent
     reprojection = scale[:, None] * pos[:, :2] - tracks.pixels / tracks.sigmas[:, None]
     depth = (np.log(z) - problem.log_depths - state.logs[tracks.views]) / _DEPTH_SIGMA
     return np.column_stack((reprojection, depth))
@@ -195,27 +219,36 @@ def _cost(state: _State, problem: _Problem) -> float:
     residuals = _residuals(state, problem)
     seen = np.log1p((residuals[:, :2] ** 2).sum(1) / _CAUCHY**2).sum()
     depth = (problem.shares * np.log1p((residuals[:, 2] / _CAUCHY) ** 2)).sum()
-    known = problem.rig.doubts > 0
-    lens = ((state.growths[known] / problem.rig.doubts[known]) ** 2).sum()
+    doubts = problem.rig.lens_doubts
+    known = doubts > 0
+    lens = ((state.lenses[known] / doubts[known]) ** 2).sum()
     return float(seen + depth + ((state.logs**2).sum() / _SCALE_SIGMA**2 + lens) / _CAUCHY**2)
 
 
 def _jacobians(state: _State, problem: _Problem) -> tuple[np.ndarray, np.ndarray]:
-    """Of `_residuals` to the unknowns of a camera (M, 3, 8) and to the point (M, 3, 3)."""
-    tracks = problem.tracks
+    """Of `_residuals` to the unknowns of a camera (M, 3, 9) and to the point (M, 3, 3).
+
+    dp / dq = f exp(g) ((1 + k |q|^2) I + 2 k q q^T), and along the ray -q times that.
+    """
+    tracks, bends, focals = problem.tracks, problem.bends(state), problem.focals(state)
     turned = _turned(state, problem)
     pos = turned + state.viewmats[tracks.views, :3, 3]
     z = np.maximum(pos[:, 2], 1e-6)
-    scale = problem.focals(state) / z
+    q = pos[:, :2] / z[:, None]
+    squares = (q**2).sum(1)
+    scale, more = focals / z * (1 + bends * squares), 2 * focals / z * bends
     to_pos = np.zeros((len(z), 3, 3))
-    to_pos[:, 0, 0] = to_pos[:, 1, 1] = scale
-    to_pos[:, :2, 2] = -pos[:, :2] * (scale / z)[:, None]
+    to_pos[:, :2, :2] = more[:, None, None] * q[:, :, None] * q[:, None]
+    to_pos[:, 0, 0] += scale
+    to_pos[:, 1, 1] += scale
+    to_pos[:, :2, 2] = -pos[:, :2] * (scale / z)[:, None] - q * (more * squares)[:, None]
     to_pos[:, 2, 2] = 1 / (z * _DEPTH_SIGMA)
-    to_camera = np.zeros((len(z), 3, _POSE + 1))
+    to_camera = np.zeros((len(z), 3, _POSE + 2))
     to_camera[:, :, :3] = np.cross(turned[:, None], to_pos)
     to_camera[:, :, 3:6] = to_pos
     to_camera[:, 2, 6] = -1 / _DEPTH_SIGMA
     to_camera[:, :2, 7] = pos[:, :2] * scale[:, None]
+    to_camera[:, :2, 8] = q * (focals * squares)[:, None]
     return to_camera, to_pos @ state.viewmats[tracks.views, :3, :3]
 
 
@@ -235,7 +268,7 @@ class _System:
         residuals = _residuals(state, problem)
         weights = _weights(residuals, problem)[..., None]
         to_camera, to_point = _jacobians(state, problem)
-        weighted = (to_camera * weights).transpose(0, 2, 1)  # (M, 8, 3)
+        weighted = (to_camera * weights).transpose(0, 2, 1)  # (M, 9, 3)
         columns, sought = problem.columns, problem.sought
         count = len(sought)
         places = (columns[:, :, None] * count + columns[:, None]).ravel()
@@ -263,10 +296,11 @@ def _priors(state: _State, problem: _Problem) -> tuple[np.ndarray, np.ndarray]:
     rig = problem.rig
     poses = np.zeros((len(rig.focals), _POSE))
     poses[:, 6] = 1 / _SCALE_SIGMA**2
-    lens = np.where(rig.doubts > 0, np.maximum(rig.doubts, 1e-9) ** -2.0, 0.0)
+    doubts = rig.lens_doubts
+    lens = np.where(doubts > 0, np.maximum(doubts, 1e-9) ** -2.0, 0.0)
     precisions = np.concatenate((poses.ravel(), lens))
     poses[:, 6] *= state.logs
-    return precisions, np.concatenate((poses.ravel(), lens * state.growths))
+    return precisions, np.concatenate((poses.ravel(), lens * state.lenses))
 
 
 def _reduced(system: _System, damping: float) -> tuple[np.ndarray, np.ndarray, scipy.sparse.csr_matrix]:
@@ -296,6 +330,7 @@ def _step(problem: _Problem, system: _System, damping: float) -> tuple[np.ndarra
 def _moved(state: _State, problem: _Problem, step: np.ndarray, shifts: np.ndarray) -> _State:
     num_views = len(state.viewmats)
     poses = step[: _POSE * num_views].reshape(num_views, _POSE)
+    growths, bends = step[_POSE * num_views :].reshape(2, -1)
     viewmats = state.viewmats.copy()
     for view, own in zip(viewmats, poses, strict=True):
         view[:3, :3] = cv2.Rodrigues(own[:3])[0] @ view[:3, :3]
@@ -304,7 +339,8 @@ def _moved(state: _State, problem: _Problem, step: np.ndarray, shifts: np.ndarra
         viewmats,
         state.logs + poses[:, 6],
         state.points + shifts * _held(state, problem, shifts)[:, None],
-        state.growths + np.clip(step[_POSE * num_views :], -0.2, 0.2),
+        state.growths + np.clip(growths, -0.2, 0.2),
+        state.bends + np.clip(bends, -0.1, 0.1),
     )
 
 
@@ -331,8 +367,8 @@ def _without_outliers(state: _State, problem: _Problem) -> tuple[_State, _Proble
 
 
 def _errors(state: _State, problem: _Problem) -> tuple[float, np.ndarray, float]:
-    """By what the residuals exceed their sigmas; the standard errors (G,) of g, scaled by it; and that of
-    where the cameras stand, as a share of how far they stand apart, whatever the unit of length."""
+    """By what the residuals exceed their sigmas; the standard errors (2, G) of g and k, scaled by it; and
+    that of where the cameras stand, as a share of how far they stand apart, whatever the unit of length."""
     residuals = _residuals(state, problem)
     weights = _weights(residuals, problem)
     sought, num_views = problem.sought, len(state.viewmats)
@@ -341,7 +377,7 @@ def _errors(state: _State, problem: _Problem) -> tuple[float, np.ndarray, float]
     reduced, _, _ = _reduced(_System.of(state, problem), 0.0)
     larger = np.zeros((num_views, _POSE))  # the direction in which everything grows
     larger[:, 3:6], larger[:, 6] = state.viewmats[:, :3, 3], 1
-    larger = np.concatenate((larger.ravel(), np.zeros(len(problem.rig.doubts))))[sought]
+    larger = np.concatenate((larger.ravel(), np.zeros(len(problem.rig.lens_doubts))))[sought]
     reduced += 1e6 * np.outer(larger, larger)
     variances = np.zeros(len(sought))
     variances[sought] = np.diag(np.linalg.inv(reduced)).clip(0) * spread**2
@@ -349,7 +385,7 @@ def _errors(state: _State, problem: _Problem) -> tuple[float, np.ndarray, float]
     centres = -np.einsum("vji,vj->vi", state.viewmats[:, :3, :3], state.viewmats[:, :3, 3])
     apart = np.median(np.linalg.norm(centres - centres.mean(0), axis=1))
     unsure = float(np.sqrt(np.median(moves[1:])) / max(apart, 1e-9)) if num_views > 1 else 0.0
-    return spread, np.sqrt(variances[_POSE * num_views :]), unsure
+    return spread, np.sqrt(variances[_POSE * num_views :]).reshape(2, -1), unsure
 
 
 def _depths(state: _State, problem: _Problem) -> tuple[np.ndarray, np.ndarray]:

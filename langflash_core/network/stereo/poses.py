@@ -32,7 +32,7 @@ from langflash_core.network.stereo.matching import (
     relative_pose,
     triangulate,
 )
-from langflash_core.records import FoundFocal
+from langflash_core.records import BentLens, FoundFocal
 
 _MIN_SHARE = 0.25  # of the matches must agree with a pose
 _MAX_DEPTH_SIGMA = 0.2  # log-depth error beyond which a triangulated match says too little
@@ -87,7 +87,8 @@ def estimate_poses(
         sought: lenses that may be corrected; None: all are given.
 
     Raises:
-        InputError: the photos do not fit the poses that are given.
+        InputError: the photos do not fit the poses that are given. BentLens: lines are bent, where that is
+            sought.
     """
     num_views = len(views)
     told = {edge: rows for edge, rows in points.pairs.items() if not _blank(points, edge)}
@@ -124,6 +125,8 @@ def _together(views: list[PoseInput], points: KeyPoints, sought: Sought, check: 
     if max(sought.doubts) > 0:
         few = _few(len(views), {edge: len(rows) for edge, rows in points.pairs.items()})
         first = _solved(*_part(views, points, sought, few), check)
+        _check_straight(first[2])
+        sought = replace(sought, bends=False)
         growths = _other_lenses(first[2], sought)
         solved = first if len(few) == len(views) and (growths == 1).all() else None
     seen = [view.through(growth) for view, growth in zip(views, growths, strict=True)]
@@ -135,6 +138,16 @@ def _together(views: list[PoseInput], points: KeyPoints, sought: Sought, check: 
     adjusted = adjusted.after(growths, sought.lenses)
     seen = [view.through(growth) for view, growth in zip(views, adjusted.growths, strict=True)]
     return _of_adjusted(adjusted, seen, found.missing)
+
+
+def _check_straight(adjusted: Adjusted | None) -> None:
+    """Refuse photos whose lens bends lines: depth and pictures take them for straight.
+
+    Raises:
+        BentLens: with all lenses, in the order of `Sought`.
+    """
+    if adjusted is not None and any(lens is not None and lens.bend for lens in adjusted.lenses):
+        raise BentLens(adjusted.lenses)
 
 
 def _solved(
