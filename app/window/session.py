@@ -30,7 +30,7 @@ from .kit import theme
 from .kit.look import Look
 from .kit.textures import Thumbnails
 from .log import LogEffects
-from .memory import keep_large_apart
+from langflash_core.memory import keep_large_apart
 from .opening.effects import OpeningEffects
 from .recovery import preferences
 from .recovery.commands import Prefer

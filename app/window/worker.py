@@ -23,7 +23,7 @@ from PIL import Image
 from langflash_core.errors import Cancelled, LangFlashError
 
 from .commands import Command, Notify, OfScene
-from .memory import give_back
+from langflash_core.memory import give_back
 from .requests import Errand, Job, SceneErrand
 from .scene.commands import JobCancelled, JobFailed, Loaded, Progressed
 

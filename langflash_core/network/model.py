@@ -11,6 +11,7 @@ from torch import Tensor, nn
 
 from langflash_core.errors import WeightsError
 from langflash_core.network.encoders.shared import Tokens
+from langflash_core.network.many import in_groups
 from langflash_core.network.presets import Preset
 from langflash_core.network.semantics.aggregation import Aggregation, averaged_atoms
 from langflash_core.network.semantics.grouping import Groups
@@ -307,9 +308,14 @@ def pooled_weights(weights: Tensor, features: Tensor) -> Tensor:
     one over rows of one over columns, and both are matrix products.
     """
     rows, columns = (
-        _windows(weights.shape[-dim], features.shape[-dim]).to(weights) for dim in (2, 1)
+        _windows(weights.shape[-dim], features.shape[-dim]).to(weights.device, _exact(weights)) for dim in (2, 1)
     )  # (h, H), (w, W)
-    return (rows @ weights @ columns.T)[None]
+    return in_groups(lambda some: rows @ some.to(rows) @ columns.T, weights)[None]
+
+
+def _exact(weights: Tensor) -> torch.dtype:
+    """Single precision of half, which many photos' weights are held in."""
+    return torch.float32 if weights.dtype == torch.float16 else weights.dtype
 
 
 def _windows(length: int, count: int) -> Tensor:

@@ -46,6 +46,17 @@ class Tokens:
         hooks, named, grouped = (tuple(map(change, kind)) for kind in (self.hooks, self.named, self.grouped))
         return Tokens(hooks, self.grid, named, grouped)
 
+    @staticmethod
+    def beside(parts: Sequence["Tokens"]) -> "Tokens":
+        """Those of several groups of views, one after the other."""
+        if len(parts) == 1:
+            return parts[0]
+        kinds = ([part.hooks for part in parts], [part.named for part in parts], [part.grouped for part in parts])
+        hooks, named, grouped = (
+            tuple(torch.cat(list(same), 1) for same in zip(*kind, strict=True)) for kind in kinds
+        )
+        return Tokens(hooks, parts[0].grid, named, grouped)
+
     def for_grouping(self) -> "Tokens":
         """Those that the grouping reads."""
         return Tokens(self.grouped or self.hooks, self.grid)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from app.window.memory import give_back
+from langflash_core.memory import give_back
 from app.window.scene import commands as show
 from app.window.scene import work
 from app.window.worker import Worker
