@@ -41,7 +41,7 @@ def load_views(
         Views with triage notes in `warnings`, one sentence each.
 
     Raises:
-        ImageError: a photo cannot be used. InputError: no photo, over 32, or an unusable lens.
+        ImageError: a photo cannot be used. InputError: no photo, too many, or an unusable lens.
         ValueError: `multiple` < 1 or `area` < multiple^2.
     """
     paths = photo_paths(photos)

@@ -57,7 +57,7 @@ def add_reconstruct(commands) -> None:
         "--frames",
         type=frame_count,
         metavar="N",
-        help="of a film, at most so many (default: as many as photos are taken)",
+        help="of a film, at most so many (default: 32)",
     )
     add_film_part(command)
     add_network(command)
@@ -120,7 +120,7 @@ def add_frames(commands) -> None:
         "--most",
         type=frame_count,
         metavar="N",
-        help="at most so many (default: as many as `langflash reconstruct` takes)",
+        help="at most so many (default: 32, as `langflash reconstruct` takes)",
     )
     add_film_part(command)
     command.add_argument(

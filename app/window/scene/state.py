@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 
 FLIGHT_SECONDS = 0.7
+WHOLE_PHOTOS = 32  # of a scene, up to which all stay whole on the graphics card: 1.4 MB each
+WHOLE = "compared photo"
+"""The picture of the one that is whole of more photos."""
 MOST_ROOMS = 3  # beside the one on show; a large scene takes 100 MB
 
 
