@@ -51,8 +51,8 @@ def with_frames(
     """Photos with films replaced by their frames; what is told of each film; and notes for people.
 
     Args:
-        most: frames of each film; None: `FILM_PHOTOS`, or as many as there is room for beside photos and other
-            films.
+        most: frames of each film; None: `FILM_PHOTOS`, or as many as there is room for beside photos and
+            other films.
 
     Raises:
         InputError: a film cannot be used, or there are no films and yet options for them, or too many photos.

@@ -138,8 +138,9 @@ def notes_on(strip: Strip, choice: Choice) -> tuple[str, ...]:
     notes = list(strip.notes)
     if choice.until is not None:
         notes.append(
-            f"{strip.film} shows more than {max(len(choice.chosen), FILM_PHOTOS)} photos can cover, what comes "
-            f"after {choice.until:.1f} s is left out; more of them cover more, and --from and --to tell another part"
+            f"{strip.film} shows more than {max(len(choice.chosen), FILM_PHOTOS)} photos can cover, what "
+            f"comes after {choice.until:.1f} s is left out; more frames cover more, and --from and --to tell "
+            "another part"
         )
     if choice.gap > 3 * APART and strip.every is None:
         notes.append(

@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
+from types import MappingProxyType
+from typing import cast
 
 import cv2
 import numpy as np
@@ -13,6 +15,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import rays
+from langflash_core.memory import give_back
 from langflash_core.network.encoders.late import LateHalf
 from langflash_core.network.encoders.local import LocalFeatures
 from langflash_core.network.encoders.shared import Encoder, Tokens, tokens_to_maps, unflattened
@@ -48,6 +51,8 @@ from langflash_core.network.stereo.sweep import DepthRefiner
 from langflash_core.running import Run
 from langflash_core.types import Gaussians, Views
 
+_SWEPT = 0.3  # of the time of refinement, before photos are registered one by one
+_CLOSELY = 32  # photos, up to which language features are held at their full size
 _OTHER_LENS = 0.01
 """Change of the focal length, as a logarithm, from which depth is predicted anew: it is known no better."""
 
@@ -66,6 +71,7 @@ class GuidedDepthNet(LangFlashNet):
     surfaces = True
     caches_tokens = True
     stages = ("encoder", "depth", "poses", "refinement", "Gaussians", *MEANING_STAGES)
+    begins = MappingProxyType(dict(zip(stages, (0.0, 0.07, 0.1, 0.2, 0.8, 0.82, 0.85, 0.97), strict=True)))
 
     def __init__(self, preset: GuidedDepth):
         super().__init__(preset)
@@ -124,27 +130,32 @@ class GuidedDepthNet(LangFlashNet):
 
     def _prior(self, levels: tuple[Tensor, ...], tokens: Tokens) -> DepthMaps:
         """Depth of one scene (B = 1), some views at a time."""
+        count = tokens.shape[1]
         parts = [
-            self.depth_head(tuple(level[some] for level in levels), tokens.views(range(some.start, some.stop)))
-            for some in groups_of(tokens.shape[1])
+            self.depth_head(
+                tuple(level[some] for level in levels), tokens.views(range(some.start, some.stop))
+            )
+            for some in groups_of(count)
         ]
-        if len(parts) == 1:
-            return parts[0]
-        logs, errors = [part.log_depths for part in parts], [part.log_errors for part in parts]
-        return DepthMaps(together(logs, 1), together(errors, 1))
+        logs, errors = (part.log_depths for part in parts), (part.log_errors for part in parts)
+        return DepthMaps(together(logs, count, 1), together(errors, count, 1))
 
     def monocular_depth(self, tokens: Tokens, Ks: Tensor) -> DepthMaps:
         """Prior depth in metres, (B, V, H, W)."""
         return self.depth_head(self.levels(tokens, Ks), tokens)
 
     def language(self, tokens: Tokens, images: Tensor) -> Tensor:
-        """L(x) from the shared tokens, at four times their grid."""
-        parts = []
-        for some in groups_of(tokens.shape[1]):
+        """L(x) from the shared tokens, at four times their grid; of very many photos at twice."""
+        count = tokens.shape[1]
+
+        def features(some: slice) -> Tensor:
             with self._fast(images):
-                features = self.language_head(tokens.views(range(some.start, some.stop)))
-            parts.append(held(self._exact(features), tokens.shape[1]))
-        return together(parts, 1)
+                own = self._exact(self.language_head(tokens.views(range(some.start, some.stop))))
+            if count > _CLOSELY:
+                own = F.normalize(F.avg_pool2d(own.flatten(0, 1), 2), dim=1).unflatten(0, own.shape[:2])
+            return held(own, count)
+
+        return together(map(features, groups_of(count)), count, 1)
 
     def semantic_maps(self, tokens: Tokens, images: Tensor) -> tuple[tuple[Tensor, ...], Tensor]:
         """Memories at 1, 2 and 4 times the grid, and the mask map at 8 times."""
@@ -175,16 +186,19 @@ class GuidedDepthNet(LangFlashNet):
     ) -> Tensor:
         """`parts`, some views at a time; features (V, C, h, w)."""
         rule, some = self.preset.splitting, groups_of(tokens.shape[1])
+        grouping = cast(SemanticGrouping, self.grouping)
         memories, finest = [], []
         for own in some:
             read, fine = self.semantic_maps(tokens.views(range(own.start, own.stop)), images[:, own])
             memories.append(read)
             finest.append(fine.half())
-        queries = self.grouping.of_many(memories)
+            del fine
+            give_back()
+        queries = grouping.of_many(memories)
         del memories
         strongest, existence = [], None
         for fine in finest:
-            masks = self.grouping.masks(queries, fine.float())
+            masks = grouping.masks(queries, fine.float())
             strongest.append(masks.mask_logits[0].amax((0, 2, 3)))
             existence = masks.existence_logits[0]
         assert existence is not None, "there are many views"
@@ -195,7 +209,7 @@ class GuidedDepthNet(LangFlashNet):
 
         def joint(number: int) -> Tensor:
             fine = finest[number].float()
-            groups = self.grouping.masks(queries, fine)
+            groups = grouping.masks(queries, fine)
             whole = group_weights(groups, survivors, (fine.shape[-2], fine.shape[-1]))
             return joint_maps(whole, fine, meant[some[number]], rule)
 
@@ -266,6 +280,8 @@ class GuidedDepthNet(LangFlashNet):
                 len(own),
             )[-1]
             log_depths[own], log_errors[own] = refined.log_depths[0], refined.log_errors[0]
+            if len(ids) > len(own):
+                give_back()  # groups look at more and fewer others: what one leaves fits no other
         return DepthMaps(log_depths, log_errors)
 
     @staticmethod
@@ -295,7 +311,14 @@ def _agreed(maps: DepthMaps, views: Views, poses: Poses, viewmats: Tensor, Ks: T
     near = partners(part.log_depths, viewmats[placed], Ks[placed])
     part = agreed(part, viewmats[placed], Ks[placed], near)
     photos = _greys(views)
-    part = registered(part, [photos[v] for v in placed], viewmats[placed], Ks[placed], near, run.check)
+    told = run.counted("refinement", "photo", range(len(placed)), _SWEPT)
+
+    def each(view: int, make: Callable[[], Tensor]) -> Tensor:
+        next(told)
+        found = run.kept(f"depth-{view}", lambda: {"log_depths": make().cpu().numpy()})
+        return torch.from_numpy(np.array(found["log_depths"])).to(part.log_depths)
+
+    part = registered(part, [photos[v] for v in placed], viewmats[placed], Ks[placed], near, run.check, each)
     part = replace(part, log_depths=in_groups(flattened, part.log_depths, part.log_errors))
     log_depths = maps.log_depths.clone()
     log_depths[placed] = part.log_depths

@@ -4,9 +4,9 @@ Few photos are one group and take the same way as ever, to the same bits. Of man
 photo (language features, the map that masks are read from, weights) is held in half precision.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
+from itertools import pairwise
 
-import torch
 from torch import Tensor
 
 from langflash_core.memory import give_back
@@ -19,27 +19,40 @@ def groups_of(count: int) -> list[slice]:
     """Places of `count` photos, at most `FEW` of them at a time; nothing of none."""
     number = -(-count // FEW)
     bounds = [count * k // number for k in range(number + 1)] if count else []
-    return [slice(first, last) for first, last in zip(bounds[:-1], bounds[1:], strict=True)]
+    return [slice(first, last) for first, last in pairwise(bounds)]
 
 
 def in_groups(work: Callable[..., Tensor], *of_views: Tensor, dim: int = 0) -> Tensor:
-    """What `work` makes of all views, which are dimension `dim` of what it reads and gives, group by group."""
-    groups = groups_of(of_views[0].shape[dim])
+    """What `work` makes of all views, which are dimension `dim` of what it reads and gives, group by
+    group."""
+    count = of_views[0].shape[dim]
+    groups = groups_of(count)
     if len(groups) < 2:
         return work(*of_views)
-    parts = []
-    for some in groups:
-        own = (values.narrow(dim, some.start, some.stop - some.start) for values in of_views)
-        parts.append(work(*own))
-    return together(parts, dim)
+    parts = (
+        work(*(values.narrow(dim, some.start, some.stop - some.start) for values in of_views))
+        for some in groups
+    )
+    return together(parts, count, dim)
 
 
-def together(parts: Sequence[Tensor], dim: int = 0) -> Tensor:
-    """Parts of all views in one; a single one as it is. What made them goes back to the system."""
-    if len(parts) == 1:
-        return parts[0]
-    whole = torch.cat(list(parts), dim)
-    give_back()
+def together(parts: Iterable[Tensor], count: int, dim: int = 0) -> Tensor:
+    """Parts of `count` views in one, each put there as it comes; a single one as it is.
+
+    What made them goes back to the system.
+    """
+    whole, done = None, 0
+    for part in parts:
+        length = part.shape[dim]
+        if length == count:
+            return part
+        if whole is None:
+            whole = part.new_empty(*part.shape[:dim], count, *part.shape[dim + 1 :])
+        whole.narrow(dim, done, length).copy_(part)
+        done += length
+        del part
+        give_back()
+    assert whole is not None and done == count, "the parts are those of all views"
     return whole
 
 

@@ -56,8 +56,9 @@ def seen_through(
 
 
 def _witnesses(view: int, points: Tensor, viewmats: Tensor, Ks: Tensor, size: tuple[int, int]) -> list[int]:
-    """The other photos that are asked about a photo's points (n, 3): all of `_ASKED` and fewer; of more so many,
-    spread evenly over those that have some of the points before them, so that the work grows with the photos."""
+    """The other photos that are asked about a photo's points (n, 3): all of `_ASKED` and fewer; of more so
+    many, spread evenly over those that have some of the points before them, so that the work grows with the
+    photos."""
     others = [other for other in range(len(viewmats)) if other != view]
     if len(others) <= _ASKED:
         return others

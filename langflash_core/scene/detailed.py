@@ -16,6 +16,7 @@ from torch.nn import functional as F
 
 from langflash_core.detail import Detail
 from langflash_core.geometry.cameras import invert_rigid, unproject
+from langflash_core.memory import give_back
 from langflash_core.scene.assemble import (
     directed,
     mean_distance,
@@ -234,8 +235,8 @@ def _made(
     limit: float,
     top_m: int,
 ) -> tuple[Gaussians, list[tuple[Tensor, Tensor]], list[Elements]]:
-    """All photos' Gaussians in the world, in the prediction's unit; weights of each photo's, which end where it
-    has borders (`borders`); and its elements. A photo at a time."""
+    """All photos' Gaussians in the world, in the prediction's unit; weights of each photo's, which end where
+    it has borders (`borders`); and its elements. A photo at a time."""
     known = directed(prediction.dictionary)
     made, weights, parts = [], [], []
     for view, (sight, tree) in enumerate(zip(sights, trees, strict=True)):
@@ -246,6 +247,8 @@ def _made(
         width = sight.size[1]
         weights.append(sparse_weights(refined.at(part.pixels // width, part.pixels % width), top_m))
         parts.append(part)
+        if len(trees) > _HELD:
+            give_back()
     names = ("means", "quats", "scales", "opacities", "sh")
     whole = Gaussians(*(torch.cat([getattr(some, name) for some in made]) for name in names))
     return whole, weights, parts

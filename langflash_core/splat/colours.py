@@ -11,17 +11,18 @@ Andersen and Kak 1984 with one subset), each begun a little ahead of the last (B
 FISTA). Colours stay within [0, 1] or, with `ringing`, near what the photos show around a Gaussian.
 
 Of a view only the Gaussians that it shows are held. Many photos say the same again and again: each of them
-speaks in one block of its pixels in some, in another one than its neighbours, and in a low voice where much of
-what it shows is its own, since nobody else may see that. More than `TOGETHER` photos' worth of pixels are solved for in groups of
-neighbours in their order, each from where those before it came to; a colour is the mean of what its groups
-found, weighed by how much of it each saw. So memory stays that of one group, and time grows with the photos.
+speaks in one block of its pixels in some, in another one than its neighbours, and in a low voice where much
+of what it shows is its own, since nobody else may see that. More than `TOGETHER` photos' worth of pixels are
+solved for in groups of neighbours in their order, each from where those before it came to; a colour is the
+mean of what its groups found, weighed by how much of it each saw. So memory stays that of one group, and
+time grows with the photos.
 
 Sizes: V views, N Gaussians, n of them in one view, h w pixels of a photo.
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import cv2
@@ -30,6 +31,7 @@ import scipy.sparse
 import torch
 from torch import Tensor
 
+from langflash_core.memory import give_back
 from langflash_core.splat.frustum import Packs
 from langflash_core.splat.mixing import mixing
 from langflash_core.splat.projection import Footprints, project
@@ -43,7 +45,10 @@ _MANY, _CUTS = 8, {"faint": 1 / 32, "small": 0.02}
 .005 dB of 28.9."""
 _EVERY, _MOST_EVERY = 8, 8
 """Photos of which one speaks in a block, and in one block of how many a photo speaks at least."""
-_BLOCK, _OWN = 96, 0.25  # pixels, a block's side; share of own Gaussians in it, from which a photo speaks anyway
+_BLOCK, _OWN = (
+    96,
+    0.25,
+)  # pixels, a block's side; share of own Gaussians in it, from which a photo speaks anyway
 _LOW = 0.1  # what a photo's word counts where it speaks for its own alone
 _TURN = 3  # blocks by which a row of them begins later than the one before
 _LEAST = 0.5  # of a pixel's light, from which a picture says what is wrong there
@@ -89,10 +94,9 @@ def solved_colours(
             the work there.
 
     Returns:
-        Colours, and how near every photo they come where it speaks: of several groups of photos "after" is over
-        one row of pixels in eight.
+        Colours, and how near every photo they come where it speaks: of several groups of photos "after" is
+        over an eighth of that.
     """
-    trusts = trusts or [None] * len(photos)
     gaussians = gaussians.map(lambda values: values.float())
     first = start.detach().cpu().numpy().astype(np.float32)
     packs, answer = Packs.of(gaussians), _Answer.of(first)
@@ -107,7 +111,11 @@ def solved_colours(
             rows = packs.before(cameras[view])
             own = None if owners is None or share == 1 else (owners[rows.to(owners.device)] == view)
             spoken = None if own is None else _Spoken(own.cpu().numpy(), view, share)
-            group.views.append(_View.of(gaussians, rows, cameras[view], photos[view], trusts[view], cuts, spoken))
+            trust = None if trusts is None else trusts[view]
+            seen = _View.of(gaussians, rows, cameras[view], photos[view], trust, cuts, spoken)
+            group.views.append(seen)
+            if cuts:
+                give_back()  # each view leaves holes of other sizes
         before += [view.error(first) for view in group.views]
         answer.take(group.solved(answer.colours, rounds, ringing), group.total)
         probes += group.views if len(bounds) == 2 else [view.every(_PROBE) for view in group.views]
@@ -209,7 +217,8 @@ class _Spoken:
     share: int
 
     def loudness(self, footprints: Footprints, size: tuple[int, int]) -> np.ndarray:
-        """(h, w) of a picture of `size`: 1 in its blocks, less where it speaks for its own Gaussians, else 0."""
+        """(h, w) of a picture of `size`: 1 in its blocks, less where it speaks for its own Gaussians, else
+        0."""
         high, wide = (-(-side // _BLOCK) for side in size)
         x, y = (footprints.centres // _BLOCK).long().cpu().numpy().T
         inside = (x >= 0) & (y >= 0) & (x < wide) & (y < high)
@@ -226,7 +235,8 @@ class _View:
     """ids: (n,) rows of the Gaussians that are shown. contributions: (h w, n), of 1 a pixel where anything is
     drawn. photo: (h w, 3). trust: (n, 1), None: 1. sums: (n,) of contributions, times the trust. shown:
     (h w, 1), 1 where something is drawn and the photo is a number, else 0. around: rows of some Gaussians,
-    and least and most of the photo around each, uint8. size: (h, w). counts: (h w, 1), what each pixel's word
+    and least and most of the photo around each, uint8. size: (h, w), or 1 and how many pixels where a photo
+    speaks in some, which are those of the rows here. counts: (h w, 1), what each pixel's word
     counts, None: 1."""
 
     ids: np.ndarray
@@ -242,50 +252,64 @@ class _View:
     @staticmethod
     def of(
         gaussians: Gaussians,
-        rows: Tensor,
+        seen: Tensor,
         camera: Camera,
         photo: Tensor,
         trust: Tensor | None,
         cuts: Mapping[str, float],
         spoken: _Spoken | None = None,
     ) -> "_View":
-        """rows: of the Gaussians that the camera may see. cuts: as `mixing` takes them, or nothing. spoken: where
-        the photo speaks; None: everywhere."""
-        footprints = project(gaussians.rows(rows), camera)
+        """seen: rows of the Gaussians that the camera may see. cuts: as `mixing` takes them, or nothing.
+        spoken: where the photo speaks; None: everywhere."""
+        footprints = project(gaussians.rows(seen), camera)
         loudness = None if spoken is None else spoken.loudness(footprints, (camera.height, camera.width))
         wanted = None if loudness is None else loudness > 0
-        matrix, some = _narrowed(mixing(footprints, camera, len(rows), **cuts, wanted=wanted), len(rows))
+        matrix, some = _narrowed(mixing(footprints, camera, len(seen), **cuts, wanted=wanted), len(seen))
         light = np.asarray(matrix.sum(1)).ravel()
         flat = photo.movedim(0, -1).flatten(0, 1).cpu().numpy().astype(np.float32)
         shown = (light >= _LEAST) & np.isfinite(flat).all(1)
         flat[~shown] = 0
         matrix.data *= np.repeat(shown / np.maximum(light, _LEAST), np.diff(matrix.indptr)).astype(np.float32)
-        ids, size = rows.cpu().numpy()[some], (camera.height, camera.width)
+        ids, size = seen.cpu().numpy()[some], (camera.height, camera.width)
         counts = np.ones(len(flat), np.float32) if loudness is None else loudness.ravel()
         sums = matrix.T @ counts
         told = None if trust is None else trust.cpu().numpy().astype(np.float32)[ids]
         if told is not None:
             sums = sums * told
-        placed = np.full(len(rows), -1)
+        placed = np.full(len(seen), -1)
         placed[some] = np.arange(len(some))
         around = _around(footprints, placed, sums, flat.reshape(*size, 3))
-        return _View(
+        view = _View(
             ids, matrix, flat, None if told is None else told[:, None], sums,
             shown[:, None].astype(np.float32), (ids[around[0]], *around[1:]), size,
-            None if loudness is None else counts[:, None],
         )  # fmt: skip
+        if loudness is None:
+            return view
+        spoken_of = np.flatnonzero(loudness)  # the rows of other pixels are empty
+        return replace(view.at(spoken_of), counts=counts[spoken_of, None])
+
+    def at(self, kept: np.ndarray) -> "_View":
+        """The same of some pixels."""
+        return replace(
+            self,
+            contributions=self.contributions[kept],
+            photo=self.photo[kept],
+            shown=self.shown[kept],
+            size=(1, len(kept)),
+            counts=None if self.counts is None else self.counts[kept],
+        )
 
     def every(self, step: int) -> "_View":
-        """What one row of pixels in `step` says."""
-        kept = np.zeros(self.size, bool)
-        kept[step // 2 :: step] = True
-        kept = np.flatnonzero(kept)
-        matrix, some = _narrowed(self.contributions[kept], len(self.ids))
+        """What one row of pixels in `step` says; of a photo that speaks in some pixels one of so many."""
+        height, width = self.size
+        kept = np.arange(height * width).reshape(height, width)
+        kept = kept[:, step // 2 :: step] if height == 1 else kept[step // 2 :: step]
+        part = self.at(kept.ravel())
+        matrix, some = _narrowed(part.contributions, len(self.ids))
         nothing = (np.zeros(0, np.int64), np.zeros((0, 3), np.uint8), np.zeros((0, 3), np.uint8))
-        return _View(
-            self.ids[some], matrix, self.photo[kept], None, self.sums[some], self.shown[kept], nothing,
-            (len(kept) // self.size[1], self.size[1]),
-        )  # fmt: skip
+        return replace(
+            part, ids=self.ids[some], contributions=matrix, trust=None, sums=self.sums[some], around=nothing
+        )
 
     def wrong(self, colours: np.ndarray) -> np.ndarray:
         """(h w, 3) the photo less the picture, 0 where nothing is drawn."""

@@ -103,6 +103,12 @@ def add_reconstruct(commands) -> None:
         help="a transforms.json or COLMAP text model with the photos' poses and lenses: they are not sought, "
         "and the scene is in their world and unit",
     )
+    command.add_argument(
+        "--keep",
+        type=Path,
+        metavar="FOLDER",
+        help="what is done is kept there until the scene is written: the same command goes on from there",
+    )
     add_json(command)
 
 

@@ -104,7 +104,13 @@ _SAID = {
 
 def said(stage: str) -> str:
     """A stage of the reconstruction as people would say it; others are called as they are."""
-    return _SAID.get(stage, stage)
+    head = head_of(stage)
+    return _SAID.get(head, head) + stage[len(head) :]
+
+
+def head_of(stage: str) -> str:
+    """A stage without the photo that it is at."""
+    return stage.partition(": ")[0]
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,5 @@
-"""What more photos cost, as a picture: processor time and memory against their number; needs matplotlib (extra
-`bench`)."""
+"""What more photos cost, as a picture: processor time and memory against their number; needs matplotlib
+(extra `bench`)."""
 
 import io
 import math
@@ -16,7 +16,8 @@ _INK, _GRID, _TIME, _MEMORY = "#3a3a40", "#dcdce2", "#2f6fb0", "#d97b16"
 
 def walk_png(result: Mapping) -> bytes:
     """Left: processor seconds of a scene against its photos, beside the line through 0 and the fewest of more
-    than eight photos, as time would grow with their number alone. Right: the most memory, where it was measured.
+    than eight photos, as time would grow with their number alone. Right: the most memory, where it was
+    measured.
 
     Args:
         result: of `run_walks`, means by number of photos.

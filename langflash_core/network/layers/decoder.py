@@ -10,7 +10,6 @@ from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.layers.attention import CrossBlock, Memory, SelfBlock, rope_2d
 from langflash_core.network.presets import GuidedDepth, Preset
 
-
 Readings = Sequence[Sequence[int]]
 """Of each view the others that it reads, at least one."""
 
@@ -41,7 +40,8 @@ class TwoStacks(nn.Module):
 
     def layers(self, x: Tensor, grid: tuple[int, int], read: Readings | None = None) -> list[Tensor]:
         """What every layer gives, the last one normalised, from embedded tokens (B, V, h*w + 1, C);
-        the last token of a view is the one of its intrinsics. read: which others each view reads; None: all."""
+        the last token of a view is the one of its intrinsics. read: which others each view reads; None:
+        all."""
         code = rope_2d(grid, self.head_dim, self.base, extra=1).to(x.device)
         given = []
         for first, other in zip(self.first, self.other, strict=True):
@@ -83,7 +83,8 @@ def _memories(x: Tensor, code: Tensor, block: CrossBlock) -> Iterator[Memory]:
 
 
 def _chosen_memories(x: Tensor, code: Tensor, block: CrossBlock, read: Readings) -> Iterator[Memory]:
-    """What each view but the first reads of those it reads: keys and values are made once a view that is read."""
+    """What each view but the first reads of those it reads: keys and values are made once a view that is
+    read."""
     keys, values = block.memory(x.flatten(1, 2), code.repeat(1, x.shape[1], 1))
     keys, values = (of.unflatten(2, (x.shape[1], x.shape[2])) for of in (keys, values))
     for others in read[1:]:

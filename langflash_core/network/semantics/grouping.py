@@ -98,7 +98,8 @@ class SemanticGrouping(nn.Module):
     def of_many(self, memories: Sequence[tuple[Tensor, ...]]) -> Tensor:
         """What the queries (1, N, d) come to by the memories of one scene's views, group after group of them.
 
-        But for rounding what `forward` reads its last masks from (`masks`); one group's keys are held at a time.
+        But for rounding what `forward` reads its last masks from (`masks`); one group's keys are held at a
+        time.
         """
         queries = self.patterns.expand(1, -1, -1)
         per_scale = len(self.layers) // len(self.memories)

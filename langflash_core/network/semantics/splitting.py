@@ -72,25 +72,27 @@ def joint_maps(weights: Tensor, embeddings: Tensor, meant: Tensor | None, rule: 
 def split_maps(
     groups: Sequence[Callable[[], Tensor]], num_views: int, rule: Splitting, size: tuple[int, int]
 ) -> Tensor:
-    """`split_groups` of V views whose joint maps (v, S, h, w) come group by group, each as often as it is asked
-    for. Of many views the parts are found in some of their pixels, and the answer is held in half precision."""
+    """`split_groups` of V views whose joint maps (v, S, h, w) come group by group, each as often as it is
+    asked for. Of many views the parts are found in some of their pixels, and the answer is held in half
+    precision."""
     step = -(-num_views // _WHOLE)
     coarse = []
     for group in groups:
         small = F.avg_pool2d(group(), 2, ceil_mode=True).movedim(1, -1).flatten(0, 2)  # (X, S)
         coarse.append(F.normalize(small[::step], dim=-1))
     centres = cluster(torch.cat(coarse) if len(coarse) > 1 else coarse[0], rule)
-    parts = []
-    for group in groups:
+
+    def weights(group: Callable[[], Tensor]) -> Tensor:
         closeness = torch.einsum("vshw,js->vjhw", group(), rule.sharpness * centres)
         own = resize(closeness.contiguous(), size).softmax(1)  # three times as fast as in einsum's own order
-        parts.append(held(own, num_views))
-    return together(parts)
+        return held(own, num_views)
+
+    return together(map(weights, groups), num_views)
 
 
 def condensed(features: Tensor) -> Tensor:
-    """Maps (V, C, h, w) in the few directions that a scene needs, (V, `_DIRECTIONS`, h, w) float32: clustering
-    then takes a fifth of the time, and cosines stay.
+    """Maps (V, C, h, w) in the few directions that a scene needs, (V, `_DIRECTIONS`, h, w) float32:
+    clustering then takes a fifth of the time, and cosines stay.
 
     Source: Halko, Martinsson and Tropp 2011 (randomised range finder, one power iteration).
     """

@@ -16,6 +16,7 @@ Search", of OpenCV.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import cv2
@@ -69,6 +70,7 @@ def registered(
     Ks: Tensor,
     neighbours: Neighbours | None = None,
     check: Callable[[], None] = lambda: None,
+    each: Callable[[int, Callable[[], Tensor]], Tensor] = lambda view, make: make(),
 ) -> DepthMaps:
     """Maps (V, H, W) whose surfaces show the same in neighbouring photos; the expected errors stay.
 
@@ -77,6 +79,7 @@ def registered(
         viewmats: (V, 4, 4) of the maps' unit. Ks: (V, 3, 3), pixels of the maps.
         neighbours: of each view, the best first; None: all others.
         check: called before each comparison; what it raises ends the work.
+        each: gives the map (H, W) of a view, which it may have made, or know already.
     """
     logs = maps.log_depths
     near = neighbours or everyone(len(logs))
@@ -88,9 +91,9 @@ def registered(
     fine = _Pictures.of(photos, size, Ks, cells)
     half = (size[0] // 2, size[1] // 2)
     coarse = _Pictures.of(photos, half, Ks, cells) if many and min(half) >= _SMALLEST else fine
-    corrected = []
-    for view, others in enumerate(near):
-        own = logs[view].cpu()
+
+    def corrected(view: int) -> Tensor:
+        own, others = logs[view].cpu(), near[view]
         rounds = zip(_ROUNDS, (coarse, fine), strict=True) if len(others) > 1 else [(1, fine)]
         for partners, pictures in rounds:
             target, weight = torch.zeros(2, *cells)
@@ -103,8 +106,10 @@ def registered(
                 target += _cells(counts * change, cells)
                 weight += _cells(counts, cells)
             own = own + _smooth(target, weight, own)
-        corrected.append(own.to(logs))
-    return DepthMaps(torch.stack(corrected), maps.log_errors)
+        return own.to(logs)
+
+    found = [each(view, partial(corrected, view)) for view in range(len(logs))]
+    return DepthMaps(torch.stack(found), maps.log_errors)
 
 
 @dataclass(frozen=True)
@@ -115,7 +120,9 @@ class _Pictures:
     Ks: Tensor
 
     @staticmethod
-    def of(photos: Sequence[np.ndarray], size: tuple[int, ...], Ks: Tensor, cells: tuple[int, int]) -> "_Pictures":
+    def of(
+        photos: Sequence[np.ndarray], size: tuple[int, ...], Ks: Tensor, cells: tuple[int, int]
+    ) -> "_Pictures":
         """Ks: pixels of maps of so many cells."""
         greys = [photo if photo.shape == size else _resized(photo, size) for photo in photos]
         ratio = torch.tensor([size[1] / cells[1], size[0] / cells[0], 1.0])
@@ -128,10 +135,9 @@ class _Pictures:
     def compared(
         self, view: int, other: int, depths: Tensor, texture: Tensor, pose: Tensor, many: bool
     ) -> tuple[Tensor, Tensor]:
-        """Changes of log depth (h, w) that another photo asks for, and what each counts; depths: log, (h, w)."""
-        matches = _matched(
-            depths, self.greys[view], self.greys[other], self.Ks[view], self.Ks[other], pose
-        )
+        """Changes of log depth (h, w) that another photo asks for, and what each counts; depths: log, (h,
+        w)."""
+        matches = _matched(depths, self.greys[view], self.greys[other], self.Ks[view], self.Ks[other], pose)
         change, moves = _triangulated(depths, matches, self.Ks[view], self.Ks[other], pose)
         # `norm` over rows takes thirty times as long; of few photos it stays, to the last bit.
         length = (moves * moves).sum(0).sqrt() if many else moves.norm(dim=0)

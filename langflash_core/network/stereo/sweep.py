@@ -37,8 +37,8 @@ class Compared:
     """What a sweep compares: unit vectors of every view.
 
     table: (V, (h' + 2) (w' + 2), C), maps of `size` = (h', w') with a border of zeros, as rows.
-    own: (v, h w, C, G) of the first v views, whose depth is looked for, at the size of the depth maps, once for
-    each of G equal groups of channels and 0 outside of it: products with it are sums by group.
+    own: (v, h w, C, G) of the first v views, whose depth is looked for, at the size of the depth maps, once
+    for each of G equal groups of channels and 0 outside of it: products with it are sums by group.
     """
 
     table: Tensor
@@ -229,8 +229,8 @@ class DepthRefiner(nn.Module):
             prior: (B, V, H, W), of the viewmats' length unit.
             viewmats: (B, V, 4, 4). Ks: (B, V, 3, 3), pixels of the images.
             neighbours: as `sweep_correlation` has them, of every scene.
-            first: of one scene (B = 1) only so many views are refined, of which the prior and the neighbours are;
-                the others are looked at. None: all.
+            first: of one scene (B = 1) only so many views are refined, of which the prior and the neighbours
+                are; the others are looked at. None: all.
         """
         grid, pictures = tokens.grid, images.flatten(0, 1)
         size = (4 * grid[0], 4 * grid[1])
