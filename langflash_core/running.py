@@ -83,7 +83,7 @@ class Run:
 
     def within(self, name: str) -> Progress:
         """Progress of a stage's own steps, as a part of the whole; each may be where the run stops."""
-        start = self.begins[name]
+        start = self.begins.get(name, 0.0)
         end = min((begin for begin in self.begins.values() if begin > start), default=1.0)
 
         def told(step: str, fraction: float) -> None:

@@ -125,7 +125,7 @@ class GuidedDepthNet(LangFlashNet):
 
     def _alike(self, tokens: Tokens) -> list[list[int]]:
         """Of each view of one scene (B = 1) those most like it."""
-        rows = F.normalize(tokens.hooks[self.preset.match_hook][0].float(), dim=-1).cpu().numpy()
+        rows = F.normalize(tokens.hooks[self.refiner.match_hook][0].float(), dim=-1).cpu().numpy()
         return most_alike(list(rows), FEW - 1)
 
     def _prior(self, levels: tuple[Tensor, ...], tokens: Tokens) -> DepthMaps:

@@ -93,10 +93,15 @@ def solved_colours(
         progress: called with the share that is done, before every view and every round; what it raises ends
             the work there.
 
+    Raises:
+        ValueError: there are not as many cameras, or trusts, as photos.
+
     Returns:
         Colours, and how near every photo they come where it speaks: of several groups of photos "after" is
         over an eighth of that.
     """
+    if len(cameras) != len(photos) or (trusts is not None and len(trusts) != len(photos)):
+        raise ValueError(f"cameras, trusts: expected one for each of {len(photos)} photos, received others")
     gaussians = gaussians.map(lambda values: values.float())
     first = start.detach().cpu().numpy().astype(np.float32)
     packs, answer = Packs.of(gaussians), _Answer.of(first)

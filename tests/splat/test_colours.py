@@ -262,7 +262,7 @@ def test_twice_is_the_same_to_the_last_bit():
 
 def test_photos_and_cameras_are_as_many():
     gaussians, colours = scene(3)
-    with pytest.raises(ValueError, match="zip"):
+    with pytest.raises(ValueError, match="one for each of"):
         solved_colours(gaussians, colours, views(2), [torch.rand(3, 40, 48)])
 
 
