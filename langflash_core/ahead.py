@@ -7,11 +7,12 @@ the photos, match them and read the weights. This module and what it imports kno
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.images.pictures import Picture, read_pictures
+from langflash_core.keeping import Keep, not_kept
 from langflash_core.network.checkpoints.stored import Stored, read_header, read_stored, weights_file
 from langflash_core.network.presets import PRESETS, GuidedDepth
 
@@ -27,6 +28,7 @@ class Ahead:
     pictures: Future[list[Picture]]
     matched: Future[None]
     stored: Future[Stored] | None
+    matching: "Matching" = field(default_factory=lambda: Matching())
 
     def check_photos(self) -> None:
         """Wait until the photos are read.
@@ -37,6 +39,28 @@ class Ahead:
         self.pictures.result()
 
 
+@dataclass
+class Matching:
+    """How far key points and matches are: what is being done, how much of it was, of how much."""
+
+    what: str = "weights"
+    done: int = 0
+    count: int = 0
+
+    def tell(self, what: str, done: int, count: int) -> None:
+        """From the thread that matches."""
+        self.what, self.done, self.count = what, done, count
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.done + 1} of {self.count}" if self.count else self.what
+
+    @property
+    def share(self) -> float:
+        """Of what is being done; key points and matches are a half each."""
+        half = 0.5 * self.done / max(self.count, 1)
+        return half + (0.5 if self.what.startswith("matching") else 0.0)
+
+
 def begin(
     photos: Sequence[Path | str],
     *,
@@ -45,12 +69,14 @@ def begin(
     size: int | None = None,
     read_weights: bool = True,
     check: Callable[[], None] = lambda: None,
+    keep: Path | None = None,
 ) -> Ahead:
     """Start on a reconstruction; arguments as `pipeline.reconstruct` has them.
 
     Args:
         read_weights: also read the checkpoint, of presets that keep theirs in one file.
         check: called between photos and pairs; what it raises ends the work.
+        keep: a folder where matches are kept, and those of an earlier run are; None: nowhere.
 
     Raises:
         WeightsError: there is no such preset, or the checkpoint's header cannot be read.
@@ -71,9 +97,10 @@ def begin(
         path = weights_file(preset, None if weights is None else Path(weights))
         read_header(path)
         stored = pool.submit(_stored, pictures, path)
-    matched = pool.submit(_match, pictures, check) if matches else _nothing()
+    matching = Matching()
+    matched = pool.submit(_match, pictures, check, matching, keep) if matches else _nothing()
     pool.shutdown(wait=False)
-    return Ahead(pictures, matched, stored)
+    return Ahead(pictures, matched, stored, matching)
 
 
 def _stored(pictures: Future[list[Picture]], path: Path) -> Stored:
@@ -82,10 +109,14 @@ def _stored(pictures: Future[list[Picture]], path: Path) -> Stored:
     return read_stored(path)
 
 
-def _match(pictures: Future[list[Picture]], check: Callable[[], None]) -> None:
+def _match(
+    pictures: Future[list[Picture]], check: Callable[[], None], matching: Matching, keep: Path | None
+) -> None:
     from langflash_core.network.stereo.keypoints import match_sources  # OpenCV
 
-    match_sources(tuple(picture.source for picture in pictures.result()), check)
+    sources = tuple(picture.source for picture in pictures.result())
+    kept = not_kept if keep is None else Keep.of(keep, {}, sources)
+    match_sources(sources, check, matching.tell, kept)
 
 
 def _nothing() -> Future[None]:

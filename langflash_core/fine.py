@@ -4,23 +4,25 @@ in shape.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import overload
 
 import torch
 from torch import Tensor
 
 from langflash_core.detail import Detail
 from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
-from langflash_core.images.views import source_pictures
+from langflash_core.images.views import source_picture
 from langflash_core.running import Progress
 from langflash_core.scene.assemble import placed_views
-from langflash_core.scene.detailed import assemble_detailed, working_photos
+from langflash_core.scene.detailed import assemble_detailed, working_photo
 from langflash_core.scene.light import Light, photo_light
 from langflash_core.scene.prune import prune
 from langflash_core.splat.colours import ROUNDS, solved_colours
 from langflash_core.types import Cost, Prediction, Scene, Views
 
+_HELD = 8  # photos that stay decoded
 _RINGING = 0.3
 """Of what a photo varies by around a Gaussian, how far its colour may go beyond: blur needs some of it."""
 
@@ -52,10 +54,7 @@ def fine_scene(
         views.images, prediction.depths, prediction.confidences, prediction.viewmats, views.Ks
     )
     grid = (views.images.shape[-2], views.images.shape[-1])
-    photos = [
-        light.corrected(photo, view=v).clamp(0, 1)
-        for v, photo in enumerate(working_photos(source_pictures(views), grid))
-    ]
+    photos = _Photos(views, light, grid)
     views = replace(views, images=light.corrected(views.images).clamp(0, 1))
     scene = assemble_detailed(
         prediction,
@@ -78,13 +77,48 @@ def fine_scene(
     return prune(scene, merge=False), light
 
 
-def _coloured(scene: Scene, photos: list[Tensor], progress: Callable[[float], None]) -> Scene:
+class _Photos(Sequence[Tensor]):
+    """Photos (3, h, w) at their working size, in the light of all; of more than `_HELD` each is decoded anew
+    whenever it is asked for."""
+
+    def __init__(self, views: Views, light: Light, grid: tuple[int, int]):
+        self._views, self._light, self._grid = views, light, grid
+        self._known: dict[int, Tensor] = {}
+
+    def __len__(self) -> int:
+        return self._views.num_views
+
+    @overload
+    def __getitem__(self, index: int) -> Tensor: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Tensor]: ...
+    def __getitem__(self, index: int | slice) -> Tensor | Sequence[Tensor]:
+        if isinstance(index, slice):
+            return [self[v] for v in range(*index.indices(len(self)))]
+        if not 0 <= index < len(self):
+            raise IndexError(index)
+        if index in self._known:
+            return self._known[index]
+        photo = working_photo(source_picture(self._views, index), self._grid)
+        photo = self._light.corrected(photo, view=index).clamp(0, 1)
+        if len(self) <= _HELD:
+            self._known[index] = photo
+        return photo
+
+    def size(self, index: int) -> tuple[int, int]:
+        """(width, height) of one."""
+        photo = self[index]
+        return photo.shape[-1], photo.shape[-2]
+
+
+def _coloured(scene: Scene, photos: _Photos, progress: Callable[[float], None]) -> Scene:
     """The scene in the colours that make its photos (3, h, w) again; its record says how near they come."""
     solved = solved_colours(
         scene.gaussians,
         sh_to_colour(scene.gaussians.sh, scene.gaussians.means),
-        [scene.camera(v, photo.shape[-1], photo.shape[-2]) for v, photo in enumerate(photos)],
+        [scene.camera(v, *photos.size(v)) for v in range(len(photos))],
         photos,
+        owners=scene.view_ids,
         ringing=_RINGING,
         progress=progress,
     )

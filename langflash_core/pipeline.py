@@ -8,7 +8,6 @@ import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import asdict, replace
-from functools import partial
 from pathlib import Path
 
 import torch
@@ -23,6 +22,8 @@ from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.straight import after, straightened
 from langflash_core.images.views import load_views, source_pictures
+from langflash_core.keeping import Arrays, Keep, not_kept
+from langflash_core.kept_prediction import arrays_of, prediction_of
 from langflash_core.language.answers import answer
 from langflash_core.language.clip import load_clip_images
 from langflash_core.language.gaussians import gaussian_relevance
@@ -33,7 +34,7 @@ from langflash_core.language.vocabulary import all_phrases
 from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_network
 from langflash_core.network.build import network_class
 from langflash_core.network.checkpoints.parts import part_folder
-from langflash_core.network.checkpoints.stored import Stored
+from langflash_core.network.checkpoints.stored import Stored, weights_file
 from langflash_core.network.model import Atoms, Geometry, Lifted, Redrawn, pooled_weights
 from langflash_core.network.precision import bfloat16_fails, has_bfloat16
 from langflash_core.network.semantics.aggregation import averaged_atoms
@@ -60,6 +61,7 @@ GROUPINGS = ("queries", "mobile-sam", "sam2")
 LARGEST_PICTURE = 8192
 LONGEST_REFINEMENT = 3600  # seconds
 _STRAIGHTENED = 3  # times, at most
+_PATIENCE = 0.2  # seconds, until it is told again how far something is
 _AS_IT_IS = "the preset '{}' makes one Gaussian a pixel; the detail that was asked for is left out"
 _NOT_TOLD = "; these photos do not determine it by themselves"
 _networks: dict[tuple, LangFlashNet] = {}
@@ -81,6 +83,7 @@ def reconstruct(
     gaussians: int | None = None,
     refine_seconds: float | None = None,
     viewmats: Tensor | None = None,
+    keep: Path | str | None = None,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
     ahead: Ahead | None = None,
@@ -111,6 +114,8 @@ def reconstruct(
         viewmats: poses (V, 4, 4) of the photos, world to camera, in any world and unit: they are not
             sought, and the scene is in that world; preset mini. None: the first photo's camera is the world.
         device: "auto" takes CUDA where there is one; "cpu"; "cuda".
+        keep: a folder for what is done of it: matches, each photo's depth, what the network found. The same
+            photos and settings go on from there, to the same bits. `keeping.forget` clears it. None: nowhere.
         progress: called with the stage and the fraction of the whole in [0, 1].
         cancelled: asked between stages, photos and pairs of photos, and before every layer.
         ahead: of `ahead.begin` with the same arguments, which may have been called before torch was
@@ -121,17 +126,23 @@ def reconstruct(
 
     Raises:
         ImageError: a photo cannot be used. InputError: an argument cannot.
-        WeightsError: the checkpoint is missing or does not fit.
+        WeightsError: the checkpoint is missing or does not fit. OutputError: `keep` cannot be written.
         Cancelled: `cancelled()` became true.
     """
-    run = Run(STAGES, progress, cancelled)
+    run, keep = Run(STAGES, progress, cancelled), None if keep is None else Path(keep)
     device = _device(device)
     _check_detail(detail, gaussians)
     if refine_seconds is not None:
         _check_refinement(refine_seconds, photos)
     with run.stage("photos"):
         ahead = ahead or begin(
-            photos, preset=preset, weights=weights, size=size, read_weights=False, check=run.check
+            photos,
+            preset=preset,
+            weights=weights,
+            size=size,
+            read_weights=False,
+            check=run.check,
+            keep=keep,
         )
         views = load_views(
             photos, fov=fov, intrinsics=intrinsics, check=run.check, pictures=ahead.pictures.result
@@ -141,20 +152,30 @@ def reconstruct(
         network = _network(preset, weights, device, precision, ahead.stored)
         atoms = _atoms(network, aggregation, views)
         groups, redrawn = _groups(network, grouping, device), _redrawn(grouping, device)
-        ahead.matched.result()  # key points are found beside the weights
+        _wait_for_matches(ahead, run)  # key points are found beside the weights
     finer = None if detail is None or not network.surfaces else chosen_detail(detail)
     with run.stage("network"):
-        predict = partial(
-            network.predict,
-            progress=run.within("network"),
-            cancelled=cancelled,
-            atoms=atoms,
-            groups=groups,
-            redrawn=redrawn,
-            elements=finer is None,
+        settings = (
+            preset,
+            _identity(preset, weights),
+            device,
+            precision,
+            aggregation,
+            grouping,
+            finer is None,
         )
-        prediction, views = _straight(predict, views)
-        prediction = _on_cpu(prediction)
+
+        def predicted(seen: Views) -> Prediction:
+            told = run.within("network")
+            kept = not_kept if keep is None else _keep(keep, seen, settings)
+
+            def made() -> Arrays:
+                found = network.predict(seen, told, cancelled, atoms, groups, redrawn, finer is None, kept)
+                return arrays_of(_on_cpu(found))
+
+            return prediction_of(kept("prediction", made))
+
+        prediction, views = _straight(predicted, views)
         views = _through(views, prediction)
     images = views.images[[v for v in range(views.num_views) if v not in prediction.unplaced]]
     with run.stage("assemble"), torch.no_grad():
@@ -182,6 +203,34 @@ def reconstruct(
         scene = in_world(scene, viewmats[0], unit)
     run.report("done", 1.0)
     return _with_record(scene, network, run.timings)
+
+
+def _wait_for_matches(ahead: Ahead, run: Run) -> None:
+    """Until photos are matched; how far that is is told, and it may be cancelled at any time."""
+    told = run.within("weights")
+    while True:
+        try:
+            return ahead.matched.result(timeout=_PATIENCE)
+        except TimeoutError:
+            if ahead.matched.done():
+                raise
+            told(f"weights: {ahead.matching}", ahead.matching.share)
+
+
+def _identity(preset: str, weights: Path | str | None) -> list[tuple[str, int, int]]:
+    """Which weights: the checkpoint and its installed parts, with size and time of change."""
+    own = weights_file(preset, None if weights is None else Path(weights))
+    files = [own, *sorted(part_folder(PRESETS[preset]).glob("*.safetensors"))]
+    return [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in files if path.is_file()]
+
+
+def _keep(folder: Path, views: Views, settings: tuple) -> Keep:
+    """Where what these views become is kept; hangs on all that changes a bit of it."""
+    machine = (torch.__version__, torch.get_num_threads(), torch.backends.cpu.get_cpu_capability())
+    said = {"settings": settings, "machine": machine, "names": views.names, "lenses": views.lenses}
+    numbers = [views.images, views.Ks] + ([] if views.viewmats is None else [views.viewmats])
+    parts = (values.contiguous().numpy().tobytes() for values in numbers)
+    return Keep.of(folder, said, (*views.sources, *parts))
 
 
 def query(

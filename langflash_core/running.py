@@ -1,14 +1,30 @@
 """Work under way: what is done is told, each stage is timed, and a person may stop it in between."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
 from langflash_core.errors import Cancelled
 
 Progress = Callable[[str, float], None]
 """Called with what is being done and the share of the whole that is done, in [0, 1]."""
+
+
+Kept = Callable[[str, Callable[[], Mapping[str, Any]]], Mapping[str, Any]]
+"""The result of a named step, as `keeping.Keep` gives it: what was kept, else what the step makes."""
+T = TypeVar("T")
+_TOLD_FROM, _SURE_FROM = 3.0, 0.05  # seconds, and share of the whole, before which nobody knows what is left
+
+
+def left(seconds: float, fraction: float) -> str:
+    """What is left of work of which so much was done in so long: "about 40 s left"; nothing where that says
+    nothing yet."""
+    if seconds < _TOLD_FROM or not _SURE_FROM <= fraction < 1:
+        return ""
+    rest = seconds * (1 - fraction) / fraction
+    return f"about {rest:.0f} s left" if rest < 90 else f"about {rest / 60:.0f} min left"
 
 
 def evenly(stages: Sequence[str]) -> dict[str, float]:
@@ -27,6 +43,7 @@ class Run:
     progress: Progress | None = None
     cancelled: Callable[[], bool] | None = None
     timings: dict[str, float] = field(default_factory=dict)
+    kept: Kept = lambda name, make: make()
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -55,9 +72,18 @@ class Run:
         if self.progress is not None:
             self.progress(name, fraction)
 
+    def counted(self, name: str, what: str, items: Collection[T], begin: float = 0.0) -> Iterator[T]:
+        """The items of a stage one after the other, each told before, with its number: "refinement: photo 3
+        of 32"; each may be where the run stops. begin: share of the stage that was done before."""
+        told = self.within(name)
+        for number, item in enumerate(items):
+            share = begin + (1 - begin) * number / len(items)
+            told(f"{name}: {what} {number + 1} of {len(items)}", share)
+            yield item
+
     def within(self, name: str) -> Progress:
         """Progress of a stage's own steps, as a part of the whole; each may be where the run stops."""
-        start = self.begins[name]
+        start = self.begins.get(name, 0.0)
         end = min((begin for begin in self.begins.values() if begin > start), default=1.0)
 
         def told(step: str, fraction: float) -> None:

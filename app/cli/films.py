@@ -7,7 +7,7 @@ from typing import Any
 
 from langflash_core.errors import FilmError, InputError
 from langflash_core.formats import is_film
-from langflash_core.images.pictures import MAX_PHOTOS
+from langflash_core.images.pictures import FILM_PHOTOS, MAX_PHOTOS
 from langflash_core.images.strip import REASONS, Choice, Strip, choose, notes_on
 from langflash_core.running import Progress
 
@@ -51,7 +51,8 @@ def with_frames(
     """Photos with films replaced by their frames; what is told of each film; and notes for people.
 
     Args:
-        most: frames of each film; None: as many as there is room for beside photos, and other films.
+        most: frames of each film; None: `FILM_PHOTOS`, or as many as there is room for beside photos and
+            other films.
 
     Raises:
         InputError: a film cannot be used, or there are no films and yet options for them, or too many photos.
@@ -70,7 +71,7 @@ def with_frames(
             taken.append(path)
             continue
         strip = look_through(path, progress, start=start, end=end)
-        choice = choose(strip, min(most or room, room))
+        choice = choose(strip, min(most or FILM_PHOTOS, room))
         taken += [strip.path(index) for index in choice.chosen]
         told.append(summary(strip, choice))
         notes += notes_on(strip, choice)

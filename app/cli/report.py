@@ -12,6 +12,7 @@ from typing import Any, TextIO
 
 from langflash_core.errors import LangFlashError
 from langflash_core.files import make_folder, write_atomically
+from langflash_core.running import left
 
 
 def one_sentence(text: str) -> str:
@@ -85,7 +86,9 @@ class ProgressBar:
             return
         done = round(self.WIDTH * min(max(fraction, 0.0), 1.0))
         bar = "#" * done + "." * (self.WIDTH - done)
-        line = f"[{bar}] {time.monotonic() - self.start:5.1f} s  {stage}"
+        seconds = time.monotonic() - self.start
+        rest = left(seconds, fraction)
+        line = f"[{bar}] {seconds:5.1f} s  {stage}{', ' if rest else ''}{rest}"
         line = line[: shutil.get_terminal_size().columns - 1]  # a second line could not be wiped
         self.stream.write("\r" + line.ljust(self.drawn))
         self.stream.flush()

@@ -24,17 +24,18 @@ _CAPACITIES = (2, 4, 8, 16, 32)
 
 
 class PhotoDepths:
-    """Depth maps of at most `MOST_PHOTOS` photos as layers of one texture.
+    """Depth maps of at most `MOST_PHOTOS` photos, spread evenly over all, as layers of one texture.
 
     own: every photo sees only the Gaussians that it made itself.
     """
 
     def __init__(self, painter: Painter, scene: Scene, own: bool):
-        self.cameras = tuple(_small(scene.camera(v)) for v in range(min(scene.num_views, MOST_PHOTOS)))
+        views = spread(scene.num_views)
+        self.cameras = tuple(_small(scene.camera(view)) for view in views)
         ctx, programs = painter.ctx, painter.programs
         whole = None if own else SplatBuffers(ctx, programs, scene)
         maps = []
-        for view, camera in enumerate(self.cameras):
+        for view, camera in zip(views, self.cameras, strict=True):
             splats = whole or SplatBuffers(ctx, programs, _own_scene(scene, view))
             maps.append(_depths(painter, splats, camera))
             if splats is not whole:
@@ -67,6 +68,13 @@ class PhotoDepths:
 
     def release(self) -> None:
         self.texture.release()
+
+
+def spread(count: int) -> list[int]:
+    """At most `MOST_PHOTOS` of so many photos, the first and the last of them too, evenly."""
+    if count <= MOST_PHOTOS:
+        return list(range(count))
+    return [k * (count - 1) // (MOST_PHOTOS - 1) for k in range(MOST_PHOTOS)]
 
 
 def photo_places(scene: Scene, camera: Camera) -> np.ndarray:

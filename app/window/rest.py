@@ -1,8 +1,9 @@
 """What a window does once nothing happens in it: it gives memory back."""
 
+from langflash_core.memory import give_back
+
 from .commands import Command, Measured, Tick
 from .effects import Effects, Hands
-from .memory import give_back
 from .state import State
 
 REST_SECONDS = 1.0  # without a command until what is free is given back, which takes some milliseconds

@@ -16,6 +16,7 @@ from imgui_bundle import imgui, implot
 from imgui_bundle.python_backends.glfw_backend import GlfwRenderer
 
 from langflash_core.errors import LangFlashError
+from langflash_core.memory import keep_large_apart
 
 from . import desktop
 from .asking.effects import AskingEffects
@@ -30,7 +31,6 @@ from .kit import theme
 from .kit.look import Look
 from .kit.textures import Thumbnails
 from .log import LogEffects
-from .memory import keep_large_apart
 from .opening.effects import OpeningEffects
 from .recovery import preferences
 from .recovery.commands import Prefer

@@ -21,9 +21,9 @@ from queue import Empty, SimpleQueue
 from PIL import Image
 
 from langflash_core.errors import Cancelled, LangFlashError
+from langflash_core.memory import give_back
 
 from .commands import Command, Notify, OfScene
-from .memory import give_back
 from .requests import Errand, Job, SceneErrand
 from .scene.commands import JobCancelled, JobFailed, Loaded, Progressed
 

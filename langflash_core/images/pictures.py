@@ -19,7 +19,9 @@ from langflash_core.errors import InputError
 from langflash_core.images.decode import Photo, PhotoFacts, read_photo
 from langflash_core.images.still_names import shown_name
 
-MAX_PHOTOS = 32
+MAX_PHOTOS = 300
+FILM_PHOTOS = 32
+"""Frames of a film that a scene is made of unless more are asked for: each takes as long as a photo."""
 MAX_ASPECT = 2.0
 SOURCE_SIDE = 768
 SOURCE_QUALITY = 88
@@ -57,13 +59,13 @@ def read_pictures(
     """Photos in the first one's shape, the others centre-cropped to it.
 
     Args:
-        photos: 1 to 32 files.
+        photos: 1 to `MAX_PHOTOS` files.
         area: about this many pixels each. multiple: of which both sides are multiples.
         square: the centre square of every photo instead of the first one's shape.
         check: called before each photo; what it raises ends the work.
 
     Raises:
-        ImageError: a photo cannot be used. InputError: no photo, or over 32.
+        ImageError: a photo cannot be used. InputError: no photo, or too many.
         ValueError: `multiple` < 1 or `area` < multiple^2.
     """
     if multiple < 1 or area < multiple**2:
@@ -95,7 +97,7 @@ def photo_paths(photos: Sequence[Path | str]) -> list[Path]:
     """The files of an argument, one or several.
 
     Raises:
-        InputError: none, or over 32.
+        InputError: none, or more than `MAX_PHOTOS`.
     """
     listed = [photos] if isinstance(photos, str | Path) else list(photos)
     if not listed:

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from langflash_core.errors import FilmError
-from langflash_core.images.pictures import MAX_PHOTOS
+from langflash_core.images.pictures import FILM_PHOTOS
 
 FORMAT = 1
 INDEX = "strip.json"
@@ -119,10 +119,11 @@ def choose(strip: Strip, most: int, fewest: int = 2) -> Choice:
     if strip.every is not None:
         chosen = _evenly(np.flatnonzero(taken), most)
     else:
-        covered = places <= places[usable][0] + APART * (MAX_PHOTOS - 1)
+        reach = APART * (max(most, FILM_PHOTOS) - 1)
+        covered = places <= places[usable][0] + reach
         if not covered.all():
             until = stills[int(np.flatnonzero(covered)[-1])].seconds
-            taken, way = taken & covered, APART * (MAX_PHOTOS - 1)
+            taken, way = taken & covered, reach
         count = min(max(round(way / SPACING) + 1, fewest), most, int(taken.sum()))
         indices = np.flatnonzero(taken)
         chosen = indices[_best(places[indices], np.log(relative[indices].clip(0.05)), count)]
@@ -137,8 +138,9 @@ def notes_on(strip: Strip, choice: Choice) -> tuple[str, ...]:
     notes = list(strip.notes)
     if choice.until is not None:
         notes.append(
-            f"{strip.film} shows more than {MAX_PHOTOS} photos can cover, what comes after "
-            f"{choice.until:.1f} s is left out; --from and --to tell another part"
+            f"{strip.film} shows more than {max(len(choice.chosen), FILM_PHOTOS)} photos can cover, what "
+            f"comes after {choice.until:.1f} s is left out; more frames cover more, and --from and --to tell "
+            "another part"
         )
     if choice.gap > 3 * APART and strip.every is None:
         notes.append(

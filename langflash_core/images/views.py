@@ -41,7 +41,7 @@ def load_views(
         Views with triage notes in `warnings`, one sentence each.
 
     Raises:
-        ImageError: a photo cannot be used. InputError: no photo, over 32, or an unusable lens.
+        ImageError: a photo cannot be used. InputError: no photo, too many, or an unusable lens.
         ValueError: `multiple` < 1 or `area` < multiple^2.
     """
     paths = photo_paths(photos)
@@ -78,10 +78,15 @@ def load_views(
 
 def source_pictures(views: Views) -> list[Tensor]:
     """The largest version of every photo at hand, (3, h, w) in [0, 1]; the same crop as the views."""
+    return [source_picture(views, view) for view in range(views.num_views)]
+
+
+def source_picture(views: Views, view: int) -> Tensor:
+    """The largest version of one photo at hand, (3, h, w) in [0, 1]; the same crop as the views."""
     if not views.sources:
-        return list(views.images)
-    opened = [Image.open(io.BytesIO(source)).convert("RGB") for source in views.sources]
-    return [torch.from_numpy(np.array(image, dtype=np.float32)).permute(2, 0, 1) / 255 for image in opened]
+        return views.images[view]
+    opened = Image.open(io.BytesIO(views.sources[view])).convert("RGB")
+    return torch.from_numpy(np.array(opened, dtype=np.float32)).permute(2, 0, 1) / 255
 
 
 def cropped_intrinsics(K: Tensor, box: Box, size: tuple[int, int]) -> Tensor:

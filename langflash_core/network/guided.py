@@ -4,25 +4,37 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
+from functools import partial
+from types import MappingProxyType
+from typing import cast
 
 import cv2
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import rays
+from langflash_core.memory import give_back
 from langflash_core.network.encoders.late import LateHalf
 from langflash_core.network.encoders.local import LocalFeatures
 from langflash_core.network.encoders.shared import Encoder, Tokens, tokens_to_maps, unflattened
 from langflash_core.network.gaussians import GaussianHead, assemble_gaussians
 from langflash_core.network.layers.decoder import SiameseDecoder, TwoStackDecoder
+from langflash_core.network.many import FEW, groups_of, held, in_groups, together
 from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Seen
 from langflash_core.network.presets import GuidedDepth
 from langflash_core.network.semantics.aggregation import Aggregation
 from langflash_core.network.semantics.features import LanguageHead
-from langflash_core.network.semantics.grouping import ScratchHead, SemanticGrouping, group_weights, surviving
+from langflash_core.network.semantics.grouping import (
+    ScratchHead,
+    SemanticGrouping,
+    group_weights,
+    surviving,
+    surviving_of,
+)
 from langflash_core.network.semantics.naming import PartNamer, describe, places
-from langflash_core.network.semantics.splitting import split_groups
+from langflash_core.network.semantics.splitting import condensed, joint_maps, split_groups, split_maps
 from langflash_core.network.stereo.adjustment import Sought
 from langflash_core.network.stereo.agreement import agreed
 from langflash_core.network.stereo.alignment import Correction
@@ -33,11 +45,14 @@ from langflash_core.network.stereo.planes import flattened
 from langflash_core.network.stereo.poses import PoseInput, Poses, estimate_poses, on_other_maps
 from langflash_core.network.stereo.prior import DepthHead, DepthMaps
 from langflash_core.network.stereo.registration import registered
+from langflash_core.network.stereo.retrieval import most_alike
 from langflash_core.network.stereo.sharpening import sharpened
 from langflash_core.network.stereo.sweep import DepthRefiner
 from langflash_core.running import Run
 from langflash_core.types import Gaussians, Views
 
+_SWEPT = 0.3  # of the time of refinement, before photos are registered one by one
+_CLOSELY = 32  # photos, up to which language features are held at their full size
 _OTHER_LENS = 0.01
 """Change of the focal length, as a logarithm, from which depth is predicted anew: it is known no better."""
 
@@ -56,6 +71,7 @@ class GuidedDepthNet(LangFlashNet):
     surfaces = True
     caches_tokens = True
     stages = ("encoder", "depth", "poses", "refinement", "Gaussians", *MEANING_STAGES)
+    begins = MappingProxyType(dict(zip(stages, (0.0, 0.07, 0.1, 0.2, 0.8, 0.82, 0.85, 0.97), strict=True)))
 
     def __init__(self, preset: GuidedDepth):
         super().__init__(preset)
@@ -88,27 +104,58 @@ class GuidedDepthNet(LangFlashNet):
     def encode(self, images: Tensor, Ks: Tensor) -> Tokens:
         """Four hooks of the frozen encoder and two of the half that real photos taught; the intrinsics
         join later."""
+        return Tokens.beside([self._encoded(images[:, some]) for some in groups_of(images.shape[1])])
+
+    def _encoded(self, images: Tensor) -> Tokens:
         with self._fast(images):
             tokens, early = self.encoder(images)
             named = tuple(unflattened(t, images) for t in self.late(early, self.encoder.vit))
         return replace(tokens, named=named).each(self._exact)
 
     def levels(self, tokens: Tokens, Ks: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Level maps (B*V, C_i, h, w) of the geometry heads: two encoder hooks, two decoder depths."""
+        """Level maps (B*V, C_i, h, w) of the geometry heads: two encoder hooks, two decoder depths.
+
+        Of many photos each reads those most like it, as many as it was trained among.
+        """
+        read = self._alike(tokens) if tokens.shape[1] > FEW else None
         with self._fast(Ks):
-            decoded = self.decoder(tokens, Ks)
+            decoded = self.decoder(tokens, Ks, read)
         deep = tuple(tokens_to_maps(self._exact(t).flatten(0, 1), tokens.grid) for t in decoded)
         return tokens.maps(0), tokens.maps(1), deep[0], deep[1]
+
+    def _alike(self, tokens: Tokens) -> list[list[int]]:
+        """Of each view of one scene (B = 1) those most like it."""
+        rows = F.normalize(tokens.hooks[self.refiner.match_hook][0].float(), dim=-1).cpu().numpy()
+        return most_alike(list(rows), FEW - 1)
+
+    def _prior(self, levels: tuple[Tensor, ...], tokens: Tokens) -> DepthMaps:
+        """Depth of one scene (B = 1), some views at a time."""
+        count = tokens.shape[1]
+        parts = [
+            self.depth_head(
+                tuple(level[some] for level in levels), tokens.views(range(some.start, some.stop))
+            )
+            for some in groups_of(count)
+        ]
+        logs, errors = (part.log_depths for part in parts), (part.log_errors for part in parts)
+        return DepthMaps(together(logs, count, 1), together(errors, count, 1))
 
     def monocular_depth(self, tokens: Tokens, Ks: Tensor) -> DepthMaps:
         """Prior depth in metres, (B, V, H, W)."""
         return self.depth_head(self.levels(tokens, Ks), tokens)
 
     def language(self, tokens: Tokens, images: Tensor) -> Tensor:
-        """L(x) from the shared tokens, at four times their grid."""
-        with self._fast(images):
-            features = self.language_head(tokens)
-        return self._exact(features)
+        """L(x) from the shared tokens, at four times their grid; of very many photos at twice."""
+        count = tokens.shape[1]
+
+        def features(some: slice) -> Tensor:
+            with self._fast(images):
+                own = self._exact(self.language_head(tokens.views(range(some.start, some.stop))))
+            if count > _CLOSELY:
+                own = F.normalize(F.avg_pool2d(own.flatten(0, 1), 2), dim=1).unflatten(0, own.shape[:2])
+            return held(own, count)
+
+        return together(map(features, groups_of(count)), count, 1)
 
     def semantic_maps(self, tokens: Tokens, images: Tensor) -> tuple[tuple[Tensor, ...], Tensor]:
         """Memories at 1, 2 and 4 times the grid, and the mask map at 8 times."""
@@ -126,11 +173,47 @@ class GuidedDepthNet(LangFlashNet):
         """The surviving groups, cut into parts, also by what their pixels are called."""
         if features is None:
             features = self.language(tokens, images)
+        if tokens.shape[1] > FEW:
+            return self._parts_of_many(tokens, images, size, features[0])
         memories, finest = self.semantic_maps(tokens, images)
         groups = self.grouping(memories, finest, tokens.shape[1])[-1]
         survivors = surviving(groups, self.preset.tau_exist)
         whole = group_weights(groups, survivors, (finest.shape[-2], finest.shape[-1]))
         return split_groups(whole, finest, self.preset.splitting, size, features[0].float())
+
+    def _parts_of_many(
+        self, tokens: Tokens, images: Tensor, size: tuple[int, int], features: Tensor
+    ) -> Tensor:
+        """`parts`, some views at a time; features (V, C, h, w)."""
+        rule, some = self.preset.splitting, groups_of(tokens.shape[1])
+        grouping = cast(SemanticGrouping, self.grouping)
+        memories, finest = [], []
+        for own in some:
+            read, fine = self.semantic_maps(tokens.views(range(own.start, own.stop)), images[:, own])
+            memories.append(read)
+            finest.append(fine.half())
+            del fine
+            give_back()
+        queries = grouping.of_many(memories)
+        del memories
+        strongest, existence = [], None
+        for fine in finest:
+            masks = grouping.masks(queries, fine.float())
+            strongest.append(masks.mask_logits[0].amax((0, 2, 3)))
+            existence = masks.existence_logits[0]
+        assert existence is not None, "there are many views"
+        survivors = surviving_of(strongest, existence, self.preset.tau_exist)
+        if len(survivors) == 0:
+            return images.new_zeros(images.shape[1], 0, *size)
+        meant = condensed(features)
+
+        def joint(number: int) -> Tensor:
+            fine = finest[number].float()
+            groups = grouping.masks(queries, fine)
+            whole = group_weights(groups, survivors, (fine.shape[-2], fine.shape[-1]))
+            return joint_maps(whole, fine, meant[some[number]], rule)
+
+        return split_maps([partial(joint, number) for number in range(len(some))], len(features), rule, size)
 
     def named(self, atoms: Tensor, weights: Tensor, seen: Seen) -> Tensor:
         """Atoms corrected by deep tokens, places and each other."""
@@ -145,7 +228,7 @@ class GuidedDepthNet(LangFlashNet):
         """Depth, poses, refined depth with edges and flat surfaces that agrees between photos, Gaussians."""
         with run.stage("depth"):
             levels = self.levels(tokens, Ks)
-            prior = self.depth_head(levels, tokens)
+            prior = self._prior(levels, tokens)
         with run.stage("poses"):
             local = _one_by_one(self.local, images[0])
             inputs = self._pose_inputs(Ks[0], views.size, prior, local)
@@ -153,13 +236,13 @@ class GuidedDepthNet(LangFlashNet):
             Ks = _with_lens(Ks, poses)
             if np.abs(np.log(poses.growths)).max() > _OTHER_LENS:
                 levels = self.levels(tokens, Ks)
-                prior = self.depth_head(levels, tokens)
+                prior = self._prior(levels, tokens)
                 poses = on_other_maps(poses, self._pose_inputs(Ks[0], views.size, prior, local))
             viewmats = torch.from_numpy(poses.viewmats).to(images)[None]
         with run.stage("refinement"):
             maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)
             sharp = _one_by_one(sharpened, maps.log_depths, images[0])
-            maps = replace(maps, log_depths=flattened(sharp, maps.log_errors))
+            maps = replace(maps, log_depths=in_groups(flattened, sharp, maps.log_errors))
             maps = _agreed(maps, views, poses, viewmats[0], Ks[0], run)
         if not elements:
             return _geometry(Gaussians.none(), maps, poses, viewmats[0], Ks[0], views)
@@ -181,14 +264,24 @@ class GuidedDepthNet(LangFlashNet):
         maps = DepthMaps(scaled.log_depths[0], scaled.log_errors[0])
         if len(keep) < 2:
             return maps
-        chosen = tokens.views(keep)
-        part = DepthMaps(scaled.log_depths[:, keep], scaled.log_errors[:, keep])
-        near = partners(part.log_depths[0], viewmats[0, keep], Ks[0, keep])
-        refined = self.refiner(
-            images[:, keep], chosen, local[keep], part, viewmats[:, keep], Ks[:, keep], near
-        )[-1]
+        near = partners(maps.log_depths[keep], viewmats[0, keep], Ks[0, keep])
         log_depths, log_errors = maps.log_depths.clone(), maps.log_errors.clone()
-        log_depths[keep], log_errors[keep] = refined.log_depths[0], refined.log_errors[0]
+        for some in groups_of(len(keep)):
+            own, others = keep[some], [[keep[other] for other in of] for of in near[some]]
+            ids = own if len(own) == len(keep) else [*own, *sorted({o for of in others for o in of} - {*own})]
+            refined = self.refiner(
+                images[:, ids],
+                tokens.views(ids),
+                local[ids],
+                DepthMaps(scaled.log_depths[:, own], scaled.log_errors[:, own]),
+                viewmats[:, ids],
+                Ks[:, ids],
+                [[ids.index(other) for other in of] for of in others],
+                len(own),
+            )[-1]
+            log_depths[own], log_errors[own] = refined.log_depths[0], refined.log_errors[0]
+            if len(ids) > len(own):
+                give_back()  # groups look at more and fewer others: what one leaves fits no other
         return DepthMaps(log_depths, log_errors)
 
     @staticmethod
@@ -218,8 +311,15 @@ def _agreed(maps: DepthMaps, views: Views, poses: Poses, viewmats: Tensor, Ks: T
     near = partners(part.log_depths, viewmats[placed], Ks[placed])
     part = agreed(part, viewmats[placed], Ks[placed], near)
     photos = _greys(views)
-    part = registered(part, [photos[v] for v in placed], viewmats[placed], Ks[placed], near, run.check)
-    part = replace(part, log_depths=flattened(part.log_depths, part.log_errors))
+    told = run.counted("refinement", "photo", range(len(placed)), _SWEPT)
+
+    def each(view: int, make: Callable[[], Tensor]) -> Tensor:
+        next(told)
+        found = run.kept(f"depth-{view}", lambda: {"log_depths": make().cpu().numpy()})
+        return torch.from_numpy(np.array(found["log_depths"])).to(part.log_depths)
+
+    part = registered(part, [photos[v] for v in placed], viewmats[placed], Ks[placed], near, run.check, each)
+    part = replace(part, log_depths=in_groups(flattened, part.log_depths, part.log_errors))
     log_depths = maps.log_depths.clone()
     log_depths[placed] = part.log_depths
     return replace(maps, log_depths=log_depths)

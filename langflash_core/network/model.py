@@ -2,7 +2,7 @@
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 
@@ -10,11 +10,13 @@ import torch
 from torch import Tensor, nn
 
 from langflash_core.errors import WeightsError
+from langflash_core.keeping import not_kept
 from langflash_core.network.encoders.shared import Tokens
+from langflash_core.network.many import in_groups
 from langflash_core.network.presets import Preset
 from langflash_core.network.semantics.aggregation import Aggregation, averaged_atoms
 from langflash_core.network.semantics.grouping import Groups
-from langflash_core.running import Progress, Run, evenly
+from langflash_core.running import Kept, Progress, Run, evenly
 from langflash_core.types import FoundLens, Gaussians, Prediction, Views
 
 Atoms = Callable[[Tensor, Tensor], Tensor]
@@ -56,6 +58,8 @@ class LangFlashNet(nn.Module):
 
     stages: tuple[str, ...]
     """Names of the timed steps, in order."""
+    begins: Mapping[str, float] | None = None
+    """Where each begins in the whole; None: they take equally long."""
     frozen: tuple[str, ...]
     """Parts that this project takes as they are and never trains."""
     compact: bool
@@ -169,6 +173,7 @@ class LangFlashNet(nn.Module):
         groups: Lifted | None = None,
         redrawn: Redrawn | None = None,
         elements: bool = True,
+        kept: Kept = not_kept,
     ) -> Prediction:
         """One scene from V photos of one size (sides multiples of the patch).
 
@@ -177,13 +182,14 @@ class LangFlashNet(nn.Module):
                 None: `dictionary`, with all that was seen.
             groups: geometry and views to w_k(x), (V, K, H, W), sums to 1 over K; None: `parts`.
             redrawn: w_k(x) and views to finer ones of the same shape; None: they stay.
+            kept: gives the results of long steps, those that were kept of an earlier run.
             elements: one Gaussian a pixel; without them `gaussians` is empty, where depth maps say it all
                 (`surfaces`), and networks without surfaces make them all the same.
 
         Raises:
             Cancelled: `cancelled()` became true; asked before every layer and every pair of photos.
         """
-        return self.predict_scenes([views], progress, cancelled, atoms, groups, redrawn, elements)[0]
+        return self.predict_scenes([views], progress, cancelled, atoms, groups, redrawn, elements, kept)[0]
 
     @torch.inference_mode()
     def predict_scenes(
@@ -195,6 +201,7 @@ class LangFlashNet(nn.Module):
         groups: Lifted | None = None,
         redrawn: Redrawn | None = None,
         elements: bool = True,
+        kept: Kept = not_kept,
     ) -> list[Prediction]:
         """Several scenes of equally many photos of one size: the transformers see them as one batch.
 
@@ -206,7 +213,7 @@ class LangFlashNet(nn.Module):
         shapes = {tuple(views.images.shape) for views in scenes}
         if len(shapes) != 1:
             raise ValueError(f"scenes: expected one shape of (V, 3, H, W), received {sorted(shapes)}")
-        run = Run(evenly(self.stages), progress, cancelled)
+        run = Run(self.begins or evenly(self.stages), progress, cancelled, kept=kept)
         with nullcontext() if cancelled is None else self.stopping(run.check):
             return self._predict(scenes, run, atoms, groups, redrawn, elements)
 
@@ -307,9 +314,15 @@ def pooled_weights(weights: Tensor, features: Tensor) -> Tensor:
     one over rows of one over columns, and both are matrix products.
     """
     rows, columns = (
-        _windows(weights.shape[-dim], features.shape[-dim]).to(weights) for dim in (2, 1)
+        _windows(weights.shape[-dim], features.shape[-dim]).to(weights.device, _exact(weights))
+        for dim in (2, 1)
     )  # (h, H), (w, W)
-    return (rows @ weights @ columns.T)[None]
+    return in_groups(lambda some: rows @ some.to(rows) @ columns.T, weights)[None]
+
+
+def _exact(weights: Tensor) -> torch.dtype:
+    """Single precision of half, which many photos' weights are held in."""
+    return torch.float32 if weights.dtype == torch.float16 else weights.dtype
 
 
 def _windows(length: int, count: int) -> Tensor:

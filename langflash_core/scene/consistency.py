@@ -12,6 +12,8 @@ beyond the depth error of the shipped network, so that double surfaces of good d
 
 _VOTES = 2
 """Photos that see through something, one of which may be wrong."""
+_ASKED = 16  # photos that are asked about one photo's points
+_TRIED = 67  # of whose points one is looked for in the others
 _SKIRT = 0.05  # relative depth beyond all of the other's around a place, from which it is another surface
 _AROUND, _JUMP = 5, 0.1  # pixels of a window, and log depth within it from which depth jumps there
 
@@ -43,9 +45,7 @@ def seen_through(
     blocked = torch.zeros(num_views, height * width, dtype=torch.bool, device=means.device)
     limits, trusts = (1 - tolerance) * depths.flatten(1), confidences.flatten(1)
     for view, own in enumerate(means.reshape(num_views, -1, 3)):
-        for other in range(num_views):
-            if other == view:
-                continue
+        for other in _witnesses(view, own, viewmats, Ks, (height, width)):
             x, y, z = pictured(viewmats[other], Ks[other], own.T)
             inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
             places = torch.where(inside, y.floor() * width + x.floor(), 0.0).long()
@@ -53,6 +53,24 @@ def seen_through(
             outvoted = (theirs > trusts[view]) if other > view else (theirs >= trusts[view])
             blocked[view] |= inside & (z < limits[other].index_select(0, places)) & outvoted
     return blocked.flatten()
+
+
+def _witnesses(view: int, points: Tensor, viewmats: Tensor, Ks: Tensor, size: tuple[int, int]) -> list[int]:
+    """The other photos that are asked about a photo's points (n, 3): all of `_ASKED` and fewer; of more so
+    many, spread evenly over those that have some of the points before them, so that the work grows with the
+    photos."""
+    others = [other for other in range(len(viewmats)) if other != view]
+    if len(others) <= _ASKED:
+        return others
+    some = points[_TRIED // 2 :: _TRIED].T  # (3, m)
+    pos_c = viewmats[:, :3, :3] @ some + viewmats[:, :3, 3:]  # (V, 3, m)
+    ahead = pos_c[:, 2].clamp_min(1e-8)
+    x, y = (pos_c[:, axis] / ahead * Ks[:, axis, axis, None] + Ks[:, axis, 2, None] for axis in (0, 1))
+    inside = (pos_c[:, 2] > 0) & (x >= 0) & (y >= 0) & (x < size[1]) & (y < size[0])
+    seeing = [other for other, sees in enumerate(inside.any(1).tolist()) if sees and other != view]
+    if len(seeing) <= _ASKED:
+        return seeing
+    return [seeing[(2 * k + 1) * len(seeing) // (2 * _ASKED)] for k in range(_ASKED)]
 
 
 def outvoted(points: Tensor, viewmats: Tensor, Ks: Tensor, depths: Tensor) -> Tensor:
@@ -71,9 +89,7 @@ def outvoted(points: Tensor, viewmats: Tensor, Ks: Tensor, depths: Tensor) -> Te
     nearest = -F.max_pool2d(-depths[:, None], 3, 1, 1)[:, 0].flatten(1)
     farthest = F.max_pool2d(depths[:, None], 3, 1, 1)[:, 0].flatten(1)
     for view, own in enumerate(points):
-        for other in range(num_views):
-            if other == view:
-                continue
+        for other in _witnesses(view, own, viewmats, Ks, (height, width)):
             x, y, z = pictured(viewmats[other], Ks[other], own.T)
             inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
             places = torch.where(inside, y.floor() * width + x.floor(), 0.0).long()

@@ -8,7 +8,7 @@ it finest (`ownership`), by elements of the size that the photo asks for (`block
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TypeVar, overload
 
 import torch
 from torch import Tensor
@@ -16,6 +16,7 @@ from torch.nn import functional as F
 
 from langflash_core.detail import Detail
 from langflash_core.geometry.cameras import invert_rigid, unproject
+from langflash_core.memory import give_back
 from langflash_core.scene.assemble import (
     directed,
     mean_distance,
@@ -41,8 +42,10 @@ from langflash_core.scene.elements import (
 )
 from langflash_core.scene.ownership import covered, owned
 from langflash_core.scene.upsampling import Upsampled, upsampled
-from langflash_core.types import Camera, Cost, Gaussians, Prediction, Record, Scene, Semantics, Views
+from langflash_core.types import Camera, Cost, Gaussians, Prediction, Record, Scene, Views
 
+_HELD = 8
+"""Photos, what all of which see is held; each takes ten megabytes and a fiftieth of a second."""
 GROUND = 4  # pixels, side of the squares under what was parted
 MOST_ENLARGED = 3
 """Times the grid, the size up to which a photo is looked at."""
@@ -58,21 +61,18 @@ def working_size(photo: tuple[int, int], grid: tuple[int, int]) -> tuple[int, in
     return high[0], high[1]
 
 
-def working_photos(photos: list[Tensor], grid: tuple[int, int]) -> list[Tensor]:
-    """Photos (3, h, w) in [0, 1] at their working size."""
-    sized = []
-    for photo in photos:
-        size = working_size((photo.shape[-2], photo.shape[-1]), grid)
-        if size != (photo.shape[-2], photo.shape[-1]):
-            photo = F.interpolate(photo[None], size=size, mode="bicubic", antialias=True)[0].clamp(0, 1)
-        sized.append(photo)
-    return sized
+def working_photo(photo: Tensor, grid: tuple[int, int]) -> Tensor:
+    """A photo (3, h, w) in [0, 1] at its working size."""
+    size = working_size((photo.shape[-2], photo.shape[-1]), grid)
+    if size == (photo.shape[-2], photo.shape[-1]):
+        return photo
+    return F.interpolate(photo[None], size=size, mode="bicubic", antialias=True)[0].clamp(0, 1)
 
 
 def assemble_detailed(
     prediction: Prediction,
     views: Views,
-    photos: list[Tensor],
+    photos: Sequence[Tensor],
     detail: Detail,
     *,
     gaussians: int | None = None,
@@ -83,9 +83,10 @@ def assemble_detailed(
     """A scene in scene units, as `assemble` makes it, of elements as fine as the photos.
 
     Args:
-        photos: (3, h, w) in [0, 1] of every view, `working_photos`; each may have its own size.
+        photos: (3, h, w) in [0, 1] of every view, `working_photo`; each may have its own size. Of many
+            each is asked for several times and not kept.
         gaussians: about as many; None: as `detail` has it.
-        progress: called with the share that is done, four times a photo; what it raises ends the work.
+        progress: called with the share that is done, twice a photo; what it raises ends the work.
 
     Returns:
         Scene with `levels`, `confidences`, `view_ids` and, in its record, `detail`.
@@ -95,21 +96,20 @@ def assemble_detailed(
         ValueError: the prediction's poses are not finite.
     """
     start = time.perf_counter()
-    photos = [photos[v] for v in range(len(photos)) if v not in prediction.unplaced]
+    if prediction.unplaced:
+        photos = [photos[v] for v in range(len(photos)) if v not in prediction.unplaced]
     prediction, views = placed_views(prediction, views)
     if not bool(torch.isfinite(prediction.viewmats).all()):
         raise ValueError("viewmats: expected finite poses, received others")
     known, keep, unit, through = _kept(prediction, views)
-    told = _told(photos, progress, 0.0)
-    sights = [
-        _Sight.of(photo, image, depths.log(), own)
-        for photo, image, depths, own in zip(told, views.images, known, keep, strict=True)
-    ]
+    sights = _Sights(lambda v: _Sight.of(photos[v], views.images[v], known[v].log(), keep[v]), len(photos))
     budget = gaussians or round(detail.most * _area(keep))
-    parts = _parts(sights, detail, budget, 0.0 if gaussians else detail.gain, progress)
+    trees, limit = _trees(sights, detail, budget, 0.0 if gaussians else detail.gain, progress)
+    made, weights, parts = _made(prediction, views, _told(sights, progress, 0.5), trees, limit, top_m)
+    size = sights[0].size
     scene = Scene(
-        gaussians=normalised(_gaussians(prediction, views, sights, parts), unit),
-        semantics=_semantics(prediction, _told(sights, progress, 0.75), parts, top_m),
+        gaussians=normalised(made, unit),
+        semantics=semantics_of(prediction, weights),
         viewmats=scaled_poses(prediction.viewmats, unit),
         Ks=views.Ks.clone(),
         view_size=views.size,
@@ -122,7 +122,7 @@ def assemble_detailed(
             photos=views.names,
             warnings=(*views.warnings, *prediction.warnings),
             counts={"predicted": keep.numel(), "covered": int(keep.sum()), "seen_through": through},
-            detail=_spent(joined(parts), detail, budget, sights[0].size),
+            detail=_spent(joined(parts), detail, budget, size),
             network_unit=unit,
         ),
     )
@@ -134,10 +134,10 @@ T = TypeVar("T")
 
 
 def _told(photos: Sequence[T], progress: Callable[[float], None], begin: float) -> Iterator[T]:
-    """One after the other, each told before; a quarter of the whole from `begin` on."""
-    for number, each in enumerate(photos):
-        progress(begin + number / len(photos) / 4)
-        yield each
+    """One after the other, each told before; half of the whole from `begin` on."""
+    for number in range(len(photos)):
+        progress(begin + number / len(photos) / 2)
+        yield photos[number]
 
 
 @dataclass(frozen=True)
@@ -161,6 +161,30 @@ class _Sight:
     @property
     def size(self) -> tuple[int, int]:
         return self.photo.shape[-2], self.photo.shape[-1]
+
+
+class _Sights(Sequence[_Sight]):
+    """What each photo sees; of more than `_HELD` made anew whenever it is asked for."""
+
+    def __init__(self, make: Callable[[int], _Sight], count: int):
+        self._make, self._count = make, count
+        self._known: dict[int, _Sight] = {}
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, index: int) -> _Sight: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[_Sight]: ...
+    def __getitem__(self, index: int | slice) -> _Sight | Sequence[_Sight]:
+        if isinstance(index, slice):
+            return [self[v] for v in range(*index.indices(self._count))]
+        if index not in self._known:
+            if self._count > _HELD:
+                self._known.clear()
+            self._known[index] = self._make(index)
+        return self._known[index]
 
 
 def _area(keep: Tensor) -> float:
@@ -191,17 +215,43 @@ def _kept(prediction: Prediction, views: Views) -> tuple[Tensor, Tensor, float, 
     return depths, keep, unit, int((through | between).sum())
 
 
-def _parts(
-    sights: list[_Sight], detail: Detail, budget: int, least: float, progress: Callable[[float], None]
-) -> list[Elements]:
-    """The elements of each photo, at most about `budget` of them together, each of which gains `least`."""
+def _trees(
+    sights: Sequence[_Sight], detail: Detail, budget: int, least: float, progress: Callable[[float], None]
+) -> tuple[list[Tree], float]:
+    """The tree of each photo, and the threshold by which all together have at most about `budget` elements,
+    each of which gains `least`."""
     trees = [
         grown(s.photo, s.depth.log_depths, s.clear, s.wanted, detail.finest)
-        for s in _told(sights, progress, 0.25)
+        for s in _told(sights, progress, 0.0)
     ]
-    limit = _limit(trees, budget, least)
-    told = _told(sights, progress, 0.5)
-    return [_of_view(sight, tree, limit) for sight, tree in zip(told, trees, strict=True)]
+    return trees, _limit(trees, budget, least)
+
+
+def _made(
+    prediction: Prediction,
+    views: Views,
+    sights: Iterable[_Sight],
+    trees: list[Tree],
+    limit: float,
+    top_m: int,
+) -> tuple[Gaussians, list[tuple[Tensor, Tensor]], list[Elements]]:
+    """All photos' Gaussians in the world, in the prediction's unit; weights of each photo's, which end where
+    it has borders (`borders`); and its elements. A photo at a time."""
+    known = directed(prediction.dictionary)
+    made, weights, parts = [], [], []
+    for view, (sight, tree) in enumerate(zip(sights, trees, strict=True)):
+        part = _of_view(sight, tree, limit)
+        camera = Camera(prediction.viewmats[view], views.Ks[view], *views.size)
+        made.append(placed(part, sight.log_depths, sight.depth.slopes, camera, sight.size))
+        refined = refined_weights(prediction.weights[view][known].float(), sight.image, sight.photo)
+        width = sight.size[1]
+        weights.append(sparse_weights(refined.at(part.pixels // width, part.pixels % width), top_m))
+        parts.append(part)
+        if len(trees) > _HELD:
+            give_back()
+    names = ("means", "quats", "scales", "opacities", "sh")
+    whole = Gaussians(*(torch.cat([getattr(some, name) for some in made]) for name in names))
+    return whole, weights, parts
 
 
 def _limit(trees: list[Tree], budget: int, least: float) -> float:
@@ -223,32 +273,6 @@ def _of_view(sight: _Sight, tree: Tree, limit: float) -> Elements:
     ratio = [p / g for p, g in zip(sight.size, sight.image.shape[1:], strict=True)]
     own = sight.wanted[((row + 0.5) * ratio[0]).long(), ((column + 0.5) * ratio[1]).long()]
     return joined([*parts, behind.rows(own)])
-
-
-def _gaussians(
-    prediction: Prediction, views: Views, sights: list[_Sight], parts: list[Elements]
-) -> Gaussians:
-    """All photos' elements in the world, in the prediction's unit."""
-    cameras = [Camera(*of, *views.size) for of in zip(prediction.viewmats, views.Ks, strict=True)]
-    made = [
-        placed(part, sight.log_depths, sight.depth.slopes, camera, sight.size)
-        for part, sight, camera in zip(parts, sights, cameras, strict=True)
-    ]
-    names = ("means", "quats", "scales", "opacities", "sh")
-    return Gaussians(*(torch.cat([getattr(some, name) for some in made]) for name in names))
-
-
-def _semantics(
-    prediction: Prediction, sights: Iterable[_Sight], parts: list[Elements], top_m: int
-) -> Semantics:
-    """Weights end where the photo has borders (`borders`)."""
-    known = directed(prediction.dictionary)
-    of_views = []
-    for maps, sight, part in zip(prediction.weights, sights, parts, strict=True):
-        refined = refined_weights(maps[known], sight.image, sight.photo)
-        width = sight.size[1]
-        of_views.append(sparse_weights(refined.at(part.pixels // width, part.pixels % width), top_m))
-    return semantics_of(prediction, of_views)
 
 
 def _confidences(prediction: Prediction, parts: list[Elements]) -> Tensor:

@@ -10,16 +10,19 @@ lessen sum |photo - F|^2 (Landweber's iteration, the normal matrix lumped onto i
 Andersen and Kak 1984 with one subset), each begun a little ahead of the last (Beck and Teboulle 2009,
 FISTA). Colours stay within [0, 1] or, with `ringing`, near what the photos show around a Gaussian.
 
-Of a view only the Gaussians that it shows are held. More than `TOGETHER` photos are solved for in groups of
-neighbours in their order, each from where those before it came to; a colour is the mean of what its groups
-found, weighed by how much of it each saw. So memory stays that of one group, and time grows with the photos.
+Of a view only the Gaussians that it shows are held. Many photos say the same again and again: each of them
+speaks in one block of its pixels in some, in another one than its neighbours, and in a low voice where much
+of what it shows is its own, since nobody else may see that. More than `TOGETHER` photos' worth of pixels are
+solved for in groups of neighbours in their order, each from where those before it came to; a colour is the
+mean of what its groups found, weighed by how much of it each saw. So memory stays that of one group, and
+time grows with the photos.
 
 Sizes: V views, N Gaussians, n of them in one view, h w pixels of a photo.
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import cv2
@@ -28,6 +31,7 @@ import scipy.sparse
 import torch
 from torch import Tensor
 
+from langflash_core.memory import give_back
 from langflash_core.splat.frustum import Packs
 from langflash_core.splat.mixing import mixing
 from langflash_core.splat.projection import Footprints, project
@@ -39,6 +43,14 @@ TOGETHER = 16
 _MANY, _CUTS = 8, {"faint": 1 / 32, "small": 0.02}
 """Of more photos than that, alpha and contribution below which pairs are left out: a fifth of the time for
 .005 dB of 28.9."""
+_EVERY, _MOST_EVERY = 10, 8
+"""Photos of which one speaks in a block, and in one block of how many a photo speaks at least."""
+_BLOCK, _OWN = (
+    96,
+    0.25,
+)  # pixels, a block's side; share of own Gaussians in it, from which a photo speaks anyway
+_LOW = 0.1  # what a photo's word counts where it speaks for its own alone
+_TURN = 3  # blocks by which a row of them begins later than the one before
 _LEAST = 0.5  # of a pixel's light, from which a picture says what is wrong there
 _WINDOWS, _FINE = (5, 13), 1.5
 """Sides of what is around a Gaussian, pixels, below and from a deviation on."""
@@ -63,6 +75,7 @@ def solved_colours(
     cameras: Sequence[Camera],
     photos: Sequence[Tensor],
     trusts: Sequence[Tensor] | None = None,
+    owners: Tensor | None = None,
     rounds: int = ROUNDS,
     ringing: float | None = None,
     progress: Callable[[float], None] = lambda done: None,
@@ -74,28 +87,40 @@ def solved_colours(
         start: (N, 3), colours to begin with.
         cameras: of the photos' size. photos: (3, h, w) in [0, 1]; pixels that are no numbers say nothing.
         trusts: (N,) >= 0 of each view, what its photo counts for a Gaussian; None: 1.
+        owners: (N,) int64, the view that made each Gaussian; None: every photo speaks in all its pixels.
         ringing: how far colours may leave what the photos show around a Gaussian, in parts of how much that
             differs; None: within [0, 1], as far as they like.
         progress: called with the share that is done, before every view and every round; what it raises ends
             the work there.
 
+    Raises:
+        ValueError: there are not as many cameras, or trusts, as photos.
+
     Returns:
-        Colours, and how near every photo they come: of more than `TOGETHER` photos "after" is over one row of
-        pixels in eight.
+        Colours, and how near every photo they come where it speaks: of several groups of photos "after" is
+        over an eighth of that.
     """
-    given = list(zip(cameras, photos, trusts or [None] * len(photos), strict=True))
+    if len(cameras) != len(photos) or (trusts is not None and len(trusts) != len(photos)):
+        raise ValueError(f"cameras, trusts: expected one for each of {len(photos)} photos, received others")
     gaussians = gaussians.map(lambda values: values.float())
     first = start.detach().cpu().numpy().astype(np.float32)
     packs, answer = Packs.of(gaussians), _Answer.of(first)
     before, probes = [], []
-    bounds, cuts = _groups(len(given)), _CUTS if len(given) > _MANY else {}
+    share = 1 if owners is None or len(photos) <= _MANY else min(-(-len(photos) // _EVERY), _MOST_EVERY)
+    bounds, cuts = _groups(len(photos), share), _CUTS if len(photos) > _MANY else {}
     for begin, end in pairwise(bounds):
-        told = _within(progress, begin / len(given), (end - begin) / len(given))
+        told = _within(progress, begin / len(photos), (end - begin) / len(photos))
         group = _Group(len(first), told)
-        for number, (camera, photo, trust) in enumerate(given[begin:end]):
-            told(_OF_VIEWS * number / (end - begin))
-            rows = packs.before(camera)
-            group.views.append(_View.of(gaussians, rows, camera, photo, trust, cuts))
+        for view in range(begin, end):
+            told(_OF_VIEWS * (view - begin) / (end - begin))
+            rows = packs.before(cameras[view])
+            own = None if owners is None or share == 1 else (owners[rows.to(owners.device)] == view)
+            spoken = None if own is None else _Spoken(own.cpu().numpy(), view, share)
+            trust = None if trusts is None else trusts[view]
+            seen = _View.of(gaussians, rows, cameras[view], photos[view], trust, cuts, spoken)
+            group.views.append(seen)
+            if cuts:
+                give_back()  # each view leaves holes of other sizes
         before += [view.error(first) for view in group.views]
         answer.take(group.solved(answer.colours, rounds, ringing), group.total)
         probes += group.views if len(bounds) == 2 else [view.every(_PROBE) for view in group.views]
@@ -103,9 +128,10 @@ def solved_colours(
     return Solved(torch.from_numpy(answer.colours), tuple(zip(before, after, strict=True)))
 
 
-def _groups(count: int) -> list[int]:
-    """Where groups of photos begin and the last ends: equally many in each, at most `TOGETHER`."""
-    number = -(-count // TOGETHER)
+def _groups(count: int, share: int = 1) -> list[int]:
+    """Where groups of photos begin and the last ends: equally many in each, at most `TOGETHER` where each
+    speaks in all its pixels, as many more as it speaks in fewer."""
+    number = -(-count // (TOGETHER * share))
     return [count * k // number for k in range(number + 1)] if count else []
 
 
@@ -187,11 +213,36 @@ class _Group:
 
 
 @dataclass(frozen=True)
+class _Spoken:
+    """Where a photo speaks. own: (n,) bool, which of the Gaussians that it may see it made; view: its number;
+    share: it speaks in one block of so many."""
+
+    own: np.ndarray
+    view: int
+    share: int
+
+    def loudness(self, footprints: Footprints, size: tuple[int, int]) -> np.ndarray:
+        """(h, w) of a picture of `size`: 1 in its blocks, less where it speaks for its own Gaussians, else
+        0."""
+        high, wide = (-(-side // _BLOCK) for side in size)
+        x, y = (footprints.centres // _BLOCK).long().cpu().numpy().T
+        inside = (x >= 0) & (y >= 0) & (x < wide) & (y < high)
+        places, own = (y * wide + x)[inside], self.own[footprints.ids.cpu().numpy()[inside]]
+        counts, mine = (np.bincount(places, of, minlength=high * wide) for of in (None, own))
+        turns = np.arange(high)[:, None] * _TURN + np.arange(wide) + self.view
+        known = ((mine >= _OWN * counts) & (mine > 0)).reshape(high, wide)
+        told = np.where(turns % self.share == 0, 1, np.where(known, _LOW, 0)).astype(np.float32)
+        return told.repeat(_BLOCK, 0).repeat(_BLOCK, 1)[: size[0], : size[1]]
+
+
+@dataclass(frozen=True)
 class _View:
     """ids: (n,) rows of the Gaussians that are shown. contributions: (h w, n), of 1 a pixel where anything is
     drawn. photo: (h w, 3). trust: (n, 1), None: 1. sums: (n,) of contributions, times the trust. shown:
     (h w, 1), 1 where something is drawn and the photo is a number, else 0. around: rows of some Gaussians,
-    and least and most of the photo around each, uint8. size: (h, w)."""
+    and least and most of the photo around each, uint8. size: (h, w), or 1 and how many pixels where a photo
+    speaks in some, which are those of the rows here. counts: (h w, 1), what each pixel's word
+    counts, None: 1."""
 
     ids: np.ndarray
     contributions: scipy.sparse.csr_matrix
@@ -201,48 +252,69 @@ class _View:
     shown: np.ndarray
     around: tuple[np.ndarray, np.ndarray, np.ndarray]
     size: tuple[int, int]
+    counts: np.ndarray | None = None
 
     @staticmethod
     def of(
         gaussians: Gaussians,
-        rows: Tensor,
+        seen: Tensor,
         camera: Camera,
         photo: Tensor,
         trust: Tensor | None,
         cuts: Mapping[str, float],
+        spoken: _Spoken | None = None,
     ) -> "_View":
-        """rows: of the Gaussians that the camera may see. cuts: as `mixing` takes them, or nothing."""
-        footprints = project(gaussians.rows(rows), camera)
-        matrix, some = _narrowed(mixing(footprints, camera, len(rows), **cuts), len(rows))
+        """seen: rows of the Gaussians that the camera may see. cuts: as `mixing` takes them, or nothing.
+        spoken: where the photo speaks; None: everywhere."""
+        footprints = project(gaussians.rows(seen), camera)
+        loudness = None if spoken is None else spoken.loudness(footprints, (camera.height, camera.width))
+        wanted = None if loudness is None else loudness > 0
+        matrix, some = _narrowed(mixing(footprints, camera, len(seen), **cuts, wanted=wanted), len(seen))
         light = np.asarray(matrix.sum(1)).ravel()
         flat = photo.movedim(0, -1).flatten(0, 1).cpu().numpy().astype(np.float32)
         shown = (light >= _LEAST) & np.isfinite(flat).all(1)
         flat[~shown] = 0
         matrix.data *= np.repeat(shown / np.maximum(light, _LEAST), np.diff(matrix.indptr)).astype(np.float32)
-        ids, size = rows.cpu().numpy()[some], (camera.height, camera.width)
-        sums = matrix.T @ np.ones(len(flat), np.float32)
+        ids, size = seen.cpu().numpy()[some], (camera.height, camera.width)
+        counts = np.ones(len(flat), np.float32) if loudness is None else loudness.ravel()
+        sums = matrix.T @ counts
         told = None if trust is None else trust.cpu().numpy().astype(np.float32)[ids]
         if told is not None:
             sums = sums * told
-        placed = np.full(len(rows), -1)
+        placed = np.full(len(seen), -1)
         placed[some] = np.arange(len(some))
         around = _around(footprints, placed, sums, flat.reshape(*size, 3))
-        return _View(
+        view = _View(
             ids, matrix, flat, None if told is None else told[:, None], sums,
             shown[:, None].astype(np.float32), (ids[around[0]], *around[1:]), size,
         )  # fmt: skip
+        if loudness is None:
+            return view
+        spoken_of = np.flatnonzero(loudness)  # the rows of other pixels are empty
+        return replace(view.at(spoken_of), counts=counts[spoken_of, None])
+
+    def at(self, kept: np.ndarray) -> "_View":
+        """The same of some pixels."""
+        return replace(
+            self,
+            contributions=self.contributions[kept],
+            photo=self.photo[kept],
+            shown=self.shown[kept],
+            size=(1, len(kept)),
+            counts=None if self.counts is None else self.counts[kept],
+        )
 
     def every(self, step: int) -> "_View":
-        """What one row of pixels in `step` says."""
-        kept = np.zeros(self.size, bool)
-        kept[step // 2 :: step] = True
-        kept = np.flatnonzero(kept)
-        matrix, some = _narrowed(self.contributions[kept], len(self.ids))
+        """What one row of pixels in `step` says; of a photo that speaks in some pixels one of so many."""
+        height, width = self.size
+        kept = np.arange(height * width).reshape(height, width)
+        kept = kept[:, step // 2 :: step] if height == 1 else kept[step // 2 :: step]
+        part = self.at(kept.ravel())
+        matrix, some = _narrowed(part.contributions, len(self.ids))
         nothing = (np.zeros(0, np.int64), np.zeros((0, 3), np.uint8), np.zeros((0, 3), np.uint8))
-        return _View(
-            self.ids[some], matrix, self.photo[kept], None, self.sums[some], self.shown[kept], nothing,
-            (len(kept) // self.size[1], self.size[1]),
-        )  # fmt: skip
+        return replace(
+            part, ids=self.ids[some], contributions=matrix, trust=None, sums=self.sums[some], around=nothing
+        )
 
     def wrong(self, colours: np.ndarray) -> np.ndarray:
         """(h w, 3) the photo less the picture, 0 where nothing is drawn."""
@@ -250,7 +322,8 @@ class _View:
 
     def carried_back(self, colours: np.ndarray) -> np.ndarray:
         """(n, 3) of what is wrong."""
-        back = self.contributions.T @ self.wrong(colours)
+        wrong = self.wrong(colours)
+        back = self.contributions.T @ (wrong if self.counts is None else wrong * self.counts)
         return back if self.trust is None else back * self.trust
 
     def error(self, colours: np.ndarray) -> float:

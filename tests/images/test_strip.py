@@ -82,8 +82,11 @@ def test_an_index_that_is_not_whole_is_none(tmp_path: Path) -> None:
 def test_of_a_way_too_long_for_one_scene_the_begin_is_taken() -> None:
     places = np.linspace(0, 40, 401)
     long = strip(places, np.ones(401))
-    choice = choose(long, module.MAX_PHOTOS)
-    assert len(choice.chosen) == module.MAX_PHOTOS and choice.gap < 0.7
+    choice = choose(long, module.FILM_PHOTOS)
+    assert len(choice.chosen) == module.FILM_PHOTOS and choice.gap < 0.7
+    more = choose(long, 2 * module.FILM_PHOTOS)
+    assert len(more.chosen) == 2 * module.FILM_PHOTOS and more.until is not None and choice.until is not None
+    assert more.until > 1.9 * choice.until
     assert choice.until is not None and choice.left["beyond"] == sum(
         s.seconds > choice.until for s in long.stills
     )

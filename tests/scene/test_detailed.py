@@ -14,7 +14,7 @@ from langflash_core.scene.detailed import (
     _area,
     _spent,
     assemble_detailed,
-    working_photos,
+    working_photo,
     working_size,
 )
 from langflash_core.scene.elements import under
@@ -26,7 +26,7 @@ LOW, NORMAL, HIGH = (DETAILS[name] for name in ("low", "normal", "high"))
 
 
 def made(given: Photographed, detail: Detail = NORMAL, **options) -> Scene:
-    photos = working_photos(given.photos, GRID)
+    photos = [working_photo(photo, GRID) for photo in given.photos]
     return assemble_detailed(given.prediction, given.views, photos, detail, **options)
 
 
@@ -264,7 +264,7 @@ def test_photos_of_any_size(ratio):
 def test_the_size_at_which_a_photo_is_used(photo, expected):
     assert working_size(photo, GRID) == expected
     drawn = torch.rand(3, *photo, generator=torch.Generator().manual_seed(0))
-    [sized] = working_photos([drawn], GRID)
+    sized = working_photo(drawn, GRID)
     assert sized.shape[-2:] == expected and float(sized.min()) >= 0 and float(sized.max()) <= 1
     assert (sized is drawn) == (photo == expected)
 

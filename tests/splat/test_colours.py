@@ -262,7 +262,7 @@ def test_twice_is_the_same_to_the_last_bit():
 
 def test_photos_and_cameras_are_as_many():
     gaussians, colours = scene(3)
-    with pytest.raises(ValueError, match="zip"):
+    with pytest.raises(ValueError, match="one for each of"):
         solved_colours(gaussians, colours, views(2), [torch.rand(3, 40, 48)])
 
 
@@ -338,3 +338,31 @@ def test_no_photos():
     gaussians, colours = scene(3)
     solved = solved_colours(gaussians, colours, [], [])
     assert torch.equal(solved.colours, colours) and solved.psnr == ()
+
+
+def test_of_many_photos_each_speaks_in_turn_and_colours_come_back(monkeypatch):
+    """In blocks of 8 pixels of 48 x 40: the sixth of a picture each, and all of it together."""
+    cameras, gaussians, colours, photos = row_of_views(12)
+    for name, value in (("_MANY", 3), ("_EVERY", 2), ("_BLOCK", 8)):
+        monkeypatch.setattr(module, name, value)
+    owners = torch.full((400,), -1)
+    owners[:100] = 0
+    listed = []
+    whole = module.mixing
+    monkeypatch.setattr(module, "mixing", lambda *a, **k: listed.append(k["wanted"]) or whole(*a, **k))
+    solved = solved_colours(gaussians, grey(colours), cameras, photos, owners=owners)
+    assert all(wanted.mean() < 0.4 for wanted in listed[1:])
+    assert listed[0].sum() > listed[1].sum()  # the first also speaks for its own
+    before, after = np.mean(solved.psnr, axis=0)
+    assert after > before + 10
+    everywhere = solved_colours(gaussians, grey(colours), cameras, photos)
+    drawn = [picture(gaussians, of.colours, cameras[5])[0] for of in (solved, everywhere)]
+    off = [float((photos[5] - own).square().mean()) for own in drawn]
+    assert -10 * math.log10(off[0] / off[1]) > -3  # pictures that agree are known from a part
+
+
+def test_few_photos_speak_everywhere_whoever_made_what():
+    cameras, gaussians, colours, photos = row_of_views(4)
+    owners = torch.arange(400) % 4
+    with_owners = solved_colours(gaussians, grey(colours), cameras, photos, owners=owners)
+    assert torch.equal(with_owners.colours, solved_colours(gaussians, grey(colours), cameras, photos).colours)

@@ -5,6 +5,7 @@ import json
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
@@ -59,6 +60,8 @@ def walk(args: Namespace, out: TextIO) -> None:
         write_atomically(args.results / NUMBERS, json.dumps(result, indent=1).encode())
     if args.sheet is not None and args.results is not None:
         _write_sheet(args.sheet, [("drawn", args.results)])
+    if args.plot is not None:
+        _write_plot(args.plot, result)
     write_tables(args, result, walk_markdown(result), out)
 
 
@@ -72,6 +75,10 @@ def _check(args: Namespace) -> None:
         check_output_file(args.output, (".md",))
     if args.results is not None:
         check_folder(args.results)
+    if args.plot is not None:
+        check_output_file(args.plot, (".png",))
+        if find_spec("matplotlib") is None:
+            raise InputError("--plot needs matplotlib; pip install 'langflash[bench]' brings it")
     if args.sheet is not None:
         check_output_file(args.sheet, (".png",))
         if args.results is None:
@@ -151,6 +158,13 @@ def _numbers(folder: Path) -> dict:
     if not isinstance(found, dict) or not {"cases", "by_photos"} <= found.keys():
         raise InputError(f"{path} is no result of eval walk; make it with --results")
     return found
+
+
+def _write_plot(path: Path, result: dict) -> None:
+    from langflash_core.lab.evaluation.walk_plot import walk_png
+
+    make_folder(path.parent)
+    write_atomically(path, walk_png(result))
 
 
 def _write_sheet(path: Path, versions: Sequence[tuple[str, Path]]) -> None:

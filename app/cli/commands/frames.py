@@ -13,7 +13,7 @@ from PIL import Image
 
 from langflash_core.errors import OutputError
 from langflash_core.files import filled_atomically, make_folder, write_atomically
-from langflash_core.images.pictures import MAX_PHOTOS
+from langflash_core.images.pictures import FILM_PHOTOS
 from langflash_core.images.still_names import is_still, shown_name
 from langflash_core.images.strip import Choice, Strip, choose, notes_on
 
@@ -33,7 +33,7 @@ def run(args: Namespace, out: TextIO) -> None:
     _check_output(args)
     with ProgressBar() as progress:
         strip = look_through(args.film, progress, start=args.start, end=args.end, every=args.every)
-        choice = choose(strip, args.most or MAX_PHOTOS)
+        choice = choose(strip, args.most or FILM_PHOTOS)
         progress("writing", 1.0)
         document = _document(args.output, strip, choice)
         with filled_atomically(args.output) as folder:

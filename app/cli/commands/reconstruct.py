@@ -2,15 +2,21 @@
 
 import time
 from argparse import Namespace
+from contextlib import nullcontext
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from langflash_core.errors import ImageError, InputError, WeightsError
+from langflash_core.files import held_alone
 from langflash_core.formats import is_film
+from langflash_core.keeping import forget
 
 from ..files import check_output_file, readable_file
 from ..films import with_frames
 from ..report import ProgressBar, say_warnings, write_json
+
+if TYPE_CHECKING:
+    from langflash_core.types import Scene
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -32,14 +38,35 @@ def run(args: Namespace, out: TextIO) -> None:
         args.photos, films, notes = with_frames(
             args.photos, progress, most=args.frames, start=args.start, end=args.end
         )
+    with nullcontext() if args.keep is None else held_alone(args.keep):
+        scene = _written(args)
+        if args.keep is not None:
+            forget(args.keep)
+    from langflash_core.scene.report import describe
+
+    say_warnings((*notes, *scene.record.warnings))
+    document = {
+        "scene": str(args.output),
+        **describe(scene),
+        "file_bytes": args.output.stat().st_size,
+        "seconds": round(time.perf_counter() - start, 3),
+        **({"films": films} if films else {}),
+    }
+    if args.json:
+        write_json(document, out)
+    else:
+        print(_sentence(args.output, scene, document), file=out)
+
+
+def _written(args: Namespace) -> "Scene":
+    """The scene, once it is on the disk."""
     from langflash_core.ahead import begin
 
-    ahead = begin(args.photos, preset=args.preset, weights=args.weights, size=args.size)
+    ahead = begin(args.photos, preset=args.preset, weights=args.weights, size=args.size, keep=args.keep)
     ahead.check_photos()
     from langflash_core import pipeline
     from langflash_core.export.cameras import read_posed
     from langflash_core.scene.file import save
-    from langflash_core.scene.report import describe
 
     lens, viewmats = {"fov": args.fov, "intrinsics": args.intrinsics}, None
     if args.poses:
@@ -60,24 +87,14 @@ def run(args: Namespace, out: TextIO) -> None:
             detail=args.detail,
             gaussians=args.gaussians,
             refine_seconds=args.refine,
+            keep=args.keep,
             progress=progress,
             ahead=ahead,
         )
         progress("writing", 1.0)
         args.output.parent.mkdir(parents=True, exist_ok=True)
         save(scene, args.output)
-    say_warnings((*notes, *scene.record.warnings))
-    document = {
-        "scene": str(args.output),
-        **describe(scene),
-        "file_bytes": args.output.stat().st_size,
-        "seconds": round(time.perf_counter() - start, 3),
-        **({"films": films} if films else {}),
-    }
-    if args.json:
-        write_json(document, out)
-    else:
-        print(_sentence(args.output, scene, document), file=out)
+    return scene
 
 
 def _sentence(path: Path, scene, document: dict) -> str:

@@ -275,6 +275,9 @@ def _add_walk(actions) -> None:
         help="keep every walk there, for walk-beside, and go on from it; one folder for each version",
     )
     command.add_argument("--sheet", type=Path, metavar="IMG", help="also kept frames and scenes, as .png")
+    command.add_argument(
+        "--plot", type=Path, metavar="IMG", help="also time and memory against photos, as .png"
+    )
     _add_judging(command)
     beside = new_command(actions, "walk-beside", "two results of walk on the same walks, beside each other")
     beside.add_argument("before", type=Path, metavar="BEFORE", help="folder of --results")

@@ -57,7 +57,7 @@ def add_reconstruct(commands) -> None:
         "--frames",
         type=frame_count,
         metavar="N",
-        help="of a film, at most so many (default: as many as photos are taken)",
+        help="of a film, at most so many (default: 32)",
     )
     add_film_part(command)
     add_network(command)
@@ -103,6 +103,12 @@ def add_reconstruct(commands) -> None:
         help="a transforms.json or COLMAP text model with the photos' poses and lenses: they are not sought, "
         "and the scene is in their world and unit",
     )
+    command.add_argument(
+        "--keep",
+        type=Path,
+        metavar="FOLDER",
+        help="what is done is kept there until the scene is written: the same command goes on from there",
+    )
     add_json(command)
 
 
@@ -120,7 +126,7 @@ def add_frames(commands) -> None:
         "--most",
         type=frame_count,
         metavar="N",
-        help="at most so many (default: as many as `langflash reconstruct` takes)",
+        help="at most so many (default: 32, as `langflash reconstruct` takes)",
     )
     add_film_part(command)
     command.add_argument(

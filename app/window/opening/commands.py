@@ -7,7 +7,7 @@ from langflash_core.errors import FilmError
 from langflash_core.images.strip import Strip, choose, notes_on
 
 from ..commands import Notify, ShowDialog
-from ..scene.drops import MAX_PHOTOS
+from ..scene.drops import FILM_PHOTOS, MAX_PHOTOS
 from ..scene.state import LOOKING_THROUGH, Job, Photo
 from ..state import State
 from .state import LOOKING, NO_OPENING, Film, Folder
@@ -142,7 +142,7 @@ class FilmRead:
     def apply(self, state: State) -> State:
         state = replace(state, job=None)
         try:
-            film = proposed(self.path, self.strip, room_for_frames(state))
+            film = proposed(self.path, self.strip, min(room_for_frames(state), FILM_PHOTOS))
         except FilmError as error:
             return Notify(str(error)).apply(state)
         state = replace(state, opening=replace(state.opening, film=film))

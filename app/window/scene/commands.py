@@ -14,7 +14,7 @@ from ..commands import NOTHING_TO_SAVE, Command, Notify, ShowDialog
 from ..editing.state import fresh
 from ..state import State
 from .drops import MAX_PHOTOS
-from .state import MOST_ROOMS, RECONSTRUCTING, RESTORING, Job, Photo, Room, SceneInfo
+from .state import MOST_ROOMS, RECONSTRUCTING, RESTORING, Job, Photo, Room, SceneInfo, head_of
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
@@ -465,9 +465,9 @@ class Progressed:
         if job is None:
             return state
         fraction = min(max(self.fraction, 0.0), 1.0)
-        if self.stage == job.stage:
-            return replace(state, job=replace(job, fraction=fraction))
-        done = (*job.done, (job.stage, state.now - job.started))
+        if head_of(self.stage) == head_of(job.stage):  # the same, at another of its photos
+            return replace(state, job=replace(job, stage=self.stage, fraction=fraction))
+        done = (*job.done, (head_of(job.stage), state.now - job.started))
         return replace(
             state, job=replace(job, stage=self.stage, fraction=fraction, started=state.now, done=done)
         )

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from langflash_core.formats import DROPPED, FILMS_IN, is_film
+from langflash_core.images.pictures import FILM_PHOTOS as FILM_PHOTOS
 from langflash_core.images.pictures import MAX_PHOTOS as MAX_PHOTOS
 
 PHOTO_SUFFIXES = frozenset(

@@ -40,8 +40,17 @@ from .commands import (
     dropped,
 )
 from .drops import sort_drop
-from .state import SceneInfo
-from .work import FindPair, JoinScenes, LoadScene, MakeThumbnails, ReconstructPhotos, Thin, WriteScene
+from .state import WHOLE, WHOLE_PHOTOS, SceneInfo
+from .work import (
+    FindPair,
+    JoinScenes,
+    LoadScene,
+    MakeThumbnails,
+    ReconstructPhotos,
+    ShrinkPhotos,
+    Thin,
+    WriteScene,
+)
 
 
 class SceneEffects(Effects):
@@ -86,6 +95,7 @@ class SceneEffects(Effects):
                 self._hands.dispatch(Loaded())
             case _:
                 self._go_on(command, before, state)
+        self._show_whole(before, state)
 
     def _go_on(self, command: Command, before: State, state: State) -> None:
         """Commands that stand for others."""
@@ -108,6 +118,17 @@ class SceneEffects(Effects):
                 pass
         for each in waited:
             self._hands.perform(each)
+
+    def _show_whole(self, before: State, state: State) -> None:
+        """Of many photos the one that the scene is compared with, whole."""
+        view, info = state.view, state.info
+        if info is None or view is None or state.compare is None:
+            return
+        known = before.info is info and before.view == view and before.compare is not None
+        if len(info.scene.photos) <= WHOLE_PHOTOS or view >= len(info.scene.photos) or known:
+            return
+        with suppress(OSError):
+            self._thumbnails.put_encoded(WHOLE, info.scene.photos[view])
 
     def _open(self, paths: Sequence[str], was_dropped: bool, state: State) -> None:
         perform = self._hands.perform
@@ -134,7 +155,9 @@ class SceneEffects(Effects):
             self._viewport.set_scene(info.serial, info.scene)
         except LangFlashError as error:
             self._hands.perform(Notify(str(error)))
-        for index, photo in enumerate(info.scene.photos):
+        if len(info.scene.photos) > WHOLE_PHOTOS:
+            self._hands.submit(ShrinkPhotos(info.serial, info.scene.photos))
+        for index, photo in enumerate(info.scene.photos[:WHOLE_PHOTOS]):
             with suppress(OSError):  # a scene whose small photos are damaged still shows; buttons get numbers
                 self._thumbnails.put_encoded(f"view {index}", photo)
         for colormap in COLOUR_MAPS:

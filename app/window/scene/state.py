@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 
 FLIGHT_SECONDS = 0.7
+WHOLE_PHOTOS = 32  # of a scene, up to which all stay whole on the graphics card: 1.4 MB each
+WHOLE = "compared photo"
+"""The picture of the one that is whole of more photos."""
 MOST_ROOMS = 3  # beside the one on show; a large scene takes 100 MB
 
 
@@ -101,7 +104,13 @@ _SAID = {
 
 def said(stage: str) -> str:
     """A stage of the reconstruction as people would say it; others are called as they are."""
-    return _SAID.get(stage, stage)
+    head = head_of(stage)
+    return _SAID.get(head, head) + stage[len(head) :]
+
+
+def head_of(stage: str) -> str:
+    """A stage without the photo that it is at."""
+    return stage.partition(": ")[0]
 
 
 @dataclass(frozen=True)

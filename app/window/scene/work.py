@@ -3,13 +3,16 @@
 Heavy imports wait until they are needed: the window makes these requests before torch is loaded.
 """
 
+import io
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from PIL import Image
 
 from langflash_core.detail import DEFAULT_DETAIL
 from langflash_core.errors import ImageError, LangFlashError
@@ -190,6 +193,21 @@ class Thin(SceneErrand):
         from langflash_core.scene.thin import thin_with_rows
 
         yield Thinned(self.scene, self.share, *thin_with_rows(self.scene, self.share))
+
+
+@dataclass(frozen=True)
+class ShrinkPhotos(SceneErrand):
+    """Small pictures of a scene's many photos, one after another: all of them whole would fill the graphics
+    card."""
+
+    photos: tuple[bytes, ...] = field(repr=False)
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        for index, encoded in enumerate(self.photos):
+            with suppress(OSError), Image.open(io.BytesIO(encoded)) as photo:  # else the button has a number
+                photo.draft("RGB", (THUMBNAIL_SIDE, THUMBNAIL_SIDE))
+                photo.thumbnail((THUMBNAIL_SIDE, THUMBNAIL_SIDE))
+                yield ShowPicture(f"view {index}", np.asarray(photo.convert("RGB")))
 
 
 @dataclass(frozen=True)

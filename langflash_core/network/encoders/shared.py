@@ -7,6 +7,7 @@ import torch
 from torch import Tensor, nn
 
 from langflash_core.network.encoders.plain import PlainViT
+from langflash_core.network.many import together
 from langflash_core.network.presets import GuidedDepth
 
 _MEAN = (0.485, 0.456, 0.406)
@@ -45,6 +46,22 @@ class Tokens:
         """Every hook (B, V, h*w, C) changed alike."""
         hooks, named, grouped = (tuple(map(change, kind)) for kind in (self.hooks, self.named, self.grouped))
         return Tokens(hooks, self.grid, named, grouped)
+
+    @staticmethod
+    def beside(parts: Sequence["Tokens"]) -> "Tokens":
+        """Those of several groups of views, one after the other."""
+        if len(parts) == 1:
+            return parts[0]
+        kinds = (
+            [part.hooks for part in parts],
+            [part.named for part in parts],
+            [part.grouped for part in parts],
+        )
+        count = sum(part.shape[1] for part in parts)
+        hooks, named, grouped = (
+            tuple(together(same, count, 1) for same in zip(*kind, strict=True)) for kind in kinds
+        )
+        return Tokens(hooks, parts[0].grid, named, grouped)
 
     def for_grouping(self) -> "Tokens":
         """Those that the grouping reads."""

@@ -1,5 +1,7 @@
 """Transformer blocks. n query tokens, m memory tokens, C channels; pre-norm throughout."""
 
+from collections.abc import Iterable
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
@@ -60,6 +62,23 @@ class Attention(nn.Module):
         q = self._of_heads(self.query(query))
         q = q if code is None else rotate(q, code)
         return self.out(F.scaled_dot_product_attention(q, *memory).transpose(1, 2).flatten(2))
+
+    def gathered_in_turn(self, query: Tensor, memories: Iterable[Memory]) -> Tensor:
+        """(B, n, C) from queries (B, n, C) and a memory that comes in parts: one of them is held at a time.
+
+        Of every part the largest logit is taken out before exponentials are summed, and sums so far are
+        brought to the largest of all (Milakov and Gimelshein 2018): softmax over all parts but for rounding.
+        """
+        q = self._of_heads(self.query(query))
+        top = q.new_full(q.shape[:-1], -torch.inf)
+        total, sums = torch.zeros_like(top), torch.zeros_like(q)
+        for k, v in memories:
+            logits = q @ k.mT * q.shape[-1] ** -0.5  # (B, heads, n, m)
+            higher = torch.maximum(top, logits.amax(-1))
+            shrunk, shares = (top - higher).exp(), (logits - higher[..., None]).exp()
+            total, sums = total * shrunk + shares.sum(-1), sums * shrunk[..., None] + shares @ v
+            top = higher
+        return self.out((sums / total[..., None]).transpose(1, 2).flatten(2))
 
     def _of_heads(self, x: Tensor) -> Tensor:
         return x.unflatten(-1, (self.heads, -1)).transpose(1, 2)
@@ -125,8 +144,21 @@ class QueryBlock(nn.Module):
         query_pos: Tensor | float = 0.0,
         memory_pos: Tensor | float = 0.0,
     ) -> Tensor:
-        x = self.norm1(queries)
-        queries = queries + self.attn(x + query_pos, x + query_pos, x)
+        queries = self._among_themselves(queries, query_pos)
         m = self.norm_memory(memory)
         queries = queries + self.cross(self.norm2(queries) + query_pos, m + memory_pos, m)
         return queries + self.mlp(self.norm3(queries))
+
+    def in_turn(
+        self, queries: Tensor, memories: Iterable[tuple[Tensor, Tensor]], query_pos: Tensor | float = 0.0
+    ) -> Tensor:
+        """The same of a memory in parts, each with its positions; one of them is held at a time."""
+        queries = self._among_themselves(queries, query_pos)
+        normed = ((self.norm_memory(memory), pos) for memory, pos in memories)
+        parts = (self.cross.memory(m + pos, m) for m, pos in normed)
+        queries = queries + self.cross.gathered_in_turn(self.norm2(queries) + query_pos, parts)
+        return queries + self.mlp(self.norm3(queries))
+
+    def _among_themselves(self, queries: Tensor, query_pos: Tensor | float) -> Tensor:
+        x = self.norm1(queries)
+        return queries + self.attn(x + query_pos, x + query_pos, x)

@@ -1,6 +1,6 @@
 """Two-stack decoder (views look at each other) and the Siamese decoder of the semantic branch."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import cast
 
 import torch
@@ -9,6 +9,9 @@ from torch import Tensor, nn
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.layers.attention import CrossBlock, Memory, SelfBlock, rope_2d
 from langflash_core.network.presets import GuidedDepth, Preset
+
+Readings = Sequence[Sequence[int]]
+"""Of each view the others that it reads, at least one."""
 
 
 def normalised_intrinsics(Ks: Tensor, width: int, height: int) -> Tensor:
@@ -35,22 +38,28 @@ class TwoStacks(nn.Module):
         self.other = nn.ModuleList(CrossBlock(dim, heads, eps) for _ in range(depth))
         self.norm = nn.LayerNorm(dim, eps)
 
-    def layers(self, x: Tensor, grid: tuple[int, int]) -> list[Tensor]:
+    def layers(self, x: Tensor, grid: tuple[int, int], read: Readings | None = None) -> list[Tensor]:
         """What every layer gives, the last one normalised, from embedded tokens (B, V, h*w + 1, C);
-        the last token of a view is the one of its intrinsics."""
+        the last token of a view is the one of its intrinsics. read: which others each view reads; None:
+        all."""
         code = rope_2d(grid, self.head_dim, self.base, extra=1).to(x.device)
         given = []
         for first, other in zip(self.first, self.other, strict=True):
-            x = self._layer(x, code, cast(CrossBlock, first), cast(CrossBlock, other))
+            x = self._layer(x, code, cast(CrossBlock, first), cast(CrossBlock, other), read)
             given.append(x)
         return [*given[:-1], self.norm(x)]
 
     @staticmethod
-    def _layer(x: Tensor, code: Tensor, first: CrossBlock, other: CrossBlock) -> Tensor:
+    def _layer(
+        x: Tensor, code: Tensor, first: CrossBlock, other: CrossBlock, read: Readings | None
+    ) -> Tensor:
         seen = x[:, 1:] if x.shape[1] > 1 else x
+        if read is not None:
+            seen = x[:, list(read[0])]
         memory = first.memory(seen.flatten(1, 2), code.repeat(1, seen.shape[1], 1))
         outputs = [first(x[:, 0], memory, code)]
-        for view, memory in enumerate(_memories(x, code, other), start=1):
+        memories = _memories(x, code, other) if read is None else _chosen_memories(x, code, other, read)
+        for view, memory in enumerate(memories, start=1):
             outputs.append(other(x[:, view], memory, code))
         return torch.stack(outputs, 1)
 
@@ -73,6 +82,15 @@ def _memories(x: Tensor, code: Tensor, block: CrossBlock) -> Iterator[Memory]:
         yield keys[:, :, others], values[:, :, others]
 
 
+def _chosen_memories(x: Tensor, code: Tensor, block: CrossBlock, read: Readings) -> Iterator[Memory]:
+    """What each view but the first reads of those it reads: keys and values are made once a view that is
+    read."""
+    keys, values = block.memory(x.flatten(1, 2), code.repeat(1, x.shape[1], 1))
+    keys, values = (of.unflatten(2, (x.shape[1], x.shape[2])) for of in (keys, values))
+    for others in read[1:]:
+        yield keys[:, :, list(others)].flatten(2, 3), values[:, :, list(others)].flatten(2, 3)
+
+
 class TwoStackDecoder(TwoStacks):
     """The stacks behind an encoder that knows no intrinsics: their token joins here."""
 
@@ -82,17 +100,18 @@ class TwoStackDecoder(TwoStacks):
         self.embed_named = nn.Linear(preset.encoder_dim, preset.decoder_dim, bias=False)
         nn.init.zeros_(self.embed_named.weight)
 
-    def forward(self, tokens: Tokens, Ks: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(self, tokens: Tokens, Ks: Tensor, read: Readings | None = None) -> tuple[Tensor, Tensor]:
         """Tokens (B, V, h*w, C) after half of the layers and after the last.
 
         Args:
             tokens: of the encoder; the last hook is decoded, and what real photos taught beside it.
             Ks: (B, V, 3, 3), pixels of the encoded images.
+            read: which others each view reads; None: all.
         """
         height, width = (side * self.patch for side in tokens.grid)
         camera = self.intrinsics(normalised_intrinsics(Ks, width, height))[:, :, None]
         seen = self.embed(tokens.hooks[-1]) + self.embed_named(tokens.named[-1])
-        given = self.layers(torch.cat((seen, camera), 2), tokens.grid)
+        given = self.layers(torch.cat((seen, camera), 2), tokens.grid, read)
         middle = given[max(len(given) // 2, 1) - 1]
         return middle[:, :, :-1], given[-1][:, :, :-1]
 

@@ -1,11 +1,16 @@
 """Language feature aggregation: one vector per group. K groups, C channels, V views."""
 
+import math
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from langflash_core.network.layers.attention import QueryBlock
+from langflash_core.network.many import groups_of, in_groups
 from langflash_core.network.presets import Preset
+
+_CLOSELY = 32  # views that groups read at half of the features' size; more at less: as many tokens in all
 
 
 def average_atoms(weights: Tensor, features: Tensor, eps: float = 1e-6) -> Tensor:
@@ -19,13 +24,23 @@ def average_atoms(weights: Tensor, features: Tensor, eps: float = 1e-6) -> Tenso
 
     Source: the paper, initialisation of the aggregation.
     """
-    total = torch.einsum("bvkhw,bvchw->bkc", weights, features)
+    sums = [
+        torch.einsum("bvkhw,bvchw->bkc", weights[:, some], features[:, some].float())
+        for some in groups_of(weights.shape[1])
+    ]
+    total = sums[0] if len(sums) == 1 else torch.stack(sums).sum(0)
     return total / (weights.sum((1, 3, 4))[..., None] + eps)
 
 
 def averaged_atoms(weights: Tensor, features: Tensor, eps: float = 1e-6) -> Tensor:
     """`average_atoms` of unit norm; a group without agreement points nowhere."""
     return F.normalize(average_atoms(weights, features, eps), dim=-1)
+
+
+def _pooled(features: Tensor, side: int) -> Tensor:
+    """Means (B, V, C, h / side, w / side) of features (B, V, C, h, w)."""
+    side = min(side, *features.shape[-2:])
+    return F.avg_pool2d(features.flatten(0, 1), side).unflatten(0, features.shape[:2])
 
 
 class Aggregation(nn.Module):
@@ -51,7 +66,8 @@ class Aggregation(nn.Module):
             features: L(x), (B, V, C, h, w).
         """
         initial = F.normalize(average_atoms(weights, features, self.eps), dim=-1)
-        memory = F.avg_pool2d(features.flatten(0, 1), 2).unflatten(0, features.shape[:2])
+        side = 2 * math.ceil((features.shape[1] / _CLOSELY) ** 0.5)
+        memory = in_groups(lambda some: _pooled(some.float(), side), features, dim=1)
         memory = memory.permute(0, 1, 3, 4, 2).flatten(1, 3)  # (B, V*h*w/4, C)
         memory = self.memory(memory * memory.shape[-1] ** 0.5)
         queries = self.embed(initial * initial.shape[-1] ** 0.5)

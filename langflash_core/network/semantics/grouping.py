@@ -4,7 +4,9 @@ B batch, V views, N queries, d channels. Source: the paper's grouping decoder, a
 (Carion et al. 2020) and Mask2Former (Cheng et al. 2022).
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import torch
 from torch import Tensor, nn
@@ -26,10 +28,11 @@ class Groups:
     existence_logits: Tensor
 
 
-def sinusoid(length: int, dim: int, *, like: Tensor) -> Tensor:
-    """1-D code (length, dim) of the running position. Source: Vaswani et al. 2017."""
+def sinusoid(length: int, dim: int, *, like: Tensor, start: int = 0) -> Tensor:
+    """1-D code (length, dim) of the running position from `start` on. Source: Vaswani et al. 2017."""
     rates = 10_000.0 ** (-torch.arange(0, dim, 2, device=like.device, dtype=torch.float32) / dim)
-    angles = torch.arange(length, device=like.device, dtype=torch.float32)[:, None] * rates
+    places = torch.arange(start, start + length, device=like.device, dtype=torch.float32)
+    angles = places[:, None] * rates
     return torch.stack((angles.sin(), angles.cos()), -1).flatten(1).to(like.dtype)
 
 
@@ -92,6 +95,33 @@ class SemanticGrouping(nn.Module):
             answers.append(self._read(queries, finest.unflatten(0, (batch, num_views))))
         return tuple(answers)
 
+    def of_many(self, memories: Sequence[tuple[Tensor, ...]]) -> Tensor:
+        """What the queries (1, N, d) come to by the memories of one scene's views, group after group of them.
+
+        But for rounding what `forward` reads its last masks from (`masks`); one group's keys are held at a
+        time.
+        """
+        queries = self.patterns.expand(1, -1, -1)
+        per_scale = len(self.layers) // len(self.memories)
+        for number, layer in enumerate(self.layers):
+            scale = number // per_scale
+            codes = self._coded(self.memories[scale], [maps[scale] for maps in memories])
+            queries = cast(QueryBlock, layer).in_turn(queries, codes, self.positions)
+        return queries
+
+    @staticmethod
+    def _coded(project: nn.Module, groups: Sequence[Tensor]) -> Iterator[tuple[Tensor, Tensor]]:
+        """Memories (1, m, d) of groups of maps (v, f, h, w), and the codes of their running positions."""
+        start = 0
+        for maps in groups:
+            memory = project(maps).flatten(2).transpose(1, 2).flatten(0, 1)[None]
+            yield memory, sinusoid(memory.shape[1], memory.shape[2], like=memory, start=start)
+            start += memory.shape[1]
+
+    def masks(self, queries: Tensor, finest: Tensor) -> Groups:
+        """What the queries (1, N, d) answer in some views, whose finest maps are (v, f, h, w)."""
+        return self._read(queries, finest[None])
+
     def _read(self, queries: Tensor, finest: Tensor) -> Groups:
         x = self.norm(queries)
         logits = torch.einsum("bnf,bvfhw->bvnhw", self.mask_mlp(x), finest) / finest.shape[2] ** 0.5
@@ -103,9 +133,13 @@ def surviving(groups: Groups, tau_exist: float) -> Tensor:
 
     Query n survives where e_n > tau_exist and max_x p_n(x) > tau_exist. Source: the paper, 3.2.
     """
-    existence = torch.sigmoid(groups.existence_logits[0])
-    strongest = torch.sigmoid(groups.mask_logits[0].amax((0, 2, 3)))
-    return ((existence > tau_exist) & (strongest > tau_exist)).nonzero()[:, 0]
+    return surviving_of([groups.mask_logits[0].amax((0, 2, 3))], groups.existence_logits[0], tau_exist)
+
+
+def surviving_of(strongest: Sequence[Tensor], existence: Tensor, tau_exist: float) -> Tensor:
+    """`surviving` by the largest mask logits (N,) of each group of views and the existence logits (N,)."""
+    highest = torch.sigmoid(torch.stack(list(strongest)).amax(0))
+    return ((torch.sigmoid(existence) > tau_exist) & (highest > tau_exist)).nonzero()[:, 0]
 
 
 def group_weights(groups: Groups, survivors: Tensor, size: tuple[int, int]) -> Tensor:

@@ -12,15 +12,19 @@ Notation: V views, K groups, f channels of the mask map, J parts, X pixels of al
 S = f + K channels of the joint space.
 """
 
+from collections.abc import Callable, Sequence
+
 import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from langflash_core.network.many import groups_of, held, in_groups, together
 from langflash_core.network.presets import Splitting
 from langflash_core.network.stereo.prior import resize
 
 _ITERATIONS = 6
 _DIRECTIONS = 32
+_WHOLE = 16  # views, all pixels of which are looked at for parts; of more, as many pixels
 _SEEDS_FROM = 1500  # pixels; enough to seed from, and seeding is the only serial step
 
 
@@ -51,32 +55,65 @@ def split_groups(
     """
     if weights.shape[1] == 0:
         return weights.new_zeros(len(weights), 0, *size)
+    joint = joint_maps(weights, embeddings, None if features is None else condensed(features), rule)
+    return split_maps([lambda: joint], len(weights), rule, size)
+
+
+def joint_maps(weights: Tensor, embeddings: Tensor, meant: Tensor | None, rule: Splitting) -> Tensor:
+    """u of some views (v, S, h, w): weights (v, K, h, w) and embeddings (v, f, h, w) as `split_groups` has
+    them; meant: (v, D, h', w'), condensed features."""
     units = F.normalize(embeddings.float(), dim=1)
     seen = [units, rule.agreement * weights.float().sqrt()]
-    if features is not None:
-        meant = condensed(features)
+    if meant is not None:
         seen.append(rule.meaning * F.normalize(resize(meant, (units.shape[-2], units.shape[-1])), dim=1))
-    joint = F.normalize(torch.cat(seen, 1), dim=1)
-    coarse = F.avg_pool2d(joint, 2, ceil_mode=True).movedim(1, -1).flatten(0, 2)  # (X, S)
-    centres = cluster(F.normalize(coarse, dim=-1), rule)
-    closeness = torch.einsum("vshw,js->vjhw", joint, rule.sharpness * centres)
-    return resize(closeness.contiguous(), size).softmax(1)  # three times as fast as in einsum's own order
+    return F.normalize(torch.cat(seen, 1), dim=1)
+
+
+def split_maps(
+    groups: Sequence[Callable[[], Tensor]], num_views: int, rule: Splitting, size: tuple[int, int]
+) -> Tensor:
+    """`split_groups` of V views whose joint maps (v, S, h, w) come group by group, each as often as it is
+    asked for. Of many views the parts are found in some of their pixels, and the answer is held in half
+    precision."""
+    step = -(-num_views // _WHOLE)
+    coarse = []
+    for group in groups:
+        small = F.avg_pool2d(group(), 2, ceil_mode=True).movedim(1, -1).flatten(0, 2)  # (X, S)
+        coarse.append(F.normalize(small[::step], dim=-1))
+    centres = cluster(torch.cat(coarse) if len(coarse) > 1 else coarse[0], rule)
+
+    def weights(group: Callable[[], Tensor]) -> Tensor:
+        closeness = torch.einsum("vshw,js->vjhw", group(), rule.sharpness * centres)
+        own = resize(closeness.contiguous(), size).softmax(1)  # three times as fast as in einsum's own order
+        return held(own, num_views)
+
+    return together(map(weights, groups), num_views)
 
 
 def condensed(features: Tensor) -> Tensor:
-    """Maps (V, C, h, w) in the few directions that a scene needs, (V, `_DIRECTIONS`, h, w): clustering then
-    takes a fifth of the time, and cosines stay.
+    """Maps (V, C, h, w) in the few directions that a scene needs, (V, `_DIRECTIONS`, h, w) float32:
+    clustering then takes a fifth of the time, and cosines stay.
 
     Source: Halko, Martinsson and Tropp 2011 (randomised range finder, one power iteration).
     """
     if features.shape[1] <= _DIRECTIONS:
         return features
-    pixels = features.movedim(1, -1).flatten(0, 2)  # (X, C)
     drawn = torch.randn(features.shape[1], _DIRECTIONS, generator=torch.Generator().manual_seed(0))
-    basis = drawn.to(features)
+    basis = drawn.to(features.device)
     for _ in range(2):
-        basis = torch.linalg.qr(pixels.T @ (pixels @ basis)).Q
-    return torch.einsum("vchw,cd->vdhw", features, basis)
+        basis = torch.linalg.qr(_powered(features, basis)).Q
+    return in_groups(lambda some: torch.einsum("vchw,cd->vdhw", some.float(), basis), features)
+
+
+def _powered(features: Tensor, basis: Tensor) -> Tensor:
+    """X^T X B of all pixels' features, (C, D); some views at a time."""
+    found = None
+    for some in groups_of(len(features)):
+        pixels = features[some].float().movedim(1, -1).flatten(0, 2)  # (X, C)
+        product = pixels.T @ (pixels @ basis)
+        found = product if found is None else found + product
+    assert found is not None, "there is a view"
+    return found
 
 
 def cluster(vectors: Tensor, rule: Splitting) -> Tensor:

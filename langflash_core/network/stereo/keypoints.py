@@ -1,14 +1,19 @@
 """Key points of several photos and which of each pair correspond. Imports no torch: photos are matched
 while torch is still being imported."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import overload
 
 import cv2
 import numpy as np
 
+from langflash_core.keeping import not_kept
 from langflash_core.network.stereo.matching import detect, match_descriptors
 from langflash_core.network.stereo.retrieval import likely_pairs
+from langflash_core.running import Kept
+
+Told = Callable[[str, int, int], None]
 
 WORKING_SIDE = 768  # pixels of the longer side at which photos are matched
 _MANY_VIEWS = 4  # beyond this, fewer features keep the pairs affordable
@@ -24,32 +29,85 @@ class KeyPoints:
     positions: tuple[np.ndarray, ...]
     pairs: dict[tuple[int, int], np.ndarray]
 
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Both, end to end, to be kept."""
+        rows = list(self.pairs.values())
+        return {
+            "positions": np.concatenate([*self.positions, np.zeros((0, 2))]),
+            "of_views": np.array([len(own) for own in self.positions], np.int64),
+            "edges": np.array(list(self.pairs), np.int64).reshape(-1, 2),
+            "of_edges": np.array([len(own) for own in rows], np.int64),
+            "rows": np.concatenate([*rows, np.zeros((0, 2), np.int64)]),
+        }
 
-def match_sources(sources: tuple[bytes, ...], check: Callable[[], None] = lambda: None) -> KeyPoints:
-    """`match_photos` of pictures as JPEG bytes; the last answer is remembered."""
+    @staticmethod
+    def of(arrays: Mapping[str, np.ndarray]) -> "KeyPoints":
+        """What `arrays` had."""
+        positions = np.split(arrays["positions"], np.cumsum(arrays["of_views"])[:-1])
+        rows = np.split(arrays["rows"], np.cumsum(arrays["of_edges"])[:-1])
+        edges = (tuple(edge) for edge in arrays["edges"].tolist())
+        return KeyPoints(tuple(positions), dict(zip(edges, rows, strict=False)))
+
+
+def match_sources(
+    sources: tuple[bytes, ...],
+    check: Callable[[], None] = lambda: None,
+    told: Told = lambda what, done, count: None,
+    kept: Kept = not_kept,
+) -> KeyPoints:
+    """`match_photos` of pictures as JPEG bytes; the last answer is remembered.
+
+    Args:
+        kept: gives what was kept of an earlier run.
+    """
     points = _last.get(sources)
     if points is None:
-        points = match_photos([decoded(source) for source in sources], check)
+        found = kept("matches", lambda: match_photos(_Decoded(sources), check, told).arrays())
+        points = KeyPoints.of(found)
         _last.clear()
         _last[sources] = points
     return points
 
 
-def match_photos(greys: Sequence[np.ndarray], check: Callable[[], None] = lambda: None) -> KeyPoints:
+class _Decoded(Sequence[np.ndarray]):
+    """Pictures (h, w) uint8 of JPEG bytes, each decoded when it is asked for."""
+
+    def __init__(self, sources: tuple[bytes, ...]):
+        self._sources = sources
+
+    def __len__(self) -> int:
+        return len(self._sources)
+
+    @overload
+    def __getitem__(self, index: int) -> np.ndarray: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[np.ndarray]: ...
+    def __getitem__(self, index: int | slice) -> np.ndarray | Sequence[np.ndarray]:
+        return _Decoded(self._sources[index]) if isinstance(index, slice) else decoded(self._sources[index])
+
+
+def match_photos(
+    greys: Sequence[np.ndarray],
+    check: Callable[[], None] = lambda: None,
+    told: Told = lambda what, done, count: None,
+) -> KeyPoints:
     """Key points of photos (h, w) uint8 of one shape, and what corresponds; deterministic.
 
-    `check` is called before each photo and each pair; what it raises ends the work.
+    `check` is called before each photo and each pair; what it raises ends the work. So is `told`, with what
+    is done, how much of it was, and of how much.
     """
     limit = _FEATURES[len(greys) > _MANY_VIEWS]
     positions, descriptors = [], []
-    for grey in greys:
+    for number, grey in enumerate(greys):
         check()
+        told("key points of photos", number, len(greys))
         own_positions, own_descriptors = detect(_working_size(grey), limit)
         positions.append(own_positions)
         descriptors.append(own_descriptors)
-    pairs = {}
-    for i, j in likely_pairs(descriptors):
+    pairs, likely = {}, likely_pairs(descriptors)
+    for number, (i, j) in enumerate(likely):
         check()
+        told("matching pairs", number, len(likely))
         pairs[i, j] = match_descriptors(descriptors[i], descriptors[j])
     return KeyPoints(tuple(positions), pairs)
 

@@ -6,7 +6,7 @@ pictures are the same; what optical flow finds between them is a remaining shift
 match in the neighbour to a fraction of a pixel, and a depth by triangulation. What flow says counts by
 how sure it is (there and back, same brightness, texture) and by how many pixels the match moves for a
 change of depth; a smooth correction of log depth takes it over, cut where depth jumps (one sparse linear
-system a view).
+system a view). Of many photos the first round is at half of their size.
 
 Sizes: V views, H W pixels of the maps, h w pixels of the photos.
 
@@ -16,6 +16,7 @@ Search", of OpenCV.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import cv2
@@ -27,6 +28,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import invert_rigid, pictured, unproject
+from langflash_core.network.many import FEW
 from langflash_core.network.stereo.prior import DepthMaps
 from langflash_core.network.stereo.sweep import Neighbours, everyone
 
@@ -68,6 +70,7 @@ def registered(
     Ks: Tensor,
     neighbours: Neighbours | None = None,
     check: Callable[[], None] = lambda: None,
+    each: Callable[[int, Callable[[], Tensor]], Tensor] = lambda view, make: make(),
 ) -> DepthMaps:
     """Maps (V, H, W) whose surfaces show the same in neighbouring photos; the expected errors stay.
 
@@ -76,35 +79,70 @@ def registered(
         viewmats: (V, 4, 4) of the maps' unit. Ks: (V, 3, 3), pixels of the maps.
         neighbours: of each view, the best first; None: all others.
         check: called before each comparison; what it raises ends the work.
+        each: gives the map (H, W) of a view, which it may have made, or know already.
     """
     logs = maps.log_depths
     near = neighbours or everyone(len(logs))
-    height, width = logs.shape[1:]
-    size = tuple(min(_LARGEST * g, max(p, g)) for p, g in zip(photos[0].shape, (height, width), strict=True))
-    greys = [photo if photo.shape == size else _resized(photo, size) for photo in photos]
-    ratio = torch.tensor([size[1] / width, size[0] / height, 1.0])
-    large = Ks.cpu() * ratio[:, None]
+    cells = (logs.shape[1], logs.shape[2])
+    size = tuple(min(_LARGEST * g, max(p, g)) for p, g in zip(photos[0].shape, cells, strict=True))
     if min(size) < _SMALLEST:
         return maps
-    corrected = []
-    for view, others in enumerate(near):
-        texture, own = _texture(greys[view]), logs[view].cpu()
-        for partners in _ROUNDS if len(others) > 1 else (1,):
-            target, weight = torch.zeros(2, height, width)
-            depths = F.interpolate(own[None, None], size=size, mode="bilinear")[0, 0]
+    many = len(logs) > FEW
+    fine = _Pictures.of(photos, size, Ks, cells)
+    half = (size[0] // 2, size[1] // 2)
+    coarse = _Pictures.of(photos, half, Ks, cells) if many and min(half) >= _SMALLEST else fine
+
+    def corrected(view: int) -> Tensor:
+        own, others = logs[view].cpu(), near[view]
+        rounds = zip(_ROUNDS, (coarse, fine), strict=True) if len(others) > 1 else [(1, fine)]
+        for partners, pictures in rounds:
+            target, weight = torch.zeros(2, *cells)
+            depths = F.interpolate(own[None, None], size=pictures.size, mode="bilinear")[0, 0]
+            texture = _texture(pictures.greys[view])
             for other in others[:partners]:
                 check()
                 pose = (viewmats[other] @ invert_rigid(viewmats[view])).cpu()
-                matches = _matched(depths, greys[view], greys[other], large[view], large[other], pose)
-                change, moves = _triangulated(depths, matches, large[view], large[other], pose)
-                length = moves.norm(dim=0)
-                known = _known_along(texture, moves / length.clamp_min(1e-9))
-                counts = torch.from_numpy(matches.sure) * known * (length / _FLOW_ERROR) ** 2 / _ONE_SHIFT
-                target += _cells(counts * change, (height, width))
-                weight += _cells(counts, (height, width))
+                change, counts = pictures.compared(view, other, depths, texture, pose, many)
+                target += _cells(counts * change, cells)
+                weight += _cells(counts, cells)
             own = own + _smooth(target, weight, own)
-        corrected.append(own.to(logs))
-    return DepthMaps(torch.stack(corrected), maps.log_errors)
+        return own.to(logs)
+
+    found = [each(view, partial(corrected, view)) for view in range(len(logs))]
+    return DepthMaps(torch.stack(found), maps.log_errors)
+
+
+@dataclass(frozen=True)
+class _Pictures:
+    """Photos (h, w) uint8 of one size, and their intrinsics (V, 3, 3) there."""
+
+    greys: list[np.ndarray]
+    Ks: Tensor
+
+    @staticmethod
+    def of(
+        photos: Sequence[np.ndarray], size: tuple[int, ...], Ks: Tensor, cells: tuple[int, int]
+    ) -> "_Pictures":
+        """Ks: pixels of maps of so many cells."""
+        greys = [photo if photo.shape == size else _resized(photo, size) for photo in photos]
+        ratio = torch.tensor([size[1] / cells[1], size[0] / cells[0], 1.0])
+        return _Pictures(greys, Ks.cpu() * ratio[:, None])
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return self.greys[0].shape[0], self.greys[0].shape[1]
+
+    def compared(
+        self, view: int, other: int, depths: Tensor, texture: Tensor, pose: Tensor, many: bool
+    ) -> tuple[Tensor, Tensor]:
+        """Changes of log depth (h, w) that another photo asks for, and what each counts; depths: log, (h,
+        w)."""
+        matches = _matched(depths, self.greys[view], self.greys[other], self.Ks[view], self.Ks[other], pose)
+        change, moves = _triangulated(depths, matches, self.Ks[view], self.Ks[other], pose)
+        # `norm` over rows takes thirty times as long; of few photos it stays, to the last bit.
+        length = (moves * moves).sum(0).sqrt() if many else moves.norm(dim=0)
+        known = _known_along(texture, moves / length.clamp_min(1e-9))
+        return change, torch.from_numpy(matches.sure) * known * (length / _FLOW_ERROR) ** 2 / _ONE_SHIFT
 
 
 def _resized(photo: np.ndarray, size: tuple[int, ...]) -> np.ndarray:

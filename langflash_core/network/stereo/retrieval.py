@@ -35,6 +35,19 @@ def likely_pairs(descriptors: Sequence[np.ndarray]) -> list[tuple[int, int]]:
     return sorted(pairs)
 
 
+def most_alike(descriptors: Sequence[np.ndarray], count: int) -> list[list[int]]:
+    """Of each photo the `count` others most like it, in order; all where there are not so many.
+
+    Args:
+        descriptors: per photo (n, C), unit rows.
+    """
+    vectors = _vectors(descriptors)
+    alike = vectors @ vectors.T
+    np.fill_diagonal(alike, -np.inf)
+    nearest = np.argsort(-alike, axis=1, kind="stable")[:, : min(count, len(vectors) - 1)]
+    return [sorted(row) for row in nearest.tolist()]
+
+
 def _vectors(descriptors: Sequence[np.ndarray]) -> np.ndarray:
     """Unit vectors (V, W C); 0 of a photo without descriptors.
 

@@ -37,8 +37,8 @@ class Compared:
     """What a sweep compares: unit vectors of every view.
 
     table: (V, (h' + 2) (w' + 2), C), maps of `size` = (h', w') with a border of zeros, as rows.
-    own: (V, h w, C, G) at the size of the depth maps, once for each of G equal groups of channels and 0
-    outside of it: products with it are sums by group.
+    own: (v, h w, C, G) of the first v views, whose depth is looked for, at the size of the depth maps, once
+    for each of G equal groups of channels and 0 outside of it: products with it are sums by group.
     """
 
     table: Tensor
@@ -46,9 +46,11 @@ class Compared:
     own: Tensor
 
     @staticmethod
-    def of(maps: Tensor, size: tuple[int, int], groups: int = 1) -> "Compared":
-        """Vectors (V, C, h', w') of any size, for depth maps of `size`; groups must divide C."""
-        own = _rows(maps if _size(maps) == size else resize(maps, size))
+    def of(maps: Tensor, size: tuple[int, int], groups: int = 1, first: int | None = None) -> "Compared":
+        """Vectors (V, C, h', w') of any size, for depth maps of `size`; groups must divide C. first: so many
+        views' depth is looked for; None: that of all."""
+        mine = maps[:first]
+        own = _rows(mine if _size(maps) == size else resize(mine, size))
         belongs = torch.eye(groups).to(own).repeat_interleave(own.shape[-1] // groups, 0)  # (C, G)
         return Compared(_rows(F.pad(maps, (1,) * 4)).contiguous(), _size(maps), own[..., None] * belongs)
 
@@ -218,6 +220,7 @@ class DepthRefiner(nn.Module):
         viewmats: Tensor,
         Ks: Tensor,
         neighbours: Neighbours | None = None,
+        first: int | None = None,
     ) -> tuple[DepthMaps, ...]:
         """Refined maps of the prior's size after each pass; the last are the answer.
 
@@ -226,13 +229,22 @@ class DepthRefiner(nn.Module):
             prior: (B, V, H, W), of the viewmats' length unit.
             viewmats: (B, V, 4, 4). Ks: (B, V, 3, 3), pixels of the images.
             neighbours: as `sweep_correlation` has them, of every scene.
+            first: of one scene (B = 1) only so many views are refined, of which the prior and the neighbours
+                are; the others are looked at. None: all.
         """
         grid, pictures = tokens.grid, images.flatten(0, 1)
         size = (4 * grid[0], 4 * grid[1])
         scale = torch.tensor([size[1] / images.shape[-1], size[0] / images.shape[-2], 1.0]).to(Ks)
         with torch.no_grad():
-            compared = [Compared.of(local, size, self.groups), Compared.of(patches(pictures), size)]
-        read = (resize(pictures, size) - 0.5, tokens.maps(self.match_hook), tokens.maps(-1))
+            compared = [
+                Compared.of(local, size, self.groups, first),
+                Compared.of(patches(pictures), size, 1, first),
+            ]
+        read = (
+            resize(pictures[:first], size) - 0.5,
+            tokens.maps(self.match_hook)[:first],
+            tokens.maps(-1)[:first],
+        )
         passes = []
         for _ in range(self.num_passes):
             prior = self._once(compared, read, prior, viewmats, Ks * scale[:, None], neighbours)
@@ -278,7 +290,7 @@ class DepthRefiner(nn.Module):
         count = log_depths.shape[1]
         scenes = [
             sweep_correlation(
-                [c.views(b * count, count) for c in compared],
+                compared if len(log_depths) == 1 else [c.views(b * count, count) for c in compared],
                 logs,
                 self.offsets,
                 viewmats[b],

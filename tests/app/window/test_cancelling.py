@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from app.window.memory import give_back
 from app.window.scene import commands as show
 from app.window.scene import work
 from app.window.worker import Worker
+from langflash_core.memory import give_back
 from langflash_core.resources import asset_path
 from tests.app.window.test_worker import PATIENCE, wait_for
 

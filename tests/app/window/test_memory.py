@@ -24,7 +24,7 @@ HELD_MB = 100  # of the 300 MB of arrays that are gone; what lies apart leaves a
 ARRAYS_AMONG_SMALL_THINGS = """
 import sys
 import numpy as np
-from app.window import memory
+from langflash_core import memory
 
 def resident_mb():
     lines = open("/proc/self/status").read().splitlines()

@@ -14,7 +14,7 @@ from ...kit.look import Look
 from ...poses import Pose
 from ...state import State
 from .. import camera
-from ..state import Mode
+from ..state import WHOLE, WHOLE_PHOTOS, Mode
 
 FRUSTUM = 0.10  # length of a frustum in distances to the pivot of its view
 _HANDLE = 13.0  # design pixels
@@ -165,7 +165,8 @@ def photo_box(pose: Pose, size: tuple[float, float]) -> tuple[float, float, floa
 
 def _compare(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Command]:
     """The photo to the right of a line that can be dragged."""
-    place, picture = state.compare, look.thumbnails.get(f"view {state.view}")
+    many = state.info is not None and len(state.info.scene.photos) > WHOLE_PHOTOS
+    place, picture = state.compare, look.thumbnails.get(WHOLE if many else f"view {state.view}")
     if place is None or picture is None:
         return []
     left, top, right, bottom = photo_box(state.pose, (size.x, size.y))

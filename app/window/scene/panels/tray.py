@@ -7,6 +7,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from langflash_core.images.still_names import shown_name
+from langflash_core.running import left
 
 from ... import commands as do
 from ...kit import theme, widgets
@@ -287,11 +288,12 @@ def _progress(job: Job, now: float, look: Look) -> list[do.Command]:
 
 
 def _seconds(job: Job, now: float) -> str:
-    """Of the stage so far; of a film, whose pictures take equally long, those that are left."""
+    """What is left of the job, where that can be told; else seconds of the stage so far."""
     gone = now - job.started
     if job.stage == LOOKING_THROUGH and job.fraction > 0.05 and gone > 1:
         return f"{gone * (1 - job.fraction) / job.fraction:.0f} s left"
-    return f"{gone:.1f} s"
+    rest = left(gone + sum(seconds for _, seconds in job.done), job.fraction)
+    return rest or f"{gone:.1f} s"
 
 
 def _told(job: Job) -> str:

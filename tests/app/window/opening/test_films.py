@@ -15,7 +15,7 @@ from app.window.opening import effects, work
 from app.window.opening.panels import strip as panel
 from app.window.opening.state import Film
 from app.window.scene import commands as show
-from app.window.scene.drops import MAX_PHOTOS, sort_drop
+from app.window.scene.drops import FILM_PHOTOS, MAX_PHOTOS, sort_drop
 from app.window.scene.effects import SceneEffects
 from app.window.scene.panels import tray
 from app.window.scene.state import Job
@@ -87,7 +87,7 @@ def desk(walk: Path) -> Desk:
 
 def test_a_dropped_film_shows_its_strip(desk: Desk, walk: Path) -> None:
     assert desk.state.dialog == "film" and desk.state.job is None and desk.film.path == walk
-    assert 10 < len(desk.film.chosen) <= MAX_PHOTOS and desk.state.photos == ()
+    assert 10 < len(desk.film.chosen) <= FILM_PHOTOS and desk.state.photos == ()
     pictures = [command for command in desk.performed if isinstance(command, ShowPicture)]
     assert len(pictures) == len(desk.film.strip.stills)
     assert "Of 40 frames" in panel.told(desk.film) and "lay between them" in panel.told(desk.film)
@@ -112,7 +112,7 @@ def test_frames_are_put_in_and_taken_out(desk: Desk) -> None:
     assert len(desk.film.chosen) == 5
     desk.perform(opening.ProposeFrames(6, exactly=True))
     assert len(desk.film.chosen) == 6
-    desk.perform(opening.ProposeFrames(MAX_PHOTOS))
+    desk.perform(opening.ProposeFrames(FILM_PHOTOS))
     assert desk.film.chosen == (first, *others)
     assert not desk.asked, "nothing is decoded or read for that"
 

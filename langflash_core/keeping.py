@@ -1,0 +1,78 @@
+"""Work that is kept: finished steps of a long run as files, so that one which was ended goes on where it was.
+
+A step is named by what it is of, and its file also by the fingerprint of all that its result hangs on:
+photos, weights, settings, version. So files of other photos or settings are never taken for one's own. A
+file is whole or absent; one that cannot be read is made again.
+"""
+
+import hashlib
+import json
+import zipfile
+import zlib
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from langflash_core.files import written_atomically
+
+Arrays = Mapping[str, np.ndarray]
+Made = Callable[[], Arrays]
+STEPS = 1
+"""Raised whenever a step comes to mean something else: what an older program kept is then made anew."""
+_ENDING = ".kept.npz"
+
+
+@dataclass(frozen=True)
+class Keep:
+    """Steps in a folder. key: the fingerprint of what they hang on."""
+
+    folder: Path
+    key: str
+
+    @staticmethod
+    def of(folder: Path, said: Mapping[str, Any], parts: Iterable[bytes] = ()) -> "Keep":
+        """said: settings, as JSON has them. parts: what else results hang on."""
+        digest = hashlib.sha256(json.dumps([STEPS, said], sort_keys=True, default=str).encode())
+        for part in parts:
+            digest.update(hashlib.sha256(part).digest())
+        return Keep(folder, digest.hexdigest()[:24])
+
+    def __call__(self, name: str, make: Made) -> Arrays:
+        """The result of a step: what was kept of it, else what `make` gives, which is kept then.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        path = self.folder / f"{name}-{self.key}{_ENDING}"
+        found = _read(path)
+        if found is not None:
+            return found
+        made = make()
+        with written_atomically(path) as temporary, temporary.open("wb") as stream:
+            np.savez(stream, allow_pickle=False, **made)
+        return made
+
+
+def not_kept(name: str, make: Made) -> Arrays:
+    """As a `Keep`, without a folder."""
+    return make()
+
+
+def forget(folder: Path) -> None:
+    """Remove all steps that were kept in a folder, and the folder where nothing else is in it."""
+    for path in folder.glob(f"*{_ENDING}"):
+        path.unlink(missing_ok=True)
+    with suppress(OSError):
+        folder.rmdir()
+
+
+def _read(path: Path) -> dict[str, np.ndarray] | None:
+    try:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+        return None
