@@ -135,7 +135,8 @@ class SceneEffects(Effects):
         except LangFlashError as error:
             self._hands.perform(Notify(str(error)))
         for index, photo in enumerate(info.scene.photos):
-            with suppress(OSError):  # a scene whose small photos are damaged still shows; buttons get numbers
+            # A scene whose small photos are damaged still shows; buttons get numbers.
+            with suppress(OSError, SyntaxError, ValueError):
                 self._thumbnails.put_encoded(f"view {index}", photo)
         for colormap in COLOUR_MAPS:
             self._thumbnails.put(f"bar {colormap}", colour_bar(colormap))
