@@ -57,13 +57,12 @@ class Limit:
             error: it holds more; one sentence with the file's name.
         """
         if self.passed_by(number):
-            raise error(
-                f"{name} holds {self.told(number)} of {self.name}, the most is {self.told()}; {self.remedy()}"
-            )
+            found = f"{self.told(number)} of {self.name}" if self.unit else f"{number:,} {self.name}"
+            raise error(f"{name} holds {found}, more than {self.told()}; {self.remedy()}")
 
     def remedy(self) -> str:
         """What to do about a file that is known to be good."""
-        return f"if you trust it, set {self.variable} higher (now {self.value:,})"
+        return f"if you trust it, set {self.variable} higher"
 
 
 PIXELS = Limit("pixels", 170_000_000, "pixels", "of one photo, or picture of a film or in a scene")

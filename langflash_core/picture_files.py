@@ -41,9 +41,8 @@ def opened_picture(
         source: a path, the bytes of a file, or an open file. formats: names of Pillow's plug-ins.
 
     Raises:
-        TooManyPixels: more than `limits.PIXELS`. OSError: missing, or of no format of these. What Pillow
-        raises
-            for damaged files: OSError, SyntaxError, ValueError and others.
+        TooManyPixels: more than `limits.PIXELS`. OSError: missing, or of no format of these. Whatever else
+            Pillow raises for damaged files: OSError, SyntaxError, ValueError and others.
     """
     file = io.BytesIO(source) if isinstance(source, bytes) else source
     stream: BufferedIOBase = open(file, "rb") if isinstance(file, Path | str) else file  # noqa: SIM115 - closed below
@@ -98,7 +97,7 @@ def _decoded_apart(content: bytes) -> Image.Image:
     mode, size = str(part.facts["mode"]), (int(part.facts["width"]), int(part.facts["height"]))
     if PIXELS.passed_by(size[0] * size[1]):
         raise TooManyPixels(f"it has {size[0]:,} x {size[1]:,} pixels")
-    picture = Image.frombytes(mode, size, part.arrays["pixels"].tobytes())
+    picture = Image.frombytes(mode, size, part.arrays["pixels"])
     for name in ("exif", "icc_profile", "xmp"):
         if name in part.arrays:
             picture.info[name] = part.arrays[name].tobytes()

@@ -62,8 +62,17 @@ def ask(reader: str, request: Mapping[str, Any], content: bytes = b"") -> Genera
     """
     worker = _asked(reader, request, content)
     try:
-        while (part := worker.answer()) is not None:
+        try:
+            part = worker.answer()
+        except Ended:
+            if not worker.served:
+                raise
+            worker.end()  # what it read before may have broken it
+            worker = _asked(reader, request, content, new=True)
+            part = worker.answer()
+        while part is not None:
             yield part
+            part = worker.answer()
     except BaseException:
         worker.end()
         raise
@@ -78,7 +87,7 @@ class _Worker:
         path = [*dict.fromkeys(entry for entry in (*sys.path, _ROOT) if entry)]
         words = (json.dumps(path), module, str(MEMORY.value), str(SECONDS.value))
         self.bounds = MEMORY.value, SECONDS.value
-        self._late = False
+        self.served, self._late = False, False
         self._process = subprocess.Popen(
             [sys.executable, "-I", "-S", "-c", _BOOT, *words],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=0,
@@ -195,8 +204,8 @@ _idle: dict[str, list[_Worker]] = {}
 _lock = threading.Lock()
 
 
-def _asked(reader: str, request: Mapping[str, Any], content: bytes) -> _Worker:
-    """A process that has the request: one that waits, else a new one.
+def _asked(reader: str, request: Mapping[str, Any], content: bytes, new: bool = False) -> _Worker:
+    """A process that has the request: one that waits and served before, else a new one.
 
     Raises:
         Ended: it could not be started, or broke at once.
@@ -204,14 +213,13 @@ def _asked(reader: str, request: Mapping[str, Any], content: bytes) -> _Worker:
     module = READERS[reader]
     while True:
         with _lock:
-            waiting = _idle.get(module, [])
+            waiting = [] if new else _idle.get(module, [])
             worker = waiting.pop() if waiting else None
-        new = worker is None
         try:
             worker = _Worker(module) if worker is None else worker
         except OSError as error:
             raise Ended(f"could not be started ({error.strerror})") from error
-        if not new and not worker.fit:
+        if worker.served and not worker.fit:
             worker.end()
             continue
         try:
@@ -219,11 +227,12 @@ def _asked(reader: str, request: Mapping[str, Any], content: bytes) -> _Worker:
             return worker
         except OSError:
             code = worker.end()
-            if new:
+            if not worker.served:
                 raise Ended(f"crashed (code {code})") from None
 
 
 def _keep(worker: _Worker) -> None:
+    worker.served = True
     with _lock:
         waiting = _idle.setdefault(worker.module, [])
         if len(waiting) < _MOST_IDLE:
