@@ -72,7 +72,8 @@ def check_container(path: Path) -> None:
 
 def damaged(path: Path, reason: object) -> SceneFileError:
     """The error that says so."""
-    return SceneFileError(f"{path.name} is damaged ({reason}); {_REMEDY}")
+    said = " ".join(str(reason).split())[:200]  # errors repeat what a file holds
+    return SceneFileError(f"{path.name} is damaged ({said}); {_REMEDY}")
 
 
 def digest(text: str, arrays: Mapping[str, np.ndarray]) -> str:

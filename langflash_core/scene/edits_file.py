@@ -98,8 +98,13 @@ def load_history(path: Path, scene: Scene) -> History:
         whole = replace(start.moved_to(len(done)), undone=undone)
         whole.moved_to(len(done) + len(undone))  # what can be redone must fit as well
     except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, zlib.error) as error:
-        raise SceneFileError(f"{path.name} is damaged ({error}); edit the scene again") from error
+        raise SceneFileError(f"{path.name} is damaged ({_said(error)}); edit the scene again") from error
     return whole
+
+
+def _said(error: Exception) -> str:
+    """One short line: what a file holds may have many, and errors repeat it."""
+    return " ".join(str(error).split())[:100]
 
 
 def _check_there(edits: Iterable[Edit], scene: Scene) -> None:
@@ -184,5 +189,5 @@ def _read(path: Path) -> dict:
     except OSError as error:
         raise SceneFileError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
     except (ValueError, LookupError, TypeError, ArithmeticError, RecursionError) as error:
-        raise SceneFileError(f"{path.name} is damaged ({error}); edit the scene again") from error
+        raise SceneFileError(f"{path.name} is damaged ({_said(error)}); edit the scene again") from error
     return content
