@@ -1,6 +1,7 @@
 # make run    set up what is missing, then open the window on the demo photos
 # make test   set up what is missing, then every check and every test
 # make setup  the set-up alone
+# make torture         100,000 hostile files for every reader of ours (SEED=1, COUNT=100000)
 # make test-machines   every test three times, as three other processors and orders would run it
 #
 # Set-up is a virtual environment in .venv, this package in it, and (Debian, Ubuntu) the system's
@@ -29,9 +30,9 @@ APT := install() { \
 	echo "Installing $$*"; \
 	$$add "$$@" >/dev/null 2>&1 || { $$get update >/dev/null && $$add "$$@" >/dev/null; }; }
 
-.PHONY: help setup run test test-machines
+.PHONY: help setup run test test-machines torture
 help:
-	@sed -n '1,4s/^# //p' Makefile
+	@sed -n '1,5s/^# //p' Makefile
 
 setup: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window $(STAMP)-browser
 
@@ -64,6 +65,10 @@ test-machines: setup
 	env -u ATEN_CPU_CAPABILITY OMP_NUM_THREADS=2 $(BIN)/python -m pytest
 	ATEN_CPU_CAPABILITY=avx2 OMP_NUM_THREADS=1 $(BIN)/python -m pytest $(SHUFFLED)=$(SEED)
 	ATEN_CPU_CAPABILITY=default OMP_NUM_THREADS=2 $(BIN)/python -m pytest $(SHUFFLED)=$$(($(SEED) + 1))
+
+COUNT ?= 100000
+torture: setup
+	PYTHONHASHSEED=0 OMP_NUM_THREADS=1 $(BIN)/python -m tests.torture.fuzz --seed $(SEED) --count $(COUNT)
 
 # The newest Python from 3.11 that can make a virtual environment.
 $(BIN)/python:

@@ -2,6 +2,8 @@
 
 import os
 import random
+import socket
+import sys
 from pathlib import Path
 
 from jaxtyping import install_import_hook
@@ -27,6 +29,25 @@ torch.set_num_threads(int(os.environ["OMP_NUM_THREADS"]))
 def pytest_runtest_setup() -> None:
     """Of a list the checker looks at one item, drawn at random: the same one whenever a test is run again."""
     random.seed(0)
+
+
+_NEAR = ("127.", "::1", "localhost", "0.0.0.0")  # this computer
+
+
+def _keep_near(event: str, arguments: tuple) -> None:
+    """No test reaches the network: what one would fetch, it makes itself and serves on this computer."""
+    if event == "socket.getaddrinfo":
+        host = arguments[0]
+    elif event in ("socket.connect", "socket.sendto") and isinstance(arguments[1], tuple):
+        host = arguments[1][0]
+    else:
+        return
+    host = host.decode() if isinstance(host, bytes) else host
+    if host and not str(host).startswith((*_NEAR, socket.gethostname())):
+        raise RuntimeError(f"a test tried to reach {host}")
+
+
+sys.addaudithook(_keep_near)
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ import yaml
 from app.cli.parser import build_parser
 
 ROOT = Path(__file__).resolve().parent.parent
-DOCUMENTS = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md")
+DOCUMENTS = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")
 TOPS = ("app", "langflash_core", "shaders", "assets", "tests", ".github", ".ci")
 TO_BE_MADE = re.compile(r"NAME")  # of recipes
 SOURCES = ("*.py", "*.frag", "*.vert", "*.glsl")

@@ -12,6 +12,7 @@ import torch
 
 from langflash_core.errors import ViewError
 from langflash_core.geometry.reach import median_reach
+from langflash_core.limits import TEXT
 from langflash_core.types import Camera, Scene
 
 from .files import readable_file
@@ -89,6 +90,7 @@ def read_camera(path: Path) -> Camera:
         ViewError: missing, not JSON, or not a rigid pose with a usable pinhole K.
     """
     readable_file(path, "camera file", ViewError)
+    TEXT.check(path.stat().st_size, path.name, ViewError)
     try:
         fields = json.loads(path.read_bytes())
     except (ValueError, RecursionError):

@@ -22,6 +22,7 @@ from langflash_core.export.answers import write_answers
 from langflash_core.export.png import heat_over, to_8bit
 from langflash_core.extras import optional_packages
 from langflash_core.files import filled_atomically, write_atomically
+from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.scene.file import load, save
 from langflash_core.types import QueryResult, Scene
 
@@ -135,7 +136,10 @@ def write_thumbnail(scene: Scene, result: QueryResult | None, path: Path) -> Non
     Raises:
         OutputError: it cannot be written.
     """
-    pictures = [Image.open(io.BytesIO(scene.photos[0])).convert("RGB")] if scene.photos else []
+    pictures = []
+    if scene.photos:
+        with opened_picture(scene.photos[0], STORED) as photo:
+            pictures.append(photo.convert("RGB"))
     for answer, relevance in zip(result.answers[:_HEATS], result.relevance, strict=False) if result else ():
         assert result is not None
         lit = heat_over(relevance, result.frame.rgb, answer.threshold, result.mode)

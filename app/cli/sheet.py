@@ -14,6 +14,7 @@ from langflash_core.export.png import heat_over, to_8bit
 from langflash_core.export.sheet import captioned
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.quaternions import matrices_to_quats, quats_to_matrices
+from langflash_core.picture_files import opened_picture
 from langflash_core.types import Camera, Scene
 
 from .renderers import Renderer
@@ -98,5 +99,5 @@ def _between(first: Tensor, second: Tensor, share: float) -> Tensor:
 
 
 def _photo(path: Path, size: tuple[int, int]) -> np.ndarray:
-    with Image.open(path) as photo:
+    with opened_picture(path) as photo:
         return np.asarray(photo.convert("RGB").resize(size, Image.Resampling.LANCZOS))

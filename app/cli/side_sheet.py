@@ -20,6 +20,7 @@ from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.evaluation.side_pictures import SHOWN, room_pictures, scene_pictures
 from langflash_core.lab.evaluation.side_subjects import Case
+from langflash_core.picture_files import opened_picture
 from langflash_core.pipeline import reconstruct
 from langflash_core.resources import asset_path
 from langflash_core.types import Scene
@@ -86,7 +87,7 @@ def _band(name: str, folders: Sequence[tuple[str, Path]]) -> np.ndarray:
     for degrees in SHOWN:
         for title, folder in sources:
             stem = f"{name}_true" if title == "truth" else name
-            with Image.open(folder / f"{stem}_{degrees:02d}.png") as stored:
+            with opened_picture(folder / f"{stem}_{degrees:02d}.png") as stored:
                 size = (round(stored.width * _HEIGHT / stored.height), _HEIGHT)
                 picture = np.asarray(stored.convert("RGB").resize(size, Image.Resampling.LANCZOS))
             cells.append(captioned(picture, f"{degrees} degrees, {title}"))

@@ -16,6 +16,7 @@ from langflash_core.export.png import USUAL, heat_over, to_8bit
 from langflash_core.geometry.reach import median_reach
 from langflash_core.language.relevance import CompiledQuery, compile_query
 from langflash_core.language.spaces import language_space
+from langflash_core.limits import TEXT
 from langflash_core.running import Progress
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
 
@@ -171,6 +172,7 @@ def read_key_frames(path: Path, seconds: float | None) -> tuple[list[Camera], li
         ViewError: missing, not a list of two or more cameras, or times that do not rise.
     """
     readable_file(path, "key frames", ViewError)
+    TEXT.check(path.stat().st_size, path.name, ViewError)
     try:
         entries = json.loads(path.read_bytes())
     except (ValueError, RecursionError):

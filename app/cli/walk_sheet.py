@@ -16,6 +16,7 @@ from langflash_core.export.png import to_8bit
 from langflash_core.export.sheet import captioned
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.evaluation.walk import OWN, TRUTH, Shown
+from langflash_core.picture_files import opened_picture
 
 MOST = 12
 """So many kept frames are shown."""
@@ -76,6 +77,6 @@ def _band(stem: str, folders: Sequence[tuple[str, Path]], titles: Sequence[str])
 
 
 def _cell(path: Path, title: str) -> np.ndarray:
-    with Image.open(path) as stored:
+    with opened_picture(path) as stored:
         size = (round(stored.width * _HEIGHT / stored.height), _HEIGHT)
         return captioned(np.asarray(stored.convert("RGB").resize(size, Image.Resampling.LANCZOS)), title)

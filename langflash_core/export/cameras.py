@@ -8,7 +8,6 @@ images/ beside the text. The centre of the top-left pixel is (0.5, 0.5) in both.
 Source: COLMAP's documentation (output format); nerfstudio's (data conventions).
 """
 
-import io
 import json
 import math
 import struct
@@ -17,13 +16,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import torch
-from PIL import Image
 from torch import Tensor
 
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.quaternions import matrices_to_quats, quats_to_matrices
+from langflash_core.limits import TEXT, VIEWS
+from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.types import Scene
 
 COLMAP, TRANSFORMS = "cameras.txt", "transforms.json"
@@ -40,7 +40,6 @@ _MODELS = {
 }
 _PLACES = ((0, 0), (1, 1), (0, 2), (1, 2))  # of fx, fy, cx, cy in K
 _STRAIGHT = 1e-3  # distortion below which photos count as straight
-_MOST_TEXT = 1 << 28  # bytes
 _DAMAGE = (ValueError, LookupError, TypeError, AttributeError, RecursionError, OverflowError, RuntimeError,
            struct.error)  # fmt: skip
 _REMEDY = "export it again as COLMAP text or transforms.json, of undistorted photos"
@@ -85,7 +84,7 @@ class PosedPhotos:
         lenses = []
         for path, K, said in zip(self.paths, self.Ks, self.sizes, strict=True):
             try:
-                with Image.open(path) as picture:
+                with opened_picture(path) as picture:
                     size = picture.size
             except (OSError, ValueError, SyntaxError) as error:
                 raise SceneFileError(f"the photo {path} of a pose cannot be read; check the path") from error
@@ -162,6 +161,7 @@ def read_posed(path: Path) -> PosedPhotos:
             ]
             path = next((file for file in known if file.is_file()), path / COLMAP)
         posed = _transforms(path) if path.suffix.lower() == ".json" else _colmap(path)
+        VIEWS.check(len(posed.paths), path.name, SceneFileError)
         _check(posed)
         return posed
     except FileNotFoundError as error:
@@ -182,10 +182,20 @@ def _write_photos(scene: Scene, path: Path) -> tuple[list[str], list[tuple[int, 
     names, sizes = [], []
     for view, photo in enumerate(scene.photos):
         names.append(f"{view:03d}.jpg")
-        with Image.open(io.BytesIO(photo)) as picture:
-            sizes.append(picture.size)
+        sizes.append(_picture_size(photo, path))
         write_atomically(path.parent / _IMAGES / names[-1], photo)
     return names, sizes
+
+
+def _picture_size(photo: bytes, path: Path) -> tuple[int, int]:
+    try:
+        with opened_picture(photo, STORED) as picture:
+            return picture.size
+    except (OSError, SyntaxError, ValueError) as error:
+        said = " ".join(str(error).split())[:100]
+        raise OutputError(
+            f"cannot write {path.name}: a photo in the scene is damaged ({said}); reconstruct it from photos"
+        ) from error
 
 
 def _told(numbers) -> str:
@@ -193,8 +203,7 @@ def _told(numbers) -> str:
 
 
 def _lines(path: Path) -> list[str]:
-    if path.stat().st_size > _MOST_TEXT:
-        raise ValueError(f"{path.name} is too large")
+    TEXT.check(path.stat().st_size, path.name, SceneFileError)
     return [line for line in path.read_text("utf-8").splitlines() if not line.startswith("#")]
 
 
@@ -277,7 +286,7 @@ def _frame_file(folder: Path, name: str) -> Path:
 def _size(own: dict, file: Path) -> tuple[int, int]:
     if "w" in own and "h" in own:
         return int(own["w"]), int(own["h"])
-    with Image.open(file) as picture:
+    with opened_picture(file) as picture:
         return picture.size
 
 

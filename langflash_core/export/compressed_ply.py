@@ -67,7 +67,7 @@ def read_compressed_ply(path: Path) -> Scene:
             )
         num_rest = _check_elements(places, path.name)
         count = places["vertex"][1]
-        gathering = Gathering(count, 1 + num_rest // 3)
+        gathering = Gathering(count, 1 + num_rest // 3, path.name)
         for first in range(0, count, _AT_ONCE * _CHUNK):
             gathering.add(_rows(stream, places, first, num_rest))
     return to_scene(gathering, path.name, [], logs=True, logits=False)

@@ -28,6 +28,7 @@ from langflash_core.files import write_atomically
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE, SH_C0
 from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.geometry.turning import axes_matrix
+from langflash_core.limits import HEADER
 from langflash_core.types import Gaussians, Scene
 
 EXTENSION, LANGUAGE = "KHR_gaussian_splatting", "LANGFLASH_language"
@@ -83,7 +84,7 @@ def _gathered(document: "_Document", name: str) -> tuple[Scene, list[int]]:
         raise SceneFileError(f"{name} holds no Gaussians (no primitive with {EXTENSION}); {_REMEDY}")
     counts = [document.count(primitive["attributes"]["POSITION"]) for primitive, _ in found]
     num_bases = max(_num_bases(primitive["attributes"]) for primitive, _ in found)
-    gathering = Gathering(sum(counts), num_bases)
+    gathering = Gathering(sum(counts), num_bases, name)
     warnings: list[str] = []
     for (primitive, matrix), count in zip(found, counts, strict=True):
         own = primitive["extensions"][EXTENSION]
@@ -110,6 +111,7 @@ class _Document:
             if version != 2 or length != len(content):
                 raise ValueError(f"version {version} of {length:,} bytes, found {len(content):,}")
             text = self._chunks(content)
+        HEADER.check(len(text), path.name, SceneFileError)
         self.json = json.loads(bytes(text))
         self._buffers: dict[int, memoryview] = {}
 

@@ -13,6 +13,7 @@ model the dictionary.
 """
 
 import base64
+import hashlib
 import html
 import json
 import re
@@ -123,6 +124,7 @@ def _page(header: dict, payload: bytes, text_model: TextModel | None) -> str:
 
     names = SCRIPTS if text_model is None else (READING, *SCRIPTS)
     program = _COMMENT.sub("", "\n".join(source(f"{name}.js") for name in names))
+    script = f'\n"use strict";\n(() => {{\n{program}}})();\n'
     shaders = {name: _COMMENT.sub("", shader_source(f"web/{name}")) for name in _SHADERS}
     parts = {
         "title": html.escape(header["title"]),
@@ -130,9 +132,19 @@ def _page(header: dict, payload: bytes, text_model: TextModel | None) -> str:
         "header": _json_script("header", {**header, "shaders": shaders, "constants": _constants()}),
         "payload": _packed_script("payload", payload),
         "text": _text_scripts(text_model),
-        "program": f'<script>\n"use strict";\n(() => {{\n{program}}})();\n</script>',
+        "program": f"<script>{script}</script>",
+        "policy": _policy(script),
     }
     return _SLOT.sub(lambda slot: parts[slot[1]], source("page.html"))
+
+
+def _policy(script: str) -> str:
+    """What a browser lets the page do: run this program and no other, load nothing, send nothing."""
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    return (
+        f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; base-uri 'none'; "
+        "form-action 'none'"
+    )
 
 
 def _packed_script(name: str, content: bytes) -> str:

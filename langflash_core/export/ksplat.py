@@ -71,7 +71,7 @@ def read_ksplat(path: Path) -> Scene:
             raise SceneFileError(f"{path.name} holds no Gaussians, or not as many as it says; {_REMEDY}")
         low, high = limits[0] or -_SH_RANGE, limits[1] or _SH_RANGE
         num_bases = (max(section.degree for section in sections) + 1) ** 2
-        gathering = Gathering(count, num_bases)
+        gathering = Gathering(count, num_bases, path.name)
         for section in sections:
             for rows in _rows(stream, section, level, (low, high), num_bases):
                 gathering.add(rows)

@@ -18,6 +18,7 @@ import torch
 from safetensors import SafetensorError
 
 from langflash_core.export.packing import told
+from langflash_core.limits import ATOMS, VIEWS
 from langflash_core.scene.assemble import renormalised
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.fields import to_fields
@@ -66,6 +67,9 @@ def with_language(scene: Scene, block: bytes, name: str) -> Scene:
         photos = tuple(
             fields[photo].numpy().tobytes() for photo in sorted(f for f in fields if f.startswith("photo_"))
         )
+        for limit, part in ((ATOMS, "dictionary"), (VIEWS, "viewmats")):
+            if limit.passed_by(len(fields[part])):
+                raise ValueError(f"{len(fields[part]):,} {limit.name}; {limit.remedy()}")
         width, height = (int(side) for side in described["view_size"])
         whole = replace(
             scene,

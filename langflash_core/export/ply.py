@@ -71,7 +71,7 @@ def read_ply(path: Path) -> Scene:
         layout = _read_layout(stream, path.name)
         _check_size(path, layout)
         num_bases = 1 + layout.num_rest // 3
-        gathering = Gathering(layout.count, num_bases)
+        gathering = Gathering(layout.count, num_bases, path.name)
         stream.seek(layout.start)
         for first in range(0, layout.count, ROWS_AT_ONCE):
             rows = np.fromfile(stream, layout.row, min(ROWS_AT_ONCE, layout.count - first))

@@ -29,6 +29,8 @@ from langflash_core.export.quantised import Palette, quantised
 from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, to_scene
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.formats import SOG_FOLDER
+from langflash_core.limits import FILES, GAUSSIANS
+from langflash_core.picture_files import opened_picture
 from langflash_core.types import Scene
 
 _BOOK, _ROW = 256, 64  # numbers, entries a row of the palette's picture
@@ -57,6 +59,7 @@ def read_sog(path: Path) -> Scene:
         if path.name.lower() == SOG_FOLDER:
             return _read(path.name, lambda name, most: _file(path.parent, name, most))
         with zipfile.ZipFile(path) as archive:
+            FILES.check(len(archive.infolist()), path.name, SceneFileError)
             return _read(path.name, lambda name, most: _entry(archive, name, most))
     except Image.DecompressionBombError as error:
         raise SceneFileError(f"{path.name} has a picture of too many pixels; {_REMEDY}") from error
@@ -122,6 +125,7 @@ def _read(name: str, open_file: _Opener) -> Scene:
     count = meta["count"]
     if not isinstance(count, int) or not 0 < count <= _LARGEST_SIDE**2:
         raise ValueError(f"its count is {count!r}")
+    GAUSSIANS.check(count, name, SceneFileError)
 
     def pixels(part: str, index: int, needed: int = count) -> np.ndarray:
         file = meta[part]["files"][index]
@@ -135,7 +139,7 @@ def _read(name: str, open_file: _Opener) -> Scene:
     quats, scales, colours = pixels("quats", 0), pixels("scales", 0), pixels("sh0", 0)
     harmonics = _harmonics(meta["shN"], pixels, count) if meta.get("shN", {}).get("bands") else None
     num_bases = 1 if harmonics is None else 1 + harmonics[0].shape[1]
-    gathering = Gathering(count, num_bases)
+    gathering = Gathering(count, num_bases, name)
     for first in range(0, count, ROWS_AT_ONCE):
         some = slice(first, min(first + ROWS_AT_ONCE, count))
         whole = low[some, :3].astype(np.float64) + 256.0 * high[some, :3]
@@ -153,7 +157,7 @@ def _read(name: str, open_file: _Opener) -> Scene:
 
 def _pixels(content: bytes, needed: int, name: str) -> np.ndarray:
     """The first `needed` pixels (needed, 4) uint8 of a WebP."""
-    with Image.open(io.BytesIO(content), formats=["WEBP"]) as picture:
+    with opened_picture(content, ("WEBP",)) as picture:
         area = picture.width * picture.height
         if not needed <= area <= 2 * needed + _SLACK:
             raise ValueError(f"{name} has {area:,} pixels, expected about {needed:,}")

@@ -37,7 +37,7 @@ def read_splat(path: Path) -> Scene:
             f"found {size:,} bytes; {_REMEDY}"
         )
     count = size // _ROW.itemsize
-    gathering, unit = Gathering(count, 1), 0
+    gathering, unit = Gathering(count, 1, path.name), 0
     with path.open("rb") as stream:
         for first in range(0, count, ROWS_AT_ONCE):
             rows = np.fromfile(stream, _ROW, min(ROWS_AT_ONCE, count - first))

@@ -88,7 +88,7 @@ def read_spz(path: Path) -> Scene:
     else:
         header, streams, extensions = _unpacked(content, path.name)
     matrix = axes_matrix(_axes(extensions)).T  # to ours
-    gathering = Gathering(header.count, header.num_shown)
+    gathering = Gathering(header.count, header.num_shown, path.name)
     for first in range(0, header.count, ROWS_AT_ONCE):
         gathering.add(turned(_rows(header, streams, slice(first, first + ROWS_AT_ONCE)), matrix))
     warnings = ["The scene was made for smoothed splats, which are drawn as plain ones here."]

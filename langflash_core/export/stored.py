@@ -12,6 +12,7 @@ import torch
 
 from langflash_core.errors import SceneFileError
 from langflash_core.geometry.quaternions import unit_quats
+from langflash_core.limits import GAUSSIANS
 from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Gaussians, Scene
 
@@ -43,7 +44,13 @@ class Gathering:
     An infinite logit opacity is kept, it means 0 or 1, and so is a log scale of minus infinity.
     """
 
-    def __init__(self, most: int, num_bases: int):
+    def __init__(self, most: int, num_bases: int, name: str):
+        """most: Gaussians of the file called `name`.
+
+        Raises:
+            SceneFileError: a file may not hold so many.
+        """
+        GAUSSIANS.check(most, name, SceneFileError)
         self._rows = Rows(
             *(np.empty((most, *shape), np.float32) for shape in ((3,), (4,), (3,), (), (num_bases, 3)))
         )

@@ -8,11 +8,13 @@ and under transformed parents are read too.
 Source: OpenUSD 26.03 and later, the schemas of usdVol (generatedSchema.usda).
 """
 
+import importlib.util
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
+from langflash_core.apart import Ended, Part, Refused, ask
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export.packing import check_some, placed, told, turned
 from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, parts, to_scene
@@ -22,37 +24,33 @@ from langflash_core.geometry.turning import axes_matrix
 from langflash_core.types import Scene
 
 _AXES = {"Y": "RUB", "Z": "RFU"}  # by a stage's upAxis
+# The attributes that `langflash_core/apart/stages.py` reads, which imports OpenUSD.
+ARRAYS = ("positions", "orientations", "scales", "opacities")
+HARMONICS = "radiance:sphericalHarmonicsCoefficients"
 _KIND = "ParticleField3DGaussianSplat"
 _ABSENT = "OpenUSD is not installed; pip install 'langflash[usd]'"
 _REMEDY = "export it again, or name a .ply"
 
 
 def read_usd(path: Path) -> Scene:
-    """The Gaussians of a .usd, .usda, .usdc or .usdz, of all its prims together.
+    """The Gaussians of a .usd, .usda, .usdc or .usdz, of all its prims together; OpenUSD reads it in a
+    process of its own.
 
     Raises:
-        SceneFileError: no OpenUSD, missing, damaged, or without a usable Gaussian.
+        SceneFileError: no OpenUSD, missing, damaged, without a usable Gaussian, or too much for OpenUSD.
     """
-    pxr = _pxr()
-    if pxr is None:
+    if not installed():
         raise SceneFileError(f"{path.name} cannot be read: {_ABSENT}")
     if not path.stat().st_size:
         raise SceneFileError(f"{path.name} is an empty file; {_REMEDY}")
     try:
-        stage = pxr.Usd.Stage.Open(str(path))
-        prims = [prim for prim in stage.Traverse() if prim.GetTypeName() == _KIND]
+        prims = [_prim(part) for part in ask("stage", {"path": str(path.absolute())})]
         if not prims:
             raise SceneFileError(f"{path.name} holds no Gaussians (no {_KIND}); {_REMEDY}")
-        axes = _AXES[str(pxr.UsdGeom.GetStageUpAxis(stage))]
-        fields = [_fields(prim, pxr) for prim in prims]
-        num_bases = max(rows.sh.shape[1] for rows in fields)
-        gathering = Gathering(sum(len(rows.means) for rows in fields), num_bases)
-        for rows, prim in zip(fields, prims, strict=True):
-            place = np.array(pxr.UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0)).T
-            for first in range(0, len(rows.means), ROWS_AT_ONCE):
-                some = Rows(*(values[first : first + ROWS_AT_ONCE] for values in rows.all()))
-                gathering.add(_padded(placed(some, place, axes), num_bases))
-    except (RuntimeError, ValueError, TypeError, KeyError, pxr.Tf.ErrorException) as error:
+        gathering = _gathered(prims, path.name)
+    except Ended as error:
+        raise SceneFileError(f"{path.name} cannot be read: OpenUSD {error}; {_REMEDY}") from error
+    except (Refused, ValueError, TypeError, KeyError) as error:
         raise SceneFileError(f"{path.name} is damaged or no USD ({told(error)}); {_REMEDY}") from error
     return to_scene(gathering, path.name, [], logs=False, logits=False)
 
@@ -79,6 +77,11 @@ def write_usd(scene: Scene, path: Path) -> None:
         target.write_bytes(plain.read_bytes())
 
 
+def installed() -> bool:
+    """Whether there is an OpenUSD; without importing it."""
+    return importlib.util.find_spec("pxr") is not None
+
+
 def _pxr():
     """The modules of usd-core that are needed, None where it is absent or older than the schema."""
     try:
@@ -94,33 +97,31 @@ def _pxr():
     )
 
 
-def _fields(prim, pxr) -> Rows:
-    """A prim's arrays in its own axes.
+def _prim(part: Part) -> tuple[Rows, np.ndarray, str]:
+    """A prim's arrays in its own axes, where it stands (4, 4), and the stage's axes.
 
     Raises:
-        ValueError: their lengths disagree.
+        ValueError, TypeError, KeyError: their lengths disagree, or the stage's axis is none.
     """
-    field = pxr.UsdVol.ParticleField3DGaussianSplat(prim)
-    means = _array(prim, "positions", 3)
-    count = len(means)
-    quats = _array(prim, "orientations", 4)  # OpenUSD hands quaternions over as xyzw
-    scales, opacities = _array(prim, "scales", 3), _array(prim, "opacities", 1)[:, 0]
-    flat = _array(prim, "radiance:sphericalHarmonicsCoefficients", 3)
-    degree = field.GetRadianceSphericalHarmonicsDegreeAttr().Get()
+    means, quats, scales, opacities, flat = (part.arrays[name] for name in (*ARRAYS, HARMONICS))
+    count, degree = len(means), part.facts["degree"]
     bases = (degree + 1) ** 2 if degree is not None and 0 <= degree <= 10 else 0
     if not count or len(flat) != count * bases or {len(quats), len(scales), len(opacities)} != {count}:
         raise ValueError(f"{count:,} positions, and other numbers of the rest")
     sh = flat.reshape(count, bases, 3)[:, : (MAX_SHOWN_DEGREE + 1) ** 2]
-    return Rows(means, quats[:, [3, 0, 1, 2]], scales, opacities, np.ascontiguousarray(sh))
+    # OpenUSD hands quaternions over as xyzw.
+    rows = Rows(means, quats[:, [3, 0, 1, 2]], scales, opacities[:, 0], np.ascontiguousarray(sh))
+    return rows, np.array(part.facts["place"], np.float64).reshape(4, 4), _AXES[part.facts["up"]]
 
 
-def _array(prim, name: str, width: int) -> np.ndarray:
-    """An attribute (n, width) float32, of whichever precision has values; (0, width) where none has."""
-    for suffix in ("", "h"):
-        values = prim.GetAttribute(name + suffix).Get()
-        if values is not None and len(values):
-            return np.asarray(values, np.float32).reshape(-1, width)
-    return np.zeros((0, width), np.float32)
+def _gathered(prims: list[tuple[Rows, np.ndarray, str]], name: str) -> Gathering:
+    num_bases = max(rows.sh.shape[1] for rows, _, _ in prims)
+    gathering = Gathering(sum(len(rows.means) for rows, _, _ in prims), num_bases, name)
+    for rows, place, axes in prims:
+        for first in range(0, len(rows.means), ROWS_AT_ONCE):
+            some = Rows(*(values[first : first + ROWS_AT_ONCE] for values in rows.all()))
+            gathering.add(_padded(placed(some, place, axes), num_bases))
+    return gathering
 
 
 def _padded(rows: Rows, num_bases: int) -> Rows:

@@ -5,14 +5,11 @@ light nor much of an edge; deeper than 8 bits is scaled to 8; an embedded colour
 converted to sRGB; JPEGs much larger than needed are decoded at 1/2, 1/4 or 1/8.
 """
 
-import ctypes
 import io
-import logging
 import struct
 import warnings
 import zlib
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +17,9 @@ from PIL import Image, ImageCms
 
 from langflash_core.errors import ImageError
 from langflash_core.formats import is_film
+from langflash_core.limits import PIXELS, PROFILE
+from langflash_core.picture_files import TooManyPixels, opened_picture, picture_block
 
-FORMATS = ("JPEG", "MPO", "PNG", "WEBP", "TIFF", "HEIF", "AVIF", "JPEG2000", "BMP", "GIF", "PPM")
 MIN_SIDE = 32
 MID_GREY = (128, 128, 128, 255)
 DECODED_SIDE = 1536  # pixels on the long side that a reduced JPEG decode keeps at least
@@ -90,8 +88,8 @@ def read_photo(path: Path, name: str | None = None) -> Photo:
             return _decode(content, name)
     except Image.UnidentifiedImageError as error:
         raise ImageError(f"{name} is not a picture this program can read; {_REMEDY}") from error
-    except Image.DecompressionBombError as error:
-        raise ImageError(f"{name} has too many pixels; scale it below 170 megapixels first") from error
+    except TooManyPixels as error:
+        raise ImageError(f"{name} has too many pixels; scale it to {PIXELS.told()} or less") from error
     except MemoryError as error:
         raise ImageError(f"{name} does not fit into memory; scale it down first") from error
     except _DAMAGE as error:
@@ -123,13 +121,7 @@ def _read_bytes(path: Path, name: str) -> bytes:
 
 
 def _decode(content: bytes, name: str) -> Photo:
-    if content[4:8] == b"ftyp":
-        _register_heif()
-    if content[:2] in (b"II", b"MM"):
-        _quiet_tiff()
-    Image.init()  # all plug-ins; only the formats named above are let in (no PostScript)
-    known = [kind for kind in FORMATS if kind in Image.OPEN]
-    with Image.open(io.BytesIO(content), formats=known) as opened:
+    with opened_picture(content) as opened:
         if min(opened.size) < MIN_SIDE:
             size = f"{opened.width} x {opened.height}"
             raise ImageError(f"{name} is only {size} pixels; use a photo of at least 200 pixels a side")
@@ -139,31 +131,13 @@ def _decode(content: bytes, name: str) -> Photo:
         reduction = stored[0] / opened.width
         opened.load()
         exif = _exif(opened)
-        image = _to_srgb(_to_8bit(opened), opened.info.get("icc_profile"))
+        image = _to_srgb(_to_8bit(opened), picture_block(opened, "icc_profile"))
     turn = _UPRIGHT.get(exif.get(_ORIENTATION_TAG, 1))
     if turn is not None:
         image = image.transpose(turn)
     turned = turn in (_UPRIGHT[5], _UPRIGHT[6], _UPRIGHT[7], _UPRIGHT[8])
     width, height = stored[::-1] if turned else stored
     return Photo(name, width, height, exif, image, reduction)
-
-
-def _register_heif() -> None:
-    """HEIC needs a plug-in; loading it only for such files keeps the start quick."""
-    import pillow_heif
-
-    pillow_heif.register_heif_opener()
-
-
-@cache
-def _quiet_tiff() -> None:
-    """What is wrong with a TIFF is told once, in the error: libtiff and Pillow's log would write it to the
-    terminal as well. Where libtiff's functions are hidden inside Pillow's own (Windows), it still does."""
-    logging.getLogger("PIL.TiffImagePlugin").setLevel(logging.CRITICAL)
-    library = ctypes.CDLL(Image.core.__file__)  # a look-up goes on into the libraries that it needs
-    for name in ("TIFFSetErrorHandler", "TIFFSetWarningHandler"):
-        if hasattr(library, name):
-            getattr(library, name)(None)
 
 
 def _draft_size(size: tuple[int, int]) -> tuple[int, int]:
@@ -173,7 +147,9 @@ def _draft_size(size: tuple[int, int]) -> tuple[int, int]:
 
 
 def _exif(image: Image.Image) -> dict:
-    """EXIF tags by number; a broken block counts as none."""
+    """EXIF tags by number; a broken block counts as none, and so does one that is too long."""
+    if PROFILE.passed_by(len(image.info.get("exif") or b"")):
+        return {}
     try:
         tags = image.getexif()
         return {**dict(tags), **tags.get_ifd(0x8769)}

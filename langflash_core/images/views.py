@@ -1,12 +1,10 @@
 """Photos to `Views`: one shape for all, intrinsics following every crop and resize."""
 
-import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import torch
-from PIL import Image
 from torch import Tensor
 
 from langflash_core.errors import InputError
@@ -14,6 +12,7 @@ from langflash_core.images import triage
 from langflash_core.images.decode import PhotoFacts
 from langflash_core.images.lens import ASSUMED_FOV, check_lens, known_lenses, photo_intrinsics
 from langflash_core.images.pictures import Box, Picture, photo_names, photo_paths, read_pictures
+from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.types import Views
 
 
@@ -85,8 +84,7 @@ def source_picture(views: Views, view: int) -> Tensor:
     """The largest version of one photo at hand, (3, h, w) in [0, 1]; the same crop as the views."""
     if not views.sources:
         return views.images[view]
-    opened = Image.open(io.BytesIO(views.sources[view])).convert("RGB")
-    return torch.from_numpy(np.array(opened, dtype=np.float32)).permute(2, 0, 1) / 255
+    return _decoded(views.sources[view])
 
 
 def cropped_intrinsics(K: Tensor, box: Box, size: tuple[int, int]) -> Tensor:
@@ -125,6 +123,13 @@ def _image(picture: Picture) -> Tensor:
     """(3, H, W) in [0, 1]."""
     pixels = picture.pixels.astype(np.float32)
     return torch.from_numpy(pixels).permute(2, 0, 1).contiguous() / 255
+
+
+def _decoded(source: bytes) -> Tensor:
+    """(3, h, w) in [0, 1]."""
+    with opened_picture(source, STORED) as picture:
+        pixels = np.array(picture.convert("RGB"), dtype=np.float32)
+    return torch.from_numpy(pixels).permute(2, 0, 1) / 255
 
 
 def _assumption(assumed: list[str], total: int) -> str:

@@ -24,6 +24,7 @@ from torch.nn.functional import normalize
 from langflash_core.errors import PromptError, WeightsError
 from langflash_core.language.vocabulary import all_phrases
 from langflash_core.resources import asset_path
+from langflash_core.shipped import check_shipped
 
 DIMENSION = 384
 MAX_TOKENS = 256  # the model's declared maximum; longer phrases are cut
@@ -161,8 +162,10 @@ def read_minilm(weights: Path, vocabulary: Path) -> MiniLM:
     """The tower of a row-int8 safetensors file and a `tokenizers` JSON file.
 
     Raises:
-        WeightsError: a file is unreadable or lacks a tensor.
+        WeightsError: a file is unreadable, lacks a tensor, or is not the one that was shipped.
     """
+    check_shipped(weights)
+    check_shipped(vocabulary)
     try:
         tokenizer = Tokenizer.from_buffer(vocabulary.read_bytes())
         return MiniLM(load_file(weights), tokenizer)

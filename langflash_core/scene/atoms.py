@@ -1,7 +1,6 @@
 """What there is to say about the atoms of a scene: how much each carries, which are alike, and where
 the photos show it."""
 
-import io
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,6 +8,7 @@ import torch
 from PIL import Image
 from torch.nn.functional import normalize
 
+from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.scene.selection import strongest_atoms
 from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Scene
@@ -140,7 +140,7 @@ def _crop(photo: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
 def _decoded(photo: bytes) -> np.ndarray | None:
     try:
-        with Image.open(io.BytesIO(photo)) as opened:
+        with opened_picture(photo, STORED) as opened:
             return np.asarray(opened.convert("RGB"))
-    except OSError:  # a scene whose small photos are damaged still has its words
+    except (OSError, SyntaxError, ValueError):  # a scene whose small photos are damaged still has its words
         return None

@@ -14,9 +14,9 @@ import safetensors.numpy
 from safetensors import SafetensorError
 
 from langflash_core.errors import SceneFileError
+from langflash_core.limits import ATOMS, GAUSSIANS, HEADER, VIEWS
 
 FORMAT, VERSION = "langflash-scene", 3
-_MAX_HEADER = 64 * 2**20
 _REMEDY = "reconstruct the scene again or copy the whole file"
 _FOREIGN = {
     b"\xff\xd8\xff": "a JPEG photo",
@@ -72,7 +72,8 @@ def check_container(path: Path) -> None:
 
 def damaged(path: Path, reason: object) -> SceneFileError:
     """The error that says so."""
-    return SceneFileError(f"{path.name} is damaged ({reason}); {_REMEDY}")
+    said = " ".join(str(reason).split())[:200]  # errors repeat what a file holds
+    return SceneFileError(f"{path.name} is damaged ({said}); {_REMEDY}")
 
 
 def digest(text: str, arrays: Mapping[str, np.ndarray]) -> str:
@@ -93,8 +94,11 @@ def _read(path: Path) -> tuple[dict[str, str], bytes]:
         with path.open("rb") as stream:
             start = stream.read(8)
             length = struct.unpack("<Q", start)[0] if len(start) == 8 else 0
-            head = stream.read(length) if 2 <= length <= _MAX_HEADER else b""
+            if length <= path.stat().st_size:  # else it is none
+                HEADER.check(length, path.name, SceneFileError)
+            head = stream.read(length) if 2 <= length <= HEADER.value else b""
             header = _parse_header(path, start + head[:8], head)
+            _check_counts(path, header)
             _check_size(path, 8 + length, header, path.stat().st_size)
             return header["__metadata__"], start + head + stream.read()
     except FileNotFoundError as error:
@@ -134,6 +138,18 @@ def _check_size(path: Path, body_start: int, header: dict, found: int) -> None:
     if found != expected:
         kind = "cut off" if found < expected else "damaged"
         raise SceneFileError(f"{path.name} is {kind}: expected {expected} bytes, found {found}; {_REMEDY}")
+
+
+def _check_counts(path: Path, header: dict) -> None:
+    """Raises:
+    SceneFileError: it has more of something than is let in, or says nothing about it.
+    """
+    for name, limit in (("means", GAUSSIANS), ("dictionary", ATOMS), ("viewmats", VIEWS)):
+        try:
+            count = int(header[name]["shape"][0]) if name in header else 0
+        except (ValueError, LookupError, TypeError) as error:
+            raise SceneFileError(f"{path.name} is damaged: its {name} have no shape; {_REMEDY}") from error
+        limit.check(count, path.name, SceneFileError)
 
 
 def _version(path: Path, header: dict[str, str]) -> int:

@@ -23,6 +23,7 @@ from typing import Any
 
 from langflash_core.errors import SceneFileError
 from langflash_core.files import write_atomically
+from langflash_core.limits import TEXT
 from langflash_core.scene.changes import Change, checked, told
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import MASKS, TOLD, Atom, Edit, History, difference
@@ -30,7 +31,6 @@ from langflash_core.scene.mask import Mask
 from langflash_core.types import Scene
 
 FORMAT, VERSION = "langflash-edits", 2
-_LARGEST = 256 * 2**20  # bytes of one file; a mask of a million Gaussians has 125,000
 
 
 def scene_digest(scene: Scene) -> str:
@@ -98,8 +98,13 @@ def load_history(path: Path, scene: Scene) -> History:
         whole = replace(start.moved_to(len(done)), undone=undone)
         whole.moved_to(len(done) + len(undone))  # what can be redone must fit as well
     except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, zlib.error) as error:
-        raise SceneFileError(f"{path.name} is damaged ({error}); edit the scene again") from error
+        raise SceneFileError(f"{path.name} is damaged ({_said(error)}); edit the scene again") from error
     return whole
+
+
+def _said(error: Exception) -> str:
+    """One short line: what a file holds may have many, and errors repeat it."""
+    return " ".join(str(error).split())[:100]
 
 
 def _check_there(edits: Iterable[Edit], scene: Scene) -> None:
@@ -170,8 +175,7 @@ def _atom(into: int, name: str, on: bool, *denied: str) -> Atom:
 
 def _read(path: Path) -> dict:
     try:
-        if path.stat().st_size > _LARGEST:
-            raise ValueError("it is too large")
+        TEXT.check(path.stat().st_size, path.name, SceneFileError)
         content = json.loads(path.read_bytes())
         if content["format"] != FORMAT or not isinstance(content["about"], dict):
             raise ValueError("it is no file of edits")
@@ -185,5 +189,5 @@ def _read(path: Path) -> dict:
     except OSError as error:
         raise SceneFileError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
     except (ValueError, LookupError, TypeError, ArithmeticError, RecursionError) as error:
-        raise SceneFileError(f"{path.name} is damaged ({error}); edit the scene again") from error
+        raise SceneFileError(f"{path.name} is damaged ({_said(error)}); edit the scene again") from error
     return content

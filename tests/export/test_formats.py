@@ -474,6 +474,7 @@ def test_usd_in_half_precision_and_z_up(tmp_path):
 
 def test_usd_that_is_absent_is_said(tmp_path, monkeypatch):
     monkeypatch.setattr("langflash_core.export.usd._pxr", lambda: None)
+    monkeypatch.setattr("langflash_core.export.usd.installed", lambda: False)
     (tmp_path / "a.usda").write_text("#usda 1.0\n")
     with pytest.raises(SceneFileError, match=r"langflash\[usd\]"):
         read(tmp_path / "a.usda")

@@ -198,7 +198,7 @@ def test_damage_anywhere_gives_pixels_or_an_image_error(tmp_path, kind):
     whole = encoded(room_picture(64, 48), kind, exif=exif(focal_35mm=26, orientation=6).tobytes())
     rng = np.random.default_rng(3)
     path = tmp_path / "a.bin"
-    for _ in range(60):
+    for _ in range(15 if kind == "HEIF" else 60):  # each refused HEIC ends its decoder's process
         damaged = bytearray(whole)
         for place in rng.integers(0, len(whole), 4):
             damaged[place] = rng.integers(0, 256)

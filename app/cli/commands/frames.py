@@ -16,6 +16,7 @@ from langflash_core.files import filled_atomically, make_folder, write_atomicall
 from langflash_core.images.pictures import FILM_PHOTOS
 from langflash_core.images.still_names import is_still, shown_name
 from langflash_core.images.strip import Choice, Strip, choose, notes_on
+from langflash_core.picture_files import opened_picture
 
 from ..files import check_folder, check_output_file
 from ..films import look_through, sentence, summary
@@ -92,7 +93,7 @@ def _write_sheet(path: Path, folder: Path, strip: Strip, choice: Choice) -> None
     tiles = []
     for index in choice.chosen:
         file = strip.stills[index].file
-        with Image.open(folder / file) as frame:
+        with opened_picture(folder / file) as frame:
             small = thumbnail(np.asarray(frame.convert("RGB")))
         tiles.append((shown_name(file).rpartition("@ ")[2], small))
     stream = io.BytesIO()

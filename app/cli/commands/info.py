@@ -1,13 +1,15 @@
-"""`langflash info`: what a scene file holds."""
+"""`langflash info`: what a scene file holds; with --limits, how much of a file is let in."""
 
 from argparse import Namespace
 from pathlib import Path
 from typing import Any, TextIO
 
-from langflash_core.errors import SceneFileError
+from langflash_core.errors import InputError, SceneFileError
+from langflash_core.limits import LIMITS
 
 from ..files import readable_file
 from ..report import write_json
+from ..sbom import bill_of_materials
 
 _SHOWS = 1 / 255  # the smallest step of an 8-bit picture
 
@@ -16,8 +18,14 @@ def run(args: Namespace, out: TextIO) -> None:
     """Print counts, sizes, timings, and what pruning saved.
 
     Raises:
-        SceneFileError: missing, truncated or foreign.
+        SceneFileError: missing, truncated or foreign. InputError: neither a scene nor --limits was named.
     """
+    if args.limits:
+        return _print_limits(args.json, out)
+    if args.sbom:
+        return write_json(bill_of_materials(), out)
+    if args.scene is None:
+        raise InputError("no scene was named; name one, or use --limits or --sbom")
     document = {
         "scene": str(args.scene),
         **_described(args.scene),
@@ -27,6 +35,14 @@ def run(args: Namespace, out: TextIO) -> None:
         write_json(document, out)
     else:
         print("\n".join(_lines(_for_people(_in_words(document)))), file=out)
+
+
+def _print_limits(as_json: bool, out: TextIO) -> None:
+    if as_json:
+        return write_json({"limits": {limit.name: limit.value for limit in LIMITS}}, out)
+    widths = max(len(limit.variable) for limit in LIMITS), max(len(limit.told()) for limit in LIMITS)
+    for limit in LIMITS:
+        print(f"{limit.variable:{widths[0]}}  {limit.told():>{widths[1]}}  {limit.what}", file=out)
 
 
 def _described(path: Path) -> dict[str, Any]:

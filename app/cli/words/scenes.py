@@ -336,7 +336,13 @@ def add_lift(commands) -> None:
 def add_info(commands) -> None:
     """`langflash info`."""
     command = new_command(commands, "info", "what a scene file holds, and what pruning saved")
-    command.add_argument("scene", type=Path, metavar="SCENE", help=".langflash or a splat file")
+    command.add_argument("scene", type=Path, nargs="?", metavar="SCENE", help=".langflash or a splat file")
+    command.add_argument(
+        "--sbom", action="store_true", help="what is installed, as a bill of materials (CycloneDX JSON)"
+    )
+    command.add_argument(
+        "--limits", action="store_true", help="how much readers take of a file, and the variables that say so"
+    )
     add_json(command)
 
 

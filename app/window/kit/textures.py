@@ -1,11 +1,10 @@
 """Thumbnails on the graphics card, by key, within bounds."""
 
-import io
-
 import moderngl
 import numpy as np
 from imgui_bundle import imgui
-from PIL import Image
+
+from langflash_core.picture_files import STORED, opened_picture
 
 MOST_BYTES = 96 * 2**20  # 400 photos of the tray, or 3,500 atoms
 
@@ -39,9 +38,9 @@ class Thumbnails:
         """Upload a small JPEG.
 
         Raises:
-            OSError: the bytes are no picture.
+            OSError, SyntaxError, ValueError: the bytes are no picture.
         """
-        with Image.open(io.BytesIO(encoded)) as photo:
+        with opened_picture(encoded, STORED) as photo:
             self.put(key, np.asarray(photo.convert("RGB")))
 
     def get(self, key: str) -> tuple[imgui.ImTextureRef, float] | None:

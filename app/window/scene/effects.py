@@ -158,7 +158,8 @@ class SceneEffects(Effects):
         if len(info.scene.photos) > WHOLE_PHOTOS:
             self._hands.submit(ShrinkPhotos(info.serial, info.scene.photos))
         for index, photo in enumerate(info.scene.photos[:WHOLE_PHOTOS]):
-            with suppress(OSError):  # a scene whose small photos are damaged still shows; buttons get numbers
+            # A scene whose small photos are damaged still shows; buttons get numbers.
+            with suppress(OSError, SyntaxError, ValueError):
                 self._thumbnails.put_encoded(f"view {index}", photo)
         for colormap in COLOUR_MAPS:
             self._thumbnails.put(f"bar {colormap}", colour_bar(colormap))

@@ -3,7 +3,6 @@
 Heavy imports wait until they are needed: the window makes these requests before torch is loaded.
 """
 
-import io
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -12,12 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PIL import Image
 
 from langflash_core.detail import DEFAULT_DETAIL
 from langflash_core.errors import ImageError, LangFlashError
 from langflash_core.geometry.reach import median_reach
 from langflash_core.images.still_names import film_of, shown_name
+from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command, ShowPicture
@@ -204,8 +203,8 @@ class ShrinkPhotos(SceneErrand):
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         for index, encoded in enumerate(self.photos):
-            with suppress(OSError), Image.open(io.BytesIO(encoded)) as photo:  # else the button has a number
-                photo.draft("RGB", (THUMBNAIL_SIDE, THUMBNAIL_SIDE))
+            with suppress(OSError, SyntaxError, ValueError), opened_picture(encoded, STORED) as photo:
+                photo.draft("RGB", (THUMBNAIL_SIDE, THUMBNAIL_SIDE))  # a damaged one's button has a number
                 photo.thumbnail((THUMBNAIL_SIDE, THUMBNAIL_SIDE))
                 yield ShowPicture(f"view {index}", np.asarray(photo.convert("RGB")))
 

@@ -21,6 +21,7 @@ from safetensors.numpy import save
 
 from langflash_core.errors import InputError
 from langflash_core.files import write_atomically
+from langflash_core.picture_files import STORED, opened_picture
 
 FORMAT = "langflash-labels-1"
 LABELS = "labels.safetensors"
@@ -181,5 +182,5 @@ def decoded_map(content: bytes) -> UInt16[np.ndarray, "H W"]:
     Raises:
         OSError, ValueError: it is none.
     """
-    with Image.open(io.BytesIO(content)) as opened:
+    with opened_picture(content, STORED) as opened:
         return np.asarray(opened).astype(np.uint16)

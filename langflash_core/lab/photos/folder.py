@@ -25,12 +25,12 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from PIL import Image
 from torch import Tensor
 
 from langflash_core.errors import InputError
 from langflash_core.images.decode import read_photo
 from langflash_core.lab.photos.names import CLASSES40, class_of, spoken
+from langflash_core.picture_files import opened_picture
 
 PHOTO_SUFFIXES = (".jpg", ".jpeg", ".png")
 MILLIMETRE = 0.001
@@ -249,7 +249,7 @@ def _size(values: np.ndarray) -> str:
 def read_map(path: Path, what: str) -> np.ndarray:
     """(H, W) uint8 or uint16."""
     try:
-        with Image.open(path) as opened:
+        with opened_picture(path) as opened:
             if opened.mode not in ("L", "P", "I", "I;16", "I;16B"):
                 raise ValueError(f"mode {opened.mode}")
             values = np.asarray(opened)

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from PIL import Image
 
 from langflash_core.errors import InputError
 from langflash_core.lab.photos.matlab import MatFile, open_mat
 from langflash_core.lab.photos.writing import FolderWriter, NameTable
+from langflash_core.picture_files import opened_picture
 from langflash_core.running import Progress
 
 NYU_FRAME = (41, 45, 601, 471)
@@ -186,7 +186,7 @@ def _sun_labels(path: Path, table: NameTable) -> np.ndarray:
 
 def _sun_depths(path: Path) -> np.ndarray:
     """Metres (H, W)."""
-    with Image.open(path) as opened:
+    with opened_picture(path) as opened:
         steps = np.asarray(opened).astype(np.uint16)
     return ((steps >> 3) | (steps << 13)).astype(np.float32) / 1000
 
@@ -212,7 +212,7 @@ def from_frames(source: Source, writer: FolderWriter) -> None:
         writer.photo(id, colour)
         depth = source.path / f"{stem}.depth.png"
         if depth.is_file():
-            with Image.open(depth) as opened:
+            with opened_picture(depth) as opened:
                 steps = np.asarray(opened).astype(np.float64)
             writer.depths(id, np.where(steps == 65535, 0, steps) / 1000)
         writer.camera(id, *camera)
@@ -257,7 +257,7 @@ def _json(path: Path, keys: tuple[str, ...]) -> dict:
 def _picture(path: Path, mode: str) -> np.ndarray:
     """(H, W) or (H, W, 3) uint8."""
     try:
-        with Image.open(path) as opened:
+        with opened_picture(path) as opened:
             same = opened.mode == mode or (mode == "L" and opened.mode == "P")
             return np.asarray(opened if same else opened.convert(mode))
     except (OSError, SyntaxError) as error:

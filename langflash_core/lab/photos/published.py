@@ -5,7 +5,6 @@ executed. A labelled id is one of `names`; 0 is not labelled.
 """
 
 import csv
-import io
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -35,6 +34,7 @@ from langflash_core.lab.photos.layouts import (
 )
 from langflash_core.lab.photos.matlab import MatFile, open_mat
 from langflash_core.lab.photos.names import CLASSES40, class_of, spoken
+from langflash_core.picture_files import opened_picture
 
 SCANNET_NAMES = "scannetv2-labels.combined.tsv"
 NO_DEPTH = 65_535
@@ -147,7 +147,7 @@ class ScanNetScene(PhotoFolder):
         return next((self.root / name for name in names if (self.root / name).is_dir()), self.root / names[0])
 
     def _sized(self, id: str, values: np.ndarray) -> np.ndarray:
-        with Image.open(_first(self._folder("images", "color"), id, (".jpg", ".png"))) as photo:
+        with opened_picture(_first(self._folder("images", "color"), id, (".jpg", ".png"))) as photo:
             size = photo.size
         if (values.shape[1], values.shape[0]) == size:
             return values
@@ -313,7 +313,7 @@ class MaskedScene(PhotoFolder):
     def stored_labels(self, id: str) -> np.ndarray:
         """The class whose mask holds a pixel, the first in order of names; 0 where none does, and of photos
         without masks. Masks of another size take the photo's."""
-        with Image.open(self.files[id]) as photo:
+        with opened_picture(self.files[id]) as photo:
             size = photo.size
         ids = np.zeros((size[1], size[0]), dtype=np.int64)
         if id not in self.annotated:
@@ -321,7 +321,7 @@ class MaskedScene(PhotoFolder):
         for number, name in sorted(self.names.items(), reverse=True):
             path = self.annotated[id] / f"{name.text}.png"
             try:
-                with Image.open(path) as opened:
+                with opened_picture(path) as opened:
                     mask = np.asarray(opened.convert("L").resize(size, Image.Resampling.NEAREST)) > 127
             except OSError as error:
                 raise InputError(f"the mask {path} cannot be read ({error}); unpack the data again") from None
@@ -361,7 +361,7 @@ def open_masked(root: Path) -> MaskedScene:
     names = {n: Name(text, class_of(text)) for n, text in enumerate(texts, start=1)}
     Ks = poses = None
     if (root / "cameras.pt").is_file():
-        with Image.open(files[ids[0]]) as photo:
+        with opened_picture(files[ids[0]]) as photo:
             size = photo.size
         stored = _tensors(root / "cameras.pt")
         if not isinstance(stored, Tensor) or tuple(stored.shape) != (len(ids), RE10K_NUMBERS):
@@ -410,7 +410,7 @@ def _pixels(path: Path) -> np.ndarray:
 
 def _decoded(content: bytes, what: str) -> np.ndarray:
     try:
-        with Image.open(io.BytesIO(content)) as opened:
+        with opened_picture(content) as opened:
             return np.asarray(opened.convert("RGB"))
     except (UnidentifiedImageError, OSError) as error:
         raise InputError(f"{what} is no picture ({error}); get the chunk again") from None
@@ -419,7 +419,7 @@ def _decoded(content: bytes, what: str) -> np.ndarray:
 def _decoded_map(content: bytes, what: str) -> np.ndarray:
     """(H, W) int64 of a PNG of one channel."""
     try:
-        with Image.open(io.BytesIO(content)) as opened:
+        with opened_picture(content) as opened:
             return np.asarray(opened).astype(np.int64)
     except (OSError, ValueError) as error:
         raise InputError(f"the {what} cannot be read ({error}); collect them again") from None

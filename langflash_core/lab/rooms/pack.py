@@ -24,6 +24,7 @@ from langflash_core.lab.rooms.catalogue import UNSEEN, Archive, Item, default_ma
 from langflash_core.lab.rooms.mesh import Mesh, index, pose
 from langflash_core.lab.rooms.objfile import PANE, Material, Soup, parse_mtl, parse_obj
 from langflash_core.lab.rooms.parametric import parametric_models, wood_textures
+from langflash_core.picture_files import STORED, opened_picture
 
 FORMAT = 1
 TEXTURE_SIZE = 128
@@ -193,7 +194,8 @@ def _texture(draft: _Draft, look: Material, folder: str, archive: Archive, membe
         return -1
     member = found[0]
     try:
-        image = Image.open(io.BytesIO(archive.read(member))).convert("RGBA")
+        with opened_picture(archive.read(member)) as opened:
+            image = opened.convert("RGBA")
     except OSError:
         return -1
     image = image.resize((TEXTURE_SIZE, TEXTURE_SIZE), Image.Resampling.BOX)
@@ -292,6 +294,6 @@ def _decode_textures(
     layers = np.zeros((max(len(sizes), 1), TEXTURE_SIZE, TEXTURE_SIZE, 4), dtype=np.uint8)
     starts = np.cumsum(sizes) - sizes
     for layer, (start, size) in enumerate(zip(starts, sizes, strict=True)):
-        image = Image.open(io.BytesIO(joined[start : start + size].tobytes()))
-        layers[layer] = np.asarray(image.convert("RGBA"))[::-1]  # row 0 is v = 0
+        with opened_picture(joined[start : start + size].tobytes(), STORED) as image:
+            layers[layer] = np.asarray(image.convert("RGBA"))[::-1]  # row 0 is v = 0
     return layers

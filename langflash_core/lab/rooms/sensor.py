@@ -7,6 +7,8 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from PIL import Image
 
+from langflash_core.picture_files import opened_picture
+
 
 @dataclass(frozen=True)
 class Sensor:
@@ -107,4 +109,5 @@ def _to_srgb(light: Float[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "H W 3"]:
 def _jpeg(photo: UInt8[np.ndarray, "H W 3"], quality: int) -> UInt8[np.ndarray, "H W 3"]:
     stream = io.BytesIO()
     Image.fromarray(photo).save(stream, "JPEG", quality=quality)
-    return np.asarray(Image.open(stream).convert("RGB"))
+    with opened_picture(stream, ("JPEG",)) as picture:
+        return np.asarray(picture.convert("RGB"))

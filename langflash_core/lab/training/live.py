@@ -18,6 +18,7 @@ from torch import Tensor
 
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.photos.fitting import drawn_window, fitted
+from langflash_core.picture_files import opened_picture
 from langflash_core.types import LUMA
 
 SIZES = ((252, 196), (252, 196), (252, 196), (224, 224), (196, 252), (308, 238))
@@ -115,5 +116,6 @@ def weathered(rgb: Tensor, generator: torch.Generator) -> Tensor:
     else:
         packed = io.BytesIO()
         picture.save(packed, "JPEG", quality=int(25 + 60 * u[11]))
-        picture = Image.open(packed)
+        with opened_picture(packed, ("JPEG",)) as decoded:
+            picture = decoded.copy()
     return torch.from_numpy(np.array(picture)).permute(2, 0, 1).contiguous()

@@ -18,6 +18,7 @@ from safetensors import SafetensorError, safe_open
 
 from langflash_core.errors import WeightsError
 from langflash_core.resources import asset_path
+from langflash_core.shipped import check_shipped
 
 SCALE = ".scale"
 ALIGNMENT = 64
@@ -59,8 +60,9 @@ def read_stored(path: Path) -> Stored:
     """Everything in a weights file.
 
     Raises:
-        WeightsError: there is none, or it is no safetensors file.
+        WeightsError: there is none, it is no safetensors file, or not the one that was shipped.
     """
+    check_shipped(path)
     with _opened(path) as file:
         raw = {key: _array(file, path, key) for key in file.keys()}  # noqa: SIM118 (no mapping)
         header = json.loads((file.metadata() or {}).get("langflash", "{}"))
