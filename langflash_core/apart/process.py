@@ -1,6 +1,6 @@
 """This side: `ask` a reader in a process of its own, and get what it read part by part.
 
-A process serves one request after another, so that 32 photos start as many processes as read at once. It is
+A process serves one request after another, so that many photos start as many processes as read at once. It is
 used again only after a request that ended well: one that refused a file, was left early or broke is ended.
 """
 
