@@ -10,7 +10,6 @@ import numpy as np
 import scipy.sparse
 from scipy.sparse.csgraph import connected_components
 
-
 _LONGEST = 32  # observations of a point that are adjusted
 
 
@@ -61,8 +60,9 @@ def thinned(tracks: Tracks, most: int) -> Tracks:
 
 
 def _spread(tracks: Tracks) -> np.ndarray:
-    """Of each point the observations (M,) bool that stay: all of `_LONGEST` and fewer; of more so many, evenly,
-    the first and the last of them too. A point that a hundred photos saw is known from a part of them."""
+    """Of each point the observations (M,) bool that stay: all of `_LONGEST` and fewer; of more so many,
+    evenly, the first and the last of them too. A point that a hundred photos saw is known from a part of
+    them."""
     lengths = np.bincount(tracks.points)
     ranks = np.arange(len(tracks)) - (np.cumsum(lengths) - lengths)[tracks.points]
     steps = np.maximum(lengths[tracks.points] - 1, 1)
