@@ -52,6 +52,7 @@ from langflash_core.running import Run
 from langflash_core.types import Gaussians, Views
 
 _SWEPT = 0.3  # of the time of refinement, before photos are registered one by one
+_READ = 15  # photos that each of many reads in the decoder
 _CLOSELY = 32  # photos, up to which language features are held at their full size
 _OTHER_LENS = 0.01
 """Change of the focal length, as a logarithm, from which depth is predicted anew: it is known no better."""
@@ -115,7 +116,7 @@ class GuidedDepthNet(LangFlashNet):
     def levels(self, tokens: Tokens, Ks: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Level maps (B*V, C_i, h, w) of the geometry heads: two encoder hooks, two decoder depths.
 
-        Of many photos each reads those most like it, as many as it was trained among.
+        Of many photos each reads those most like it.
         """
         read = self._alike(tokens) if tokens.shape[1] > FEW else None
         with self._fast(Ks):
@@ -126,7 +127,7 @@ class GuidedDepthNet(LangFlashNet):
     def _alike(self, tokens: Tokens) -> list[list[int]]:
         """Of each view of one scene (B = 1) those most like it."""
         rows = F.normalize(tokens.hooks[self.refiner.match_hook][0].float(), dim=-1).cpu().numpy()
-        return most_alike(list(rows), FEW - 1)
+        return most_alike(list(rows), _READ)
 
     def _prior(self, levels: tuple[Tensor, ...], tokens: Tokens) -> DepthMaps:
         """Depth of one scene (B = 1), some views at a time."""

@@ -43,7 +43,7 @@ TOGETHER = 16
 _MANY, _CUTS = 8, {"faint": 1 / 32, "small": 0.02}
 """Of more photos than that, alpha and contribution below which pairs are left out: a fifth of the time for
 .005 dB of 28.9."""
-_EVERY, _MOST_EVERY = 10, 8
+_EVERY, _MOST_EVERY = 16, 8
 """Photos of which one speaks in a block, and in one block of how many a photo speaks at least."""
 _BLOCK, _OWN = (
     96,

@@ -336,3 +336,21 @@ def test_other_depth_maps_bring_their_own_unit():
     np.testing.assert_allclose(other.depth_scales[1:] * 3 / 2, found.depth_scales[1:], rtol=1e-6)
     assert found.depth_scales == pytest.approx(1.0, abs=0.05)
     assert len(found.corrections) == 5 and max(abs(c.coefficients[0]) for c in found.corrections) < 0.05
+
+
+def test_points_that_very_many_photos_saw_are_known_from_some_of_them():
+    from langflash_core.network.stereo import tracks as module
+
+    lengths = (2, module._LONGEST, module._LONGEST + 1, 100)
+    points = np.repeat(np.arange(4), lengths)
+    views = np.concatenate([np.arange(length) for length in lengths])
+    given = module.Tracks(
+        points, views, np.random.default_rng(0).random((len(views), 2)), np.ones(len(views))
+    )
+    kept = module._spread(given)
+    for point, length in enumerate(lengths):
+        own = views[(points == point) & kept]
+        assert len(own) == min(length, module._LONGEST) and own[0] == 0 and own[-1] == length - 1
+        assert max(np.diff(own)) - min(np.diff(own)) <= 1
+    few = given.subset(points < 2)[0]
+    assert module._spread(few).all()

@@ -6,7 +6,7 @@ pictures are the same; what optical flow finds between them is a remaining shift
 match in the neighbour to a fraction of a pixel, and a depth by triangulation. What flow says counts by
 how sure it is (there and back, same brightness, texture) and by how many pixels the match moves for a
 change of depth; a smooth correction of log depth takes it over, cut where depth jumps (one sparse linear
-system a view). Of many photos the first round is at half of their size.
+system a view). Of more than `_CAREFUL` photos the first round is at half of their size.
 
 Sizes: V views, H W pixels of the maps, h w pixels of the photos.
 
@@ -51,6 +51,7 @@ _ALIKE = 50  # cells that are off together: errors of the maps are slow
 _STIFF = 3000.0  # of the correction from a cell to the next
 _JUMP = 0.03  # log depth between cells from which it is cut
 _ITERATIONS = 250
+_CAREFUL = 32  # photos
 _MARGIN = 1.0  # pixels at the border that say nothing
 
 
@@ -90,7 +91,8 @@ def registered(
     many = len(logs) > FEW
     fine = _Pictures.of(photos, size, Ks, cells)
     half = (size[0] // 2, size[1] // 2)
-    coarse = _Pictures.of(photos, half, Ks, cells) if many and min(half) >= _SMALLEST else fine
+    hasty = len(logs) > _CAREFUL and min(half) >= _SMALLEST
+    coarse = _Pictures.of(photos, half, Ks, cells) if hasty else fine
 
     def corrected(view: int) -> Tensor:
         own, others = logs[view].cpu(), near[view]

@@ -10,6 +10,8 @@ import numpy as np
 import scipy.sparse
 from scipy.sparse.csgraph import connected_components
 
+_LONGEST = 32  # observations of a point that are adjusted
+
 
 @dataclass(frozen=True)
 class Tracks:
@@ -45,6 +47,7 @@ def thinned(tracks: Tracks, most: int) -> Tracks:
     """Points that most views saw, so many that each view has `most` observations, or all of its own."""
     if len(tracks) == 0:
         return tracks
+    tracks = tracks.subset(_spread(tracks))[0]
     lengths = np.bincount(tracks.points)
     ends = np.cumsum(lengths)
     kept, seen = np.zeros(len(lengths), bool), np.zeros(int(tracks.views.max()) + 1, int)
@@ -54,6 +57,17 @@ def thinned(tracks: Tracks, most: int) -> Tracks:
             kept[point] = True
             seen[views] += 1
     return tracks.subset(kept[tracks.points])[0]
+
+
+def _spread(tracks: Tracks) -> np.ndarray:
+    """Of each point the observations (M,) bool that stay: all of `_LONGEST` and fewer; of more so many,
+    evenly, the first and the last of them too. A point that a hundred photos saw is known from a part of
+    them."""
+    lengths = np.bincount(tracks.points)
+    ranks = np.arange(len(tracks)) - (np.cumsum(lengths) - lengths)[tracks.points]
+    steps = np.maximum(lengths[tracks.points] - 1, 1)
+    place, before = (number * (_LONGEST - 1) // steps for number in (ranks, ranks - 1))
+    return (steps < _LONGEST) | (ranks == 0) | (place != before)
 
 
 def no_tracks() -> Tracks:
