@@ -1,4 +1,4 @@
-"""What documents and docstrings say of the tree is true; pages are as long as one reads; figures have dates."""
+"""What documents and docstrings say of the tree is true; pages are short enough; figures have dates."""
 
 import argparse
 import ast
@@ -96,11 +96,16 @@ def test_every_folder_and_module_at_the_top_is_explained():
                 assert f"`{top}/{path.name}`" in told
 
 
-def sources() -> Iterator[tuple[Path, str]]:
-    for top in ("app", "langflash_core", "shaders", "tests"):
-        for pattern in SOURCES:
-            for path in sorted((ROOT / top).rglob(pattern)):
-                yield path, path.read_text(encoding="utf-8")
+@cache
+def sources() -> tuple[tuple[Path, str], ...]:
+    """Every file of code with its text."""
+    paths = (path for top in ("app", "langflash_core", "shaders", "tests") for path in _below(ROOT / top))
+    return tuple((path, path.read_text(encoding="utf-8")) for path in paths)
+
+
+def _below(folder: Path) -> Iterator[Path]:
+    for pattern in SOURCES:
+        yield from sorted(folder.rglob(pattern))
 
 
 def test_no_comment_cites_a_document_that_is_not_here():
@@ -166,15 +171,19 @@ def defined(body: list[ast.stmt]) -> dict[str, ast.stmt]:
 
 
 @cache
-def classes() -> dict[str, list[ast.ClassDef]]:
-    """All classes of program, library and tests, by name."""
-    found: dict[str, list[ast.ClassDef]] = {}
-    for path, _ in sources():
-        if path.suffix == ".py":
-            for node in ast.walk(tree_of(path)):
-                if isinstance(node, ast.ClassDef):
-                    found.setdefault(node.name, []).append(node)
-    return found
+def code() -> dict[Path, str]:
+    """Modules of the program and the library."""
+    tests = ROOT / "tests"
+    return {path: text for path, text in sources() if path.suffix == ".py" and not path.is_relative_to(tests)}
+
+
+@cache
+def classes(name: str) -> tuple[ast.ClassDef, ...]:
+    """All classes of that name; only modules that have one are parsed."""
+    begins = re.compile(rf"^\s*class {name}\b", re.MULTILINE)
+    trees = (tree_of(path) for path, text in code().items() if begins.search(text))
+    nodes = (node for tree in trees for node in ast.walk(tree))
+    return tuple(node for node in nodes if isinstance(node, ast.ClassDef) and node.name == name)
 
 
 def has_attribute(owner: ast.ClassDef, name: str) -> bool:
@@ -184,9 +193,9 @@ def has_attribute(owner: ast.ClassDef, name: str) -> bool:
         return True
     for base in owner.bases:
         word = base.attr if isinstance(base, ast.Attribute) else getattr(base, "id", "")
-        if word not in classes():
+        if not classes(word):
             return word not in ("Protocol", "Enum", "object")
-        if any(has_attribute(other, name) for other in classes()[word] if other is not owner):
+        if any(has_attribute(other, name) for other in classes(word) if other is not owner):
             return True
     return False
 
@@ -211,21 +220,15 @@ def resolved(dotted: str) -> bool:
     return node is not None and (len(words) == 1 or isinstance(node, ast.Import | ast.ImportFrom))
 
 
-def docstrings(tree: ast.Module) -> Iterator[str]:
-    for node in ast.walk(tree):
-        if (
-            isinstance(node, ast.Expr)
-            and isinstance(node.value, ast.Constant)
-            and isinstance(node.value.value, str)
-        ):
-            yield node.value.value
+def docstrings(text: str) -> str:
+    return "\n".join(re.findall(r'"""(.*?)"""', text, re.DOTALL))
 
 
 def wrong_names(text: str) -> set[str]:
     """Dotted names of ours that nothing has: `langflash_core.x.y`, and `Class.attribute` of our classes."""
     wrong = {name for name in DOTTED.findall(text) if not name.endswith(".py") and not resolved(name)}
     for owner, name in re.findall(r"`([A-Z]\w+)\.([a-z_]\w*)(?:\(\))?`", text):
-        if owner in classes() and not any(has_attribute(node, name) for node in classes()[owner]):
+        if classes(owner) and not any(has_attribute(node, name) for node in classes(owner)):
             wrong.add(f"{owner}.{name}")
     return wrong
 
@@ -248,10 +251,8 @@ def test_names_of_code_in_documents_exist(document):
 
 def test_names_of_code_and_paths_in_docstrings_exist():
     wrong = {}
-    for path, _ in sources():
-        if path.suffix != ".py" or path == Path(__file__):
-            continue
-        text = "\n".join(docstrings(tree_of(path)))
+    for path, module in code().items():
+        text = docstrings(module)
         cited = re.findall(
             r"(?<![\w/.])(?:app|langflash_core|shaders|tests)/[\w/-]+\.(?:py|frag|vert|glsl)", text
         )
