@@ -12,7 +12,7 @@ from langflash_core.lab.evaluation.report_small import filled
 
 ROOT = Path(__file__).resolve().parent.parent
 SMALL = ROOT / "assets" / "report" / "report.json"
-DOCUMENTS = ("README.md", "assets/weights/mini_card.md")
+DOCUMENTS = ("MEASURED.md",)
 
 
 def current(name: str) -> tuple[str, str]:

@@ -67,7 +67,7 @@ SIZES_OF_MIDDLING_SCENES = (
     (0.25, 0.25),
     (0.18, 0.25),
 )
-"""Pixels go before Gaussians: ARCHITECTURE.md, "What moves", has all combinations."""
+"""Pixels go before Gaussians: MEASURED.md, "What moves", has all combinations."""
 _START = 2  # rung of an unknown machine
 
 

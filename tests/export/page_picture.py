@@ -1,4 +1,4 @@
-"""The README's picture of a web page: a wide window and a phone.
+"""The guide's picture of a web page: a wide window and a phone.
 
 python -m tests.export.page_picture assets/readme/page.jpg
 """

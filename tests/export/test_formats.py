@@ -483,12 +483,12 @@ def test_usd_that_is_absent_is_said(tmp_path, monkeypatch):
     assert not (tmp_path / "b.usd").exists()
 
 
-def test_the_table_in_the_readme_is_what_the_code_does():
+def test_the_table_in_the_guide_is_what_the_code_does():
     """A row a format: whether it is read and written, and its axes."""
     from langflash_core.export import gltf, usd
 
-    readme = (Path(__file__).parents[2] / "README.md").read_text()
-    section = readme.split("### Splat files")[1].split("\n#")[0]
+    guide = (Path(__file__).parents[2] / "GUIDE.md").read_text()
+    section = guide.split("## Splat files")[1].split("\n#")[0]
     lines = [line for line in section.splitlines() if line.startswith("| `")]
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines]
     axes = {"`.spz`": spz._STORED_AXES, "`.glb`": gltf._AXES, "`.usd`": usd._AXES["Y"]}

@@ -15,7 +15,7 @@ from .commands import change, with_edit
 from .state import RADIUS_RANGE, REACH_RANGE, Card, Point, Reading, Spot, Tool
 
 LIKE_THIS = "like this"
-LIKE_THRESHOLD = 0.97  # relevancy; a look at one spot is sharper than a word, see the README
+LIKE_THRESHOLD = 0.97  # relevancy; a look at one spot is sharper than a word
 
 
 # The tool in hand
