@@ -13,14 +13,14 @@ import torch
 from langflash_core.colormaps import HeatColours
 from langflash_core.errors import InputError, LangFlashError, ViewError
 from langflash_core.export.png import USUAL, heat_over, to_8bit
+from langflash_core.geometry.poses import Pose, Vector, blend, framing, from_view, orbit, to_camera
 from langflash_core.geometry.reach import median_reach
+from langflash_core.geometry.tours import RATE, along, even
 from langflash_core.language.relevance import CompiledQuery, compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.running import Progress
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
 
-from ..window.poses import Pose, Vector, blend, framing, from_view, orbit, to_camera
-from ..window.tours import RATE, along, even
 from .cameras import camera_of
 from .files import readable_file
 from .renderers import Renderer

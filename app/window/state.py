@@ -5,13 +5,13 @@ from pathlib import Path
 from typing import Any
 
 from langflash_core.colormaps import HeatColours
+from langflash_core.geometry.poses import START, Pose
 
 from .asking.state import FIRST_PROMPT, NO_ASKING, Asking, Prompt, usable
 from .editing.state import NO_EDITING, Editing
 from .exporting.state import NO_EXPORTING, Exporting
 from .filming.state import Tour, read
 from .opening.state import NO_OPENING, Opening
-from .poses import START, Pose
 from .recovery.preferences import DEFAULTS, Preferences
 from .recovery.state import NO_RECOVERY, Recovery
 from .scene.state import Flight, Job, Mode, Photo, Room, SceneInfo

@@ -16,6 +16,7 @@ import numpy as np
 
 from langflash_core.colormaps import HeatColours
 from langflash_core.errors import GraphicsError
+from langflash_core.geometry.poses import START, Pose, to_camera
 from langflash_core.graphics import draws_in_software
 from langflash_core.scene.changes import Change, Recoloured
 from langflash_core.scene.edits import Marks
@@ -25,7 +26,6 @@ from .artist import Artist, Asked
 from .asking.state import Prompt, margin_span
 from .editing.state import Point, Reading, strongest
 from .governor import SETTLE_AFTER, Governor, Kind, Plan
-from .poses import START, Pose, to_camera
 from .scene.near import fills_gaps, keeps_near
 from .scene.state import Mode
 from .state import State

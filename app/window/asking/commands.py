@@ -5,7 +5,8 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..poses import Vector
+from langflash_core.geometry.poses import Vector
+
 from ..scene.state import Mode
 from ..state import State
 from .prompt_sets import MOST_PROMPTS, PromptSet

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..poses import Vector
+from langflash_core.geometry.poses import Vector
 
 # Told apart by people with the common colour-vision deficiencies, on dark ground.
 PALETTE = (

@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from langflash_core.geometry import poses
+from langflash_core.geometry.poses import Vector
 from langflash_core.scene.edits import Combine
 
-from .. import poses
 from ..asking.state import PALETTE, Prompt
-from ..poses import Vector
 from ..scene.state import Flight, Mode
 from ..state import State
 from .commands import change, with_edit

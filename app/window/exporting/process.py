@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from ..poses import Pose, alike, intrinsics, viewmat
+from langflash_core.geometry.poses import Pose, alike, intrinsics, viewmat
 
 _LAST_LINES = 20
 _PROGRAM = "langflash_core"  # its __main__ finds the command line, installed or not

@@ -6,9 +6,10 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+from langflash_core.geometry.poses import Pose
+
 from ..asking.state import PALETTE, Prompt
 from ..commands import Notify
-from ..poses import Pose
 from ..scene.commands import scene_photos
 from ..scene.state import Mode, Photo
 from ..state import State

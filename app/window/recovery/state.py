@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from ..poses import Pose
+from langflash_core.geometry.poses import Pose
+
 from ..scene.drops import SCENE_SUFFIX
 
 KeptPhoto = tuple[str, float | None]

@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass, replace
 
-from .. import poses
+from langflash_core.geometry import poses
+from langflash_core.geometry.poses import Pose, Vector
+
 from ..commands import Notify
-from ..poses import Pose, Vector
 from ..state import State
 from .near import places_to_keep_to
 from .state import Flight, Mode

@@ -5,9 +5,8 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from langflash_core.geometry.poses import START, Pose, Vector
 from langflash_core.scene.edits import History, Marks
-
-from ..poses import START, Pose, Vector
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene

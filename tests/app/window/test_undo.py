@@ -23,13 +23,13 @@ from app.window.editing.work import ScoreFloaters, request_for
 from app.window.exporting import commands as export
 from app.window.filming import commands as film
 from app.window.opening import commands as opening
-from app.window.poses import Pose, Vector
 from app.window.recovery import commands as keep
 from app.window.scene import camera
 from app.window.scene import commands as show
 from app.window.scene.state import SceneInfo
 from app.window.scene.work import describe_scene
 from app.window.state import State
+from langflash_core.geometry.poses import Pose, Vector
 from langflash_core.language.relevance import CompiledQuery, compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.edited import edited_scene

@@ -9,9 +9,9 @@ import torch
 
 from app.gl import still
 from app.window.governor import Governor, Kind, Plan
-from app.window.poses import orbit
 from app.window.scene.state import Mode
 from app.window.viewport import RETRY_SECONDS, Viewport
+from langflash_core.geometry.poses import orbit
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.edited import first_marks

@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 
 from app.window import commands as do
-from app.window import poses
 from app.window.asking import commands as ask
 from app.window.editing import commands as edit
 from app.window.editing import pointing as point
@@ -30,6 +29,7 @@ from app.window.scene import camera
 from app.window.scene import commands as show
 from app.window.scene.state import Mode
 from app.window.session import Session
+from langflash_core.geometry import poses
 from langflash_core.resources import asset_path
 from tests.app.window.sheet import Shot, write_picture, write_sheet
 from tests.app.window.test_window import TOP, x_server

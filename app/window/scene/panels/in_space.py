@@ -5,13 +5,14 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from langflash_core.geometry import poses
+from langflash_core.geometry.poses import Pose
+
 from ... import commands as do
-from ... import poses
 from ...asking.things import told
 from ...kit import boxes, theme, widgets
 from ...kit.boxes import Box
 from ...kit.look import Look
-from ...poses import Pose
 from ...state import State
 from .. import camera
 from ..state import Mode

@@ -15,7 +15,6 @@ from app.window.exporting import order as export_form
 from app.window.exporting.effects import ExportingEffects
 from app.window.exporting.process import Exporter
 from app.window.exporting.state import What
-from app.window.poses import Pose, Vector
 from app.window.recovery import commands as keep
 from app.window.recovery.keeper import Keeper
 from app.window.scene import camera
@@ -23,6 +22,7 @@ from app.window.scene import commands as show
 from app.window.scene.near import photos_known
 from app.window.scene.state import Photo
 from app.window.state import State
+from langflash_core.geometry.poses import Pose, Vector
 from langflash_core.scene.edits import Atom, History, Marks, Mask
 from tests.app.window.scenes import after, told
 from tests.app.window.scenes import shown_scene as scene

@@ -9,7 +9,6 @@ import torch
 
 from app.cli.cameras import camera_of
 from app.window import commands as do
-from app.window import poses
 from app.window.editing import commands as edit
 from app.window.exporting.order import Order, order
 from app.window.exporting.process import keys_json
@@ -17,12 +16,13 @@ from app.window.exporting.state import What
 from app.window.filming import commands as film
 from app.window.filming.state import MOST_KEYS, read, stored
 from app.window.filming.work import PlanTour, way
-from app.window.poses import Vector, facing, orbit
 from app.window.scene import camera
 from app.window.scene.near import places_to_keep_to
 from app.window.scene.state import FLIGHT_SECONDS
 from app.window.state import State
-from app.window.tours import along
+from langflash_core.geometry import poses
+from langflash_core.geometry.poses import Vector, facing, orbit
+from langflash_core.geometry.tours import along
 from langflash_core.types import Record
 from tests.app.window.scenes import after, shown_scene
 

@@ -8,7 +8,6 @@ import pytest
 import torch
 
 from app.window.asking import commands as ask
-from app.window.poses import Pose, Vector
 from app.window.recovery import commands as keep
 from app.window.recovery.preferences import PANEL_WIDTHS
 from app.window.recovery.state import Kept, Offer
@@ -16,6 +15,7 @@ from app.window.scene import commands as show
 from app.window.scene.state import Mode
 from app.window.scene.work import describe_scene
 from app.window.state import State
+from langflash_core.geometry.poses import Pose, Vector
 from tests.app.window.scenes import after, room
 from tests.app.window.scenes import shown_scene as scene
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import torch
 
-from app.window import poses
-from app.window.poses import FOV_RANGE, Pose, Rotation, Vector
+from langflash_core.geometry import poses, rotations
 from langflash_core.geometry.cameras import project, transform
+from langflash_core.geometry.poses import FOV_RANGE, Pose, Rotation, Vector
 from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.geometry.reach import median_reach
 
@@ -101,8 +101,8 @@ def test_slerp_takes_the_shorter_arc() -> None:
     negated = Rotation(*(-v for v in turned))
     half = Rotation(math.cos(0.1), 0.0, math.sin(0.1), 0.0)
     for end in (turned, negated):
-        np.testing.assert_allclose(poses.slerp(Rotation(1, 0, 0, 0), end, 0.5), half, atol=EXACT)
-    same = poses.slerp(turned, turned, 0.3)
+        np.testing.assert_allclose(rotations.slerp(Rotation(1, 0, 0, 0), end, 0.5), half, atol=EXACT)
+    same = rotations.slerp(turned, turned, 0.3)
     np.testing.assert_allclose(same, turned, atol=EXACT)
 
 

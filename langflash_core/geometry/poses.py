@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import pyrr
 
+from langflash_core.geometry import rotations
 from langflash_core.geometry.reach import MIN_REACH
+from langflash_core.geometry.rotations import about
 
 if TYPE_CHECKING:
     from langflash_core.types import Camera
@@ -73,7 +74,7 @@ class Pose:
     @property
     def axes(self) -> np.ndarray:
         """Camera to world rotation (3, 3); its columns are right, down, forward."""
-        return _matrix(self.rotation)
+        return rotations.matrix(self.rotation)
 
     @property
     def pivot(self) -> np.ndarray:
@@ -98,7 +99,7 @@ def from_view(
     longer = max(width, height) / float(K[0, 0] if width >= height else K[1, 1])
     return Pose(
         centre=Vector(*(-axes @ viewmat[:3, 3]).tolist()),
-        rotation=_quaternion(axes),
+        rotation=_rotation(axes),
         reach=max(float(reach), MIN_REACH),
         fov=START.fov if orthographic else math.degrees(2 * math.atan(0.5 * longer)),
         aspect=width / height,
@@ -219,13 +220,13 @@ def degrees_aside(pose: Pose, places: Sequence[Vector]) -> float:
 
 def look(pose: Pose, yaw: float, pitch: float) -> Pose:
     """Turn on the spot, radians; stops short of the poles so that up stays up."""
-    axes = _about(UP, yaw) @ pose.axes
+    axes = about(UP, yaw) @ pose.axes
     from_pole = math.acos(float(np.clip(axes[:, 2] @ UP, -1.0, 1.0)))
     floor = math.radians(MIN_POLE_DEGREES)
     # Looking up shrinks the angle to the pole: a positive pitch turns the view upwards.
     lowest, highest = min(floor - from_pole, 0.0), max(math.pi - floor - from_pole, 0.0)
     pitch = -float(np.clip(-pitch, lowest, highest))
-    return replace(pose, rotation=_quaternion(_about(axes[:, 0], pitch) @ axes))
+    return replace(pose, rotation=_rotation(about(axes[:, 0], pitch) @ axes))
 
 
 def pan(pose: Pose, right: float, down: float) -> Pose:
@@ -258,7 +259,7 @@ def facing(pose: Pose, forward: Vector) -> Pose:
     right /= np.linalg.norm(right)
     axes = np.stack((right, np.cross(ahead, right), ahead), axis=1)
     centre = pose.pivot - pose.reach * ahead
-    return replace(pose, centre=Vector(*centre.tolist()), rotation=_quaternion(axes))
+    return replace(pose, centre=Vector(*centre.tolist()), rotation=_rotation(axes))
 
 
 def facing_near(pose: Pose, forward: Vector, places: Sequence[Vector]) -> Pose:
@@ -274,7 +275,7 @@ def facing_near(pose: Pose, forward: Vector, places: Sequence[Vector]) -> Pose:
     axis = np.cross(nearest, wanted)
     if np.linalg.norm(axis) < 1e-6:  # right behind what the photo looked at: around it
         axis = UP
-    direction = _about(axis / np.linalg.norm(axis), math.radians(NEAR)) @ nearest
+    direction = about(axis / np.linalg.norm(axis), math.radians(NEAR)) @ nearest
     return facing(pose, Vector(*(-direction).tolist()))
 
 
@@ -326,7 +327,7 @@ def blend(start: Pose, end: Pose, fraction: float) -> Pose:
 
     return Pose(
         centre=Vector(*(mix(a, b) for a, b in zip(start.centre, end.centre, strict=True))),
-        rotation=slerp(start.rotation, end.rotation, t),
+        rotation=Rotation(*rotations.slerp(start.rotation, end.rotation, t)),
         reach=mix(start.reach, end.reach),
         fov=mix(start.fov, end.fov),
         aspect=mix(start.aspect, end.aspect),
@@ -341,36 +342,5 @@ def alike(all_poses: Sequence[Pose]) -> tuple[Pose, ...]:
     return tuple(pose if flat or pose.span is None else perspective(pose) for pose in all_poses)
 
 
-def slerp(start: Rotation, end: Rotation, t: float) -> Rotation:
-    """Along the shorter arc, from `start` (0) to `end` (1). Source: Shoemake, SIGGRAPH 1985.
-
-    The sign is settled here, because pyrr's short cut for small angles forgets it.
-    """
-    a, b = _xyzw(start), _xyzw(end)
-    return _rotation(pyrr.quaternion.slerp(a, b if a @ b >= 0 else -b, t))
-
-
-def _about(axis: np.ndarray, angle: float) -> np.ndarray:
-    """Rotation (3, 3) by `angle` radians about a unit axis; pyrr's acts on row vectors."""
-    return pyrr.matrix33.create_from_axis_rotation(axis, angle).T
-
-
-def _matrix(rotation: Rotation) -> np.ndarray:
-    """Rotation matrix (3, 3) of a unit quaternion; no torch, unlike geometry.quats_to_matrices."""
-    return pyrr.matrix33.create_from_quaternion(_xyzw(rotation))
-
-
-def _quaternion(matrix: np.ndarray) -> Rotation:
-    """Unit quaternion, w >= 0, of a rotation (3, 3) that may carry the rounding of float32."""
-    return _rotation(pyrr.quaternion.create_from_matrix(matrix))
-
-
-def _xyzw(rotation: Rotation) -> np.ndarray:
-    """In pyrr's order."""
-    return np.array([rotation.x, rotation.y, rotation.z, rotation.w])
-
-
-def _rotation(quat_xyzw: np.ndarray) -> Rotation:
-    sign = -1.0 if quat_xyzw[3] < 0 else 1.0
-    x, y, z, w = (sign * quat_xyzw / np.linalg.norm(quat_xyzw)).tolist()
-    return Rotation(w, x, y, z)
+def _rotation(axes: np.ndarray) -> Rotation:
+    return Rotation(*rotations.quaternion(axes))
