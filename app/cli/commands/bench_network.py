@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TextIO
 
 from langflash_core.errors import InputError, WeightsError
+from langflash_core.files import check_output_file, readable_file
 
-from ..files import check_output_file, readable_file
 from ..report import ProgressBar, write_json
 
 

@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import TextIO
 
 from langflash_core.errors import ImageError, InputError, WeightsError
-from langflash_core.files import make_folder, write_atomically
+from langflash_core.files import check_output_file, make_folder, readable_file, write_atomically
 from langflash_core.lab.evaluation.rooms.run import run_eval
 from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.lab.photos import PhotoFolder, chosen_ids
 from langflash_core.network import load_network
 
-from ..files import check_output_file, readable_file
 from ..photos import chosen, opened_folder
 from ..renderers import open_renderer
 from ..report import ProgressBar, say_warnings, write_json, write_tables

@@ -4,8 +4,8 @@ from argparse import Namespace
 from typing import TextIO
 
 from langflash_core.errors import InputError
+from langflash_core.files import check_folder, check_output_file
 
-from ..files import check_folder, check_output_file
 from ..report import ProgressBar, write_tables
 
 

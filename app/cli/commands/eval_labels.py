@@ -4,14 +4,19 @@ from argparse import Namespace
 from typing import TextIO
 
 from langflash_core.errors import InputError
-from langflash_core.files import filled_atomically, write_atomically
+from langflash_core.files import (
+    check_folder,
+    check_output_file,
+    filled_atomically,
+    readable_file,
+    write_atomically,
+)
 from langflash_core.lab.evaluation.clips import clips_markdown, clips_result, judged, rendered_clip
 from langflash_core.lab.labels.making import REPORT, LabelMaker
 from langflash_core.lab.labels.report import report
 from langflash_core.lab.labels.storage import write_labels
 from langflash_core.lab.rooms import RoomRenderer, load_pack
 
-from ..files import check_folder, check_output_file, readable_file
 from ..report import ProgressBar, write_tables
 from .labels import ordered
 

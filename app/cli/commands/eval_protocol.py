@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from langflash_core.errors import InputError, WeightsError
+from langflash_core.files import check_folder, check_output_file, readable_file
 from langflash_core.lab.photos import PhotoFolder, open_folder
 
-from ..files import check_folder, check_output_file, readable_file
 from ..renderers import open_renderer
 from ..report import ProgressBar, write_tables
 

@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, TextIO
 
 from langflash_core.__main__ import in_program
 from langflash_core.errors import InputError, LangFlashError, SceneFileError
-from langflash_core.files import make_folder, write_atomically
+from langflash_core.files import check_folder, make_folder, readable_file, write_atomically
 from langflash_core.lab.photos import PhotoFolder, open_folder
 from langflash_core.running import Progress
 
 from ...bench.machine import host
-from ..files import check_folder, readable_file
 from ..photos import chosen
 from ..renderers import Renderer, open_renderer
 from ..report import ProgressBar

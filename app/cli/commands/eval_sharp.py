@@ -8,11 +8,10 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, TextIO
 
 from langflash_core.errors import ImageError, InputError, SceneFileError
-from langflash_core.files import make_folder, write_atomically
+from langflash_core.files import check_folder, check_output_file, make_folder, readable_file, write_atomically
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.rooms import RoomRenderer, load_pack
 
-from ..files import check_folder, check_output_file, readable_file
 from ..photos import opened_folder
 from ..renderers import open_renderer
 from ..report import ProgressBar, write_tables

@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import TextIO
 
 from langflash_core.errors import InputError, WeightsError
-from langflash_core.files import make_folder, write_atomically
+from langflash_core.files import check_folder, check_output_file, make_folder, readable_file, write_atomically
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.evaluation.side_subjects import Case
 from langflash_core.lab.rooms import RoomRenderer, load_pack
 from langflash_core.types import Camera, Frame, Scene
 
-from ..files import check_folder, check_output_file, readable_file
 from ..photos import opened_folder
 from ..renderers import Renderer, open_renderer
 from ..report import ProgressBar, write_tables

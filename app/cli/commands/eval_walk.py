@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from langflash_core.errors import InputError
-from langflash_core.files import make_folder, write_atomically
+from langflash_core.files import check_folder, check_output_file, make_folder, readable_file, write_atomically
 from langflash_core.lab.rooms import RoomRenderer, load_pack
 
-from ..files import check_folder, check_output_file, readable_file
 from ..photos import opened_folder
 from ..renderers import Renderer, open_renderer
 from ..report import ProgressBar, write_tables

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from langflash_core.errors import SceneFileError
+from langflash_core.files import readable_file
 
-from ..files import readable_file
 from ..report import write_json
 
 _SHOWS = 1 / 255  # the smallest step of an 8-bit picture

@@ -13,7 +13,7 @@ from langflash_core.batch.ledger import DONE, FAILED, Ledger
 from langflash_core.batch.run import finish, run_jobs
 from langflash_core.batch.sets import LEDGER, SUMMARY
 from langflash_core.errors import InputError, WeightsError
-from langflash_core.files import filled_atomically, held_alone
+from langflash_core.files import check_folder, filled_atomically, held_alone, readable_file
 from langflash_core.lab.labels.clips import INDEX, ClipPlace, find_clips
 from langflash_core.lab.labels.making import REPORT
 from langflash_core.lab.labels.order import LabelOrder
@@ -21,7 +21,6 @@ from langflash_core.lab.labels.re10k import enrich, labels_inside
 from langflash_core.lab.labels.storage import LABELS, write_labels
 
 from ..crew import crew
-from ..files import check_folder, readable_file
 from ..report import ProgressBar, say_error, write_json
 from ..table import ProgressTable
 from .batch import INTERRUPTED

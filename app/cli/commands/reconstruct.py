@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TextIO
 
 from langflash_core.errors import ImageError, InputError, WeightsError
+from langflash_core.files import check_output_file, readable_file
 from langflash_core.formats import is_film
 
-from ..files import check_output_file, readable_file
 from ..films import with_frames
 from ..report import ProgressBar, say_warnings, write_json
 

@@ -4,10 +4,9 @@ from argparse import Namespace
 from typing import TextIO
 
 from langflash_core.errors import InputError
-from langflash_core.files import make_folder
+from langflash_core.files import check_folder, check_output_file, make_folder, readable_file
 from langflash_core.lab.rooms.commands import run_pack, run_preview, run_render
 
-from ..files import check_folder, check_output_file, readable_file
 from ..report import ProgressBar
 
 

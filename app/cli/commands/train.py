@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from langflash_core.errors import InputError, WeightsError
+from langflash_core.files import check_folder, check_output_file, readable_file
 from langflash_core.lab.photos import chosen_ids
 from langflash_core.lab.photos.layouts import Source, convert
 from langflash_core.lab.training.commands import (
@@ -28,7 +29,6 @@ from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS
 from langflash_core.resources import asset_path
 
-from ..files import check_folder, check_output_file, readable_file
 from ..photos import opened_folder
 from ..report import ProgressBar
 

@@ -11,6 +11,7 @@ from weakref import ref
 
 import numpy as np
 
+from langflash_core import pictures
 from langflash_core.geometry.rotations import quaternion
 from langflash_core.scene import edits
 from langflash_core.scene.changes import (
@@ -26,7 +27,6 @@ from langflash_core.scene.changes import (
 )
 from langflash_core.scene.edits import Marks
 
-from ..scene.state import Mode
 from ..state import State
 from .commands import change, with_edit
 from .state import Handle, Tint, Tool
@@ -77,7 +77,7 @@ class ShowTint:
         if marks is None or not marks.selected:
             return state
         gesture = Recoloured.tinted(marks.selected, self.tint.colour, self.tint.strength, self.luma)
-        return change(replace(state, mode=Mode.RGB), tint=self.tint, gesture=gesture, last_tint=self.tint)
+        return change(replace(state, mode=pictures.RGB), tint=self.tint, gesture=gesture, last_tint=self.tint)
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ class Exporter:
         """Whether one is under way."""
         return self._process is not None and self._process.poll() is None
 
-    def start(self, words: tuple[str, ...]) -> None:
+    def start(self, words: Sequence[str]) -> None:
         """Run `langflash` with these words.
 
         Raises:

@@ -31,7 +31,7 @@ class Kept:
     thresholds: tuple[float | None, ...] = ()
     colours: tuple[tuple[float, float, float], ...] = ()
     visible: tuple[bool, ...] = ()
-    mode: str = "RGB"
+    mode: str = "rgb"
     pose: Pose | None = None
     file: Path | None = None
     missing: tuple[str, ...] = ()

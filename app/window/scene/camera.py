@@ -4,18 +4,19 @@ from dataclasses import dataclass, replace
 
 from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Pose, Vector
+from langflash_core.pictures import Picture
 
 from ..commands import Notify
 from ..state import State
 from .near import places_to_keep_to
-from .state import Flight, Mode
+from .state import Flight
 
 
 @dataclass(frozen=True)
 class SetMode:
     """What the picture shows."""
 
-    mode: Mode
+    mode: Picture
 
     def apply(self, state: State) -> State:
         return replace(state, mode=self.mode)

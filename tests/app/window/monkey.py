@@ -33,9 +33,10 @@ import numpy as np
 from app.window.asking import commands as ask
 from app.window.filming import commands as film
 from app.window.scene import camera
-from app.window.scene.state import Mode
 from app.window.session import Session
+from langflash_core import pictures
 from langflash_core.files import write_atomically
+from langflash_core.pictures import PICTURES
 from langflash_core.resources import asset_path
 from tests.app.window.guarded import REFUSED, environment
 from tests.app.window.items import Items
@@ -135,7 +136,7 @@ def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
             asked.clear()
             for prompt in session.state.prompts:
                 session.dispatch(ask.RemovePrompt(prompt.key))
-            session.dispatch(camera.SetMode(Mode.RGB))
+            session.dispatch(camera.SetMode(pictures.RGB))
             glfw.set_window_size(session._window, width, height)
         if time.monotonic() - said > 0.5:
             said, state = time.monotonic(), session.state
@@ -168,7 +169,7 @@ def _see_everything(session: Session) -> None:
 
     goes_on(PATIENCE, lambda: session.state.info is not None)
     session.dispatch(ask.EditPrompt(session.state.prompts[0].key, "plant"))
-    for mode in Mode:
+    for mode in PICTURES:
         session.dispatch(camera.SetMode(mode))
         goes_on(MODE_SECONDS, lambda: False)
     for turn in (0.0, 0.1):
@@ -178,7 +179,7 @@ def _see_everything(session: Session) -> None:
     goes_on(PATIENCE, lambda: session.state.tour is not None)
     session.dispatch(film.StopTour())
     session.dispatch(film.ClearKeys())
-    session.dispatch(camera.SetMode(Mode.RGB))
+    session.dispatch(camera.SetMode(pictures.RGB))
 
 
 def resident_mb(process: int) -> float:

@@ -101,7 +101,7 @@ def test_a_command_by_its_name(program: Program) -> None:
         program.xdotool("key", "ctrl+p", "type", "--delay", "5", "depth")
     program.until(lambda s: s["dialog"] == "palette", "the palette")
     program.xdotool("key", "Return")
-    program.until(lambda s: s["mode"] == "DEPTH" and s["dialog"] is None, "the depth")
+    program.until(lambda s: s["mode"] == "depth" and s["dialog"] is None, "the depth")
     program.xdotool("key", "ctrl+p", "sleep", "0.5", "type", "--delay", "5", "select")
     program.until(lambda s: sum(name.startswith("Select") for name in s["items"]) > 4, "what fits")
     program.xdotool("key", "Down", "key", "Up", "key", "Down", "key", "Return")

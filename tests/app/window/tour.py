@@ -22,14 +22,14 @@ from app.window.editing import commands as edit
 from app.window.editing import pointing as point
 from app.window.editing.state import Region, Tool
 from app.window.exporting import commands as export
-from app.window.exporting.state import What
 from app.window.recovery import commands as keep
 from app.window.recovery.state import Kept
 from app.window.scene import camera
 from app.window.scene import commands as show
-from app.window.scene.state import Mode
 from app.window.session import Session
+from langflash_core import outputs, pictures
 from langflash_core.geometry import poses
+from langflash_core.pictures import PICTURES
 from langflash_core.resources import asset_path
 from tests.app.window.sheet import Shot, write_picture, write_sheet
 from tests.app.window.test_window import TOP, x_server
@@ -41,14 +41,7 @@ PHOTOS = tuple(asset_path(f"photos/living_room_{side}.png") for side in ("left",
 PHRASES = ("plant", "window", "floor", "picture")
 PLANT, FLOOR = (420.0, 330.0), (260.0, 640.0)  # pixels of the picture's place
 PATIENCE = 300.0  # seconds
-MODES = (
-    (Mode.RGB, "RGB"), (Mode.HEAT, "Heat-map of one phrase"), (Mode.LABELS, "Labels: the best phrase"),
-    (Mode.MASKS, "Masks of all phrases"), (Mode.ISOLATE, "Only these"), (Mode.HIDE, "Without these"),
-    (Mode.DIM, "Dim the rest"), (Mode.DEPTH, "Depth"), (Mode.ATOMS, "The scene's groups"),
-    (Mode.FEATURES, "Features"), (Mode.WEIGHT, "One group"), (Mode.TRANSMITTANCE, "Transmittance"),
-    (Mode.COVERAGE, "Coverage: photos that see it"), (Mode.AGREEMENT, "Agreement of the photos"),
-    (Mode.MARGIN, "Margin: how sure the best is"),
-)  # fmt: skip
+MODES = tuple((picture, picture.label) for picture in PICTURES)
 
 
 class Guide:
@@ -118,7 +111,7 @@ class Guide:
 def hero(guide: Guide, folder: Path) -> None:
     """The first picture of the README."""
     guide.ask("plant")
-    guide.tell(camera.SetMode(Mode.HEAT))
+    guide.tell(camera.SetMode(pictures.HEAT))
     guide.rest()
     write_picture(guide.screen(), folder / "hero.png")
 
@@ -128,7 +121,7 @@ def modes(guide: Guide, folder: Path) -> None:
     guide.ask(*PHRASES)
     shots = []
     for mode, caption in MODES:
-        guide.tell(ask.ShowAtom(atom_of(guide, "plant")) if mode is Mode.WEIGHT else camera.SetMode(mode))
+        guide.tell(ask.ShowAtom(atom_of(guide, "plant")) if mode is pictures.WEIGHT else camera.SetMode(mode))
         guide.rest()
         shots.append(Shot(caption, guide.canvas()))
     write_sheet(shots, folder / "tour_modes.png", columns=5, width=260, numbered=False)
@@ -143,14 +136,14 @@ def atom_of(guide: Guide, word: str) -> int:
 
 def asking(guide: Guide, folder: Path) -> None:
     guide.ask("plant", "window", "armchair")
-    guide.tell(camera.SetMode(Mode.LABELS))
+    guide.tell(camera.SetMode(pictures.LABELS))
     guide.rest()
     write_picture(guide.screen(), folder / "tour_ask.png")
 
 
 def pointing(guide: Guide, folder: Path) -> None:
     guide.ask("plant")
-    guide.tell(camera.SetMode(Mode.RGB), point.SetTool(Tool.POINT), point.Ask(PLANT))
+    guide.tell(camera.SetMode(pictures.RGB), point.SetTool(Tool.POINT), point.Ask(PLANT))
     guide.until(
         lambda: bool(guide.session.state.editing.card and guide.session.state.editing.card.words), "words"
     )
@@ -172,7 +165,7 @@ def editing(guide: Guide, folder: Path) -> None:
 
 
 def dictionary(guide: Guide, folder: Path) -> None:
-    guide.tell(ask.OpenDictionary(True), camera.SetMode(Mode.ATOMS))
+    guide.tell(ask.OpenDictionary(True), camera.SetMode(pictures.ATOMS))
     guide.until(lambda: guide.session.state.asking.insight is not None, "the atoms' description")
     guide.rest()
     write_picture(guide.screen(), folder / "tour_dictionary.png")
@@ -181,15 +174,15 @@ def dictionary(guide: Guide, folder: Path) -> None:
 
 def trust(guide: Guide, folder: Path) -> None:
     aside = poses.orbit(guide.session.state.pose, 0.35, -0.1)
-    guide.tell(camera.SetMode(Mode.COVERAGE), camera.MoveTo(aside))
+    guide.tell(camera.SetMode(pictures.COVERAGE), camera.MoveTo(aside))
     guide.rest()
     write_picture(guide.screen(), folder / "tour_trust.png")
     guide.tell(camera.JumpTo(0))
 
 
 def exporting(guide: Guide, folder: Path) -> None:
-    guide.tell(show.SceneSaved(Path("room.langflash")), camera.SetMode(Mode.HEAT), export.ShowExport())
-    form = replace(guide.session.state.exporting.form, what=What.CUTOUT, path="plant.png")
+    guide.tell(show.SceneSaved(Path("room.langflash")), camera.SetMode(pictures.HEAT), export.ShowExport())
+    form = replace(guide.session.state.exporting.form, what=outputs.CUTOUT, path="plant.png")
     guide.tell(export.EditForm(form))
     guide.rest()
     write_picture(guide.screen(), folder / "tour_export.png")

@@ -10,9 +10,11 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from langflash_core import pipeline
 from langflash_core.colormaps import HeatColours
 from langflash_core.errors import InputError, LangFlashError, ViewError
 from langflash_core.export.png import USUAL, heat_over, to_8bit
+from langflash_core.files import readable_file, staged_folder
 from langflash_core.geometry.poses import Pose, Vector, blend, framing, from_view, orbit, to_camera
 from langflash_core.geometry.reach import median_reach
 from langflash_core.geometry.tours import RATE, along, even
@@ -20,10 +22,9 @@ from langflash_core.language.relevance import CompiledQuery, compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.running import Progress
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
-
-from .cameras import camera_of
-from .files import readable_file
-from .renderers import Renderer
+from langflash_core.writing.cameras import camera_of
+from langflash_core.writing.job import Job
+from langflash_core.writing.renderers import Renderer
 
 SECONDS = 6.0
 LONGEST = 600.0  # seconds
@@ -44,6 +45,24 @@ def check_encoder() -> None:
             "videos need the package imageio-ffmpeg, which is not installed; "
             "pip install 'langflash[video]' brings it"
         ) from None
+
+
+def write_film(job: Job) -> str:
+    """The scene, or what of it answers, or with one phrase's heat-map, along a way.
+
+    Raises:
+        LangFlashError: nothing answers, the key frames cannot be used, or the encoder stopped.
+    """
+    request, scene = job.request, job.scene
+    shown, heat = scene, None
+    if job.kind.colours:
+        heat = asked(scene, job.prompts[0], request.threshold)
+    elif job.prompts:
+        shown = pipeline.select(scene, job.prompts, threshold=request.threshold)
+    cameras = way(request.path, scene, shown, request.size, request.seconds)
+    with job.renderer() as renderer, staged_folder(request.output.parent) as staging:
+        write(staging / request.output.name, shown, cameras, renderer, job.progress, heat, job.colours)
+    return f"{len(cameras) / RATE:.1f} s, {cameras[0].width} x {cameras[0].height}"
 
 
 def asked(scene: Scene, phrase: str, threshold: float | None) -> CompiledQuery:

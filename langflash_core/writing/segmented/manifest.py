@@ -1,17 +1,12 @@
 """The manifest: what the folder holds, in which unit and axes, and the command that makes it again."""
 
-import shlex
-from argparse import Namespace
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from langflash_core import __version__
+from langflash_core.request import ExportRequest
 from langflash_core.types import Camera
-
-from .subject import Subject, boxes
-
-_SAID = ("threshold", "view", "camera", "size", "backend")
+from langflash_core.writing.subject import Subject, boxes
 
 
 def folder_name(number: int | None) -> str:
@@ -19,21 +14,8 @@ def folder_name(number: int | None) -> str:
     return "camera" if number is None else f"view_{number}"
 
 
-def command(args: Namespace) -> str:
-    """The words that make the folder again."""
-    words = ["langflash", "export", str(args.scene), "-o", str(args.output), "--segmented"]
-    for name in _SAID:
-        value = getattr(args, name)
-        if isinstance(value, tuple):
-            value = "{}x{}".format(*value)
-        if isinstance(value, str | int | float | Path):
-            words += [f"--{name}", str(value)]
-    flags = [f"--{name}" for name in ("fade", "ortho") if getattr(args, name)]
-    return shlex.join([*words, *flags, "--prompt", *args.prompt])
-
-
 def document(
-    args: Namespace,
+    request: ExportRequest,
     subject: Subject,
     files: Sequence[dict[str, Any]],
     step: float,
@@ -47,8 +29,8 @@ def document(
     views = zip(subject.numbers, subject.cameras, files, strict=True)
     return {
         "made_by": f"langflash {__version__}",
-        "command": command(args),
-        "scene": str(args.scene),
+        "command": request.line,
+        "scene": str(request.scene),
         "backend": subject.renderer.backend,
         "threshold": subject.segments.threshold,
         "unit": subject.unit,

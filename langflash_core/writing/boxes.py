@@ -1,4 +1,4 @@
-"""What `export` writes of an answered view: pictures, and tables of places and sizes."""
+"""Tables and bodies of places and sizes: where each phrase is in a view."""
 
 import csv
 import io
@@ -7,14 +7,11 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from langflash_core.colormaps import HeatColours
 from langflash_core.export import glb
-from langflash_core.export.png import USUAL, heat_over, label_map, to_8bit, write_labels, write_mask
+from langflash_core.export.answers import answer_fields
 from langflash_core.files import make_folder, write_atomically
-from langflash_core.types import Frame, QueryResult, Scene
-
-from . import pictures
-from .commands.query import answer_fields
+from langflash_core.types import QueryResult, Scene
+from langflash_core.writing.job import Job
 
 COLUMNS = (
     "view", "prompt", "found", "score", "threshold", "area", "unit",
@@ -23,27 +20,20 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def write_plain(path: Path, frame: Frame) -> None:
-    """The colours of a frame."""
-    pictures.write_picture(path, to_8bit(frame.rgb))
+def write_boxes(job: Job) -> str:
+    """Where each phrase is and how large, as JSON, CSV or glTF; a row or a box per phrase and view.
 
-
-def write_answered(what: str, path: Path, result: QueryResult, colours: HeatColours = USUAL) -> None:
-    """One picture of an answer.
-
-    Args:
-        what: "heat" (of the first phrase), or of the phrases that are there "mask", or "labels" with a
-            legend beside it.
-        colours: of the heat-map.
+    Raises:
+        LangFlashError: a phrase cannot be used, or the file cannot be written.
     """
-    if what == "labels":
-        write_labels(path, label_map(result), [answer.prompt for answer in result.answers])
-    elif what == "mask":
-        write_mask(path, result.masks.any(0))
-    else:
-        threshold = result.answers[0].threshold
-        lit = heat_over(result.relevance[0], result.frame.rgb, threshold, result.mode, colours)
-        pictures.write_picture(path, to_8bit(lit))
+    request, scene = job.request, job.scene
+    cameras = job.cameras()
+    views = [None] if request.camera is not None else [request.view or 0]
+    with job.renderer() as renderer:
+        results = job.answers(cameras, renderer)
+        rows = box_rows(results, range(scene.num_views) if request.all_views else views, scene)
+    write_rows(request.output, rows)
+    return f"{sum(row['found'] for row in rows)} of {len(rows)} found"
 
 
 def box_rows(
@@ -58,7 +48,7 @@ def box_rows(
     ]
 
 
-def write_boxes(path: Path, rows: Sequence[dict[str, Any]]) -> None:
+def write_rows(path: Path, rows: Sequence[dict[str, Any]]) -> None:
     """The rows as JSON, as CSV with a column per number, or as boxes in glTF.
 
     Raises:

@@ -1,6 +1,6 @@
-"""Pictures that only the command line makes: arrays of uint8 from a frame.
+"""Frames painted by numbers on the processor: depth, atoms, one weight map, as arrays of uint8.
 
-Colours, heat-maps and label maps are the core's own (langflash_core.export).
+The window paints the same by shaders. Colours, heat-maps and label maps are in `png.py`.
 """
 
 import io
@@ -11,12 +11,12 @@ import torch
 from PIL import Image
 from torch import Tensor
 
-from langflash_core.export.colours import atom_colours, heat, label_colours
-from langflash_core.export.png import label_map, to_8bit
+from langflash_core.export.colours import atom_colours, heat
+from langflash_core.export.png import to_8bit
 from langflash_core.files import make_folder, write_atomically
-from langflash_core.types import Frame, QueryResult
+from langflash_core.types import Frame
 
-LABEL_OPACITY = 0.6
+Span = tuple[float, float]
 
 
 def write_picture(path: Path, pixels: np.ndarray) -> None:
@@ -31,15 +31,6 @@ def write_picture(path: Path, pixels: np.ndarray) -> None:
     write_atomically(path, stream.getvalue())
 
 
-def label_picture(result: QueryResult) -> np.ndarray:
-    """(H, W, 3): each pixel in the colour of the phrase that fits best, dimmed where none does."""
-    labels = label_map(result).cpu()  # (H, W), 0 is none
-    colours = np.concatenate((np.zeros((1, 3)), label_colours(len(result.answers)) / 255))
-    rgb = result.frame.rgb.detach().cpu().float().clamp(0, 1)
-    coloured = (1 - LABEL_OPACITY) * rgb + LABEL_OPACITY * torch.from_numpy(colours).float()[labels]
-    return to_8bit(torch.where((labels > 0)[..., None], coloured, 0.4 * rgb))
-
-
 def atom_picture(frame: Frame, dictionary: Tensor) -> np.ndarray:
     """(H, W, 3): every atom of the dictionary (K, C) its own colour, mixed as the splats mix them."""
     colours = atom_colours(dictionary.detach().cpu().double().numpy())
@@ -51,19 +42,21 @@ def weight_picture(frame: Frame, atom: int) -> np.ndarray:
     return to_8bit(_weights(frame)[..., atom, None].expand(-1, -1, 3))[..., 0]
 
 
-def depth_picture(frame: Frame) -> np.ndarray:
+def depth_picture(frame: Frame) -> tuple[np.ndarray, Span | None]:
     """(H, W, 3): near bright, far dark, linear in 1/z so that near things keep contrast; empty black.
 
-    The range is that of the middle 96 % of the pixels that show something.
+    Returns:
+        Pixels, and the depths of the first and the last colour, scene units: those of the middle 96 % of the
+        pixels that show something; None where none does.
     """
     depths = frame.depths.detach().cpu().float()
     seen = depths > 0
     if not seen.any():
-        return np.zeros((*depths.shape, 3), np.uint8)
+        return np.zeros((*depths.shape, 3), np.uint8), None
     near, far = np.percentile(depths[seen].numpy(), [2, 98])
     span = max(1 / near - 1 / max(far, near * 1.001), 1e-9)
     levels = (1 / torch.where(seen, depths, torch.tensor(far)) - 1 / far) / span
-    return to_8bit(heat(levels) * seen[..., None])
+    return to_8bit(heat(levels) * seen[..., None]), (float(near), float(far))
 
 
 def _weights(frame: Frame) -> Tensor:

@@ -10,12 +10,10 @@ import numpy as np
 from langflash_core import segments
 from langflash_core.errors import PromptError
 from langflash_core.export import depth
-from langflash_core.export.answers import file_names
+from langflash_core.export.answers import file_names, scaled_box
 from langflash_core.geometry.fusion import Surface
 from langflash_core.types import Camera, Scene, SegmentedView, Segments
-
-from ..commands.query import scaled_box
-from ..renderers import Renderer
+from langflash_core.writing.renderers import Renderer
 
 MOST = 255  # phrases or instances: a palette's colours
 _SURFACE_SIDE = 512  # pixels of the depths that a surface is fused from

@@ -1,7 +1,6 @@
 """The files of the folder: per view masks, cut-outs and depth; of all together boxes, surfaces, a sheet."""
 
 import json
-from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
@@ -11,21 +10,21 @@ from torch import Tensor
 from langflash_core.errors import MissingPackageError
 from langflash_core.export import depth, glb
 from langflash_core.export.colours import label_colours
+from langflash_core.export.paint import depth_picture, write_picture
 from langflash_core.export.png import to_8bit, write_grey, write_labels, write_mask, write_rgb
 from langflash_core.export.sheet import contact_sheet, thumbnail
+from langflash_core.files import staged_folder
+from langflash_core.request import ExportRequest
 from langflash_core.running import Progress
 from langflash_core.types import SegmentedView
-
-from ..files import staged_folder
-from ..pictures import depth_picture, write_picture
-from . import manifest
-from .subject import Subject, boxes, counted, cut_out, surfaces, views_of
+from langflash_core.writing.segmented import manifest
+from langflash_core.writing.subject import Subject, boxes, counted, cut_out, surfaces, views_of
 
 _GREY = 0.25  # behind phrases on the sheet
 _WIDE = 8  # tiles of a view that fit into a row of their own
 
 
-def write_folder(folder: Path, subject: Subject, args: Namespace, progress: Progress) -> str:
+def write_folder(subject: Subject, request: ExportRequest, progress: Progress) -> str:
     """All views, boxes, surfaces, contact sheet and manifest, all or none.
 
     Returns:
@@ -34,7 +33,7 @@ def write_folder(folder: Path, subject: Subject, args: Namespace, progress: Prog
     Raises:
         LangFlashError: the folder cannot be written.
     """
-    with staged_folder(folder) as staging:
+    with staged_folder(request.output) as staging:
         places = [staging / manifest.folder_name(number) for number in subject.numbers]
         files, tiles, depths = [], [], []
         for index, view in enumerate(views_of(subject)):
@@ -49,7 +48,7 @@ def write_folder(folder: Path, subject: Subject, args: Namespace, progress: Prog
         write_picture(staging / "sheet.png", contact_sheet(tiles, a_row if a_row <= _WIDE else None))
         glb.write_boxes(boxes(subject), staging / "boxes.glb")
         missing |= _write_surfaces(staging / "surfaces.glb", subject)
-        document = manifest.document(args, subject, files, step, missing)
+        document = manifest.document(request, subject, files, step, missing)
         text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
         (staging / "manifest.json").write_text(text, encoding="utf-8")
     said = [
@@ -119,7 +118,7 @@ def _tiles(subject: Subject, view: SegmentedView, where: str) -> list[tuple[str,
     colours = np.concatenate((np.zeros((1, 3), np.uint8), label_colours(len(subject.things))))
     tiles = [
         (where, to_8bit(view.frame.rgb)),
-        ("nearness", depth_picture(view.frame)),
+        ("nearness", depth_picture(view.frame)[0]),
         (counted(len(subject.things), "instance"), colours[view.things.cpu().numpy()]),
     ]
     for phrase in subject.found:
