@@ -13,6 +13,9 @@ from typing import Any, TextIO
 from langflash_core.errors import LangFlashError
 from langflash_core.files import make_folder, write_atomically
 
+INTERRUPTED = 130
+"""What a shell reports for a program that Ctrl-C ended: 128 and the signal's number."""
+
 
 def one_sentence(text: str) -> str:
     """`text` on one line, whatever line breaks it came with."""

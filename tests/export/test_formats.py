@@ -228,8 +228,8 @@ def test_axes_turn_positions_shapes_and_colours_together(letters, matrix):
     """A Gaussian seen along d before looks the same seen along M d after."""
     from langflash_core.export.packing import turned
     from langflash_core.export.stored import Rows
-    from langflash_core.geometry.quaternions import covariances
     from langflash_core.geometry.turning import axes_matrix
+    from tests.geometry.spread import covariances
 
     expected = torch.tensor(matrix, dtype=torch.float64)
     assert torch.equal(axes_matrix(letters), expected)

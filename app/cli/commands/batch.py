@@ -18,10 +18,9 @@ from langflash_core.outputs import ALL_OUT, output_of
 from langflash_core.request import spoken
 
 from ..crew import crew, processors, threads_said
-from ..report import say_error, write_json
+from ..report import INTERRUPTED, say_error, write_json
 from ..table import ProgressTable
 
-INTERRUPTED = 130
 MEMORY = {"mini": 1_500_000_000, "full": 7_000_000_000}  # bytes that a worker may come to hold
 EXPORTS = tuple(kind for kind in ALL_OUT if kind != ".langflash")  # the scene itself is always written
 

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 
 from app.window.kit import theme
-from tests.app.window.journey import PHOTOS
 from tests.app.window.test_window import (
     LEFT,
     MIDDLE,
@@ -25,6 +24,7 @@ from tests.app.window.test_window import (
     scene_file,
     x_server,
 )
+from tests.tools.journey import PHOTOS
 
 __all__ = ["display", "program", "pytestmark", "scene_file"]  # fixtures and the mark of the window's tests
 

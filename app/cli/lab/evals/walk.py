@@ -12,11 +12,10 @@ from langflash_core.errors import InputError
 from langflash_core.files import check_folder, check_output_file, make_folder, readable_file, write_atomically
 from langflash_core.lab.rooms import RoomRenderer, load_pack
 
+from ...renderers import Renderer, open_renderer
+from ...report import ProgressBar, write_tables
 from ..photos import opened_folder
-from ..renderers import Renderer, open_renderer
-from ..report import ProgressBar, write_tables
-from .eval_protocol import opened_lpips
-from .eval_sides import colour_only
+from ..shared import colour_only, opened_lpips
 
 if TYPE_CHECKING:
     from langflash_core.lab.evaluation.tallies import Shelf
@@ -43,7 +42,7 @@ def walk(args: Namespace, out: TextIO) -> None:
     from langflash_core.lab.evaluation.walk import run_walks
     from langflash_core.lab.evaluation.walk_tables import walk_markdown
 
-    from ..walk_sheet import keeper
+    from ..sheets.walk import keeper
 
     plan = _plan(args)
     with _walks(args, plan) as (walks, count), open_renderer(args.backend) as renderer:
@@ -153,7 +152,7 @@ def _numbers(folder: Path) -> dict:
 
 
 def _write_sheet(path: Path, versions: Sequence[tuple[str, Path]]) -> None:
-    from ..walk_sheet import walk_sheet
+    from ..sheets.walk import walk_sheet
 
     sheet = walk_sheet([(title, folder / PICTURES) for title, folder in versions])
     stream = io.BytesIO()

@@ -13,11 +13,12 @@ from langflash_core.files import check_folder, check_output_file, make_folder, r
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.evaluation.side_subjects import Case
 from langflash_core.lab.rooms import RoomRenderer, load_pack
-from langflash_core.types import Camera, Frame, Scene
+from langflash_core.types import Scene
 
+from ...renderers import open_renderer
+from ...report import ProgressBar, write_tables
 from ..photos import opened_folder
-from ..renderers import Renderer, open_renderer
-from ..report import ProgressBar, write_tables
+from ..shared import colour_only
 
 ROOMS, PAIRS = 100, 40
 NUMBERS, PICTURES = "sides.json", "pictures"
@@ -59,7 +60,7 @@ def sides(args: Namespace, out: TextIO) -> None:
             made=_pictures(args, render),
         )
         if args.results is not None and args.pack is not None:
-            from ..side_sheet import draw_pairs
+            from ..sheets.sides import draw_pairs
 
             draw_pairs(args.results / PICTURES, render, args.weights)
     if args.results is not None:
@@ -82,8 +83,8 @@ def _pictures(args: Namespace, render: Render) -> Callable[[Case, Scene], None]:
 
     def made(case: Case, scene: Scene) -> None:
         nonlocal shown
-        from ..side_sheet import ROOMS as SHOWN
-        from ..side_sheet import draw_room
+        from ..sheets.sides import ROOMS as SHOWN
+        from ..sheets.sides import draw_room
 
         if args.results is not None and args.pack is not None and shown < SHOWN:
             draw_room(args.results / PICTURES, shown, case, scene, render)
@@ -93,7 +94,7 @@ def _pictures(args: Namespace, render: Render) -> Callable[[Case, Scene], None]:
 
 
 def _write_sheet(path: Path, versions: Sequence[tuple[str, Path]]) -> None:
-    from ..side_sheet import side_sheet
+    from ..sheets.sides import side_sheet
 
     sheet = side_sheet([(title, folder / PICTURES) for title, folder in versions])
     stream = io.BytesIO()
@@ -140,15 +141,6 @@ def _cases(args: Namespace) -> Iterator[tuple[Iterator, int]]:
     pack, count = load_pack(args.pack), args.limit or ROOMS
     with RoomRenderer(pack) as renderer:
         yield room_cases(pack, renderer, kind=args.set, count=count, first=args.first_seed), count
-
-
-def colour_only(renderer: Renderer) -> Render:
-    """A renderer without weight maps."""
-
-    def render(scene: Scene, camera: Camera) -> Frame:
-        return renderer(scene, camera, weight_maps=False)
-
-    return render
 
 
 def _numbers(folder: Path) -> dict:

@@ -6,12 +6,13 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
-from langflash_core.errors import InputError, WeightsError
-from langflash_core.files import check_folder, check_output_file, readable_file
+from langflash_core.errors import InputError
+from langflash_core.files import check_folder, check_output_file
 from langflash_core.lab.photos import PhotoFolder, open_folder
 
-from ..renderers import open_renderer
-from ..report import ProgressBar, write_tables
+from ...renderers import open_renderer
+from ...report import ProgressBar, write_tables
+from ..shared import opened_lpips
 
 if TYPE_CHECKING:
     from langflash_core.lab.evaluation.lpips import Lpips
@@ -101,17 +102,6 @@ def nyu_folder(path: Path) -> PhotoFolder:
     if not folder.labelled:
         raise InputError(f"{path} has no names.csv, so nothing in it is labelled; add one, and labels/")
     return folder
-
-
-def opened_lpips(path: Path | None) -> "Lpips | None":
-    """LPIPS as --lpips names it; None where it does not.
-
-    Raises:
-        WeightsError: it cannot be read, or holds something else.
-    """
-    from langflash_core.lab.evaluation.lpips import Lpips
-
-    return None if path is None else Lpips(readable_file(path, "LPIPS file", WeightsError))
 
 
 def _weights(args: Namespace) -> str:

@@ -12,8 +12,8 @@ from langflash_core.batch.dispatch import Job, Lost, Made
 from langflash_core.batch.ledger import DONE, FAILED, Ledger
 from langflash_core.batch.run import finish, run_jobs
 from langflash_core.batch.sets import LEDGER, SUMMARY
-from langflash_core.errors import InputError, WeightsError
-from langflash_core.files import check_folder, filled_atomically, held_alone, readable_file
+from langflash_core.errors import InputError
+from langflash_core.files import check_folder, filled_atomically, held_alone
 from langflash_core.lab.labels.clips import INDEX, ClipPlace, find_clips
 from langflash_core.lab.labels.making import REPORT
 from langflash_core.lab.labels.order import LabelOrder
@@ -21,9 +21,9 @@ from langflash_core.lab.labels.re10k import enrich, labels_inside
 from langflash_core.lab.labels.storage import LABELS, write_labels
 
 from ..crew import crew
-from ..report import ProgressBar, say_error, write_json
+from ..report import INTERRUPTED, ProgressBar, say_error, write_json
 from ..table import ProgressTable
-from .batch import INTERRUPTED
+from .models import ordered
 
 
 def run(args: Namespace, out: TextIO) -> int:
@@ -51,19 +51,6 @@ def run(args: Namespace, out: TextIO) -> int:
         stopped = not _worked_off(args, order, to_do, ledger, [job.name for job in jobs], keyed)
         enriched = 0 if stopped or not args.enrich else _enriched(args, places, order, ledger)
     return _told(args, ledger, jobs, len(jobs) - len(to_do), enriched, stopped, out)
-
-
-def ordered(args: Namespace) -> LabelOrder:
-    """The options of the models, checked.
-
-    Raises:
-        LangFlashError: they do not fit, or weights are missing.
-    """
-    if args.masks == "mobile-sam" and args.weights:
-        readable_file(Path(args.weights), "checkpoint of MobileSAM", WeightsError)
-    local = args.weights and Path(args.weights).exists()
-    weights = str(Path(args.weights).absolute()) if local else args.weights or ""
-    return LabelOrder(args.masks, weights, args.side, args.follow, args.vectors)
 
 
 def _jobs(places: Sequence[ClipPlace], output: Path, order: LabelOrder) -> list[Job]:
@@ -94,7 +81,7 @@ def _worked_off(
         finish(ledger, names)
         return True
     source = args.source.absolute()
-    opening = partial(in_program, "cli.labelling", "open_labeller", order, source, keyed)
+    opening = partial(in_program, "cli.lab.labelling", "open_labeller", order, source, keyed)
     try:
         if args.workers is None and args.address is None:
             with ProgressBar() as bar:

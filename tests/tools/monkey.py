@@ -1,6 +1,6 @@
 """Random hands on a real window: moves, clicks, drags, keys, typing, drops, resizes, from a seed.
 
-    python -m tests.app.window.monkey [--minutes 10] [--seed 1] [--screen 1000x700]
+    python -m tests.tools.monkey [--minutes 10] [--seed 1] [--screen 1000x700]
 
 Ends with 0 when the window lived through it without an exception, an OpenGL error or a hang, and its
 memory stayed. The window can write only in a temporary folder (guarded.py); leaving is refused, so that
@@ -322,7 +322,7 @@ class Watched:
     """The window's process and what it says."""
 
     def __init__(self, display: str, folder: Path, size: tuple[int, int], photos: Sequence[Path]) -> None:
-        program = [sys.executable, "-m", "tests.app.window.monkey", "--inside", *map(str, (*size, *photos))]
+        program = [sys.executable, "-m", "tests.tools.monkey", "--inside", *map(str, (*size, *photos))]
         own = {**environment(folder, ROOT), "DISPLAY": display}
         own.pop("WAYLAND_DISPLAY", None)
         self._errors = (folder / "stderr.txt").open("w+")

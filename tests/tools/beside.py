@@ -1,6 +1,6 @@
 """Two versions of the program beside each other, in what people do in their first minutes.
 
-    python -m tests.app.window.beside OUT.png --code OLD --code .
+    python -m tests.tools.beside OUT.png --code OLD --code .
 
 A real X server, real mouse and keys; the program of each folder is seen only on the screen. Each row is a
 story, each column a version. Where a version has no such key or button, nothing happens.
@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from langflash_core.resources import asset_path
-from tests.app.window.journey import LEFT, PHOTOS, TOP, Person, person
-from tests.app.window.sheet import Shot, write_sheet
+from tests.tools.journey import LEFT, PHOTOS, TOP, Person, person
+from tests.tools.sheet import Shot, write_sheet
 
 OTHERS = [asset_path(f"photos/books_{side}.jpg") for side in ("left", "right")]
 SMALL = (800, 500)

@@ -1,6 +1,6 @@
 """From launch to an answer with nothing but a pointer and a keyboard, recorded.
 
-    python -m tests.app.window.journey assets/readme/journey.png
+    python -m tests.tools.journey assets/readme/journey.png
 
 The program is the one that people start, `python -m app view`; it is seen only on the screen.
 """
@@ -18,9 +18,9 @@ import numpy as np
 from app.window.kit import theme
 from langflash_core.resources import asset_path
 from tests.app.window.guarded import environment
-from tests.app.window.sheet import Shot, write_sheet
 from tests.app.window.test_window import ROOT, x_server
 from tests.app.window.x11 import Client
+from tests.tools.sheet import Shot, write_sheet
 
 SIZE = (1280, 800)
 PHOTOS = [asset_path(f"photos/living_room_{side}.png") for side in ("left", "right")]

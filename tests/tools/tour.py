@@ -1,6 +1,6 @@
 """The pictures of the README's tour, made again with one command:
 
-    python -m tests.app.window.tour assets/readme
+    python -m tests.tools.tour assets/readme
 
 A window on a screen of its own is told what a person would do there with the shipped photos of the
 living room, and photographed each time it rests.
@@ -31,9 +31,9 @@ from langflash_core import outputs, pictures
 from langflash_core.geometry import poses
 from langflash_core.pictures import PICTURES
 from langflash_core.resources import asset_path
-from tests.app.window.sheet import Shot, write_picture, write_sheet
 from tests.app.window.test_window import TOP, x_server
 from tests.app.window.x11 import Client
+from tests.tools.sheet import Shot, write_picture, write_sheet
 
 SIZE = (1280, 800)
 LEFT, BOTTOM = 348, 32  # of the picture's place, pixels

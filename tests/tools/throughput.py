@@ -1,6 +1,6 @@
 """What a run over many sets saves: one worker of `langflash batch` against a `reconstruct` process a set.
 
-    python -m tests.batch.throughput FOLDER --sets 1000 --alone 20 --size 84
+    python -m tests.tools.throughput FOLDER --sets 1000 --alone 20 --size 84
 
 Processor seconds of both, whose ratio other programs on the machine hardly touch, and seconds by the clock.
 Set OMP_NUM_THREADS=1, so that both have one thread.

@@ -1,6 +1,6 @@
 """What a moving picture costs and how far it is from the exact one, by size and share of the Gaussians.
 
-    python -m tests.app.window.ladder SCENE [--size 640x480] [--rounds 4]
+    python -m tests.tools.ladder SCENE [--size 640x480] [--rounds 4]
 
 The rungs of `app/window/governor.py` were chosen from this table. Colours and one phrase's heat-map in the
 fast mode, enlarged to full size by a linear filter as the window does; the camera is on its way from the

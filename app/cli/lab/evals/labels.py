@@ -17,8 +17,8 @@ from langflash_core.lab.labels.report import report
 from langflash_core.lab.labels.storage import write_labels
 from langflash_core.lab.rooms import RoomRenderer, load_pack
 
-from ..report import ProgressBar, write_tables
-from .labels import ordered
+from ...report import ProgressBar, write_tables
+from ..models import ordered
 
 
 def labels(args: Namespace, out: TextIO) -> None:

@@ -12,11 +12,10 @@ from langflash_core.files import check_folder, check_output_file, make_folder, r
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.rooms import RoomRenderer, load_pack
 
+from ...renderers import open_renderer
+from ...report import ProgressBar, write_tables
 from ..photos import opened_folder
-from ..renderers import open_renderer
-from ..report import ProgressBar, write_tables
-from .eval_protocol import opened_lpips
-from .eval_sides import colour_only
+from ..shared import colour_only, opened_lpips
 
 if TYPE_CHECKING:
     from langflash_core.lab.evaluation.sharp import Bench
@@ -37,7 +36,7 @@ def sharp(args: Namespace, out: TextIO) -> None:
     from langflash_core.lab.evaluation.sharp import run_sharp
     from langflash_core.lab.evaluation.sharp_tables import sharp_markdown
 
-    from ..sharp_sheet import SharpSheet
+    from ..sheets.sharp import SharpSheet
 
     sheet = SharpSheet()
     with (

@@ -1,6 +1,6 @@
 """How late frames come, from launch to the end of a first phrase, an orbit and three exports.
 
-    python -m tests.app.window.frames [--size 1280x800] [--code FOLDER ...] [--photos A B]
+    python -m tests.tools.frames [--size 1280x800] [--code FOLDER ...] [--photos A B]
 
 A real X server, real mouse and keys. The gap of a frame is the time since the frame before it, less the time
 that the loop slept with nothing to do: what a person would have waited for at the worst. Each FOLDER is a

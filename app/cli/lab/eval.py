@@ -13,19 +13,20 @@ from langflash_core.lab.evaluation.rooms.run import run_eval
 from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.lab.photos import PhotoFolder, chosen_ids
 from langflash_core.network import load_network
+from langflash_core.request import spoken
 
-from ..photos import chosen, opened_folder
 from ..renderers import open_renderer
 from ..report import ProgressBar, say_warnings, write_json, write_tables
-from .eval_ablations import ablations
-from .eval_labels import labels
-from .eval_protocol import opened_lpips, protocol
-from .eval_report import report
-from .eval_sharp import sharp
-from .eval_sides import beside, sides
-from .eval_walk import beside as walk_beside
-from .eval_walk import walk
-from .query import spoken
+from .evals.ablations import ablations
+from .evals.labels import labels
+from .evals.protocol import protocol
+from .evals.report import report
+from .evals.sharp import sharp
+from .evals.sides import beside, sides
+from .evals.walk import beside as walk_beside
+from .evals.walk import walk
+from .photos import chosen, opened_folder
+from .shared import opened_lpips
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -170,7 +171,7 @@ def _photos(args: Namespace, out: TextIO) -> None:
         )
     photos = [readable_file(path, "photo", ImageError) for path in args.photos]
     check_output_file(args.output, (".png",))
-    from ..sheet import PROMPTS, pair_sheet
+    from .sheets.pairs import PROMPTS, pair_sheet
 
     pairs = list(zip(photos[::2], photos[1::2], strict=True))
     prompts = PROMPTS if args.prompt is None else spoken(args.prompt)

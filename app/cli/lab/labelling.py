@@ -17,7 +17,7 @@ from langflash_core.lab.labels.making import LabelMaker
 from langflash_core.lab.labels.order import LabelOrder
 from langflash_core.running import Progress
 
-from .report import explained
+from ..report import explained
 
 
 def _silent(stage: str, fraction: float) -> None:

@@ -29,8 +29,8 @@ from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS
 from langflash_core.resources import asset_path
 
-from ..photos import opened_folder
 from ..report import ProgressBar
+from .photos import opened_folder
 
 
 def run(args: Namespace, out: TextIO) -> None:

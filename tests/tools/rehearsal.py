@@ -1,8 +1,8 @@
 """A run over many items by two workers, of which one is killed with -9, against the run by one.
 
-    python -m tests.batch.rehearsal FOLDER [--address local] [--sets 40] [--size 84]
+    python -m tests.tools.rehearsal FOLDER [--address local] [--sets 40] [--size 84]
     python -m tests.batch.moving_clips CLIPS 8
-    python -m tests.batch.rehearsal FOLDER --command labels CLIPS --same labels.safetensors
+    python -m tests.tools.rehearsal FOLDER --command labels CLIPS --same labels.safetensors
 
 Says whether the results are the same, whether anything was done twice, and what failed. With a command of its
 own any that keeps a `ledger.csv` can be rehearsed so; what is compared is the file `--same` of every item:

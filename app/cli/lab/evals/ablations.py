@@ -6,7 +6,7 @@ from typing import TextIO
 from langflash_core.errors import InputError
 from langflash_core.files import check_folder, check_output_file
 
-from ..report import ProgressBar, write_tables
+from ...report import ProgressBar, write_tables
 
 
 def ablations(args: Namespace, out: TextIO) -> None:

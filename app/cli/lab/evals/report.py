@@ -16,12 +16,12 @@ from langflash_core.files import check_folder, make_folder, readable_file, write
 from langflash_core.lab.photos import PhotoFolder, open_folder
 from langflash_core.running import Progress
 
-from ...bench.machine import host
+from ....bench.machine import host
+from ...renderers import Renderer, open_renderer
+from ...report import ProgressBar
+from ...scenes import open_scene
 from ..photos import chosen
-from ..renderers import Renderer, open_renderer
-from ..report import ProgressBar
-from ..scenes import open_scene
-from .eval_protocol import opened_lpips
+from ..shared import opened_lpips
 
 if TYPE_CHECKING:
     from langflash_core.lab.evaluation.report import Sources, Workplace
@@ -99,7 +99,7 @@ def _drawing(path: Path, progress: Progress) -> "Section":
     """A scene drawn in every way that `langflash bench` knows."""
     from langflash_core.lab.evaluation.report_drawing import drawing_section
 
-    from ...bench import measured_cases, scene_case
+    from ....bench import measured_cases, scene_case
 
     case = scene_case(path.stem, open_scene(path), None, FRAMES, None)
     return drawing_section(measured_cases([case], None, progress))
@@ -109,7 +109,7 @@ def _drawing(path: Path, progress: Progress) -> "Section":
 def _neighbour(args: Namespace) -> Iterator[None]:
     """A process beside what is done here judges all sections but the first into the same work folder: it has
     ended when this has, at once where this failed."""
-    whole = ("cli.commands.eval_report", "judge_the_rest", args)
+    whole = ("cli.lab.evals.report", "judge_the_rest", args)
     process = get_context("spawn").Process(target=in_program, args=whole, daemon=True)
     process.start()
     try:

@@ -16,7 +16,7 @@ from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.quaternions import matrices_to_quats, quats_to_matrices
 from langflash_core.types import Camera, Scene
 
-from .renderers import Renderer
+from ...renderers import Renderer
 
 PROMPTS = (
     "book", "floor", "plant", "flower pot", "table", "picture frame", "monitor", "chair", "door", "toy",
