@@ -7,8 +7,9 @@
     lf.save(scene, "room.langflash")
     scene = lf.load("room.langflash")  # or .ply, .splat: the suffix says which
     scene = lf.reconstruct(lf.frames("walk.mp4"))  # the sharpest frames of a film
+    lf.write(scene, lf.ExportRequest(Path("plant.png"), what="mask", prompts=("plant",)))  # as `export`
 
-The five functions are read in at first use: importing the package alone costs no torch. It settles
+The functions are read in at first use: importing the package alone costs no torch. It settles
 how torch's threads will wait (`threads.py`), unless the environment says that already.
 """
 
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from langflash_core.images.frames import frames as frames
     from langflash_core.pipeline import query as query
     from langflash_core.pipeline import reconstruct as reconstruct
+    from langflash_core.request import ExportRequest as ExportRequest
+    from langflash_core.writing import write as write
 
 __version__ = "0.1.0"
 
@@ -34,6 +37,8 @@ _HOMES = {
     "query": ("pipeline", "query"),
     "save": ("export", "export"),
     "load": ("export", "read"),
+    "write": ("writing", "write"),
+    "ExportRequest": ("request", "ExportRequest"),
 }
 
 

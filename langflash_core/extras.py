@@ -9,7 +9,6 @@ EXTRAS = {
     "glfw": "window",
     "imgui_bundle": "window",
     "OpenGL": "window",
-    "pyrr": "window",
     "moderngl": "gl",
     "open_clip": "full",
     "torchvision": "full",

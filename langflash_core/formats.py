@@ -1,5 +1,5 @@
-"""Which scene files there are, and which colour maps, by name alone: light enough for the command line and
-the window to ask.
+"""What the name of a file says, which films are read, and which colour maps there are: light enough for the
+command line and the window to ask. What is written is in `outputs.py`.
 
 A name ends in a suffix, or in `.compressed.ply`, or is a whole one:
 `meta.json` is a SOG in a folder, `cameras.txt` COLMAP's model in one.
@@ -10,11 +10,6 @@ from pathlib import Path
 COMPRESSED_PLY = ".compressed.ply"
 SOG_FOLDER = "meta.json"
 USD = (".usd", ".usda", ".usdc", ".usdz")
-SCENES_IN = (".langflash", ".ply", ".splat", ".spz", ".sog", SOG_FOLDER, ".ksplat", ".glb", ".gltf", *USD)
-SCENES_OUT = (".langflash", ".ply", COMPRESSED_PLY, ".splat", ".spz", ".sog", SOG_FOLDER, ".glb", *USD)
-CAMERAS_OUT = ("cameras.txt", "transforms.json")  # and the photos, in images/ beside
-ANSWERS_OUT = (".json", ".csv")  # of phrases
-FILMS_OUT = (".mp4", ".webp")
 FILMS_IN = (
     ".mp4",
     ".mov",
@@ -31,17 +26,14 @@ FILMS_IN = (
     ".ogv",
 )
 """Films that scenes are made of."""
-DEPTH_OUT = ".exr"
-PAGE_OUT = ".html"  # the whole scene, to be looked at and asked; no program reads it back
-ALL_OUT = (".png", *SCENES_OUT, *CAMERAS_OUT, *ANSWERS_OUT, *FILMS_OUT, ".npz", DEPTH_OUT, PAGE_OUT)
-"""What `langflash export` writes."""
-DROPPED = tuple(kind for kind in SCENES_IN if kind.startswith("."))  # a meta.json may be anything
+LARGEST_SIDE = 8192  # pixels of a picture; GL 3.3 promises no larger texture on most drivers
+_WHOLE_NAMES = (SOG_FOLDER, "cameras.txt", "transforms.json")
 
 
 def kind_of(path: Path) -> str:
     """What the name of a file says it is: its suffix in lower case, or one of the longer names above."""
     name = path.name.lower()
-    if name in (SOG_FOLDER, *CAMERAS_OUT):
+    if name in _WHOLE_NAMES:
         return name
     return COMPRESSED_PLY if name.endswith(COMPRESSED_PLY) else path.suffix.lower()
 

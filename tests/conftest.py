@@ -18,6 +18,8 @@ os.environ["PYTHONPATH"] = os.pathsep.join([ROOT, *filter(None, [os.environ.get(
 
 # Every signature of the library holds at every call: shapes, their shared sizes, and types. An int
 # passes for a float, as type checkers have it.
+import pyrr  # noqa: E402, F401 - before the hook, which would compile it anew, and its docstrings warn
+
 install_import_hook("langflash_core", "beartype.beartype(conf=beartype.BeartypeConf(is_pep484_tower=True))")
 
 import pytest  # noqa: E402 - after the hook

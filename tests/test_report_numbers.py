@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from langflash_core.lab.evaluation.report_small import asked_for, filled
+from langflash_core.lab.evaluation.report_small import filled
 from tests.report_numbers import DOCUMENTS, SMALL, current
 
 TABLES = {
@@ -23,7 +23,7 @@ TEXT = "before\n<!-- report rooms: Some -->\nold\n<!-- end -->\nafter\n"
 @pytest.mark.parametrize("name", DOCUMENTS)
 def test_tables_of_documents_are_those_of_the_report(name: str):
     text, expected = current(name)
-    assert asked_for(text), f"{name} marks no table"
+    assert "<!-- report " in text, f"{name} marks no table"
     assert text == expected, f"run python -m tests.report_numbers; {name} would be:\n{expected}"
 
 

@@ -22,6 +22,9 @@ from .words.scenes import (
 )
 from .words.training import add_labels, add_rooms, add_train
 
+LAB = ("bench-network", "eval", "labels", "rooms", "train")
+"""Commands that make and judge the weights."""
+
 
 class UsageError(InputError):
     """The command line itself cannot be understood."""

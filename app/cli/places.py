@@ -14,22 +14,20 @@ from PIL import Image
 
 from langflash_core import pipeline
 from langflash_core.batch.dispatch import Job, Made
-from langflash_core.batch.order import Order
+from langflash_core.batch.order import Order, export_path
 from langflash_core.batch.run import SCENE
 from langflash_core.batch.summary import THUMBNAIL
 from langflash_core.errors import ImageError, PromptError
-from langflash_core.export.answers import write_answers
+from langflash_core.export.answers import answers_document, write_answers
 from langflash_core.export.png import heat_over, to_8bit
 from langflash_core.extras import optional_packages
-from langflash_core.files import filled_atomically, write_atomically
+from langflash_core.files import filled_atomically, readable_file, write_atomically
 from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.scene.file import load, save
 from langflash_core.types import QueryResult, Scene
+from langflash_core.writing import Renderer, request_of_whole, write
 
-from .commands.export import write_whole
-from .commands.query import answers_document
-from .files import readable_file
-from .renderers import Renderer, open_renderer
+from .renderers import open_renderer
 from .report import explained, write_json
 
 ANSWERS = "answers"  # folder, in a set's own
@@ -117,11 +115,12 @@ class _Maker:
         """Write the files that are wanted besides; where no phrase is found, a note instead of its masks."""
         notes = []
         for kind in self._order.exports:
-            name = f"scene{kind}" if kind.startswith(".") else kind
+            path = folder / export_path(kind)
             try:
-                write_whole(scene, folder / name, self._renderer(), self._order.prompts)
+                request = request_of_whole(path, self._order.prompts)
+                write(scene, request, renderers=lambda: contextlib.nullcontext(self._renderer()))
             except PromptError as reason:
-                notes.append(f"no {name}: {reason}")
+                notes.append(f"no {path.name}: {reason}")
         return notes
 
     def _renderer(self) -> Renderer:

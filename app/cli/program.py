@@ -11,13 +11,12 @@ from collections.abc import Sequence
 from langflash_core.errors import LangFlashError
 from langflash_core.extras import optional_packages
 
-from .parser import build_parser, joined
-from .report import explained, say_error
+from .parser import LAB, build_parser, joined
+from .report import INTERRUPTED, explained, say_error
 
 # Imports make a million objects that stay; looking for garbage among them, as Python would do
 # every 700 of them, is a tenth of the time that torch takes.
 _COLLECT_EVERY = (50_000, 20, 20)
-INTERRUPTED = 128 + signal.SIGINT  # what a shell reports for a program that Ctrl-C ended
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -59,7 +58,8 @@ def _run(argv: Sequence[str] | None) -> int:
         with contextlib.suppress(ValueError):  # not the main thread
             signal.signal(signal.SIGINT, signal.default_int_handler)
     with optional_packages():
-        command = importlib.import_module(f".commands.{args.command.replace('-', '_')}", __package__)
+        folder = "lab" if args.command in LAB else "commands"
+        command = importlib.import_module(f".{folder}.{args.command.replace('-', '_')}", __package__)
         if not getattr(args, "json", False):
             return command.run(args, sys.stdout) or 0
         # stdout carries one document and nothing else, whatever a library prints.

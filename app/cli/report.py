@@ -14,6 +14,9 @@ from langflash_core.errors import LangFlashError
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.running import left
 
+INTERRUPTED = 130
+"""What a shell reports for a program that Ctrl-C ended: 128 and the signal's number."""
+
 
 def one_sentence(text: str) -> str:
     """`text` on one line, whatever line breaks it came with."""

@@ -40,7 +40,8 @@ def _needs(package: Distribution) -> set[str]:
 
 
 def _component(package: Distribution, name: str, ref: str) -> dict[str, Any]:
-    told = package.metadata.get("License-Expression") or package.metadata.get("License") or ""
+    about = package.metadata.json
+    told = str(about.get("license_expression") or about.get("license") or "")
     short = told.strip().partition("\n")[0][:120]
     licences = {"licenses": [{"license": {"name": short}}]} if short else {}
     return {

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from langflash_core.errors import SceneFileError
+from langflash_core.files import readable_file
 from langflash_core.types import NO_LANGUAGE, Scene
 
-from .files import readable_file
 from .report import say_warnings
 
 

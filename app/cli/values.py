@@ -5,9 +5,8 @@ import re
 from argparse import ArgumentTypeError
 
 from langflash_core.detail import FEWEST, MOST
-
-LARGEST_SIDE = 8192  # pixels; GL 3.3 promises no larger texture on most drivers
-PICTURES = ("rgb", "depth", "relevance", "labels", "atoms", "weights")
+from langflash_core.formats import LARGEST_SIDE
+from langflash_core.pictures import SPOKEN, WORDS, Picture
 
 
 def size(text: str) -> tuple[int, int]:
@@ -156,14 +155,14 @@ def span(text: str) -> tuple[float, float]:
     return ends
 
 
-def what(text: str) -> tuple[str, int | None]:
-    """A picture's kind, and for `weights:K` the atom K."""
-    kind, colon, atom = text.partition(":")
-    if kind not in PICTURES or bool(colon) != (kind == "weights"):
-        raise ArgumentTypeError(
-            f"expected rgb, depth, relevance, labels, atoms or weights:K, received {text!r}"
-        )
-    return kind, _whole(atom, 0, 10**6) if colon else None
+def what(text: str) -> tuple[Picture, str, int | None]:
+    """A picture, the word for it, and for `weights:K` the atom K."""
+    word, colon, atom = text.partition(":")
+    picture = SPOKEN.get(word)
+    if picture is None or bool(colon) != picture.of_an_atom:
+        known = f"{', '.join(WORDS[:-1])} or {WORDS[-1]}"
+        raise ArgumentTypeError(f"expected {known}, received {text!r}")
+    return picture, word, _whole(atom, 0, 10**6) if colon else None
 
 
 def _number(text: str) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 
 from langflash_core.colormaps import colour_stops
 from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.pictures import COUNT_COLOURS
 from langflash_core.scene.trust import COSINES
 from langflash_core.types import Camera, Scene
 
@@ -23,8 +24,6 @@ _LABEL_OPACITY = 0.6
 _TRUST_OPACITY = 0.7
 _COVERED: dict[str, float] = {"COVERED_ALPHA": COVERED_ALPHA}
 MASK_STYLES = ("flat", "isolate", "hide", "dim")
-COUNT_COLOURS = ((0.86, 0.20, 0.55), (0.95, 0.70, 0.20), (0.25, 0.62, 0.55))
-"""Coverage: no photo saw it, one, several."""
 Background = tuple[float, float, float]
 Span = tuple[float, float]
 
@@ -142,15 +141,12 @@ class Display:
             {"depth_range": span, "colour_stops": colour_stops(colormap)},
         )
 
-    def transmittance(self, drawn: Drawn, colormap: str) -> moderngl.Texture:
-        """What passes every splat, 0 to 1."""
-        return self._filled(
-            ("transmittance",),
-            (drawn.key, colormap),
-            "show_transmittance.frag",
-            drawn.depth,
-            {"colour_stops": colour_stops(colormap)},
-        )
+    def shown(
+        self, drawn: Drawn, kind: str, fragment: str, uniforms: Uniforms, key: tuple
+    ) -> moderngl.Texture:
+        """What a fragment shader makes of depth and transmittance; painted again where these, or `key`, are
+        others."""
+        return self._filled((kind,), (drawn.key, *key), fragment, drawn.depth, uniforms)
 
     def trust(self, drawn: Drawn, photos: PhotoDepths, own: bool, colormap: str) -> moderngl.Texture:
         """Agreement of the photos' own depths, or else how many photos see each pixel."""

@@ -33,6 +33,7 @@ from .colours import hues
 from .display import MASK_STYLES, Answer, Background, Drawn
 from .host import HostAnswers
 from .layout import PHRASES_A_LAYER
+from .painter import Uniforms
 from .question import Question
 from .scene import Level, LiveScene, MakeSplats
 from .splats import SplatBuffers
@@ -254,16 +255,6 @@ class SplatRenderer:
         if self._scene is None:
             raise ValueError("columns: expected set_scene before, received no scene")
         return self._scene.feature_columns if features else self._scene.atom_colours
-
-    @property
-    def num_dropped(self) -> int:
-        """Gaussians of the scene left out because a value or a weight was NaN or infinite."""
-        return 0 if self._scene is None else self._scene.whole.splats.num_dropped
-
-    @property
-    def num_dropped_atoms(self) -> int:
-        """Atoms of the scene that say nothing because a number was NaN or infinite."""
-        return 0 if self._scene is None else self._scene.num_dropped_atoms
 
     def draw(
         self,
@@ -536,10 +527,14 @@ class SplatRenderer:
         span = (float(near), float(max(far, near * 1.001)))
         return picture.view.display.depth(picture.drawn, span, colormap)
 
-    def transmittance_texture(self, colormap: str = COLOUR_MAPS[0]) -> moderngl.Texture:
-        """What passes every splat, 0 to 1."""
+    def shown(self, kind: str, fragment: str, uniforms: Uniforms, key: tuple = ()) -> moderngl.Texture:
+        """What a fragment shader of shaders/splat/ makes of the view's depth and transmittance.
+
+        Args:
+            kind: names the picture. key: of all that `uniforms` hold; another one, and it is painted again.
+        """
         picture = self._drawn()
-        return picture.view.display.transmittance(picture.drawn, colormap)
+        return picture.view.display.shown(picture.drawn, kind, fragment, uniforms, key)
 
     def coverage_texture(self) -> moderngl.Texture:
         """How many photos saw what each pixel shows, in `COUNT_COLOURS`; the first call draws their views."""

@@ -11,7 +11,6 @@ import torch
 
 from langflash_core.export.colours import atom_colours
 from langflash_core.graphics import Programs
-from langflash_core.language.relevance import finite_atoms
 from langflash_core.scene.changed import changed
 from langflash_core.scene.changes import Change
 from langflash_core.scene.thin import thin_with_rows
@@ -109,11 +108,6 @@ class LiveScene:
     @property
     def num_atoms(self) -> int:
         return self.scene.semantics.num_atoms
-
-    @property
-    def num_dropped_atoms(self) -> int:
-        """Atoms that say nothing because a number was NaN or infinite."""
-        return int((~finite_atoms(self.scene.semantics.dictionary)).sum())
 
     @cached_property
     def atom_colours(self) -> np.ndarray:

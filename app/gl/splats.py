@@ -37,7 +37,7 @@ class SplatBuffers:
     float32, place and shape as project.vert has them, in draw order; elsewhere None. Where none is too
     large, `sprites` are drawn there in place of quads: the same fragments out of one vertex, 30 % quicker.
 
-    Gaussians with a value or a weight that is not finite are left out (`num_dropped`), and those
+    Gaussians with a value or a weight that is not finite are left out, and those
     below opacity 1/255, which no pixel can show. Footprints end where alpha falls below 1/255 and, where
     `reach` is given, no further than so many deviations.
     """
@@ -58,7 +58,6 @@ class SplatBuffers:
         sh = gaussians.sh  # most of a large scene's bytes: never copied as a whole
         gaussians = replace(gaussians, sh=sh[:, :0]).map(lambda v: v[kept])
         gaussians = replace(gaussians, scales=gaussians.scales.clamp(-_WIDEST, _WIDEST))
-        self.num_dropped = int((~finite).sum())
         self._kept = kept.numpy()
         self._shown = np.ones(len(gaussians), bool)
         self.num_gaussians = len(gaussians)

@@ -11,7 +11,8 @@ from typing import Protocol
 
 import numpy as np
 
-from . import poses
+from langflash_core.geometry import poses
+
 from .asking.state import PROMPT_DIALOGS, PROMPTS_SUFFIX
 from .scene import samples
 from .scene.drops import SCENE_SUFFIX

@@ -4,17 +4,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from langflash_core import pictures
 from langflash_core.colormaps import HeatColours
+from langflash_core.geometry.poses import START, Pose
+from langflash_core.pictures import Picture
 
 from .asking.state import FIRST_PROMPT, NO_ASKING, Asking, Prompt, usable
 from .editing.state import NO_EDITING, Editing
 from .exporting.state import NO_EXPORTING, Exporting
 from .filming.state import Tour, read
 from .opening.state import NO_OPENING, Opening
-from .poses import START, Pose
 from .recovery.preferences import DEFAULTS, Preferences
 from .recovery.state import NO_RECOVERY, Recovery
-from .scene.state import Flight, Job, Mode, Photo, Room, SceneInfo
+from .scene.state import Flight, Job, Photo, Room, SceneInfo
 
 TOAST_SECONDS = {"info": 5.0, "error": 20.0}
 MOST_LINES = 300
@@ -91,7 +93,7 @@ class State:
     prompts: tuple[Prompt, ...] = (FIRST_PROMPT,)
     active: int = 0
     negatives: tuple[str, ...] = ()
-    mode: Mode = Mode.RGB
+    mode: Picture = pictures.RGB
     pose: Pose = START
     flight: Flight | None = None
     tour: Tour | None = None
@@ -144,4 +146,4 @@ class State:
         """Whether the picture needs the weight maps and not only colour and depth: to show them, or
         for a phrase that has no score yet."""
         waiting = any(prompt.score is None for prompt in self.asked)
-        return self.mode.of_atoms or waiting or (self.mode.answers and bool(self.asked))
+        return self.mode.maps or waiting or (self.mode.answers and bool(self.asked))

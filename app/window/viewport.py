@@ -14,20 +14,21 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
-from langflash_core.colormaps import HeatColours
+from langflash_core import pictures
 from langflash_core.errors import GraphicsError
+from langflash_core.geometry.poses import START, Pose, to_camera
 from langflash_core.graphics import draws_in_software
+from langflash_core.pictures import Picture
 from langflash_core.scene.changes import Change, Recoloured
 from langflash_core.scene.edits import Marks
 from langflash_core.scene.mask import Mask
 
 from .artist import Artist, Asked
-from .asking.state import Prompt, margin_span
+from .asking.state import Prompt
 from .editing.state import Point, Reading, strongest
 from .governor import SETTLE_AFTER, Governor, Kind, Plan
-from .poses import START, Pose, to_camera
 from .scene.near import fills_gaps, keeps_near
-from .scene.state import Mode
+from .scene.state import possible
 from .state import State
 
 if TYPE_CHECKING:
@@ -49,7 +50,6 @@ LONG_SECONDS = 0.1  # a picture that took as long is painted in the next frame, 
 MOST_THREADS = 8  # of a still picture
 RETRY_SECONDS = 5.0  # until a still picture that could not be drawn is tried again
 SHOWN_ALPHA = 0.5  # as in the answers: from here on a pixel shows the scene
-MASKS = {Mode.MASKS: "flat", Mode.ISOLATE: "isolate", Mode.HIDE: "hide", Mode.DIM: "dim"}
 
 
 @dataclass(frozen=True)
@@ -375,8 +375,8 @@ class Viewport:
     def _questions(self, state: State) -> "Callable[[Still], None]":
         """What is to be made of a still picture on the artist's thread, so that showing it is quick."""
         query, columns = self._query, None
-        if state.mode in (Mode.ATOMS, Mode.FEATURES) and self._renderer is not None:
-            columns = self._renderer.columns(state.mode is Mode.FEATURES)
+        if state.mode.columns and self._renderer is not None:
+            columns = self._renderer.columns(state.mode.columns == "features")
 
         def ask(still: "Still") -> None:
             if still.maps is not None:
@@ -394,9 +394,9 @@ class Viewport:
             return True
         if self._query is not None and not still.maps.answers(self._query):
             return False
-        if state.mode not in (Mode.ATOMS, Mode.FEATURES) or self._renderer is None:
+        if not state.mode.columns or self._renderer is None:
             return True
-        return still.maps.mixes(self._renderer.columns(state.mode is Mode.FEATURES))
+        return still.maps.mixes(self._renderer.columns(state.mode.columns == "features"))
 
     def _bring(self, wanted: _Drawn, state: State) -> None:
         """Show the still picture that is finished, once it tells all that is asked of it."""
@@ -492,15 +492,15 @@ class Viewport:
         fill = fills_gaps(state)
         shown = {p.key: p for p in state.prompts}
         asked = [shown[key] for key in self._keys if key in shown]
-        mode = state.mode if drawn.plan.covers(replace(drawn.plan, kind=_kind(state))) else Mode.RGB
-        if (mode.answers and (not asked or len(asked) != len(self._keys))) or not mode.possible(state.info):
-            mode = Mode.RGB
-        answers = mode.answers or mode in (Mode.ATOMS, Mode.FEATURES)
+        mode = state.mode if drawn.plan.covers(replace(drawn.plan, kind=_kind(state))) else pictures.RGB
+        if (mode.answers and (not asked or len(asked) != len(self._keys))) or not possible(mode, state.info):
+            mode = pictures.RGB
+        answers = mode.answers or bool(mode.columns)
         if answers and self._still is not None and not self._tells(self._still, state):
             return  # what is on show stays until the answer is there
         active = next((i for i, p in enumerate(asked) if p.key == state.active), 0)
         colours = state.heat_colours
-        faded = mode is Mode.RGB and keeps_near(state, drawn.pose)
+        faded = mode is pictures.RGB and keeps_near(state, drawn.pose)
         colouring = (
             mode,
             active,
@@ -514,10 +514,19 @@ class Viewport:
             self._colouring = colouring
             renderer.fill(fill)
             self._texture = (
-                renderer.faded_texture()
-                if faded
-                else _picture(renderer, mode, asked, active, state.asking.atom, colours)
+                renderer.faded_texture() if faded else self._painted(renderer, mode, asked, active, state)
             )
+
+    def _painted(
+        self, renderer: "SplatRenderer", mode: Picture, asked: list[Prompt], active: int, state: State
+    ) -> moderngl.Texture:
+        """The texture that shows a mode; `asked` in the order of the query, not empty where it `answers`."""
+        from ..gl.paints import PAINTS, Wanted  # loads torch; the worker has by now
+
+        shown_from = asked[active].shown_from if asked else 0.0
+        colours, cuts = np.array([p.colour for p in asked]), np.array([p.cut for p in asked])
+        wanted = Wanted(colours, cuts, active, shown_from, state.asking.atom, state.heat_colours)
+        return PAINTS[mode](renderer, wanted)
 
 
 def torch_of(values: np.ndarray) -> "Tensor":
@@ -527,43 +536,8 @@ def torch_of(values: np.ndarray) -> "Tensor":
     return torch.from_numpy(values)
 
 
-def _picture(
-    renderer: "SplatRenderer", mode: Mode, asked: list[Prompt], active: int, atom: int, shades: HeatColours
-) -> moderngl.Texture:
-    """The texture that shows a mode; `asked` in the order of the query, not empty where it `answers`."""
-    colours = np.array([p.colour for p in asked], np.float32)
-    cuts = np.array([p.cut for p in asked], np.float32)
-    match mode:
-        case Mode.HEAT:
-            return renderer.heat_texture(
-                active, shades.colormap, asked[active].shown_from, True, shades.ends(asked[active].cut)
-            )
-        case Mode.LABELS:
-            return renderer.label_texture(colours, min(p.cut for p in asked))
-        case Mode.MASKS | Mode.ISOLATE | Mode.HIDE | Mode.DIM:
-            return renderer.mask_texture(MASKS[mode], colours, cuts)
-        case Mode.MARGIN:
-            return renderer.margin_texture(asked[0].cut, margin_span(len(asked)), shades.colormap)
-        case Mode.ATOMS:
-            return renderer.atom_texture()
-        case Mode.WEIGHT:
-            return renderer.weight_texture(atom, shades.colormap)
-        case Mode.FEATURES:
-            return renderer.feature_texture()
-        case Mode.TRANSMITTANCE:
-            return renderer.transmittance_texture(shades.colormap)
-        case Mode.COVERAGE:
-            return renderer.coverage_texture()
-        case Mode.AGREEMENT:
-            return renderer.agreement_texture(shades.colormap)
-        case Mode.DEPTH:
-            return renderer.depth_texture(shades.colormap)
-        case Mode.RGB:
-            return renderer.rgb_texture
-
-
 def _kind(state: State) -> Kind:
     """What a picture must hold to show what is wanted while the camera moves."""
     if not state.wants_maps or state.info is None or state.info.num_atoms == 0:
         return Kind.COLOUR
-    return Kind.MAPS if state.mode.of_atoms else Kind.FAST
+    return Kind.MAPS if state.mode.maps else Kind.FAST

@@ -40,3 +40,8 @@ def stamp(path: Path) -> tuple[str, int, int]:
     except OSError:
         return path.name, -1, -1
     return path.name, known.st_size, known.st_mtime_ns
+
+
+def export_path(ending: str) -> Path:
+    """What a file besides the scene is called in its set's folder."""
+    return Path(f"scene{ending}" if ending.startswith(".") else ending)

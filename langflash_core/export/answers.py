@@ -1,9 +1,10 @@
-"""The folder that `query -o DIR` fills: one view, and per prompt its mask, heat, and relevance."""
+"""What is told of an answered view: the folder that `query -o DIR` fills, and the document beside it."""
 
 import itertools
 import unicodedata
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from langflash_core.colormaps import HeatColours
 from langflash_core.export.npz import write_npz
@@ -17,7 +18,7 @@ from langflash_core.export.png import (
     write_rgb,
 )
 from langflash_core.files import make_folder
-from langflash_core.types import QueryResult
+from langflash_core.types import PromptAnswer, QueryResult, Scene
 
 _MAX_NAME = 60
 
@@ -64,3 +65,39 @@ def file_names(prompts: Sequence[str]) -> list[str]:
         others = (f"{name}_{number}" for number in itertools.count(2))
         names.append(name if name not in names else next(other for other in others if other not in names))
     return names
+
+
+def answers_document(scene: Scene, result: QueryResult, files: Sequence[dict[str, str]]) -> dict[str, Any]:
+    """What `query --json` says of a view; `files` by kind, one entry a phrase."""
+    metres = scene.record.metric_scale
+    return {
+        "mode": result.mode,
+        "size": [result.camera.width, result.camera.height],
+        "unit": "m" if metres else "scene",
+        "prompts": [
+            {**answer_fields(answer, metres or 1.0), "files": paths}
+            for answer, paths in zip(result.answers, files, strict=True)
+        ],
+    }
+
+
+def answer_fields(answer: PromptAnswer, scale: float) -> dict[str, Any]:
+    """The JSON of one answer; positions and sizes multiplied by `scale` (metres per scene unit)."""
+    return {
+        "prompt": answer.prompt,
+        "found": answer.found,
+        "score": answer.score,
+        "threshold": answer.threshold,
+        "area": answer.area,
+        "centroid": answer.centroid and [scale * value for value in answer.centroid],
+        "box": answer.box and scaled_box(answer.box, scale),
+    }
+
+
+def scaled_box(box: dict[str, Any], scale: float) -> dict[str, Any]:
+    """Place and size multiplied by `scale`."""
+    return {
+        "center": [scale * value for value in box["center"]],
+        "axes": [list(axis) for axis in box["axes"]],
+        "size": [scale * value for value in box["size"]],
+    }

@@ -17,7 +17,7 @@ import numpy as np
 
 from langflash_core.errors import SceneFileError
 from langflash_core.export.packing import check_some, from_smallest_three, morton_order, smallest_three
-from langflash_core.export.ply import bytes_of, read_elements
+from langflash_core.export.ply import bytes_of, read_elements, read_ply
 from langflash_core.export.stored import Gathering, Rows, parts, to_scene
 from langflash_core.files import write_atomically
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE, SH_C0
@@ -196,3 +196,12 @@ def _word(shares: np.ndarray, shifts: tuple[int, ...], bits: tuple[int, ...]) ->
     tops = (1 << np.array(bits)) - 1
     fields = np.clip(np.floor(shares.astype(np.float64) * tops + 0.5), 0, tops).astype(np.uint32)
     return np.bitwise_or.reduce(fields << np.array(shifts, np.uint32), 1)
+
+
+def read_any_ply(path: Path) -> Scene:
+    """A .ply by what its header declares, whatever stands before the suffix.
+
+    Raises:
+        SceneFileError: what the reader of its kind finds wrong.
+    """
+    return read_compressed_ply(path) if is_compressed(path) else read_ply(path)

@@ -18,6 +18,7 @@ from langflash_core.types import LUMA, Frame, QueryResult
 USUAL = HeatColours()
 RANGES = {"cosine": (-1.0, 1.0), "relevancy": (0.0, 1.0)}
 GLOW = 0.85  # share of the heat colour where relevance is highest
+LABEL_OPACITY = 0.6  # of a phrase's colour over the view, as in the window
 DIM = 0.6  # brightness of the photo where nothing was found
 
 
@@ -145,14 +146,16 @@ def write_answer(result: QueryResult, path: Path) -> None:
         threshold = result.answers[0].threshold
         write_heat(path, result.relevance[0], result.frame.rgb, threshold, result.mode)
         return
-    labels = label_map(result).cpu()
-    colours = torch.from_numpy(
-        np.concatenate((np.zeros((1, 3), np.uint8), label_colours(len(result.answers))))
-    )
-    view = result.frame.rgb.float().cpu().clamp(0, 1)
-    grey = (view * view.new_tensor(LUMA)).sum(-1, keepdim=True)
-    lit = colours[labels].float() / 255 * (0.45 + 0.55 * grey)
-    write_rgb(path, torch.where((labels > 0)[..., None], lit, DIM * grey.expand_as(view)))
+    write_rgb(path, torch.from_numpy(label_picture(result)))
+
+
+def label_picture(result: QueryResult) -> np.ndarray:
+    """(H, W, 3) uint8: each pixel in the colour of the phrase that fits best, dimmed where none does."""
+    labels = label_map(result).cpu()  # (H, W), 0 is none
+    colours = np.concatenate((np.zeros((1, 3)), label_colours(len(result.answers)) / 255))
+    rgb = result.frame.rgb.detach().cpu().float().clamp(0, 1)
+    coloured = (1 - LABEL_OPACITY) * rgb + LABEL_OPACITY * torch.from_numpy(colours).float()[labels]
+    return to_8bit(torch.where((labels > 0)[..., None], coloured, 0.4 * rgb))
 
 
 def to_8bit(rgb: Tensor) -> np.ndarray:

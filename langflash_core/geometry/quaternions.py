@@ -75,9 +75,3 @@ def multiply_quats(left: Tensor, right: Tensor) -> Tensor:
         ),
         -1,
     )
-
-
-def covariances(quats: Tensor, scales: Tensor) -> Tensor:
-    """Covariance matrices R diag(s^2) R^T, (..., 3, 3), symmetric positive semi-definite."""
-    half = quats_to_matrices(quats) * scales[..., None, :]
-    return half @ half.transpose(-1, -2)

@@ -151,26 +151,6 @@ def compile_query(
     )
 
 
-def cosine_maps(weight_maps: Tensor, factor: Tensor, phrases: Tensor, eps: float = EMPTY_NORM) -> Tensor:
-    """Cosine between F(p) and phrases, in reduced form.
-
-    Args:
-        weight_maps: W (..., K), any dtype; computed in the factor's.
-        factor: R (K, r).
-        phrases: Q t (P, r), of unit t.
-        eps: empty pixels, |F| < eps, give 0.
-
-    Returns:
-        (P, ...) in [-1, 1].
-
-    Raises:
-        ValueError: K or r disagree between arguments.
-
-    Source: own derivation; twins `feature_cosine`, `gram_cosine`, tests/language/reference.py.
-    """
-    return _cosines(_features(weight_maps, factor), phrases, eps)[0].movedim(-1, 0)
-
-
 def relevancy(positives: Tensor, negatives: Tensor, temperature: float) -> Tensor:
     """Smallest, over the negatives, of softmax(temperature * [pos, neg])_pos.
 

@@ -6,7 +6,6 @@ from scipy.spatial import KDTree
 from langflash_core.types import Gaussians, Semantics
 
 NEIGHBOURS = 12  # that a Gaussian on a surface has around it, two rings of a square grid
-STRICTNESS = 5.0  # robust deviations from which a Gaussian is a floater, unless asked otherwise
 _MAD_TO_DEVIATION = 1.4826  # of a normal distribution
 _LEAST_DEVIATION = 0.1  # of a logarithm: a perfect grid has spread 0, and tenths there are no news
 

@@ -6,6 +6,7 @@ import signal
 import struct
 import sys
 import time
+from collections.abc import Generator
 from pathlib import Path
 
 import numpy as np
@@ -195,6 +196,7 @@ def test_a_film_left_early_ends_its_process(tmp_path):
     path = films.write(tmp_path / "walk.mp4", films.walk(40))
     with opened(path) as reader:
         pictures = reader.pictures(0.0, None, lambda: None)
+        assert isinstance(pictures, Generator)
         next(pictures)
         waiting = len(process._idle.get("films", []))
         pictures.close()

@@ -24,10 +24,10 @@ from langflash_core.errors import LangFlashError
 from langflash_core.export import export, read
 from langflash_core.export.packing import turned
 from langflash_core.export.stored import Rows
-from langflash_core.geometry.quaternions import covariances
 from langflash_core.geometry.turning import axes_matrix
 from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Gaussians, Scene
+from tests.geometry.spread import covariances
 
 _Convert = Callable[[Path, Path], None]
 # Axes that a reader leaves a format's numbers in, where it does not turn them to right, down, forward.

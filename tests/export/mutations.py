@@ -26,16 +26,17 @@ import numpy as np
 import pillow_heif
 from PIL import Image
 
-from app.cli.cameras import read_camera
-from app.cli.video import along, read_key_frames
 from langflash_core.errors import InputError, OutputError
 from langflash_core.export import export, read
 from langflash_core.export.cameras import read_posed
+from langflash_core.geometry.tours import along
 from langflash_core.images.decode import read_photo
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.edits import History, Marks, Mask, hide, rename_atom
 from langflash_core.scene.edits_file import load_history, save_history
+from langflash_core.writing.cameras import read_camera
+from langflash_core.writing.films import read_key_frames
 from tests.app.cli.conftest import stripes
 from tests.export.splats import ksplat_bytes, random_gaussians
 

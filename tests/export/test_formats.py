@@ -17,11 +17,11 @@ from torch.nn.functional import normalize
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export import READERS, WRITERS, export, read, spz
 from langflash_core.export.packing import morton_order
-from langflash_core.formats import CAMERAS_OUT, DROPPED, PAGE_OUT, SCENES_IN, SCENES_OUT
 from langflash_core.geometry.harmonics import SH_C0, sh_to_colour
+from langflash_core.outputs import DROPPED, SCENES_IN, SCENES_OUT
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
-from langflash_core.types import Gaussians, Scene
+from langflash_core.types import Gaussians
 from tests.export.splats import ksplat_bytes, random_gaussians
 
 HALF = 0.5 / 255 + 1e-6  # of a step of 8 bits
@@ -206,10 +206,8 @@ def test_an_empty_scene_is_refused_and_nothing_written(tmp_path, kind):
 
 
 def test_the_list_of_names_is_the_table():
-    assert set(READERS) == set(SCENES_IN)
-    assert {kind for kind, ws in WRITERS.items() if any(w.subject is Scene for w in ws)} == set(
-        SCENES_OUT
-    ) | {*CAMERAS_OUT, PAGE_OUT}
+    whole = {"cameras.txt", "transforms.json", ".html"}
+    assert {kind for kind, own in WRITERS.items() if "of_scene" in own} == set(SCENES_OUT) | whole
     assert set(DROPPED) == set(READERS) - {"meta.json"}
 
 
@@ -230,8 +228,8 @@ def test_axes_turn_positions_shapes_and_colours_together(letters, matrix):
     """A Gaussian seen along d before looks the same seen along M d after."""
     from langflash_core.export.packing import turned
     from langflash_core.export.stored import Rows
-    from langflash_core.geometry.quaternions import covariances
     from langflash_core.geometry.turning import axes_matrix
+    from tests.geometry.spread import covariances
 
     expected = torch.tensor(matrix, dtype=torch.float64)
     assert torch.equal(axes_matrix(letters), expected)

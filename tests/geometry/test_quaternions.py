@@ -6,12 +6,12 @@ import torch
 from scipy.spatial.transform import Rotation
 
 from langflash_core.geometry.quaternions import (
-    covariances,
     matrices_to_quats,
     multiply_quats,
     quats_to_matrices,
     unit_quats,
 )
+from tests.geometry.spread import covariances
 
 
 def _rotations(count: int = 300) -> tuple[torch.Tensor, torch.Tensor]:

@@ -1,5 +1,6 @@
 import math
 import time
+from dataclasses import replace
 from inspect import unwrap
 
 import pytest
@@ -12,7 +13,6 @@ from langflash_core.language.relevance import (
     CompiledQuery,
     Mode,
     compile_query,
-    cosine_maps,
     finite_atoms,
     reduce_dictionary,
     relevance_maps,
@@ -197,7 +197,7 @@ def test_sizes_must_agree():
     with pytest.raises(ValueError, match="weight_maps: expected K = 4, received 5"):
         relevance_maps(maps(5), query)
     with pytest.raises(ValueError, match="phrases: expected r = 4, received 3"):
-        cosine_maps(maps(4), query.factor, query.prompts[:, :3])
+        relevance_maps(maps(4), replace(query, prompts=query.prompts[:, :3]))
 
 
 # With the real text tower.

@@ -76,7 +76,9 @@ def test_a_layer_of_the_stacks_equals_every_view_reading_all_others(num_views):
         block, others = other if view else first, [v for v in range(num_views) if v != view] or [view]
         memory = torch.cat([x[:, v] for v in others], 1)
         expected.append(block(x[:, view], block.memory(memory, code.repeat(1, len(others), 1)), code))
-    assert torch.allclose(decoder._layer(x, code, first, other), torch.stack(expected, 1), rtol=0, atol=1e-12)
+    assert torch.allclose(
+        decoder._layer(x, code, first, other, None), torch.stack(expected, 1), rtol=0, atol=1e-12
+    )
 
 
 def test_decoder_treats_other_views_alike_and_reads_them():

@@ -6,11 +6,11 @@ import pytest
 import torch
 from torch import Tensor
 
-from langflash_core.geometry.quaternions import covariances
 from langflash_core.network import PointMapNet, build_network
 from langflash_core.network.checkpoints.importing import convert
 from langflash_core.network.points.heads import activated
 from langflash_core.network.presets import PointMaps
+from tests.geometry.spread import covariances
 from tests.network import published
 from tests.network.sizes import TINY, large
 

@@ -13,7 +13,7 @@ import torch
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.harmonics import sh_to_colour
-from langflash_core.geometry.quaternions import covariances, multiply_quats, quats_to_matrices, unit_quats
+from langflash_core.geometry.quaternions import multiply_quats, quats_to_matrices, unit_quats
 from langflash_core.scene import edits
 from langflash_core.scene.changed import changed, changed_scene, mean_luma
 from langflash_core.scene.changes import (
@@ -34,6 +34,7 @@ from langflash_core.scene.joining import joined
 from langflash_core.scene.mask import Mask
 from langflash_core.splat import render
 from langflash_core.types import LUMA, NO_LANGUAGE, Gaussians, Scene
+from tests.geometry.spread import covariances
 from tests.splat.scenes import camera, cloud
 
 COUNT = 203  # not a multiple of 8

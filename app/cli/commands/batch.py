@@ -9,20 +9,18 @@ from typing import TextIO
 from langflash_core.__main__ import in_program
 from langflash_core.batch.dispatch import Job
 from langflash_core.batch.ledger import FAILED, Ledger
-from langflash_core.batch.order import Order
+from langflash_core.batch.order import Order, export_path
 from langflash_core.batch.run import finish, jobs_of, left_to_do, run_jobs
 from langflash_core.batch.sets import LEDGER, SUMMARY, read_sets
 from langflash_core.errors import InputError, PromptError, WeightsError
-from langflash_core.files import held_alone
-from langflash_core.formats import ALL_OUT, ANSWERS_OUT, FILMS_OUT
+from langflash_core.files import check_folder, held_alone, readable_file
+from langflash_core.outputs import ALL_OUT, output_of
+from langflash_core.request import spoken
 
 from ..crew import crew, processors, threads_said
-from ..files import check_folder, readable_file
-from ..report import say_error, write_json
+from ..report import INTERRUPTED, say_error, write_json
 from ..table import ProgressTable
-from .query import spoken
 
-INTERRUPTED = 130
 MEMORY = {"mini": 1_500_000_000, "full": 7_000_000_000}  # bytes that a worker may come to hold
 EXPORTS = tuple(kind for kind in ALL_OUT if kind != ".langflash")  # the scene itself is always written
 
@@ -96,12 +94,13 @@ def _check_exports(exports: Sequence[str], prompts: Sequence[str]) -> None:
     for name in exports:
         if name not in EXPORTS:
             raise InputError(f"--export {name} is not an ending that is written; choose {', '.join(EXPORTS)}")
-        if name in ANSWERS_OUT and not prompts:
+        kind = output_of(export_path(name), None, asked=False)
+        if kind is not None and kind.needs_phrases and not prompts:
             raise PromptError(f'--export {name} needs a phrase; add --prompt "armchair"')
-    if set(FILMS_OUT) & set(exports):
-        from ..video import check_encoder
+        if kind is not None and kind.moves:
+            from langflash_core.writing.films import check_encoder
 
-        check_encoder()
+            check_encoder()
 
 
 def _opening(order: Order, threads: int) -> partial:

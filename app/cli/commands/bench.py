@@ -4,8 +4,8 @@ from argparse import Namespace
 from typing import TYPE_CHECKING, TextIO
 
 from langflash_core.errors import InputError, OutputError, PromptError, SceneFileError
+from langflash_core.files import check_folder, readable_file, staged_folder
 
-from ..files import check_folder, readable_file, staged_folder
 from ..report import ProgressBar, say_warnings, write_json
 from ..scenes import open_scene
 

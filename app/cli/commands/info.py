@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from langflash_core.errors import InputError, SceneFileError
+from langflash_core.files import readable_file
 from langflash_core.limits import LIMITS
 
-from ..files import readable_file
 from ..report import write_json
 from ..sbom import bill_of_materials
 

@@ -5,8 +5,8 @@ from argparse import Namespace
 from typing import TextIO
 
 from langflash_core.errors import ImageError, InputError, WeightsError
+from langflash_core.files import check_output_file, readable_file
 
-from ..files import check_output_file, readable_file
 from ..renderers import open_renderer
 from ..report import ProgressBar, write_json
 from ..scenes import open_scene

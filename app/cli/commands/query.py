@@ -1,17 +1,14 @@
 """`langflash query`: heat-maps, masks and numbers for phrases."""
 
 from argparse import Namespace
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import Any, TextIO
 
-from langflash_core.errors import PromptError
+from langflash_core.files import check_folder, staged_folder
+from langflash_core.request import spoken
 
-from ..files import check_folder, checked_scene, staged_folder
+from ..files import checked_scene
 from ..report import ProgressBar, write_json
-
-if TYPE_CHECKING:
-    from langflash_core.types import PromptAnswer, QueryResult, Scene
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -26,7 +23,7 @@ def run(args: Namespace, out: TextIO) -> None:
     check_folder(args.output)
     from langflash_core import pipeline
     from langflash_core.colormaps import HeatColours
-    from langflash_core.export.answers import write_answers
+    from langflash_core.export.answers import answers_document, write_answers
 
     from ..cameras import chosen_camera
     from ..renderers import open_renderer
@@ -52,56 +49,6 @@ def run(args: Namespace, out: TextIO) -> None:
         write_json(document, out)
     else:
         print("\n".join(_line(entry, document["unit"]) for entry in document["prompts"]), file=out)
-
-
-def spoken(prompts: Sequence[str]) -> list[str]:
-    """Phrases without the white space around them.
-
-    Raises:
-        PromptError: one is empty.
-    """
-    phrases = [" ".join(prompt.split()) for prompt in prompts]
-    if not all(phrases):
-        raise PromptError('a prompt is empty; give a phrase such as "armchair"')
-    return phrases
-
-
-def answers_document(
-    scene: "Scene", result: "QueryResult", files: Sequence[dict[str, str]]
-) -> dict[str, Any]:
-    """What `query --json` says of a view; `files` by kind, one entry a phrase."""
-    metres = scene.record.metric_scale
-    return {
-        "mode": result.mode,
-        "size": [result.camera.width, result.camera.height],
-        "unit": "m" if metres else "scene",
-        "prompts": [
-            {**answer_fields(answer, metres or 1.0), "files": paths}
-            for answer, paths in zip(result.answers, files, strict=True)
-        ],
-    }
-
-
-def answer_fields(answer: "PromptAnswer", scale: float) -> dict[str, Any]:
-    """The JSON of one answer; positions and sizes multiplied by `scale` (metres per scene unit)."""
-    return {
-        "prompt": answer.prompt,
-        "found": answer.found,
-        "score": answer.score,
-        "threshold": answer.threshold,
-        "area": answer.area,
-        "centroid": answer.centroid and [scale * value for value in answer.centroid],
-        "box": answer.box and scaled_box(answer.box, scale),
-    }
-
-
-def scaled_box(box: dict[str, Any], scale: float) -> dict[str, Any]:
-    """Place and size multiplied by `scale`."""
-    return {
-        "center": [scale * value for value in box["center"]],
-        "axes": [list(axis) for axis in box["axes"]],
-        "size": [scale * value for value in box["size"]],
-    }
 
 
 def _line(entry: dict[str, Any], unit: str) -> str:

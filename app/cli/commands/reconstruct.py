@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from langflash_core.errors import ImageError, InputError, WeightsError
-from langflash_core.files import held_alone
+from langflash_core.files import check_output_file, held_alone, readable_file
 from langflash_core.formats import is_film
 from langflash_core.keeping import forget
 
-from ..files import check_output_file, readable_file
 from ..films import with_frames
 from ..report import ProgressBar, say_warnings, write_json
 

@@ -4,8 +4,7 @@ from argparse import Namespace
 from typing import TextIO
 
 from langflash_core.errors import ImageError
-
-from ..files import readable_file
+from langflash_core.files import readable_file
 
 
 def run(args: Namespace, out: TextIO) -> int:

@@ -9,6 +9,7 @@ from typing import Any, TextIO
 from safetensors import SafetensorError, safe_open
 
 from langflash_core.errors import WeightsError
+from langflash_core.files import readable_file
 from langflash_core.network import PRESETS, load_network
 from langflash_core.network.checkpoints.catalogue import CATALOGUE, CLIP, OTHERS, SAM2, published
 from langflash_core.network.checkpoints.download import download
@@ -16,7 +17,6 @@ from langflash_core.network.checkpoints.parts import FORMAT, part_folder, read_p
 from langflash_core.network.checkpoints.store import install, verify_part
 from langflash_core.resources import asset_path, weights_folder
 
-from ..files import readable_file
 from ..report import ProgressBar, say_warnings, write_json
 
 

@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
+from langflash_core import pictures
 from langflash_core.detail import EXPORT_DETAILS
+from langflash_core.outputs import WORDS, help_of_files, help_of_words
 
 from ..values import (
     above_zero,
@@ -28,10 +30,6 @@ from .shared import (
     new_actions,
     new_command,
 )
-
-WHATS = (
-    "rgb", "heat", "mask", "soft", "cutout", "labels", "instances", "depth", "boxes", "surface",
-)  # fmt: skip
 
 
 def add_view(commands) -> None:
@@ -221,8 +219,8 @@ def add_render(commands) -> None:
     command.add_argument(
         "--what",
         type=what,
-        default=("rgb", None),
-        metavar="rgb|depth|relevance|labels|atoms|weights:K",
+        default=(pictures.RGB, pictures.RGB.word, None),
+        metavar="|".join(pictures.WORDS),
         help="(default: rgb)",
     )
     command.add_argument(
@@ -243,12 +241,7 @@ def add_export(commands) -> None:
     add_output(
         command,
         "FILE",
-        "with --segmented a folder; else .png: a picture, or a cut-out with --prompt; .langflash, .ply, "
-        ".compressed.ply, .splat, .spz, .sog, meta.json (a SOG in a folder), .glb, .usd, .usda, .usdc, "
-        ".usdz: Gaussians; transforms.json, cameras.txt (COLMAP): photos and their poses; "
-        ".json: COCO masks of --prompt; .csv, or .glb with --what boxes: their boxes; "
-        ".npz: a view as numbers; .exr: its depth; .mp4, .webp: a flight; "
-        ".html: a web page that shows the scene and answers phrases",
+        help_of_files(),
     )
     command.add_argument(
         "--prompt",
@@ -261,11 +254,8 @@ def add_export(commands) -> None:
     )
     command.add_argument(
         "--what",
-        choices=WHATS,
-        help="of a .png: colours, a heat-map, a mask, a soft mask of 16 bits, a cut-out with transparency "
-        "(default with --prompt), numbers of phrases or of instances with a legend as .json, or depth in "
-        "steps of 16 bits; boxes: a .json, .csv or .glb of places and sizes; surface: a .glb; of a video: "
-        "heat",
+        choices=WORDS,
+        help=help_of_words(),
     )
     command.add_argument(
         "--segmented",

@@ -5,8 +5,9 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..poses import Vector
-from ..scene.state import Mode
+from langflash_core import pictures
+from langflash_core.geometry.poses import Vector
+
 from ..state import State
 from .prompt_sets import MOST_PROMPTS, PromptSet
 from .state import LEAST_SPAN, MOST_RECENT, PALETTE, Histogram, Insight, Prompt
@@ -99,7 +100,7 @@ class EditPrompt:
             state, self.key, text=self.text, score=None, like=b"", place=None, foreign=False
         )
         first = not state.asked and bool(after.asked)
-        mode = Mode.HEAT if first and state.mode is Mode.RGB else after.mode
+        mode = pictures.HEAT if first and state.mode is pictures.RGB else after.mode
         return change(replace(after, mode=mode, active=self.key), named=False)
 
 
@@ -203,7 +204,7 @@ class AskAgain:
             key = empty.key
             asked = replace(empty, text=self.text, score=None, visible=True)
             prompts = tuple(asked if p.key == key else p for p in prompts)
-        mode = Mode.HEAT if state.mode is Mode.RGB and not state.asked else state.mode
+        mode = pictures.HEAT if state.mode is pictures.RGB and not state.asked else state.mode
         after = replace(state, prompts=prompts, active=key, mode=mode, next_key=state.next_key + 1)
         return Remember(self.text).apply(change(after, named=False))
 
@@ -241,7 +242,7 @@ class PromptsRead:
             replace(p, key=first + place, calibrated=calibrated)
             for place, p in enumerate(self.chosen.prompts)
         )
-        mode = Mode.LABELS if state.mode is Mode.RGB else state.mode
+        mode = pictures.LABELS if state.mode is pictures.RGB else state.mode
         state = replace(
             state,
             prompts=prompts,
@@ -375,7 +376,7 @@ class ShowAtom:
     def apply(self, state: State) -> State:
         if state.info is None or not 0 <= self.atom < state.info.num_atoms:
             return state
-        return replace(change(state, atom=self.atom), mode=Mode.WEIGHT)
+        return replace(change(state, atom=self.atom), mode=pictures.WEIGHT)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..poses import Vector
+from langflash_core.geometry.poses import Vector
 
 # Told apart by people with the common colour-vision deficiencies, on dark ground.
 PALETTE = (
@@ -149,8 +149,3 @@ def unfinished(text: str) -> bool:
 def usable(text: str) -> bool:
     """Whether a prompt can be asked as it reads."""
     return bool(text.strip()) and not unfinished(text)
-
-
-def margin_span(num_prompts: int) -> tuple[float, float]:
-    """Margins shown as the first and the last colour: of one prompt it may be negative."""
-    return (-0.5, 0.5) if num_prompts == 1 else (0.0, 0.5)

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from langflash_core.geometry.poses import Vector
 from langflash_core.scene.edits import Marks
 
 from ..commands import Command, Notify, ShowPicture
-from ..poses import Vector
 from ..requests import Asked, Errand, SceneErrand
 from .commands import Answered, AtomsDescribed, AtomsWeighed, Binned, PhrasesCompiled, PromptsRead
 from .prompt_sets import PromptSet, read_prompts, write_prompts

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 
+from langflash_core import pictures
 from langflash_core.scene import edits
 from langflash_core.scene.changes import Moved
 from langflash_core.scene.edits import Combine, History, Marks
@@ -9,7 +10,6 @@ from langflash_core.scene.mask import Mask
 
 from ..asking.commands import lapsed
 from ..commands import Notify
-from ..scene.state import Mode
 from ..state import State
 from .state import STRICTNESS_RANGE, Floaters, Point, Region
 
@@ -77,7 +77,7 @@ class SelectByPhrase:
     combine: Combine = "replace"
 
     def apply(self, state: State) -> State:
-        return change(replace(state, mode=Mode.RGB), waiting="Selecting")
+        return change(replace(state, mode=pictures.RGB), waiting="Selecting")
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 from weakref import ref
 
 import numpy as np
-import pyrr
 
+from langflash_core import pictures
+from langflash_core.geometry.rotations import quaternion
 from langflash_core.scene import edits
 from langflash_core.scene.changes import (
     SCALES,
@@ -26,7 +27,6 @@ from langflash_core.scene.changes import (
 )
 from langflash_core.scene.edits import Marks
 
-from ..scene.state import Mode
 from ..state import State
 from .commands import change, with_edit
 from .state import Handle, Tint, Tool
@@ -77,7 +77,7 @@ class ShowTint:
         if marks is None or not marks.selected:
             return state
         gesture = Recoloured.tinted(marks.selected, self.tint.colour, self.tint.strength, self.luma)
-        return change(replace(state, mode=Mode.RGB), tint=self.tint, gesture=gesture, last_tint=self.tint)
+        return change(replace(state, mode=pictures.RGB), tint=self.tint, gesture=gesture, last_tint=self.tint)
 
 
 @dataclass(frozen=True)
@@ -208,9 +208,7 @@ def from_matrix(matrix: np.ndarray, pivot: Spot, handle: Handle, before: Moved) 
             offset = matrix[:3, 3] - pivot
             return Moved(before.rows, offset=_spot(offset)) if abs(offset).max() < FARTHEST else before
         case Handle.TURN:
-            quat_xyzw = pyrr.quaternion.create_from_matrix(matrix[:3, :3] / factors)
-            x, y, z, w = (quat_xyzw / np.linalg.norm(quat_xyzw)).tolist()
-            return Moved.about(before.rows, pivot, (w, x, y, z))
+            return Moved.about(before.rows, pivot, quaternion(matrix[:3, :3] / factors))
         case Handle.SCALE:
             factor = float(factors[np.argmax(abs(np.log(factors)))])
             return Moved.about(before.rows, pivot, scale=min(max(factor, SCALES[0]), SCALES[1]))

@@ -4,12 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from langflash_core import pictures
+from langflash_core.geometry import poses
+from langflash_core.geometry.poses import Vector
 from langflash_core.scene.edits import Combine
 
-from .. import poses
 from ..asking.state import PALETTE, Prompt
-from ..poses import Vector
-from ..scene.state import Flight, Mode
+from ..scene.state import Flight
 from ..state import State
 from .commands import change, with_edit
 from .state import RADIUS_RANGE, REACH_RANGE, Card, Point, Reading, Spot, Tool
@@ -222,7 +223,7 @@ class FindSimilar:
         free = [c for c in PALETTE if c not in used] or [PALETTE[len(state.prompts) % len(PALETTE)]]
         prompt = Prompt(state.next_key, text, free[0], LIKE_THRESHOLD, like=card.vector)
         prompts = (*(p for p in state.prompts if p is not empty), prompt)
-        mode = Mode.HEAT if state.mode is Mode.RGB else state.mode
+        mode = pictures.HEAT if state.mode is pictures.RGB else state.mode
         state = replace(state, prompts=prompts, active=prompt.key, next_key=state.next_key + 1, mode=mode)
         return change(state, card=None)
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from langflash_core.geometry.poses import Pose, to_camera
 from langflash_core.scene.edits import Combine, Marks
 from langflash_core.scene.mask import Mask
 
 from ..commands import Command, Notify
-from ..poses import Pose, to_camera
 from ..requests import Asked, SceneErrand
 from ..scene.state import SceneInfo
 from ..state import State

@@ -4,10 +4,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from langflash_core.outputs import Output
+
 from ..commands import Notify
 from ..scene import samples
 from ..state import State
-from .state import ExportForm, Running, What
+from .state import ExportForm, Running
 
 
 def change(state: State, **changes: Any) -> State:
@@ -135,14 +137,14 @@ class CopiesAt:
         return change(state, edited=self.edited, selection=self.selection)
 
 
-def _place(state: State, what: What) -> Path:
+def _place(state: State, what: Output) -> Path:
     """Beside the scene, or beside its photos, by a name of its own for each kind."""
     assert state.info is not None
     beside = state.info.path or samples.beside(state.photos)
     return beside.with_name(f"{beside.stem}{what.ends}{what.suffix}")
 
 
-def _renamed(path: str, old: What, new: What) -> str:
+def _renamed(path: str, old: Output, new: Output) -> str:
     """The path of one kind as that of another; one that does not end as its kind stays as it is."""
     if not path.lower().endswith(old.suffix):
         return path

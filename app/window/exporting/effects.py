@@ -114,10 +114,10 @@ class ExportingEffects(Effects):
         make_folder(wanted.target.parent)
         if wanted.camera_file is not None:
             size = pixels(state.exporting.form.side, state.pose.aspect)
-            keys = state.keys if state.exporting.form.what.film else ()
+            keys = state.keys if state.exporting.form.what.moves else ()
             content = keys_json(keys, *size) if keys else camera_json(state.pose, *size)
             write_atomically(wanted.camera_file, content)
-        self._exporter.start((*wanted.words, *(("--replace",) if replaces else ())))
+        self._exporter.start(replace(wanted.request, replace=replaces).words())
 
     def _progressed(self, stage: str, fraction: float) -> None:
         self._hands.dispatch(ExportProgressed(stage, fraction))

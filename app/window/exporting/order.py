@@ -1,39 +1,77 @@
-"""The command line that does what the export dialog says.
+"""The request that does what the export dialog says.
 
-The window runs that very command in a process of its own, so what is shown is what is done.
+The window runs the command that says the same in a process of its own, so what is shown is what is done.
 """
 
 import os
-import shlex
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from langflash_core.formats import COLOUR_MAPS
+from langflash_core.outputs import PAGE, SEGMENTED
+from langflash_core.request import ExportRequest
 
 from ..scene.drops import typed_path
 from ..scene.near import fills_gaps, keeps_near, photos_known
 from ..state import State
-from .state import ExportForm, What
+from .state import ExportForm
 
 
 @dataclass(frozen=True)
 class Order:
-    """What the dialog comes to: the words after `langflash`, a camera file to write first, and all files
-    that will be written."""
+    """What the dialog comes to: what to write, a camera file to write first, and all files that will be
+    written."""
 
-    words: tuple[str, ...]
-    target: Path
+    request: ExportRequest
     camera_file: Path | None = None
     files: tuple[Path, ...] = ()
 
     @property
+    def target(self) -> Path:
+        """The file, or folder, that is named."""
+        return self.request.output
+
+    @property
+    def words(self) -> list[str]:
+        """The command that does it, after `langflash`."""
+        return self.request.words()
+
+    @property
     def line(self) -> str:
-        """To paste into a shell."""
-        return shlex.join(("langflash", *self.words))
+        """The command, to paste into a shell."""
+        return self.request.line
 
 
 def order(state: State) -> Order | str:
-    """The command for the form as it stands, or a sentence that says what is missing."""
+    """What the form says as it stands, or a sentence that says what is missing."""
+    target = _target(state)
+    if isinstance(target, str):
+        return target
+    phrases, problem = _phrases(state)
+    if problem:
+        return problem
+    if state.exporting.form.what.moves and way(state) == "keys" and len(state.keys) < 2:
+        return "A film along key frames needs two of them; fly somewhere and add one (M)."
+    what, form = state.exporting.form.what, state.exporting.form
+    camera_file = _camera_file(state, target)
+    request = ExportRequest(
+        target,
+        source(state),
+        what=what.word or None,
+        segmented=what is SEGMENTED,
+        prompts=phrases,
+        threshold=_threshold(state) if phrases else None,
+        fade=fades(state),
+        fill=what.fills and fills_gaps(state) and (what.phrases == "one" or not phrases),
+        size=pixels(form.side, state.pose.aspect) if what.sized else None,
+        **_seen_from(state, camera_file),
+        **(_colours(state) if what.colours else {}),
+    )
+    return Order(request, camera_file, (*_written(state, target), *((camera_file,) if camera_file else ())))
+
+
+def _target(state: State) -> Path | str:
+    """The file, or what is wrong with its name."""
     form, info = state.exporting.form, state.info
     if info is None:
         return "There is no scene to export; drop photos on the window first."
@@ -45,37 +83,9 @@ def order(state: State) -> Order | str:
         return "Type a file name."
     if os.path.realpath(target) in _real(scene_file, info.path):
         return "This file is the scene itself; choose another name."
-    if _real(target, *_written(form, target, len(info.views))) & _real(*(p.path for p in state.photos)):
+    if _real(target, *_written(state, target)) & _real(*(photo.path for photo in state.photos)):
         return "This would replace a photo of the tray; choose another name."
-    phrases, problem = _phrases(state)
-    if problem:
-        return problem
-    words = ["export", str(scene_file), "-o", str(target)]
-    if form.what is What.SEGMENTED:
-        words.append("--segmented")
-    if form.what.word:
-        words += ["--what", form.what.word]
-    if phrases:
-        words += ["--prompt", *phrases, *_threshold(state)]
-    if fades(state):
-        words.append("--fade")
-    if form.what.fills and fills_gaps(state) and (form.what.of_one_phrase or not phrases):
-        words.append("--fill")
-    if form.what in (What.HEAT, What.HEAT_VIDEO):
-        words += _colours(state)
-    seen_from, camera_file = _seen_from(state, target)
-    words += seen_from
-    if form.what.sized:
-        words += ["--size", "{}x{}".format(*pixels(form.side, state.pose.aspect))]
-    if form.what.film:
-        if way(state) == "keys":
-            if len(state.keys) < 2:
-                return "A film along key frames needs two of them; fly somewhere and add one (M)."
-            camera_file = target.with_name(f"{target.stem}.keys.json")
-        words += ["--path", str(camera_file) if way(state) == "keys" else way(state)]
-        words += ["--seconds", f"{form.seconds:g}"]
-    files = (*_written(form, target, len(info.views)), *((camera_file,) if camera_file else ()))
-    return Order(tuple(words), target, camera_file, files)
+    return target
 
 
 def fades(state: State) -> bool:
@@ -91,29 +101,23 @@ def way(state: State) -> str:
     return state.exporting.form.way or ("keys" if len(state.keys) > 1 else "photos")
 
 
-def _colours(state: State) -> list[str]:
+def _colours(state: State) -> dict[str, Any]:
     """The window's own colour map and range."""
-    colours, words = state.heat_colours, []
-    if colours.colormap != COLOUR_MAPS[0]:
-        words += ["--colormap", colours.colormap]
-    if colours.span is not None:
-        words += ["--span", "{:.4g},{:.4g}".format(*colours.span)]
-    return words
+    low_high = state.heat_colours.span
+    span = None if low_high is None else (_rounded(low_high[0]), _rounded(low_high[1]))
+    return {"colormap": state.heat_colours.colormap, "span": span}
 
 
-def _written(form: ExportForm, target: Path, num_views: int) -> tuple[Path, ...]:
+def _rounded(value: float) -> float:
+    """To four digits, as people would type it."""
+    return float(f"{value:.4g}")
+
+
+def _written(state: State, target: Path) -> tuple[Path, ...]:
     """What the command writes: one file, or one a view, and what lies beside."""
-    what, views = form.what, range(num_views if form.all_views else 1)
-    if what is What.COCO:
-        return (target, *(target.with_name(f"{target.stem}_{view}.png") for view in views))
-    if what is What.PLY:
-        return target, target.with_name(f"{target.stem}.language.safetensors")
-    pictures = (target,)
-    if form.all_views and what.looks and what.suffix == ".png":
-        pictures = tuple(target.with_name(f"{target.stem}_{view}.png") for view in views)
-    with_legend = what in (What.LABELS, What.INSTANCES)
-    legends = (picture.with_suffix(".json") for picture in pictures if with_legend)
-    return (*pictures, *legends)
+    form, info = state.exporting.form, state.info
+    all_views = form.all_views and form.what.looks and info is not None
+    return form.what.files(target, len(info.views) if all_views and info is not None else None)
 
 
 def there(order: Order) -> tuple[Path, ...]:
@@ -121,17 +125,25 @@ def there(order: Order) -> tuple[Path, ...]:
     return tuple(file for file in order.files if os.path.exists(file))
 
 
-def _seen_from(state: State, target: Path) -> tuple[list[str], Path | None]:
-    """The words that say where from it is looked at, and the camera file that they name, if any."""
+def _camera_file(state: State, target: Path) -> Path | None:
+    """Where the view on show, or the key frames, are to be written for the command to read."""
     form = state.exporting.form
+    if form.what.moves:
+        return target.with_name(f"{target.stem}.keys.json") if way(state) == "keys" else None
+    looks = form.what.looks and not form.all_views and state.view is None
+    return target.with_name(f"{target.stem}.camera.json") if looks else None
+
+
+def _seen_from(state: State, camera_file: Path | None) -> dict[str, Any]:
+    """The fields of a request that say where from it is looked at."""
+    form = state.exporting.form
+    if form.what.moves:
+        return {"path": str(camera_file or way(state)), "seconds": form.seconds}
     if not form.what.looks:
-        return [], None
+        return {}
     if form.all_views:
-        return ([] if form.what is What.SEGMENTED else ["--all-views"]), None
-    if state.view is not None:
-        return ["--view", str(state.view)], None
-    camera_file = target.with_name(f"{target.stem}.camera.json")
-    return ["--camera", str(camera_file)], camera_file
+        return {"all_views": form.what is not SEGMENTED}
+    return {"view": state.view, "camera": camera_file}
 
 
 def _real(*files: Path | None) -> set[str]:
@@ -171,10 +183,10 @@ def _phrases(state: State) -> tuple[tuple[str, ...], str]:
     asked = tuple(prompt.text.strip() for prompt in state.asked)
     if what.needs_phrases and not asked:
         return (), f"{what.label} needs a phrase; type one under Find first."
-    if what.of_one_phrase:
+    if what.phrases == "one":
         active = state.active_prompt
         return ((active.text.strip(),) if active else asked[:1]), ""
-    if what is What.PAGE:
+    if what is PAGE:
         return asked, ""
     wanted = what.needs_phrases or (what.takes_phrases and state.exporting.form.only_found)
     if wanted and not asked:
@@ -182,15 +194,15 @@ def _phrases(state: State) -> tuple[tuple[str, ...], str]:
     return (asked if wanted else ()), ""
 
 
-def _threshold(state: State) -> list[str]:
+def _threshold(state: State) -> float | None:
     """The person's own threshold, where all phrases that take part share one."""
     active = state.active_prompt
-    part = [active] if state.exporting.form.what.of_one_phrase and active else list(state.asked)
+    part = [active] if state.exporting.form.what.phrases == "one" and active else list(state.asked)
     own = {prompt.threshold for prompt in part}
     threshold = next(iter(own)) if len(own) == 1 else None
     if threshold is None or not 0.0 < threshold < 1.0:
-        return []
-    return ["--threshold", f"{threshold:.4g}"]
+        return None
+    return _rounded(threshold)
 
 
 def remarks(state: State) -> list[str]:
@@ -202,7 +214,7 @@ def remarks(state: State) -> list[str]:
         notes.append(f"The {why} not saved: the command reads a copy that goes when the window closes.")
     if not (form.what.needs_phrases or form.only_found):
         return notes
-    if not form.what.of_one_phrase and len({prompt.threshold for prompt in state.asked}) > 1:
+    if form.what.phrases != "one" and len({prompt.threshold for prompt in state.asked}) > 1:
         notes.append("The thresholds differ, so the calibrated one is used for all.")
     if state.negatives:
         notes.append("Phrases are compared with the usual ones, not with your own.")

@@ -5,6 +5,8 @@ from dataclasses import replace
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from langflash_core.outputs import OFFERED
+
 from .. import commands as do
 from ..filming.state import WAYS
 from ..kit import theme, widgets
@@ -14,7 +16,7 @@ from ..scene.near import photos_known
 from ..state import State
 from . import commands as export
 from . import order as written
-from .state import SECONDS, ExportForm, What
+from .state import SECONDS, ExportForm
 
 WIDTH = 620.0  # design pixels
 HEIGHT = 740.0  # of the kinds that need most, with a command of three lines
@@ -22,39 +24,13 @@ PROGRESS = 112.0  # the same, high: what `draw_progress` needs
 COLUMNS = 4
 _NAMED = 6  # files that the question before a replacement names
 SIDES = (512, 1024, 1600, 2048, 4096)
-HINTS = {
-    What.RGB: "The scene's colours, PNG",
-    What.HEAT: "Where the active phrase fits, over the colours",
-    What.MASK: "White where any phrase is found",
-    What.SOFT: "How much of each pixel any phrase is, grey of 16 bits",
-    What.CUTOUT: "What the phrases find, on transparency (RGBA)",
-    What.LABELS: "Phrase numbers as a palette PNG, and a legend as JSON",
-    What.INSTANCES: "A number for each connected thing: three chairs are three; and a legend",
-    What.DEPTH: "16-bit PNG; the length of one step is in the file",
-    What.SEGMENTED: "Masks, cut-outs, instances, depth, boxes, surfaces, a contact sheet and a manifest",
-    What.COCO: "Instance masks as COCO JSON, and the pictures they belong to",
-    What.BOXES_JSON: "Place, axes and size of what each phrase finds",
-    What.BOXES_CSV: "The same as a table",
-    What.BOXES_GLB: "The same as bodies, for Blender and other 3D programs",
-    What.SURFACE: "A coloured mesh of what each phrase finds, fused from depth",
-    What.VIDEO: "A film around it, past the photos or along key frames, H.264",
-    What.WEBP: "The same for pages and messages, without a player",
-    What.HEAT_VIDEO: "The film with the active phrase's heat-map, H.264",
-    What.PLY: "3D Gaussians as other viewers read them",
-    What.SPZ: "Compressed, for phones and the web",
-    What.SOG: "Compressed as pictures, for SuperSplat and PlayCanvas",
-    What.SPLAT: "The compact format of older web viewers",
-    What.GLB: "3D Gaussians in glTF, with what they mean",
-    What.PAGE: "One HTML file for any browser, to fly through and to ask, without a network",
-    What.SCENE: "With language and photos, for this program",
-}
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
     """The dialog's body."""
     form = state.exporting.form
     wanted = _kinds(form, look)
-    widgets.muted(HINTS[form.what])
+    widgets.muted(form.what.tip)
     widgets.gap(look.px(4))
     wanted = _options(state, wanted, look)
     widgets.gap(look.px(4))
@@ -70,7 +46,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
 def _kinds(form: ExportForm, look: Look) -> ExportForm:
     spacing = imgui.get_style().item_spacing.x
     width = (imgui.get_content_region_avail().x - (COLUMNS - 1) * spacing) / COLUMNS
-    for index, what in enumerate(What):
+    for index, what in enumerate(OFFERED):
         if index % COLUMNS:
             imgui.same_line()
         size = ImVec2(width, 0)
@@ -95,7 +71,7 @@ def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
         imgui.same_line()
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.MUTED, "px")
-    if what.film:
+    if what.moves:
         _label("Goes", look)
         shown = written.way(state)
         chosen = widgets.choice(WAYS, shown)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from ..poses import Pose, alike, intrinsics, viewmat
+from langflash_core.geometry.poses import Pose, alike, intrinsics, viewmat
 
 _LAST_LINES = 20
 _PROGRAM = "langflash_core"  # its __main__ finds the command line, installed or not
@@ -30,7 +30,7 @@ class Exporter:
         """Whether one is under way."""
         return self._process is not None and self._process.poll() is None
 
-    def start(self, words: tuple[str, ...]) -> None:
+    def start(self, words: Sequence[str]) -> None:
         """Run `langflash` with these words.
 
         Raises:

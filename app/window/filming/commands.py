@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from langflash_core.geometry.poses import Pose
+
 from ..commands import Notify
 from ..editing.commands import with_edit
-from ..poses import Pose
 from ..state import State
 from .state import MOST_KEYS, Tour, stored
 

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Any
 
-from ..poses import Pose, Rotation, Vector
+from langflash_core.geometry.poses import Pose, Rotation, Vector
 
 MOST_KEYS = 50
 WAYS = (("past the photos", "photos"), ("around it", "orbit"), ("along the key frames", "keys"))

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from langflash_core.geometry.poses import Pose, alike, from_view, to_camera
+
 from ..commands import Command
-from ..poses import Pose, alike, from_view, to_camera
 from ..requests import Asked, Errand
 from .commands import TourReady
 
@@ -28,7 +29,7 @@ class PlanTour(Errand):
 
 def way(keys: Sequence[Pose], seconds: float) -> tuple[Pose, ...]:
     """Poses of a film of so many seconds along two or more key frames."""
-    from ..tours import along  # loads torch; the worker has by now
+    from langflash_core.geometry.tours import along  # loads torch; the worker has by now
 
     keys = alike(keys)
     width, height = _SIDE, max(2, round(_SIDE / keys[0].aspect))

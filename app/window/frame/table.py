@@ -11,6 +11,8 @@ from pathlib import Path
 from imgui_bundle import icons_fontawesome_6 as fa
 from imgui_bundle import imgui
 
+from langflash_core.pictures import KEYED, PICTURES, Picture
+
 from .. import commands as do
 from ..asking import commands as ask
 from ..asking.prompt_sets import MOST_PROMPTS
@@ -25,8 +27,7 @@ from ..recovery import commands as keep
 from ..scene import camera, samples
 from ..scene import commands as show
 from ..scene.panels import in_space
-from ..scene.panels.modes import KEYED
-from ..scene.state import Mode
+from ..scene.state import possible
 from ..state import State
 
 BRUSH_STEP = 1.15  # of its radius, per press of [ or ]
@@ -212,13 +213,13 @@ def _looking() -> Iterable[Entry]:
     yield Entry("Add a key frame", group, _shown(film.AddKey()), _plain("m"))
     yield Entry("Remove the last key frame", group, lambda s: film.RemoveKey() if s.keys else None)
     yield Entry("Fly along the key frames", group, _shown(film.Preview()), _plain("j"))
-    for mode in Mode:
+    for mode in PICTURES:
         keys = _plain(f"_{_DIGITS[KEYED.index(mode)]}") if mode in KEYED else ()
-        yield Entry(f"Show: {mode.value}", group, _mode(mode), keys)
+        yield Entry(f"Show: {mode.label}", group, _mode(mode), keys)
 
 
-def _mode(mode: Mode) -> Callable[[State], do.Command | None]:
-    return lambda state: camera.SetMode(mode) if mode.possible(state.info) else None
+def _mode(mode: Picture) -> Callable[[State], do.Command | None]:
+    return lambda state: camera.SetMode(mode) if possible(mode, state.info) else None
 
 
 def _compare(state: State) -> do.Command | None:

@@ -3,12 +3,13 @@
 from imgui_bundle import icons_fontawesome_6 as fa
 from imgui_bundle import imgui
 
+from langflash_core.geometry.poses import FOV_RANGE
+
 from .. import commands as do
 from ..asking.panels import dictionary
 from ..exporting import commands as export
 from ..kit import theme, widgets
 from ..kit.look import Look
-from ..poses import FOV_RANGE
 from ..scene import camera
 from ..scene.panels import modes
 from ..state import State

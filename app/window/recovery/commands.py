@@ -6,11 +6,13 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+from langflash_core.geometry.poses import Pose
+from langflash_core.pictures import NAMED
+
 from ..asking.state import PALETTE, Prompt
 from ..commands import Notify
-from ..poses import Pose
 from ..scene.commands import scene_photos
-from ..scene.state import Mode, Photo
+from ..scene.state import Photo
 from ..state import State
 from .preferences import PANEL_WIDTHS, SCALES, SPEEDS, Preferences
 from .state import Kept, KeptPhoto, Offer
@@ -142,7 +144,7 @@ class StandAgain:
         if state.info is None:
             return state
         info = state.info if self.saved else replace(state.info, name=self.name, path=None)
-        mode = Mode[self.mode] if self.mode in Mode.__members__ else state.mode
+        mode = NAMED.get(self.mode.lower(), state.mode)  # earlier versions wrote capitals
         pose = self.pose or state.pose
         view = state.view if pose == state.pose else None
         return replace(state, info=info, mode=mode, pose=pose, view=view)

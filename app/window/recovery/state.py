@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from ..poses import Pose
+from langflash_core.geometry.poses import Pose
+
 from ..scene.drops import SCENE_SUFFIX
 
 KeptPhoto = tuple[str, float | None]
@@ -30,7 +31,7 @@ class Kept:
     thresholds: tuple[float | None, ...] = ()
     colours: tuple[tuple[float, float, float], ...] = ()
     visible: tuple[bool, ...] = ()
-    mode: str = "RGB"
+    mode: str = "rgb"
     pose: Pose | None = None
     file: Path | None = None
     missing: tuple[str, ...] = ()

@@ -2,19 +2,21 @@
 
 from dataclasses import dataclass, replace
 
-from .. import poses
+from langflash_core.geometry import poses
+from langflash_core.geometry.poses import Pose, Vector
+from langflash_core.pictures import Picture
+
 from ..commands import Notify
-from ..poses import Pose, Vector
 from ..state import State
 from .near import places_to_keep_to
-from .state import Flight, Mode
+from .state import Flight
 
 
 @dataclass(frozen=True)
 class SetMode:
     """What the picture shows."""
 
-    mode: Mode
+    mode: Picture
 
     def apply(self, state: State) -> State:
         return replace(state, mode=self.mode)

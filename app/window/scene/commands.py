@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from langflash_core.geometry import poses
 from langflash_core.scene.edits import Marks
 from langflash_core.scene.mask import Mask
 
-from .. import poses
 from ..commands import NOTHING_TO_SAVE, Command, Notify, ShowDialog
 from ..editing.state import fresh
 from ..state import State

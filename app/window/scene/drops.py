@@ -8,9 +8,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from langflash_core.formats import DROPPED, FILMS_IN, is_film
+from langflash_core.formats import FILMS_IN, is_film
 from langflash_core.images.pictures import FILM_PHOTOS as FILM_PHOTOS
 from langflash_core.images.pictures import MAX_PHOTOS as MAX_PHOTOS
+from langflash_core.outputs import DROPPED
 
 PHOTO_SUFFIXES = frozenset(
     {".jpg", ".jpeg", ".png", ".webp", ".heic", ".heif", ".tif", ".tiff", ".bmp", ".avif"}

@@ -1,7 +1,8 @@
 """Where the photos were taken, for whoever keeps to what they saw."""
 
-from .. import poses
-from ..poses import Pose, Vector
+from langflash_core.geometry import poses
+from langflash_core.geometry.poses import Pose, Vector
+
 from ..state import State
 
 FADING = 30.0  # degrees aside from which the picture fades: `FULL` of langflash_core/scene/trust.py

@@ -1,13 +1,12 @@
 """The photos in the tray, the scene made of them, and what of it the picture shows."""
 
 from dataclasses import dataclass, field
-from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from langflash_core.geometry.poses import START, Pose, Vector
+from langflash_core.pictures import Picture
 from langflash_core.scene.edits import History, Marks
-
-from ..poses import START, Pose, Vector
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
@@ -20,43 +19,12 @@ WHOLE = "compared photo"
 MOST_ROOMS = 3  # beside the one on show; a large scene takes 100 MB
 
 
-class Mode(Enum):
-    """What the picture shows; the value is the label on its button."""
-
-    RGB = "RGB"
-    HEAT = "Heat-map"
-    LABELS = "Labels"
-    ATOMS = "Groups"
-    DEPTH = "Depth"
-    MASKS = "Masks"
-    ISOLATE = "Only these"
-    HIDE = "Without these"
-    DIM = "Dim the rest"
-    FEATURES = "Features"
-    WEIGHT = "One group"
-    TRANSMITTANCE = "Transmittance"
-    COVERAGE = "Coverage"
-    AGREEMENT = "Agreement"
-    MARGIN = "Margin"
-
-    @property
-    def answers(self) -> bool:
-        """Whether it shows relevance."""
-        return self in _ANSWERING
-
-    @property
-    def of_atoms(self) -> bool:
-        """Whether it shows weight maps whatever is asked."""
-        return self in (Mode.ATOMS, Mode.FEATURES, Mode.WEIGHT)
-
-    def possible(self, info: "SceneInfo | None") -> bool:
-        """Whether a scene has what it shows."""
-        if info is None or (self in (Mode.WEIGHT, Mode.FEATURES) and info.num_atoms == 0):
-            return False
-        return bool(info.views) if self is Mode.COVERAGE else self is not Mode.AGREEMENT or info.own_views
-
-
-_ANSWERING = (Mode.HEAT, Mode.LABELS, Mode.MASKS, Mode.ISOLATE, Mode.HIDE, Mode.DIM, Mode.MARGIN)
+def possible(picture: Picture, info: "SceneInfo | None") -> bool:
+    """Whether a scene has what a picture shows."""
+    if info is None:
+        return False
+    has = {"atoms": info.num_atoms > 0, "photos": bool(info.views), "owners": info.own_views}
+    return has.get(picture.needs, True)
 
 
 @dataclass(frozen=True)

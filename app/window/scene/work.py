@@ -14,13 +14,13 @@ import numpy as np
 
 from langflash_core.detail import DEFAULT_DETAIL
 from langflash_core.errors import ImageError, LangFlashError
+from langflash_core.geometry.poses import Vector, from_view
 from langflash_core.geometry.reach import median_reach
 from langflash_core.images.still_names import film_of, shown_name
 from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command, ShowPicture
-from ..poses import Vector, from_view
 from ..requests import Asked, Errand, Job, SceneErrand
 from .commands import (
     ChoosingFailed,

@@ -50,18 +50,6 @@ def bootstrap(
     return dict(zip(names, _percentiles(np.array(rows, dtype=np.float64), level), strict=True))
 
 
-def mean_interval(
-    values: Sequence[float], *, draws: int = DRAWS, level: float = LEVEL, seed: int = 0
-) -> tuple[float, float]:
-    """`bootstrap` of a mean over scenes, NaN left out, without a loop; the same draws."""
-    known = np.array([v for v in values if not math.isnan(v)])
-    if len(known) < 2:
-        return math.nan, math.nan
-    generator = np.random.default_rng(seed)
-    means = np.array([known[generator.integers(len(known), size=len(known))].mean() for _ in range(draws)])
-    return _percentiles(means[:, None], level)[0]
-
-
 def _percentiles(rows: np.ndarray, level: float) -> list[tuple[float, float]]:
     """(low, high) of every column (draws, names), NaN left out."""
     tail = 50 * (1 - level)

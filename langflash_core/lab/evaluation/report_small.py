@@ -81,11 +81,6 @@ def filled(text: str, document: Mapping[str, Any]) -> str:
     return _PLACE.sub(table, text)
 
 
-def asked_for(text: str) -> list[tuple[str, str]]:
-    """Section and title of every table that a document marks."""
-    return [(section, title) for _, section, title, _ in _PLACE.findall(text)]
-
-
 def _table(document: Mapping[str, Any], section: str, title: str) -> Table:
     tables = document["sections"].get(section, {}).get("tables", [])
     for entry in tables:

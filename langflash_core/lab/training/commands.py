@@ -32,7 +32,7 @@ from langflash_core.lab.training.mixing import MixedSet
 from langflash_core.lab.training.naming import NAMING
 from langflash_core.lab.training.parts import PartSet, run_parts
 from langflash_core.lab.training.real import JointSet, KeptPhotos, PhotoTargets, train_late
-from langflash_core.lab.training.recipes import Recipe, named_recipe, stages_of
+from langflash_core.lab.training.recipes import Recipe, stages_of
 from langflash_core.lab.training.scenes import SceneSet, SceneSource
 from langflash_core.lab.training.shards import Label
 from langflash_core.lab.training.stages.grouping import taught, untaught
@@ -126,36 +126,6 @@ def run_cache(
     return written
 
 
-def run_train(
-    stages: Sequence[str],
-    folder: Path,
-    run_dir: Path,
-    start: Path | None,
-    encode: Encode,
-    minutes: Sequence[float],
-    *,
-    preset: str = "mini",
-    options: LoopOptions | None = None,
-    from_scratch: bool = False,
-) -> LangFlashNet:
-    """Train stages one after the other, each for its minutes, on the cached sets in `folder`.
-
-    Earlier stages are read from `run_dir`; a stage found there continues unless
-    `options.resume` is False. Returns the network with every stage trained so far.
-
-    Args:
-        start: weights file of the preset. Its frozen parts are used, and stages without a run of
-            their own begin with its heads, as far as these still fit the network. None: what is imported
-            for a preset that nothing is shipped for.
-        from_scratch: draw the heads anew instead.
-
-    Raises:
-        InputError: an unknown stage, a stage whose needs have not been trained, or no cache.
-    """
-    recipe = named_recipe(stages, minutes, preset, options or LoopOptions(minutes=0))
-    return run_recipe(recipe, folder, run_dir, start, encode, from_scratch=from_scratch)
-
-
 def run_recipe(
     recipe: Recipe,
     folder: Path,
@@ -168,9 +138,16 @@ def run_recipe(
     sam: Path | None = None,
     sam_side: int = SIDE,
 ) -> LangFlashNet:
-    """Train the stages of a recipe; everything else as `run_train`.
+    """Train the stages of a recipe one after the other, each for its minutes, on the cached sets in `folder`.
+
+    Earlier stages are read from `run_dir`; a stage found there continues unless its options say otherwise.
+    Returns the network with every stage trained so far.
 
     Args:
+        start: weights file of the preset. Its frozen parts are used, and stages without a run of
+            their own begin with its heads, as far as these still fit the network. None: what is imported
+            for a preset that nothing is shipped for.
+        from_scratch: draw the heads anew instead.
         scenes: what grouping and aggregation learn from instead of rooms; `folder` then keeps phrases and
             what frozen networks say. sam: weights of MobileSAM, for stages that regress its embedding; these
             see views whose longer side is `sam_side` pixels.

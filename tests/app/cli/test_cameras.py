@@ -6,8 +6,9 @@ from dataclasses import replace
 import pytest
 import torch
 
-from app.cli.cameras import chosen_camera, read_camera
+from app.cli.cameras import chosen_camera
 from langflash_core.errors import ViewError
+from langflash_core.writing.cameras import read_camera
 from tests.app.cli.conftest import HEIGHT, WIDTH, stripes
 
 

@@ -7,7 +7,7 @@ import pytest
 import torch
 from PIL import Image
 
-from app.cli.sheet import _between
+from app.cli.lab.sheets.pairs import _between
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.quaternions import quats_to_matrices
 

@@ -15,8 +15,8 @@ from PIL import Image
 from app.window.scene.drops import SCENE_SUFFIXES
 from langflash_core.export import READERS, WRITERS, export, read
 from langflash_core.export.language import side_car
-from langflash_core.formats import ALL_OUT
 from langflash_core.language.spaces import language_space
+from langflash_core.outputs import ALL_OUT
 from langflash_core.scene.file import save
 from langflash_core.types import Scene
 from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, stripes
@@ -56,7 +56,7 @@ def pixels(path: Path) -> np.ndarray:
 
 
 def test_the_suffixes_of_commands_are_those_of_the_core():
-    assert {s for s, ws in WRITERS.items() if any(w.subject is Scene for w in ws)} <= set(ALL_OUT)
+    assert {ending for ending, own in WRITERS.items() if "of_scene" in own} <= set(ALL_OUT)
     assert {".png", ".json"} <= set(ALL_OUT) & set(WRITERS)
     assert set(READERS) - {"meta.json"} == SCENE_SUFFIXES
 

@@ -244,7 +244,7 @@ def test_posed_photos_are_judged(run, checkpoint, tmp_path):
 @pytest.mark.slow
 def test_rooms_are_judged_and_shown_from_aside(run, checkpoint, tmp_path, monkeypatch):
     """Two scenes of the network's own size, by an untrained network."""
-    monkeypatch.setattr("app.cli.side_sheet.PAIRS", ("toy",))
+    monkeypatch.setattr("app.cli.lab.sheets.sides.PAIRS", ("toy",))
     sheet, kept = tmp_path / "new" / "sheet.png", tmp_path / "kept"
     words = ("--weights", checkpoint, "--limit", "1", "--results", kept, "--sheet", sheet)
     outcome = run("eval", "sides", TINY_PACK, *words)

@@ -8,11 +8,12 @@ import pytest
 import torch
 from PIL import Image
 
-from app.cli import video
-from app.cli.renderers import GlRenderer, TorchRenderer
+from app.cli.renderers import GlRenderer
 from langflash_core.errors import ViewError
 from langflash_core.export.png import to_8bit
 from langflash_core.geometry.cameras import rotation_angle_degrees
+from langflash_core.writing import films as video
+from langflash_core.writing.renderers import TorchRenderer
 from tests.app.cli.conftest import stripes
 
 K = [[35.0, 0.0, 28.0], [0.0, 35.0, 21.0], [0.0, 0.0, 1.0]]

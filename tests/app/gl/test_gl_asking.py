@@ -8,11 +8,13 @@ import torch
 
 from app.gl import SplatRenderer
 from app.gl.colours import feature_axes
-from app.gl.display import COUNT_COLOURS
 from app.gl.painter import Painter
+from app.gl.paints import PAINTS, Wanted
 from app.gl.photos import SAME, WORST, PhotoDepths
-from langflash_core.colormaps import colour_bar
+from langflash_core import pictures
+from langflash_core.colormaps import HeatColours, colour_bar
 from langflash_core.formats import COLOUR_MAPS
+from langflash_core.pictures import COUNT_COLOURS
 from langflash_core.splat import render
 from langflash_core.types import Scene
 from tests.app.gl.questions import full_relevance, question
@@ -121,7 +123,13 @@ def test_an_atom_out_of_view_weighs_nothing(exact):
 
 def test_transmittance_is_what_passes(asked, truth):
     alphas = render(truth, camera()).alphas.numpy()
-    np.testing.assert_allclose(pixels(asked.transmittance_texture("grey"))[..., 0], 1 - alphas, atol=STEP)
+    wanted = Wanted(np.zeros((0, 3)), np.zeros(0), 0, 0.0, 0, HeatColours("grey"))
+    picture = PAINTS[pictures.TRANSMITTANCE](asked, wanted)
+    np.testing.assert_allclose(pixels(picture)[..., 0], 1 - alphas, atol=STEP)
+
+
+def test_every_picture_has_its_painter():
+    assert set(PAINTS) == set(pictures.PICTURES)
 
 
 def test_features_are_the_principal_axes_of_f(asked, truth):

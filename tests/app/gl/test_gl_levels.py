@@ -63,10 +63,3 @@ def test_a_level_is_made_once(renderer, scene, monkeypatch):
     renderer.set_scene(cloud(50, 2))
     renderer.draw(camera(), share=0.25)
     assert len(made) == 2
-
-
-def test_dropped_gaussians_are_counted_in_the_whole_scene(renderer, scene):
-    scene.gaussians.means[5] = torch.nan
-    renderer.set_scene(scene)
-    renderer.draw(camera(), share=0.25)
-    assert renderer.num_dropped == 1

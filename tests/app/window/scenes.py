@@ -11,11 +11,11 @@ from PIL import Image
 
 from app.window.asking.commands import EditPrompt
 from app.window.commands import Command, apply
-from app.window.poses import Pose, Vector
 from app.window.scene.commands import SceneArrived
 from app.window.scene.state import SceneInfo
 from app.window.state import State
 from langflash_core.geometry.harmonics import colour_to_sh
+from langflash_core.geometry.poses import Pose, Vector
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History
 from langflash_core.types import Gaussians, Record, Scene, Semantics

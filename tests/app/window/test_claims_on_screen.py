@@ -14,11 +14,11 @@ from app.window.editing import commands as edit
 from app.window.editing.panels import tools
 from app.window.kit.boxes import overlap
 from app.window.kit.look import Look
-from app.window.poses import Vector
 from app.window.scene.camera import SwitchRays
 from app.window.scene.panels import axes, in_space, tray
 from app.window.scene.state import Photo
 from app.window.state import State
+from langflash_core.geometry.poses import Vector
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History, Mask
 from tests.app.window.headless import box, context, frames, look

@@ -12,9 +12,9 @@ from app.window.frame.status import figures, fitting
 from app.window.kit.widgets import sentence
 from app.window.scene import camera
 from app.window.scene import commands as show
-from app.window.scene.state import Mode
 from app.window.scene.work import describe_scene
 from app.window.state import TOAST_SECONDS, State
+from langflash_core import pictures
 from tests.app.window.scenes import after, room, shown_scene
 
 
@@ -30,7 +30,7 @@ def shown(info) -> State:
 
 def test_a_command_leaves_the_old_state_alone() -> None:
     before = State()
-    after(before, ask.EditPrompt(0, "door"), camera.SetMode(Mode.DEPTH), do.Notify("x"))
+    after(before, ask.EditPrompt(0, "door"), camera.SetMode(pictures.DEPTH), do.Notify("x"))
     assert before == State()
 
 

@@ -1,4 +1,4 @@
-"""A short run of random input into a real window; ten minutes of it: python -m tests.app.window.monkey."""
+"""A short run of random input into a real window; ten minutes of it: python -m tests.tools.monkey."""
 
 import os
 import subprocess
@@ -7,9 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from langflash_core.language.spaces import language_space
-from tests.app.window import monkey, test_window
+from tests.app.window import test_window
 from tests.app.window.guarded import REFUSED, environment
 from tests.app.window.scenes import PHRASES, room
+from tests.tools import monkey
 
 pytestmark = test_window.pytestmark
 SECONDS = 15.0

@@ -20,7 +20,7 @@ from app.window.editing.panels import ruler, tools
 from app.window.editing.state import Card, Editing, Reading, Tool
 from app.window.exporting import commands as export
 from app.window.exporting import order
-from app.window.exporting.state import Running, What
+from app.window.exporting.state import Running
 from app.window.filming import commands as film
 from app.window.frame import dialogs, keys, layout
 from app.window.frame.table import named
@@ -36,6 +36,7 @@ from app.window.scene.panels import views
 from app.window.scene.state import said
 from app.window.state import State
 from app.window.worker import Worker
+from langflash_core import outputs
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.pointmaps import PointMapNet
 from langflash_core.pipeline import STAGES
@@ -216,13 +217,13 @@ def test_a_file_is_written_to_a_folder_that_was_walked_to(asker: str, items: Ite
 
 def test_the_kinds_of_export_are_where_they_were_when_the_dialog_opens_again(items: Items) -> None:
     places = set()
-    for what in What:
+    for what in outputs.OFFERED:
         state = after(shown_scene(), export.ShowExport())
         state = after(state, export.EditForm(replace(state.exporting.form, what=what)))
         with context(SIZE):
             frames(lambda seen, state=state: dialogs.draw(state, seen), look(), 6)
             assert box("Export")[3] <= SIZE[1]
-        places.add(middle(items, What.RGB.label))
+        places.add(middle(items, outputs.RGB.label))
     assert len(places) == 1
 
 
@@ -456,7 +457,7 @@ def test_an_export_moves_nothing_in_the_panel(items: Items, monkeypatch) -> None
 
 def test_a_film_follows_the_key_frames_where_there_are_some() -> None:
     state = after(shown_scene(), export.ShowExport())
-    state = after(state, export.EditForm(replace(state.exporting.form, what=What.VIDEO)))
+    state = after(state, export.EditForm(replace(state.exporting.form, what=outputs.VIDEO)))
     assert order.way(state) == "photos"
     state = after(state, film.AddKey(), film.AddKey())
     assert len(state.keys) == 2 and order.way(state) == "keys"

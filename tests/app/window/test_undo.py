@@ -23,15 +23,17 @@ from app.window.editing.work import ScoreFloaters, request_for
 from app.window.exporting import commands as export
 from app.window.filming import commands as film
 from app.window.opening import commands as opening
-from app.window.poses import Pose, Vector
 from app.window.recovery import commands as keep
 from app.window.scene import camera
 from app.window.scene import commands as show
 from app.window.scene.state import SceneInfo
 from app.window.scene.work import describe_scene
 from app.window.state import State
+from langflash_core.geometry.poses import Pose, Vector
 from langflash_core.language.relevance import CompiledQuery, compile_query
 from langflash_core.language.spaces import language_space
+from langflash_core.outputs import OFFERED, Output
+from langflash_core.pictures import PICTURES, Picture
 from langflash_core.scene.edited import edited_scene
 from langflash_core.scene.edits import Marks, Mask
 from langflash_core.types import Scene
@@ -44,7 +46,8 @@ SAYS_WHICH = {
     "kind": ("info", "error"),
     "then": ("", "delete", "select"),
 }
-GIVEN = {("mode", str): "RGB", ("pair", tuple[int, int] | None): None}  # what else would be no answer
+GIVEN = {("mode", str): "rgb", ("pair", tuple[int, int] | None): None}  # what else would be no answer
+TABLES = {Picture: PICTURES, Output: OFFERED}
 LAZY = {each.__name__: each for each in (CompiledQuery, Scene)}  # known to the type checker alone
 SIZE = (64, 48)  # pixels of the picture that regions are drawn on
 
@@ -123,8 +126,9 @@ def value(name: str, hint, chance: np.random.Generator, state: State):
         return state.pose
     if hint is Vector:
         return Vector(*chance.normal(size=3).tolist())
-    if isinstance(hint, type) and issubclass(hint, Enum):
-        return list(hint)[chance.integers(len(list(hint)))]
+    if isinstance(hint, type) and (hint in TABLES or issubclass(hint, Enum)):
+        choices = list(TABLES.get(hint, hint))
+        return choices[chance.integers(len(choices))]
     if is_dataclass(hint) and isinstance(hint, type):
         return hint(**arguments(hint, chance, state))
     simple = {

@@ -9,9 +9,9 @@ import torch
 
 from app.gl import still
 from app.window.governor import Governor, Kind, Plan
-from app.window.poses import orbit
-from app.window.scene.state import Mode
 from app.window.viewport import RETRY_SECONDS, Viewport
+from langflash_core import pictures
+from langflash_core.geometry.poses import orbit
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.edited import first_marks
@@ -43,7 +43,7 @@ def test_a_picture_comes_to_rest_in_full(context) -> None:
     shown = shown_scene()
     assert shown.info is not None
     scene = room(space.encode(list(PHRASES)))
-    state = replace(shown, mode=Mode.HEAT, info=replace(shown.info, scene=scene))
+    state = replace(shown, mode=pictures.HEAT, info=replace(shown.info, scene=scene))
     with context:
         viewport = Viewport(context)
         viewport.set_scene(1, scene)
@@ -98,7 +98,7 @@ def test_a_scene_begins_without_the_targets_of_the_one_before(context) -> None:
     shown = shown_scene()
     assert shown.info is not None
     scene, other = (room(space.encode(list(PHRASES))) for _ in range(2))
-    state = replace(shown, mode=Mode.HEAT, info=replace(shown.info, scene=scene))
+    state = replace(shown, mode=pictures.HEAT, info=replace(shown.info, scene=scene))
     with context:
         viewport = Viewport(context)
         viewport.set_scene(1, scene)
@@ -165,7 +165,7 @@ def test_only_the_picture_on_show_is_scored(context) -> None:
     shown = shown_scene()
     assert shown.info is not None
     scene = room(space.encode(list(PHRASES)))
-    state = replace(shown, mode=Mode.HEAT, info=replace(shown.info, scene=scene))
+    state = replace(shown, mode=pictures.HEAT, info=replace(shown.info, scene=scene))
     query = compile_query(scene, space, list(PHRASES[:1]))
     with context:
         viewport = Viewport(context)

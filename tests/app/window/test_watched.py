@@ -3,7 +3,7 @@
 from functools import reduce
 from importlib import import_module
 
-from tests.app.window.watched import WATCHED
+from tests.tools.watched import WATCHED
 
 
 def test_everything_that_is_watched_is_there() -> None:

@@ -238,7 +238,7 @@ def test_a_typed_phrase_lights_up_where_it_is(program: Program) -> None:
     plain = program.picture()
     program.type_prompt("armchair")
     state = program.until(lambda s: s["prompts"][0][0] == "armchair" and s["prompts"][0][2], "the armchair")
-    assert state["mode"] == "HEAT"
+    assert state["mode"] == "heat"
     program.at_rest()
     heat = program.picture()
     difference = abs(heat - plain).mean(-1)
@@ -311,7 +311,7 @@ def test_keys_fly_and_go_home(program: Program) -> None:
 
 def test_keys_change_the_mode(program: Program) -> None:
     program.at_rest()
-    for key, mode in (("5", "DEPTH"), ("4", "ATOMS"), ("1", "RGB")):
+    for key, mode in (("5", "depth"), ("4", "atoms"), ("1", "rgb")):
         picture = program.picture()
         program.xdotool("key", key)
         program.until(lambda s, wanted=mode: s["mode"] == wanted, mode)

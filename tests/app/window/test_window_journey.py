@@ -12,8 +12,8 @@ import pytest
 
 from app.window.kit import theme
 from tests.app.window import test_window
-from tests.app.window.journey import PHOTOS, lit, person, walk
 from tests.app.window.test_window import LEFT, PATIENCE, TOP, Program, x_server
+from tests.tools.journey import PHOTOS, lit, person, walk
 
 pytestmark = test_window.pytestmark
 

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 
 from app.window.kit import theme
-from tests.app.window.journey import PHOTOS
 from tests.app.window.test_window import (
     LEFT,
     MIDDLE,
@@ -25,6 +24,7 @@ from tests.app.window.test_window import (
     scene_file,
     x_server,
 )
+from tests.tools.journey import PHOTOS
 
 __all__ = ["display", "program", "pytestmark", "scene_file"]  # fixtures and the mark of the window's tests
 
@@ -101,7 +101,7 @@ def test_a_command_by_its_name(program: Program) -> None:
         program.xdotool("key", "ctrl+p", "type", "--delay", "5", "depth")
     program.until(lambda s: s["dialog"] == "palette", "the palette")
     program.xdotool("key", "Return")
-    program.until(lambda s: s["mode"] == "DEPTH" and s["dialog"] is None, "the depth")
+    program.until(lambda s: s["mode"] == "depth" and s["dialog"] is None, "the depth")
     program.xdotool("key", "ctrl+p", "sleep", "0.5", "type", "--delay", "5", "select")
     program.until(lambda s: sum(name.startswith("Select") for name in s["items"]) > 4, "what fits")
     program.xdotool("key", "Down", "key", "Up", "key", "Down", "key", "Return")

@@ -28,6 +28,7 @@ from langflash_core.lab.training.trained import run_export
 from langflash_core.network import MINI, GuidedDepthNet, load_network, save_network
 from langflash_core.network.checkpoints.files import read_weights
 from tests.lab.training.conftest import encode, toy_record
+from tests.lab.training.runs import run_train
 
 TINY_PACK = Path(__file__).resolve().parents[2] / "fixtures" / "rooms" / "cc0_pack.npz"
 
@@ -139,12 +140,12 @@ def test_from_furniture_to_weights(tmp_path: Path, encoder: Path):
     renderer.release()
     options = LoopOptions(minutes=1, max_steps=1, pictures=2)
     with pytest.raises(InputError, match="reads depth"):
-        commands.run_train(["refine"], cache, run, encoder, encode, [1], options=options, from_scratch=True)
+        run_train(["refine"], cache, run, encoder, encode, [1], options=options, from_scratch=True)
     with pytest.raises(InputError, match="no stage 'taste'"):
-        commands.run_train(["taste"], cache, run, encoder, encode, [1])
+        run_train(["taste"], cache, run, encoder, encode, [1])
     with pytest.raises(InputError, match="no trained stage"):
         run_export(run, tmp_path / "mini.safetensors", encoder)
-    commands.run_train(["depth", "language"], cache, run, encoder, encode, [1, 1], options=options)
+    run_train(["depth", "language"], cache, run, encoder, encode, [1, 1], options=options)
     details = {"data": "one room", "calibration": {"threshold": 0.7}}
     out = run_export(run, tmp_path / "mini.safetensors", encoder, metadata=details)
     header = read_weights(out)[1]

@@ -9,7 +9,6 @@ from langflash_core.lab.training.batches import RoomSet
 from langflash_core.lab.training.commands import (
     phrase_table,
     run_find_parts,
-    run_train,
 )
 from langflash_core.lab.training.loop import LoopOptions
 from langflash_core.lab.training.mixing import Mixed, MixedSet, loss_of
@@ -22,6 +21,7 @@ from langflash_core.lab.training.trained import run_export
 from langflash_core.network import MINI, load_network, save_network
 from langflash_core.network.build import build_network
 from tests.lab.training.conftest import encode, toy_record
+from tests.lab.training.runs import run_train
 
 
 def photo_record(seed: int):

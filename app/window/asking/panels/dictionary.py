@@ -6,6 +6,7 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui, implot
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from langflash_core import pictures
 from langflash_core.scene.edits import Atom
 
 from ... import commands as do
@@ -13,7 +14,6 @@ from ...editing import commands as edit
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...recovery import commands as keep
-from ...scene.state import Mode
 from ...state import State
 from .. import commands as ask
 from ..state import Insight
@@ -181,7 +181,7 @@ def _picture(state: State, k: int, look: Look) -> list[do.Command]:
     """What a photo shows of the atom, in a frame of its colour; a click shows its weight map."""
     insight = state.asking.insight
     colour = widgets.rgba(insight.colours[k]) if insight else theme.LINE
-    shown = state.mode is Mode.WEIGHT and state.asking.atom == k
+    shown = state.mode is pictures.WEIGHT and state.asking.atom == k
     ring = theme.ACCENT if shown else colour
     picture = look.thumbnails.get(f"atom {k}")
     side = 2 * imgui.get_frame_height() + imgui.get_style().item_spacing.y

@@ -3,10 +3,11 @@
 import numpy as np
 from imgui_bundle import ImVec2, imgui, imguizmo
 
+from langflash_core.geometry import poses
+from langflash_core.geometry.poses import Pose
+
 from ... import commands as do
-from ... import poses
 from ...kit.look import Look
-from ...poses import Pose
 from ...state import State
 from .. import placing
 from ..state import Handle

@@ -8,8 +8,9 @@ import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from langflash_core.geometry import poses
+
 from ... import commands as do
-from ... import poses
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State

@@ -5,8 +5,9 @@ from contextlib import suppress
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
+from langflash_core.geometry import poses
+
 from ... import commands as do
-from ... import poses
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State

@@ -5,16 +5,18 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from langflash_core import pictures
+from langflash_core.geometry import poses
+from langflash_core.geometry.poses import Pose
+
 from ... import commands as do
-from ... import poses
 from ...asking.things import told
 from ...kit import boxes, theme, widgets
 from ...kit.boxes import Box
 from ...kit.look import Look
-from ...poses import Pose
 from ...state import State
 from .. import camera
-from ..state import WHOLE, WHOLE_PHOTOS, Mode
+from ..state import WHOLE, WHOLE_PHOTOS
 
 FRUSTUM = 0.10  # length of a frustum in distances to the pivot of its view
 _HANDLE = 13.0  # design pixels
@@ -28,7 +30,7 @@ def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Comm
     if comparing(state):
         return _compare(state, look, corner, size)
     _candidates(state, look, corner, size)
-    if state.asking.named and state.mode is Mode.RGB:
+    if state.asking.named and state.mode is pictures.RGB:
         _names(state, look, corner, size)
     if state.keys and state.tour is None:
         _keys(state, look, corner, size)

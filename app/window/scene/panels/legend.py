@@ -2,11 +2,12 @@
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from ...asking.state import margin_span
+from langflash_core.pictures import Colour, Facts, Legend
+
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State
-from ..state import Mode
+from ..state import possible
 from . import tray
 
 _WIDTH = 244.0  # design pixels
@@ -18,7 +19,7 @@ _FLAGS = widgets.PLAIN | imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_fo
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
     """The legend of the present mode; nothing for plain colours."""
-    if state.info is None or state.mode is Mode.RGB:
+    if state.info is None or state.mode.legend is None:
         return
     raised = look.px(_VIEWS) if covers_views(size.x / look.scale, len(state.info.views)) else 0.0
     corner = ImVec2(place.x + size.x - look.px(_MARGIN), place.y + size.y - look.px(_MARGIN) - raised)
@@ -39,58 +40,68 @@ def covers_views(width: float, count: int) -> bool:
     return width < _WIDTH + 2 * _MARGIN + 16 + 84 * count + 80
 
 
+class _Told(Facts):
+    """The facts in a state, each looked up when a legend asks for it."""
+
+    def __init__(self, state: State) -> None:
+        self._state = state
+
+    @property
+    def phrases(self) -> list[tuple[str, Colour, bool]]:
+        return [(p.text, p.colour, p.found is None or p.found) for p in self._state.asked]
+
+    @property
+    def heat(self) -> tuple[str, float, float]:
+        prompt = self._state.active_prompt
+        assert prompt is not None
+        return prompt.text, *self._state.heat_colours.ends(prompt.cut)
+
+    @property
+    def depth_range(self) -> tuple[float, float]:
+        return self._state.stats.depth_range
+
+    @property
+    def atom(self) -> str:
+        return self._state.editing.atom_name(self._state.asking.atom)
+
+    @property
+    def largest_atoms(self) -> list[tuple[str, Colour]]:
+        insight, named = self._state.asking.insight, self._state.editing.atom_name
+        if insight is None:
+            return []
+        largest = sorted(range(len(insight.shares)), key=lambda k: -insight.shares[k])[:_ATOMS_NAMED]
+        return [(named(k), insight.colours[k]) for k in largest]
+
+    @property
+    def worst(self) -> float:
+        from ....gl.photos import WORST  # loads torch; the worker has by now
+
+        return WORST
+
+    @property
+    def warnings(self) -> list[str]:
+        info = self._state.info
+        return list(tray.sentences(info.warnings)[:2]) if info is not None else []
+
+
 def _body(state: State, look: Look) -> None:
     mode = state.mode
-    if not mode.possible(state.info):
+    if not possible(mode, state.info):
         widgets.muted("This scene has no data for it.")
     elif mode.answers and not state.asked:
         widgets.muted("Type a phrase to see this.")
-    elif mode is Mode.HEAT:
-        prompt = state.active_prompt
-        assert prompt is not None
-        low, high = state.heat_colours.ends(prompt.cut)
-        _bar(prompt.text, state.preferences.colormap, _numbers(low, high), look)
-    elif mode is Mode.MARGIN:
-        _margin(state, look)
-    elif mode in (Mode.LABELS, Mode.MASKS, Mode.ISOLATE, Mode.HIDE, Mode.DIM):
-        _prompts(state, look)
-    elif mode is Mode.DEPTH:
-        near, far = state.stats.depth_range
-        middle = 2 / (1 / max(near, 1e-9) + 1 / max(far, 1e-9))
-        _bar(
-            "Depth, scene units",
-            state.preferences.colormap,
-            (f"{far:.2f}", f"{middle:.2f}", f"{near:.2f}"),
-            look,
-        )
-    elif mode is Mode.WEIGHT:
-        _bar(
-            f"Weight of {state.editing.atom_name(state.asking.atom)}",
-            state.preferences.colormap,
-            ("0", "0.5", "1"),
-            look,
-        )
-    elif mode is Mode.TRANSMITTANCE:
-        _bar("Light that passes every splat", state.preferences.colormap, ("0", "0.5", "1"), look)
-    elif mode is Mode.FEATURES:
-        widgets.muted("The three main axes of the language features, as red, green and blue.")
-    elif mode is Mode.ATOMS:
-        _atoms(state, look)
-    elif mode in (Mode.COVERAGE, Mode.AGREEMENT):
-        _trust(state, look)
-    else:
-        widgets.muted(mode.value)
+    elif mode.legend is not None:
+        _draw(mode.legend(_Told(state)), state.preferences.colormap, look)
 
 
-def _margin(state: State, look: Look) -> None:
-    low, high = margin_span(len(state.asked))
-    alone = len(state.asked) == 1
-    title = f"{state.asked[0].text}, over its threshold" if alone else "Best phrase over the second best"
-    _bar(title, state.preferences.colormap, _numbers(low, high), look)
-
-
-def _numbers(low: float, high: float) -> tuple[str, ...]:
-    return tuple(f"{value:.2f}" for value in (low, (low + high) / 2, high))
+def _draw(legend: Legend, colormap: str, look: Look) -> None:
+    if legend.title:
+        _bar(legend.title, colormap, legend.numbers, look)
+    for text, colour, muted in legend.patches:
+        _swatch(colour, look)
+        _fitted(text, theme.MUTED if muted else theme.TEXT)
+    for sentence in legend.sentences:
+        widgets.muted(sentence)
 
 
 def _bar(title: str, colormap: str, numbers: tuple[str, ...], look: Look) -> None:
@@ -107,43 +118,6 @@ def _bar(title: str, colormap: str, numbers: tuple[str, ...], look: Look) -> Non
             imgui.same_line()
         imgui.set_cursor_pos_x(start + share * (width - imgui.calc_text_size(number).x))
         imgui.text_colored(theme.MUTED, number)
-
-
-def _prompts(state: State, look: Look) -> None:
-    for prompt in state.asked:
-        _swatch(prompt.colour, look)
-        mark = "" if prompt.found is None or prompt.found else "  (not found)"
-        _fitted(prompt.text.strip() + mark, theme.MUTED if mark else theme.TEXT)
-
-
-def _atoms(state: State, look: Look) -> None:
-    insight = state.asking.insight
-    if insight is None or not insight.shares:
-        widgets.muted("Every group of the dictionary in its own colour.")
-        return
-    largest = sorted(range(len(insight.shares)), key=lambda k: -insight.shares[k])[:_ATOMS_NAMED]
-    for k in largest:
-        _swatch(insight.colours[k], look)
-        _fitted(state.editing.atom_name(k))
-
-
-def _trust(state: State, look: Look) -> None:
-    from ....gl.display import COUNT_COLOURS  # loads torch; the worker has by now
-    from ....gl.photos import WORST
-
-    if state.mode is Mode.COVERAGE:
-        names = ("seen by no photo", "by one photo", "by two or more")
-        for colour, name in zip(COUNT_COLOURS, names, strict=True):
-            _swatch(colour, look)
-            imgui.text(name)
-    else:
-        numbers = ("0 %", f"{50 * WORST:.0f} %", f"{100 * WORST:.0f} %")
-        _bar("Photos disagree on depth by", state.preferences.colormap, numbers, look)
-        _swatch((0.3, 0.3, 0.3), look)
-        imgui.text_colored(theme.MUTED, "fewer than two can tell")
-    assert state.info is not None
-    for sentence in tray.sentences(state.info.warnings)[:2]:
-        widgets.muted(sentence)
 
 
 def _swatch(colour: tuple[float, float, float], look: Look) -> None:

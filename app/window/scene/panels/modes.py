@@ -3,38 +3,17 @@
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from langflash_core import pictures
+from langflash_core.pictures import GROUPS, KEYED, MISSING, PICTURES, Picture, in_group
+
 from ... import commands as do
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State
 from .. import camera
-from ..state import Mode
+from ..state import possible
 
-USUAL = (Mode.RGB, Mode.HEAT, Mode.LABELS, Mode.ATOMS, Mode.DEPTH)
-KEYED = tuple(Mode)[:10]  # on the keys 1 to 9 and 0
-GROUPS = (
-    ("Picture", (Mode.RGB, Mode.DEPTH, Mode.TRANSMITTANCE)),
-    ("Answers", (Mode.HEAT, Mode.LABELS, Mode.MASKS, Mode.ISOLATE, Mode.HIDE, Mode.DIM)),
-    ("Dictionary", (Mode.ATOMS, Mode.WEIGHT, Mode.FEATURES)),
-    ("Trust", (Mode.COVERAGE, Mode.AGREEMENT, Mode.MARGIN)),
-)
-TIPS = {
-    Mode.RGB: "Colour",
-    Mode.HEAT: "Where the active phrase fits, over the colours",
-    Mode.LABELS: "Every phrase in its own colour",
-    Mode.ATOMS: "The groups the scene is made of",
-    Mode.DEPTH: "Distance, near to far",
-    Mode.MASKS: "What passes its threshold, as flat colours",
-    Mode.ISOLATE: "Only what passes",
-    Mode.HIDE: "Everything but what passes",
-    Mode.DIM: "What passes in full colour, the rest dimmed",
-    Mode.FEATURES: "Principal axes of the language features",
-    Mode.WEIGHT: "How much of one group each pixel carries",
-    Mode.TRANSMITTANCE: "The light that passes every splat",
-    Mode.COVERAGE: "How many photos saw what is shown",
-    Mode.AGREEMENT: "How well the photos agree on depth, where more than one covers a surface",
-    Mode.MARGIN: "How clear the answer is",
-}
+USUAL = tuple(picture for picture in PICTURES if picture.usual)
 _RESTING = imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled
 _MENU = 296.0  # design pixels wide
 
@@ -46,12 +25,12 @@ def draw(state: State, look: Look, room: float) -> list[do.Command]:
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 0))
     shown = _fitting(look, room)
     for mode in shown:
-        if _choice(mode.value, state.mode is mode):
+        if _choice(mode.label, state.mode is mode):
             issued.append(camera.SetMode(mode))
-        widgets.tooltip(f"{TIPS[mode]}{_key(mode)}")
+        widgets.tooltip(f"{mode.tip}{_key(mode)}")
         imgui.same_line()
     named = state.mode not in shown
-    if _choice(f"{state.mode.value if named else 'More'}  {fa.ICON_FA_CARET_DOWN}###menu", named):
+    if _choice(f"{state.mode.label if named else 'More'}  {fa.ICON_FA_CARET_DOWN}###menu", named):
         imgui.open_popup("modes")
     corner = ImVec2(imgui.get_item_rect_min().x, imgui.get_item_rect_max().y + look.px(6))
     imgui.pop_style_var()
@@ -65,13 +44,13 @@ def draw(state: State, look: Look, room: float) -> list[do.Command]:
     return issued
 
 
-def _fitting(look: Look, room: float) -> tuple[Mode, ...]:
+def _fitting(look: Look, room: float) -> tuple[Picture, ...]:
     padding = 2 * imgui.get_style().frame_padding.x + look.px(4)
-    menu = imgui.calc_text_size(f"{Mode.TRANSMITTANCE.value}  {fa.ICON_FA_CARET_DOWN}").x + padding
+    menu = imgui.calc_text_size(f"{pictures.TRANSMITTANCE.label}  {fa.ICON_FA_CARET_DOWN}").x + padding
     left = room - menu
-    shown: list[Mode] = []
+    shown: list[Picture] = []
     for mode in USUAL:
-        left -= imgui.calc_text_size(mode.value).x + padding
+        left -= imgui.calc_text_size(mode.label).x + padding
         if left < 0:
             break
         shown.append(mode)
@@ -81,13 +60,13 @@ def _fitting(look: Look, room: float) -> tuple[Mode, ...]:
 def _menu(state: State, look: Look) -> list[do.Command]:
     """Every mode with what it means; what the scene has no data for is greyed."""
     issued: list[do.Command] = []
-    for place, (title, group) in enumerate(GROUPS):
+    for place, title in enumerate(GROUPS):
         if place:
             widgets.gap(look.px(2))
         imgui.text_colored(theme.MUTED, title)
-        for mode in group:
-            possible = mode.possible(state.info)
-            imgui.begin_disabled(not possible)
+        for mode in in_group(title):
+            there = possible(mode, state.info)
+            imgui.begin_disabled(not there)
             if imgui.selectable(f"##{mode.name}", False, 0, ImVec2(look.px(_MENU - 24), 0))[0]:
                 issued.append(camera.SetMode(mode))
             hovered = imgui.is_item_hovered(_RESTING)
@@ -95,23 +74,17 @@ def _menu(state: State, look: Look) -> list[do.Command]:
                 imgui.same_line(look.px(12))
                 imgui.text(fa.ICON_FA_CHECK)
             imgui.same_line(look.px(36))
-            imgui.text(mode.value)
+            imgui.text(mode.label)
             imgui.end_disabled()
             if hovered:
-                imgui.set_tooltip(TIPS[mode] if possible else _missing(mode))
+                imgui.set_tooltip(mode.tip if there else MISSING[mode.needs])
             key = _key(mode).strip(" ()")
             imgui.same_line(look.px(_MENU) - look.px(14) - imgui.calc_text_size(key).x)
             imgui.text_colored(theme.MUTED, key)
     return issued
 
 
-def _missing(mode: Mode) -> str:
-    if mode is Mode.AGREEMENT:
-        return "This scene does not say which photo made what, or has one photo only"
-    return "This scene has no photos" if mode is Mode.COVERAGE else "This scene has no groups"
-
-
-def _key(mode: Mode) -> str:
+def _key(mode: Picture) -> str:
     return f"  ({(KEYED.index(mode) + 1) % 10})" if mode in KEYED else ""
 
 

@@ -4,9 +4,10 @@ import math
 
 from imgui_bundle import ImVec2, imgui
 
-from ... import poses
+from langflash_core.geometry import poses
+from langflash_core.geometry.poses import Pose
+
 from ...kit.look import Look
-from ...poses import Pose
 from ...state import State
 from ..near import places_to_keep_to
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from langflash_core.geometry.poses import FOV_RANGE
 from langflash_core.images.still_names import shown_name
 from langflash_core.running import left
 
@@ -13,7 +14,6 @@ from ... import commands as do
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...opening import commands as opening
-from ...poses import FOV_RANGE
 from ...state import State
 from .. import commands as show
 from ..state import LOOKING_THROUGH, Job, Photo, said

@@ -4,7 +4,7 @@ Sizes: V views, H W pixels, N = V H W Gaussians, K groups, C channels, G class g
 """
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
@@ -326,8 +326,3 @@ def _judge_groups(room: _Room) -> None:
                 f"K{count}_lfa_seconds": seconds,
             }
         )
-
-
-def rows_of(tally: Tally) -> Sequence[str]:
-    """Names of the rivals that were counted."""
-    return list(dict.fromkeys(row for row, _ in tally.counts))

@@ -7,21 +7,24 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from langflash_core.lab.rooms.makers.common import (
+from langflash_core.lab.rooms.makers.kit import (
     BLACK,
     SIDES,
     WHITE,
     Design,
     Draw,
     Look,
-    plain,
-)
-from langflash_core.lab.rooms.makers.shapes import ball, dappled, loft, mixed, torus, vivid
-from langflash_core.lab.rooms.solids import (
     Triangles,
     Vector,
+    ball,
+    dappled,
+    loft,
+    mixed,
+    plain,
     shifted,
+    torus,
     turned,
+    vivid,
 )
 
 _CATS = (

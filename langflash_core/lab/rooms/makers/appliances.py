@@ -5,9 +5,13 @@ Metres, y up, front +z.
 
 import numpy as np
 
-from langflash_core.lab.rooms.makers.common import (
+from langflash_core.lab.rooms.makers.fittings import plain_refrigerator, plain_stove, plain_tv
+from langflash_core.lab.rooms.makers.kit import (
     BLACK,
+    BRASS,
     DARK,
+    GLASS,
+    PICTURE,
     QUARTER,
     SIDES,
     STEEL,
@@ -16,28 +20,20 @@ from langflash_core.lab.rooms.makers.common import (
     Draw,
     Face,
     Look,
-    laid,
-    plain,
-    spread,
-)
-from langflash_core.lab.rooms.makers.fittings import plain_refrigerator, plain_stove, plain_tv
-from langflash_core.lab.rooms.makers.shapes import (
-    BRASS,
-    GLASS,
-    PICTURE,
     across,
-    pad,
-    panels,
-    slab,
-    torus,
-    vivid,
-)
-from langflash_core.lab.rooms.solids import (
     box,
     cylinder,
+    laid,
+    pad,
+    panels,
+    plain,
     rounded,
     shifted,
+    slab,
+    spread,
+    torus,
     turned,
+    vivid,
 )
 
 

@@ -5,38 +5,34 @@ Metres, y up, front +z.
 
 import numpy as np
 
-from langflash_core.lab.rooms.makers.common import (
+from langflash_core.lab.rooms.makers.furniture import plain_bed
+from langflash_core.lab.rooms.makers.kit import (
+    BRASS,
     DARK,
     LINEN,
     QUARTER,
+    RUBBER,
     SIDES,
     WHITE,
     Design,
     Draw,
     Face,
     Look,
-    plain,
-    polar,
-    spread,
-)
-from langflash_core.lab.rooms.makers.furniture import plain_bed
-from langflash_core.lab.rooms.makers.shapes import (
-    BRASS,
-    RUBBER,
     across,
     ball,
+    grid_triangles,
+    lathe,
     merge,
     pad,
     panels,
-    slab,
-    vivid,
-)
-from langflash_core.lab.rooms.solids import (
-    grid_triangles,
-    lathe,
+    plain,
+    polar,
     rounded,
     shifted,
+    slab,
+    spread,
     turned,
+    vivid,
 )
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from langflash_core.lab.rooms.makers.common import (
+from langflash_core.lab.rooms.makers.kit import (
     BLACK,
     DARK,
     SIDES,
@@ -12,13 +12,19 @@ from langflash_core.lab.rooms.makers.common import (
     Draw,
     Face,
     Look,
+    box,
+    cylinder,
     fronts,
     laid,
+    lathe,
     plain,
     polar,
+    rounded,
+    scaled,
+    shifted,
     spread,
+    turned,
 )
-from langflash_core.lab.rooms.solids import box, cylinder, lathe, rounded, scaled, shifted, turned
 
 # ------------------------------------------------------------------------------------------- kitchen
 

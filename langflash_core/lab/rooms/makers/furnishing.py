@@ -8,37 +8,41 @@ from collections.abc import Sequence
 import numpy as np
 
 from langflash_core.lab.rooms.builtin import KIND_FABRIC
-from langflash_core.lab.rooms.makers.common import (
+from langflash_core.lab.rooms.makers.fittings import floor_lamp, pendant_lamp, table_lamp
+from langflash_core.lab.rooms.makers.furniture import plain_bookcase, plain_chair, plain_cupboard, plain_table
+from langflash_core.lab.rooms.makers.kit import (
+    BULB,
     DARK,
+    LEAF,
     LINEN,
+    MIRROR,
     QUARTER,
     SIDES,
+    TURN,
     WHITE,
     Design,
     Draw,
     Face,
     Look,
+    Material,
+    Vector,
+    between_all,
+    box,
     carcass,
+    displaced,
     four_legs,
     fronts,
+    grid_triangles,
+    lathe,
+    pillow_at,
     plain,
     polar,
+    rounded,
+    shifted,
     spread,
-)
-from langflash_core.lab.rooms.makers.fittings import floor_lamp, pendant_lamp, table_lamp
-from langflash_core.lab.rooms.makers.furniture import plain_bookcase, plain_chair, plain_cupboard, plain_table
-from langflash_core.lab.rooms.makers.shapes import (
-    BULB,
-    LEAF,
-    MIRROR,
-    TURN,
-    between_all,
-    displaced,
-    pillow_at,
+    turned,
     twins,
 )
-from langflash_core.lab.rooms.objfile import Material
-from langflash_core.lab.rooms.solids import Vector, box, grid_triangles, lathe, rounded, shifted, turned
 
 _GLASS = plain((0.8, 0.88, 0.87), 0.9, opacity=0.35)
 _WICKER = Material((0.72, 0.58, 0.38)), KIND_FABRIC

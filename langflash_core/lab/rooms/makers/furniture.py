@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from langflash_core.lab.rooms.makers.common import (
+from langflash_core.lab.rooms.makers.kit import (
     BLACK,
     DARK,
     LINEN,
@@ -13,14 +13,17 @@ from langflash_core.lab.rooms.makers.common import (
     Draw,
     Face,
     Look,
+    Vector,
+    box,
     carcass,
     four_legs,
     fronts,
     plain,
     polar,
+    rounded,
     spread,
+    turned,
 )
-from langflash_core.lab.rooms.solids import Vector, box, rounded, turned
 
 # ------------------------------------------------------------------------------------------- seating
 

@@ -7,40 +7,36 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from langflash_core.lab.rooms.makers.common import (
+from langflash_core.lab.rooms.makers.kit import (
+    BARK,
     QUARTER,
     SIDES,
+    TURN,
     Design,
     Draw,
     Look,
-    plain,
-    polar,
-    spread,
-)
-from langflash_core.lab.rooms.makers.shapes import (
-    BARK,
-    TURN,
+    Triangles,
+    Vector,
     ball,
+    cylinder,
+    grid_triangles,
+    lathe,
     leaflet,
     loft,
     mixed,
     open_box,
+    plain,
+    polar,
     put,
-    woven,
-)
-from langflash_core.lab.rooms.makers.small import plain_plant
-from langflash_core.lab.rooms.solids import (
-    Triangles,
-    Vector,
-    cylinder,
-    grid_triangles,
-    lathe,
     rounded,
     scaled,
     shifted,
+    spread,
     tube,
     turned,
+    woven,
 )
+from langflash_core.lab.rooms.makers.small import plain_plant
 
 _SOIL = plain((0.14, 0.10, 0.07))
 

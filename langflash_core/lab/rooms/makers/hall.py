@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from langflash_core.lab.rooms.makers.common import (
+from langflash_core.lab.rooms.makers.kit import (
     BLACK,
     DARK,
     QUARTER,
@@ -14,11 +14,17 @@ from langflash_core.lab.rooms.makers.common import (
     Design,
     Draw,
     Look,
+    Triangles,
+    Vector,
+    box,
+    grid_triangles,
+    lathe,
     plain,
     polar,
+    rounded,
     spread,
+    turned,
 )
-from langflash_core.lab.rooms.solids import Triangles, Vector, box, grid_triangles, lathe, rounded, turned
 
 _RED = plain((0.72, 0.06, 0.05), 0.6)
 _BLUE = plain((0.35, 0.6, 0.88), 0.8, 0.5)

@@ -6,7 +6,7 @@ import numpy as np
 
 from langflash_core.lab.rooms import solids
 from langflash_core.lab.rooms.makers import common
-from langflash_core.lab.rooms.makers.common import (
+from langflash_core.lab.rooms.makers.kit import (
     BLACK,
     QUARTER,
     SIDES,
@@ -15,11 +15,16 @@ from langflash_core.lab.rooms.makers.common import (
     Design,
     Draw,
     Look,
+    Triangles,
+    Vector,
+    boxes,
+    cylinder,
+    lathe,
     plain,
+    shifted,
+    turned,
 )
-from langflash_core.lab.rooms.makers.shapes import boxes
 from langflash_core.lab.rooms.makers.small import plain_cup
-from langflash_core.lab.rooms.solids import Triangles, Vector, cylinder, lathe, shifted, turned
 
 _GLASS, _GOLD = plain((0.8, 0.87, 0.87), 0.8, 0.4), plain((0.75, 0.6, 0.25), 0.8)
 _IRON, _RED, _GREEN = (

@@ -5,7 +5,8 @@ Metres, y up, front +z.
 
 import numpy as np
 
-from langflash_core.lab.rooms.makers.common import (
+from langflash_core.lab.rooms.makers.furniture import plain_armchair, plain_sofa
+from langflash_core.lab.rooms.makers.kit import (
     DARK,
     QUARTER,
     SIDES,
@@ -14,21 +15,26 @@ from langflash_core.lab.rooms.makers.common import (
     Design,
     Draw,
     Look,
-    four_legs,
-    plain,
-    polar,
-    spread,
-)
-from langflash_core.lab.rooms.makers.furniture import plain_armchair, plain_sofa
-from langflash_core.lab.rooms.makers.shapes import across, ball, loft, merge, mixed, pad, slab, vivid, woven
-from langflash_core.lab.rooms.solids import (
     Vector,
+    across,
+    ball,
     cylinder,
+    four_legs,
     grid_triangles,
     lathe,
+    loft,
+    merge,
+    mixed,
+    pad,
+    plain,
+    polar,
     rounded,
     shifted,
+    slab,
+    spread,
     turned,
+    vivid,
+    woven,
 )
 
 

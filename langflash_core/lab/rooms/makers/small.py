@@ -3,9 +3,24 @@
 import numpy as np
 
 from langflash_core.lab.rooms.builtin import KIND_FABRIC
-from langflash_core.lab.rooms.makers.common import BLACK, DARK, WHITE, Design, Draw, Look, plain, polar
-from langflash_core.lab.rooms.objfile import Material
-from langflash_core.lab.rooms.solids import Triangles, Vector, box, rounded, scaled, shifted, turned
+from langflash_core.lab.rooms.makers.kit import (
+    BLACK,
+    DARK,
+    WHITE,
+    Design,
+    Draw,
+    Look,
+    Material,
+    Triangles,
+    Vector,
+    box,
+    plain,
+    polar,
+    rounded,
+    scaled,
+    shifted,
+    turned,
+)
 
 _SOIL = plain((0.14, 0.10, 0.07))
 _STEM = plain((0.33, 0.25, 0.15))

@@ -5,9 +5,18 @@ Metres, y up, front +z.
 
 import numpy as np
 
-from langflash_core.lab.rooms.makers.common import (
+from langflash_core.lab.rooms.makers.furniture import (
+    plain_desk,
+    plain_dresser,
+    plain_tv_stand,
+    plain_wardrobe,
+)
+from langflash_core.lab.rooms.makers.kit import (
     BLACK,
+    BRASS,
     DARK,
+    GLASS,
+    MIRROR,
     QUARTER,
     SIDES,
     STEEL,
@@ -16,36 +25,23 @@ from langflash_core.lab.rooms.makers.common import (
     Draw,
     Face,
     Look,
-    four_legs,
-    plain,
-    spread,
-)
-from langflash_core.lab.rooms.makers.furniture import (
-    plain_desk,
-    plain_dresser,
-    plain_tv_stand,
-    plain_wardrobe,
-)
-from langflash_core.lab.rooms.makers.shapes import (
-    BRASS,
-    GLASS,
-    MIRROR,
+    Vector,
     across,
     ball,
+    box,
+    cylinder,
+    four_legs,
+    grid_triangles,
     loft,
     pad,
     panels,
-    slab,
-    torus,
-    vivid,
-)
-from langflash_core.lab.rooms.solids import (
-    Vector,
-    box,
-    cylinder,
-    grid_triangles,
+    plain,
     shifted,
+    slab,
+    spread,
+    torus,
     turned,
+    vivid,
 )
 
 _SHIRT = ((0.85, 0), (0.85, 0.6), (1, 0.86), (0.9, 0.94), (0.25, 1))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from langflash_core.lab.rooms.builtin import KIND_ART
-from langflash_core.lab.rooms.makers.common import (
+from langflash_core.lab.rooms.makers.kit import (
     BLACK,
     DARK,
     QUARTER,
@@ -18,16 +18,14 @@ from langflash_core.lab.rooms.makers.common import (
     Design,
     Draw,
     Look,
-    plain,
-)
-from langflash_core.lab.rooms.makers.shapes import boxes
-from langflash_core.lab.rooms.objfile import Material
-from langflash_core.lab.rooms.solids import (
+    Material,
     Triangles,
     Vector,
     box,
+    boxes,
     cylinder,
     grid_triangles,
+    plain,
     rounded,
     shifted,
     turned,

@@ -6,32 +6,35 @@ Metres, y up, front +z.
 import numpy as np
 
 from langflash_core.lab.rooms.builtin import KIND_ART, KIND_FABRIC, KIND_RUG
-from langflash_core.lab.rooms.makers.common import (
+from langflash_core.lab.rooms.makers.kit import (
     DARK,
     LINEN,
+    PAGES,
     QUARTER,
     SIDES,
+    TURN,
     WHITE,
     Design,
     Draw,
     Look,
-    plain,
-    spread,
-)
-from langflash_core.lab.rooms.makers.shapes import (
-    PAGES,
-    TURN,
+    Material,
     across,
     between_all,
+    box,
     displaced,
+    grid_triangles,
+    lathe,
     loft,
     pad,
     pillow_at,
+    plain,
+    rounded,
+    shifted,
+    spread,
     torus,
+    turned,
     twins,
 )
-from langflash_core.lab.rooms.objfile import Material
-from langflash_core.lab.rooms.solids import box, grid_triangles, lathe, rounded, shifted, turned
 
 _ART = Material((0.8, 0.8, 0.8), gloss=0.1), KIND_ART
 _PATTERN_MIDDLE = 0.32  # m: shaders draw pictures and rugs from 0 to 0.77 m of a model's own axes

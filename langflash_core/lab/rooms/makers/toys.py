@@ -5,38 +5,34 @@ Metres, y up, front +z.
 
 import numpy as np
 
-from langflash_core.lab.rooms.makers.common import (
+from langflash_core.lab.rooms.makers.kit import (
     BLACK,
     DARK,
     LINEN,
     QUARTER,
+    RUBBER,
     SIDES,
     STEEL,
     WHITE,
     Design,
     Draw,
-    plain,
-    spread,
-)
-from langflash_core.lab.rooms.makers.shapes import (
-    RUBBER,
     across,
     ball,
+    box,
+    cylinder,
     loft,
     merge,
     open_box,
     pad,
+    plain,
+    shifted,
     slab,
+    spread,
     torus,
+    turned,
     vivid,
 )
 from langflash_core.lab.rooms.makers.small import plain_toy
-from langflash_core.lab.rooms.solids import (
-    box,
-    cylinder,
-    shifted,
-    turned,
-)
 
 
 def toy(draw: Draw) -> Design:

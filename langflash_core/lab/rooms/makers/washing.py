@@ -6,9 +6,25 @@ import numpy as np
 from jaxtyping import Float
 
 from langflash_core.lab.rooms.builtin import KIND_FABRIC, KIND_MIRROR, KIND_RUG
-from langflash_core.lab.rooms.makers.common import BLACK, DARK, SIDES, STEEL, WHITE, Design, Draw, Look, plain
-from langflash_core.lab.rooms.objfile import Material
-from langflash_core.lab.rooms.solids import Triangles, grid_triangles, lathe, rounded, scaled, shifted, turned
+from langflash_core.lab.rooms.makers.kit import (
+    BLACK,
+    DARK,
+    SIDES,
+    STEEL,
+    WHITE,
+    Design,
+    Draw,
+    Look,
+    Material,
+    Triangles,
+    grid_triangles,
+    lathe,
+    plain,
+    rounded,
+    scaled,
+    shifted,
+    turned,
+)
 
 _PAPER = plain((0.95, 0.94, 0.92))
 _GOLD = plain((0.78, 0.62, 0.33), 0.7)

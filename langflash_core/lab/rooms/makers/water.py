@@ -7,47 +7,43 @@ import itertools
 
 import numpy as np
 
-from langflash_core.lab.rooms.makers.common import (
+from langflash_core.lab.rooms.makers.fittings import plain_bathtub, plain_shower, plain_sink, plain_toilet
+from langflash_core.lab.rooms.makers.kit import (
     BLACK,
+    BRASS,
     DARK,
+    GLASS,
     LINEN,
     QUARTER,
     SIDES,
     STEEL,
+    TURN,
+    WATER,
     WHITE,
     Design,
     Draw,
     Face,
     Look,
-    four_legs,
-    plain,
-    polar,
-    spread,
-)
-from langflash_core.lab.rooms.makers.fittings import plain_bathtub, plain_shower, plain_sink, plain_toilet
-from langflash_core.lab.rooms.makers.shapes import (
-    BRASS,
-    GLASS,
-    TURN,
-    WATER,
+    Vector,
     across,
     ball,
+    cylinder,
     facing,
+    four_legs,
+    grid_triangles,
     hull,
+    lathe,
     loft,
     merge,
     open_box,
     pad,
     panels,
-    slab,
-)
-from langflash_core.lab.rooms.solids import (
-    Vector,
-    cylinder,
-    grid_triangles,
-    lathe,
+    plain,
+    polar,
     scaled,
     shifted,
+    slab,
+    spread,
     turned,
 )
 

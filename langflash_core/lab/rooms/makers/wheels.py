@@ -6,35 +6,31 @@ Metres, y up, front +z.
 import numpy as np
 
 from langflash_core.lab.rooms.builtin import KIND_FABRIC
-from langflash_core.lab.rooms.makers.common import (
+from langflash_core.lab.rooms.makers.kit import (
     BLACK,
     DARK,
     LINEN,
     QUARTER,
+    RUBBER,
     SIDES,
     STEEL,
     WHITE,
     Design,
     Draw,
     Look,
-    plain,
-    spread,
-)
-from langflash_core.lab.rooms.makers.shapes import (
-    RUBBER,
+    Material,
     across,
     loft,
     merge,
     open_box,
     pad,
-    slab,
-    torus,
-    vivid,
-)
-from langflash_core.lab.rooms.objfile import Material
-from langflash_core.lab.rooms.solids import (
+    plain,
     rounded,
+    slab,
+    spread,
+    torus,
     turned,
+    vivid,
 )
 
 

@@ -9,14 +9,16 @@ import torch
 
 from app.window.asking import commands as ask
 from app.window.asking.prompt_sets import MOST_PROMPTS
-from app.window.asking.state import BINS, MOST_RECENT, Histogram, margin_span, unfinished, usable
+from app.window.asking.state import BINS, MOST_RECENT, Histogram, unfinished, usable
 from app.window.scene import camera
 from app.window.scene import commands as show
-from app.window.scene.state import Mode
+from app.window.scene.state import possible
 from app.window.scene.work import describe_scene
 from app.window.state import State
+from langflash_core import pictures
 from langflash_core.errors import PromptError
 from langflash_core.language.algebra import terms
+from langflash_core.pictures import PICTURES, margin_span
 from tests.app.window.scenes import after, room, shown_scene
 
 
@@ -42,10 +44,10 @@ def test_recent_phrases_are_kept_once_newest_first_and_bounded() -> None:
 
 def test_a_recent_phrase_takes_an_empty_row_or_a_new_one() -> None:
     state = after(State(), ask.Calibrated(0.7), ask.AskAgain("sofa"))
-    assert [p.text for p in state.prompts] == ["sofa"] and state.mode is Mode.HEAT
-    state = after(state, camera.SetMode(Mode.DEPTH), ask.AskAgain("rug"))
+    assert [p.text for p in state.prompts] == ["sofa"] and state.mode is pictures.HEAT
+    state = after(state, camera.SetMode(pictures.DEPTH), ask.AskAgain("rug"))
     assert [p.text for p in state.prompts] == ["sofa", "rug"]
-    assert state.active == state.prompts[1].key and state.mode is Mode.DEPTH
+    assert state.active == state.prompts[1].key and state.mode is pictures.DEPTH
     assert state.prompts[1].colour != state.prompts[0].colour and state.prompts[1].cut == 0.7
     assert state.asking.recent == ("rug", "sofa")
     full = asked(*(str(n) for n in range(MOST_PROMPTS)))
@@ -67,22 +69,22 @@ def test_a_whole_phrase_is_asked(text: str) -> None:
 
 
 def test_what_each_mode_needs() -> None:
-    for mode in Mode:
+    for mode in PICTURES:
         silent, spoken = (replace(state, mode=mode) for state in (State(), asked("door")))
-        assert silent.wants_maps == mode.of_atoms
+        assert silent.wants_maps == mode.maps
         assert spoken.wants_maps  # to be answered
         answered = replace(spoken, prompts=tuple(replace(p, score=0.9) for p in spoken.prompts))
-        assert answered.wants_maps == (mode.of_atoms or mode.answers)
-    assert not any(mode.of_atoms and mode.answers for mode in Mode)
+        assert answered.wants_maps == (mode.maps or mode.answers)
+    assert not any(mode.maps and mode.answers for mode in PICTURES)
 
 
 def test_modes_that_the_scene_cannot_show(info) -> None:
-    assert not any(mode.possible(None) for mode in Mode)
-    assert not info.own_views and {m for m in Mode if not m.possible(info)} == {Mode.AGREEMENT}
-    assert Mode.AGREEMENT.possible(replace(info, own_views=True))
+    assert not any(possible(mode, None) for mode in PICTURES)
+    assert not info.own_views and {m for m in PICTURES if not possible(m, info)} == {pictures.AGREEMENT}
+    assert possible(pictures.AGREEMENT, replace(info, own_views=True))
     bare = replace(info, views=(), num_atoms=0)
-    assert {m for m in Mode if not m.possible(bare)} == {
-        Mode.AGREEMENT, Mode.COVERAGE, Mode.WEIGHT, Mode.FEATURES,
+    assert {m for m in PICTURES if not possible(m, bare)} == {
+        pictures.AGREEMENT, pictures.COVERAGE, pictures.WEIGHT, pictures.FEATURES,
     }  # fmt: skip
 
 
@@ -106,7 +108,7 @@ def test_atoms_are_shown_and_chosen(info) -> None:
     state = after(State(), show.SceneArrived(info))
     assert after(state, ask.ShowAtom(3)) == state and after(State(), ask.ShowAtom(0)) == State()
     state = after(state, ask.ShowAtom(2), ask.OpenDictionary(True))
-    assert (state.mode, state.asking.atom, state.preferences.dictionary_open) == (Mode.WEIGHT, 2, True)
+    assert (state.mode, state.asking.atom, state.preferences.dictionary_open) == (pictures.WEIGHT, 2, True)
     state = after(state, ask.ChooseAtom(2, True), ask.ChooseAtom(0, True), ask.ChooseAtom(2, True))
     assert state.asking.chosen == (0, 2)
     assert after(state, ask.ChooseAtom(0, False)).asking.chosen == (2,)
@@ -119,10 +121,10 @@ def test_one_phrase_may_have_a_negative_margin() -> None:
 
 def test_the_first_phrase_turns_the_heat_map_on_and_only_the_first() -> None:
     state = after(State(), ask.EditPrompt(0, "d"))
-    assert state.mode is Mode.HEAT
-    state = after(state, camera.SetMode(Mode.RGB), ask.EditPrompt(0, "do"))
-    assert state.mode is Mode.RGB
-    assert after(State(), ask.EditPrompt(0, "  ")).mode is Mode.RGB
+    assert state.mode is pictures.HEAT
+    state = after(state, camera.SetMode(pictures.RGB), ask.EditPrompt(0, "do"))
+    assert state.mode is pictures.RGB
+    assert after(State(), ask.EditPrompt(0, "  ")).mode is pictures.RGB
 
 
 def test_prompts_are_edited_by_key() -> None:
@@ -152,11 +154,11 @@ def test_found_follows_the_threshold_in_force() -> None:
 def test_negatives_and_what_needs_weight_maps() -> None:
     state = after(State(), ask.SetNegatives(("thing",)))
     assert state.negatives == ("thing",) and State().negatives == ()
-    assert not after(State(), camera.SetMode(Mode.HEAT)).wants_maps
-    assert after(State(), camera.SetMode(Mode.ATOMS)).wants_maps
+    assert not after(State(), camera.SetMode(pictures.HEAT)).wants_maps
+    assert after(State(), camera.SetMode(pictures.ATOMS)).wants_maps
     asked = after(State(), ask.EditPrompt(0, "door"))
-    assert asked.wants_maps and after(asked, camera.SetMode(Mode.DEPTH)).wants_maps  # it has no score yet
-    answered = after(asked, ask.Answered(((0, "door", 0.9),)), camera.SetMode(Mode.DEPTH))
+    assert asked.wants_maps and after(asked, camera.SetMode(pictures.DEPTH)).wants_maps  # it has no score yet
+    answered = after(asked, ask.Answered(((0, "door", 0.9),)), camera.SetMode(pictures.DEPTH))
     assert answered.prompts[0].score == 0.9 and not answered.wants_maps
 
 

@@ -9,8 +9,8 @@ from app.window import commands as do
 from app.window.asking import commands as ask
 from app.window.asking.prompt_sets import PromptSet, read_prompts, write_prompts
 from app.window.asking.state import PALETTE, Prompt
-from app.window.scene.state import Mode
 from app.window.state import State
+from langflash_core import pictures
 from langflash_core.errors import OutputError, PromptError
 from tests.app.window.scenes import after
 
@@ -31,7 +31,7 @@ def test_a_prompt_set_comes_back_as_it_was(tmp_path: Path) -> None:
     state = after(State(), ask.Calibrated(0.7), ask.PromptsRead(path, found))
     assert [p.text for p in state.prompts] == [p.text for p in found.prompts]
     assert len({p.key for p in state.prompts}) == 2 and state.next_key > max(p.key for p in state.prompts)
-    assert (state.active, state.mode) == (state.prompts[0].key, Mode.LABELS)
+    assert (state.active, state.mode) == (state.prompts[0].key, pictures.LABELS)
     assert [p.cut for p in state.prompts] == [0.625, 0.7]
     assert state.asking.prompts_path == path and state.negatives == ("stuff", "things")
 

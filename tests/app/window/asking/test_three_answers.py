@@ -13,9 +13,9 @@ from app.window.asking.panels.known import KNOWS
 from app.window.asking.state import EVEN, Insight, Prompt
 from app.window.asking.work import Encode
 from app.window.editing.pointing import AtomsNamed
-from app.window.poses import Vector
 from app.window.scene.panels import tray
 from app.window.scene.state import Photo
+from langflash_core.geometry.poses import Vector
 from langflash_core.language.answers import best_places
 from langflash_core.language.minilm import reads_foreign
 from langflash_core.language.spaces import language_space

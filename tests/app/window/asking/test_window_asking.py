@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from app.window.scene.panels.modes import KEYED
-from app.window.scene.state import Mode
 from langflash_core.language.spaces import language_space
+from langflash_core.pictures import KEYED, PICTURES, Picture
 from langflash_core.scene.file import save
 from tests.app.window import test_window
 from tests.app.window.scenes import PHRASES, room
@@ -19,7 +18,7 @@ from tests.app.window.test_window import LEFT, PATIENCE, SIZE, Program, change
 pytestmark = test_window.pytestmark
 display = test_window.display  # a fixture: an X server of this module's own
 
-MENU = (Mode.TRANSMITTANCE, Mode.WEIGHT, Mode.COVERAGE, Mode.AGREEMENT, Mode.MARGIN)  # without a key
+MENU = tuple(picture for picture in PICTURES if picture not in KEYED)  # in the menu alone
 SLOWER = 0.100  # seconds that a frame may take longer while typing
 
 
@@ -57,10 +56,10 @@ def type_into(program: Program, row: int, text: str, delay: int = 30) -> None:
 def test_escape_leaves_the_field_and_keeps_what_was_typed(program: Program) -> None:
     type_into(program, 0, "floor")
     program.xdotool("key", "Escape", "sleep", "0.5", "key", "4")  # no letter of the phrase: a mode
-    state = program.until(lambda s: s["mode"] == "ATOMS", "the key of a mode")
+    state = program.until(lambda s: s["mode"] == "atoms", "the key of a mode")
     assert state["prompts"][0][0] == "floor"
     program.xdotool("key", "2")
-    program.until(lambda s: s["mode"] == "HEAT", "the heat-map")
+    program.until(lambda s: s["mode"] == "heat", "the heat-map")
 
 
 def test_two_phrases_are_asked_at_once(program: Program) -> None:
@@ -70,7 +69,7 @@ def test_two_phrases_are_asked_at_once(program: Program) -> None:
     program.until(lambda s: len(s["items"]["##text"]) == 2, "a second row")
     type_into(program, 1, "floor")
     state = program.until(lambda s: [p[2] for p in s["prompts"]] == [True, True], "both found")
-    assert state["mode"] == "HEAT" and state["recent"][0] == "armchair"
+    assert state["mode"] == "heat" and state["recent"][0] == "armchair"
     program.until(lambda s: len(s["binned"]) == 2, "the histograms")
 
 
@@ -98,7 +97,7 @@ def test_every_mode_shows_something_of_its_own(program: Program) -> None:
         program.click("###menu")
         program.click(f"##{mode.name}")
         pictures[mode] = settled(program, mode, list(pictures.values())[-1:])
-    assert set(pictures) == set(Mode)
+    assert set(pictures) == set(PICTURES)
     state = program.state
     assert state["gl_errors"] == [] and state["toasts"] == []
     modes = list(pictures)
@@ -108,7 +107,7 @@ def test_every_mode_shows_something_of_its_own(program: Program) -> None:
             assert change(pictures[first], pictures[second]) > 0.5, (first, second)
 
 
-def settled(program: Program, mode: Mode, before: list[np.ndarray]) -> np.ndarray:
+def settled(program: Program, mode: Picture, before: list[np.ndarray]) -> np.ndarray:
     """The picture of a mode once it has replaced the one before and stays."""
     program.until(lambda s: s["mode"] == mode.name, mode.name)
     for picture in before:
@@ -164,11 +163,11 @@ def test_typing_never_holds_a_frame_up(program: Program) -> None:
 def test_a_new_phrase_has_the_caret_and_is_answered_in_any_mode(program: Program) -> None:
     click(program, 30, SIZE[1] - 12)
     program.xdotool("key", "1")
-    program.until(lambda s: s["mode"] == "RGB", "the colours")
+    program.until(lambda s: s["mode"] == "rgb", "the colours")
     rows = len(program.state["prompts"])
     program.click("Add a phrase")
     program.until(lambda s: len(s["prompts"]) == rows + 1, "another row")
     time.sleep(0.5)
     program.xdotool("type", "--delay", "60", "lamp")
     program.until(lambda s: s["prompts"][-1][0] == "lamp", "the phrase in its field")
-    program.until(lambda s: s["prompts"][-1][1] is not None and s["mode"] == "RGB", "its score")
+    program.until(lambda s: s["prompts"][-1][1] is not None and s["mode"] == "rgb", "its score")

@@ -16,9 +16,10 @@ from app.window.editing import pointing as point
 from app.window.editing.state import RADIUS_RANGE, Floaters, Reading, Region, Tool
 from app.window.frame.status import figures
 from app.window.scene import commands as show
-from app.window.scene.state import FLIGHT_SECONDS, Mode
+from app.window.scene.state import FLIGHT_SECONDS
 from app.window.scene.work import describe_scene
 from app.window.state import State
+from langflash_core import pictures
 from langflash_core.scene.edited import edited_scene
 from langflash_core.scene.edits import Combine, Mask
 from tests.app.window.scenes import CHAIR, room
@@ -163,7 +164,7 @@ def test_a_click_is_answered_and_becomes_a_prompt(shown: State) -> None:
     similar = after(state, point.FindSimilar())
     prompt = similar.prompts[-1]
     assert (len(similar.prompts), prompt.text, prompt.like) == (1, "like this (armchair)", vector)
-    assert similar.mode is Mode.HEAT and similar.active == prompt.key and similar.editing.card is None
+    assert similar.mode is pictures.HEAT and similar.active == prompt.key and similar.editing.card is None
     typed = after(similar, ask.EditPrompt(prompt.key, "sofa"))
     assert typed.prompts[0].like == b""
     again = after(replace(similar, editing=state.editing), point.FindSimilar())

@@ -8,7 +8,6 @@ import pytest
 import torch
 from imgui_bundle import ImVec2
 
-from app.window import poses
 from app.window.asking.commands import AtomsWeighed
 from app.window.asking.work import WeighAtoms
 from app.window.editing import commands as edit
@@ -19,11 +18,12 @@ from app.window.editing.placing import Adjust, BeginTint, EndGesture, Nudge, Set
 from app.window.editing.state import Handle, Tint, Tool
 from app.window.editing.work import FindThing
 from app.window.frame import table
-from app.window.poses import Vector
 from app.window.scene import commands as show
 from app.window.scene.work import describe_scene
 from app.window.state import State
+from langflash_core.geometry import poses
 from langflash_core.geometry.harmonics import sh_to_colour
+from langflash_core.geometry.poses import Vector
 from langflash_core.scene import edits as core
 from langflash_core.scene.changed import changed_scene
 from langflash_core.scene.changes import Moved, turn_about

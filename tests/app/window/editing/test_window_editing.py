@@ -111,7 +111,7 @@ def test_what_is_deleted_is_not_found_until_it_is_back(program: Program) -> None
     program.until(lambda s: s["prompts"][0][2] is True, "the armchair")
     program.click("##select")
     state = program.until(lambda s: s["selected"] > 0 and not s["waiting"], "its Gaussians")
-    assert state["mode"] == "RGB" and state["prompts"][0][2] is True
+    assert state["mode"] == "rgb" and state["prompts"][0][2] is True
     program.xdotool("mousemove", *map(str, MIDDLE), "click", "1", "sleep", "0.3", "key", "Delete")
     program.until(lambda s: s["deleted"] == 2500 and s["prompts"][0][2] is False, "not found")
     program.xdotool("key", "ctrl+z")

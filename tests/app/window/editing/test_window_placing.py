@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from app.window.poses import project
 from app.window.scene.work import describe_scene
+from langflash_core.geometry.poses import project
 from tests.app.window.editing.test_window_editing import (
     ACROSS,
     CHAIR,

@@ -10,9 +10,9 @@ import torch
 from app.window.editing import commands as edit
 from app.window.editing import work
 from app.window.editing.state import Reading, Region
-from app.window.poses import orthographic, project, to_camera, units_per_pixel
 from app.window.requests import SceneErrand
 from app.window.scene.work import describe_scene
+from langflash_core.geometry.poses import orthographic, project, to_camera, units_per_pixel
 from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.edited import spoken_scene

@@ -14,8 +14,6 @@ from app.window.exporting import commands as export
 from app.window.exporting import order as export_form
 from app.window.exporting.effects import ExportingEffects
 from app.window.exporting.process import Exporter
-from app.window.exporting.state import What
-from app.window.poses import Pose, Vector
 from app.window.recovery import commands as keep
 from app.window.recovery.keeper import Keeper
 from app.window.scene import camera
@@ -23,6 +21,9 @@ from app.window.scene import commands as show
 from app.window.scene.near import photos_known
 from app.window.scene.state import Photo
 from app.window.state import State
+from langflash_core import outputs
+from langflash_core.geometry.poses import Pose, Vector
+from langflash_core.outputs import OFFERED, Output
 from langflash_core.scene.edits import Atom, History, Marks, Mask
 from tests.app.window.scenes import after, told
 from tests.app.window.scenes import shown_scene as scene
@@ -32,8 +33,8 @@ def form(state: State, **changes) -> State:
     return after(state, export.EditForm(replace(state.exporting.form, **changes)))
 
 
-@pytest.mark.parametrize("what", What)
-def test_every_kind_says_the_command_that_does_it(what: What) -> None:
+@pytest.mark.parametrize("what", OFFERED, ids=lambda what: what.name)
+def test_every_kind_says_the_command_that_does_it(what: Output) -> None:
     state = form(scene(), what=what, path="/out/a picture")
     order = export_form.order(state)
     assert not isinstance(order, str)
@@ -45,10 +46,10 @@ def test_every_kind_says_the_command_that_does_it(what: What) -> None:
         "-o",
         f"/out/a picture{what.suffix}",
     ]
-    asked = what.needs_phrases or what is What.PAGE  # a page shows the phrases as asked
+    asked = what.needs_phrases or what is outputs.PAGE  # a page shows the phrases as asked
     assert ("--prompt" in words) == asked and ("--view" in words) == what.looks
-    assert ("--size" in words) == what.sized and ("--seconds" in words) == what.film
-    assert ("--segmented" in words) == (what is What.SEGMENTED)
+    assert ("--size" in words) == what.sized and ("--seconds" in words) == what.moves
+    assert ("--segmented" in words) == (what is outputs.SEGMENTED)
 
 
 def of_photos() -> State:
@@ -68,30 +69,34 @@ def test_what_fades_on_show_fades_in_files_unless_said_otherwise() -> None:
         assert not isinstance(order, str)
         return "--fade" in order.words
 
-    assert fades(True, what=What.RGB) and fades(True, what=What.VIDEO) and not fades(False, what=What.RGB)
-    assert fades(False, what=What.RGB, fade=True) and not fades(True, what=What.RGB, fade=False)
-    assert not fades(True, what=What.PLY) and not fades(True, what=What.MASK)
-    plan = after(form(of_photos(), path="/out/a picture", what=What.RGB), camera.SwitchRays())
+    assert (
+        fades(True, what=outputs.RGB)
+        and fades(True, what=outputs.VIDEO)
+        and not fades(False, what=outputs.RGB)
+    )
+    assert fades(False, what=outputs.RGB, fade=True) and not fades(True, what=outputs.RGB, fade=False)
+    assert not fades(True, what=outputs.PLY) and not fades(True, what=outputs.MASK)
+    plan = after(form(of_photos(), path="/out/a picture", what=outputs.RGB), camera.SwitchRays())
     assert plan.preferences.near_photos and not export_form.fades(plan), "a plan does not fade on show"
 
 
 def test_gaps_are_filled_in_files_as_on_show() -> None:
-    def fills(state: State, what: What, **changes) -> bool:
+    def fills(state: State, what: Output, **changes) -> bool:
         order = export_form.order(form(state, path="/out/a picture", what=what, **changes))
         assert not isinstance(order, str)
         return "--fill" in order.words
 
     state = of_photos()
-    kinds = {what for what in What if fills(state, what)}
-    assert kinds == {What.RGB, What.HEAT, What.VIDEO, What.WEBP, What.HEAT_VIDEO}
-    assert not fills(state, What.VIDEO, only_found=True), "around a thing on its own is no gap"
-    assert not fills(replace(state, preferences=replace(state.preferences, fill_gaps=False)), What.RGB)
-    assert not fills(scene(), What.RGB)
+    kinds = {what for what in OFFERED if fills(state, what)}
+    assert kinds == {outputs.RGB, outputs.HEAT, outputs.VIDEO, outputs.WEBP, outputs.HEAT_VIDEO}
+    assert not fills(state, outputs.VIDEO, only_found=True), "around a thing on its own is no gap"
+    assert not fills(replace(state, preferences=replace(state.preferences, fill_gaps=False)), outputs.RGB)
+    assert not fills(scene(), outputs.RGB)
 
 
 def test_what_no_photo_made_does_not_fade_since_its_file_does_not_say_where_photos_looked() -> None:
     for fade in (None, True):
-        order = export_form.order(form(scene(), path="/out/a picture", what=What.RGB, fade=fade))
+        order = export_form.order(form(scene(), path="/out/a picture", what=outputs.RGB, fade=fade))
         assert not isinstance(order, str) and "--fade" not in order.words
     state = of_photos()
     assert state.info is not None and state.info.scene.view_ids is not None
@@ -117,10 +122,10 @@ def wrong(state: State) -> str:
 def test_what_is_missing_is_said() -> None:
     assert "no scene" in wrong(State())
     assert "file name" in wrong(form(scene(), path=" "))
-    assert "is the scene itself" in wrong(form(scene(), what=What.SCENE, path="/rooms/my room"))
+    assert "is the scene itself" in wrong(form(scene(), what=outputs.SCENE, path="/rooms/my room"))
     silent = after(scene(), ask.EditPrompt(0, ""))
-    assert "needs a phrase" in wrong(form(silent, what=What.MASK, path="/x"))
-    assert "no phrase to keep" in wrong(form(silent, what=What.PLY, only_found=True, path="/x"))
+    assert "needs a phrase" in wrong(form(silent, what=outputs.MASK, path="/x"))
+    assert "no phrase to keep" in wrong(form(silent, what=outputs.PLY, only_found=True, path="/x"))
     assert "save it first" in wrong(form(scene(None), path="/x"))
 
 
@@ -137,7 +142,7 @@ def test_the_view_on_show_a_camera_of_its_own_or_all_photos() -> None:
 def test_an_unsaved_scene_is_read_from_its_copy() -> None:
     state = form(after(scene(None), keep.CopyAt(Path("/state/copy.langflash"))), path="/x")
     order = export_form.order(state)
-    assert not isinstance(order, str) and order.words[1] == "/state/copy.langflash"
+    assert not isinstance(order, str) and order.request.scene == Path("/state/copy.langflash")
     assert "copy" in export_form.remarks(state)[0]
 
 
@@ -146,15 +151,15 @@ def test_unsaved_edits_and_a_selection_are_read_from_their_copies() -> None:
     marks = Marks.untouched(8, 3)
     selected = replace(marks, selected=Mask.full(8), atoms=(Atom(0, "sofa"), *marks.atoms[1:]))
     editing = replace(plain.editing, history=History(selected), saved=marks)
-    state = form(replace(plain, editing=editing), what=What.PLY, path="/x")
+    state = form(replace(plain, editing=editing), what=outputs.PLY, path="/x")
     assert state.editing.unsaved and "save it first" in str(export_form.order(state))  # before the copies
     state = after(state, export.CopiesAt(Path("/s/edited.langflash"), Path("/s/selection.langflash")))
     order = export_form.order(state)
-    assert not isinstance(order, str) and order.words[1] == "/s/edited.langflash"
+    assert not isinstance(order, str) and order.request.scene == Path("/s/edited.langflash")
     assert "edits are not saved" in export_form.remarks(state)[0]
     state = form(state, only_selected=True)
     order = export_form.order(state)
-    assert not isinstance(order, str) and order.words[1] == "/s/selection.langflash"
+    assert not isinstance(order, str) and order.request.scene == Path("/s/selection.langflash")
     assert "selection is not saved" in export_form.remarks(state)[0]
     nothing = replace(state.editing, history=History(marks))
     again = after(replace(state, editing=nothing), export.ShowExport())
@@ -198,8 +203,8 @@ def test_no_two_kinds_write_the_same_file(all_views: bool, moved: bool) -> None:
     """A legend, the pictures of COCO masks and camera files among them."""
     state = after(scene(), export.ShowExport())
     state = after(state, camera.MoveTo(Pose(Vector(0.0, 0.0, -1.0)))) if moved else state
-    taken: dict[Path, What] = {}
-    for what in (*What, *reversed(What)):
+    taken: dict[Path, Output] = {}
+    for what in (*OFFERED, *reversed(OFFERED)):
         state = form(state, what=what, all_views=all_views)
         for file in written(state):
             assert taken.setdefault(file, what) is what, file
@@ -207,30 +212,30 @@ def test_no_two_kinds_write_the_same_file(all_views: bool, moved: bool) -> None:
 
 
 def test_what_a_kind_writes_beside_its_file() -> None:
-    state = form(scene(), what=What.LABELS, path="/x/a.png")
+    state = form(scene(), what=outputs.LABELS, path="/x/a.png")
     assert written(state) == {Path("/x/a.png"), Path("/x/a.json")}
     every = form(state, all_views=True)
     assert written(every) == {Path(f"/x/a_{n}.{kind}") for n in (0, 1) for kind in ("png", "json")}
-    coco = form(scene(), what=What.COCO, path="/x/a.json")
+    coco = form(scene(), what=outputs.COCO, path="/x/a.json")
     assert written(coco) == {Path("/x/a.json"), Path("/x/a_0.png")}
-    ply = form(scene(), what=What.PLY, path="/x/a.ply")
+    ply = form(scene(), what=outputs.PLY, path="/x/a.ply")
     assert written(ply) == {Path("/x/a.ply"), Path("/x/a.language.safetensors")}
 
 
 def test_a_name_of_ones_own_is_kept_for_its_scene_and_named_by_kind() -> None:
     state = form(after(scene(), export.ShowExport()), path="/out/x.png")
-    state = form(state, what=What.MASK)
+    state = form(state, what=outputs.MASK)
     assert state.exporting.form.path == "/out/x_mask.png"
-    assert form(state, what=What.VIDEO).exporting.form.path == "/out/x_film.mp4"
-    folder = form(state, what=What.SEGMENTED)
+    assert form(state, what=outputs.VIDEO).exporting.form.path == "/out/x_film.mp4"
+    folder = form(state, what=outputs.SEGMENTED)
     assert folder.exporting.form.path == "/out/x_segmented"
-    assert form(folder, what=What.RGB).exporting.form.path == "/out/x_picture.png"
+    assert form(folder, what=outputs.RGB).exporting.form.path == "/out/x_picture.png"
     again = after(state, do.ShowDialog(None), export.ShowExport())
     assert again.exporting.form.path == "/out/x_mask.png"
 
 
 def test_a_folder_may_be_there_already_and_is_asked_about(tmp_path) -> None:
-    state = form(scene(), what=What.SEGMENTED, path=str(tmp_path))
+    state = form(scene(), what=outputs.SEGMENTED, path=str(tmp_path))
     order = export_form.order(state)
     assert not isinstance(order, str) and export_form.there(order) == (tmp_path,)
     every = export_form.order(form(state, all_views=True))
@@ -266,7 +271,7 @@ class Desk:
 
 def test_it_is_asked_before_a_file_is_replaced(monkeypatch, folders: Path) -> None:
     path = folders / "room.langflash"
-    desk = Desk(form(scene(path), what=What.LABELS, path=str(folders / "a.png")), monkeypatch)
+    desk = Desk(form(scene(path), what=outputs.LABELS, path=str(folders / "a.png")), monkeypatch)
     desk.perform(export.Export())
     assert len(desk.ran) == 1 and "--replace" not in desk.ran[0]
     desk.perform(export.ExportEnded(0, "done", ""))
@@ -277,16 +282,16 @@ def test_it_is_asked_before_a_file_is_replaced(monkeypatch, folders: Path) -> No
     desk.perform(do.ShowDialog("export"))
     assert desk.state.exporting.form.path == str(folders / "a.png")
     desk.perform(export.Export(sure=True))
-    assert len(desk.ran) == 2 and desk.ran[1][-1] == "--replace" and desk.state.dialog is None
+    assert len(desk.ran) == 2 and "--replace" in desk.ran[1] and desk.state.dialog is None
 
 
 def test_a_heat_map_is_exported_in_the_window_s_own_colours() -> None:
-    state = form(scene(), what=What.HEAT, path="/out/heat")
+    state = form(scene(), what=outputs.HEAT, path="/out/heat")
     usual = export_form.order(state)
     assert not isinstance(usual, str) and "--colormap" not in usual.words and "--span" not in usual.words
     own = keep.Prefer(replace(state.preferences, colormap="viridis"))
     order = export_form.order(after(state, own, ask.SetSpan((0.25, 0.9))))
     assert not isinstance(order, str)
     assert "--colormap viridis --span 0.25,0.9" in order.line
-    other = export_form.order(form(after(state, own), what=What.MASK))
+    other = export_form.order(form(after(state, own), what=outputs.MASK))
     assert not isinstance(other, str) and "--colormap" not in other.words

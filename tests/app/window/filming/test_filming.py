@@ -7,23 +7,23 @@ import numpy as np
 import pytest
 import torch
 
-from app.cli.cameras import camera_of
 from app.window import commands as do
-from app.window import poses
 from app.window.editing import commands as edit
 from app.window.exporting.order import Order, order
 from app.window.exporting.process import keys_json
-from app.window.exporting.state import What
 from app.window.filming import commands as film
 from app.window.filming.state import MOST_KEYS, read, stored
 from app.window.filming.work import PlanTour, way
-from app.window.poses import Vector, facing, orbit
 from app.window.scene import camera
 from app.window.scene.near import places_to_keep_to
 from app.window.scene.state import FLIGHT_SECONDS
 from app.window.state import State
-from app.window.tours import along
+from langflash_core import outputs
+from langflash_core.geometry import poses
+from langflash_core.geometry.poses import Vector, facing, orbit
+from langflash_core.geometry.tours import along
 from langflash_core.types import Record
+from langflash_core.writing.cameras import camera_of
 from tests.app.window.scenes import after, shown_scene
 
 
@@ -107,7 +107,7 @@ def test_key_frames_survive_a_file_and_damaged_ones_are_none(shown: State) -> No
 
 def test_an_export_takes_the_way_that_was_chosen(shown: State) -> None:
     def ordered(state: State, way: str) -> Order | str:
-        form = replace(state.exporting.form, what=What.VIDEO, way=way, path="/out/film")
+        form = replace(state.exporting.form, what=outputs.VIDEO, way=way, path="/out/film")
         return order(replace(state, exporting=replace(state.exporting, form=form)))
 
     orbits, keyed = ordered(shown, "orbit"), ordered(with_keys(shown), "keys")

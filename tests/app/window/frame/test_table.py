@@ -12,8 +12,8 @@ from app.window.frame import dialogs, table
 from app.window.kit import theme
 from app.window.recovery import commands as keep
 from app.window.scene import commands as show
-from app.window.scene.state import Mode
 from app.window.state import State
+from langflash_core import pictures
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History, Mask
 from tests.app.window import headless
@@ -56,7 +56,7 @@ def found(text: str, state: State = State()) -> list[str]:  # noqa: B008
 
 def test_words_narrow_down_in_any_order() -> None:
     assert table.matching("", State())[: len(table.ENTRIES)] == table.ENTRIES
-    assert found("map heat") == [f"Show: {Mode.HEAT.value} (View)"]
+    assert found("map heat") == [f"Show: {pictures.HEAT.label} (View)"]
     assert {entry.group for entry in table.matching("tools", State())} == {"Tools"}
     assert found("sel")[0].startswith("Sel")  # before "Delete the selection"
     assert found("no such thing") == []

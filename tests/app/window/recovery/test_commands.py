@@ -8,14 +8,14 @@ import pytest
 import torch
 
 from app.window.asking import commands as ask
-from app.window.poses import Pose, Vector
 from app.window.recovery import commands as keep
 from app.window.recovery.preferences import PANEL_WIDTHS
 from app.window.recovery.state import Kept, Offer
 from app.window.scene import commands as show
-from app.window.scene.state import Mode
 from app.window.scene.work import describe_scene
 from app.window.state import State
+from langflash_core import pictures
+from langflash_core.geometry.poses import Pose, Vector
 from tests.app.window.scenes import after, room
 from tests.app.window.scenes import shown_scene as scene
 
@@ -47,7 +47,7 @@ def test_a_restored_session_has_its_photos_phrases_camera_and_mode() -> None:
     info = scene().info
     assert info is not None
     shown = after(state, show.SceneArrived(info), keep.StandAgain(pose, "DEPTH", "kitchen", False))
-    assert shown.mode is Mode.DEPTH and shown.pose == pose and shown.view is None
+    assert shown.mode is pictures.DEPTH and shown.pose == pose and shown.view is None
     assert shown.info is not None and (shown.info.name, shown.info.path) == ("kitchen", None)
     turned_down = after(State(), keep.OfferSession(kept), keep.EndSessionOffer(restore=False))
     assert turned_down == State()

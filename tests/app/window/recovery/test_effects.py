@@ -189,7 +189,7 @@ def test_a_session_of_the_version_before_is_restored_with_its_edits(desk: Desk, 
     desk.perform(scene_work.LoadScene(file.with_suffix(".langflash"), file).run(3, print, lambda: False))
     state = desk.state
     assert state.editing.history == history and state.info is not None
-    assert (state.info.name, state.info.path, state.mode.name) == ("kitchen", None, "DEPTH")
+    assert (state.info.name, state.info.path, state.mode.name) == ("kitchen", None, "depth")
     assert tuple(state.pose.centre) == (0.1, 0.2, -0.3) and [p.text for p in state.prompts] == ["armchair"]
     desk.work()
     assert not file.exists()  # this window keeps them under its own name

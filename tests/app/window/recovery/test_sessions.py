@@ -8,12 +8,12 @@ import sys
 from pathlib import Path
 
 from app.window.places import state_folder
-from app.window.poses import Pose, Vector
 from app.window.recovery import sessions
 from app.window.recovery.commands import restored_phrases
 from app.window.recovery.keeper import Keeper
 from app.window.recovery.state import Kept
 from app.window.state import State
+from langflash_core.geometry.poses import Pose, Vector
 
 ROOT = Path(__file__).parents[4]
 DYING = """

@@ -34,7 +34,7 @@ def test_a_killed_session_comes_back_whole(display: str, scene_file: Path, folde
     running.until(lambda s: s["scene"] == "room.langflash", "the scene")
     running.at_rest()
     running.type_prompt("armchair")
-    running.until(lambda s: s["mode"] == "HEAT" and s["recent"] is not None, "the heat-map")
+    running.until(lambda s: s["mode"] == "heat" and s["recent"] is not None, "the heat-map")
     running.xdotool("mousemove", *map(str, MIDDLE), "sleep", "0.3", "click", "4")  # nearer
     running.xdotool("click", "1", "sleep", "0.3", "key", "ctrl+a")
     running.until(lambda s: s["selected"] == COUNT, "everything selected")
@@ -50,7 +50,7 @@ def test_a_killed_session_comes_back_whole(display: str, scene_file: Path, folde
     again = Program(display)
     again.click("Go on with it")
     after = again.until(lambda s: s["deleted"] == COUNT and s["job"] is None, "the restored edits")
-    after = again.until(lambda s: s["mode"] == "HEAT" and s["pose"] == before["pose"], "camera and mode")
+    after = again.until(lambda s: s["mode"] == "heat" and s["pose"] == before["pose"], "camera and mode")
     assert (after["scene"], after["edits"]) == (before["scene"], before["edits"])
     assert [row[0] for row in after["prompts"]] == ["armchair"] and after["toasts"] == []
     again.until(lambda s: s["prompts"][0][1] is not None, "an answer")

@@ -10,7 +10,6 @@ import torch
 from app.window import commands as do
 from app.window.asking.commands import EditPrompt
 from app.window.effects import Hands
-from app.window.poses import Pose
 from app.window.scene import camera, work
 from app.window.scene import commands as show
 from app.window.scene.drops import MAX_PHOTOS
@@ -18,6 +17,7 @@ from app.window.scene.effects import SceneEffects
 from app.window.scene.state import FLIGHT_SECONDS
 from app.window.scene.work import describe_scene
 from app.window.state import State
+from langflash_core.geometry.poses import Pose
 from langflash_core.scene.file import save
 from tests.app.window.scenes import after, room, told
 from tests.app.window.scenes import shown_scene as scene

@@ -6,10 +6,10 @@ from dataclasses import replace
 import pytest
 import torch
 
-from app.window import poses
 from app.window.frame.status import figures
 from app.window.scene.near import FADING, degrees_from_photos, fills_gaps, places_to_keep_to
 from app.window.state import State
+from langflash_core.geometry import poses
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History
 from langflash_core.scene.mask import Mask

@@ -1,0 +1,1 @@
+"""What `langflash eval` does, a module an action."""

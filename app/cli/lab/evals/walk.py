@@ -1,0 +1,203 @@
+"""`langflash eval walk` and `walk-beside`: the same place in 2, 4, 8 ... photos, by one version or by two."""
+
+import io
+import json
+from argparse import Namespace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+from langflash_core.errors import InputError
+from langflash_core.files import check_folder, check_output_file, make_folder, readable_file, write_atomically
+from langflash_core.lab.rooms import RoomRenderer, load_pack
+
+from ...renderers import Renderer, open_renderer
+from ...report import ProgressBar, write_tables
+from ..photos import opened_folder
+from ..shared import colour_only, opened_lpips
+
+if TYPE_CHECKING:
+    from langflash_core.lab.evaluation.tallies import Shelf
+    from langflash_core.lab.evaluation.walk import Bench
+    from langflash_core.lab.evaluation.walk_subjects import Plan, Walk
+
+ROOMS, STRETCHES = 20, 4
+NUMBERS, WALKS, PICTURES = "walk.json", "walks", "pictures"
+"""What --results holds."""
+OPTIONS = (
+    "size", "set", "way", "exposure", "blur", "step", "assume_lens", "given_poses", "no_own", "align",
+    "memory", "colmap", "depth_unit", "crop", "intrinsics",
+)  # fmt: skip
+"""By which numbers of a walk change."""
+
+
+def walk(args: Namespace, out: TextIO) -> None:
+    """Judge the code that makes scenes of many photos.
+
+    Raises:
+        LangFlashError: pack, folder, checkpoint or output cannot be used.
+    """
+    _check(args)
+    from langflash_core.lab.evaluation.walk import run_walks
+    from langflash_core.lab.evaluation.walk_tables import walk_markdown
+
+    from ..sheets.walk import keeper
+
+    plan = _plan(args)
+    with _walks(args, plan) as (walks, count), open_renderer(args.backend) as renderer:
+        bench = _bench(args, renderer)
+        kept = {} if args.results is None else {
+            "shelf": _shelf(args, plan, bench), "shown": keeper(args.results / PICTURES)
+        }  # fmt: skip
+        with ProgressBar() as progress:
+            result = run_walks(walks, count, bench, progress=progress, **kept)
+    if args.results is not None:
+        make_folder(args.results)
+        write_atomically(args.results / NUMBERS, json.dumps(result, indent=1).encode())
+    if args.sheet is not None and args.results is not None:
+        _write_sheet(args.sheet, [("drawn", args.results)])
+    if args.plot is not None:
+        _write_plot(args.plot, result)
+    write_tables(args, result, walk_markdown(result), out)
+
+
+def _check(args: Namespace) -> None:
+    """What can be known before any work."""
+    if (args.pack is None) == (args.folder is None):
+        raise InputError("give either a furniture pack or a folder with --posed; not both, not none")
+    if args.folder is not None and (args.exposure or args.blur):
+        raise InputError("--exposure and --blur change rooms that are drawn; leave them out with --posed")
+    if args.output is not None:
+        check_output_file(args.output, (".md",))
+    if args.results is not None:
+        check_folder(args.results)
+    if args.plot is not None:
+        check_output_file(args.plot, (".png",))
+        if find_spec("matplotlib") is None:
+            raise InputError("--plot needs matplotlib; pip install 'langflash[bench]' brings it")
+    if args.sheet is not None:
+        check_output_file(args.sheet, (".png",))
+        if args.results is None:
+            raise InputError("--sheet shows what --results keeps; give --results, too")
+    if args.colmap:
+        from langflash_core.lab.evaluation.walk_colmap import check_installed
+
+        check_installed()
+
+
+def _plan(args: Namespace) -> "Plan":
+    from langflash_core.lab.evaluation.walk_subjects import KEPT, PHOTOS, planned
+
+    return planned(args.photos or PHOTOS, args.kept or KEPT, "apart" if args.growing else "same")
+
+
+def _bench(args: Namespace, renderer: Renderer) -> "Bench":
+    from langflash_core.lab.evaluation.walk_scenes import Bench
+
+    return Bench(
+        colour_only(renderer),
+        args.weights,
+        args.preset,
+        args.size,
+        assume_lens=args.assume_lens,
+        given_poses=args.given_poses,
+        alone=not args.no_own,
+        align=args.align,
+        lpips=opened_lpips(args.lpips),
+        memory=args.memory,
+        colmap=args.colmap,
+    )
+
+
+def _shelf(args: Namespace, plan: "Plan", bench: "Bench") -> "Shelf":
+    """Where walks are kept; other weights, photos or options make them anew, other code does not."""
+    from langflash_core.lab.evaluation.tallies import Shelf, identity
+    from langflash_core.lab.evaluation.walk import Tally
+
+    key = {
+        **{name: getattr(args, name) for name in OPTIONS},
+        "source": str((args.pack or args.folder).resolve()),
+        "weights": identity(args.weights, args.preset),
+        "photos": {str(photos): frames for photos, frames in plan.chosen.items()},
+        "kept": plan.kept,
+        "lpips": bench.lpips and bench.lpips.digest,
+    }
+    return Shelf(args.results / WALKS, key, Tally)
+
+
+def beside(args: Namespace, out: TextIO) -> None:
+    """Two results of the same walks in one table.
+
+    Raises:
+        InputError: a folder holds no results, or they have no walk in common.
+    """
+    if args.output is not None:
+        check_output_file(args.output, (".md",))
+    if args.sheet is not None:
+        check_output_file(args.sheet, (".png",))
+    from langflash_core.lab.evaluation.walk_tables import beside_markdown
+
+    before, after = (_numbers(folder) for folder in (args.before, args.after))
+    if not {row["name"] for row in before["cases"]} & {row["name"] for row in after["cases"]}:
+        raise InputError("these results have no walk in common; make both along the same walks")
+    if args.sheet is not None:
+        _write_sheet(args.sheet, [("before", args.before), ("after", args.after)])
+    write_tables(args, {}, beside_markdown(before, after), out)
+
+
+def _numbers(folder: Path) -> dict:
+    path = readable_file(folder / NUMBERS, "result of eval walk", InputError)
+    try:
+        found = json.loads(path.read_bytes())
+    except ValueError:
+        found = None
+    if not isinstance(found, dict) or not {"cases", "by_photos"} <= found.keys():
+        raise InputError(f"{path} is no result of eval walk; make it with --results")
+    return found
+
+
+def _write_plot(path: Path, result: dict) -> None:
+    from langflash_core.lab.evaluation.walk_plot import walk_png
+
+    make_folder(path.parent)
+    write_atomically(path, walk_png(result))
+
+
+def _write_sheet(path: Path, versions: Sequence[tuple[str, Path]]) -> None:
+    from ..sheets.walk import walk_sheet
+
+    sheet = walk_sheet([(title, folder / PICTURES) for title, folder in versions])
+    stream = io.BytesIO()
+    sheet.save(stream, "PNG", optimize=True)
+    make_folder(path.parent)
+    write_atomically(path, stream.getvalue())
+
+
+@contextmanager
+def _walks(args: Namespace, plan: "Plan") -> "Iterator[tuple[Iterator[Walk], int]]":
+    """What is judged, and how much of it."""
+    from langflash_core.lab.evaluation.walk_subjects import Camcorder, posed_walks, room_walks
+
+    if args.folder is not None:
+        folder = opened_folder(args)
+        if folder.poses is None:
+            raise InputError(f"{args.folder} has no poses.txt; add it, or judge rooms")
+        count = args.limit or STRETCHES
+        yield posed_walks(folder, plan, count, args.step), count
+        return
+    pack, count = load_pack(readable_file(args.pack, "furniture pack", InputError)), args.limit or ROOMS
+    camcorder = Camcorder(args.exposure or 0.0, args.blur or 0.0)
+    with RoomRenderer(pack) as drawer:
+        walks = room_walks(
+            pack,
+            drawer,
+            plan,
+            way=args.way,
+            camcorder=camcorder,
+            kind=args.set,
+            count=count,
+            first=args.first_seed,
+        )
+        yield walks, count

@@ -1,1 +1,0 @@
-"""`langflash export --segmented`: every view of a scene taken apart by phrases, in one folder."""

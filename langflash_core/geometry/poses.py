@@ -1,0 +1,346 @@
+"""Where the person stands: a pose to orbit, pan, zoom and fly with, as pure functions.
+
+Conventions of the core: OpenCV axes, world = camera of view 0, quaternions wxyz. World up is
+-y, because view 0 was held roughly level. A pose frames a *box* with the shape of the photos
+inside a panel of any shape: the box always fits, so an input view shows all of its photo.
+
+A pose with a `span` sees by parallel rays (orthographic). It stands clear of the scene, since what is
+behind it is not drawn: how large things are follows from the span, not from where it stands.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from langflash_core.geometry import rotations
+from langflash_core.geometry.reach import MIN_REACH
+from langflash_core.geometry.rotations import about
+
+if TYPE_CHECKING:
+    from langflash_core.types import Camera
+
+UP = np.array([0.0, -1.0, 0.0])
+NEAREST = 0.02  # scene units in front of the camera from which something is marked in the picture
+MIN_POLE_DEGREES = 4.0  # how near to straight up or down an orbit may come
+FOV_RANGE = (15.0, 120.0)
+FRAME_MARGIN = 1.08  # around what is framed
+NEAR, FARTHEST = 45.0, 70.0  # degrees aside of the photos: orbits slow down, and stop
+SLOWING_STEP = 2.0  # degrees
+
+
+class Vector(NamedTuple):
+    """A point or direction, world axes, scene units."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Rotation(NamedTuple):
+    """A unit quaternion."""
+
+    w: float
+    x: float
+    y: float
+    z: float
+
+
+ORIGIN = Vector(0.0, 0.0, 0.0)
+UNTURNED = Rotation(1.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A camera a person can move.
+
+    centre: scene units. rotation: camera to world. reach: distance to the pivot along the
+    viewing direction, scene units. fov: degrees over the longer side of the photo box.
+    aspect: width / height of the box. shift: principal point minus the box's middle, in box
+    widths and heights. span: of parallel rays, scene units along the longer side of the box; None
+    sees in perspective.
+    """
+
+    centre: Vector = ORIGIN
+    rotation: Rotation = UNTURNED
+    reach: float = 1.0
+    fov: float = 60.0
+    aspect: float = 4 / 3
+    shift: tuple[float, float] = (0.0, 0.0)
+    span: float | None = None
+
+    @property
+    def axes(self) -> np.ndarray:
+        """Camera to world rotation (3, 3); its columns are right, down, forward."""
+        return rotations.matrix(self.rotation)
+
+    @property
+    def pivot(self) -> np.ndarray:
+        """The point (3,) that orbits turn around."""
+        return np.array(self.centre) + self.reach * self.axes[:, 2]
+
+    @property
+    def distance(self) -> float:
+        """From where the pivot looks as large in perspective as it does: `reach`, without a span."""
+        return self.reach if self.span is None else 0.5 * self.span / math.tan(math.radians(self.fov) / 2)
+
+
+START = Pose()  # of an empty window
+
+
+def from_view(
+    viewmat: np.ndarray, K: np.ndarray, size: tuple[int, int], reach: float, orthographic: bool = False
+) -> Pose:
+    """The pose of an input view: viewmat (4, 4) world to camera, K (3, 3), size (width, height)."""
+    width, height = size
+    axes = viewmat[:3, :3].T
+    longer = max(width, height) / float(K[0, 0] if width >= height else K[1, 1])
+    return Pose(
+        centre=Vector(*(-axes @ viewmat[:3, 3]).tolist()),
+        rotation=_rotation(axes),
+        reach=max(float(reach), MIN_REACH),
+        fov=START.fov if orthographic else math.degrees(2 * math.atan(0.5 * longer)),
+        aspect=width / height,
+        shift=(float(K[0, 2]) / width - 0.5, float(K[1, 2]) / height - 0.5),
+        span=longer if orthographic else None,
+    )
+
+
+def intrinsics(pose: Pose, width: int, height: int) -> np.ndarray:
+    """K (3, 3) in pixels of a width x height picture that holds the pose's whole box; with a span, focal
+    lengths in pixels per scene unit."""
+    box_width = min(width, height * pose.aspect)
+    box_height = box_width / pose.aspect
+    longer = max(box_width, box_height)
+    focal = 0.5 * longer / math.tan(math.radians(pose.fov) / 2) if pose.span is None else longer / pose.span
+    centre_x = width / 2 + pose.shift[0] * box_width
+    centre_y = height / 2 + pose.shift[1] * box_height
+    return np.array([[focal, 0.0, centre_x], [0.0, focal, centre_y], [0.0, 0.0, 1.0]])
+
+
+def viewmat(pose: Pose) -> np.ndarray:
+    """World to camera (4, 4)."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = pose.axes.T
+    matrix[:3, 3] = -pose.axes.T @ np.array(pose.centre)
+    return matrix
+
+
+def to_camera(pose: Pose, width: int, height: int) -> "Camera":
+    """The core's camera, float32, for a picture of width x height pixels."""
+    import torch  # the first frame is drawn before torch is needed
+
+    from langflash_core.types import Camera
+
+    return Camera(
+        torch.tensor(viewmat(pose), dtype=torch.float32),
+        torch.tensor(intrinsics(pose, width, height), dtype=torch.float32),
+        width,
+        height,
+        pose.span is not None,
+    )
+
+
+def project(
+    points: np.ndarray, pose: Pose, size: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Camera coordinates (n, 3) and pixels (n, 2) of world points in a picture of `size`; None where one is
+    not in front."""
+    matrix = viewmat(pose)
+    pos_c = points @ matrix[:3, :3].T + matrix[:3, 3]
+    if pos_c[:, 2].min() < NEAREST:
+        return None
+    K = intrinsics(pose, max(round(size[0]), 1), max(round(size[1]), 1))
+    across = pos_c[:, :2] if pose.span is not None else pos_c[:, :2] / pos_c[:, 2:]
+    return pos_c, across * K.diagonal()[:2] + K[:2, 2]
+
+
+def orthographic(pose: Pose, low: Vector, high: Vector) -> Pose:
+    """The pose by parallel rays, the pivot as large as before, clear of the box from `low` to `high`."""
+    span = 2 * pose.distance * math.tan(math.radians(pose.fov) / 2)
+    return _clear(replace(pose, span=max(span, MIN_REACH)), low, high)
+
+
+def perspective(pose: Pose) -> Pose:
+    """The pose without a span, the pivot as large as before."""
+    return _at_reach(replace(pose, span=None), max(pose.distance, MIN_REACH))
+
+
+def _clear(pose: Pose, low: Vector, high: Vector) -> Pose:
+    """Stepped back from the pivot until it can turn around it with the whole box ahead."""
+    corners = np.maximum(np.abs(np.array(low) - pose.pivot), np.abs(np.array(high) - pose.pivot))
+    return _at_reach(pose, max(pose.reach, FRAME_MARGIN * float(np.linalg.norm(corners)) + NEAREST))
+
+
+def _at_reach(pose: Pose, reach: float) -> Pose:
+    """So far from the same pivot."""
+    centre = pose.pivot - reach * pose.axes[:, 2]
+    return replace(pose, centre=Vector(*centre.tolist()), reach=reach)
+
+
+def orbit(pose: Pose, yaw: float, pitch: float) -> Pose:
+    """Turn around the pivot, radians: yaw about world up, pitch about the camera's x axis."""
+    turned = look(pose, yaw, pitch)
+    centre = pose.pivot - pose.reach * turned.axes[:, 2]
+    return replace(turned, centre=Vector(*centre.tolist()))
+
+
+def orbit_near(pose: Pose, yaw: float, pitch: float, places: Sequence[Vector]) -> Pose:
+    """`orbit`, slower and slower to a stop between `NEAR` and `FARTHEST` degrees from the nearest of some
+    places, as the pivot sees them. It is free without places, on the way back, and for who went farther
+    on another way."""
+    if not places:
+        return orbit(pose, yaw, pitch)
+    # In small steps, so that a quick drag ends where a slow one does.
+    steps = max(1, math.ceil(math.degrees(max(abs(yaw), abs(pitch))) / SLOWING_STEP))
+    for _ in range(steps):
+        pose = _slowed(pose, yaw / steps, pitch / steps, places)
+    return pose
+
+
+def _slowed(pose: Pose, yaw: float, pitch: float, places: Sequence[Vector]) -> Pose:
+    turned = orbit(pose, yaw, pitch)
+    before, after = (degrees_aside(at, places) for at in (pose, turned))
+    if after <= max(before, NEAR) or before > FARTHEST:
+        return turned
+    share = (FARTHEST - max(before, NEAR)) / (FARTHEST - NEAR)
+    held = orbit(pose, yaw * share, pitch * share)
+    return pose if degrees_aside(held, places) > FARTHEST else held
+
+
+def degrees_aside(pose: Pose, places: Sequence[Vector]) -> float:
+    """Angle at the pivot between the camera and the nearest of some places, at least one."""
+    own, others = np.array(pose.centre) - pose.pivot, np.array(places) - pose.pivot
+    lengths = np.linalg.norm(own) * np.linalg.norm(others, axis=1)
+    cosine = float(np.max(others @ own / np.maximum(lengths, 1e-12)))
+    return math.degrees(math.acos(min(max(cosine, -1.0), 1.0)))
+
+
+def look(pose: Pose, yaw: float, pitch: float) -> Pose:
+    """Turn on the spot, radians; stops short of the poles so that up stays up."""
+    axes = about(UP, yaw) @ pose.axes
+    from_pole = math.acos(float(np.clip(axes[:, 2] @ UP, -1.0, 1.0)))
+    floor = math.radians(MIN_POLE_DEGREES)
+    # Looking up shrinks the angle to the pole: a positive pitch turns the view upwards.
+    lowest, highest = min(floor - from_pole, 0.0), max(math.pi - floor - from_pole, 0.0)
+    pitch = -float(np.clip(-pitch, lowest, highest))
+    return replace(pose, rotation=_rotation(about(axes[:, 0], pitch) @ axes))
+
+
+def pan(pose: Pose, right: float, down: float) -> Pose:
+    """Slide in the picture plane, scene units; the pivot moves along."""
+    return fly(pose, right, down, 0.0)
+
+
+def fly(pose: Pose, right: float, down: float, forward: float) -> Pose:
+    """Move along the camera's own axes, scene units; with a span, forward comes nearer as `zoom` does."""
+    if pose.span is not None:
+        pose, forward = zoom(pose, math.exp(-forward / pose.distance)), 0.0
+    step = pose.axes @ np.array([right, down, forward])
+    return replace(pose, centre=Vector(*(np.array(pose.centre) + step).tolist()))
+
+
+def zoom(pose: Pose, factor: float) -> Pose:
+    """Scale the distance to the pivot, or the span; a factor below 1 comes nearer."""
+    if pose.span is not None:
+        return replace(pose, span=max(pose.span * factor, MIN_REACH))
+    return _at_reach(pose, max(pose.reach * factor, MIN_REACH))
+
+
+def facing(pose: Pose, forward: Vector) -> Pose:
+    """The pose that looks along a world direction at the same pivot, upright; straight up or down, with the
+    picture's right side where it was."""
+    ahead = np.array(forward) / np.linalg.norm(forward)
+    right = np.cross(-UP, ahead)
+    if np.linalg.norm(right) < 1e-6:
+        right = pose.axes[:, 0] - (pose.axes[:, 0] @ ahead) * ahead
+    right /= np.linalg.norm(right)
+    axes = np.stack((right, np.cross(ahead, right), ahead), axis=1)
+    centre = pose.pivot - pose.reach * ahead
+    return replace(pose, centre=Vector(*centre.tolist()), rotation=_rotation(axes))
+
+
+def facing_near(pose: Pose, forward: Vector, places: Sequence[Vector]) -> Pose:
+    """`facing`, no farther than `NEAR` degrees from the nearest of some places, as the pivot sees them: from
+    there on the way to where it should look from."""
+    there = facing(pose, forward)
+    if not places or degrees_aside(there, places) <= NEAR:
+        return there
+    wanted = -there.axes[:, 2]
+    ways = np.array(places) - pose.pivot
+    ways = ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-12)
+    nearest = ways[np.argmax(ways @ wanted)]
+    axis = np.cross(nearest, wanted)
+    if np.linalg.norm(axis) < 1e-6:  # right behind what the photo looked at: around it
+        axis = UP
+    direction = about(axis / np.linalg.norm(axis), math.radians(NEAR)) @ nearest
+    return facing(pose, Vector(*(-direction).tolist()))
+
+
+def with_fov(pose: Pose, degrees: float) -> Pose:
+    """Another field of view, clamped to `FOV_RANGE`."""
+    return replace(pose, fov=float(np.clip(degrees, *FOV_RANGE)))
+
+
+def units_per_pixel(pose: Pose, width: int, height: int) -> float:
+    """Scene units that one pixel spans at the pivot's depth."""
+    depth = pose.reach if pose.span is None else 1.0
+    return depth / float(intrinsics(pose, width, height)[0, 0])
+
+
+def framing(pose: Pose, low: Vector, high: Vector) -> Pose:
+    """The pose that looks the same way and shows the whole box from `low` to `high`, with a margin."""
+    corners = np.array([[x, y, z] for x in (low.x, high.x) for y in (low.y, high.y) for z in (low.z, high.z)])
+    middle = (np.array(low) + np.array(high)) / 2
+    offsets = (corners - middle) @ pose.axes  # (8, 3) right, down, forward
+    if pose.span is not None:
+        across, along = abs(offsets[:, 0]).max(), abs(offsets[:, 1]).max()
+        widest = max(across, along * pose.aspect)  # half the box's width
+        span = 2 * FRAME_MARGIN * float(widest / min(pose.aspect, 1.0))
+        centre = middle - pose.reach * pose.axes[:, 2]
+        there = replace(pose, centre=Vector(*centre.tolist()), span=max(span, MIN_REACH))
+        return _clear(there, low, high)
+    half = math.tan(math.radians(pose.fov) / 2)
+    half_x, half_y = (half, half / pose.aspect) if pose.aspect >= 1 else (half * pose.aspect, half)
+    needed = np.maximum(abs(offsets[:, 0]) / half_x, abs(offsets[:, 1]) / half_y) - offsets[:, 2]
+    reach = max(float(FRAME_MARGIN * needed.max()), MIN_REACH)
+    centre = middle - reach * pose.axes[:, 2]
+    return replace(pose, centre=Vector(*centre.tolist()), reach=reach)
+
+
+def blend(start: Pose, end: Pose, fraction: float) -> Pose:
+    """Between two poses: slerp of the rotations, smooth start and stop; exact at both ends.
+
+    Between perspective and parallel rays the way is one in perspective.
+    """
+    if fraction <= 0.0:
+        return start
+    if fraction >= 1.0:
+        return end
+    start, end = alike((start, end))
+    t = fraction * fraction * (3.0 - 2.0 * fraction)
+
+    def mix(a: float, b: float) -> float:
+        return a + t * (b - a)
+
+    return Pose(
+        centre=Vector(*(mix(a, b) for a, b in zip(start.centre, end.centre, strict=True))),
+        rotation=Rotation(*rotations.slerp(start.rotation, end.rotation, t)),
+        reach=mix(start.reach, end.reach),
+        fov=mix(start.fov, end.fov),
+        aspect=mix(start.aspect, end.aspect),
+        shift=(mix(start.shift[0], end.shift[0]), mix(start.shift[1], end.shift[1])),
+        span=None if start.span is None or end.span is None else mix(start.span, end.span),
+    )
+
+
+def alike(all_poses: Sequence[Pose]) -> tuple[Pose, ...]:
+    """As they are where all see by parallel rays, else all in perspective."""
+    flat = all(pose.span is not None for pose in all_poses)
+    return tuple(pose if flat or pose.span is None else perspective(pose) for pose in all_poses)
+
+
+def _rotation(axes: np.ndarray) -> Rotation:
+    return Rotation(*rotations.quaternion(axes))

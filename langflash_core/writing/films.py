@@ -1,0 +1,215 @@
+"""A scene as a film: from photo to photo, around it, or along key frames; in colours or as a heat-map."""
+
+import itertools
+import json
+import math
+from collections.abc import Generator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from langflash_core import pipeline
+from langflash_core.colormaps import HeatColours
+from langflash_core.errors import InputError, LangFlashError, ViewError
+from langflash_core.export.png import USUAL, heat_over, to_8bit
+from langflash_core.files import readable_file, staged_folder
+from langflash_core.geometry.poses import Pose, Vector, blend, framing, from_view, orbit, to_camera
+from langflash_core.geometry.reach import median_reach
+from langflash_core.geometry.tours import RATE, along, even
+from langflash_core.language.relevance import CompiledQuery, compile_query
+from langflash_core.language.spaces import language_space
+from langflash_core.limits import TEXT
+from langflash_core.running import Progress
+from langflash_core.types import NO_LANGUAGE, Camera, Scene
+from langflash_core.writing.cameras import camera_of
+from langflash_core.writing.job import Job
+from langflash_core.writing.renderers import Renderer
+
+SECONDS = 6.0
+LONGEST = 600.0  # seconds
+_SWAY = (math.radians(12), math.radians(4))  # yaw and pitch around a single photo: further out are holes
+_H264 = ("-preset", "veryfast")  # half the encoder's time; files grow a little
+_WEBP = ("-quality", "80", "-compression_level", "2", "-loop", "0")
+_MIDDLE = (0.02, 0.98)  # of what is orbited: stray Gaussians do not count
+
+
+def check_encoder() -> None:
+    """Raises:
+    InputError: the optional package that writes videos is missing.
+    """
+    try:
+        import imageio_ffmpeg  # noqa: F401
+    except ImportError:
+        raise InputError(
+            "videos need the package imageio-ffmpeg, which is not installed; "
+            "pip install 'langflash[video]' brings it"
+        ) from None
+
+
+def write_film(job: Job) -> str:
+    """The scene, or what of it answers, or with one phrase's heat-map, along a way.
+
+    Raises:
+        LangFlashError: nothing answers, the key frames cannot be used, or the encoder stopped.
+    """
+    request, scene = job.request, job.scene
+    shown, heat = scene, None
+    if job.kind.colours:
+        heat = asked(scene, job.prompts[0], request.threshold)
+    elif job.prompts:
+        shown = pipeline.select(scene, job.prompts, threshold=request.threshold)
+    cameras = way(request.path, scene, shown, request.size, request.seconds)
+    with job.renderer() as renderer, staged_folder(request.output.parent) as staging:
+        write(staging / request.output.name, shown, cameras, renderer, job.progress, heat, job.colours)
+    return f"{len(cameras) / RATE:.1f} s, {cameras[0].width} x {cameras[0].height}"
+
+
+def asked(scene: Scene, phrase: str, threshold: float | None) -> CompiledQuery:
+    """What a heat-map is of.
+
+    Raises:
+        PromptError: the phrase cannot be used.
+    """
+    compiled = compile_query(scene, language_space(scene.semantics.space), [phrase])
+    return compiled if threshold is None else replace(compiled, threshold=threshold)
+
+
+def way(
+    path: str | None, scene: Scene, shown: Scene, size: tuple[int, int] | None, seconds: float | None
+) -> list[Camera]:
+    """Cameras of a film, sides rounded down to even numbers of pixels as encoders want them.
+
+    Args:
+        path: photos (None), orbit, or a file of key frames. shown: the part of the scene that is drawn.
+
+    Raises:
+        ViewError: the key frames cannot be used.
+    """
+    if path in (None, "photos", "orbit"):
+        width, height = even(size or scene.view_size)
+        views = _poses(scene)
+        around = _turn(views[0], shown) if path == "orbit" else None
+        count = max(1, round(RATE * (seconds or SECONDS)))
+        turns = _turns(scene)
+        poses = [
+            orbit(around, 2 * math.pi * index / count, 0.0) if around else _at(views, index / count, turns)
+            for index in range(count)
+        ]
+        return [to_camera(pose, width, height) for pose in poses]
+    return along(*read_key_frames(Path(path), seconds), size)
+
+
+def write(
+    path: Path,
+    scene: Scene,
+    cameras: list[Camera],
+    renderer: Renderer,
+    progress: Progress,
+    heat: CompiledQuery | None = None,
+    colours: HeatColours = USUAL,
+) -> None:
+    """Draw every camera into an H.264 file, or an animated WebP that begins again at its end.
+
+    Args:
+        heat: over the colours; None: colours alone. colours: of the heat-map.
+
+    Raises:
+        LangFlashError: the encoder stopped.
+    """
+    film = _encoder(path, (cameras[0].width, cameras[0].height))
+    try:
+        film.send(None)
+        for index, camera in enumerate(cameras):
+            progress("drawing", index / len(cameras))
+            film.send(picture(scene, camera, renderer, heat, colours).tobytes())
+    except OSError as error:
+        raise LangFlashError(f"the video encoder stopped ({error}); try another --size") from error
+    finally:
+        film.close()
+
+
+def picture(
+    scene: Scene,
+    camera: Camera,
+    renderer: Renderer,
+    heat: CompiledQuery | None,
+    colours: HeatColours = USUAL,
+) -> np.ndarray:
+    """(H, W, 3) uint8."""
+    if heat is None:
+        return renderer.colours(scene, camera)
+    frame, relevance = renderer.answered(scene, camera, heat)
+    return to_8bit(heat_over(relevance[0], frame.rgb, heat.threshold, heat.mode, colours))
+
+
+def _encoder(path: Path, size: tuple[int, int]) -> Generator[None, bytes | None, None]:
+    import imageio_ffmpeg
+
+    if path.suffix.lower() == ".webp":
+        own = {"codec": "libwebp_anim", "quality": None, "output_params": list(_WEBP)}  # None: not theirs
+        return imageio_ffmpeg.write_frames(str(path), size, fps=RATE, macro_block_size=2, **own)
+    own = {"quality": 8, "output_params": list(_H264)}
+    return imageio_ffmpeg.write_frames(str(path), size, fps=RATE, macro_block_size=2, **own)
+
+
+def _poses(scene: Scene) -> list[Pose]:
+    means = scene.gaussians.means.double().cpu().numpy()
+    pairs = zip(scene.viewmats.double().cpu().numpy(), scene.Ks.double().cpu().numpy(), strict=True)
+    return [from_view(V, K, scene.view_size, median_reach(means, V, K, scene.view_size)) for V, K in pairs]
+
+
+def _turns(scene: Scene) -> bool:
+    """Whether the scene can be walked around: a splat file's that is looked at from outside."""
+    at_origin = torch.equal(scene.viewmats[0].cpu(), torch.eye(4))
+    return scene.semantics.space == NO_LANGUAGE and not at_origin
+
+
+def _turn(view: Pose, shown: Scene) -> Pose:
+    """Where an orbit begins: as the first view looks, far enough away to show all that is drawn."""
+    means = shown.gaussians.means.detach().double().cpu().numpy()
+    low, high = np.quantile(means[np.isfinite(means).all(1)], _MIDDLE, axis=0)
+    return framing(view, Vector(*low.tolist()), Vector(*high.tolist()))
+
+
+def _at(views: list[Pose], time: float, turns: bool) -> Pose:
+    """The pose at `time` in [0, 1) of the round."""
+    if len(views) == 1:
+        angle = 2 * math.pi * time
+        if turns:
+            return orbit(views[0], angle, 0.0)
+        return orbit(views[0], _SWAY[0] * math.sin(angle), _SWAY[1] * (1 - math.cos(angle)) / 2)
+    leg, fraction = divmod(time * len(views), 1.0)
+    return blend(views[int(leg)], views[(int(leg) + 1) % len(views)], fraction)
+
+
+def read_key_frames(path: Path, seconds: float | None) -> tuple[list[Camera], list[float]]:
+    """Cameras and their times in seconds, from 0: as the file says, or evenly spread over `seconds`.
+
+    Raises:
+        ViewError: missing, not a list of two or more cameras, or times that do not rise.
+    """
+    readable_file(path, "key frames", ViewError)
+    TEXT.check(path.stat().st_size, path.name, ViewError)
+    try:
+        entries = json.loads(path.read_bytes())
+    except (ValueError, RecursionError):
+        entries = None
+    if not isinstance(entries, list) or len(entries) < 2:
+        raise ViewError(f"{path} holds no key frames: expected a JSON list of two or more cameras")
+    cameras = [camera_of(entry, f"{path}, key frame {number}") for number, entry in enumerate(entries)]
+    if len({camera.orthographic for camera in cameras}) > 1:
+        raise ViewError(f"{path}: either all key frames are orthographic, or none")
+    times = [entry.get("time") for entry in entries]
+    if all(time is None for time in times):
+        return cameras, np.linspace(0, seconds or SECONDS, len(cameras)).tolist()
+    numbers = [
+        t for t in times if isinstance(t, int | float) and not isinstance(t, bool) and math.isfinite(t)
+    ]
+    rising = len(numbers) == len(times) and all(a < b for a, b in itertools.pairwise(numbers))
+    if not rising or numbers[-1] - numbers[0] > LONGEST:
+        raise ViewError(f"{path}: times must rise, all of them given, over at most {LONGEST:g} seconds")
+    if seconds is not None:
+        raise ViewError(f"{path} says its times; leave --seconds away")
+    return cameras, [number - numbers[0] for number in numbers]

@@ -1,0 +1,66 @@
+"""Files of Gaussians and of photos with their poses, and web pages."""
+
+from pathlib import Path
+
+from langflash_core import pipeline
+from langflash_core.export.language import side_car
+from langflash_core.export.sog import sog_files
+from langflash_core.files import make_folder
+from langflash_core.formats import SOG_FOLDER, kind_of
+from langflash_core.outputs import PLY, loaded
+from langflash_core.scene.thin import coarse_level
+from langflash_core.types import Scene
+from langflash_core.writing.job import Job
+
+
+def write_scene(job: Job) -> str:
+    """The scene, or what of it answers, in the format of the record.
+
+    Raises:
+        LangFlashError: nothing answers, or a file cannot be written.
+    """
+    scene, path = job.scene, job.request.output
+    chosen = _as_fine(job)
+    if job.prompts:
+        chosen = pipeline.select(chosen, job.prompts, threshold=job.request.threshold)
+    make_folder(path.parent)
+    loaded(job.kind.of_scene)(chosen, path)
+    if job.kind.subject == "photos":
+        return f"{scene.num_views} photos in images/ and their poses"
+    fewer = len(chosen.gaussians) < len(scene.gaussians)
+    share = f" of {len(scene.gaussians):,}" if fewer or job.prompts else ""
+    has_side_car = job.kind is PLY and chosen.semantics.num_atoms > 0
+    beside = f", its language in {side_car(path).name}" if has_side_car else ""
+    return f"{len(chosen.gaussians):,}{share} Gaussians, {_megabytes(path):.1f} MB{beside}"
+
+
+def write_page(job: Job) -> str:
+    """A web page with the whole scene; the phrases are what it shows as asked.
+
+    Raises:
+        LangFlashError: a phrase cannot be used, or the file cannot be written.
+    """
+    request, shown = job.request, _as_fine(job)
+    job.progress("reading the vocabulary", 0.2)
+    make_folder(request.output.parent)
+    phrases = pipeline.web_page(
+        shown,
+        request.output,
+        job.prompts,
+        threshold=request.threshold,
+        with_text=request.with_text,
+        title=(request.scene or request.output).stem,
+    )
+    known = "any phrase" if request.with_text else f"{len(phrases.texts)} phrases" if phrases else ""
+    answers = f", answers {known}" if known else ""
+    share = f" of {len(job.scene.gaussians):,}" if shown is not job.scene else ""
+    return f"{len(shown.gaussians):,}{share} Gaussians, {_megabytes(request.output):.1f} MB{answers}"
+
+
+def _as_fine(job: Job) -> Scene:
+    return coarse_level(job.scene) if job.request.detail == "low" else job.scene
+
+
+def _megabytes(path: Path) -> float:
+    files = sog_files(path) if kind_of(path) == SOG_FOLDER else [path]
+    return sum(file.stat().st_size for file in files) / 1e6

@@ -1,0 +1,129 @@
+"""The files of the folder: per view masks, cut-outs and depth; of all together boxes, surfaces, a sheet."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from torch import Tensor
+
+from langflash_core.errors import MissingPackageError
+from langflash_core.export import depth, glb
+from langflash_core.export.colours import label_colours
+from langflash_core.export.paint import depth_picture, write_picture
+from langflash_core.export.png import to_8bit, write_grey, write_labels, write_mask, write_rgb
+from langflash_core.export.sheet import contact_sheet, thumbnail
+from langflash_core.files import staged_folder
+from langflash_core.request import ExportRequest
+from langflash_core.running import Progress
+from langflash_core.types import SegmentedView
+from langflash_core.writing.segmented import manifest
+from langflash_core.writing.subject import Subject, boxes, counted, cut_out, surfaces, views_of
+
+_GREY = 0.25  # behind phrases on the sheet
+_WIDE = 8  # tiles of a view that fit into a row of their own
+
+
+def write_folder(subject: Subject, request: ExportRequest, progress: Progress) -> str:
+    """All views, boxes, surfaces, contact sheet and manifest, all or none.
+
+    Returns:
+        What was written, in words.
+
+    Raises:
+        LangFlashError: the folder cannot be written.
+    """
+    with staged_folder(request.output) as staging:
+        places = [staging / manifest.folder_name(number) for number in subject.numbers]
+        files, tiles, depths = [], [], []
+        for index, view in enumerate(views_of(subject)):
+            progress("drawing", 0.9 * index / len(places))
+            files.append(_write_view(places[index], subject, view))
+            tiles += _tiles(subject, view, places[index].name.replace("_", " "))
+            depths.append(depth.lengths(view.frame, subject.metres))
+        progress("surfaces", 0.9)
+        step = depth.fitting_step(max(float(each.max()) for each in depths))
+        missing = _write_depths(places, depths, step, subject.unit)
+        a_row = len(tiles) // len(places)
+        write_picture(staging / "sheet.png", contact_sheet(tiles, a_row if a_row <= _WIDE else None))
+        glb.write_boxes(boxes(subject), staging / "boxes.glb")
+        missing |= _write_surfaces(staging / "surfaces.glb", subject)
+        document = manifest.document(request, subject, files, step, missing)
+        text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+        (staging / "manifest.json").write_text(text, encoding="utf-8")
+    said = [
+        f"{len(subject.found)} of {len(subject.names)} phrases, {counted(len(subject.things), 'instance')}"
+    ]
+    said[0] += f" in {counted(len(places), 'view')}"
+    return "; ".join([*said, *(f"without {name}: {why}" for name, why in missing.items())])
+
+
+def _write_view(folder: Path, subject: Subject, view: SegmentedView) -> dict[str, Any]:
+    """All of a view but its depth; the names by kind."""
+    folder.mkdir()
+    write_rgb(folder / "rgb.png", view.frame.rgb)
+    write_labels(folder / "labels.png", view.labels, subject.segments.prompts)
+    write_labels(folder / "instances.png", view.things, subject.things)
+    parts = {
+        subject.segments.prompts[p]: _write_part(
+            folder, subject.names[p], view.mattes[p], cut_out(subject, view, p)
+        )
+        for p in subject.found
+    }
+    return {
+        "rgb": "rgb.png",
+        "depth": "depth.png",
+        "labels": "labels.png",
+        "instances": "instances.png",
+        "union": _write_part(folder, subject.union_name, view.union, cut_out(subject, view, None)),
+        "phrases": parts,
+    }
+
+
+def _write_part(folder: Path, name: str, matte: Tensor, cut: np.ndarray) -> dict[str, str]:
+    """Hard mask, soft mask and cut-out."""
+    files = {kind: f"{name}_{kind}.png" for kind in ("mask", "soft", "cutout")}
+    write_mask(folder / files["mask"], matte >= 0.5)
+    write_grey(folder / files["soft"], matte, 0.0, 1.0)
+    write_picture(folder / files["cutout"], cut)
+    return files
+
+
+def _write_depths(places: list[Path], depths: list[np.ndarray], step: float, unit: str) -> dict[str, str]:
+    """`depth.png`, and `depth.exr` where its package is there; else why not, by name."""
+    for folder, lengths in zip(places, depths, strict=True):
+        depth.write_depth_png(folder / "depth.png", lengths, step, unit)
+    try:
+        for folder, lengths in zip(places, depths, strict=True):
+            depth.write_depth_exr(folder / "depth.exr", lengths, unit)
+    except MissingPackageError as missing:
+        return {"depth.exr": str(missing)}
+    return {}
+
+
+def _write_surfaces(path: Path, subject: Subject) -> dict[str, str]:
+    """The meshes, where their package is there; else why not, by name."""
+    try:
+        meshes = surfaces(subject)
+    except MissingPackageError as missing:
+        return {path.name: str(missing)}
+    if not meshes:
+        return {path.name: "no view shows a surface of these phrases"}
+    glb.write_surfaces(meshes, path, subject.metres or 1.0)
+    return {}
+
+
+def _tiles(subject: Subject, view: SegmentedView, where: str) -> list[tuple[str, np.ndarray]]:
+    """Of one view: colours, depth, instances, and each phrase that is there on dark grey."""
+    colours = np.concatenate((np.zeros((1, 3), np.uint8), label_colours(len(subject.things))))
+    tiles = [
+        (where, to_8bit(view.frame.rgb)),
+        ("nearness", depth_picture(view.frame)[0]),
+        (counted(len(subject.things), "instance"), colours[view.things.cpu().numpy()]),
+    ]
+    for phrase in subject.found:
+        matte = view.mattes[phrase][..., None].cpu()
+        lit = matte * view.frame.rgb.cpu().clamp(0, 1) + (1 - matte) * _GREY
+        count = subject.segments.counts[phrase]
+        tiles.append((subject.segments.prompts[phrase] + (f" ({count})" if count > 1 else ""), to_8bit(lit)))
+    return [(caption, thumbnail(picture)) for caption, picture in tiles]
