@@ -89,7 +89,6 @@ def test_headers(monkeypatch, tmp_path):
 
 
 def test_texts(monkeypatch, tmp_path):
-    from app.cli.cameras import read_camera
     from langflash_core.writing.cameras import read_camera
     from langflash_core.writing.films import read_key_frames
 

@@ -12,6 +12,7 @@ import torch
 from PIL import Image
 from safetensors.torch import save_file
 
+from langflash_core.outputs import ALL_OUT
 from langflash_core.resources import asset_path
 
 IDENTITY = torch.eye(4).tolist()
@@ -200,9 +201,7 @@ def test_bad_picture(refused, scene_file, tmp_path, words, hint):
 def test_only_png(refused, scene_file, tmp_path, name):
     assert ".png" in refused("render", scene_file, "-o", tmp_path / name)
     if not name.endswith(".ply"):
-        assert ".png, .langflash, .ply, .compressed.ply, .splat" in refused(
-            "export", scene_file, "-o", tmp_path / name
-        )
+        assert ", ".join(ALL_OUT) in refused("export", scene_file, "-o", tmp_path / name)
 
 
 def test_export_of_what_is_not_there(refused, scene_file, tmp_path):

@@ -262,7 +262,7 @@ def test_video_without_its_package(refused, scene_file, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("name", "words", "hint"),
     [
-        ("a.obj", [], ".png, .langflash, .ply, .compressed.ply, .splat, .spz"),
+        ("a.obj", [], ", ".join(ALL_OUT)),
         ("a", [], ".png"),
         ("a.json", [], "--prompt"),
         ("a.png", ["--what", "labels"], "--prompt"),
