@@ -26,7 +26,7 @@ MAIN_SHARE = 0.65
 WHOLE = 0.5
 """A set of whose pixels at least this share has a name is labelled; in others the teacher has its say."""
 EMA_DECAY = 0.995
-WARM_UP = 50
+WARM_UP = 20
 
 
 @dataclass(frozen=True)
