@@ -8,7 +8,7 @@ rendered room. The teacher counts only where it is surer than it usually is of t
 
 Sizes: B photos, h w pixels of the language map, P drawn pixels, N names, C channels.
 
-Source: Sohn et al. 2020 (FixMatch); Wang et al. 2023 (FreeMatch: thresholds of each class); Yun et al. 2019
+Source: Sohn et al. 2020 (FixMatch); Zhang et al. 2021 (FlexMatch: a threshold of each class); Yun et al. 2019
 (CutMix); Yang et al. 2025 (UniMatch V2).
 """
 
@@ -42,6 +42,8 @@ CLASS_PIXELS, NAME_PIXELS, SILENT_PIXELS = 6000, 2500, 6000
 """Drawn from all photos of a step."""
 TEACHER_DECAY = 0.99
 """Of the averaged teacher, at most; younger ones forget faster."""
+SURE = 0.9
+"""Of the softmax, from which the teacher counts for the class that it is usually surest of."""
 SURE_DECAY = 0.98
 """Of what is remembered of how sure the teacher usually is."""
 CUT = (0.3, 0.7)
@@ -107,11 +109,10 @@ class FewSet:
 class Averaged(nn.Module):
     """The average of the weights so far, which says what is where in photos that nobody labelled.
 
-    usual (37,): how sure it is of each class where it says it, on average; surest (): of all.
+    usual (37,): how sure it is of each class where it says it, on average; age (): steps it has followed.
     """
 
     usual: Tensor
-    surest: Tensor
     age: Tensor
 
     def __init__(self, network: GuidedDepthNet):
@@ -119,7 +120,6 @@ class Averaged(nn.Module):
         head = network.language_head
         self.late, self.taught, self.out = (deepcopy(m) for m in (network.late, head.taught, head.out))
         self.register_buffer("usual", torch.full((len(CLASSES37),), 1 / len(CLASSES37)))
-        self.register_buffer("surest", torch.tensor(1 / len(CLASSES37)))
         self.register_buffer("age", torch.tensor(0))
 
     @torch.no_grad()
@@ -149,7 +149,7 @@ class Averaged(nn.Module):
     def surely(self, features: Tensor, classes: Tensor) -> Tensor:
         """Rows of classes (...) that the teacher is sure of, -1 elsewhere; remembers how sure it is.
 
-        A class counts from its own usual sureness on, in shares of the largest, times that of all.
+        Hard classes, of which it is usually less sure, count from less on.
         """
         sure, said = (TEMPERATURE * features @ classes.T).float().softmax(-1).max(-1)
         sums = torch.zeros_like(self.usual).index_add_(0, said.flatten(), sure.flatten())
@@ -157,8 +157,7 @@ class Averaged(nn.Module):
         seen = counts > 0
         step = 1 - self._decay(SURE_DECAY)
         self.usual[seen] = self.usual[seen].lerp((sums / counts.clamp_min(1))[seen], step)
-        self.surest.lerp_(sure.mean(), step)
-        needed = self.surest * self.usual / self.usual.max()
+        needed = SURE * (self.usual / self.usual.max()).sqrt()
         return torch.where(sure >= needed[said], said, -1)
 
 
