@@ -231,7 +231,7 @@ def _add_late(actions) -> None:
         nargs="+",
         default=[],
         metavar="FOLDER",
-        help="other photos, labelled, in part or not at all: learning goes on from the weights' own late half, "
+        help="other photos, labelled, in part or not at all: learning goes on from what the weights have, "
         "and an average of the weights teaches what nobody labelled",
     )
     add_output(late, "RUN", "folder of checkpoints and logs")
@@ -267,7 +267,9 @@ def _add_convert(actions) -> None:
         "--splits", type=Path, metavar="FILE", help="nyu: splits.mat, for its training split"
     )
     command.add_argument("--classes", type=Path, metavar="FILE", help="nyu: classMapping40.mat")
-    command.add_argument("--images", type=Path, metavar="FOLDER", help="coco, coco-things: where the photos are")
+    command.add_argument(
+        "--images", type=Path, metavar="FOLDER", help="of coco layouts: where the photos are"
+    )
     command.add_argument("--camera", type=Path, metavar="FILE", help="frames: K, nine numbers")
     command.add_argument("--limit", type=whole_count, metavar="N", help="only the first N photos")
 

@@ -115,7 +115,7 @@ def _denied(one: NamedSet, at: Mapping[str, int], name_of: Tensor) -> Tensor:
         if label is None or row < 0:
             continue
         for other in (label.group, name.label, *label.words):
-            if other in at and other != label.name:
+            if other is not None and other in at and other != label.name:
                 against[row, at[other]] = False
     return against
 

@@ -118,7 +118,7 @@ class Averaged(nn.Module):
     def __init__(self, network: GuidedDepthNet):
         super().__init__()
         head = network.language_head
-        self.late, self.taught, self.out = (deepcopy(m) for m in (network.late, head.taught, head.out))
+        self.late, self.taught, self.out = deepcopy(network.late), deepcopy(head.taught), deepcopy(head.out)
         self.register_buffer("usual", torch.full((len(CLASSES37),), 1 / len(CLASSES37)))
         self.register_buffer("age", torch.tensor(0))
 

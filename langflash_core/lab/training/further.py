@@ -25,6 +25,8 @@ MAIN_SHARE = 0.65
 """Of the labelled photos of a step, those of the judged set; other labelled sets share the rest."""
 WHOLE = 0.5
 """A set of whose pixels at least this share has a name is labelled; in others the teacher has its say."""
+LEARNED = 0.5
+"""Of the way from the weights that a run begins with to those it ends with (model card)."""
 EMA_DECAY = 0.995
 WARM_UP = 20
 
@@ -79,11 +81,15 @@ def train_few(
     kept: KeptPhotos | None = None,
     weights: Weights | None = None,
 ) -> LoopState:
-    """Train whole late blocks and what reads them, then cut the blocks: `RUN/late.pt` is what later stages
-    and `train export` read, `RUN/late_few.pt` what a run goes on from."""
+    """Train whole late blocks and what reads them, go back a part of the way, and cut the blocks:
+    `RUN/late.pt` is what later stages and `train export` read, `RUN/late_few.pt` what a run goes on from.
+
+    Source: Wortsman et al. 2022 (WiSE-FT: weights between those before and after hold better).
+    """
     net = guided(network)
     preset, vit = net.late.preset, net.encoder.vit
     net.late = whole(net.late, vit)  # type: ignore[assignment]
+    start = {name: value.clone() for name, value in net.state_dict().items() if _learns(name)}
     net.averaged = Averaged(net)  # type: ignore[assignment]
     words = Words(PhraseSampler(table), torch.Generator().manual_seed(options.seed))
     rule = (
@@ -95,9 +101,17 @@ def train_few(
     stage = few_stage(sets.told.bank, weights)
     state = train_stage(net, stage, FewSet(sets.told, sets.silent, rooms), words, run_dir, options, kept)
     del net.averaged
+    with torch.no_grad():
+        for name, value in net.state_dict().items():
+            if _learns(name) and value.is_floating_point():
+                value.lerp_(start[name].to(value), 1 - LEARNED)
     net.late = cut(net.late, vit, preset)  # type: ignore[arg-type]
     save_cut(run_dir / "late.pt", net, replace(stage, name="late", modules=MODULES), state)
     return state
+
+
+def _learns(name: str) -> bool:
+    return name.partition(".")[0] in MODULES
 
 
 def judge_of(

@@ -39,8 +39,8 @@ class DrawnPhotos:
     seeds: tuple[str, ...] = ()
 
     def to(self, device: str | torch.device) -> "DrawnPhotos":
-        moved = {f.name: getattr(self, f.name) for f in fields(self)}
-        return DrawnPhotos(**{k: v.to(device) if isinstance(v, Tensor) else v for k, v in moved.items()})
+        tensors = (getattr(self, field.name) for field in fields(self) if field.name != "seeds")
+        return DrawnPhotos(*(values.to(device) for values in tensors), seeds=self.seeds)
 
 
 @dataclass(frozen=True)
