@@ -10,8 +10,9 @@ from typing import Any, TextIO
 
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.files import check_folder, check_output_file, readable_file
-from langflash_core.lab.photos import chosen_ids
-from langflash_core.lab.photos.layouts import Source, convert
+from langflash_core.lab.photos import chosen_ids, open_folder
+from langflash_core.lab.photos.layouts import convert
+from langflash_core.lab.photos.reading import Source
 from langflash_core.lab.training.commands import (
     run_adopt,
     run_cache,
@@ -122,6 +123,7 @@ def _late(args: Namespace, out: TextIO) -> None:
     folder = opened_folder(args)
     if not folder.labelled:
         raise InputError(f"{args.folder} has no names.csv, so its photos name nothing; give labelled ones")
+    more = [open_folder(place) for place in args.more]
     learned = chosen_ids(folder.ids, "train")
     kept = [id for id in folder.ids if id not in learned]
     with joined(args.device) as device:
@@ -134,6 +136,7 @@ def _late(args: Namespace, out: TextIO) -> None:
             _start(args),
             language_space(PRESETS[args.preset].space).encode,
             replace(_options(args, args.minutes), device=device),
+            more=more,
             preset=args.preset,
         )
         if leads():

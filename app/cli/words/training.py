@@ -7,7 +7,9 @@ from ..values import minutes, part, seed, size, whole_count
 from .shared import add_description, add_json, add_output, new_actions, new_command
 
 # langflash_core.lab.photos.layouts.LAYOUTS, which would bring torch along.
-LAYOUTS = ("nyu", "coco", "ade20k", "sunrgbd", "frames")
+LAYOUTS = (
+    "nyu", "coco", "ade20k", "sunrgbd", "frames", "coco-things", "polygons", "plain", "panoramas",
+)  # fmt: skip
 
 
 def add_rooms(commands) -> None:
@@ -223,6 +225,15 @@ def _add_late(actions) -> None:
         help="labelled photos, as train photos makes them; every seventh run of numbers is kept to validate",
     )
     add_description(late)
+    late.add_argument(
+        "--more",
+        type=Path,
+        nargs="+",
+        default=[],
+        metavar="FOLDER",
+        help="other photos, labelled, in part or not at all: learning goes on from what the weights have, "
+        "and an average of the weights teaches what nobody labelled",
+    )
     add_output(late, "RUN", "folder of checkpoints and logs")
     late.add_argument("--minutes", required=True, type=minutes, metavar="M", help="of training")
     _add_loop(late)
@@ -256,7 +267,9 @@ def _add_convert(actions) -> None:
         "--splits", type=Path, metavar="FILE", help="nyu: splits.mat, for its training split"
     )
     command.add_argument("--classes", type=Path, metavar="FILE", help="nyu: classMapping40.mat")
-    command.add_argument("--images", type=Path, metavar="FOLDER", help="coco: where the photos are")
+    command.add_argument(
+        "--images", type=Path, metavar="FOLDER", help="of coco layouts: where the photos are"
+    )
     command.add_argument("--camera", type=Path, metavar="FILE", help="frames: K, nine numbers")
     command.add_argument("--limit", type=whole_count, metavar="N", help="only the first N photos")
 

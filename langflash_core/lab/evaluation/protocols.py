@@ -12,7 +12,6 @@ from langflash_core.errors import InputError
 from langflash_core.lab.evaluation.posed import APART, PAIRS, chosen_triples
 from langflash_core.lab.evaluation.words import OTHER, PAPER_LABELS
 from langflash_core.lab.photos import Name, PhotoFolder
-from langflash_core.lab.photos.layouts import read_table
 from langflash_core.lab.photos.published import (
     open_frames,
     open_masked,
@@ -20,6 +19,7 @@ from langflash_core.lab.photos.published import (
     re10k_scenes,
     scannet_names,
 )
+from langflash_core.lab.photos.reading import read_table
 
 HELD, TESTED = 8, (1, 4)
 """ScanNet: of every so many sampled frames, these are targets."""

@@ -19,8 +19,8 @@ from langflash_core.errors import InputError
 from langflash_core.images.decode import read_photo
 from langflash_core.lab.photos import PhotoFolder, open_folder
 from langflash_core.lab.photos.folder import PHOTO_SUFFIXES, order
-from langflash_core.lab.photos.layouts import read_table
 from langflash_core.lab.photos.published import re10k_scenes
+from langflash_core.lab.photos.reading import read_table
 
 INDEX = "index.json"
 """What a split of RealEstate10K in chunks has: key -> chunk."""

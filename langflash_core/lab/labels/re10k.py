@@ -31,8 +31,8 @@ from langflash_core.lab.labels.storage import (
     read_labels,
     unpacked,
 )
-from langflash_core.lab.photos.layouts import read_table
 from langflash_core.lab.photos.published import read_chunk
+from langflash_core.lab.photos.reading import read_table
 
 ENTRY = "labels"
 

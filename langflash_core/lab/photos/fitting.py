@@ -46,7 +46,8 @@ def fitted(
     degrees. mirrored: left and right change places, also in the intrinsics.
     """
     height, width = photo.image.shape[:2]
-    box = centre_box(width, height, size) if window is None else window
+    left, top, right, bottom = centre_box(width, height, size) if window is None else window
+    box = max(left, 0.0), max(top, 0.0), min(right, width), min(bottom, height)  # rounding may lead outside
     pixels = Image.fromarray(photo.image).resize(size, Image.Resampling.LANCZOS, box=box, reducing_gap=3.0)
     rgb = torch.from_numpy(np.array(pixels)).permute(2, 0, 1).contiguous()
     K = intrinsics_from_fov(ASSUMED_FOV, width, height) if photo.K is None else photo.K

@@ -4,9 +4,7 @@ Each takes what one downloads, as it was unpacked, and says which photos it leav
 set comes with this project; who converts one keeps to its terms.
 """
 
-import json
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +12,10 @@ import torch
 
 from langflash_core.errors import InputError
 from langflash_core.lab.photos.matlab import MatFile, open_mat
+from langflash_core.lab.photos.partly import from_panoramas, from_plain, from_polygons, from_things
+from langflash_core.lab.photos.reading import Source, read_json
 from langflash_core.lab.photos.writing import FolderWriter, NameTable
 from langflash_core.picture_files import opened_picture
-from langflash_core.running import Progress
 
 NYU_FRAME = (41, 45, 601, 471)
 """The usual crop of the 640 x 480 pictures, which have a white frame: left, top, right, bottom."""
@@ -24,24 +23,6 @@ NYU_CAMERA = (518.8579, 519.4696, 325.5824, 253.7362)
 """fx, fy, cx, cy of the colour camera, from the data set's toolbox."""
 KINECT_CAMERA = (585.0, 585.0, 320.0, 240.0)
 """fx, fy, cx, cy that 7-Scenes publishes for its 640 x 480 frames."""
-
-
-@dataclass(frozen=True)
-class Source:
-    """What a converter reads. path: the file or folder; further: other files by role (a layout says
-    which); limit: only the first so many photos; progress: stage and fraction done."""
-
-    path: Path
-    further: dict[str, Path] = field(default_factory=dict)
-    limit: int | None = None
-    progress: Progress = lambda stage, fraction: None
-
-    def walk(self, items: Iterable) -> Iterator:
-        """Items up to the limit, with progress."""
-        listed = list(items)[: self.limit]
-        for done, item in enumerate(listed):
-            self.progress(f"photo {done + 1} of {len(listed)}", done / len(listed))
-            yield item
 
 
 def convert(layout: str, source: Source, out: Path) -> int:
@@ -102,7 +83,7 @@ def from_coco(source: Source, writer: FolderWriter) -> None:
 
     Source: Kirillov, He, Girshick, Rother, Dollár, Panoptic Segmentation, CVPR 2019.
     """
-    document = _json(source.path, ("images", "annotations", "categories"))
+    document = read_json(source.path, ("images", "annotations", "categories"))
     pngs = source.path.with_suffix("")
     split = source.path.stem.removeprefix("panoptic_")
     photos = source.further.get("images", source.path.parent.parent / split)
@@ -226,32 +207,11 @@ LAYOUTS: dict[str, Callable[[Source, FolderWriter], None]] = {
     "ade20k": from_ade,
     "sunrgbd": from_sun,
     "frames": from_frames,
+    "coco-things": from_things,
+    "polygons": from_polygons,
+    "plain": from_plain,
+    "panoramas": from_panoramas,
 }
-
-
-def read_table(path: Path) -> dict:
-    """A JSON object.
-
-    Raises:
-        InputError: it cannot be read, or is something else.
-    """
-    try:
-        document = json.loads(path.read_bytes())
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror}); check the path") from None
-    except ValueError as error:
-        raise InputError(f"{path} is not JSON ({error}); download it again") from None
-    if not isinstance(document, dict):
-        raise InputError(f"{path} is no table of names; download it again")
-    return document
-
-
-def _json(path: Path, keys: tuple[str, ...]) -> dict:
-    document = read_table(path)
-    missing = [key for key in keys if key not in document]
-    if missing:
-        raise InputError(f"{path} holds no '{missing[0]}'; it is not the file this layout needs")
-    return document
 
 
 def _picture(path: Path, mode: str) -> np.ndarray:

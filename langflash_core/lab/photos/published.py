@@ -30,10 +30,10 @@ from langflash_core.lab.photos.layouts import (
     NYU_CAMERA,
     NYU_FRAME,
     forty_classes,
-    read_table,
 )
 from langflash_core.lab.photos.matlab import MatFile, open_mat
 from langflash_core.lab.photos.names import CLASSES40, class_of, spoken
+from langflash_core.lab.photos.reading import read_table
 from langflash_core.picture_files import opened_picture
 
 SCANNET_NAMES = "scannetv2-labels.combined.tsv"

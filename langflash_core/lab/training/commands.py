@@ -26,6 +26,7 @@ from langflash_core.lab.training.cache import (
 )
 from langflash_core.lab.training.dense import DenseSet
 from langflash_core.lab.training.frozen import FrozenSet
+from langflash_core.lab.training.further import Sets, judge_of, train_few
 from langflash_core.lab.training.live import LivePhotos
 from langflash_core.lab.training.loop import LoopOptions, Validate, train_stage
 from langflash_core.lab.training.mixing import MixedSet
@@ -192,13 +193,15 @@ def run_late(
     encode: Encode,
     options: LoopOptions,
     *,
+    more: Sequence[PhotoFolder] = (),
     preset: str = "mini",
 ) -> LoopState:
     """Train the late half, and the heads that read it, on labelled photos and the cached rooms.
 
     Args:
         ids: of the photos to learn from. kept: of those to judge by now and then. start: weights file that
-            the run begins with.
+            the run begins with. more: other sets, labelled, in part or not at all; with them the late half
+            goes on from what the weights have instead of beginning anew (`fewlabels`).
 
     Raises:
         InputError: no cache, or a photo cannot be used.
@@ -206,6 +209,12 @@ def run_late(
     rooms = _open(folder / "train")
     network = initial_network(PRESETS[preset], start, options.seed)
     begin(network, start, ())
+    if more:
+        sets, judge = Sets.of(photos, ids, more, encode), None
+        if kept:
+            judge = judge_of(photos, kept, encode, options.device)
+        rooms.tokens = False  # of the frozen half alone, which is run with the other
+        return train_few(network, sets, rooms, phrase_table(folder, encode), run_dir, options, judge)
     live = LivePhotos(photos, ids)
     words = Words(PhraseSampler(phrase_table(folder, encode)), torch.Generator().manual_seed(options.seed))
     targets = PhotoTargets.of(photos, live, encode)

@@ -8,9 +8,10 @@ from typing import cast
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional as F
 
 from langflash_core.network.encoders.late import LateHalf, take_own
-from langflash_core.network.encoders.plain import NORM_EPS, Block, PlainViT, through
+from langflash_core.network.encoders.plain import NORM_EPS, Block, LayerScale, PlainViT, attended, through
 from langflash_core.network.presets import GuidedDepth
 
 KEPT = 0.9
@@ -23,14 +24,21 @@ class SkippingBlock(Block):
     """A block whose branches leave out some pictures. Source: Huang et al. 2016 (stochastic depth)."""
 
     def forward(self, x: Tensor) -> Tensor:
-        x = x + self._some(self.ls1(self.attn(self.norm1(x))))
-        return x + self._some(self.ls2(self.mlp(self.norm2(x))))
+        values = attended(self.attn.qkv(self.norm1(x)), self.attn.heads)
+        x = x + self._some(_scaled(self.attn.proj, self.ls1, values))
+        hidden = F.gelu(self.mlp.fc1(self.norm2(x)))
+        return x + self._some(_scaled(self.mlp.fc2, self.ls2, hidden))
 
     def _some(self, change: Tensor) -> Tensor:
         if not self.training:
             return change
         kept = torch.rand(len(change), 1, 1) >= SKIPPED  # drawn where the run's generator is
         return change * (kept.to(change) / (1 - SKIPPED))
+
+
+def _scaled(layer: nn.Linear, scale: LayerScale, x: Tensor) -> Tensor:
+    """What a layer gives, times a scale a channel: of the matrix, which is smaller than what it gives."""
+    return F.linear(x, scale.gamma[:, None] * layer.weight, scale.gamma * layer.bias)
 
 
 class WholeLateHalf(nn.Module):

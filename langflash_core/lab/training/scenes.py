@@ -23,8 +23,8 @@ from langflash_core.lab.labels.posed import open_collected
 from langflash_core.lab.labels.storage import LABELS
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.photos.fitting import FittedPhoto, fitted, network_size
-from langflash_core.lab.photos.layouts import read_table
 from langflash_core.lab.photos.published import open_scannet, re10k_scenes, scannet_names
+from langflash_core.lab.photos.reading import read_table
 from langflash_core.lab.training.batches import SceneBatch, collate
 from langflash_core.lab.training.objects import Objects, linked, tracked
 from langflash_core.lab.training.photo_names import photo_label

@@ -40,9 +40,16 @@ class LanguageHead(nn.Module):
 
     def hidden(self, tokens: Tokens) -> Tensor:
         """What the last layer reads, (B*V, F, 4h, 4w)."""
+        return torch.cat((self.own(tokens), self.of_photos(tokens)), 1)
+
+    def own(self, tokens: Tokens) -> Tensor:
+        """What rendered rooms taught to tell, from the frozen half; (B*V, 2 * feature, 4h, 4w)."""
         levels = (tokens.maps(0), tokens.maps(1), tokens.maps(2), tokens.maps(3))
-        own = F.gelu(self.mix(F.avg_pool2d(self.dpt(levels).path_1, 2)))
-        return torch.cat((own, double(self.taught(tokens.taught_maps()), align_corners=False)), 1)
+        return F.gelu(self.mix(F.avg_pool2d(self.dpt(levels).path_1, 2)))
+
+    def of_photos(self, tokens: Tokens) -> Tensor:
+        """What photos taught to tell, (B*V, taught_feature, 4h, 4w)."""
+        return double(self.taught(tokens.taught_maps()), align_corners=False)
 
     def forward(self, tokens: Tokens) -> Tensor:
         """L(x), (B, V, C, 4h, 4w), unit channel norm."""

@@ -206,6 +206,23 @@ def test_the_late_half_is_trained_and_exported(run, checkpoint, photos, tmp_path
     assert moved == {"late", "language_head", "decoder", "depth_head"}
 
 
+def test_the_late_half_goes_on_with_other_photos(run, checkpoint, photos, tmp_path):
+    """The same photos once more without a label beside them; `late` is what later stages read."""
+    for number in range(3, 7):
+        for folder in ("images", "labels"):
+            content = next((photos / folder).glob("1.*"))
+            (photos / folder / f"{number}{content.suffix}").write_bytes(content.read_bytes())
+    write_shard(tmp_path / "cache" / "train" / "a.safetensors", [toy_record(0)])
+    assert run("train", "photos", "plain", photos / "images", "-o", tmp_path / "plain").code == 0
+    words = ("--photos", photos, "--more", tmp_path / "plain", "--minutes", "5", "--max-steps", "1")
+    where = ("-o", tmp_path / "run", "--start", checkpoint)
+    outcome = run("train", "late", tmp_path / "cache", *words, *where)
+    assert outcome.code == 0 and "1 steps" in outcome.out, outcome.err
+    assert {path.name for path in (tmp_path / "run").glob("*.pt")} == {"late.pt", "late_few.pt"}
+    words = ("--photos", photos, "--more", tmp_path / "gone", "--minutes", "5")
+    assert "gone/images" in run("train", "late", tmp_path / "cache", *words, *where).err
+
+
 def test_a_data_set_is_converted(run, tmp_path):
     (tmp_path / "seq").mkdir()
     Image.new("RGB", (56, 42)).save(tmp_path / "seq" / "frame-000000.color.png")

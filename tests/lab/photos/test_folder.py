@@ -12,6 +12,7 @@ from PIL import Image
 from langflash_core.errors import ImageError, InputError
 from langflash_core.lab.photos import Name, chosen_ids, open_folder
 from langflash_core.lab.photos.fitting import drawn_window, fitted, network_size, seen_through
+from langflash_core.lab.photos.folder import LabelledPhoto
 from langflash_core.lab.photos.writing import FolderWriter, NameTable
 
 WIDTH, HEIGHT = 60, 45
@@ -205,3 +206,9 @@ def test_unlabelled_and_unknown_become_nothing(folder: Path):
     assert int(view.labels.max()) == 0 and float(view.depths.max()) == 0  # no unit, so no metres
     fov = 2 * torch.rad2deg(torch.atan(WIDTH / 2 / (view.K[0, 0] * (HEIGHT / 28))))
     assert float(fov) == pytest.approx(65, abs=0.5)
+
+
+def test_a_centre_that_rounding_moves_outside_is_taken_from_the_edge():
+    """455 x 640 at 196 x 266: the widest centre begins 3e-14 pixels left of the photo."""
+    image = np.random.default_rng(0).integers(0, 255, (640, 455, 3), dtype=np.uint8)
+    assert fitted(LabelledPhoto("1", image), (196, 266)).rgb.shape == (3, 266, 196)

@@ -11,7 +11,8 @@ from scipy.io import savemat
 from langflash_core.errors import InputError, MissingPackageError
 from langflash_core.lab.photos import matlab as matlab_files
 from langflash_core.lab.photos import open_folder
-from langflash_core.lab.photos.layouts import Source, convert
+from langflash_core.lab.photos.layouts import convert
+from langflash_core.lab.photos.reading import Source
 
 HEIGHT, WIDTH, PHOTOS = 480, 640, 3
 

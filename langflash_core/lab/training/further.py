@@ -1,0 +1,122 @@
+"""Going on from taught weights, with other sets of photos beside the labelled ones: `train late --more`."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from langflash_core.lab.photos import PhotoFolder, chosen_ids
+from langflash_core.lab.training.bank import NameBank
+from langflash_core.lab.training.batches import RoomSet
+from langflash_core.lab.training.fewlabels import Averaged, FewSet, Weights, few_stage
+from langflash_core.lab.training.late import cut, whole
+from langflash_core.lab.training.live import LivePhotos
+from langflash_core.lab.training.loop import LoopOptions, Optimising, train_stage
+from langflash_core.lab.training.pool import PhotoPool, PhotoSet
+from langflash_core.lab.training.real import MODULES, KeptPhotos, PhotoTargets
+from langflash_core.lab.training.stages.stage import Words, guided
+from langflash_core.lab.training.states import LoopState, save_cut
+from langflash_core.lab.training.words import PhraseSampler, PhraseTable
+from langflash_core.network.model import LangFlashNet
+
+MAIN_SHARE = 0.65
+"""Of the labelled photos of a step, those of the judged set; other labelled sets share the rest."""
+WHOLE = 0.5
+"""A set of whose pixels at least this share has a name is labelled; in others the teacher has its say."""
+LEARNED = 0.5
+"""Of the way from the weights that a run begins with to those it ends with (model card)."""
+EMA_DECAY = 0.995
+WARM_UP = 20
+
+
+@dataclass(frozen=True)
+class Sets:
+    """All photos that are learned from; which of them are labelled, and which mostly not."""
+
+    told: PhotoPool
+    silent: PhotoPool | None
+
+    @staticmethod
+    def of(
+        main: PhotoFolder,
+        ids: Sequence[str],
+        more: Sequence[PhotoFolder],
+        encode: Callable[[Sequence[str]], Tensor],
+    ) -> "Sets":
+        """Of each further folder what `split` does not keep is learned from.
+
+        Raises:
+            InputError: a photo or its labels cannot be used.
+        """
+        first = PhotoSet.of(main, ids, MAIN_SHARE, hold=True)
+        others = [PhotoSet.of(folder, chosen_ids(folder.ids, "train"), 1.0) for folder in more]
+        bank = NameBank.of([one.named for one in (first, *others)], encode)
+        labelled = [place for place, one in enumerate(others) if labelled_share(one) >= WHOLE]
+        rest = [place for place in range(len(others)) if place not in labelled]
+        photos = sum(len(others[place].ids) for place in labelled)
+        shares = [(1 - MAIN_SHARE) * len(others[place].ids) / photos for place in labelled]
+        told = [replace(others[place], share=share) for place, share in zip(labelled, shares, strict=True)]
+        silent = [replace(others[place], share=len(others[place].ids) ** 0.5) for place in rest]
+        return Sets(
+            PhotoPool((first, *told), (0, *(place + 1 for place in labelled)), bank),
+            PhotoPool(tuple(silent), tuple(place + 1 for place in rest), bank, strong=True) if rest else None,
+        )
+
+
+def labelled_share(photos: PhotoSet) -> float:
+    """Share of the pixels of a set that have a name."""
+    shown = photos.named.shown
+    return sum(sum(one.pixels.values()) / one.size for one in shown) / max(len(shown), 1)
+
+
+def train_few(
+    network: LangFlashNet,
+    sets: Sets,
+    rooms: RoomSet | None,
+    table: PhraseTable,
+    run_dir: Path,
+    options: LoopOptions,
+    kept: KeptPhotos | None = None,
+    weights: Weights | None = None,
+) -> LoopState:
+    """Train whole late blocks and what reads them, go back a part of the way, and cut the blocks:
+    `RUN/late.pt` is what later stages and `train export` read, `RUN/late_few.pt` what a run goes on from.
+
+    Source: Wortsman et al. 2022 (WiSE-FT: weights between those before and after hold better).
+    """
+    net = guided(network)
+    preset, vit = net.late.preset, net.encoder.vit
+    net.late = whole(net.late, vit)  # type: ignore[assignment]
+    start = {name: value.clone() for name, value in net.state_dict().items() if _learns(name)}
+    net.averaged = Averaged(net)  # type: ignore[assignment]
+    words = Words(PhraseSampler(table), torch.Generator().manual_seed(options.seed))
+    rule = (
+        replace(options.optimising, warm_up=WARM_UP)
+        if options.optimising == Optimising()
+        else options.optimising
+    )
+    options = replace(options, ema_decay=EMA_DECAY, optimising=rule)
+    stage = few_stage(sets.told.bank, weights)
+    state = train_stage(net, stage, FewSet(sets.told, sets.silent, rooms), words, run_dir, options, kept)
+    del net.averaged
+    with torch.no_grad():
+        for name, value in net.state_dict().items():
+            if _learns(name) and value.is_floating_point():
+                value.lerp_(start[name].to(value), 1 - LEARNED)
+    net.late = cut(net.late, vit, preset)  # type: ignore[arg-type]
+    save_cut(run_dir / "late.pt", net, replace(stage, name="late", modules=MODULES), state)
+    return state
+
+
+def _learns(name: str) -> bool:
+    return name.partition(".")[0] in MODULES
+
+
+def judge_of(
+    folder: PhotoFolder, ids: Sequence[str], encode: Callable[[Sequence[str]], Tensor], device: str
+) -> KeptPhotos:
+    """Judges by photos that nothing learns from."""
+    live = LivePhotos(folder, ids)
+    return KeptPhotos(live, PhotoTargets.of(folder, live, encode), device)
