@@ -188,7 +188,7 @@ HOSTILE = Path(__file__).resolve().parents[1] / "fixtures" / "hostile"
 @pytest.mark.skipif(sys.platform != "linux", reason="the kernel's bound of memory")
 @pytest.mark.parametrize("name", ["memory.usdc", "unpacking.usdc"])
 def test_usdc_that_took_all_memory_is_a_sentence(name):
-    """1.3 KB each; read in this process, OpenUSD filled 20 GB with them until the system ended it."""
+    """Some 1.3 KB each. Without a bound OpenUSD took memory until the system killed its process."""
     pytest.importorskip("pxr")
     with pytest.raises(SceneFileError, match=r"of memory|damaged") as raised:
         read(HOSTILE / name)
