@@ -68,7 +68,7 @@ class Limit:
 PIXELS = Limit("pixels", 170_000_000, "pixels", "of one photo, or picture of a film or in a scene")
 PROFILE = Limit("profile", 4 * _MIB, "bytes", "of a photo's colour profile or EXIF; larger ones are ignored")
 GAUSSIANS = Limit("gaussians", 50_000_000, "", "Gaussians of one scene or splat file")
-ATOMS = Limit("atoms", 4096, "", "atoms, the rows of the dictionary of one scene")
+ATOMS = Limit("atoms", 65_536, "", "atoms, the rows of the dictionary of one scene")
 VIEWS = Limit("views", 4096, "", "photos of one scene, poses of one file of cameras")
 HEADER = Limit("header", 64 * _MIB, "bytes", "the header of a .langflash, the JSON of a .glb or .gltf")
 TEXT = Limit("text", 256 * _MIB, "bytes", "a text of cameras, poses, key frames or edits")

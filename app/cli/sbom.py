@@ -40,9 +40,9 @@ def _needs(package: Distribution) -> set[str]:
 
 
 def _component(package: Distribution, name: str, ref: str) -> dict[str, Any]:
-    about = package.metadata.json
-    told = str(about.get("license_expression") or about.get("license") or "")
-    short = told.strip().partition("\n")[0][:120]
+    fields = package.metadata.json
+    told = fields.get("license_expression") or fields.get("license") or ""
+    short = str(told).strip().partition("\n")[0][:120]
     licences = {"licenses": [{"license": {"name": short}}]} if short else {}
     return {
         "type": "library",

@@ -43,7 +43,7 @@ class Reader:
 
     def pictures(
         self, start: float, end: float | None, check: Callable[[], None]
-    ) -> Iterator[tuple[float, Picture]]:
+    ) -> Generator[tuple[float, Picture], None, None]:
         """Seconds from the film's begin, and what is seen then; at most `LOOKS` a second.
 
         Args:

@@ -183,6 +183,19 @@ def test_damaged_usdc_never_ends_this_process(tmp_path):
     assert said and all("; " in each and "\n" not in each for each in said)
 
 
+HOSTILE = Path(__file__).resolve().parents[1] / "fixtures" / "hostile"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the kernel's bound of memory")
+@pytest.mark.parametrize("name", ["memory.usdc", "unpacking.usdc"])
+def test_usdc_that_took_all_memory_is_a_sentence(name):
+    """Some 1.3 KB each. Without a bound OpenUSD took memory until the system killed its process."""
+    pytest.importorskip("pxr")
+    with pytest.raises(SceneFileError, match=r"of memory|damaged") as raised:
+        read(HOSTILE / name)
+    assert "\n" not in str(raised.value) and raised.value.exit_code == 2
+
+
 def test_a_film_that_is_a_list_of_other_files_is_none(tmp_path):
     """FFmpeg would open what a list names, whatever the list is called."""
     films.write(tmp_path / "real.mp4", films.walk(4))
