@@ -94,7 +94,7 @@ def _tray(entries: object) -> tuple[tuple[KeptPhoto, ...], tuple[str, ...]]:
     damaged, or of an earlier version."""
     try:
         return still_there((str(path), fov) for path, fov in entries)  # pyright: ignore[reportGeneralTypeIssues]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, ArithmeticError):
         return (), ()
 
 

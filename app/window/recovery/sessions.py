@@ -53,11 +53,14 @@ def read(path: Path) -> Kept | None:
         lists = {name: tuple(content.pop(name)) for name in ("photos", "fovs", "phrases")}
         asked = _asked(content, len(lists["phrases"]))
         kept = Kept(pose=placed, file=path, **asked, **lists, **content)
+        words = (kept.scene, kept.edits, kept.name, kept.mode, *kept.photos, *kept.phrases)
+        if not all(isinstance(word, str) for word in words):  # a number would name an open file
+            raise ValueError("expected texts")
         there, missing = still_there(zip(kept.photos, kept.fovs, strict=True))
         photos, fovs = tuple(photo for photo, _ in there), tuple(fov for _, fov in there)
         edits = kept.edits if kept.edits and os.path.isfile(kept.edits) else ""
         scene = kept.scene if edits or (kept.scene and os.path.isfile(kept.scene)) else ""
-    except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError):
+    except (OSError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError):
         return None
     return replace(kept, photos=photos, fovs=fovs, scene=scene, edits=edits, missing=missing)
 
