@@ -30,7 +30,7 @@ from langflash_core.outputs import (
 )
 from langflash_core.request import ExportRequest
 
-README = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
+GUIDE = (Path(__file__).parents[1] / "GUIDE.md").read_text("utf-8")
 
 
 @pytest.mark.parametrize("output", OUTPUTS, ids=lambda output: output.name)
@@ -124,8 +124,8 @@ def test_words_that_do_not_go_together_are_refused(changes: dict, sentence: str)
         replace(ExportRequest(Path("a.png"), Path("s.langflash")), **changes).check()
 
 
-def test_the_readme_s_table_of_export_and_the_help_name_what_is_written() -> None:
-    section = README.split("| `export` to | writes |")[1].split("\n\n")[0]
+def test_the_guide_s_table_of_export_and_the_help_name_what_is_written() -> None:
+    section = GUIDE.split("| `export` to | writes |")[1].split("\n\n")[0]
     rows = [line.split("|") for line in section.splitlines() if line.startswith("| ")]
     named = {word for row in rows for word in re.findall(r"`([.\w]+)`", row[1]) if "." in word}
     assert named <= set(ALL_OUT) and set(ALL_OUT) - named <= {".usda", ".usdc", ".usdz", "meta.json"}

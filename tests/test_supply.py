@@ -84,7 +84,15 @@ def test_notice_names_all_that_is_shipped_of_others():
     """Every file of assets/ that others made, or a pattern that it fits, and the text of its licence."""
     notice = " ".join((ROOT / "NOTICE").read_text(encoding="utf-8").split())
     words = [word.rpartition("/")[2] for word in re.findall(r"[\w*/.-]+\.\w+", notice)]
-    own = {"SOURCES.md", "SHA256SUMS", "mini_card.md", "mini_sheet.jpg", "mini_sides.jpg", "mini_walk.jpg"}
+    own = {
+        "SOURCES.md",
+        "SHA256SUMS",
+        "mini_card.md",
+        "mini_history.md",
+        "mini_sheet.jpg",
+        "mini_sides.jpg",
+        "mini_walk.jpg",
+    }
     for folder in ("weights", "photos"):
         for path in (ROOT / "assets" / folder).iterdir():
             named = any(fnmatch(path.name, word) for word in words)

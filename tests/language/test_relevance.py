@@ -196,8 +196,9 @@ def test_sizes_must_agree():
     query = compiled(atoms(4), atoms(2, seed=2), atoms(2, seed=3))
     with pytest.raises(ValueError, match="weight_maps: expected K = 4, received 5"):
         relevance_maps(maps(5), query)
+    narrow = replace(query, prompts=query.prompts[:, :3], negatives=query.negatives[:, :3])
     with pytest.raises(ValueError, match="phrases: expected r = 4, received 3"):
-        relevance_maps(maps(4), replace(query, prompts=query.prompts[:, :3]))
+        relevance_maps(maps(4), narrow)
 
 
 # With the real text tower.

@@ -22,6 +22,7 @@ from langflash_core.images.decode import read_photo
 from langflash_core.lab.photos.folder import PHOTO_SUFFIXES
 from langflash_core.lab.photos.reading import Source, read_json
 from langflash_core.lab.photos.writing import FolderWriter, NameTable
+from langflash_core.picture_files import opened_picture
 
 WHITE = 248
 """From which value on a border is no part of the photo."""
@@ -45,7 +46,7 @@ def from_polygons(source: Source, writer: FolderWriter) -> None:
     photos = [p for folder in _splits(source.path) for p in _photos(folder / "images")]
     for id, photo in source.walk(numbered(photos)):
         outlines = list(_yolo(photo.parent.parent / "labels" / f"{photo.stem}.txt", len(ids)))
-        with Image.open(photo) as opened:
+        with opened_picture(photo) as opened:
             size = opened.size
         writer.photo(id, photo)
         shapes = [(ids[row], [points * np.array(size)]) for row, points in outlines]

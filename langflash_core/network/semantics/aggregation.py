@@ -25,7 +25,7 @@ def average_atoms(weights: Tensor, features: Tensor, eps: float = 1e-6) -> Tenso
     Source: the paper, initialisation of the aggregation.
     """
     sums = [
-        torch.einsum("bvkhw,bvchw->bkc", weights[:, some], features[:, some].float())
+        torch.einsum("bvkhw,bvchw->bkc", weights[:, some], features[:, some].to(weights))
         for some in groups_of(weights.shape[1])
     ]
     total = sums[0] if len(sums) == 1 else torch.stack(sums).sum(0)
