@@ -16,7 +16,7 @@ from ...kit.look import Look
 from ...opening import commands as opening
 from ...state import State
 from .. import commands as show
-from ..state import LOOKING_THROUGH, Job, Photo, said
+from ..state import Job, Photo, said
 from . import rooms, stages
 
 COLUMNS, MORE = 3, 5  # photos side by side; the second where there are over 12
@@ -290,8 +290,6 @@ def _progress(job: Job, now: float, look: Look) -> list[do.Command]:
 def _seconds(job: Job, now: float) -> str:
     """What is left of the job, where that can be told; else seconds of the stage so far."""
     gone = now - job.started
-    if job.stage == LOOKING_THROUGH and job.fraction > 0.05 and gone > 1:
-        return f"{gone * (1 - job.fraction) / job.fraction:.0f} s left"
     rest = left(gone + sum(seconds for _, seconds in job.done), job.fraction)
     return rest or f"{gone:.1f} s"
 
