@@ -7,6 +7,7 @@ render -> query.relevance_maps -> query.answer
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -155,19 +156,11 @@ def reconstruct(
         _wait_for_matches(ahead, run)  # key points are found beside the weights
     finer = None if detail is None or not network.surfaces else chosen_detail(detail)
     with run.stage("network"):
-        settings = (
-            preset,
-            _identity(preset, weights),
-            device,
-            precision,
-            aggregation,
-            grouping,
-            finer is None,
-        )
+        settings = (preset, device, precision, aggregation, grouping, finer is None)
 
         def predicted(seen: Views) -> Prediction:
             told = run.within("network")
-            kept = not_kept if keep is None else _keep(keep, seen, settings)
+            kept = not_kept if keep is None else _keep(keep, seen, (*settings, _identity(preset, weights)))
 
             def made() -> Arrays:
                 found = network.predict(seen, told, cancelled, atoms, groups, redrawn, finer is None, kept)
@@ -219,8 +212,9 @@ def _wait_for_matches(ahead: Ahead, run: Run) -> None:
 
 def _identity(preset: str, weights: Path | str | None) -> list[tuple[str, int, int]]:
     """Which weights: the checkpoint and its installed parts, with size and time of change."""
-    own = weights_file(preset, None if weights is None else Path(weights))
-    files = [own, *sorted(part_folder(PRESETS[preset]).glob("*.safetensors"))]
+    files = sorted(part_folder(PRESETS[preset]).glob("*.safetensors"))
+    with suppress(WeightsError):  # there may be no file but the parts
+        files.append(weights_file(preset, None if weights is None else Path(weights)))
     return [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in files if path.is_file()]
 
 
