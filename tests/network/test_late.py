@@ -95,7 +95,7 @@ def test_branches_are_skipped_only_while_it_learns(vit, states):
         expected, same = late(early, vit), learned.eval()(early, vit)
         torch.manual_seed(0)
         other = learned.train()(early.repeat(32, 1, 1), vit)
-    assert torch.equal(same[-1], expected[-1])
+    torch.testing.assert_close(same[-1], expected[-1], rtol=0, atol=1e-5)  # a scale times a matrix is rounded
     assert len({tuple(row[0, :4].tolist()) for row in other[-1]}) > 8, "pictures lose different branches"
 
 
