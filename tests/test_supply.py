@@ -89,6 +89,7 @@ def test_notice_names_all_that_is_shipped_of_others():
         "SHA256SUMS",
         "mini_card.md",
         "mini_history.md",
+        "mini_orbit.jpg",
         "mini_sheet.jpg",
         "mini_sides.jpg",
         "mini_walk.jpg",
