@@ -189,4 +189,5 @@ def test_the_dialog_fits_and_switches(desk: Desk) -> None:
 def test_what_remains_of_a_film_is_told() -> None:
     job = Job("Opening walk.mp4", "film", 0.25, started=10.0)
     assert tray._seconds(job, 14.0) == "12 s left" and tray._seconds(job, 10.5) == "0.5 s"
-    assert tray._seconds(Job("x", "network", 0.25, started=10.0), 14.0) == "4.0 s"
+    assert tray._seconds(Job("x", "network", 0.25, started=10.0), 14.0) == "about 12 s left"
+    assert tray._seconds(Job("x", "network", 0.25, started=10.0), 12.0) == "2.0 s"
