@@ -287,11 +287,12 @@ class GuidedDepthNet(LangFlashNet):
 
     @staticmethod
     def _pose_inputs(Ks: Tensor, size: tuple[int, int], prior: DepthMaps, local: Tensor) -> list[PoseInput]:
+        depths = prior.depths[0].cpu().numpy()  # once: a view of every call's own would hold all of it
         return [
             PoseInput(
                 K=K.double().cpu().numpy(),
                 size=size,
-                depth=prior.depths[0, v].cpu().numpy(),
+                depth=depths[v],
                 local=local[v].cpu().numpy(),
             )
             for v, K in enumerate(Ks)

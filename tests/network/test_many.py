@@ -206,3 +206,11 @@ def test_few_directions_of_many_photos_keep_cosines():
     assert small.shape == (VIEWS, 32, 5, 6) and small.dtype == torch.float32
     full, few = (F.normalize(maps.movedim(1, -1).flatten(0, 2), dim=1) for maps in (features, small))
     assert torch.allclose(full @ full.T, few @ few.T, atol=5 * HALF)
+
+
+def test_what_poses_are_found_by_holds_the_depth_of_all_photos_once():
+    logs = torch.zeros(1, VIEWS, 8, 8)
+    Ks = torch.eye(3).expand(VIEWS, 3, 3)
+    inputs = GuidedDepthNet._pose_inputs(Ks, (8, 8), DepthMaps(logs, logs), torch.zeros(VIEWS, 4, 2, 2))
+    starts = {view.depth.__array_interface__["data"][0] for view in inputs}
+    assert max(starts) - min(starts) == (VIEWS - 1) * 8 * 8 * 4  # one block, view after view

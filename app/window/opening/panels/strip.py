@@ -8,6 +8,7 @@ from langflash_core.images.strip import ELSEWHERE, REASONS, REPEAT, Still
 from ... import commands as do
 from ...kit import theme, widgets
 from ...kit.look import Look
+from ...scene.drops import FILM_PHOTOS
 from ...state import State
 from .. import commands as opening
 from ..state import Film, small
@@ -64,7 +65,7 @@ def _number(state: State, film: Film, look: Look) -> list[do.Command]:
         widgets.tooltip(tip)
     imgui.same_line()
     if widgets.quiet_button("As proposed", "The sharpest ones, evenly along the way of the camera"):
-        issued.append(opening.ProposeFrames(most))
+        issued.append(opening.ProposeFrames(min(most, FILM_PHOTOS)))
     return issued
 
 
