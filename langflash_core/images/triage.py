@@ -21,6 +21,7 @@ BLUR_WIDTH = 4.0  # pixels at that size over which even the sharpest edges rise
 EDGE_CONTRAST = 0.12  # an edge weaker than this says nothing about sharpness
 EDGE_BLOCKS = 40  # fewer stretches with an edge: a plain wall, not judged
 SAME_DIFFERENCE = 1.5 / 255  # mean absolute difference of two views of the same picture
+ALIKE_ONE_BY_ONE = 3  # photos that show the same as others: so many are named, more are counted
 LOST_SHARE = 0.25  # of a photo's area that the crop may cut off without a note
 FOV_RANGE = (25.0, 110.0)  # degrees of the longer side
 _BLOCK, _WINDOW = 12, 25  # pixels along an edge's rise
@@ -92,7 +93,12 @@ def identical_notes(names: Sequence[str], images: Sequence[Tensor]) -> list[str]
                     "picture; take them from places a step apart"
                 )
                 break
-    return notes
+    if len(notes) <= ALIKE_ONE_BY_ONE:
+        return notes
+    return [
+        f"{len(notes)} of {len(images)} photos show the same picture as one before them; "
+        "take them from places a step apart"
+    ]
 
 
 def is_blurred(luma: Tensor) -> bool:

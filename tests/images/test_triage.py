@@ -77,6 +77,9 @@ def test_small_identical_and_extreme_lenses_are_named(tmp_path):
     first, again = room_picture(), room_picture()
     (note,) = warnings_of(tmp_path, first, room_picture(seed=1), again)
     assert note.startswith("photos 1 (0.png) and 3 (2.png) show the same picture")
+    assert len(warnings_of(tmp_path, *[first] * 4)) == 3
+    (note,) = warnings_of(tmp_path, *[first] * 5)
+    assert note.startswith("4 of 5 photos show the same picture as one before them")
     assert "very narrow field of view (20 degrees)" in warnings_of(tmp_path, first, fov=20)[0]
     assert "very wide field of view (120 degrees)" in warnings_of(tmp_path, first, fov=120)[0]
     assert warnings_of(tmp_path, first, fov=25) == warnings_of(tmp_path, first, fov=110) == ()
