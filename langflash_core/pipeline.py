@@ -23,7 +23,7 @@ from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.straight import after, straightened
 from langflash_core.images.views import load_views, source_pictures
-from langflash_core.keeping import Arrays, Keep, not_kept
+from langflash_core.keeping import Keep, not_kept
 from langflash_core.kept_prediction import arrays_of, prediction_of
 from langflash_core.language.answers import answer
 from langflash_core.language.clip import load_clip_images
@@ -46,7 +46,7 @@ from langflash_core.network.semantics.outlines import Outlines
 from langflash_core.network.semantics.sam2 import Sam2, sam2_checkpoint
 from langflash_core.records import BentLens
 from langflash_core.resources import asset_path
-from langflash_core.running import Progress, Run
+from langflash_core.running import Kept, Progress, Run
 from langflash_core.scene.assemble import assemble
 from langflash_core.scene.prune import prune
 from langflash_core.scene.world import in_world
@@ -160,13 +160,16 @@ def reconstruct(
 
         def predicted(seen: Views) -> Prediction:
             told = run.within("network")
-            kept = not_kept if keep is None else _keep(keep, seen, (*settings, _identity(preset, weights)))
 
-            def made() -> Arrays:
-                found = network.predict(seen, told, cancelled, atoms, groups, redrawn, finer is None, kept)
-                return arrays_of(_on_cpu(found))
+            def made(kept: Kept) -> Prediction:
+                return _on_cpu(
+                    network.predict(seen, told, cancelled, atoms, groups, redrawn, finer is None, kept)
+                )
 
-            return prediction_of(kept("prediction", made))
+            if keep is None:
+                return made(not_kept)
+            kept = _keep(keep, seen, (*settings, _identity(preset, weights)))
+            return prediction_of(kept("prediction", lambda: arrays_of(made(kept))))
 
         prediction, views = _straight(predicted, views)
         views = _through(views, prediction)
@@ -396,7 +399,7 @@ def _straight(predict: Callable[[Views], Prediction], views: Views) -> tuple[Pre
             assert views.lenses is not None, "bends are sought of lenses that are known"
             before = views.lenses.straightened or (None,) * len(bent.found)
             found = [
-                new if new is None else after(old, new) for old, new in zip(before, bent.found, strict=True)
+                old if new is None else after(old, new) for old, new in zip(before, bent.found, strict=True)
             ]
             views = straightened(taken, found)
     raise AssertionError("the last round seeks no bends")

@@ -167,6 +167,23 @@ def test_photos_are_straightened_until_nothing_bends(rounds):
     assert told.bend == bend.bend and "straightened by k1 = -0.0" in str(told)
 
 
+def test_a_lens_that_is_not_told_again_stays_straightened():
+    """The second round tells the other lens alone."""
+    lenses = Lenses((0, 1), (65.0, 65.0), (0.35, 0.35), (False, False))
+    K = torch.tensor([[50.0, 0, 32], [0, 50, 24], [0, 0, 1]])
+    taken = Views(torch.rand(2, 3, 48, 64), K.expand(2, 3, 3), ("a", "b"), lenses=lenses)
+    first, second = FoundFocal(1.0, 0.01, 3, -0.05, 0.001), FoundFocal(1.0, 0.01, 3, -0.04, 0.001)
+    nothing, rounds = torch.zeros(0), iter([(first, None), (None, second)])
+
+    def predict(views: Views) -> Prediction:
+        for found in rounds:
+            raise BentLens(found)
+        return Prediction(Gaussians.none(), nothing, nothing, "minilm", nothing, nothing, nothing)
+
+    _, views = pipeline._straight(predict, taken)
+    assert views.lenses is not None and views.lenses.straightened == (first, second)
+
+
 @pytest.mark.parametrize("patience", [0, 1, 4, 9])
 def test_cancelling_stops_between_stages(weights, photos, patience):
     asked = []
