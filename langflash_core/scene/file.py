@@ -21,6 +21,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.files import write_atomically
+from langflash_core.memory import out_of_memory
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.container import FORMAT, VERSION, damaged, digest, read_container
 from langflash_core.scene.fields import NEWER, from_fields, to_fields
@@ -75,6 +76,8 @@ def load(path: Path | str) -> Scene:
             scene = replace(scene, view_ids=_view_ids(scene, counts_per_view(found.metadata)))
         check_scene(scene)
     except (ValueError, LookupError, TypeError, RuntimeError, ArithmeticError) as error:
+        if out_of_memory(error):
+            raise
         raise damaged(path, error) from error
     return scene
 

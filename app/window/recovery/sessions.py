@@ -32,7 +32,10 @@ def left_behind() -> Kept | None:
         for path in state_folder().glob(f"{PREFIX}*.json"):
             if not _abandoned(path.with_suffix(".lock")):
                 continue
-            kept = read(path)
+            try:
+                kept = read(path)
+            except OSError:
+                continue  # what cannot be read today may be read tomorrow
             if kept is None or kept.empty:
                 forget(path)
             else:
@@ -45,9 +48,14 @@ def left_behind() -> Kept | None:
 
 
 def read(path: Path) -> Kept | None:
-    """A kept session without what has gone since; None where the file is damaged."""
+    """A kept session without what has gone since; None where the file is damaged.
+
+    Raises:
+        OSError: the system does not give it.
+    """
+    stored = path.read_bytes()
     try:
-        content = json.loads(path.read_bytes())
+        content = json.loads(stored)
         pose = content.pop("pose")
         placed = None if pose is None else read_pose(pose)
         lists = {name: tuple(content.pop(name)) for name in ("photos", "fovs", "phrases")}
