@@ -93,7 +93,9 @@ def refusals_said(ctx: "moderngl.Context | None", remedy: str) -> Iterator[None]
 
 def _one_line(error: Exception) -> str:
     """Compilers and linkers say pages; the first line says what."""
-    return next((line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__)[:200]
+    return next((line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__)[
+        :200
+    ]
 
 
 def draws_in_software(ctx: "moderngl.Context") -> bool:

@@ -65,7 +65,9 @@ class Fault:
         if isinstance(path, str | bytes | os.PathLike):
             place = os.path.abspath(os.fsdecode(path))
             if place.startswith(self.folders):
-                self.asks(kind, f"{what} {place}", lambda _: OSError(self.error, os.strerror(self.error), path))
+                self.asks(
+                    kind, f"{what} {place}", lambda _: OSError(self.error, os.strerror(self.error), path)
+                )
 
 
 _now: Fault | None = None
@@ -147,7 +149,9 @@ def _streams(fault: Fault) -> Iterator[None]:
     """`open` gives files whose reads and writes count, and fsync counts."""
     opened, synced = io.open, os.fsync
 
-    def ours(file, mode="r", buffering=-1, encoding=None, errors=None, newline=None, closefd=True, opener=None):
+    def ours(
+        file, mode="r", buffering=-1, encoding=None, errors=None, newline=None, closefd=True, opener=None
+    ):
         given = file if isinstance(file, str | bytes | os.PathLike) else None
         if given is None or not os.path.abspath(os.fsdecode(given)).startswith(fault.folders):
             return opened(file, mode, buffering, encoding, errors, newline, closefd, opener)

@@ -25,8 +25,8 @@ from langflash_core.formats import USD
 from langflash_core.lab.training.shards import write_shard
 from langflash_core.outputs import OUTPUTS, Output
 from langflash_core.resources import asset_path
-from langflash_core.scene.edits import History, Marks, Mask, delete
 from langflash_core.scene.edited import first_marks
+from langflash_core.scene.edits import History, Marks, Mask, delete
 from langflash_core.scene.file import save
 from langflash_core.types import Scene
 from tests.app.cli.conftest import WORDS, stripes
@@ -125,7 +125,7 @@ def _making() -> Iterator[Job]:
     pair = ("reconstruct", "in/photos/left.png", "in/photos/right.png", "-o", "out/a.langflash", *tiny)
     other = command(*pair, "--fov", "40")
     yield Job("reconstruct", command(*pair), other, (*FILES, "memory"))
-    yield Job("reconstruct --keep", command(*pair, "--keep", "out/kept"), other, FILES)
+    yield Job("reconstruct --keep", command(*pair, "--keep", "out/kept"), other, FILES, keeps="kept/")
     batch = ("batch", "in/sets", "-o", "out/batch", *tiny, "--prompt", "plant", "--export", ".ply")
     batch = (*batch, "--backend", "torch")
     yield Job("batch", _inline(*batch), _inline(*batch, "--fov", "40"), FILES, same=False)
@@ -210,7 +210,9 @@ def _keeping(scene: Scene) -> Iterator[Job]:
         def run(folder: Path) -> tuple[int, str]:
             keeper = _keeper()
             try:
-                keeper.keep(Kept(name=name, phrases=(name,), likes=("",), thresholds=(None,), visible=(True,)))
+                keeper.keep(
+                    Kept(name=name, phrases=(name,), likes=("",), thresholds=(None,), visible=(True,))
+                )
             finally:
                 if keeper._lock is not None:  # the process goes on: only a death or `close` opens it
                     keeper._lock.close()
@@ -278,7 +280,9 @@ def _killed_session(folder: Path) -> tuple[int, str]:
     state_folder().mkdir(parents=True, exist_ok=True)
     copy = state_folder() / f"{sessions.PREFIX}1-deadbeef.langflash"
     copy.write_bytes((folder / "in" / "s.langflash").read_bytes())
-    kept = Kept(scene=str(copy), saved=False, name="room", phrases=("plant",), likes=("",), thresholds=(None,))
+    kept = Kept(
+        scene=str(copy), saved=False, name="room", phrases=("plant",), likes=("",), thresholds=(None,)
+    )
     copy.with_suffix(".json").write_text(json.dumps(sessions.fields(replace(kept, visible=(True,)))))
     return 0, ""
 

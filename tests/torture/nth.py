@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import imageio_ffmpeg
 import numpy as np
 from PIL import Image
 
@@ -46,7 +47,8 @@ class Job:
     """What is done while something fails. run: with the folder of what is read ("in") and made ("out") in it;
     gives an exit code and what was said. old: the same with other words, to have something there before.
     kinds: of `failing.KINDS`, and "disk". same: whether two runs write the same bytes. fresh: whether it can
-    begin with nothing in "out", as what makes something can, and what goes on with something cannot."""
+    begin with nothing in "out", as what makes something can, and what goes on with something cannot. keeps:
+    begins the names of what stays although it failed, to go on from there."""
 
     name: str
     run: Callable[[Path], tuple[int, str]]
@@ -54,6 +56,7 @@ class Job:
     kinds: tuple[str, ...] = FILES
     same: bool = True
     fresh: bool = True
+    keeps: str = "\0"
 
 
 @dataclass
@@ -120,7 +123,9 @@ def _fault(kind: str, nth: int, folder: Path) -> contextlib.AbstractContextManag
 def _try(job: Job, folder: Path, kind: str, nth: int, row: Row, before: dict, new: dict) -> None:
     row.tried += 1
     if kind == "disk":
-        largest = max((path.stat().st_size for path in (folder / "new").rglob("*") if path.is_file()), default=1)
+        largest = max(
+            (path.stat().st_size for path in (folder / "new").rglob("*") if path.is_file()), default=1
+        )
         fault, scope = Fault(kind, nth, (), 0), small_disk(largest * nth // STEPS)
     else:
         fault = scope = _fault(kind, nth, folder)
@@ -162,7 +167,7 @@ def _harm(job: Job, out: Path, before: dict[str, str], new: dict[str, str], code
     for name in before.keys() - after.keys():
         return f"lost: {name}"
     for name, digest in after.items():
-        if name in parts:
+        if name in parts or name.startswith(job.keeps):
             continue
         if not name.endswith(".part") and digest not in (before.get(name), new.get(name)):
             if name not in new and name not in before:
@@ -181,9 +186,14 @@ def sound(path: Path) -> str:
     try:
         if path.suffix in (".png", ".jpg", ".webp"):
             with Image.open(path) as picture:
-                picture.load()
+                for place in range(getattr(picture, "n_frames", 1)):
+                    picture.seek(place)
+                    picture.load()
         elif path.suffix in (".json", ".edits"):
             json.loads(path.read_bytes())
+        elif path.suffix == ".mp4":
+            frames, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
+            assert frames == 9, f"{frames} frames of 9"
         elif path.suffix == ".npz":
             with np.load(path) as stored:
                 _ = [stored[name] for name in stored.files]
