@@ -21,7 +21,14 @@ def calls(args: argparse.Namespace, folder: Path) -> int:
     return report(rows, sys.stdout.write)
 
 
-PARTS = {"calls": calls}
+def kills(args: argparse.Namespace, folder: Path) -> int:
+    """Killed at random moments: `kills.py`."""
+    from tests.torture.kills import everything, report
+
+    return report(everything(folder, args.count, args.seed), sys.stdout.write)
+
+
+PARTS = {"calls": calls, "kills": kills}
 
 
 def main() -> int:
@@ -29,6 +36,7 @@ def main() -> int:
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(PARTS)} (default: all)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--minutes", type=float, default=5.0, help="of each part, about (default: 5)")
+    parser.add_argument("--count", type=int, default=200, help="of kills while it writes (default: 200)")
     parser.add_argument("--only", nargs="+", help="of a part's rows those whose names begin so")
     args = parser.parse_args()
     unknown = [name for name in args.parts if name not in PARTS]

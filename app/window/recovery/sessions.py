@@ -21,12 +21,14 @@ from ..scene.drops import SCENE_SUFFIX, still_there
 from .state import Kept
 
 PREFIX = "session-"
+MOST_LEFT = 8  # as many as there may be edits of
 EDITED, SELECTION = f".edited{SCENE_SUFFIX}", f".selection{SCENE_SUFFIX}"
 CONTENTS = (".json", SCENE_SUFFIX, EDITED, SELECTION)
 
 
 def left_behind() -> Kept | None:
-    """The newest session that ended badly and holds something; older and empty ones are removed."""
+    """The newest session that ended badly and holds something; the one before it is offered once that is
+    done with, and so on. Empty ones are removed, and those that are older than the newest `MOST_LEFT`."""
     found: list[tuple[float, Kept]] = []
     with suppress(OSError):
         for path in state_folder().glob(f"{PREFIX}*.json"):
@@ -41,7 +43,7 @@ def left_behind() -> Kept | None:
             else:
                 found.append((path.stat().st_mtime, kept))
     found.sort(key=lambda each: each[0], reverse=True)
-    for _, old in found[1:]:
+    for _, old in found[MOST_LEFT:]:
         if old.file is not None:
             forget(old.file)
     return found[0][1] if found else None
