@@ -28,7 +28,26 @@ def kills(args: argparse.Namespace, folder: Path) -> int:
     return report(everything(folder, args.count, args.seed), sys.stdout.write)
 
 
-PARTS = {"calls": calls, "kills": kills}
+def photos(args: argparse.Namespace, folder: Path) -> int:
+    """Photos that no scene is in, or that deceive: `hard_photos.py`."""
+    from tests.torture.hard_photos import everything, report
+
+    return report(everything(folder, args.only), sys.stdout.write)
+
+
+def window(args: argparse.Namespace, folder: Path) -> int:
+    """The window while the driver and the disk refuse: `window.py`."""
+    from tests.torture.jobs import prepared
+    from tests.torture.nth import report
+    from tests.torture.window import opened, torture
+
+    prepared(folder)
+    (folder / "out").mkdir()
+    with opened(folder / "in" / "s.langflash", folder / "out") as session:
+        return report(torture(session, folder, 60 * args.minutes, args.seed), sys.stdout.write)
+
+
+PARTS = {"calls": calls, "window": window, "kills": kills, "photos": photos}
 
 
 def main() -> int:

@@ -146,7 +146,8 @@ def _try(job: Job, folder: Path, kind: str, nth: int, row: Row, before: dict, ne
 
 def _wrong(code: int, said: str) -> str:
     """What is wrong with how it ended; "" for nothing."""
-    errors = [line for line in said.splitlines() if line.startswith("langflash: ")]
+    # Many sets or clips are told one by one.
+    errors = [line for line in said.splitlines() if line.startswith("langflash: ") or ": failed, " in line]
     if code == -1 or "Traceback" in said:
         return f"an exception: {said.strip().splitlines()[-1][:200]}"
     if code not in (0, 1, 2):
