@@ -35,7 +35,7 @@ from langflash_core.graphics import shader_source
 from langflash_core.types import Scene
 
 MOST_WEIGHTS = 4  # of a Gaussian; `langflash bench` says what the others are worth
-SCRIPTS = ("decode", "cameras", "sorting", "answers", "drawing", "moving", "asking", "main")
+SCRIPTS = ("decode", "cameras", "sorting", "answers", "drawing", "moving", "asking", "address", "main")
 READING = "words"  # beside a text model
 _SHADERS = ("splat.vert", "splat.frag", "screen.vert", "show.frag")
 _FORMAT, _VERSION = "langflash-page", 1

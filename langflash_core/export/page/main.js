@@ -1,5 +1,4 @@
 // Puts the page together: reads the scene, draws on demand, answers when the camera rests.
-// The address may say more: #view=1&ask=plant&mode=photo&bare
 
 const MOST_PIXELS = 2.1e6;         // of a picture
 const MOST_JUDGED = 320 * 320;     // pixels that scores are taken from
@@ -75,13 +74,12 @@ class Page {
     find("helper").addEventListener("click", () => this.help());
     find("help").addEventListener("click", () => find("help").close());
     addEventListener("keydown", (event) => this.key(event));
-    const said = new URLSearchParams(location.hash.slice(1));
-    document.body.classList.toggle("bare", said.has("bare"));
-    this.orbit.set(this.header.views[said.get("view")] || this.header.views[0], this.orbit.distance);
-    const row = this.answers ? this.answers.texts.indexOf(said.get("ask")) : -1;
-    if (row >= 0) this.asking.ask(row);
+    const said = readAddress(location.hash, this.header.views.length, this.answers ? this.answers.texts : []);
+    document.body.classList.toggle("bare", said.bare);
+    this.orbit.set(this.header.views[said.view], this.orbit.distance);
+    if (said.row >= 0) this.asking.ask(said.row);
     else if (this.answers && this.answers.asked) this.asking.choose(0);
-    this.setHeat(said.get("mode") !== "photo");
+    this.setHeat(said.heat);
   }
 
   key(event) {
