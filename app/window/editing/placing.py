@@ -5,7 +5,7 @@ A gesture is a change that is shown and not yet made: `Adjust` shows it as often
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from weakref import ref
 
@@ -28,7 +28,7 @@ from langflash_core.scene.changes import (
 from langflash_core.scene.edits import Marks
 
 from ..state import State
-from .commands import change, with_edit
+from .commands import with_edit
 from .state import Handle, Tint, Tool
 
 if TYPE_CHECKING:
@@ -48,8 +48,8 @@ class SetHandle:
     handle: Handle
 
     def apply(self, state: State) -> State:
-        taken = change(state, tool=Tool.PLACE, drag=(), hover=None, asked=None, card=None, ruler=())
-        return change(taken, handle=self.handle, gesture=None, tint=None)
+        taken = state.with_editing(tool=Tool.PLACE, drag=(), hover=None, asked=None, card=None, ruler=())
+        return taken.with_editing(handle=self.handle, gesture=None, tint=None)
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Adjust:
         marks = state.editing.marks
         if marks is None or not marks.selected or self.gesture.rows != marks.selected:
             return state
-        return change(state, gesture=self.gesture, tint=None)
+        return state.with_editing(gesture=self.gesture, tint=None)
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,9 @@ class ShowTint:
         if marks is None or not marks.selected:
             return state
         gesture = Recoloured.tinted(marks.selected, self.tint.colour, self.tint.strength, self.luma)
-        return change(replace(state, mode=pictures.RGB), tint=self.tint, gesture=gesture, last_tint=self.tint)
+        return state.with_scene(mode=pictures.RGB).with_editing(
+            tint=self.tint, gesture=gesture, last_tint=self.tint
+        )
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ class BeginTint:
     """Offer to recolour the selection, with the last colour."""
 
     def apply(self, state: State) -> State:
-        marks, info = state.editing.marks, state.info
+        marks, info = state.editing.marks, state.scene.info
         if marks is None or info is None or not marks.selected:
             return state
         return ShowTint(state.editing.last_tint, luma_of(info.scene, marks)).apply(state)
@@ -99,7 +101,7 @@ class EndGesture:
 
     def apply(self, state: State) -> State:
         gesture, marks = state.editing.gesture, state.editing.marks
-        state = change(state, gesture=None, tint=None)
+        state = state.with_editing(gesture=None, tint=None)
         if not self.keep or gesture is None or marks is None:
             return state
         if isinstance(gesture, Moved) and gesture.still:
@@ -118,14 +120,14 @@ class Nudge:
     ahead: float = 0.0
 
     def apply(self, state: State) -> State:
-        marks, info = state.editing.marks, state.info
+        marks, info = state.editing.marks, state.scene.info
         centre = None if marks is None or info is None else pivot_of(info.scene, marks)
         if marks is None or centre is None:
             return state
-        axes = state.pose.axes
+        axes = state.scene.pose.axes
         match state.editing.handle:
             case Handle.MOVE:
-                way = axes @ np.array([self.right, self.down, self.ahead]) * STEP * state.pose.distance
+                way = axes @ np.array([self.right, self.down, self.ahead]) * STEP * state.scene.pose.distance
                 gesture = Moved(marks.selected, offset=_spot(way))
             case Handle.TURN:
                 axis = (
@@ -135,7 +137,7 @@ class Nudge:
             case Handle.SCALE:
                 larger = self.right - self.down + self.ahead
                 gesture = Moved.about(marks.selected, centre, scale=SCALE_STEP**larger)
-        return EndGesture().apply(change(state, gesture=gesture))
+        return EndGesture().apply(state.with_editing(gesture=gesture))
 
 
 def verb(gesture: Change) -> str:

@@ -258,28 +258,35 @@ def request_for(
     scene = (info.serial, info.scene, marks)
     match command:
         case SelectRegion(region, combine) if min(size) > 0:
-            return FindInRegion(*scene, region, state.pose, size, state.editing.through, combine)
+            return FindInRegion(*scene, region, state.scene.pose, size, state.editing.through, combine)
         case SelectThing(at, combine) if min(size) > 0:
-            return FindThing(*scene, at, state.pose, size, combine)
+            return FindThing(*scene, at, state.scene.pose, size, combine)
         case SelectSphere(at, radius, combine) if min(size) > 0:
-            return FindInSphere(*scene, at, state.pose, size, combine, radius)
+            return FindInSphere(*scene, at, state.scene.pose, size, combine, radius)
         case SelectByPhrase(key, combine):
             return _phrase(state, info, marks, key, combine)
         case SelectAtom(atom, combine) if 0 <= atom < len(marks.atoms):
             return FindAtom(*scene, atom, combine)
         case Grow(phrase) if marks.selected:
-            active = state.active_prompt
+            active = state.asking.active_prompt
             within = _phrase(state, info, marks, active.key, "add") if phrase and active else None
             return GrowSelection(*scene, state.editing.reach, within)
     return None
 
 
 def _phrase(state: State, info: SceneInfo, marks: Marks, key: int, combine: Combine) -> FindByPhrase | None:
-    prompt = next((p for p in state.prompts if p.key == key and p.text.strip()), None)
+    prompt = next((p for p in state.asking.prompts if p.key == key and p.text.strip()), None)
     if prompt is None or not info.num_atoms:
         return None
     return FindByPhrase(
-        info.serial, info.scene, marks, prompt.text.strip(), prompt.like, state.negatives, prompt.cut, combine
+        info.serial,
+        info.scene,
+        marks,
+        prompt.text.strip(),
+        prompt.like,
+        state.asking.negatives,
+        prompt.cut,
+        combine,
     )
 
 

@@ -4,9 +4,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from langflash_core import pictures
 from langflash_core.geometry.poses import START, Pose, Vector
 from langflash_core.pictures import Picture
 from langflash_core.scene.edits import History, Marks
+
+from ..protocol import Command
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
@@ -139,3 +142,31 @@ class Flight:
     start: Pose
     end: Pose
     began: float
+
+
+@dataclass(frozen=True)
+class Showing:
+    """The scene's half of the state: the tray, the scene on show, how it is looked at, the work on it.
+
+    aside: photos of the scene on show while those of a new room are in the tray. choosing: the best pair is
+    being looked for. rooms: scenes that were on show before, the last one first. dropped: photos while it is
+    asked where they belong. pending: commands that wait for an answer about unsaved edits. view: of the photo
+    stood at, if any. compare: where the photo begins, 0 to 1 across the picture; None: not compared.
+    """
+
+    photos: tuple[Photo, ...] = ()
+    aside: tuple[Photo, ...] | None = None
+    choosing: bool = False
+    info: SceneInfo | None = None
+    rooms: tuple[Room, ...] = ()
+    dropped: tuple[Path, ...] = ()
+    pending: tuple[Command, ...] = ()
+    mode: Picture = pictures.RGB
+    pose: Pose = START
+    flight: Flight | None = None
+    view: int | None = None
+    compare: float | None = None
+    job: Job | None = None
+
+
+NO_SCENE = Showing()
