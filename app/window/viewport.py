@@ -27,6 +27,7 @@ from .artist import Artist, Asked
 from .asking.state import Prompt
 from .editing.state import Point, Reading, strongest
 from .governor import SETTLE_AFTER, Governor, Kind, Plan
+from .scene.memory import SceneMemory
 from .scene.near import fills_gaps, keeps_near
 from .scene.state import possible
 from .state import State
@@ -205,23 +206,25 @@ class Viewport:
             self._renderer.ask(query)
 
     def mark(
-        self, scene: "Scene | None", marks: Marks | None, doomed: Mask | None, gesture: Change | None = None
+        self,
+        memory: SceneMemory | None,
+        marks: Marks | None,
+        doomed: Mask | None,
+        gesture: Change | None = None,
     ) -> None:
         """Show the scene as marked: without what is deleted or hidden, the selection in a tint, things where
         they were moved to.
 
         doomed: what a preview would delete, in another tint. gesture: a change under way.
         """
-        if self._renderer is None or marks is None or scene is None:
+        if self._renderer is None or marks is None or memory is None:
             return
         if (marks, doomed, gesture) == self._marks:
             return
         before, _, adjusted = self._marks
         self._marks, self._adjusting = (marks, doomed, gesture), gesture is not None
         if (marks.changes, gesture) != (before.changes if before else (), adjusted):
-            from langflash_core.scene.changed import changed_scene
-
-            self._scene = changed_scene(scene, marks, gesture)
+            self._scene = memory.changed(marks, gesture)
             self._renderer.change((*marks.changes, *(() if gesture is None else (gesture,))))
         tints = np.zeros(marks.selected.count, np.uint8)
         if not isinstance(gesture, Recoloured):  # its colour is to be seen

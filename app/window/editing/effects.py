@@ -29,8 +29,8 @@ class EditingEffects(Effects):
         """Bring deletions, selection and preview into the picture."""
         marks, preview = state.editing.marks, state.editing.floaters
         doomed = preview.mask(marks.visible) if marks is not None and preview is not None else None
-        scene = None if state.scene.info is None else state.scene.info.scene
-        self._viewport.mark(scene, marks, doomed, state.editing.gesture)
+        memory = None if state.scene.info is None else state.scene.info.memory
+        self._viewport.mark(memory, marks, doomed, state.editing.gesture)
 
     def after_picture(self, state: State) -> None:
         """Read what is under the pointer, and what a click asked about once the picture rests."""
@@ -53,7 +53,7 @@ class EditingEffects(Effects):
     def _weigh(self, state: State, info: SceneInfo, reading: Reading) -> None:
         marks, size = state.editing.marks, self._viewport.size
         if marks is not None and info.num_atoms and state.scene.pose == self._viewport.pose:
-            self._hands.submit(Weigh(info.serial, info.scene, marks, reading, state.scene.pose, size))
+            self._hands.submit(Weigh(info.serial, info.memory, marks, reading, state.scene.pose, size))
 
     def _ask(self, state: State, info: SceneInfo) -> None:
         """Send the place that was clicked on."""
@@ -71,7 +71,7 @@ class EditingEffects(Effects):
             return
         extra = tuple(p.text.strip() for p in state.asking.asked if not p.like)
         content = b"" if weights is None else weights.astype(np.float32).tobytes()
-        scene = (info.serial, info.scene, state.editing.marks)
+        scene = (info.serial, info.memory, state.editing.marks)
         place = (reading, state.scene.pose, self._viewport.size)
         self._hands.submit(NamePlace(*scene, *place, content, extra, state.asking.negatives))
 
@@ -83,9 +83,9 @@ class EditingEffects(Effects):
         match command:
             case SceneArrived():
                 if info is not None and info.num_atoms and marks is not None:
-                    self._hands.submit(NameAtoms(info.serial, info.scene, marks))
+                    self._hands.submit(NameAtoms(info.serial, info.memory, marks))
             case FindFloaters() if info is not None and marks is not None:
-                self._hands.submit(ScoreFloaters(info.serial, info.scene, marks))
+                self._hands.submit(ScoreFloaters(info.serial, info.memory, marks))
             case _ if info is not None and marks is not None:
                 request = request_for(command, state, info, marks, self._viewport.size)
                 if request is not None:
@@ -103,4 +103,4 @@ class EditingEffects(Effects):
         if [(atom.into, atom.denied) for atom in old.atoms] != [
             (atom.into, atom.denied) for atom in new.atoms
         ]:
-            self._hands.submit(NameAtoms(state.scene.info.serial, state.scene.info.scene, new))
+            self._hands.submit(NameAtoms(state.scene.info.serial, state.scene.info.memory, new))

@@ -239,10 +239,8 @@ class FrameSelection:
         marks = state.editing.marks
         if marks is None or state.scene.info is None:
             return state
-        from langflash_core.scene.changed import changed_scene  # loads torch; a scene is there, so it is
-
         rows = (marks.selected or marks.visible).rows()
-        points = changed_scene(state.scene.info.scene, marks).gaussians.means.numpy()[rows]
+        points = state.scene.info.memory.changed(marks).gaussians.means.numpy()[rows]
         if not len(points):
             return state
         low, high = np.quantile(points, (0.02, 0.98), axis=0)

@@ -16,6 +16,7 @@ from ..editing.state import fresh
 from ..filming.state import NO_FILMING
 from ..state import State
 from .drops import MAX_PHOTOS
+from .memory import SceneMemory
 from .state import MOST_ROOMS, RECONSTRUCTING, RESTORING, Job, Photo, Room, SceneInfo, head_of
 
 if TYPE_CHECKING:
@@ -271,7 +272,8 @@ def _rooms(state: State, coming: SceneInfo) -> tuple[Room, ...]:
     """Those to go back to once `coming` is on show; the same file twice only where there are edits."""
     info, editing, left = state.scene.info, state.editing, ()
     if info is not None:
-        left = (Room(info, scene_photos(state), editing.history, editing.saved, state.scene.pose),)
+        rested = replace(info, memory=SceneMemory(info.scene))  # one not on show holds its scene alone
+        left = (Room(rested, scene_photos(state), editing.history, editing.saved, state.scene.pose),)
     rooms = (room for room in (*left, *state.scene.rooms) if room.info.serial != coming.serial)
     kept = (room for room in rooms if room.edited or room.info.path is None or room.info.path != coming.path)
     return tuple(kept)[:MOST_ROOMS]

@@ -10,6 +10,7 @@ from langflash_core.pictures import Picture
 from langflash_core.scene.edits import History, Marks
 
 from ..protocol import Command
+from .memory import SceneMemory
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
@@ -101,6 +102,7 @@ class SceneInfo:
     """The scene on show. `scene` is the immutable snapshot; `views` are poses of its photos.
 
     history: edits that came with it, none of them or those of an earlier session.
+    memory: of what was computed about it last; goes on with the same scene.
     own_views: whether it says which photo made which Gaussian, so that photos can be compared.
     extent: corners (low, high) of the box around nearly all of it, world axes, scene units.
     """
@@ -117,6 +119,11 @@ class SceneInfo:
     history: "History | None" = field(default=None, compare=False, repr=False)
     own_views: bool = False
     extent: tuple[Vector, Vector] | None = None
+    memory: SceneMemory = field(default=None, compare=False, repr=False)  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        if self.memory is None or self.memory.scene is not self.scene:
+            object.__setattr__(self, "memory", SceneMemory(self.scene))
 
 
 @dataclass(frozen=True)

@@ -178,7 +178,7 @@ def answered(state: State, command: do.Command) -> State:
     assert info is not None and marks is not None
     request = request_for(command, after, info, marks, SIZE)
     if isinstance(command, edit.FindFloaters):
-        request = ScoreFloaters(info.serial, info.scene, marks)
+        request = ScoreFloaters(info.serial, info.memory, marks)
     for found in () if request is None else request.run(lambda: False):
         after = apply(after, found)
     return after

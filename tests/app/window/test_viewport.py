@@ -9,6 +9,7 @@ import torch
 
 from app.gl import still
 from app.window.governor import Governor, Kind, Plan
+from app.window.scene.memory import SceneMemory
 from app.window.viewport import RETRY_SECONDS, Viewport
 from langflash_core import pictures
 from langflash_core.geometry.poses import orbit
@@ -240,7 +241,7 @@ def test_a_scene_with_levels_moves_coarse_and_rests_whole(context, monkeypatch) 
             plans.append(getattr(viewport.drawn, "plan", None))
             if turn == 20:
                 marks = first_marks(scene)
-                viewport.mark(scene, delete(marks, Mask.first(marks.selected.count, 90)), None)
+                viewport.mark(SceneMemory(scene), delete(marks, Mask.first(marks.selected.count, 90)), None)
         moved = {plan.share for plan in plans if plan is not None}
         live = viewport._made()._scene
         assert live is not None and {*live._levels} == {0.25}

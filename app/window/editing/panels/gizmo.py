@@ -30,7 +30,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> tuple[list[do
     marks = editing.marks
     if info is None or marks is None or not editing.placing:
         return [], False
-    pivot = placing.pivot_of(info.scene, marks)
+    pivot = placing.pivot_of(info, marks)
     if pivot is None:
         return [], False
     before = editing.gesture if isinstance(editing.gesture, placing.Moved) else placing.Moved(marks.selected)

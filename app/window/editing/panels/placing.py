@@ -41,7 +41,7 @@ def draw(state: State, look: Look, right: float) -> list[do.Command]:
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.MUTED, said)
         return issued
-    pivot = placing.pivot_of(info.scene, editing.marks)
+    pivot = placing.pivot_of(info, editing.marks)
     return issued if pivot is None else issued + _fields(state, pivot, look, right)
 
 
@@ -92,7 +92,7 @@ def draw_tint(state: State, tint: Tint, look: Look, right: float) -> list[do.Com
     if repainted or moved:
         red, green, blue = (min(max(float(each), 0.0), 1.0) for each in colour)
         wanted = Tint((red, green, blue), strength)
-        issued.append(placing.ShowTint(wanted, placing.luma_of(info.scene, editing.marks)))
+        issued.append(placing.ShowTint(wanted, placing.luma_of(info, editing.marks)))
     if widgets.primary_button("Recolour"):
         issued.append(placing.EndGesture())
     widgets.tooltip("Keep it so  (Ctrl+T)")

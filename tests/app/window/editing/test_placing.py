@@ -84,7 +84,7 @@ def test_what_is_not_selected_or_no_longer_does_not_move(chosen: State) -> None:
 def test_numbers_and_matrices_say_the_same_gesture(chosen: State) -> None:
     assert chosen.scene.info is not None and chosen.editing.marks is not None
     marks, rest = chosen.editing.marks, Moved(BLOCK)
-    pivot = placing.pivot_of(chosen.scene.info.scene, marks)
+    pivot = placing.pivot_of(chosen.scene.info, marks)
     assert pivot is not None
     np.testing.assert_allclose(pivot, (CHAIR[0], CHAIR[1], CHAIR[2] - 0.2), atol=1e-6)  # of the block's front
     for handle, numbers in (
@@ -133,7 +133,7 @@ def test_a_number_that_is_none_moves_nothing(chosen: State) -> None:
 
 def test_a_tint_is_shown_made_undone_and_saved(chosen: State) -> None:
     assert chosen.scene.info is not None and chosen.editing.marks is not None
-    luma = placing.luma_of(chosen.scene.info.scene, chosen.editing.marks)
+    luma = placing.luma_of(chosen.scene.info, chosen.editing.marks)
     blue = Tint((0.1, 0.2, 0.9), 1.0)
     shown = after(chosen, BeginTint(), ShowTint(blue, luma))
     assert shown.editing.tint == blue and not shown.editing.placing and labels(shown)[1:] == []
@@ -158,7 +158,7 @@ def test_moved_things_are_found_where_they_are(chosen: State, info) -> None:
     assert marks is not None
     size, focal = (224, 168), 0.5 * 224 / np.tan(np.radians(30))
     at = (112 + focal * (CHAIR[0] + 0.5) / (CHAIR[2] - 0.2), 84 + focal * CHAIR[1] / (CHAIR[2] - 0.2))
-    (found,) = FindThing(1, info.scene, marks, at, made.scene.pose, size, "replace").run(lambda: False)
+    (found,) = FindThing(1, info.memory, marks, at, made.scene.pose, size, "replace").run(lambda: False)
     assert isinstance(found, edit.Found) and len(found.mask & BLOCK) == 2500
     (weighed,) = WeighAtoms(1, info.scene, marks).run(lambda: False)
     assert isinstance(weighed, AtomsWeighed) and weighed.places[0] is not None
