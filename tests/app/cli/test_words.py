@@ -1,11 +1,9 @@
 """`langflash words` and `query --scenes`: what one scene was taught, asked of others."""
 
 import csv
-import io
 import json
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from PIL import Image
 
@@ -18,25 +16,14 @@ from tests.app.cli.conftest import HEIGHT, WIDTH, stripes
 TORCH = ("--backend", "torch")
 
 
-def photo(seed: int) -> bytes:
-    """Three stripes of different texture, as the groups of the scene lie."""
-    rng, stream = np.random.default_rng(seed), io.BytesIO()
-    pixels = rng.normal(128, 6, (HEIGHT, WIDTH, 3))
-    pixels[:, : WIDTH // 3] += 90 * np.sin(np.arange(HEIGHT))[:, None, None]
-    pixels[:, WIDTH // 3 : 2 * WIDTH // 3, 0] += 80
-    pixels[:, 2 * WIDTH // 3 :] -= 90
-    Image.fromarray(pixels.clip(0, 255).astype(np.uint8)).save(stream, "JPEG", quality=92)
-    return stream.getvalue()
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Two photographed scenes, of which the first was taught, one without photos, and a broken one."""
     root = tmp_path_factory.mktemp("scenes")
-    first = replace(stripes(), photos=(photo(0), photo(1)))
+    first = replace(stripes(), photos=(striped_photo(0), striped_photo(1)))
     names = replace(first.record, atom_names={0: "heirloom"}, atom_denials={2: ("wooden floor",)})
     save(replace(first, record=names), root / "first.langflash")
-    save(replace(stripes(), photos=(photo(2), photo(3))), root / "second.langflash")
+    save(replace(stripes(), photos=(striped_photo(2), striped_photo(3))), root / "second.langflash")
     save(stripes(), root / "third.langflash")
     (root / "deep").mkdir()
     (root / "deep" / "broken.langflash").write_bytes(b"no scene")
