@@ -11,7 +11,7 @@ from app.cli.survey import scene_files
 from langflash_core.errors import InputError
 from langflash_core.language.lessons import read_lessons
 from langflash_core.scene.file import load, save
-from tests.app.cli.conftest import HEIGHT, WIDTH, stripes
+from tests.app.cli.conftest import HEIGHT, WIDTH, striped_photo, stripes
 
 TORCH = ("--backend", "torch")
 
