@@ -10,7 +10,6 @@ from langflash_core.errors import InputError, LangFlashError, PromptError
 from langflash_core.files import check_folder, staged_folder
 
 from .report import ProgressBar, say_warnings, write_json
-from .scenes import open_scene
 
 
 def run_survey(args: Namespace, phrases: Sequence[str], negatives: Sequence[str] | None, out: TextIO) -> None:
@@ -27,6 +26,7 @@ def run_survey(args: Namespace, phrases: Sequence[str], negatives: Sequence[str]
     from langflash_core.writing.survey import Reply, ask_scene, write_survey
 
     from .renderers import open_renderer
+    from .scenes import open_scene
     from .vocabulary import taught_by
 
     teach = taught_by(args.vocabulary)

@@ -3,11 +3,13 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from langflash_core.types import Scene
+if TYPE_CHECKING:
+    from langflash_core.types import Scene
 
 
-def taught_by(path: Path | None) -> Callable[[Scene], Scene]:
+def taught_by(path: Path | None) -> "Callable[[Scene], Scene]":
     """What makes of a scene one that was taught so; nothing changes without a vocabulary.
 
     Raises:

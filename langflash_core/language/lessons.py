@@ -19,7 +19,7 @@ from jaxtyping import Float
 
 from langflash_core.errors import PromptError
 from langflash_core.files import write_atomically
-from langflash_core.types import Record
+from langflash_core.records import Record
 
 SAME = 0.85
 """Cosine of looks from which groups of two scenes are taken for the same kind of thing."""

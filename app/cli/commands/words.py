@@ -10,7 +10,6 @@ from langflash_core.language.lessons import SUFFIX
 
 from ..files import checked_scene
 from ..report import write_json
-from ..scenes import open_scene
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -31,6 +30,8 @@ def _learn(args: Namespace, out: TextIO) -> None:
     check_output_file(args.output, (".json",))
     from langflash_core.appearance import appearances, own_network
     from langflash_core.language.lessons import lessons_of, read_lessons, write_lessons
+
+    from ..scenes import open_scene
 
     known, learned, network = read_lessons(args.output) if args.output.exists() else None, 0, own_network()
     for path in args.scenes:
@@ -62,6 +63,8 @@ def _teach(args: Namespace, out: TextIO) -> None:
     from langflash_core.appearance import taken
     from langflash_core.language.lessons import read_lessons, with_lessons
     from langflash_core.scene.file import save
+
+    from ..scenes import open_scene
 
     lessons = read_lessons(args.words)
     scene = open_scene(args.scene)
