@@ -19,6 +19,7 @@ from .words.scenes import (
     add_render,
     add_view,
     add_weights,
+    add_words,
 )
 from .words.training import add_labels, add_rooms, add_train
 
@@ -68,6 +69,7 @@ def build_parser() -> Parser:
         add_train,
         add_eval,
         add_weights,
+        add_words,
     ):
         add(commands)
     return parser

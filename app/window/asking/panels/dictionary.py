@@ -11,6 +11,7 @@ from langflash_core.scene.edits import Atom
 
 from ... import commands as do
 from ...editing import commands as edit
+from ...editing import teaching as teach
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...recovery import commands as keep
@@ -27,7 +28,7 @@ _AXIS = implot.AxisFlags_.lock | implot.AxisFlags_.no_grid_lines | implot.AxisFl
 
 def button(state: State) -> list[do.Command]:
     """Opens the dictionary, or closes it."""
-    imgui.begin_disabled(state.info is None or state.info.num_atoms == 0)
+    imgui.begin_disabled(state.scene.info is None or state.scene.info.num_atoms == 0)
     opened = state.preferences.dictionary_open
     label = f"{fa.ICON_FA_BOOK}##dictionary"
     pressed = widgets.primary_button(label) if opened else imgui.button(label)
@@ -39,7 +40,7 @@ def button(state: State) -> list[do.Command]:
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
     """The window over the picture, whose corner is `place`."""
     marks, wanted = state.editing.marks, state.preferences
-    if not wanted.dictionary_open or state.info is None or marks is None or not marks.atoms:
+    if not wanted.dictionary_open or state.scene.info is None or marks is None or not marks.atoms:
         return []
     left, top, width, height = wanted.dictionary or _usual(look, place, size)
     display = imgui.get_io().display_size
@@ -112,6 +113,20 @@ def _atoms(state: State, atoms: tuple[Atom, ...], look: Look) -> list[do.Command
         issued += [edit.MergeAtoms(chosen), ask.ChooseNone()]
     imgui.end_disabled()
     widgets.tooltip("Tick two or more groups; the first ticked keeps its name.  Ctrl+Z undoes")
+    imgui.same_line()
+    return issued + _others()
+
+
+def _others() -> list[do.Command]:
+    """What leads from scene to scene, at the right of the merging."""
+    issued: list[do.Command] = []
+    if imgui.button(f"{fa.ICON_FA_BOOKMARK}  Keep names"):
+        issued.append(teach.KeepWords())
+    widgets.tooltip("For other scenes: there, groups that look like these can take your names")
+    imgui.same_line()
+    if imgui.button(f"{fa.ICON_FA_WAND_MAGIC_SPARKLES}  Take names"):
+        issued.append(teach.TakeWords())
+    widgets.tooltip("Groups that look like what you taught in other scenes take its name.  Ctrl+Z undoes")
     return issued
 
 
@@ -181,7 +196,7 @@ def _picture(state: State, k: int, look: Look) -> list[do.Command]:
     """What a photo shows of the atom, in a frame of its colour; a click shows its weight map."""
     insight = state.asking.insight
     colour = widgets.rgba(insight.colours[k]) if insight else theme.LINE
-    shown = state.mode is pictures.WEIGHT and state.asking.atom == k
+    shown = state.scene.mode is pictures.WEIGHT and state.asking.atom == k
     ring = theme.ACCENT if shown else colour
     picture = look.thumbnails.get(f"atom {k}")
     side = 2 * imgui.get_frame_height() + imgui.get_style().item_spacing.y
