@@ -1,5 +1,5 @@
-"""Addresses that strangers link to, for the page's own reader, in a browser: nothing is thrown, and what comes
-is a view and a phrase that the page has.
+"""Addresses that strangers link to, for the page's own reader, in a browser: nothing is thrown, and what
+comes is a view and a phrase that the page has.
 
     python -m tests.torture address [--seed 1] [--addresses 1000000]
 """
@@ -25,8 +25,8 @@ _FUZZ = """
   const texts = ["plant", "length", "a b", "", "%", "\\u0000", "constructor"];
   const words = ["view", "ask", "mode", "bare", "=", "&", "#", "%", "%zz", "%00", "+", "plant", "length",
     "map", "constructor", "__proto__", "toString", "0", "1", "-1", "1e9", "99999999999999999999", "0x1", " 1",
-    "1.5", "NaN", "Infinity", "photo", "heat", "\\ud800", "\\u202e", "\\u0000", "<script>", "[]", "view=length",
-    "view=1", "?", ";"];
+    "1.5", "NaN", "Infinity", "photo", "heat", "\\ud800", "\\u202e", "\\u0000", "<script>", "[]",
+    "view=length", "view=1", "?", ";"];
   const finds = [];
   for (let number = 0; number < COUNT && finds.length < 5; number++) {
     let hash = random(9) ? "#" : "";

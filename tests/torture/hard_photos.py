@@ -1,4 +1,4 @@
-"""Photos that no scene is in, or that deceive, through the whole path in float32 and bfloat16, beside float64.
+"""Photos that no scene is in, or that deceive, whole path, float32 and bfloat16, beside float64.
 
     python -m tests.torture photos [--only noise ...]
 
