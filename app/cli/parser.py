@@ -20,6 +20,7 @@ from .words.scenes import (
     add_view,
     add_weights,
 )
+from .words.showing import add_completion, add_desktop, add_tour
 from .words.training import add_labels, add_rooms, add_train
 
 LAB = ("bench-network", "eval", "labels", "rooms", "train")
@@ -59,6 +60,7 @@ def build_parser() -> Parser:
         add_query,
         add_render,
         add_export,
+        add_tour,
         add_lift,
         add_info,
         add_bench,
@@ -68,6 +70,8 @@ def build_parser() -> Parser:
         add_train,
         add_eval,
         add_weights,
+        add_desktop,
+        add_completion,
     ):
         add(commands)
     return parser

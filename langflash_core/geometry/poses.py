@@ -9,9 +9,9 @@ behind it is not drawn: how large things are follows from the span, not from whe
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -340,6 +340,44 @@ def alike(all_poses: Sequence[Pose]) -> tuple[Pose, ...]:
     """As they are where all see by parallel rays, else all in perspective."""
     flat = all(pose.span is not None for pose in all_poses)
     return tuple(pose if flat or pose.span is None else perspective(pose) for pose in all_poses)
+
+
+def told_pose(pose: Pose) -> dict[str, Any]:
+    """A pose as plain values, as a file gives them back."""
+    lists = ("centre", "rotation", "shift")
+    return asdict(pose) | {name: list(getattr(pose, name)) for name in lists}
+
+
+def read_pose(entry: Mapping[str, Any]) -> Pose:
+    """A pose out of a file; one of an earlier version has no span.
+
+    Raises:
+        KeyError, TypeError, ValueError, IndexError: it is damaged, or no picture can be drawn from there.
+    """
+    pose = Pose(
+        Vector(*map(float, entry["centre"])),
+        Rotation(*map(float, entry["rotation"])),
+        *(float(entry[name]) for name in ("reach", "fov", "aspect")),
+        shift=(float(entry["shift"][0]), float(entry["shift"][1])),
+        span=None if entry.get("span") is None else float(entry["span"]),
+    )
+    if not _can_look(pose):
+        raise ValueError(f"pose: expected one from which a picture can be drawn, received {pose}")
+    return pose
+
+
+def _can_look(pose: Pose) -> bool:
+    span = 1.0 if pose.span is None else pose.span
+    numbers = (*pose.centre, *pose.rotation, pose.reach, pose.fov, pose.aspect, *pose.shift, span)
+    turned = sum(part * part for part in pose.rotation)
+    return (
+        all(map(math.isfinite, numbers))
+        and turned > 0
+        and pose.reach > 0
+        and 0 < pose.fov < 180
+        and pose.aspect > 0
+        and span > 0
+    )
 
 
 def _rotation(axes: np.ndarray) -> Rotation:

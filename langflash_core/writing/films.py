@@ -1,9 +1,9 @@
-"""A scene as a film: from photo to photo, around it, or along key frames; in colours or as a heat-map."""
+"""A scene as a film: from photo to photo, around it, along its tour or key frames; in colours or as a heat-map."""
 
 import itertools
 import json
 import math
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,13 +15,14 @@ from langflash_core.colormaps import HeatColours
 from langflash_core.errors import InputError, LangFlashError, ViewError
 from langflash_core.export.png import USUAL, heat_over, to_8bit
 from langflash_core.files import readable_file, staged_folder
-from langflash_core.geometry.poses import Pose, Vector, blend, framing, from_view, orbit, to_camera
+from langflash_core.geometry.poses import Pose, Vector, alike, blend, framing, from_view, orbit, to_camera
 from langflash_core.geometry.reach import median_reach
 from langflash_core.geometry.tours import RATE, along, even
 from langflash_core.language.relevance import CompiledQuery, compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.limits import TEXT
 from langflash_core.running import Progress
+from langflash_core.scene.tour import read_tour
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
 from langflash_core.writing.cameras import camera_of
 from langflash_core.writing.job import Job
@@ -29,6 +30,7 @@ from langflash_core.writing.renderers import Renderer
 
 SECONDS = 6.0
 LONGEST = 600.0  # seconds
+STAY, FLIGHT = 1.5, 2.5  # seconds at a stop of a tour, and to the next one
 _SWAY = (math.radians(12), math.radians(4))  # yaw and pitch around a single photo: further out are holes
 _H264 = ("-preset", "veryfast")  # half the encoder's time; files grow a little
 _WEBP = ("-quality", "80", "-compression_level", "2", "-loop", "0")
@@ -82,11 +84,14 @@ def way(
     """Cameras of a film, sides rounded down to even numbers of pixels as encoders want them.
 
     Args:
-        path: photos (None), orbit, or a file of key frames. shown: the part of the scene that is drawn.
+        path: photos (None), orbit, tour, or a file of key frames. shown: the part of the scene that is drawn.
 
     Raises:
-        ViewError: the key frames cannot be used.
+        ViewError: the key frames cannot be used, or the scene has no tour.
     """
+    if path == "tour":
+        size = even(size or scene.view_size)
+        return [to_camera(pose, *size) for pose in along_stops(_stops(scene), seconds)]
     if path in (None, "photos", "orbit"):
         width, height = even(size or scene.view_size)
         views = _poses(scene)
@@ -99,6 +104,34 @@ def way(
         ]
         return [to_camera(pose, width, height) for pose in poses]
     return along(*read_key_frames(Path(path), seconds), size)
+
+
+def _stops(scene: Scene) -> list[Pose]:
+    """Raises:
+    ViewError: the scene has none.
+    """
+    stops = read_tour(scene.record.tour).stops
+    if not stops:
+        raise ViewError('the scene has no tour; give it stops with: langflash tour stop SCENE "The window"')
+    return [stop.pose for stop in stops]
+
+
+def along_stops(stops: Sequence[Pose], seconds: float | None) -> list[Pose]:
+    """Poses of a film that stays at every stop for a while and flies smoothly to the next.
+
+    Args:
+        seconds: of all of it; None: `STAY` at each stop and `FLIGHT` between two.
+    """
+    whole = STAY * len(stops) + FLIGHT * (len(stops) - 1)
+    pace = 1.0 if seconds is None else seconds / whole
+    stops = alike(stops)
+    poses = []
+    for index in range(max(1, round(RATE * pace * whole))):
+        place, passed = divmod(index / RATE / pace, STAY + FLIGHT)
+        here = min(int(place), len(stops) - 1)
+        there = stops[min(here + 1, len(stops) - 1)]
+        poses.append(blend(stops[here], there, max(0.0, passed - STAY) / FLIGHT))
+    return poses
 
 
 def write(

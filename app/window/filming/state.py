@@ -1,11 +1,10 @@
 """Key frames as the state and a scene file have them."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
-from math import isfinite
+from dataclasses import dataclass
 from typing import Any
 
-from langflash_core.geometry.poses import Pose, Rotation, Vector
+from langflash_core.geometry.poses import Pose, read_pose, told_pose
 
 MOST_KEYS = 50
 WAYS = (("past the photos", "photos"), ("around it", "orbit"), ("along the key frames", "keys"))
@@ -28,8 +27,7 @@ class Tour:
 
 def stored(keys: Iterable[Pose]) -> tuple[dict[str, Any], ...]:
     """Key frames as plain values for a scene's record."""
-    lists = ("centre", "rotation", "shift")  # as a file gives them back
-    return tuple(asdict(key) | {name: list(getattr(key, name)) for name in lists} for key in keys)
+    return tuple(map(told_pose, keys))
 
 
 def read(entries: Iterable[Mapping[str, Any]]) -> tuple[Pose, ...]:
@@ -38,36 +36,3 @@ def read(entries: Iterable[Mapping[str, Any]]) -> tuple[Pose, ...]:
         return tuple(map(read_pose, entries))[:MOST_KEYS]
     except (KeyError, TypeError, ValueError, IndexError):
         return ()
-
-
-def read_pose(entry: Mapping[str, Any]) -> Pose:
-    """A pose out of a file; one of an earlier version has no span.
-
-    Raises:
-        KeyError, TypeError, ValueError, IndexError: it is damaged, or no picture can be drawn from there.
-    """
-    pose = Pose(
-        Vector(*map(float, entry["centre"])),
-        Rotation(*map(float, entry["rotation"])),
-        *(float(entry[name]) for name in ("reach", "fov", "aspect")),
-        shift=(float(entry["shift"][0]), float(entry["shift"][1])),
-        span=None if entry.get("span") is None else float(entry["span"]),
-    )
-    if not _can_look(pose):
-        raise ValueError(f"pose: expected one from which a picture can be drawn, received {pose}")
-    return pose
-
-
-def _can_look(pose: Pose) -> bool:
-    """Whether a picture can be drawn from there."""
-    span = 1.0 if pose.span is None else pose.span
-    numbers = (*pose.centre, *pose.rotation, pose.reach, pose.fov, pose.aspect, *pose.shift, span)
-    turned = sum(part * part for part in pose.rotation)
-    return (
-        all(map(isfinite, numbers))
-        and turned > 0
-        and pose.reach > 0
-        and 0 < pose.fov < 180
-        and pose.aspect > 0
-        and span > 0
-    )
