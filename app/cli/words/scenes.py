@@ -271,6 +271,14 @@ def add_export(commands) -> None:
         "--with-text", action="store_true", help="an .html answers any phrase, and is 28 MB larger"
     )
     command.add_argument(
+        "--beside",
+        nargs="+",
+        type=Path,
+        default=(),
+        metavar="SCENE",
+        help="other scenes in the same .html, which are asked the same phrases",
+    )
+    command.add_argument(
         "--detail",
         choices=EXPORT_DETAILS,
         default=EXPORT_DETAILS[0],

@@ -1,5 +1,6 @@
 """The words of showing scenes to others: tours, completion of commands, the desktop."""
 
+import re
 from pathlib import Path
 
 from ..values import point, view_index, whole_count
@@ -49,6 +50,7 @@ def _add_note(actions) -> None:
     command.add_argument(
         "--at", type=point, metavar="X,Y,Z", help="in scene units (default: the middle of what --phrase finds)"
     )
+    command._negative_number_matcher = re.compile(r"^-[\d.]")  # a point may begin with a minus
     command.add_argument("--to", type=point, metavar="X,Y,Z", help="measures the length from --at to there")
     command.add_argument("--phrase", default="", metavar="PHRASE", help="what is asked by who chooses the note")
     add_backend(command)
