@@ -11,7 +11,7 @@ from langflash_core.geometry.poses import Vector
 from langflash_core.limits import TEXT
 from langflash_core.scene.container import Container
 from langflash_core.scene.tour import Note, Stop, Tour, checked, read_tour, told_tour
-from langflash_core.showing import (
+from langflash_core.showing.tours import (
     place_of,
     pose_of_camera,
     pose_of_view,

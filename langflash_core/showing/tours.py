@@ -1,4 +1,4 @@
-"""Scenes as they are shown to others: where stops and notes go, by a photo's view or by a phrase."""
+"""Tours of scene files: read and written without torch; where stops and notes go, by a photo or a phrase."""
 
 from collections.abc import Callable
 from dataclasses import replace
