@@ -324,7 +324,9 @@ def web_page(
     others = beside or {}
     said = {other.semantics.space for other in (scene, *others.values())}
     if len(said) > 1:
-        raise InputError(f"scenes of one page speak one language, not {', '.join(sorted(said))}; leave some out")
+        raise InputError(
+            f"scenes of one page speak one language, not {', '.join(sorted(said))}; leave some out"
+        )
     if with_text and scene.semantics.space != "minilm":
         raise InputError(f"a page reads words of 'minilm' only, the scene speaks '{scene.semantics.space}'")
     toured = [each.phrase for s in (scene, *others.values()) for each in _of_tour(s) if each.phrase]

@@ -24,9 +24,9 @@ class ExportRequest:
     threshold: relevance to keep, in (0, 1); None: the calibrated one. view: a photo's camera, from 0.
     camera: a JSON file of one. all_views: from every photo. size: (width, height), pixels. ortho: parallel
     rays. fade: leave out what no photo looked at. fill: fill gaps. colormap, span: of heat-maps. detail: of
-    Gaussians and pages. seconds, path: of a film, its length and "photos", "orbit", "tour" or a file of key frames.
-    with_text: a page answers any phrase. beside: files of other scenes in the same page. replace: also what is there as something else. backend: "gl",
-    "torch" or None.
+    Gaussians and pages. seconds, path: of a film, its length and "photos", "orbit", "tour" or a file of key
+    frames. with_text: a page answers any phrase. beside: files of other scenes in the same page. replace:
+    also what is there as something else. backend: "gl", "torch" or None.
     """
 
     output: Path

@@ -1,4 +1,5 @@
-"""Where the portable build starts: the program, or, as Python would, a module or a line for a process of its own.
+"""Where the portable build starts: the program, or, as Python would, a module or a line for a process of
+its own.
 
 Exports, readers and workers start `sys.executable` again, which is this file here.
 """

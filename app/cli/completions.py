@@ -31,7 +31,12 @@ WORDS
 }
 complete -o default -F _langflash langflash
 """
-_ZSH = "#compdef langflash\nautoload -U +X compinit bashcompinit\n(( $+functions[compdef] )) || compinit -u\nbashcompinit\n"
+_ZSH = """\
+#compdef langflash
+autoload -U +X compinit bashcompinit
+(( $+functions[compdef] )) || compinit -u
+bashcompinit
+"""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,5 @@
-"""LangFlash on a Linux desktop: an entry in the menu, its icon, and the type of .langflash files, in the user's own
-XDG folder of data. Three files are written, by us alone, and the same three are taken away.
+"""LangFlash on a Linux desktop: an entry in the menu, its icon, and the type of .langflash files, in the
+user's own XDG folder of data. Three files are written, by us alone, and the same three are taken away.
 
 Source: the Desktop Entry, Icon Theme and Shared MIME-info specifications of freedesktop.org.
 """
@@ -131,7 +131,8 @@ def _put_back(path: Path, text: str | None) -> None:
 
 
 def _tell(folder: Path) -> None:
-    """The desktop's own indices, where there are programs for them; it finds the files without, too, but later."""
+    """The desktop's own indices, where there are programs for them; it finds the files without, too, but
+    later."""
     for program, below in _DATABASES:
         found = shutil.which(program)
         if found and (folder / below).is_dir():

@@ -8,8 +8,8 @@ camera, at most four weights each in 8 bits. Phrases are numbers per atom, d_k .
 needs neither dictionary nor text tower, and answers those that it was made with. With a text model it holds
 both, deflated as they are, and answers any phrase.
 
-A page may hold several scenes; the first one is shown, and each answers the same phrases. Stops and notes of a
-scene's tour come along, cameras with the page's own lens.
+A page may hold several scenes; the first one is shown, and each answers the same phrases. Stops and notes
+of a scene's tour come along, cameras with the page's own lens.
 
 Axes and units are the scene's own. What is lost: photos, weights beyond the fourth, and without a text
 model the dictionary.
@@ -43,8 +43,8 @@ from langflash_core.types import Scene
 
 MOST_WEIGHTS = 4  # of a Gaussian; `langflash bench` says what the others are worth
 SCRIPTS = (
-    "decode", "cameras", "sorting", "answers", "drawing", "worlds", "moving", "asking", "touring", "notes", "plan",
-    "embedding", "main",
+    "decode", "cameras", "sorting", "answers", "drawing", "worlds", "moving", "asking", "touring", "notes",
+    "plan", "embedding", "main",
 )  # fmt: skip
 READING = "words"  # beside a text model
 _SHADERS = ("splat.vert", "splat.frag", "screen.vert", "show.frag")
@@ -253,7 +253,8 @@ def _views(scene: Scene, origin: Tensor) -> list[dict]:
 
 
 def _tour(scene: Scene, origin: np.ndarray) -> dict:
-    """Stops as cameras of the page's lens, their subject as large; notes around the origin; metres per unit."""
+    """Stops as cameras of the page's lens, their subject as large; notes around the origin; metres per
+    unit."""
     tour = read_tour(scene.record.tour)
     first = from_view(np.eye(4), scene.Ks[0].double().numpy(), scene.view_size, 1.0)
     told: dict = {"stops": [_stop(stop, first.fov, origin) for stop in tour.stops], "notes": []}

@@ -43,8 +43,9 @@ class Atom:
 class Marks:
     """What edits made of a scene. A deleted or hidden Gaussian is never selected.
 
-    camera_path, metric_scale, tour: as in `Record`; plain values of JSON. changes: of Gaussians, in order. there:
-    how many of the scene's first Gaussians and atoms there are; others came with a merge that was undone.
+    camera_path, metric_scale, tour: as in `Record`; plain values of JSON. changes: of Gaussians, in order.
+    there: how many of the scene's first Gaussians and atoms there are; others came with a merge that was
+    undone.
     """
 
     deleted: Mask

@@ -49,7 +49,17 @@ def from_json(values: dict) -> Record:
     names = _of_type(values, "atom_names", dict) or {}
     denials = _of_type(values, "atom_denials", dict) or {}
     edits = _of_type(values, "edits", dict) or {}
-    ours = {*known, "atom_names", "atom_denials", "silent_atoms", "edits", "camera_path", "tour", _VERSION_1, *_COST}
+    ours = {
+        *known,
+        "atom_names",
+        "atom_denials",
+        "silent_atoms",
+        "edits",
+        "camera_path",
+        "tour",
+        _VERSION_1,
+        *_COST,
+    }
     return Record(
         **{name: value for name, value in known.items() if value is not None},
         atom_names={_number(k): str(name) for k, name in names.items()},

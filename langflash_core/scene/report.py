@@ -145,7 +145,9 @@ def _document(
 def _tour(known: Record) -> dict | None:
     """Names of stops, and how many notes; None where there is neither."""
     tour = read_tour(known.tour)
-    return {"stops": list(tour.names), "notes": len(tour.notes), "start": tour.start or None} if tour else None
+    return (
+        {"stops": list(tour.names), "notes": len(tour.notes), "start": tour.start or None} if tour else None
+    )
 
 
 def _box(means: np.ndarray, quantiles: tuple[float, float]) -> dict | None:

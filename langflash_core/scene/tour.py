@@ -1,8 +1,9 @@
-"""A guided tour of a scene: *stops*, which are named poses in an order, and *notes*, which are pinned to points.
+"""A guided tour of a scene: *stops*, which are named poses in an order, and *notes*, which are pinned to
+points.
 
-Idea: it is told as plain JSON values in the scene's record, so programs that know nothing of tours keep it as it
-is. A note names a thing, or measures the length between two points. A stop and a note may have a phrase, which
-is asked where people come to them. Imports no torch.
+Idea: it is told as plain JSON values in the scene's record, so programs that know nothing of tours keep it
+as it is. A note names a thing, or measures the length between two points. A stop and a note may have a
+phrase, which is asked where people come to them. Imports no torch.
 
     {"stops": [{"name", "pose", "text", "phrase"}], "notes": [{"text", "at", "to", "phrase"}], "start": name}
 
@@ -148,7 +149,9 @@ def _check_words(tour: Tour) -> None:
         if tour.names.count(name) > 1:
             raise InputError(f"there is a stop called {name} already; choose another name")
     if tour.start and tour.start not in tour.names:
-        raise InputError(f"there is no stop called {tour.start}; the tour has {', '.join(tour.names) or 'none'}")
+        raise InputError(
+            f"there is no stop called {tour.start}; the tour has {', '.join(tour.names) or 'none'}"
+        )
     for note in tour.notes:
         if not note.text and note.to is None and not note.phrase:
             raise InputError("a note says nothing; give it a text, a phrase, or a second point to measure to")

@@ -1,4 +1,5 @@
-"""A scene in a cell of a notebook: its page, and with the package anywidget what happens there comes back to Python.
+"""A scene in a cell of a notebook: its page, and with the package anywidget what happens there comes back
+to Python.
 
     shown = scene.show("plant")     # a cell
     shown.answers                   # [{"phrase": "plant", "found": True, "score": 0.97}] of the view on show
@@ -83,9 +84,10 @@ def _widget() -> type | None:
         return None
 
     class Shown(anywidget.AnyWidget):
-        """A scene on show. camera: as `langflash render --camera` reads it; setting it flies there. answers: to the
-        phrases on the page, of the view on show. stop: the last one of the tour. asked: set it to ask. go: set it
-        to {"stop": name}, {"view": number} or {"camera": ...}. ready: there is a picture."""
+        """A scene on show. camera: as `langflash render --camera` reads it; setting it flies there.
+        answers: to the phrases on the page, of the view on show. stop: the last one of the tour. asked: set
+        it to ask. go: set it to {"stop": name}, {"view": number} or {"camera": ...}. ready: there is a
+        picture."""
 
         _esm = _PROGRAM
         page = traitlets.Unicode().tag(sync=True)

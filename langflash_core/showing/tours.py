@@ -58,9 +58,7 @@ def pose_of_view(found: Container, view: int) -> Pose:
 def pose_of_camera(found: Container, camera: "Camera") -> Pose:
     """The pose of any camera, around what it shows."""
     size = (camera.width, camera.height)
-    return _pose(
-        found, camera.viewmat.double().numpy(), camera.K.double().numpy(), size, camera.orthographic
-    )
+    return _pose(found, camera.viewmat.double().numpy(), camera.K.double().numpy(), size, camera.orthographic)
 
 
 def _pose(found: Container, viewmat: np.ndarray, K: np.ndarray, size: tuple[int, int], flat: bool) -> Pose:
@@ -84,7 +82,7 @@ def place_of(scene: "Scene", phrase: str, render: Callable[["Scene", "Camera"], 
     best = max(found, key=lambda answer: (answer.centroid is not None, answer.score))
     if best.centroid is None:
         raise PromptError(
-            f"not found in any view: {phrase} (best score {best.score:.3f}); say --at X,Y,Z, or another phrase"
+            f"not found in any view: {phrase} (best score {best.score:.3f}); say where, or another phrase"
         )
     return Vector(*map(float, best.centroid))
 

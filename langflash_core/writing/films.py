@@ -1,4 +1,5 @@
-"""A scene as a film: from photo to photo, around it, along its tour or key frames; in colours or as a heat-map."""
+"""A scene as a film: from photo to photo, around it, along its tour or key frames; in colours or as a
+heat-map."""
 
 import itertools
 import json

@@ -72,7 +72,9 @@ def _beside(job: Job) -> dict[str, Scene]:
     own = (job.request.scene or job.request.output).stem
     for path in job.request.beside:
         if path.stem in scenes or path.stem == own:
-            raise InputError(f"two scenes are called {path.stem}; rename one, so that the page tells them apart")
+            raise InputError(
+                f"two scenes are called {path.stem}; rename one, so that the page tells them apart"
+            )
         scenes[path.stem] = _as_fine(job, read(path))
     return scenes
 

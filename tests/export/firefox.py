@@ -1,5 +1,5 @@
-"""A Firefox on a screen of its own (Xvfb) that is driven by its own protocol (Marionette), where one is installed;
-without a screen it draws no WebGL. Nothing of the network reaches it."""
+"""A Firefox on a screen of its own (Xvfb) that is driven by its own protocol (Marionette), where one is
+installed; without a screen it draws no WebGL. Nothing of the network reaches it."""
 
 import base64
 import json
@@ -95,8 +95,9 @@ def firefox(profile: Path) -> Iterator[Firefox]:
     screen, number = _screen()
     running = subprocess.Popen(
         [found, "--marionette", "--no-remote", "--profile", str(profile)],
-        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
-        env={**os.environ, "HOME": str(profile), "DISPLAY": f":{number}", "LIBGL_ALWAYS_SOFTWARE": "1"},
+        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        start_new_session=True, env={**os.environ, "HOME": str(profile), "DISPLAY": f":{number}",
+        "LIBGL_ALWAYS_SOFTWARE": "1"},
     )  # fmt: skip
     try:
         with socket.create_connection(("127.0.0.1", _port(profile)), SECONDS) as connection:
@@ -128,7 +129,9 @@ def _port(profile: Path) -> int:
         for name in ("MarionetteActivePort", "prefs.js"):
             file = profile / name
             text = file.read_text(errors="replace") if file.exists() else ""
-            match = re.search(r'marionette\.port", (\d+)', text) if name == "prefs.js" else re.match(r"\d+", text)
+            match = (
+                re.search(r'marionette\.port", (\d+)', text) if name == "prefs.js" else re.match(r"\d+", text)
+            )
             if match and int(match[match.lastindex or 0]):
                 return int(match[match.lastindex or 0])
         time.sleep(0.2)

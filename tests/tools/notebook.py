@@ -2,8 +2,8 @@
 
 python -m tests.tools.notebook [PICTURE.png]
 
-Needs jupyterlab, ipykernel and anywidget beside the package, and Chromium. The browser's network is cut off but for
-this machine.
+Needs jupyterlab, ipykernel and anywidget beside the package, and Chromium. The browser's network is cut off
+but for this machine.
 """
 
 import io
@@ -25,6 +25,7 @@ from tests.export.browser import Browser
 
 SIZE = (1280, 900)
 HERE = "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1"
+_FRAME = "document.querySelector('iframe[title=\"a scene\"]')"
 CELLS = (
     "import json\nimport langflash_core as lf\nscene = lf.load('room.langflash')\n"
     "shown = scene.show(['armchair', 'piano'], height=420)\nshown",
@@ -39,7 +40,14 @@ CELLS = (
 def notebook() -> dict:
     """Cells that show a scene, and write down what came back."""
     cells = [
-        {"cell_type": "code", "id": f"c{n}", "metadata": {}, "outputs": [], "execution_count": None, "source": s}
+        {
+            "cell_type": "code",
+            "id": f"c{n}",
+            "metadata": {},
+            "outputs": [],
+            "execution_count": None,
+            "source": s,
+        }
         for n, s in enumerate(CELLS)
     ]
     kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
@@ -53,15 +61,20 @@ def main(picture: str | None = None) -> None:
         save(room(language_space("minilm").encode(PHRASES)), place / "room.langflash")
         (place / "show.ipynb").write_text(json.dumps(notebook()))
         port = _free_port()
-        server = subprocess.Popen(
-            [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", f"--port={port}", f"--ServerApp.root_dir={folder}",
-             "--IdentityProvider.token=", "--ServerApp.disable_check_xsrf=True", "--LabApp.news_url=", "--LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate"],
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env={**os.environ, "JUPYTER_PREFER_ENV_PATH": "1"},
+        words = (
+            "--no-browser", "--allow-root", f"--port={port}", f"--ServerApp.root_dir={folder}",
+            "--IdentityProvider.token=", "--ServerApp.disable_check_xsrf=True",
         )  # fmt: skip
+        server = subprocess.Popen(
+            [sys.executable, "-m", "jupyterlab", *words],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "JUPYTER_PREFER_ENV_PATH": "1"},
+        )
         try:
             _until_up(port)
             for name, value in _walk(place, port, picture).items():
-                print(f"{name}: {json.dumps(value)}")
+                sys.stdout.write(f"{name}: {json.dumps(value)}\n")
         finally:
             server.terminate()
             server.wait(20)
@@ -69,40 +82,43 @@ def main(picture: str | None = None) -> None:
 
 def _walk(place: Path, port: int, picture: str | None) -> dict:
     with chromium.browser(place / "profile", HERE) as page:
-        page.call(
-            "Network.emulateNetworkConditions", offline=False, latency=0, downloadThroughput=-1, uploadThroughput=-1
-        )
-        width, height = SIZE
-        page.call(
-            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False
-        )
+        speeds = {"latency": 0, "downloadThroughput": -1, "uploadThroughput": -1}
+        page.call("Network.emulateNetworkConditions", offline=False, **speeds)
+        screen = {"width": SIZE[0], "height": SIZE[1], "deviceScaleFactor": 1, "mobile": False}
+        page.call("Emulation.setDeviceMetricsOverride", **screen)
         page.call("Page.navigate", url=f"http://127.0.0.1:{port}/lab/tree/show.ipynb")
         _until(page, "document.querySelectorAll('.jp-Notebook .jp-CodeCell').length === 4")
-        _until(page, "[...document.querySelectorAll('.jp-Notebook-ExecutionIndicator')].some((e) => e.dataset.status === 'idle')")
-        _run_cell(page)
-        _until(page, "document.querySelector('iframe[title=\"a scene\"]') !== null")
+        _until(page, "document.body.textContent.includes('| Idle')")
+        _run_cell(page, 0)
+        _until(page, f"{_FRAME} !== null")
         time.sleep(12)  # the page draws, answers, tells
-        _run_cell(page)
+        _run_cell(page, 1)
         told = _written(place / "told.json")
         time.sleep(6)
         if picture:
-            page.value("document.querySelector('iframe[title=\"a scene\"]').scrollIntoView()")
+            page.value(f"{_FRAME}.scrollIntoView()")
             time.sleep(1)
             Path(picture).write_bytes(page.screenshot())
-        _run_cell(page)
+        _run_cell(page, 2)
         asked = _written(place / "asked.json")
         time.sleep(6)
-        _run_cell(page)
+        _run_cell(page, 3)
         went = _written(place / "went.json")
         return {"camera": told[0], "answers": told[1], "found": told[2], "after asking": asked, "went": went}
 
 
-def _run_cell(page: Browser) -> None:
-    """Shift and Enter, in the cell that is chosen."""
-    page.value("document.querySelector('.jp-Notebook').focus()")
-    for kind in ("keyDown", "keyUp"):
-        page.call("Input.dispatchKeyEvent", type=kind, key="Enter", code="Enter", modifiers=8,
-                  windowsVirtualKeyCode=13)  # fmt: skip
+def _run_cell(page: Browser, number: int) -> None:
+    """Choose a cell by its number, and press Shift and Enter until it runs."""
+    prompt = f"document.querySelectorAll('.jp-CodeCell')[{number}].querySelector('.jp-InputPrompt')"
+    while page.value(f"{prompt}.textContent") == "[ ]:":
+        page.value(f"{prompt}.scrollIntoView({{block: 'center'}})")
+        x, y = page.value(f"(({{x, y}}) => [x + 8, y + 8])({prompt}.getBoundingClientRect())")
+        for kind in ("mousePressed", "mouseReleased"):
+            page.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+        for kind in ("keyDown", "keyUp"):
+            held = {"key": "Enter", "code": "Enter", "modifiers": 8, "windowsVirtualKeyCode": 13}
+            page.call("Input.dispatchKeyEvent", type=kind, **held)
+        time.sleep(2)
 
 
 def _written(path: Path, seconds: float = 60) -> list:

@@ -16,7 +16,9 @@ def run(args: Namespace, out: TextIO) -> None:
         LangFlashError: it is no Linux, or a file is somebody else's or cannot be written.
     """
     if not sys.platform.startswith("linux"):
-        raise InputError("the desktop entry is for Linux; on other systems choose the program for a file by hand")
+        raise InputError(
+            "the desktop entry is for Linux; on other systems choose the program for a file by hand"
+        )
     paths = install(data_folder(), own_command()) if args.install else remove(data_folder())
     for path in paths:
         print(path if args.install else f"removed {path}", file=out)

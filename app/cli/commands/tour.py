@@ -6,7 +6,13 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from langflash_core.errors import InputError, SceneFileError, ViewError
-from langflash_core.files import check_output_file, check_same_kind, make_folder, readable_file, write_atomically
+from langflash_core.files import (
+    check_output_file,
+    check_same_kind,
+    make_folder,
+    readable_file,
+    write_atomically,
+)
 from langflash_core.geometry.poses import Vector
 from langflash_core.limits import TEXT
 from langflash_core.scene.container import Container
@@ -146,9 +152,7 @@ def _imported(args: Namespace, tour: Tour, found: Container) -> Tour:
     other = _read(args.file)
     if not args.add:
         return other
-    return checked(
-        Tour((*tour.stops, *other.stops), (*tour.notes, *other.notes), tour.start or other.start)
-    )
+    return checked(Tour((*tour.stops, *other.stops), (*tour.notes, *other.notes), tour.start or other.start))
 
 
 def _read(path: Path) -> Tour:
@@ -166,7 +170,9 @@ def _read(path: Path) -> Tour:
         return read_tour(content)
     except (ValueError, LookupError, TypeError, RecursionError) as error:
         said = " ".join(str(error).split())[:100]
-        raise InputError(f"{path.name} holds no tour ({said}); write one with: langflash tour export") from error
+        raise InputError(
+            f"{path.name} holds no tour ({said}); write one with: langflash tour export"
+        ) from error
 
 
 _CHANGES = {

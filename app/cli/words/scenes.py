@@ -289,8 +289,9 @@ def add_export(commands) -> None:
     command.add_argument(
         "--path",
         metavar="WAY",
-        help="of a video: photos, from one to the next and back (default); orbit, around what is shown; tour, "
-        "along its stops; or a JSON list of cameras as of --camera, each with its time in seconds, or evenly spread",
+        help="of a video: photos, from one to the next and back (default); orbit, around what is shown; "
+        "tour, along the scene's stops; or a JSON list of cameras as of --camera, each with its time in "
+        "seconds, or evenly spread",
     )
     command.add_argument(
         "--replace",

@@ -11,7 +11,9 @@ SHELLS = ("bash", "zsh", "fish")
 
 def add_tour(commands) -> None:
     """`langflash tour`."""
-    actions = new_actions(commands, "tour", "a guided tour of a scene: named views, pinned notes and measures")
+    actions = new_actions(
+        commands, "tour", "a guided tour of a scene: named views, pinned notes and measures"
+    )
     listing = _action(actions, "list", "its stops, in order, and its notes")
     add_json(listing)
     _add_stop(actions)
@@ -40,7 +42,9 @@ def _add_stop(actions) -> None:
     seen.add_argument("--camera", type=Path, metavar="FILE", help="as of `langflash render --camera`")
     command.add_argument("--text", default="", metavar="TEXT", help="what is told there")
     command.add_argument("--phrase", default="", metavar="PHRASE", help="what is asked there")
-    command.add_argument("--place", type=whole_count, metavar="N", help="in the order, from 1 (default: last)")
+    command.add_argument(
+        "--place", type=whole_count, metavar="N", help="in the order, from 1 (default: last)"
+    )
     command.add_argument("--start", action="store_true", help="the scene opens there")
 
 
@@ -48,11 +52,16 @@ def _add_note(actions) -> None:
     command = _changing(actions, "note", "words pinned to a point, or to what a phrase finds, or a measure")
     command.add_argument("text", nargs="?", default="", metavar="TEXT", help="(default: the phrase)")
     command.add_argument(
-        "--at", type=point, metavar="X,Y,Z", help="in scene units (default: the middle of what --phrase finds)"
+        "--at",
+        type=point,
+        metavar="X,Y,Z",
+        help="in scene units (default: the middle of what --phrase finds)",
     )
     command._negative_number_matcher = re.compile(r"^-[\d.]")  # a point may begin with a minus
     command.add_argument("--to", type=point, metavar="X,Y,Z", help="measures the length from --at to there")
-    command.add_argument("--phrase", default="", metavar="PHRASE", help="what is asked by who chooses the note")
+    command.add_argument(
+        "--phrase", default="", metavar="PHRASE", help="what is asked by who chooses the note"
+    )
     add_backend(command)
 
 
