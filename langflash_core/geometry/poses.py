@@ -29,6 +29,7 @@ FOV_RANGE = (15.0, 120.0)
 FRAME_MARGIN = 1.08  # around what is framed
 NEAR, FARTHEST = 45.0, 70.0  # degrees aside of the photos: orbits slow down, and stop
 SLOWING_STEP = 2.0  # degrees
+STAY, FLIGHT = 1.5, 2.5  # seconds at a stop of a tour, and to the next one
 
 
 class Vector(NamedTuple):
@@ -334,6 +335,20 @@ def blend(start: Pose, end: Pose, fraction: float) -> Pose:
         shift=(mix(start.shift[0], end.shift[0]), mix(start.shift[1], end.shift[1])),
         span=None if start.span is None or end.span is None else mix(start.span, end.span),
     )
+
+
+def tour_seconds(count: int) -> float:
+    """How long a tour of so many stops takes: `STAY` at each of them, `FLIGHT` between two."""
+    return STAY * count + FLIGHT * (count - 1)
+
+
+def on_tour(stops: Sequence[Pose], passed: float) -> Pose:
+    """Where a tour is that began so many seconds ago: it stays at every stop, at least one, for a while and
+    flies smoothly to the next."""
+    place, since = divmod(max(passed, 0.0), STAY + FLIGHT)
+    here = min(int(place), len(stops) - 1)
+    there = min(here + 1, len(stops) - 1)
+    return blend(stops[here], stops[there], max(0.0, since - STAY) / FLIGHT)
 
 
 def alike(all_poses: Sequence[Pose]) -> tuple[Pose, ...]:

@@ -16,7 +16,18 @@ from langflash_core.colormaps import HeatColours
 from langflash_core.errors import InputError, LangFlashError, ViewError
 from langflash_core.export.png import USUAL, heat_over, to_8bit
 from langflash_core.files import readable_file, staged_folder
-from langflash_core.geometry.poses import Pose, Vector, alike, blend, framing, from_view, orbit, to_camera
+from langflash_core.geometry.poses import (
+    Pose,
+    Vector,
+    alike,
+    blend,
+    framing,
+    from_view,
+    on_tour,
+    orbit,
+    to_camera,
+    tour_seconds,
+)
 from langflash_core.geometry.reach import median_reach
 from langflash_core.geometry.tours import RATE, along, even
 from langflash_core.language.relevance import CompiledQuery, compile_query
@@ -31,7 +42,6 @@ from langflash_core.writing.renderers import Renderer
 
 SECONDS = 6.0
 LONGEST = 600.0  # seconds
-STAY, FLIGHT = 1.5, 2.5  # seconds at a stop of a tour, and to the next one
 _SWAY = (math.radians(12), math.radians(4))  # yaw and pitch around a single photo: further out are holes
 _H264 = ("-preset", "veryfast")  # half the encoder's time; files grow a little
 _WEBP = ("-quality", "80", "-compression_level", "2", "-loop", "0")
@@ -118,21 +128,15 @@ def _stops(scene: Scene) -> list[Pose]:
 
 
 def along_stops(stops: Sequence[Pose], seconds: float | None) -> list[Pose]:
-    """Poses of a film that stays at every stop for a while and flies smoothly to the next.
+    """Poses of a film of a tour.
 
     Args:
-        seconds: of all of it; None: `STAY` at each stop and `FLIGHT` between two.
+        seconds: of all of it; None: as long as in the window.
     """
-    whole = STAY * len(stops) + FLIGHT * (len(stops) - 1)
-    pace = 1.0 if seconds is None else seconds / whole
-    stops = alike(stops)
-    poses = []
-    for index in range(max(1, round(RATE * pace * whole))):
-        place, passed = divmod(index / RATE / pace, STAY + FLIGHT)
-        here = min(int(place), len(stops) - 1)
-        there = stops[min(here + 1, len(stops) - 1)]
-        poses.append(blend(stops[here], there, max(0.0, passed - STAY) / FLIGHT))
-    return poses
+    whole = tour_seconds(len(stops))
+    seconds = whole if seconds is None else seconds
+    stops, count = alike(stops), max(1, round(RATE * seconds))
+    return [on_tour(stops, index / RATE * whole / seconds) for index in range(count)]
 
 
 def write(

@@ -4,10 +4,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from langflash_core.geometry.poses import Pose, read_pose, told_pose
+from langflash_core.geometry.poses import Pose, alike, on_tour, read_pose, told_pose, tour_seconds
 
 MOST_KEYS = 50
-WAYS = (("past the photos", "photos"), ("around it", "orbit"), ("along the key frames", "keys"))
+WAYS = (
+    ("past the photos", "photos"),
+    ("around it", "orbit"),
+    ("along the key frames", "keys"),
+    ("along the tour", "tour"),
+)
 """How a film goes: for people, and for `--path`."""
 
 
@@ -26,10 +31,24 @@ class Tour:
 
 
 @dataclass(frozen=True)
-class Filming:
-    """The filming half of the state; the key frames themselves are edits. tour: the flight along them."""
+class Walk:
+    """A flight past the stops of a scene's tour. poses: of the stops. began: on the session's clock."""
 
-    tour: Tour | None = None
+    poses: tuple[Pose, ...]
+    began: float
+
+    def at(self, now: float) -> Pose | None:
+        """Where it is; None at its end."""
+        passed = now - self.began
+        return on_tour(alike(self.poses), passed) if passed < tour_seconds(len(self.poses)) else None
+
+
+@dataclass(frozen=True)
+class Filming:
+    """The filming half of the state; key frames and stops themselves are edits. tour: the flight along
+    them."""
+
+    tour: Tour | Walk | None = None
 
 
 NO_FILMING = Filming()
