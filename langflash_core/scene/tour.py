@@ -227,7 +227,7 @@ def _text(entry: Mapping[str, Any], name: str) -> str:
 
 
 def _point(values: Any) -> Vector:
-    x, y, z = map(float, values)
-    if not all(map(math.isfinite, (x, y, z))):
+    point = tuple(map(float, values))
+    if len(point) != 3 or not all(map(math.isfinite, point)):
         raise ValueError(f"tour: expected three finite numbers for a point, received {values!r}"[:200])
-    return Vector(x, y, z)
+    return Vector(*point)
