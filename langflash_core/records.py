@@ -84,7 +84,8 @@ class Record:
     calibration: what the network's checkpoint says about scores, instead of its language space. atom_names:
     a person's own, by atom, which it answers to. atom_denials: what a person said that an atom is not.
     silent_atoms: those that answer no phrase. num_deleted: Gaussians that edits took away. camera_path:
-    the window's key frames. others: what a file says under keys that this version does not know.
+    the window's key frames. tour: stops and notes, as `scene.tour` has them. others: what a file says under
+    keys that this version does not know.
     """
 
     preset: str | None = None
@@ -105,6 +106,7 @@ class Record:
     silent_atoms: tuple[int, ...] = ()
     num_deleted: int = 0
     camera_path: tuple[Mapping[str, Any], ...] = ()
+    tour: Mapping[str, Any] = field(default_factory=dict)
     cost: Cost = Cost()
     others: Mapping[str, Any] = field(default_factory=dict)
 

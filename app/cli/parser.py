@@ -21,6 +21,7 @@ from .words.scenes import (
     add_weights,
     add_words,
 )
+from .words.showing import add_completion, add_desktop, add_tour
 from .words.training import add_labels, add_rooms, add_train
 
 LAB = ("bench-network", "eval", "labels", "rooms", "train")
@@ -60,6 +61,7 @@ def build_parser() -> Parser:
         add_query,
         add_render,
         add_export,
+        add_tour,
         add_lift,
         add_info,
         add_bench,
@@ -70,6 +72,8 @@ def build_parser() -> Parser:
         add_eval,
         add_weights,
         add_words,
+        add_desktop,
+        add_completion,
     ):
         add(commands)
     return parser

@@ -25,6 +25,15 @@ def pixel_side(text: str) -> int:
     return _whole(text, 56, 1024)
 
 
+def point(text: str) -> tuple[float, float, float]:
+    """`X,Y,Z` in scene units."""
+    parts = text.split(",")
+    if len(parts) != 3:
+        raise ArgumentTypeError(f"expected X,Y,Z such as 0.2,-0.1,1.4, received {text!r}")
+    x, y, z = map(_number, parts)
+    return x, y, z
+
+
 def view_index(text: str) -> int:
     """Index of a photo, from 0."""
     return _whole(text, 0, 10**6)

@@ -6,6 +6,7 @@ read into `Record.others` and written back as they are.
 """
 
 from langflash_core.records import Cost, Record
+from langflash_core.scene.tour import read_tour, told_tour
 
 _COST = ("timings", "seconds", "peak_memory_mb")
 _VERSION_1 = "gaussians_per_view"  # a tensor since
@@ -27,6 +28,7 @@ def to_json(record: Record) -> dict:
     known["atom_denials"] = {str(k): list(said) for k, said in record.atom_denials.items()}
     known["silent_atoms"] = record.silent_atoms
     known["camera_path"] = record.camera_path
+    known["tour"] = record.tour
     known["edits"] = {"deleted": record.num_deleted} if record.num_deleted else None
     written = {
         name: list(value) if isinstance(value, tuple) else value
@@ -47,13 +49,24 @@ def from_json(values: dict) -> Record:
     names = _of_type(values, "atom_names", dict) or {}
     denials = _of_type(values, "atom_denials", dict) or {}
     edits = _of_type(values, "edits", dict) or {}
-    ours = {*known, "atom_names", "atom_denials", "silent_atoms", "edits", "camera_path", _VERSION_1, *_COST}
+    ours = {
+        *known,
+        "atom_names",
+        "atom_denials",
+        "silent_atoms",
+        "edits",
+        "camera_path",
+        "tour",
+        _VERSION_1,
+        *_COST,
+    }
     return Record(
         **{name: value for name, value in known.items() if value is not None},
         atom_names={_number(k): str(name) for k, name in names.items()},
         atom_denials={_number(k): tuple(_list(denials, k, str)) for k in denials},
         silent_atoms=tuple(_list(values, "silent_atoms", int)),
         camera_path=tuple(_list(values, "camera_path", dict)),
+        tour=told_tour(read_tour(_of_type(values, "tour", dict) or {})),
         num_deleted=int(_of_type(edits, "deleted", int) or 0),
         cost=Cost(
             timings=_of_type(values, "timings", dict) or {},

@@ -9,6 +9,7 @@ import numpy as np
 from langflash_core.records import FoundLens, Record, check_light
 from langflash_core.scene.container import damaged, read_container
 from langflash_core.scene.record import from_json
+from langflash_core.scene.tour import read_tour
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
@@ -27,7 +28,8 @@ def describe(scene: "Scene") -> dict:
         (metres per unit or None), counts, pruning (as `prune` left it, with `psnr_db` and
         `relevance_error` where they were measured), refinement (None, or kept, held_out and the PSNR
         before and after), detail (None, or as `Record` has it), light (None, or gains and offsets, a row
-        of red, green and blue per view), lens (None, or found, as `Record` has it), timings {stage: seconds,
+        of red, green and blue per view), lens (None, or found, as `Record` has it), tour (None, or the names
+        of stops, how many notes, and the start), timings {stage: seconds,
         total} (None where they are not known, as in files), warnings`.
     """
     from langflash_core.scene.fields import to_fields  # torch
@@ -134,9 +136,18 @@ def _document(
         "detail": dict(known.detail) or None,
         "light": dict(known.light) or None,
         "lens": dict(known.lens) or None,
+        "tour": _tour(known),
         "timings": {**timings, "total": sum(timings.values())} if timings else None,
         "warnings": list(known.warnings),
     }
+
+
+def _tour(known: Record) -> dict | None:
+    """Names of stops, and how many notes; None where there is neither."""
+    tour = read_tour(known.tour)
+    return (
+        {"stops": list(tour.names), "notes": len(tour.notes), "start": tour.start or None} if tour else None
+    )
 
 
 def _box(means: np.ndarray, quantiles: tuple[float, float]) -> dict | None:

@@ -291,6 +291,14 @@ def add_export(commands) -> None:
         "--with-text", action="store_true", help="an .html answers any phrase, and is 28 MB larger"
     )
     command.add_argument(
+        "--beside",
+        nargs="+",
+        type=Path,
+        default=(),
+        metavar="SCENE",
+        help="other scenes in the same .html, which are asked the same phrases",
+    )
+    command.add_argument(
         "--detail",
         choices=EXPORT_DETAILS,
         default=EXPORT_DETAILS[0],
@@ -301,8 +309,9 @@ def add_export(commands) -> None:
     command.add_argument(
         "--path",
         metavar="WAY",
-        help="of a video: photos, from one to the next and back (default); orbit, around what is shown; or a "
-        "JSON list of cameras as of --camera, each with its time in seconds, or evenly spread",
+        help="of a video: photos, from one to the next and back (default); orbit, around what is shown; "
+        "tour, along the scene's stops; or a JSON list of cameras as of --camera, each with its time in "
+        "seconds, or evenly spread",
     )
     command.add_argument(
         "--replace",
