@@ -20,11 +20,13 @@ from langflash_core.scene.assemble import placed_views
 from langflash_core.scene.detailed import assemble_detailed, working_photo
 from langflash_core.scene.light import Light, photo_light
 from langflash_core.scene.prune import prune
+from langflash_core.scene.report import left_out_line
 from langflash_core.scene.strangers import strangers
 from langflash_core.splat.colours import ROUNDS, solved_colours
 from langflash_core.types import Cost, Prediction, Scene, Views
 
 _HELD = 8  # photos that stay decoded
+_LEFT_OUT = "{} something that the others do not ({}); it is left out"
 _RINGING = 0.3
 """Of what a photo varies by around a Gaussian, how far its colour may go beyond: blur needs some of it."""
 
@@ -58,7 +60,6 @@ def fine_scene(
     grid = (views.images.shape[-2], views.images.shape[-1])
     photos = _Photos(views, light, grid)
     views = replace(views, images=light.corrected(views.images).clamp(0, 1))
-    progress("strangers", 0.05)
     left = strangers(views.images, prediction.depths, prediction.viewmats, views.Ks)
     scene = assemble_detailed(
         prediction,
@@ -77,7 +78,9 @@ def fine_scene(
         "assembly": solving - start,
         "colours": time.perf_counter() - solving,
     }
-    scene = scene.with_record(light=light.stored(), strangers=_shares(left), cost=Cost(timings))
+    left_out = _shares(left)
+    said = (*scene.record.warnings, *([_LEFT_OUT.format(*_counted(left_out))] if left_out else []))
+    scene = scene.with_record(light=light.stored(), left_out=left_out, warnings=said, cost=Cost(timings))
     progress("prune", 0.9)
     return prune(scene, merge=False), light
 
@@ -148,6 +151,12 @@ def _shares(left: Tensor) -> dict[str, list[float]]:
     """What a record says of what was left out of photos (V, H, W): nothing of nothing."""
     shares = [round(share, 4) for share in left.flatten(1).float().mean(1).tolist()]
     return {"shares": shares} if any(shares) else {}
+
+
+def _counted(left_out: dict[str, list[float]]) -> tuple[str, str]:
+    """Which photos show what others do not, and how much of them that is."""
+    count = sum(share > 0 for share in left_out["shares"])
+    return ("1 photo shows" if count == 1 else f"{count} photos show"), left_out_line(left_out)
 
 
 def _coloured(scene: Scene, photos: _Silent, progress: Callable[[float], None]) -> Scene:

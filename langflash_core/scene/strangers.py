@@ -1,5 +1,5 @@
-"""What one photo shows and the others do not: somebody who walks through, a screen whose picture changes, what
-a mirror shows.
+"""What one photo shows and the others do not: somebody who walks through, a screen whose picture changes,
+what a mirror shows.
 
 Each of the other photos says what a photo should show: its points, in its colours, are carried there. A cell
 is contradicted where two others and more foresee one colour at one depth, not before what the photo sees, and
@@ -45,7 +45,8 @@ _FARTHEST = 24  # cells, by which a region may go on
 _MARGIN = 2  # cells beyond its border
 _NEAR, _LIKE = 3, 0.06  # pixels a side of the window, and sRGB, within which a pixel is found again
 _FOUND = 0.5  # of a region's pixels, at one depth
-_SEEN = 0.3  # of a region, that another photo must see to say anything
+_IN_VIEW = 0.3  # of a region, that another photo must have before it to say anything
+_LEAST_DEPTH = 1e-6  # unit of the depths
 _SQUARE = np.ones((3, 3), bool)
 _DEPTHS = (*(k / 20 for k in range(-12, 13)), 0.8, 1.1, 1.6, 2.5)
 """Log depths, by which a region is moved: what is seen through a window or in a mirror is far."""
@@ -76,7 +77,9 @@ def strangers(
             continue
         seen = [looks[other].foreseen(viewmats[view], Ks[view], own.depth.shape) for other in some]
         contradicted, through = _contradicted(own, _Foreseen.together(seen))
-        seeds = [seed for seed in _seeds(contradicted) if not _elsewhere(seed, view, some, looks, viewmats, Ks)]
+        seeds = [
+            seed for seed in _seeds(contradicted) if not _elsewhere(seed, view, some, looks, viewmats, Ks)
+        ]
         if seeds:
             region = _grown(np.any(seeds, axis=0), (through | contradicted).cpu().numpy())
             found[view] = _at_size(torch.from_numpy(region).to(found.device), found[view])
@@ -85,66 +88,73 @@ def strangers(
 
 @dataclass(frozen=True)
 class _Look:
-    """A photo. points: (3, H*W) world. colours: (9, H*W) its red, green, blue, and their least and most around
-    each pixel. depth (h, w), colour, least, most (3, h, w) of its cells."""
+    """A photo of `size` = (H, W).
 
+    points: (3, H*W) world. colours: (9, H*W), red, green, blue, and their least and most within `_AROUND`
+    cells. near: (6, H*W), least and most within `_NEAR` pixels. depth (h, w), colour, least, most (3, h, w)
+    of its cells.
+    """
+
+    size: tuple[int, int]
     points: Tensor
     colours: Tensor
+    near: Tensor
     depth: Tensor
     colour: Tensor
     least: Tensor
     most: Tensor
-    size: tuple[int, int]
-    near: Tensor
 
     @staticmethod
     def of(image: Tensor, depths: Tensor, viewmat: Tensor, K: Tensor) -> "_Look":
-        pose = invert_rigid(viewmat)
+        pose, (height, width) = invert_rigid(viewmat), depths.shape
         points = pose[:3, :3] @ unproject(depths, K).flatten(0, 1).T + pose[:3, 3:]
-        rows, columns = (side // _CELL * _CELL for side in depths.shape)
-        cut, side = image[None, :, :rows, :columns], _AROUND * _CELL - 1
-        least, most = -F.max_pool2d(-image[None], side, 1, side // 2), F.max_pool2d(image[None], side, 1, side // 2)
-        small = [
-            F.avg_pool2d(cut, _CELL)[0],
-            -F.max_pool2d(-least[..., :rows, :columns], _CELL)[0],
-            F.max_pool2d(most[..., :rows, :columns], _CELL)[0],
+        around, near = _range(image, _AROUND * _CELL - 1), _range(image, _NEAR)
+        inside = (slice(None), slice(height // _CELL * _CELL), slice(width // _CELL * _CELL))
+        cells = [
+            -F.max_pool2d(-depths[None][inside], _CELL)[0],
+            F.avg_pool2d(image[inside], _CELL),
+            -F.max_pool2d(-around[:3][inside], _CELL),
+            F.max_pool2d(around[3:][inside], _CELL),
         ]
-        depth = -F.max_pool2d(-depths[None, None, :rows, :columns], _CELL)[0, 0]
-        colours = torch.cat((image, least[0], most[0])).flatten(1)
-        near = torch.cat([-F.max_pool2d(-image[None], _NEAR, 1, _NEAR // 2), F.max_pool2d(image[None], _NEAR, 1, _NEAR // 2)], 1)[0].flatten(1)
-        return _Look(points, colours, depth, *small, (depths.shape[0], depths.shape[1]), near)
+        colours = torch.cat((image, around)).flatten(1)
+        return _Look((height, width), points, colours, near.flatten(1), *cells)
 
-    def cells(self, some: Tensor) -> Tensor:
+    def pixels(self, cells: np.ndarray) -> Tensor:
         """A pixel of each of some cells (h, w) bool, as numbers (n,)."""
-        rows, columns = some.nonzero().T * _CELL + _CELL // 2
-        return rows * self.size[1] + columns
+        rows, columns = np.nonzero(cells)
+        places = (rows * _CELL + _CELL // 2) * self.size[1] + columns * _CELL + _CELL // 2
+        return torch.from_numpy(places).to(self.points.device)
 
-    def shown(self, points: Tensor, colours: Tensor, viewmat: Tensor, K: Tensor) -> float | None:
-        """The share of points (3, n) in the world that this photo shows in these colours (3, n), of those before
-        it; None where these are few."""
+    def shown(self, points: Tensor, colours: Tensor, viewmat: Tensor, K: Tensor) -> float:
+        """The share of points (3, n) in the world, of those in view, that this photo shows in these colours
+        (3, n); NaN where few are in view."""
         x, y, z = pictured(viewmat, K, points)
-        inside = (z > 1e-6) & (x >= 0) & (y >= 0) & (x < self.size[1]) & (y < self.size[0])
-        if float(inside.float().mean()) < _SEEN:
-            return None
-        places = y[inside].long() * self.size[1] + x[inside].long()
-        near = _beyond(colours[:, inside], self.near[:3, places], self.near[3:, places]).amax(0) < _LIKE
-        return float(near.float().mean())
+        inside = (z > _LEAST_DEPTH) & (x >= 0) & (y >= 0) & (x < self.size[1]) & (y < self.size[0])
+        if float(inside.float().mean()) < _IN_VIEW:
+            return math.nan
+        range_there = self.near[:, y[inside].long() * self.size[1] + x[inside].long()]
+        off = _beyond(colours[:, inside], range_there[:3], range_there[3:]).amax(0)
+        return float((off < _LIKE).float().mean())
 
     def foreseen(self, viewmat: Tensor, K: Tensor, size: torch.Size) -> "_Foreseen":
         """What this photo says that another one shows in cells of that size (h, w)."""
         height, width = size
         x, y, z = pictured(viewmat, K, self.points)
         x, y = x / _CELL, y / _CELL
-        inside = ((z > 1e-6) & (x >= 0) & (y >= 0) & (x < width) & (y < height)).nonzero()[:, 0]
-        places = y[inside].long() * width + x[inside].long()
-        z, cells = z[inside], height * width
-        nearest = z.new_full((cells,), torch.inf).scatter_reduce(0, places, z, "amin")
+        inside = (z > _LEAST_DEPTH) & (x >= 0) & (y >= 0) & (x < width) & (y < height)
+        some = inside.nonzero()[:, 0]
+        places, z = y[some].long() * width + x[some].long(), z[some]
+        nearest = z.new_full((height * width,), torch.inf).scatter_reduce(0, places, z, "amin")
         front = z < (1 + _ALIKE) * nearest[places]
-        inside, places = inside[front], places[front]
-        counts = torch.bincount(places, minlength=cells)
-        sums = z.new_zeros(9, cells).index_add_(1, places, self.colours[:, inside])
-        means = (sums / counts.clamp_min(1)).view(3, 3, height, width)
-        return _Foreseen(nearest.view(size), means[0], means[1], means[2])
+        some, places = some[front], places[front]
+        sums = z.new_zeros(9, height * width).index_add_(1, places, self.colours[:, some])
+        means = sums / torch.bincount(places, minlength=height * width).clamp_min(1)
+        return _Foreseen(nearest.view(size), *means.view(3, 3, height, width))
+
+
+def _range(image: Tensor, side: int) -> Tensor:
+    """Least and most (6, H, W) of an image (3, H, W) within a window of an odd side."""
+    return torch.cat([sign * F.max_pool2d(sign * image, side, 1, side // 2) for sign in (-1, 1)])
 
 
 @dataclass(frozen=True)
@@ -204,26 +214,26 @@ def _elsewhere(
     seed: np.ndarray, view: int, others: list[int], looks: list[_Look], viewmats: Tensor, Ks: Tensor
 ) -> bool:
     """Whether half of the other photos that can show a region (h, w) do so somewhere along its rays."""
-    own = looks[view]
     centre = invert_rigid(viewmats[view])[:3, 3:]
-    pixels = own.cells(torch.from_numpy(seed).to(centre.device))
-    rays, colours = own.points[:, pixels] - centre, own.colours[:3, pixels]
-    shares = []
-    for other in others:
-        best = [
-            share
+    pixels = looks[view].pixels(seed)
+    rays, colours = looks[view].points[:, pixels] - centre, looks[view].colours[:3, pixels]
+    shares = [
+        [
+            looks[other].shown(centre + math.exp(change) * rays, colours, viewmats[other], Ks[other])
             for change in _DEPTHS
-            if (share := looks[other].shown(centre + math.exp(change) * rays, colours, viewmats[other], Ks[other]))
-            is not None
         ]
-        shares += [max(best)] if best else []
-    return float(np.median(shares)) >= _FOUND if shares else False
+        for other in others
+    ]
+    most = np.fmax.reduce(np.array(shares), axis=1)  # NaN of those that never have it before them
+    return bool(np.nanmedian(most) >= _FOUND) if np.isfinite(most).any() else False
 
 
 def _grown(seeds: np.ndarray, may: np.ndarray) -> np.ndarray:
     """(h, w) bool: seeds, what goes on from there, holes and a margin."""
     grown = scipy.ndimage.binary_dilation(seeds, _SQUARE, _FARTHEST, may | seeds)
-    closed = scipy.ndimage.binary_closing(np.pad(grown, _WINDOW), _SQUARE, 2)[_WINDOW:-_WINDOW, _WINDOW:-_WINDOW]
+    closed = scipy.ndimage.binary_closing(np.pad(grown, _WINDOW), _SQUARE, 2)[
+        _WINDOW:-_WINDOW, _WINDOW:-_WINDOW
+    ]
     return scipy.ndimage.binary_dilation(scipy.ndimage.binary_fill_holes(closed), _SQUARE, _MARGIN)
 
 

@@ -155,7 +155,9 @@ def screen_in(
 
 def _mostly(screen: Screen, picture: Picture, viewmat: np.ndarray, K: np.ndarray) -> Bool:
     """Whether a picture shows .7 of a screen, as a hundredth of it and more."""
-    corners = np.stack([screen.centre + a * screen.right + b * screen.up for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+    corners = np.stack(
+        [screen.centre + a * screen.right + b * screen.up for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    )
     pos = corners @ viewmat[:3, :3].T + viewmat[:3, 3]
     if (pos[:, 2] < 0.3).any():
         return False

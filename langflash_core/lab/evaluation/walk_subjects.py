@@ -155,8 +155,8 @@ class Camcorder:
     exposure: stops by which each photo's exposure may differ, either way, white balance by a sixth of it.
     blur: degrees by which a hand turns while a photo is taken. times: the network's grid a photo is large.
     bend: Brown's first radial term of the lens; kept frames are as a straight one takes them.
-    passers, screens: photos in which somebody stands, and in which a screen shows another picture; kept frames
-    show nobody, and the screen as it is in the others.
+    passers, screens: photos in which somebody stands, and in which a screen shows another picture; kept
+    frames show nobody, and the screen as it is in the others.
     """
 
     exposure: float = 0.0
@@ -236,7 +236,9 @@ class _Stage:
     changed: tuple[int, ...]
 
     @staticmethod
-    def of(staged: StagedRoom, renderer: RoomRenderer, way: Way, plan: Plan, camcorder: Camcorder) -> "_Stage":
+    def of(
+        staged: StagedRoom, renderer: RoomRenderer, way: Way, plan: Plan, camcorder: Camcorder
+    ) -> "_Stage":
         """`renderer` has the staged room, before and after."""
         height, width = (side * camcorder.times for side in staged.views.depths.shape[1:])
         K, seed = staged.views.Ks[0].astype(float), staged.views.seed
