@@ -3,14 +3,14 @@ what a mirror shows.
 
 Each of the other photos says what a photo should show: its points, in its colours, are carried there. A cell
 is contradicted where two others and more foresee one colour at one depth, not before what the photo sees, and
-the photo shows another colour; and not where half as many others see what it sees. Colours are compared with
-all that lies within `_AROUND` cells, both ways, so that poses and depths which are a pixel or two off say
-nothing. Small and loose parts are no regions; a region then goes on through what the others see through, and
-a little further, over blurred borders and into what a thing shades.
+the photo shows another colour; and not where half as many others see what it sees. They must look at the
+place where the photo has its surface, or through it: a near thing that they do not have before them they
+cannot deny. Colours are compared with all that lies within `_AROUND` cells, both ways, so that poses and
+depths which are a pixel or two off say nothing. Small and loose parts are no regions; a region then goes on
+through what the others see through, and a little further, over blurred borders and what a thing shades.
 
-A thing whose depth is wrong is foreseen at the wrong place, too. So a region is left out only if most others
-show it nowhere along its rays. What is left out was foreseen by others, so
-nothing is left uncovered.
+A thing whose depth is wrong is foreseen at the wrong place, too. So a region is left out only if most of
+those others show it nowhere along its rays. What is left out was foreseen by others: nothing stays uncovered.
 
 Sizes: V views, U others, H W pixels of the grid, h w cells of `_CELL` x `_CELL` pixels.
 
@@ -21,6 +21,7 @@ image-based geometric change detection given a 3D model".
 import math
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 import scipy.ndimage
 import torch
@@ -45,6 +46,7 @@ _FARTHEST = 24  # cells, by which a region may go on
 _MARGIN = 2  # cells beyond its border
 _NEAR, _LIKE = 3, 0.06  # pixels a side of the window, and sRGB, within which a pixel is found again
 _FOUND = 0.5  # of a region's pixels, at one depth
+_DENIES = 0.5  # of a region, that another photo must look at or through to deny it
 _IN_VIEW = 0.3  # of a region, that another photo must have before it to say anything
 _LEAST_DEPTH = 1e-6  # unit of the depths
 _SQUARE = np.ones((3, 3), bool)
@@ -72,33 +74,28 @@ def strangers(
         return found
     looks = [_Look.of(*own) for own in zip(images, depths, viewmats, Ks, strict=True)]
     for view, own in enumerate(looks):
-        some = witnesses(view, own.points.T, viewmats, Ks, (depths.shape[1], depths.shape[2]))
-        if len(some) < _VOTES:
+        size = (depths.shape[1], depths.shape[2])
+        others = [looks[other] for other in witnesses(view, own.points(), viewmats, Ks, size)]
+        if len(others) < _VOTES:
             continue
-        seen = [looks[other].foreseen(viewmats[view], Ks[view], own.depth.shape) for other in some]
-        contradicted, through = _contradicted(own, _Foreseen.together(seen))
-        seeds = [
-            seed for seed in _seeds(contradicted) if not _elsewhere(seed, view, some, looks, viewmats, Ks)
-        ]
+        said = _Foreseen.together([other.foreseen(own) for other in others])
+        faced = torch.stack([other.faces(own) for other in others])
+        contradicted, through = _contradicted(own, said, faced)
+        seeds = [seed for seed in _seeds(contradicted) if not _elsewhere(seed, own, others, faced)]
         if seeds:
-            region = _grown(np.any(seeds, axis=0), (through | contradicted).cpu().numpy())
-            found[view] = _at_size(torch.from_numpy(region).to(found.device), found[view])
+            found[view] = _at_size(_grown(torch.stack(seeds).any(0), through | contradicted), found[view])
     return found
 
 
 @dataclass(frozen=True)
 class _Look:
-    """A photo of `size` = (H, W).
+    """A photo: image (3, H, W), depths (H, W), camera; and of its cells depth (h, w), the nearest in each,
+    colour, and least and most (3, h, w) within `_AROUND` of them."""
 
-    points: (3, H*W) world. colours: (9, H*W), red, green, blue, and their least and most within `_AROUND`
-    cells. near: (6, H*W), least and most within `_NEAR` pixels. depth (h, w), colour, least, most (3, h, w)
-    of its cells.
-    """
-
-    size: tuple[int, int]
-    points: Tensor
-    colours: Tensor
-    near: Tensor
+    image: Tensor
+    depths: Tensor
+    viewmat: Tensor
+    K: Tensor
     depth: Tensor
     colour: Tensor
     least: Tensor
@@ -106,55 +103,78 @@ class _Look:
 
     @staticmethod
     def of(image: Tensor, depths: Tensor, viewmat: Tensor, K: Tensor) -> "_Look":
-        pose, (height, width) = invert_rigid(viewmat), depths.shape
-        points = pose[:3, :3] @ unproject(depths, K).flatten(0, 1).T + pose[:3, 3:]
-        around, near = _range(image, _AROUND * _CELL - 1), _range(image, _NEAR)
-        inside = (slice(None), slice(height // _CELL * _CELL), slice(width // _CELL * _CELL))
-        cells = [
-            -F.max_pool2d(-depths[None][inside], _CELL)[0],
-            F.avg_pool2d(image[inside], _CELL),
-            -F.max_pool2d(-around[:3][inside], _CELL),
-            F.max_pool2d(around[3:][inside], _CELL),
-        ]
-        colours = torch.cat((image, around)).flatten(1)
-        return _Look((height, width), points, colours, near.flatten(1), *cells)
+        height, width = depths.shape
+        whole = (slice(None), slice(height // _CELL * _CELL), slice(width // _CELL * _CELL))
+        cut, side, reach = image[whole], _AROUND * _CELL, (_AROUND - 1) // 2 * _CELL
+        least, most = (
+            sign * F.max_pool2d(F.pad(sign * cut, (reach,) * 4, value=-torch.inf), side, _CELL)
+            for sign in (-1, 1)
+        )
+        depth = -F.max_pool2d(-depths[None][whole], _CELL)[0]
+        return _Look(image, depths, viewmat, K, depth, F.avg_pool2d(cut, _CELL), least, most)
 
-    def pixels(self, cells: np.ndarray) -> Tensor:
-        """A pixel of each of some cells (h, w) bool, as numbers (n,)."""
-        rows, columns = np.nonzero(cells)
-        places = (rows * _CELL + _CELL // 2) * self.size[1] + columns * _CELL + _CELL // 2
-        return torch.from_numpy(places).to(self.points.device)
+    @property
+    def centre(self) -> Tensor:
+        """(3, 1) world."""
+        return invert_rigid(self.viewmat)[:3, 3:]
 
-    def shown(self, points: Tensor, colours: Tensor, viewmat: Tensor, K: Tensor) -> float:
-        """The share of points (3, n) in the world, of those in view, that this photo shows in these colours
-        (3, n); NaN where few are in view."""
-        x, y, z = pictured(viewmat, K, points)
-        inside = (z > _LEAST_DEPTH) & (x >= 0) & (y >= 0) & (x < self.size[1]) & (y < self.size[0])
-        if float(inside.float().mean()) < _IN_VIEW:
-            return math.nan
-        range_there = self.near[:, y[inside].long() * self.size[1] + x[inside].long()]
-        off = _beyond(colours[:, inside], range_there[:3], range_there[3:]).amax(0)
-        return float((off < _LIKE).float().mean())
+    def points(self, pixels: Tensor | slice = slice(None)) -> Tensor:
+        """(3, n) world, of some pixels by number."""
+        pose = invert_rigid(self.viewmat)
+        return pose[:3, :3] @ unproject(self.depths, self.K).flatten(0, 1)[pixels].T + pose[:3, 3:]
 
-    def foreseen(self, viewmat: Tensor, K: Tensor, size: torch.Size) -> "_Foreseen":
-        """What this photo says that another one shows in cells of that size (h, w)."""
-        height, width = size
-        x, y, z = pictured(viewmat, K, self.points)
-        x, y = x / _CELL, y / _CELL
+    def pixels(self, cells: Tensor) -> Tensor:
+        """Numbers (n,) of a pixel in each of some cells (h, w) bool."""
+        rows, columns = cells.nonzero().T
+        return (rows * _CELL + _CELL // 2) * self.image.shape[2] + columns * _CELL + _CELL // 2
+
+    def before(self, points: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Rows and columns (n,) of the pixels where points (3, n) of the world are seen, z, and whether they
+        are."""
+        x, y, z = pictured(self.viewmat, self.K, points)
+        height, width = (_CELL * side for side in self.depth.shape)
         inside = (z > _LEAST_DEPTH) & (x >= 0) & (y >= 0) & (x < width) & (y < height)
-        some = inside.nonzero()[:, 0]
-        places, z = y[some].long() * width + x[some].long(), z[some]
+        return torch.where(inside, y, 0.0).long(), torch.where(inside, x, 0.0).long(), z, inside
+
+    def foreseen(self, other: "_Look") -> "_Foreseen":
+        """What this photo says that another one shows."""
+        rows, columns, z, inside = other.before(self.points())
+        (height, width), some = other.depth.shape, inside.nonzero()[:, 0]
+        places, z = (rows // _CELL * width + columns // _CELL)[some], z[some]
         nearest = z.new_full((height * width,), torch.inf).scatter_reduce(0, places, z, "amin")
         front = z < (1 + _ALIKE) * nearest[places]
         some, places = some[front], places[front]
-        sums = z.new_zeros(9, height * width).index_add_(1, places, self.colours[:, some])
+        at_row, at_column = (some // self.image.shape[2] // _CELL, some % self.image.shape[2] // _CELL)
+        own = at_row.clamp(max=self.depth.shape[0] - 1), at_column.clamp(max=self.depth.shape[1] - 1)
+        colours = torch.cat((self.image.flatten(1)[:, some], self.least[:, *own], self.most[:, *own]))
+        sums = z.new_zeros(9, height * width).index_add_(1, places, colours)
         means = sums / torch.bincount(places, minlength=height * width).clamp_min(1)
-        return _Foreseen(nearest.view(size), *means.view(3, 3, height, width))
+        return _Foreseen(nearest.view(height, width), *means.view(3, 3, height, width))
 
+    def faces(self, other: "_Look") -> Tensor:
+        """(h, w) bool: cells of another photo whose surface this one sees or looks through."""
+        points = other.points(other.pixels(torch.ones_like(other.depth, dtype=torch.bool)))
+        rows, columns, z, inside = self.before(points)
+        return (inside & (z < math.exp(_THROUGH) * self.depth[rows // _CELL, columns // _CELL])).view_as(
+            other.depth
+        )
 
-def _range(image: Tensor, side: int) -> Tensor:
-    """Least and most (6, H, W) of an image (3, H, W) within a window of an odd side."""
-    return torch.cat([sign * F.max_pool2d(sign * image, side, 1, side // 2) for sign in (-1, 1)])
+    def shows(self, other: "_Look", pixels: Tensor) -> float:
+        """The largest share of another photo's pixels (n,) that this one shows, wherever along their rays all
+        of them lie; NaN where it has them nowhere before it."""
+        rays, colours = other.points(pixels) - other.centre, other.image.flatten(1)[:, pixels]
+        least, most = (
+            sign * F.max_pool2d(sign * self.image, _NEAR, 1, _NEAR // 2).flatten(1) for sign in (-1, 1)
+        )
+        best = math.nan
+        for change in _DEPTHS:
+            rows, columns, _, inside = self.before(other.centre + math.exp(change) * rays)
+            if float(inside.float().mean()) < _IN_VIEW:
+                continue
+            places = (rows * self.image.shape[2] + columns)[inside]
+            off = _beyond(colours[:, inside], least[:, places], most[:, places]).amax(0)
+            best = np.fmax(best, float((off < _LIKE).float().mean()))
+        return float(best)
 
 
 @dataclass(frozen=True)
@@ -173,9 +193,10 @@ class _Foreseen:
         return _Foreseen(*(torch.stack([getattr(one, name) for one in some]) for name in names))
 
 
-def _contradicted(own: _Look, said: _Foreseen) -> tuple[Tensor, Tensor]:
-    """(h, w) bool: cells where others foresee another colour; and those that they see through."""
-    told = torch.isfinite(said.depth)
+def _contradicted(own: _Look, said: _Foreseen, faced: Tensor) -> tuple[Tensor, Tensor]:
+    """(h, w) bool: cells where others foresee another colour; and those that they see through. faced: (U, h,
+    w) bool, where they look."""
+    told = torch.isfinite(said.depth) & faced
     gap = said.depth.log() - own.depth.log()  # > 0: they see something behind
     outside = torch.maximum(
         _beyond(said.colour, own.least, own.most).amax(1), _beyond(own.colour, said.least, said.most).amax(1)
@@ -201,40 +222,36 @@ def _as_most(other: Tensor, said: _Foreseen) -> Tensor:
     return alike & ((said.depth.log() - depth).abs() < _ALIKE)
 
 
-def _seeds(contradicted: Tensor) -> list[np.ndarray]:
+def _seeds(contradicted: Tensor) -> list[Tensor]:
     """Regions (h, w) bool of what is contradicted as a whole."""
     full = F.avg_pool2d(contradicted[None, None].float(), _WINDOW, 1, _WINDOW // 2)[0, 0] > _FULL
     inside = _wider(full, _WINDOW // 2) & contradicted
-    numbers, count = scipy.ndimage.label(inside.cpu().numpy(), _SQUARE)
-    sizes = np.bincount(numbers.ravel(), minlength=count + 1)
-    return [numbers == k for k in range(1, count + 1) if sizes[k] >= _SMALLEST * numbers.size]
+    count, numbers = cv2.connectedComponents(inside.cpu().numpy().astype(np.uint8))
+    sizes = np.bincount(numbers.ravel(), minlength=count)
+    large = [k for k in range(1, count) if sizes[k] >= _SMALLEST * numbers.size]
+    return [torch.from_numpy(numbers == k).to(contradicted.device) for k in large]
 
 
-def _elsewhere(
-    seed: np.ndarray, view: int, others: list[int], looks: list[_Look], viewmats: Tensor, Ks: Tensor
-) -> bool:
-    """Whether half of the other photos that can show a region (h, w) do so somewhere along its rays."""
-    centre = invert_rigid(viewmats[view])[:3, 3:]
-    pixels = looks[view].pixels(seed)
-    rays, colours = looks[view].points[:, pixels] - centre, looks[view].colours[:3, pixels]
+def _elsewhere(seed: Tensor, own: _Look, others: list[_Look], faced: Tensor) -> bool:
+    """Whether half of the others that could deny a region (h, w) show it somewhere along its rays."""
+    pixels = own.pixels(seed)
     shares = [
-        [
-            looks[other].shown(centre + math.exp(change) * rays, colours, viewmats[other], Ks[other])
-            for change in _DEPTHS
-        ]
-        for other in others
+        other.shows(own, pixels)
+        for other, cells in zip(others, faced, strict=True)
+        if float(cells[seed].float().mean()) > _DENIES
     ]
-    most = np.fmax.reduce(np.array(shares), axis=1)  # NaN of those that never have it before them
-    return bool(np.nanmedian(most) >= _FOUND) if np.isfinite(most).any() else False
+    return bool(np.isfinite(shares).any() and np.nanmedian(shares) >= _FOUND)
 
 
-def _grown(seeds: np.ndarray, may: np.ndarray) -> np.ndarray:
+def _grown(seeds: Tensor, may: Tensor) -> Tensor:
     """(h, w) bool: seeds, what goes on from there, holes and a margin."""
-    grown = scipy.ndimage.binary_dilation(seeds, _SQUARE, _FARTHEST, may | seeds)
+    grown = scipy.ndimage.binary_dilation(
+        seeds.cpu().numpy(), _SQUARE, _FARTHEST, (may | seeds).cpu().numpy()
+    )
     closed = scipy.ndimage.binary_closing(np.pad(grown, _WINDOW), _SQUARE, 2)[
         _WINDOW:-_WINDOW, _WINDOW:-_WINDOW
     ]
-    return scipy.ndimage.binary_dilation(scipy.ndimage.binary_fill_holes(closed), _SQUARE, _MARGIN)
+    return _wider(torch.from_numpy(scipy.ndimage.binary_fill_holes(closed)).to(seeds.device), _MARGIN)
 
 
 def _wider(mask: Tensor, cells: int) -> Tensor:

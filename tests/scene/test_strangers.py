@@ -1,7 +1,7 @@
 """What one photo shows and the others do not: rooms whose truth is known, seen from five places."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pytest
 import torch
@@ -142,7 +142,8 @@ def test_what_is_foreseen_is_what_a_plain_loop_finds():
     image, depths, viewmat, K = (v[0].double() for v in (seen.images, seen.depths, seen.viewmats, seen.Ks))
     image, depths = image[:, :24, :32], depths[:24, :32]
     other, size = seen.viewmats[1].double(), torch.Size((12, 16))
-    said = _Look.of(image, depths, viewmat, K).foreseen(other, K, size)
+    look = _Look.of(image, depths, viewmat, K)
+    said = look.foreseen(replace(look, viewmat=other))
     points = transform(other @ invert_rigid(viewmat), unproject(depths, K).flatten(0, 1))
     cells: dict[tuple[int, int], list[tuple[float, int]]] = {}
     for number, ((x, y), z) in enumerate(
