@@ -80,7 +80,8 @@ class Record:
     it. refinement: what a fit to the photos brought. detail: what was spent on how fine elements, and what
     it bought. light: `gains` and `offsets`, a row of
     red, green and blue for each view, by which `scene.light` brought the photos' colours to one light. lens:
-    `found`, a mapping of `FoundLens` for each lens that the photos told.
+    `found`, a mapping of `FoundLens` for each lens that the photos told. left_out:
+    `shares`, of each view what was left out since the others do not show it (`scene.strangers`).
     calibration: what the network's checkpoint says about scores, instead of its language space. atom_names:
     a person's own, by atom, which it answers to. atom_denials: what a person said that an atom is not.
     silent_atoms: those that answer no phrase. num_deleted: Gaussians that edits took away. camera_path:
@@ -100,6 +101,7 @@ class Record:
     detail: Mapping[str, Any] = field(default_factory=dict)
     light: Mapping[str, Any] = field(default_factory=dict)
     lens: Mapping[str, Any] = field(default_factory=dict)
+    left_out: Mapping[str, Any] = field(default_factory=dict)
     calibration: Mapping[str, Any] = field(default_factory=dict)
     atom_names: Mapping[int, str] = field(default_factory=dict)
     atom_denials: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
