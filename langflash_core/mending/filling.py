@@ -37,7 +37,7 @@ from .texture import healed, spread
 
 OPACITY = 0.99
 _COVER, _THIN = 0.85, 0.1  # deviation over spacing, as elements of a scene have
-_SIDE = 512  # longer side of the views that are looked at
+_FINER, _MOST_SIDE = 2, 512  # than the views' own grid they are looked at; pixels of the longer side
 _MOST_VIEWS = 12  # with the largest holes
 _LEAST = 12  # pixels of a hole
 _RING = 0.08  # of the longer side: what counts as around
@@ -119,7 +119,8 @@ def _views(scene: Scene, left: Scene, removed: Tensor, render: Render) -> list[_
 
 
 def _resized(camera: Camera) -> Camera:
-    ratio = _SIDE / max(camera.width, camera.height)
+    longer = max(camera.width, camera.height)
+    ratio = min(_FINER, max(1, _MOST_SIDE / longer))
     return camera.resized(max(1, round(camera.width * ratio)), max(1, round(camera.height * ratio)))
 
 
@@ -127,7 +128,7 @@ def _view(left: Scene, camera: Camera, matte: Tensor, before: Tensor, number: in
     frame = render(left, camera)
     alphas = frame.alphas.cpu().numpy()
     hole = ((matte.numpy() > 0.1) & (alphas < 0.5)) | ((matte.numpy() >= 0.5) & (alphas < 0.9))
-    size = 2 * max(2, round(_RING * _SIDE)) + 1
+    size = 2 * max(2, round(_RING * max(hole.shape))) + 1
     ring = (cv2.dilate(hole.astype(np.uint8), np.ones((size, size), np.uint8)) > 0) & (alphas >= 0.9) & ~hole
     pose = invert_rigid(camera.viewmat.cpu().double())
     ahead = rays(camera.K.cpu().double(), camera.width, camera.height) @ pose[:3, :3].T
