@@ -13,12 +13,29 @@ from torch import Tensor
 
 from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.scene.gaps import filled
+from langflash_core.splat import drawable_rows, project, view_colours, view_depths
+from langflash_core.splat.tiles import rasterize_tiles
 from langflash_core.types import Camera, Frame, Record, Scene, Semantics
 
 Render = Callable[..., Frame]  # (scene, camera, weight_maps=True)
 _SHADE, _RED = (0.85, 0.1, 0.1), 0.75  # of a preview
+_LEAST = 1 / 255  # of a pixel that is covered
 _MOST_VIEWS = 4  # in a picture of before and after
 Progress = Callable[[str, float], None]
+
+
+def drawn(scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame:
+    """A frame by the rasteriser for processors, for those who have no other at hand. Twin: `splat.render`."""
+    rows = drawable_rows(scene)
+    gaussians = scene.gaussians.map(lambda values: values.double()[rows])
+    layers = torch.cat((view_colours(gaussians, camera), view_depths(gaussians, camera)[:, None]), 1)
+    features = [layers.float()]
+    if weight_maps:
+        features.append(scene.semantics.dense_weights()[rows].float())
+    maps, alphas = rasterize_tiles(project(gaussians, camera), features, camera)
+    covered = alphas >= _LEAST
+    depths = torch.where(covered, maps[0][..., 3] / alphas.clamp_min(_LEAST), 0.0)
+    return Frame(maps[0][..., :3], alphas, depths, maps[1] if weight_maps else None)
 
 
 def mattes(

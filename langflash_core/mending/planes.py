@@ -58,9 +58,10 @@ def _best(
 ) -> Plane:
     triples = points[draws.integers(len(points), size=(_TRIPLES, 3))]  # (t, 3, 3)
     normals = np.cross(triples[:, 1] - triples[:, 0], triples[:, 2] - triples[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals /= np.maximum(lengths, 1e-30)
     offsets = (normals * triples[:, 0]).sum(1)
-    on_it = abs(normals @ points.T - offsets[:, None]) <= tolerances  # (t, n)
+    on_it = (abs(normals @ points.T - offsets[:, None]) <= tolerances) & (lengths > 1e-12)  # (t, n)
     inliers: Bool[np.ndarray, " n"] = on_it[on_it.sum(1).argmax()]
     plane = _through(points[inliers])
     for _ in range(_REFITS):

@@ -158,6 +158,10 @@ def _recipe(content: dict[str, Any]) -> Recipe:
     crop, texts = content.get("crop"), [*content.get("within", []), *content.get("kinds", KINDS)]
     if not all(isinstance(text, str) for text in texts) or not isinstance(content.get("invert", False), bool):
         raise ValueError("expected phrases, kinds, and whether to invert")
+    bounds = [value for rule in content.get("rules", []) for values in rule.values() for value in values]
+    numbers = [value for value in bounds if value is not None]
+    if not all(isinstance(value, int | float) and math.isfinite(value) for value in numbers):
+        raise InputError("the conditions of a recipe need finite numbers; save the recipe again")
     rules = [{name: tuple(values) for name, values in rule.items()} for rule in content.get("rules", [])]
     return Recipe(
         strength=float(content.get("strength", 0.0)),
@@ -185,8 +189,6 @@ def _check_rule(rule: Rule) -> None:
             raise InputError(
                 f"the condition on {name} lacks a number; say one as opacity<.1 or colour~#808080:.1"
             )
-        if not all(isinstance(value, int | float) and math.isfinite(value) for value in numbers):
-            raise InputError(f"the condition on {name} needs finite numbers")
 
 
 def _number(text: str) -> float:

@@ -1,4 +1,4 @@
-"""A screen before a wall, photographed twice, as a scene whose truth is known; and the reference renderer."""
+"""A screen before a wall, photographed twice, as a scene whose truth is known; and who draws it."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from torch import Tensor
 
 from langflash_core.detail import DETAILS
 from langflash_core.fine import fine_scene
-from langflash_core.splat import render
+from langflash_core.mending.looks import drawn
 from langflash_core.types import Scene
 from tests.scene.photographed import SCREEN, WALL, photographed
 
@@ -23,7 +23,8 @@ def one_thread():
 
 @dataclass(frozen=True)
 class Known:
-    """scene: of the photos. members (N,): the screen's. without: the photos (3, h, w) as they would be without it."""
+    """scene: of the photos. members (N,): the screen's. without: the photos (3, h, w) as they would be
+    without it."""
 
     scene: Scene
     members: Tensor
@@ -42,7 +43,4 @@ def known() -> Known:
 
 @pytest.fixture
 def draw():
-    def drawn(scene: Scene, camera, *, weight_maps: bool = True):
-        return render(scene, camera, weight_maps=weight_maps)
-
     return drawn

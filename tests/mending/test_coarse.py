@@ -35,7 +35,8 @@ def test_a_block_is_the_mean_of_its_cube(known, squares):
 
 def test_what_is_made_is_coarse_and_whole(known):
     part = known.scene.rows(known.members)
-    rough = replace(part.gaussians, sh=torch.cat((part.gaussians.sh, torch.ones(len(part.gaussians), 3, 3)), 1))
+    more = torch.ones(len(part.gaussians), 3, 3)
+    rough = replace(part.gaussians, sh=torch.cat((part.gaussians.sh, more), 1))
     made = coarsened(replace(part, gaussians=rough), SIDE, squares=True)
     assert made.gaussians.sh.shape[1] == 1  # harmonics are gone
     assert made.levels is not None and not bool(made.levels.any())

@@ -11,6 +11,7 @@ from PIL import Image
 from langflash_core.errors import InputError, SceneFileError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.mending.hiding import Hiding, hide, preview
+from langflash_core.mending.looks import drawn
 from langflash_core.scene.file import load, save
 from langflash_core.types import Camera, Record
 
@@ -20,12 +21,10 @@ BLOCKS = 2.5  # along the screen: each is longer than a period of its pattern
 
 @pytest.fixture(scope="module")
 def done(known, tmp_path_factory):
-    """Every way to hide the screen: the scene as it is read from its file, the report, and the file's bytes."""
-    from langflash_core.splat import render
-
+    """Every way to hide the screen: the scene out of its file, the report, and the file's bytes."""
     folder, made = tmp_path_factory.mktemp("hidden"), {}
     for how in HOWS:
-        scene, report = hide(known.scene, known.members, render, Hiding(how, BLOCKS))
+        scene, report = hide(known.scene, known.members, drawn, Hiding(how, BLOCKS))
         save(scene, folder / how)
         made[how] = load(folder / how), report, (folder / how).read_bytes()
     return made
@@ -128,7 +127,8 @@ def looking(camera: Camera, middle: torch.Tensor, aside: torch.Tensor) -> Camera
     """From aside at a place, upright."""
     eye = invert_rigid(camera.viewmat.double())[:3, 3] + aside.double() * float(middle.norm()) * 0.4
     ahead = torch.nn.functional.normalize(middle - eye, dim=0)
-    right = torch.nn.functional.normalize(torch.linalg.cross(torch.tensor([0.0, 1, 0]).double(), ahead), dim=0)
+    down = torch.tensor([0.0, 1, 0]).double()
+    right = torch.nn.functional.normalize(torch.linalg.cross(down, ahead), dim=0)
     viewmat = torch.eye(4, dtype=torch.float64)
     viewmat[:3, :3] = torch.stack((right, torch.linalg.cross(ahead, right), ahead))
     viewmat[:3, 3] = -viewmat[:3, :3] @ eye

@@ -404,7 +404,7 @@ def add_clean(commands) -> None:
     command.add_argument(
         "--crop",
         metavar="BOX",
-        help="only what is inside stays: core, room, or X,Y,Z,X,Y,Z, low and high corner",
+        help="only what is inside stays: core, room, or --crop=X,Y,Z,X,Y,Z, low and high corner",
     )
     command.add_argument("--recipe", type=Path, metavar="FILE", help="all of that, as a file says")
     command.add_argument("--save-recipe", type=Path, metavar="FILE", help="a .json, for other scenes")
