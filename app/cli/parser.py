@@ -10,8 +10,10 @@ from langflash_core.errors import InputError
 from .words.judging import add_bench, add_bench_network, add_eval
 from .words.scenes import (
     add_batch,
+    add_clean,
     add_export,
     add_frames,
+    add_hide,
     add_info,
     add_lift,
     add_query,
@@ -62,6 +64,8 @@ def build_parser() -> Parser:
         add_render,
         add_export,
         add_tour,
+        add_hide,
+        add_clean,
         add_lift,
         add_info,
         add_bench,

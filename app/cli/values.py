@@ -113,6 +113,14 @@ def open_fov(text: str) -> float:
     return value
 
 
+def share(text: str) -> float:
+    """A number from 0 to 1."""
+    value = _number(text)
+    if not 0.0 <= value <= 1.0:
+        raise ArgumentTypeError(f"expected a number from 0 to 1, received {text}")
+    return value
+
+
 def kept_fraction(text: str) -> float:
     """A relevancy threshold, strictly between 0 and 1."""
     value = _number(text)
