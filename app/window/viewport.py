@@ -27,6 +27,7 @@ from .artist import Artist, Asked
 from .asking.state import Prompt
 from .editing.state import Point, Reading, strongest
 from .governor import SETTLE_AFTER, Governor, Kind, Plan
+from .scene.memory import SceneMemory
 from .scene.near import fills_gaps, keeps_near
 from .scene.state import possible
 from .state import State
@@ -205,23 +206,25 @@ class Viewport:
             self._renderer.ask(query)
 
     def mark(
-        self, scene: "Scene | None", marks: Marks | None, doomed: Mask | None, gesture: Change | None = None
+        self,
+        memory: SceneMemory | None,
+        marks: Marks | None,
+        doomed: Mask | None,
+        gesture: Change | None = None,
     ) -> None:
         """Show the scene as marked: without what is deleted or hidden, the selection in a tint, things where
         they were moved to.
 
         doomed: what a preview would delete, in another tint. gesture: a change under way.
         """
-        if self._renderer is None or marks is None or scene is None:
+        if self._renderer is None or marks is None or memory is None:
             return
         if (marks, doomed, gesture) == self._marks:
             return
         before, _, adjusted = self._marks
         self._marks, self._adjusting = (marks, doomed, gesture), gesture is not None
         if (marks.changes, gesture) != (before.changes if before else (), adjusted):
-            from langflash_core.scene.changed import changed_scene
-
-            self._scene = changed_scene(scene, marks, gesture)
+            self._scene = memory.changed(marks, gesture)
             self._renderer.change((*marks.changes, *(() if gesture is None else (gesture,))))
         tints = np.zeros(marks.selected.count, np.uint8)
         if not isinstance(gesture, Recoloured):  # its colour is to be seen
@@ -273,11 +276,11 @@ class Viewport:
         size: of the panel in framebuffer pixels. touched: when the last key or pointer event came,
         on the clock of `state.now`.
         """
-        if self._renderer is None or state.info is None or min(size) < 8:
+        if self._renderer is None or state.scene.info is None or min(size) < 8:
             return float("inf")
-        if (state.pose, size) != (self._pose, self._size) or self._adjusting:
+        if (state.scene.pose, size) != (self._pose, self._size) or self._adjusting:
             self._adjusting = False
-            self._pose, self._size, self._moved = state.pose, size, state.now
+            self._pose, self._size, self._moved = state.scene.pose, size, state.now
             self._failed = None
         if self._fresh:  # to take a scene took a frame's time
             self._fresh = False
@@ -287,7 +290,9 @@ class Viewport:
             return self._update_beside(self._artist, state, size, kind)
         still = state.now - max(self._moved, touched)
         resting = self.governor.resting(kind, still)
-        wanted = _Drawn(self._serial, state.pose, size, resting or self.governor.moving(kind), self._marked)
+        wanted = _Drawn(
+            self._serial, state.scene.pose, size, resting or self.governor.moving(kind), self._marked
+        )
         if not self._covers(wanted):
             self._draw(wanted, moving=resting is None)
         self._colour(state)
@@ -297,7 +302,7 @@ class Viewport:
         """`update` where OpenGL runs on the processor: small pictures at once, still ones by the artist."""
         still = state.now - self._moved
         moving = Kind.COLOUR if kind is Kind.FAST and self._query is None else kind
-        wanted = _Drawn(self._serial, state.pose, size, self.governor.moving(moving), self._marked)
+        wanted = _Drawn(self._serial, state.scene.pose, size, self.governor.moving(moving), self._marked)
         if self._unpainted:
             self._unpainted = False
         elif not self._covers(wanted):
@@ -336,7 +341,7 @@ class Viewport:
         if scale is None or self._finished is not None:
             still = self._still if self._finished is None else self._finished[1]
             if still is not None and not self._tells(still, state):
-                asked, name = self._questions(state), (still.key, self._question, state.mode)
+                asked, name = self._questions(state), (still.key, self._question, state.scene.mode)
                 if not self._waits(name, state.now):
                     artist.order(name, lambda stopping: asked(still) or True)
             else:
@@ -346,7 +351,7 @@ class Viewport:
         if self._waits(name, state.now):
             return
         width, height = (max(8, round(side * scale)) for side in wanted.size)
-        camera, info, shown = to_camera(wanted.pose, width, height), state.info, self._shown
+        camera, info, shown = to_camera(wanted.pose, width, height), state.scene.info, self._shown
         assert info is not None
         asked, scene, maps = self._questions(state), self._scene or info.scene, kind is Kind.MAPS
 
@@ -375,8 +380,8 @@ class Viewport:
     def _questions(self, state: State) -> "Callable[[Still], None]":
         """What is to be made of a still picture on the artist's thread, so that showing it is quick."""
         query, columns = self._query, None
-        if state.mode.columns and self._renderer is not None:
-            columns = self._renderer.columns(state.mode.columns == "features")
+        if state.scene.mode.columns and self._renderer is not None:
+            columns = self._renderer.columns(state.scene.mode.columns == "features")
 
         def ask(still: "Still") -> None:
             if still.maps is not None:
@@ -394,9 +399,9 @@ class Viewport:
             return True
         if self._query is not None and not still.maps.answers(self._query):
             return False
-        if not state.mode.columns or self._renderer is None:
+        if not state.scene.mode.columns or self._renderer is None:
             return True
-        return still.maps.mixes(self._renderer.columns(state.mode.columns == "features"))
+        return still.maps.mixes(self._renderer.columns(state.scene.mode.columns == "features"))
 
     def _bring(self, wanted: _Drawn, state: State) -> None:
         """Show the still picture that is finished, once it tells all that is asked of it."""
@@ -427,7 +432,7 @@ class Viewport:
             return None
         if self._lapses != state.asking.lapses:
             return None  # the query that holds now is on its way
-        if (drawn.pose, drawn.size, drawn.marked) != (state.pose, self._size, self._marked):
+        if (drawn.pose, drawn.size, drawn.marked) != (state.scene.pose, self._size, self._marked):
             return None  # and so is the picture
         key = (drawn, self._question)
         if key == self._answered:
@@ -490,15 +495,17 @@ class Viewport:
         if renderer is None or drawn is None:
             return
         fill = fills_gaps(state)
-        shown = {p.key: p for p in state.prompts}
+        shown = {p.key: p for p in state.asking.prompts}
         asked = [shown[key] for key in self._keys if key in shown]
-        mode = state.mode if drawn.plan.covers(replace(drawn.plan, kind=_kind(state))) else pictures.RGB
-        if (mode.answers and (not asked or len(asked) != len(self._keys))) or not possible(mode, state.info):
+        mode = state.scene.mode if drawn.plan.covers(replace(drawn.plan, kind=_kind(state))) else pictures.RGB
+        if (mode.answers and (not asked or len(asked) != len(self._keys))) or not possible(
+            mode, state.scene.info
+        ):
             mode = pictures.RGB
         answers = mode.answers or bool(mode.columns)
         if answers and self._still is not None and not self._tells(self._still, state):
             return  # what is on show stays until the answer is there
-        active = next((i for i, p in enumerate(asked) if p.key == state.active), 0)
+        active = next((i for i, p in enumerate(asked) if p.key == state.asking.active), 0)
         colours = state.heat_colours
         faded = mode is pictures.RGB and keeps_near(state, drawn.pose)
         colouring = (
@@ -538,6 +545,6 @@ def torch_of(values: np.ndarray) -> "Tensor":
 
 def _kind(state: State) -> Kind:
     """What a picture must hold to show what is wanted while the camera moves."""
-    if not state.wants_maps or state.info is None or state.info.num_atoms == 0:
+    if not state.wants_maps or state.scene.info is None or state.scene.info.num_atoms == 0:
         return Kind.COLOUR
-    return Kind.MAPS if state.mode.maps else Kind.FAST
+    return Kind.MAPS if state.scene.mode.maps else Kind.FAST
