@@ -140,6 +140,15 @@ def intrinsics(text: str) -> tuple[float, float, float, float]:
     return fx, fy, cx, cy
 
 
+def spot(text: str) -> tuple[float, float, float]:
+    """`X,Y,Z`: a point or a direction."""
+    words = text.split(",")
+    if len(words) != 3:
+        raise ArgumentTypeError(f"expected three numbers X,Y,Z, received {text!r}")
+    x, y, z = (_number(word) for word in words)
+    return x, y, z
+
+
 def crop(text: str) -> tuple[int, int, int, int]:
     """`LEFT,TOP,RIGHT,BOTTOM` in whole pixels."""
     words = text.split(",")

@@ -185,13 +185,3 @@ def _version(path: Path, header: dict[str, str]) -> int:
             "update LangFlash"
         )
     return int(version)
-
-
-def in_order(content: bytes) -> bytes:
-    """The same safetensors file with its strings sorted, which its library writes in any order."""
-    length = struct.unpack("<Q", content[:8])[0]
-    header = json.loads(content[8 : 8 + length])
-    header["__metadata__"] = dict(sorted(header["__metadata__"].items()))
-    head = json.dumps(header, ensure_ascii=False, separators=(",", ":")).encode()
-    head += b" " * (-len(head) % 8)
-    return struct.pack("<Q", len(head)) + head + content[8 + length :]

@@ -166,7 +166,12 @@ def _wrong(scene: Scene) -> Iterator[str]:
     """What of a scene is not finite, or out of its range."""
     g, s = scene.gaussians, scene.semantics
     tensors = {"means": g.means, "quats": g.quats, "scales": g.scales, "opacities": g.opacities, "sh": g.sh}
-    tensors |= {"weights": s.weight_values, "dictionary": s.dictionary, "poses": scene.viewmats, "K": scene.Ks}
+    tensors |= {
+        "weights": s.weight_values,
+        "dictionary": s.dictionary,
+        "poses": scene.viewmats,
+        "K": scene.Ks,
+    }
     yield from (f"{name} is not finite" for name, values in tensors.items() if not values.isfinite().all())
     if len(g) == 0:
         yield "a scene without Gaussians"

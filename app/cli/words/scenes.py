@@ -16,6 +16,7 @@ from ..values import (
     open_fov,
     pixel_side,
     share,
+    spot,
     what,
     whole_count,
 )
@@ -307,6 +308,12 @@ def add_export(commands) -> None:
         help="of Gaussians and web pages: low keeps the coarse ones alone, for small files, slow machines; "
         f"of a scene without levels a third, wider (default: {EXPORT_DETAILS[0]})",
     )
+    command.add_argument(
+        "--upright",
+        action="store_true",
+        help="of Gaussians and poses: level, on the floor and turned north as `langflash level` found it, in "
+        "metres where they are known",
+    )
     command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of a video (default: 6)")
     command.add_argument(
         "--path",
@@ -440,6 +447,31 @@ def add_clean(commands) -> None:
     command.add_argument("--fill", action="store_true", help="fill what was removed from what is around it")
     command.add_argument("--preview", type=Path, metavar="IMG", help="a .png: what goes, in red, and after")
     add_backend(command)
+    add_json(command)
+
+
+def add_level(commands) -> None:
+    """`langflash level`."""
+    command = new_command(
+        commands, "level", "which way is up, where the floor is, which way is north, and how large it may be"
+    )
+    command.add_argument("scene", type=Path, metavar="SCENE")
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="SCENE", help="the scene with that in it (default: only say it)"
+    )
+    command.add_argument("--up", type=spot, metavar="X,Y,Z", help="this way is up, in the scene's own axes")
+    command.add_argument("--north", type=spot, metavar="X,Y,Z", help="this way is north")
+    command.add_argument("--origin", type=spot, metavar="X,Y,Z", help="this point lies at 0, on the floor")
+    lengths = command.add_mutually_exclusive_group()
+    lengths.add_argument(
+        "--length",
+        nargs=3,
+        metavar=("A", "B", "METRES"),
+        help="from A to B it is so long; A and B are points X,Y,Z of the scene, or pixels VIEW:U,V of a "
+        "photo as the scene has it",
+    )
+    lengths.add_argument("--ceiling", type=above_zero, metavar="METRES", help="the ceiling is so high")
+    lengths.add_argument("--door", type=above_zero, metavar="METRES", help="the door is so high")
     add_json(command)
 
 
