@@ -30,8 +30,8 @@ def describe(scene: "Scene") -> dict:
         with `psnr_db` and `relevance_error` where they were measured), refinement (None, or kept, held_out
         and the PSNR before and after), detail (None, or as `Record` has it), light (None, or gains and
         offsets, a row of red, green and blue per view), lens and left_out (None, or as `Record` has them),
-        tour (None, or the names of stops, how many notes, and the start), timings {stage: seconds, total} (None
-        where they are not known, as in files), warnings`.
+        tour (None, or the names of stops, how many notes, and the start), timings {stage: seconds, total}
+        (None where they are not known, as in files), warnings`.
     """
     from langflash_core.scene.fields import to_fields  # torch
 
