@@ -159,6 +159,7 @@ class Showing:
     being looked for. rooms: scenes that were on show before, the last one first. dropped: photos while it is
     asked where they belong. pending: commands that wait for an answer about unsaved edits. view: of the photo
     stood at, if any. compare: where the photo begins, 0 to 1 across the picture; None: not compared.
+    unhidden: the scene on show as it was before something in it was hidden for good, until that is saved.
     """
 
     photos: tuple[Photo, ...] = ()
@@ -173,6 +174,7 @@ class Showing:
     flight: Flight | None = None
     view: int | None = None
     compare: float | None = None
+    unhidden: Room | None = None
     job: Job | None = None
 
 
