@@ -26,9 +26,9 @@ def describe(scene: "Scene") -> dict:
         total}, bounding_box and core_box {min, max} in scene units (None when empty), metric_scale
         (metres per unit or None), world (None, or as `Record` has it), counts, pruning (as `prune` left it,
         with `psnr_db` and `relevance_error` where they were measured), refinement (None, or kept, held_out
-        and the PSNR before and after), detail (None, or as `Record` has it), light (None, or gains and offsets, a row
-        of red, green and blue per view), lens (None, or found, as `Record` has it), timings {stage: seconds,
-        total} (None where they are not known, as in files), warnings`.
+        and the PSNR before and after), detail (None, or as `Record` has it), light (None, or gains and
+        offsets, a row of red, green and blue per view), lens (None, or found, as `Record` has it), timings
+        {stage: seconds, total} (None where they are not known, as in files), warnings`.
     """
     from langflash_core.scene.fields import to_fields  # torch
 
