@@ -19,6 +19,7 @@ from .words.scenes import (
     add_render,
     add_view,
     add_weights,
+    add_words,
 )
 from .words.showing import add_completion, add_desktop, add_tour
 from .words.training import add_labels, add_rooms, add_train
@@ -72,6 +73,7 @@ def build_parser() -> Parser:
         add_weights,
         add_desktop,
         add_completion,
+        add_words,
     ):
         add(commands)
     return parser

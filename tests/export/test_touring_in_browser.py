@@ -1,5 +1,5 @@
-"""Tours, notes, plans and pages of several scenes in a real browser, from the disk without a network; pages in pages,
-by the snippet that the guide has."""
+"""Tours, notes, plans and pages of several scenes in a real browser, from the disk without a network; pages
+in pages, by the snippet that the guide has."""
 
 import html as html_escapes
 import json
@@ -155,14 +155,11 @@ def test_what_passes_is_what_the_formula_says(page, tmp_path):
 def test_the_plan_shows_what_is_below_the_eyes_and_leads_to_stops(opened):
     opened.key("p", "KeyP", "p")
     until(opened, "document.getElementById('plan').hidden === false")
-    picture = opened.value(
-        "(() => { const c = document.getElementById('above'); "
-        "return [...c.getContext('2d').getImageData(0, 0, c.width, c.height).data].filter((_, i) => i % 4 === 3); })()"
-    )
-    covered = np.array(picture).reshape(440, 440) > 128
-    assert (
-        0.05 < covered.mean() < 0.95 and not covered[-20:].any()
-    )  # the floor, and nothing below the eyes' place
+    pixels = "document.getElementById('above').getContext('2d').getImageData(0, 0, 440, 440).data"
+    alphas = opened.value(f"[...{pixels}].filter((_, at) => at % 4 === 3)")
+    covered = np.array(alphas).reshape(440, 440) > 128
+    # The floor and the block, and nothing where the photos were taken.
+    assert 0.05 < covered.mean() < 0.95 and not covered[-20:].any()
     assert opened.value("document.getElementById('metre').hidden") is False
     opened.value("document.querySelectorAll('#marks button')[1].click()")
     until(opened, "langflash.then((page) => page.moving.flight === null)")
@@ -194,13 +191,17 @@ def test_nothing_sticks_out_and_everything_has_a_name(page, file, size):
     page.open(file, size, "#plan", touch=size[0] < 500)
     page.value(_READY)
     assert page.value("document.documentElement.scrollWidth") <= size[0]
-    boxes = page.value(
-        "['tour', 'ask'].map((id) => document.getElementById(id).getBoundingClientRect()).map((b) => [b.left, b.top, b.right, b.bottom])"
+
+    def box(name: str) -> list[float]:
+        found = f"document.getElementById('{name}').getBoundingClientRect()"
+        return page.value(f"(({{left, top, right, bottom}}) => [left, top, right, bottom])({found})")
+
+    bar, asking = box("tour"), box("ask")
+    assert bar[2] <= size[0] and (bar[3] <= asking[1] or asking[2] <= bar[0]), (
+        "the tour's bar is over the box"
     )
-    (_, top, right, bottom), ask = boxes
-    assert right <= size[0] and (bottom <= ask[1] or ask[2] <= boxes[0][0]), "the tour's bar is over the box"
-    nameless = "[...document.querySelectorAll('button, input')].filter((b) => !b.hidden && !(b.textContent.trim() || b.ariaLabel)).length"
-    assert page.value(nameless) == 0
+    nameless = "(each) => !each.hidden && !(each.textContent.trim() || each.ariaLabel)"
+    assert page.value(f"[...document.querySelectorAll('button, input')].filter({nameless}).length") == 0
     assert page.value("document.getElementById('told').ariaLive") == "polite"
     if size[0] < 500:
         small = "[...document.querySelectorAll('#tour button')].filter((b) => b.offsetHeight < 44).length"

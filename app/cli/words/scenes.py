@@ -189,8 +189,28 @@ def add_batch(commands) -> None:
 def add_query(commands) -> None:
     """`langflash query`."""
     command = new_command(commands, "query", "where in a scene is each phrase? heat-maps, masks and numbers")
-    command.add_argument("scene", type=Path, metavar="SCENE")
-    command.add_argument("prompts", nargs="+", metavar="PROMPT", help='a phrase, e.g. "armchair"')
+    command.add_argument("scene", nargs="?", metavar="SCENE", help="the scene to ask")
+    command.add_argument("phrases", nargs="*", metavar="PROMPT", help='a phrase, e.g. "armchair"')
+    command.add_argument(
+        "--scenes",
+        type=Path,
+        metavar="FOLDER",
+        help="ask all scenes of a folder: a table of answers, the surest first, and a page of pictures",
+    )
+    command.add_argument(
+        "--prompts",
+        dest="phrase_file",
+        type=Path,
+        metavar="FILE",
+        help="phrases from a text file, one a line",
+    )
+    command.add_argument(
+        "--words",
+        dest="vocabulary",
+        type=Path,
+        metavar="FILE",
+        help="what `langflash words learn` kept: groups that look alike answer to it",
+    )
     add_camera(command)
     command.add_argument(
         "--mode", choices=("relevancy", "cosine"), default="relevancy", help="(default: relevancy)"
@@ -343,6 +363,25 @@ def add_info(commands) -> None:
         "--limits", action="store_true", help="how much readers take of a file, and the variables that say so"
     )
     add_json(command)
+
+
+def add_words(commands) -> None:
+    """`langflash words`."""
+    actions = new_actions(commands, "words", "what was taught in some scenes, kept and taught to others")
+    learn = new_command(actions, "learn", "names and denials that scenes were given, into a vocabulary")
+    learn.add_argument(
+        "scenes", nargs="+", type=Path, metavar="SCENE", help="scenes in which groups were named"
+    )
+    add_output(learn, "FILE", "the vocabulary, .words.json; one that is there is added to")
+    add_json(learn)
+    teach = new_command(actions, "teach", "a scene whose groups take what a vocabulary says of such things")
+    teach.add_argument("scene", type=Path, metavar="SCENE")
+    teach.add_argument("words", type=Path, metavar="FILE", help="the vocabulary")
+    add_output(teach, "SCENE", "the scene to write")
+    add_json(teach)
+    listing = new_command(actions, "list", "what a vocabulary holds")
+    listing.add_argument("words", type=Path, metavar="FILE", help="the vocabulary")
+    add_json(listing)
 
 
 def add_weights(commands) -> None:

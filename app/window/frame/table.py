@@ -20,6 +20,7 @@ from ..dialogs import Dialog
 from ..editing import commands as edit
 from ..editing import placing
 from ..editing import pointing as point
+from ..editing import teaching as teach
 from ..editing.state import Handle, Tool
 from ..exporting import commands as export
 from ..filming import commands as film
@@ -185,11 +186,17 @@ def _asking() -> Iterable[Entry]:
     yield Entry("Save the phrases ...", group, _always(do.ShowDialog(Dialog.SAVE_PROMPTS)))
     yield Entry("Load phrases ...", group, _always(do.ShowDialog(Dialog.LOAD_PROMPTS)))
     yield Entry("Dictionary", group, _dictionary)
+    yield Entry("Keep names for other scenes", group, _taught(teach.KeepWords()))
+    yield Entry("Take names from other scenes", group, _taught(teach.TakeWords()))
 
 
 def _meant(state: State) -> do.Command | None:
     prompt = state.asking.active_prompt if state.scene.info is not None else None
     return None if prompt is None else edit.SelectByPhrase(prompt.key, state.editing.combine)
+
+
+def _taught(command: do.Command) -> Callable[[State], do.Command | None]:
+    return lambda state: command if state.scene.info is not None and state.scene.info.num_atoms else None
 
 
 def _dictionary(state: State) -> do.Command | None:
