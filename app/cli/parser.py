@@ -79,15 +79,9 @@ def build_parser() -> Parser:
         add_train,
         add_eval,
         add_weights,
-<<<<<<< HEAD
-        add_words,
-        add_desktop,
-        add_completion,
-=======
         add_desktop,
         add_completion,
         add_words,
->>>>>>> wt-show
     ):
         add(commands)
     return parser
