@@ -10,9 +10,13 @@ from langflash_core.errors import InputError
 from .words.judging import add_bench, add_bench_network, add_eval
 from .words.scenes import (
     add_batch,
+    add_clean,
     add_export,
     add_frames,
+    add_hide,
     add_info,
+    add_inventory,
+    add_level,
     add_lift,
     add_query,
     add_reconstruct,
@@ -21,6 +25,7 @@ from .words.scenes import (
     add_weights,
     add_words,
 )
+from .words.showing import add_completion, add_desktop, add_tour
 from .words.training import add_labels, add_rooms, add_train
 
 LAB = ("bench-network", "eval", "labels", "rooms", "train")
@@ -60,7 +65,12 @@ def build_parser() -> Parser:
         add_query,
         add_render,
         add_export,
+        add_tour,
+        add_hide,
+        add_clean,
         add_lift,
+        add_level,
+        add_inventory,
         add_info,
         add_bench,
         add_bench_network,
@@ -69,6 +79,8 @@ def build_parser() -> Parser:
         add_train,
         add_eval,
         add_weights,
+        add_desktop,
+        add_completion,
         add_words,
     ):
         add(commands)

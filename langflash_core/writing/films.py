@@ -1,8 +1,10 @@
-"""A scene as a film: from photo to photo, around it, or along key frames; in colours or as a heat-map."""
+"""A scene as a film: from photo to photo, around it, along its tour or key frames; in colours or as a
+heat-map."""
 
 import itertools
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,13 +16,25 @@ from langflash_core.colormaps import HeatColours
 from langflash_core.errors import InputError, ViewError
 from langflash_core.export.png import USUAL, heat_over, to_8bit
 from langflash_core.files import readable_file, staged_folder
-from langflash_core.geometry.poses import Pose, Vector, blend, framing, from_view, orbit, to_camera
+from langflash_core.geometry.poses import (
+    Pose,
+    Vector,
+    alike,
+    blend,
+    framing,
+    from_view,
+    on_tour,
+    orbit,
+    to_camera,
+    tour_seconds,
+)
 from langflash_core.geometry.reach import median_reach
 from langflash_core.geometry.tours import RATE, along, even
 from langflash_core.language.relevance import CompiledQuery, compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.limits import TEXT
 from langflash_core.running import Progress
+from langflash_core.scene.tour import read_tour
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
 from langflash_core.writing.cameras import camera_of
 from langflash_core.writing.encoding import encoded
@@ -80,11 +94,14 @@ def way(
     """Cameras of a film, sides rounded down to even numbers of pixels as encoders want them.
 
     Args:
-        path: photos (None), orbit, or a file of key frames. shown: the part of the scene that is drawn.
+        path: photos (None), orbit, tour, or a file of key frames. shown: the part of the scene that is drawn.
 
     Raises:
-        ViewError: the key frames cannot be used.
+        ViewError: the key frames cannot be used, or the scene has no tour.
     """
+    if path == "tour":
+        size = even(size or scene.view_size)
+        return [to_camera(pose, *size) for pose in along_stops(_stops(scene), seconds)]
     if path in (None, "photos", "orbit"):
         width, height = even(size or scene.view_size)
         views = _poses(scene)
@@ -97,6 +114,28 @@ def way(
         ]
         return [to_camera(pose, width, height) for pose in poses]
     return along(*read_key_frames(Path(path), seconds), size)
+
+
+def _stops(scene: Scene) -> list[Pose]:
+    """Raises:
+    ViewError: the scene has none.
+    """
+    stops = read_tour(scene.record.tour).stops
+    if not stops:
+        raise ViewError('the scene has no tour; give it stops with: langflash tour stop SCENE "The window"')
+    return [stop.pose for stop in stops]
+
+
+def along_stops(stops: Sequence[Pose], seconds: float | None) -> list[Pose]:
+    """Poses of a film of a tour.
+
+    Args:
+        seconds: of all of it; None: as long as in the window.
+    """
+    whole = tour_seconds(len(stops))
+    seconds = whole if seconds is None else seconds
+    stops, count = alike(stops), max(1, round(RATE * seconds))
+    return [on_tour(stops, index / RATE * whole / seconds) for index in range(count)]
 
 
 def write(

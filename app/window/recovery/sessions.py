@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import BinaryIO
 
 from langflash_core.errors import OutputError
+from langflash_core.geometry.poses import read_pose
 
-from ..filming.state import read_pose
 from ..places import state_folder
 from ..scene.drops import SCENE_SUFFIX, still_there
 from .state import Kept
