@@ -1,10 +1,11 @@
 // Puts the page together: reads the scene, draws on demand, answers when the camera rests.
 // The address may say more: #view=1&ask=plant&mode=photo&bare
 
-const MOST_PIXELS = 2.1e6;         // of a picture
-const MOST_JUDGED = 320 * 320;     // pixels that scores are taken from
-const REST = 160;                  // milliseconds without a movement
-const SLOW = 40, QUICK = 22;       // milliseconds a frame, beyond which moving pictures get fewer or more pixels
+const MOST_PIXELS = 2.1e6; // of a picture
+const MOST_JUDGED = 320 * 320; // pixels that scores are taken from
+const REST = 160; // milliseconds without a movement
+const SLOW = 40,
+  QUICK = 22; // milliseconds a frame, beyond which moving pictures get fewer or more pixels
 const LEAST_SCALE = 0.35;
 
 const find = (id) => document.getElementById(id);
@@ -24,7 +25,10 @@ function depthsAround(texels, view, lens, [x, y], radius) {
     const offset = [texels[at] - view.eye[0], texels[at + 1] - view.eye[1], texels[at + 2] - view.eye[2]];
     const z = dot(offset, view.turn[2]);
     if (z < NEAR || texels[at + 3] < 0.3) continue;
-    const off = [dot(offset, view.turn[0]) / z * fx + cx - x, dot(offset, view.turn[1]) / z * fy + cy - y];
+    const off = [
+      (dot(offset, view.turn[0]) / z) * fx + cx - x,
+      (dot(offset, view.turn[1]) / z) * fy + cy - y,
+    ];
     if (Math.hypot(...off) < radius) depths.push(z);
   }
   return depths.sort((a, b) => a - b);
@@ -39,8 +43,8 @@ class Page {
     const phrases = readPhrases(header, columns);
     this.answers = phrases && new Answers(phrases, header.count);
     this.lens = { pinhole: header.views[0].pinhole, size: header.viewSize };
-    this.scale = 1;  // of the picture's sides while it moves
-    this.pace = QUICK;  // milliseconds a frame, on average
+    this.scale = 1; // of the picture's sides while it moves
+    this.pace = QUICK; // milliseconds a frame, on average
     this.heat = true;
     this.carried = null;
     const distance = middleDepth(this.texels, header.views[0], this.lens);
@@ -50,10 +54,12 @@ class Page {
       changed: () => this.moved(),
       aimed: (x, y) => this.aim(x, y),
     });
-    this.asking = this.answers && new Asking(phrases.texts, [...Array(phrases.asked).keys()], {
-      changed: () => this.asked(),
-      learn: find("tower") && ((text) => this.learn(text)),
-    });
+    this.asking =
+      this.answers &&
+      new Asking(phrases.texts, [...Array(phrases.asked).keys()], {
+        changed: () => this.asked(),
+        learn: find("tower") && ((text) => this.learn(text)),
+      });
     this.furnish();
     addEventListener("resize", () => this.resize());
     this.canvas.addEventListener("webglcontextlost", () => location.reload());
@@ -69,9 +75,10 @@ class Page {
       return button;
     });
     find("views").append(...views);
-    for (const name of ["photo", "heat"]) find(name).addEventListener("click", () => this.setHeat(name === "heat"));
+    for (const name of ["photo", "heat"])
+      find(name).addEventListener("click", () => this.setHeat(name === "heat"));
     find("credit").hidden = !find("tower");
-    document.querySelectorAll(".asking").forEach((part) => (part.hidden = !this.answers));
+    for (const part of document.querySelectorAll(".asking")) part.hidden = !this.answers;
     find("helper").addEventListener("click", () => this.help());
     find("help").addEventListener("click", () => find("help").close());
     addEventListener("keydown", (event) => this.key(event));
@@ -80,7 +87,7 @@ class Page {
     this.orbit.set(this.header.views[said.get("view")] || this.header.views[0], this.orbit.distance);
     const row = this.answers ? this.answers.texts.indexOf(said.get("ask")) : -1;
     if (row >= 0) this.asking.ask(row);
-    else if (this.answers && this.answers.asked) this.asking.choose(0);
+    else if (this.answers?.asked) this.asking.choose(0);
     this.setHeat(said.get("mode") !== "photo");
   }
 
@@ -89,8 +96,10 @@ class Page {
     const view = Number(event.key) - 1;
     if (this.header.views[view]) this.visit(view);
     else if (event.key === "h" && this.answers) this.setHeat(!this.heat);
-    else if (event.key === "/" && this.answers) { event.preventDefault(); find("box").focus(); }
-    else if (event.key === "?") this.help();
+    else if (event.key === "/" && this.answers) {
+      event.preventDefault();
+      find("box").focus();
+    } else if (event.key === "?") this.help();
   }
 
   help() {
@@ -137,8 +146,9 @@ class Page {
 
   // The row of another phrase. The text tower is unpacked when it is first needed.
   async learn(text) {
-    this.tower ??= Promise.all(["tower", "tokens"].map((name) => inflated(find(name).textContent)))
-      .then(([weights, tokens]) => new TextTower(weights, new TextDecoder().decode(tokens).split("\n")));
+    this.tower ??= Promise.all(["tower", "tokens"].map((name) => inflated(find(name).textContent))).then(
+      ([weights, tokens]) => new TextTower(weights, new TextDecoder().decode(tokens).split("\n")),
+    );
     return this.answers.learn(text, (await this.tower).encode(text));
   }
 
@@ -148,7 +158,9 @@ class Page {
     const wanted = [this.canvas.clientWidth, this.canvas.clientHeight].map((side) => Math.max(1, side));
     const most = Math.sqrt(MOST_PIXELS / (wanted[0] * wanted[1]));
     this.ratio = Math.min(devicePixelRatio || 1, most);
-    [this.canvas.width, this.canvas.height] = wanted.map((side) => Math.max(1, Math.round(side * this.ratio)));
+    [this.canvas.width, this.canvas.height] = wanted.map((side) =>
+      Math.max(1, Math.round(side * this.ratio)),
+    );
     if (this.target) this.drawing.release(this.target);
     this.target = this.drawing.target([this.canvas.width, this.canvas.height], 1);
     this.moved();
@@ -249,4 +261,6 @@ async function open() {
 
 // For programs that drive the page: a promise of it.
 window.langflash = open();
-window.langflash.catch((error) => (find("waiting").textContent = error.message));
+window.langflash.catch((error) => {
+  find("waiting").textContent = error.message;
+});
