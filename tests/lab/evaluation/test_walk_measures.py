@@ -181,12 +181,13 @@ def test_colmap_itself_finds_cameras(tmp_path):
     size, K = (320, 240), np.array([[300.0, 0, 160], [0, 300.0, 120], [0, 0, 1]])
     generator = np.random.default_rng(0)
     coarse, fine = (generator.integers(0, 255, (side, side)).astype(np.uint8) for side in (70, 350))
-    noise = sum(0.5 * cv2.resize(each, (700, 700), interpolation=cv2.INTER_CUBIC) for each in (coarse, fine))
+    large = [cv2.resize(each, (700, 700), interpolation=cv2.INTER_CUBIC) for each in (coarse, fine)]
+    noise = (0.5 * large[0] + 0.5 * large[1]).astype(np.uint8)
     turns = Rotation.from_euler("y", [[-12], [12]], degrees=True)
     given = cameras(np.array([0.0, 0, 4]) - turns.apply([0.0, 0, 3]), turns.inv())
     paths = [tmp_path / name for name in ("left.png", "right.png")]
     for path, viewmat in zip(paths, given, strict=True):
-        Image.fromarray(corner_photo(viewmat, K, size, noise.astype(np.uint8))).save(path)
+        Image.fromarray(corner_photo(viewmat, K, size, noise)).save(path)
     found = walk_colmap.mapped(paths, (300.0, 300.0, 160.0, 120.0))
     step = found.viewmats["right"] @ np.linalg.inv(found.viewmats["left"])
     true = given[1] @ np.linalg.inv(given[0])
