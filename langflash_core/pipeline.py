@@ -22,6 +22,7 @@ from langflash_core.fine import fine_scene
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.straight import after, straightened
+from langflash_core.images.triage import check_shown
 from langflash_core.images.views import load_views, source_pictures
 from langflash_core.keeping import Keep, not_kept
 from langflash_core.kept_prediction import arrays_of, prediction_of
@@ -149,6 +150,7 @@ def reconstruct(
         views = load_views(
             photos, fov=fov, intrinsics=intrinsics, check=run.check, pictures=ahead.pictures.result
         )
+        check_shown(views.names, list(views.images))
     views = _posed(views, viewmats, preset)
     with run.stage("weights"):
         network = _network(preset, weights, device, precision, ahead.stored)

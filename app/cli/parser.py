@@ -10,9 +10,12 @@ from langflash_core.errors import InputError
 from .words.judging import add_bench, add_bench_network, add_eval
 from .words.scenes import (
     add_batch,
+    add_clean,
     add_export,
     add_frames,
+    add_hide,
     add_info,
+    add_level,
     add_lift,
     add_query,
     add_reconstruct,
@@ -62,7 +65,10 @@ def build_parser() -> Parser:
         add_render,
         add_export,
         add_tour,
+        add_hide,
+        add_clean,
         add_lift,
+        add_level,
         add_info,
         add_bench,
         add_bench_network,
@@ -71,9 +77,9 @@ def build_parser() -> Parser:
         add_train,
         add_eval,
         add_weights,
+        add_words,
         add_desktop,
         add_completion,
-        add_words,
     ):
         add(commands)
     return parser

@@ -20,6 +20,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.files import write_atomically
+from langflash_core.memory import out_of_memory
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.container import FORMAT, VERSION, damaged, digest, in_order, read_container
 from langflash_core.scene.fields import NEWER, from_fields, to_fields
@@ -64,6 +65,8 @@ def load(path: Path | str) -> Scene:
             scene = replace(scene, view_ids=_view_ids(scene, counts_per_view(found.metadata)))
         check_scene(scene)
     except (ValueError, LookupError, TypeError, RuntimeError, ArithmeticError) as error:
+        if out_of_memory(error):
+            raise
         raise damaged(path, error) from error
     return scene
 

@@ -4,7 +4,7 @@ heat-map."""
 import itertools
 import json
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +13,7 @@ import torch
 
 from langflash_core import pipeline
 from langflash_core.colormaps import HeatColours
-from langflash_core.errors import InputError, LangFlashError, ViewError
+from langflash_core.errors import InputError, ViewError
 from langflash_core.export.png import USUAL, heat_over, to_8bit
 from langflash_core.files import readable_file, staged_folder
 from langflash_core.geometry.poses import (
@@ -37,14 +37,13 @@ from langflash_core.running import Progress
 from langflash_core.scene.tour import read_tour
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
 from langflash_core.writing.cameras import camera_of
+from langflash_core.writing.encoding import encoded
 from langflash_core.writing.job import Job
 from langflash_core.writing.renderers import Renderer
 
 SECONDS = 6.0
 LONGEST = 600.0  # seconds
 _SWAY = (math.radians(12), math.radians(4))  # yaw and pitch around a single photo: further out are holes
-_H264 = ("-preset", "veryfast")  # half the encoder's time; files grow a little
-_WEBP = ("-quality", "80", "-compression_level", "2", "-loop", "0")
 _MIDDLE = (0.02, 0.98)  # of what is orbited: stray Gaussians do not count
 
 
@@ -154,18 +153,13 @@ def write(
         heat: over the colours; None: colours alone. colours: of the heat-map.
 
     Raises:
-        LangFlashError: the encoder stopped.
+        LangFlashError: the disk is full, or the encoder stopped otherwise.
     """
-    film = _encoder(path, (cameras[0].width, cameras[0].height))
-    try:
-        film.send(None)
+    size = (cameras[0].width, cameras[0].height)
+    with encoded(path, size) as add:
         for index, camera in enumerate(cameras):
             progress("drawing", index / len(cameras))
-            film.send(picture(scene, camera, renderer, heat, colours).tobytes())
-    except OSError as error:
-        raise LangFlashError(f"the video encoder stopped ({error}); try another --size") from error
-    finally:
-        film.close()
+            add(picture(scene, camera, renderer, heat, colours).tobytes())
 
 
 def picture(
@@ -180,16 +174,6 @@ def picture(
         return renderer.colours(scene, camera)
     frame, relevance = renderer.answered(scene, camera, heat)
     return to_8bit(heat_over(relevance[0], frame.rgb, heat.threshold, heat.mode, colours))
-
-
-def _encoder(path: Path, size: tuple[int, int]) -> Generator[None, bytes | None, None]:
-    import imageio_ffmpeg
-
-    if path.suffix.lower() == ".webp":
-        own = {"codec": "libwebp_anim", "quality": None, "output_params": list(_WEBP)}  # None: not theirs
-        return imageio_ffmpeg.write_frames(str(path), size, fps=RATE, macro_block_size=2, **own)
-    own = {"quality": 8, "output_params": list(_H264)}
-    return imageio_ffmpeg.write_frames(str(path), size, fps=RATE, macro_block_size=2, **own)
 
 
 def _poses(scene: Scene) -> list[Pose]:

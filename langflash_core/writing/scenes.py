@@ -9,6 +9,7 @@ from langflash_core.export.language import side_car
 from langflash_core.export.sog import sog_files
 from langflash_core.files import make_folder
 from langflash_core.formats import SOG_FOLDER, kind_of
+from langflash_core.level import upright
 from langflash_core.outputs import PLY, loaded
 from langflash_core.scene.thin import coarse_level
 from langflash_core.types import Scene
@@ -25,6 +26,7 @@ def write_scene(job: Job) -> str:
     chosen = _as_fine(job)
     if job.prompts:
         chosen = pipeline.select(chosen, job.prompts, threshold=job.request.threshold)
+    chosen = upright(chosen) if job.request.upright else chosen
     make_folder(path.parent)
     loaded(job.kind.of_scene)(chosen, path)
     if job.kind.subject == "photos":
