@@ -16,6 +16,7 @@ from ..values import (
     open_fov,
     pixel_side,
     share,
+    spot,
     what,
     whole_count,
 )
@@ -191,8 +192,28 @@ def add_batch(commands) -> None:
 def add_query(commands) -> None:
     """`langflash query`."""
     command = new_command(commands, "query", "where in a scene is each phrase? heat-maps, masks and numbers")
-    command.add_argument("scene", type=Path, metavar="SCENE")
-    command.add_argument("prompts", nargs="+", metavar="PROMPT", help='a phrase, e.g. "armchair"')
+    command.add_argument("scene", nargs="?", metavar="SCENE", help="the scene to ask")
+    command.add_argument("phrases", nargs="*", metavar="PROMPT", help='a phrase, e.g. "armchair"')
+    command.add_argument(
+        "--scenes",
+        type=Path,
+        metavar="FOLDER",
+        help="ask all scenes of a folder: a table of answers, the surest first, and a page of pictures",
+    )
+    command.add_argument(
+        "--prompts",
+        dest="phrase_file",
+        type=Path,
+        metavar="FILE",
+        help="phrases from a text file, one a line",
+    )
+    command.add_argument(
+        "--words",
+        dest="vocabulary",
+        type=Path,
+        metavar="FILE",
+        help="what `langflash words learn` kept: groups that look alike answer to it",
+    )
     add_camera(command)
     command.add_argument(
         "--mode", choices=("relevancy", "cosine"), default="relevancy", help="(default: relevancy)"
@@ -273,18 +294,33 @@ def add_export(commands) -> None:
         "--with-text", action="store_true", help="an .html answers any phrase, and is 28 MB larger"
     )
     command.add_argument(
+        "--beside",
+        nargs="+",
+        type=Path,
+        default=(),
+        metavar="SCENE",
+        help="other scenes in the same .html, which are asked the same phrases",
+    )
+    command.add_argument(
         "--detail",
         choices=EXPORT_DETAILS,
         default=EXPORT_DETAILS[0],
         help="of Gaussians and web pages: low keeps the coarse ones alone, for small files, slow machines; "
         f"of a scene without levels a third, wider (default: {EXPORT_DETAILS[0]})",
     )
+    command.add_argument(
+        "--upright",
+        action="store_true",
+        help="of Gaussians and poses: level, on the floor and turned north as `langflash level` found it, in "
+        "metres where they are known",
+    )
     command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of a video (default: 6)")
     command.add_argument(
         "--path",
         metavar="WAY",
-        help="of a video: photos, from one to the next and back (default); orbit, around what is shown; or a "
-        "JSON list of cameras as of --camera, each with its time in seconds, or evenly spread",
+        help="of a video: photos, from one to the next and back (default); orbit, around what is shown; "
+        "tour, along the scene's stops; or a JSON list of cameras as of --camera, each with its time in "
+        "seconds, or evenly spread",
     )
     command.add_argument(
         "--replace",
@@ -414,6 +450,31 @@ def add_clean(commands) -> None:
     add_json(command)
 
 
+def add_level(commands) -> None:
+    """`langflash level`."""
+    command = new_command(
+        commands, "level", "which way is up, where the floor is, which way is north, and how large it may be"
+    )
+    command.add_argument("scene", type=Path, metavar="SCENE")
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="SCENE", help="the scene with that in it (default: only say it)"
+    )
+    command.add_argument("--up", type=spot, metavar="X,Y,Z", help="this way is up, in the scene's own axes")
+    command.add_argument("--north", type=spot, metavar="X,Y,Z", help="this way is north")
+    command.add_argument("--origin", type=spot, metavar="X,Y,Z", help="this point lies at 0, on the floor")
+    lengths = command.add_mutually_exclusive_group()
+    lengths.add_argument(
+        "--length",
+        nargs=3,
+        metavar=("A", "B", "METRES"),
+        help="from A to B it is so long; A and B are points X,Y,Z of the scene, or pixels VIEW:U,V of a "
+        "photo as the scene has it",
+    )
+    lengths.add_argument("--ceiling", type=above_zero, metavar="METRES", help="the ceiling is so high")
+    lengths.add_argument("--door", type=above_zero, metavar="METRES", help="the door is so high")
+    add_json(command)
+
+
 def add_info(commands) -> None:
     """`langflash info`."""
     command = new_command(commands, "info", "what a scene file holds, and what pruning saved")
@@ -425,6 +486,25 @@ def add_info(commands) -> None:
         "--limits", action="store_true", help="how much readers take of a file, and the variables that say so"
     )
     add_json(command)
+
+
+def add_words(commands) -> None:
+    """`langflash words`."""
+    actions = new_actions(commands, "words", "what was taught in some scenes, kept and taught to others")
+    learn = new_command(actions, "learn", "names and denials that scenes were given, into a vocabulary")
+    learn.add_argument(
+        "scenes", nargs="+", type=Path, metavar="SCENE", help="scenes in which groups were named"
+    )
+    add_output(learn, "FILE", "the vocabulary, .words.json; one that is there is added to")
+    add_json(learn)
+    teach = new_command(actions, "teach", "a scene whose groups take what a vocabulary says of such things")
+    teach.add_argument("scene", type=Path, metavar="SCENE")
+    teach.add_argument("words", type=Path, metavar="FILE", help="the vocabulary")
+    add_output(teach, "SCENE", "the scene to write")
+    add_json(teach)
+    listing = new_command(actions, "list", "what a vocabulary holds")
+    listing.add_argument("words", type=Path, metavar="FILE", help="the vocabulary")
+    add_json(listing)
 
 
 def add_weights(commands) -> None:

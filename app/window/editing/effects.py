@@ -7,6 +7,7 @@ import numpy as np
 
 from ..commands import Command, Notify
 from ..effects import Effects, Hands
+from ..places import config_folder
 from ..scene.commands import SceneArrived
 from ..scene.mended import FillHole, HidePart
 from ..scene.state import Room, SceneInfo
@@ -16,7 +17,8 @@ from .commands import FindFloaters, StopWaiting
 from .mending import BringBack, FillSelection, HiddenForGood, HideForGood, RememberUnhidden
 from .pointing import CardOpened, Named, ReadingTaken, RulerPlaced
 from .state import Reading, Tool
-from .work import NameAtoms, NamePlace, ScoreFloaters, Weigh, request_for
+from .teaching import WORDS, KeepWords, TakeWords
+from .work import FindLessons, KeepLessons, NameAtoms, NamePlace, ScoreFloaters, Weigh, request_for
 
 
 class EditingEffects(Effects):
@@ -98,6 +100,10 @@ class EditingEffects(Effects):
                 room = before.scene.unhidden
                 arrival = SceneArrived(replace(room.info, history=room.history), room=room, replaces=True)
                 self._hands.perform(arrival)
+            case KeepWords() if info is not None and marks is not None:
+                self._hands.submit(KeepLessons(info.serial, info.memory, marks, config_folder() / WORDS))
+            case TakeWords() if info is not None and marks is not None:
+                self._hands.submit(FindLessons(info.serial, info.memory, marks, config_folder() / WORDS))
             case FindFloaters() if info is not None and marks is not None:
                 self._hands.submit(ScoreFloaters(info.serial, info.memory, marks))
             case _ if info is not None and marks is not None:
