@@ -28,7 +28,7 @@ _EDGE = 0.01  # of a photo's longer side: so far colours of a thing run over its
 
 @dataclass(frozen=True)
 class FillHole(Job):
-    """The selection taken away with what runs over its edge, and the hole filled from what is left around it."""
+    """The selection taken away with what runs over its edge, and the hole filled from what is around."""
 
     info: SceneInfo
     marks: Marks = field(repr=False)
