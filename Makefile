@@ -4,7 +4,7 @@
 # make setup  the set-up alone
 # make portable        a folder that runs without Python, in dist/ (Linux; torch for processors)
 # make test-all        every test with every optional package: Ray, SAM 2, TensorBoard, COLMAP, others' measures
-# make torture         100,000 hostile files for every reader of ours (SEED=1, COUNT=100000)
+# make torture         what it is to survive (PARTS="calls kills", SEED=1; tests/torture/README.md)
 # make test-machines   every test three times, as three other processors and orders would run it
 #
 # Set-up is a virtual environment in .venv, this package in it, and (Debian, Ubuntu) the system's
@@ -78,9 +78,10 @@ test-machines: setup
 	ATEN_CPU_CAPABILITY=avx2 OMP_NUM_THREADS=1 $(BIN)/python -m pytest $(SHUFFLED)=$(SEED)
 	ATEN_CPU_CAPABILITY=default OMP_NUM_THREADS=2 $(BIN)/python -m pytest $(SHUFFLED)=$$(($(SEED) + 1))
 
-COUNT ?= 100000
+# Hostile files, failing calls, kills, hard photos, load: some 25 minutes on two cores.
+PARTS ?=
 torture: setup
-	PYTHONHASHSEED=0 OMP_NUM_THREADS=1 $(BIN)/python -m tests.torture.fuzz --seed $(SEED) --count $(COUNT)
+	PYTHONHASHSEED=0 OMP_NUM_THREADS=1 $(BIN)/python -m tests.torture $(PARTS) --seed $(SEED)
 
 # In an environment of its own, so that nothing else is packed; `make test` does not build it.
 PACKING := .venv-portable
