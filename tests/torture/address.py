@@ -23,10 +23,12 @@ _FUZZ = """
     return state % most;
   };
   const texts = ["plant", "length", "a b", "", "%", "\\u0000", "constructor"];
-  const words = ["view", "ask", "mode", "bare", "=", "&", "#", "%", "%zz", "%00", "+", "plant", "length",
+  const stops = ["The window", "length", ""];
+  const words = ["view", "stop", "plan", "The window", "ask", "mode", "bare", "=", "&", "#", "%", "%zz", "%00",
+    "+", "plant", "length",
     "map", "constructor", "__proto__", "toString", "0", "1", "-1", "1e9", "99999999999999999999", "0x1", " 1",
     "1.5", "NaN", "Infinity", "photo", "heat", "\\ud800", "\\u202e", "\\u0000", "<script>", "[]",
-    "view=length", "view=1", "?", ";", "stop", "plan"];
+    "view=length", "view=1", "?", ";"];
   const finds = [];
   for (let number = 0; number < COUNT && finds.length < 5; number++) {
     let hash = random(9) ? "#" : "";
@@ -35,11 +37,12 @@ _FUZZ = """
     if (random(50) === 0) hash = hash.repeat(1 + random(300));
     const views = 1 + random(4);
     try {
-      const said = readAddress(hash, views, texts, texts);
+      const said = readAddress(hash, views, stops, texts);
       const whole = Number.isInteger(said.view) && said.view >= -1 && said.view < views
-        && Number.isInteger(said.stop) && said.stop >= -1 && said.stop < texts.length
+        && Number.isInteger(said.stop) && said.stop >= -1 && said.stop < stops.length
+        && typeof said.plan === "boolean"
         && Number.isInteger(said.row) && said.row >= -1 && said.row < texts.length
-        && typeof said.bare === "boolean" && typeof said.plan === "boolean" && typeof said.heat === "boolean";
+        && typeof said.bare === "boolean" && typeof said.heat === "boolean";
       if (!whole) finds.push([hash.slice(0, 200), JSON.stringify(said)]);
     } catch (error) {
       finds.push([hash.slice(0, 200), String(error)]);
