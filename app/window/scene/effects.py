@@ -122,6 +122,8 @@ class SceneEffects(Effects):
                 waited = before.scene.pending
             case All(commands):
                 waited = commands
+            case Merged(gone=gone) if gone is not None and command.fits(before):
+                waited = [command.arrival(before)]
             case Merged() if command.fits(before):
                 waited = [command.arrival(before), SetHandle(Handle.MOVE), FrameAll()]
             case GoToRoom(serial):

@@ -164,6 +164,7 @@ class Showing:
     asked where they belong. pending: commands that wait for an answer about unsaved edits. view: of the photo
     stood at, if any. compare: where the photo begins, 0 to 1 across the picture; None: not compared.
     unfinished: photos on which work was begun and kept.
+    unhidden: the scene on show as it was before something in it was hidden for good, until that is saved.
     """
 
     photos: tuple[Photo, ...] = ()
@@ -178,6 +179,7 @@ class Showing:
     flight: Flight | None = None
     view: int | None = None
     compare: float | None = None
+    unhidden: Room | None = None
     job: Job | None = None
     unfinished: tuple[Path, ...] = ()
 
