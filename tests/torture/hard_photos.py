@@ -225,7 +225,7 @@ def stages(paths: list[Path], precision: str) -> Stages:
 def _network(precision: str) -> LangFlashNet:
     network = load_network("mini", bfloat16=precision == "bfloat16")
     if precision == "float64":
-        network.double()
+        network = network.to(torch.float64)
         for part in network.modules():  # some stages go back to float32 by themselves
             part.register_forward_pre_hook(lambda _, given: tuple(map(_double, given)))
     return network
