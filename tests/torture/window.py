@@ -46,8 +46,8 @@ def opened(scene: Path, folder: Path) -> Iterator[Session]:
         os.environ.pop("WAYLAND_DISPLAY", None)
         session = Session((scene,), SIZES[0])
         try:
-            _steps(session, until=lambda: session.state.info is not None)
-            count = len(session.state.info.scene.gaussians)
+            _steps(session, until=lambda: session.state.scene.info is not None)
+            count = len(session.state.scene.info.scene.gaussians)
             session.dispatch(edit.Found(Mask.of(np.arange(count) % 9 == 0), "replace", "here"))
             session.dispatch(edit.Delete())
             _steps(session, 10)
@@ -96,7 +96,7 @@ def _use(session: Session, folder: Path, turn: int) -> None:
     """Another size, another mode, another phrase; copy, paste, open and save."""
     glfw.set_window_size(session._window, *SIZES[turn % 2])
     session.dispatch(camera.SetMode(PICTURES[turn % len(PICTURES)]))
-    session.dispatch(ask.EditPrompt(session.state.prompts[0].key, ("armchair", "wall")[turn % 2]))
+    session.dispatch(ask.EditPrompt(session.state.asking.prompts[0].key, ("armchair", "wall")[turn % 2]))
     session.dispatch(CopyText("some text"))
     session.dispatch(Paste())
     if turn % 4 == 0:
