@@ -1,4 +1,4 @@
-"""Photos that no scene is in, or that deceive: through the whole path, in float32 and bfloat16, beside float64.
+"""Photos that no scene is in, or that deceive: the whole path, in float32 and bfloat16, beside float64.
 
     python -m tests.torture photos [--only noise ...]
 
@@ -32,8 +32,8 @@ BOUNDS = {
     "float32": {"tokens": 1e-3, "depth": 1e-3, "language": 1e-4, "masks": 1e-3},
     "bfloat16": {"tokens": 0.1, "depth": 0.1, "language": 0.05, "masks": 0.2},
 }
-"""Largest error beside float64: tokens and masks as a share of their mean square, root taken; depth as the mean
-of |log d - log d64|; language as the mean of 1 - cosine."""
+"""Largest error beside float64: tokens and masks as a share of their mean square, root taken; depth as the
+mean of |log d - log d64|; language as the mean of 1 - cosine."""
 Picture = np.ndarray
 
 

@@ -1,5 +1,5 @@
-"""The first, second, third ... call of a kind fails, until nothing fails any more; after each: every file is as
-it was or as it was to be, nothing is lost, and what went wrong is one sentence.
+"""The first, second, third ... call of a kind fails, until nothing fails any more; after each: every file is
+as it was or as it was to be, nothing is lost, and what went wrong is one sentence.
 
     python -m tests.torture calls [--seed 1] [--minutes 10] [--only export query ...]
 
