@@ -163,12 +163,14 @@ class Record:
     it. refinement: what a fit to the photos brought. detail: what was spent on how fine elements, and what
     it bought. light: `gains` and `offsets`, a row of
     red, green and blue for each view, by which `scene.light` brought the photos' colours to one light. lens:
-    `found`, a mapping of `FoundLens` for each lens that the photos told. world: where it stands; None: nobody
-    looked. thing_names: a person's own, by what the inventory calls a thing.
+    `found`, a mapping of `FoundLens` for each lens that the photos told. left_out:
+    `shares`, of each view what was left out since the others do not show it (`scene.strangers`). world: where
+    it stands; None: nobody looked. thing_names: a person's own, by what the inventory calls a thing.
     calibration: what the network's checkpoint says about scores, instead of its language space. atom_names:
     a person's own, by atom, which it answers to. atom_denials: what a person said that an atom is not.
     silent_atoms: those that answer no phrase. num_deleted: Gaussians that edits took away. camera_path:
-    the window's key frames. others: what a file says under keys that this version does not know.
+    the window's key frames. tour: stops and notes, as `scene.tour` has them. others: what a file says under
+    keys that this version does not know.
     """
 
     preset: str | None = None
@@ -183,6 +185,7 @@ class Record:
     detail: Mapping[str, Any] = field(default_factory=dict)
     light: Mapping[str, Any] = field(default_factory=dict)
     lens: Mapping[str, Any] = field(default_factory=dict)
+    left_out: Mapping[str, Any] = field(default_factory=dict)
     world: World | None = None
     thing_names: Mapping[str, str] = field(default_factory=dict)
     calibration: Mapping[str, Any] = field(default_factory=dict)
@@ -191,6 +194,7 @@ class Record:
     silent_atoms: tuple[int, ...] = ()
     num_deleted: int = 0
     camera_path: tuple[Mapping[str, Any], ...] = ()
+    tour: Mapping[str, Any] = field(default_factory=dict)
     cost: Cost = Cost()
     others: Mapping[str, Any] = field(default_factory=dict)
 

@@ -24,10 +24,10 @@ class ExportRequest:
     threshold: relevance to keep, in (0, 1); None: the calibrated one. view: a photo's camera, from 0.
     camera: a JSON file of one. all_views: from every photo. size: (width, height), pixels. ortho: parallel
     rays. fade: leave out what no photo looked at. fill: fill gaps. colormap, span: of heat-maps. detail: of
-    Gaussians and pages. seconds, path: of a film, its length and "photos", "orbit" or a file of key frames.
-    with_text: a page answers any phrase. upright: Gaussians stand in the scene's world, in metres where they
-    are known. replace: also what is there as something else. backend: "gl",
-    "torch" or None.
+    Gaussians and pages. seconds, path: of a film, its length and "photos", "orbit", "tour" or a file of key
+    frames. with_text: a page answers any phrase. beside: files of other scenes in the same page. upright:
+    Gaussians stand in the scene's world, in metres where they are known. replace: also what is there as
+    something else. backend: "gl", "torch" or None.
     """
 
     output: Path
@@ -49,6 +49,7 @@ class ExportRequest:
     seconds: float | None = None
     path: str | None = None
     with_text: bool = False
+    beside: tuple[Path, ...] = ()
     upright: bool = False
     replace: bool = False
     backend: str | None = None
@@ -91,6 +92,7 @@ class ExportRequest:
         words += [] if self.detail == EXPORT_DETAILS[0] else ["--detail", self.detail]
         for name in ("all_views", "fade", "fill", "ortho", "with_text", "upright", "replace"):
             words += [f"--{name.replace('_', '-')}"] if getattr(self, name) else []
+        words += ["--beside", *map(str, self.beside)] if self.beside else []
         return [*words, *(["--prompt", *self.prompts] if self.prompts else [])]
 
     @property
@@ -160,6 +162,8 @@ def _check_options(request: ExportRequest, kind: Output) -> None:
         raise InputError("--colormap and --span colour heat-maps; add --what heat, or leave them away")
     if request.with_text and kind.subject != "page":
         raise InputError("--with-text is for web pages; name an .html, or leave it away")
+    if request.beside and kind.subject != "page":
+        raise InputError("--beside is for web pages; name an .html, or leave it away")
     if request.detail == "low" and not kind.splats:
         raise InputError("--detail low is for splats, scenes and web pages; name one, or leave it away")
     if request.upright and kind.subject not in ("scene", "photos"):

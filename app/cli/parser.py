@@ -10,8 +10,10 @@ from langflash_core.errors import InputError
 from .words.judging import add_bench, add_bench_network, add_eval
 from .words.scenes import (
     add_batch,
+    add_clean,
     add_export,
     add_frames,
+    add_hide,
     add_info,
     add_inventory,
     add_level,
@@ -21,7 +23,9 @@ from .words.scenes import (
     add_render,
     add_view,
     add_weights,
+    add_words,
 )
+from .words.showing import add_completion, add_desktop, add_tour
 from .words.training import add_labels, add_rooms, add_train
 
 LAB = ("bench-network", "eval", "labels", "rooms", "train")
@@ -61,6 +65,9 @@ def build_parser() -> Parser:
         add_query,
         add_render,
         add_export,
+        add_tour,
+        add_hide,
+        add_clean,
         add_lift,
         add_level,
         add_inventory,
@@ -72,6 +79,9 @@ def build_parser() -> Parser:
         add_train,
         add_eval,
         add_weights,
+        add_desktop,
+        add_completion,
+        add_words,
     ):
         add(commands)
     return parser

@@ -25,6 +25,15 @@ def pixel_side(text: str) -> int:
     return _whole(text, 56, 1024)
 
 
+def point(text: str) -> tuple[float, float, float]:
+    """`X,Y,Z` in scene units."""
+    parts = text.split(",")
+    if len(parts) != 3:
+        raise ArgumentTypeError(f"expected X,Y,Z such as 0.2,-0.1,1.4, received {text!r}")
+    x, y, z = map(_number, parts)
+    return x, y, z
+
+
 def view_index(text: str) -> int:
     """Index of a photo, from 0."""
     return _whole(text, 0, 10**6)
@@ -101,6 +110,14 @@ def open_fov(text: str) -> float:
     value = _number(text)
     if not 1.0 < value < 179.0:
         raise ArgumentTypeError(f"expected degrees between 1 and 179, received {text}")
+    return value
+
+
+def share(text: str) -> float:
+    """A number from 0 to 1."""
+    value = _number(text)
+    if not 0.0 <= value <= 1.0:
+        raise ArgumentTypeError(f"expected a number from 0 to 1, received {text}")
     return value
 
 

@@ -121,8 +121,9 @@ class Viewport:
 
     @property
     def texture(self) -> moderngl.Texture | None:
-        """The picture to show, or None before the first scene."""
-        return self._texture
+        """The picture to show, or None before the first scene, and where one that failed took its texture."""
+        shown = self._texture
+        return shown if shown is not None and hasattr(shown.mglo, "use") else None
 
     @property
     def passes(self) -> tuple[tuple[str, int], ...]:
@@ -412,7 +413,7 @@ class Viewport:
             self._finished = None  # of what is no longer on show
         if self._finished is None or not self._tells(still, state) or self._renderer is None:
             return
-        self._finished = None
+        self._finished = self._drawn = None
         self._renderer.bring(still, BACKGROUND)
         self._camera, self._drawn, self._still, self._colouring = still.camera, name, still, None
         self.picture_seconds = seconds
@@ -476,6 +477,7 @@ class Viewport:
         self._camera = to_camera(wanted.pose, width, height)
         self._renderer.upload(plan.share)  # once, and no matter of what pictures cost
         start = time.perf_counter()
+        self._drawn = None  # should it fail: what was drawn may have made room for it
         self._renderer.draw(
             self._camera,
             background=BACKGROUND,

@@ -9,12 +9,14 @@ import numpy as np
 from langflash_core.records import FoundLens, Guess, Record, World, check_light, world_to_json
 from langflash_core.scene.container import damaged, read_container
 from langflash_core.scene.record import from_json
+from langflash_core.scene.tour import read_tour
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
 
 _CORE = (0.01, 0.99)  # the middle 98 % along each axis: stray points do not stretch the box
 _PHOTO = "photo_"
+_NAMED = 4  # photos, of which it is said what was left out
 
 
 def describe(scene: "Scene") -> dict:
@@ -27,8 +29,9 @@ def describe(scene: "Scene") -> dict:
         (metres per unit or None), world (None, or as `Record` has it), counts, pruning (as `prune` left it,
         with `psnr_db` and `relevance_error` where they were measured), refinement (None, or kept, held_out
         and the PSNR before and after), detail (None, or as `Record` has it), light (None, or gains and
-        offsets, a row of red, green and blue per view), lens (None, or found, as `Record` has it), timings
-        {stage: seconds, total} (None where they are not known, as in files), warnings`.
+        offsets, a row of red, green and blue per view), lens and left_out (None, or as `Record` has them),
+        tour (None, or the names of stops, how many notes, and the start), timings {stage: seconds, total}
+        (None where they are not known, as in files), warnings`.
     """
     from langflash_core.scene.fields import to_fields  # torch
 
@@ -94,6 +97,22 @@ def lens_line(lens: Mapping[str, Any]) -> str:
         return ""
 
 
+def left_out_line(left_out: Mapping[str, Any]) -> str:
+    """What was left out of photos since the others do not show it, for people: "6 % of photo 3"; "" of
+    nothing, and where something else is said.
+
+    Args:
+        left_out: as `Record` has it.
+    """
+    shares = left_out.get("shares")
+    if not isinstance(shares, list | tuple) or not all(isinstance(share, int | float) for share in shares):
+        return ""
+    some = [(share, number) for number, share in enumerate(shares, 1) if share > 0]
+    most = sorted(sorted(some, reverse=True)[:_NAMED], key=lambda one: one[1])
+    parts = [f"{max(1, round(100 * share))} % of photo {number}" for share, number in most]
+    return ", ".join(parts) + (f" and some of {len(some) - _NAMED} others" if len(some) > _NAMED else "")
+
+
 def world_line(world: World | None) -> str:
     """How a scene stands and how large it may be, for people; "" where nobody looked."""
     if world is None:
@@ -157,9 +176,19 @@ def _document(
         "detail": dict(known.detail) or None,
         "light": dict(known.light) or None,
         "lens": dict(known.lens) or None,
+        "tour": _tour(known),
+        "left_out": dict(known.left_out) or None,
         "timings": {**timings, "total": sum(timings.values())} if timings else None,
         "warnings": list(known.warnings),
     }
+
+
+def _tour(known: Record) -> dict | None:
+    """Names of stops, and how many notes; None where there is neither."""
+    tour = read_tour(known.tour)
+    return (
+        {"stops": list(tour.names), "notes": len(tour.notes), "start": tour.start or None} if tour else None
+    )
 
 
 def _box(means: np.ndarray, quantiles: tuple[float, float]) -> dict | None:

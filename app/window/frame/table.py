@@ -18,8 +18,9 @@ from ..asking import commands as ask
 from ..asking.prompt_sets import MOST_PROMPTS
 from ..dialogs import Dialog
 from ..editing import commands as edit
-from ..editing import placing
+from ..editing import mending, placing
 from ..editing import pointing as point
+from ..editing import teaching as teach
 from ..editing.state import Handle, Tool
 from ..exporting import commands as export
 from ..filming import commands as film
@@ -30,6 +31,7 @@ from ..scene import commands as show
 from ..scene.panels import in_space
 from ..scene.state import possible
 from ..state import State
+from ..touring import commands as tour
 
 BRUSH_STEP = 1.15  # of its radius, per press of [ or ]
 ORBIT_STEP = math.radians(5.0)
@@ -144,6 +146,7 @@ def _files() -> Iterable[Entry]:
     reconstruct = show.Instead((show.Reconstruct(),))
     yield Entry("Reconstruct the photos", group, lambda s: reconstruct if s.scene.photos else None)
     yield Entry("Back to the room before", group, _room_before)
+    yield Entry("Pause the reconstruction", group, _pause)
     yield Entry("Cancel the reconstruction", group, lambda s: show.CancelJob() if s.scene.job else None)
     yield Entry(
         "Clear the tray", group, lambda s: show.ClearPhotos() if s.scene.photos and not s.scene.job else None
@@ -156,6 +159,11 @@ def _files() -> Iterable[Entry]:
 def _frames(state: State) -> do.Command | None:
     free = state.opening.film is not None and state.scene.job is None
     return do.ShowDialog(Dialog.FILM) if free else None
+
+
+def _pause(state: State) -> do.Command | None:
+    job = state.scene.job
+    return show.PauseJob() if job is not None and job.pausable and not job.cancelling else None
 
 
 def _room_before(state: State) -> do.Command | None:
@@ -184,11 +192,17 @@ def _asking() -> Iterable[Entry]:
     yield Entry("Save the phrases ...", group, _always(do.ShowDialog(Dialog.SAVE_PROMPTS)))
     yield Entry("Load phrases ...", group, _always(do.ShowDialog(Dialog.LOAD_PROMPTS)))
     yield Entry("Dictionary", group, _dictionary)
+    yield Entry("Keep names for other scenes", group, _taught(teach.KeepWords()))
+    yield Entry("Take names from other scenes", group, _taught(teach.TakeWords()))
 
 
 def _meant(state: State) -> do.Command | None:
     prompt = state.asking.active_prompt if state.scene.info is not None else None
     return None if prompt is None else edit.SelectByPhrase(prompt.key, state.editing.combine)
+
+
+def _taught(command: do.Command) -> Callable[[State], do.Command | None]:
+    return lambda state: command if state.scene.info is not None and state.scene.info.num_atoms else None
 
 
 def _dictionary(state: State) -> do.Command | None:
@@ -220,9 +234,22 @@ def _looking() -> Iterable[Entry]:
     yield Entry("Add a key frame", group, _shown(film.AddKey()), _plain("m"))
     yield Entry("Remove the last key frame", group, lambda s: film.RemoveKey() if s.keys else None)
     yield Entry("Fly along the key frames", group, _shown(film.Preview()), _plain("j"))
+    yield Entry("Tour: stops and notes", group, _tour, icon=fa.ICON_FA_SIGNS_POST)
+    yield Entry("Tour: the present view is a stop", group, _shown(tour.AddStop()))
+    yield Entry("Tour: play", group, lambda s: tour.Play() if s.tour.stops else None)
+    yield Entry(
+        "Tour: next stop", group, lambda s: tour.Step(1) if s.tour.stops else None, _plain("page_down")
+    )
+    yield Entry(
+        "Tour: previous stop", group, lambda s: tour.Step(-1) if s.tour.stops else None, _plain("page_up")
+    )
     for mode in PICTURES:
         keys = _plain(f"_{_DIGITS[KEYED.index(mode)]}") if mode in KEYED else ()
         yield Entry(f"Show: {mode.label}", group, _mode(mode), keys)
+
+
+def _tour(state: State) -> do.Command | None:
+    return tour.ShowTour(not state.touring.open) if state.scene.info is not None else None
 
 
 def _mode(mode: Picture) -> Callable[[State], do.Command | None]:
@@ -273,7 +300,7 @@ def _tools() -> Iterable[Entry]:
         yield Entry(name, group, _shown(placing.SetHandle(handle)), _plain(key))
     yield Entry("A smaller brush", group, _brush(1 / BRUSH_STEP), _plain("left_bracket"), repeats=True)
     yield Entry("A larger brush", group, _brush(BRUSH_STEP), _plain("right_bracket"), repeats=True)
-    yield Entry("Find floaters", group, _shown(edit.FindFloaters()))
+    yield Entry("Clean up", group, _shown(edit.FindFloaters()))
 
 
 def _brush(factor: float) -> Callable[[State], do.Command | None]:
@@ -290,6 +317,8 @@ def _editing() -> Iterable[Entry]:
     yield Entry("Grow the selection", group, _selected(edit.Grow()), _plain("g"))
     deleting = (*_plain("delete"), *_plain("backspace"))
     yield Entry("Delete the selection", group, _selected(edit.Delete()), deleting)
+    yield Entry("Delete the selection and fill its hole", group, _selected(mending.FillSelection()))
+    yield Entry("Hide the selection for good", group, _selected(mending.AskToHide()))
     yield Entry("Recolour the selection", group, _recolour, _ctrl("t"))
     for name, key, nudge in (
         ("left", "left_arrow", placing.Nudge(right=-1)), ("right", "right_arrow", placing.Nudge(right=1)),
@@ -315,7 +344,9 @@ def _placing(command: do.Command) -> Callable[[State], do.Command | None]:
 
 
 def _undo(state: State) -> do.Command | None:
-    return edit.Undo() if state.editing.history and state.editing.history.done else None
+    if state.editing.history and state.editing.history.done:
+        return edit.Undo()
+    return mending.BringBack() if state.scene.unhidden is not None else None
 
 
 def _redo(state: State) -> do.Command | None:

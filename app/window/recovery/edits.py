@@ -73,6 +73,18 @@ def forget_file(edits: Path) -> None:
             file.unlink(missing_ok=True)
 
 
+def forget_scene(scene: "Scene", path: Path | None) -> None:
+    """Remove the edits that all sessions kept of a scene, found by its content or its path."""
+    from langflash_core.scene.edits_file import read_about, scene_digest
+
+    digest = scene_digest(scene)
+    for edits in _newest_first():
+        with suppress(SceneFileError):
+            found, about, _ = read_about(edits)
+            if found == digest or (path is not None and about.get("path") == str(path)):
+                forget_file(edits)
+
+
 def find(scene: "Scene | None" = None, path: Path | None = None) -> Offer | None:
     """Edits kept of this scene, by its content or its path; without a scene the newest of all."""
     from langflash_core.scene.edits_file import read_about, scene_digest
@@ -103,5 +115,10 @@ def _place(digest: str, token: str) -> Path:
 
 
 def _newest_first() -> list[Path]:
-    found = [file for file in state_folder().glob(f"*{SUFFIX}") if file.is_file()]
-    return sorted(found, key=lambda file: file.stat().st_mtime, reverse=True)
+    """Kept edits; none where the folder cannot be looked into, and without those that go meanwhile."""
+    found = []
+    with suppress(OSError):
+        for file in state_folder().glob(f"*{SUFFIX}"):
+            with suppress(OSError):
+                found.append((file.stat().st_mtime, file))
+    return [file for _, file in sorted(found, reverse=True)]
