@@ -1,6 +1,7 @@
 # make run    set up what is missing, then open the window on the demo photos
 # make test   set up what is missing, then every check and every test
 # make setup  the set-up alone
+# make portable        a folder that runs without Python, in dist/ (Linux; torch for processors)
 # make torture         100,000 hostile files for every reader of ours (SEED=1, COUNT=100000)
 # make test-machines   every test three times, as three other processors and orders would run it
 #
@@ -30,9 +31,9 @@ APT := install() { \
 	echo "Installing $$*"; \
 	$$add "$$@" >/dev/null 2>&1 || { $$get update >/dev/null && $$add "$$@" >/dev/null; }; }
 
-.PHONY: help setup run test test-machines torture
+.PHONY: help setup run test test-machines torture portable
 help:
-	@sed -n '1,5s/^# //p' Makefile
+	@sed -n '1,6s/^# //p' Makefile
 
 setup: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window $(STAMP)-browser
 
@@ -69,6 +70,16 @@ test-machines: setup
 COUNT ?= 100000
 torture: setup
 	PYTHONHASHSEED=0 OMP_NUM_THREADS=1 $(BIN)/python -m tests.torture.fuzz --seed $(SEED) --count $(COUNT)
+
+# In an environment of its own, so that nothing else is packed; `make test` does not build it.
+PACKING := .venv-portable
+portable: | $(BIN)/python
+	@test -x $(PACKING)/bin/python || $(BIN)/python -m venv $(PACKING)
+	@$(PACKING)/bin/python -m pip install --quiet --disable-pip-version-check --extra-index-url https://download.pytorch.org/whl/cpu torch==2.13.0+cpu
+	@$(PACKING)/bin/python -m pip install --quiet --disable-pip-version-check 'pyinstaller>=6.10' '.[window]'
+	@$(PACKING)/bin/python -m pip uninstall --quiet --yes langflash
+	@PYTHONPATH=$(CURDIR) $(PACKING)/bin/python -m PyInstaller --noconfirm --log-level WARN --workpath build/portable --distpath dist portable/langflash.spec
+	@du -sh dist/langflash
 
 # The newest Python from 3.11 that can make a virtual environment.
 $(BIN)/python:

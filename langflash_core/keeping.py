@@ -70,6 +70,11 @@ def forget(folder: Path) -> None:
         folder.rmdir()
 
 
+def holds_steps(folder: Path) -> bool:
+    """Whether steps were kept in a folder."""
+    return next(folder.glob(f"*{_ENDING}"), None) is not None
+
+
 def _read(path: Path) -> dict[str, np.ndarray] | None:
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:

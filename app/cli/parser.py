@@ -15,6 +15,7 @@ from .words.scenes import (
     add_frames,
     add_hide,
     add_info,
+    add_inventory,
     add_level,
     add_lift,
     add_query,
@@ -69,6 +70,7 @@ def build_parser() -> Parser:
         add_clean,
         add_lift,
         add_level,
+        add_inventory,
         add_info,
         add_bench,
         add_bench_network,
@@ -77,9 +79,9 @@ def build_parser() -> Parser:
         add_train,
         add_eval,
         add_weights,
-        add_words,
         add_desktop,
         add_completion,
+        add_words,
     ):
         add(commands)
     return parser

@@ -90,6 +90,10 @@ class EditingEffects(Effects):
             case SceneArrived():
                 if info is not None and info.num_atoms and marks is not None:
                     self._hands.submit(NameAtoms(info.serial, info.memory, marks))
+            case KeepWords() if info is not None and marks is not None:
+                self._hands.submit(KeepLessons(info.serial, info.memory, marks, config_folder() / WORDS))
+            case TakeWords() if info is not None and marks is not None:
+                self._hands.submit(FindLessons(info.serial, info.memory, marks, config_folder() / WORDS))
             case FillSelection() if info is not None and marks is not None and marks.selected:
                 self._hands.submit(FillHole(info, marks))
             case CopySelection() if info is not None and marks is not None and marks.selected:
@@ -102,10 +106,6 @@ class EditingEffects(Effects):
                 room = before.scene.unhidden
                 arrival = SceneArrived(replace(room.info, history=room.history), room=room, replaces=True)
                 self._hands.perform(arrival)
-            case KeepWords() if info is not None and marks is not None:
-                self._hands.submit(KeepLessons(info.serial, info.memory, marks, config_folder() / WORDS))
-            case TakeWords() if info is not None and marks is not None:
-                self._hands.submit(FindLessons(info.serial, info.memory, marks, config_folder() / WORDS))
             case FindFloaters() if info is not None and marks is not None:
                 self._hands.submit(ScoreFloaters(info.serial, info.memory, marks))
             case _ if info is not None and marks is not None:

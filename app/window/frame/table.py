@@ -146,6 +146,7 @@ def _files() -> Iterable[Entry]:
     reconstruct = show.Instead((show.Reconstruct(),))
     yield Entry("Reconstruct the photos", group, lambda s: reconstruct if s.scene.photos else None)
     yield Entry("Back to the room before", group, _room_before)
+    yield Entry("Pause the reconstruction", group, _pause)
     yield Entry("Cancel the reconstruction", group, lambda s: show.CancelJob() if s.scene.job else None)
     yield Entry(
         "Clear the tray", group, lambda s: show.ClearPhotos() if s.scene.photos and not s.scene.job else None
@@ -158,6 +159,11 @@ def _files() -> Iterable[Entry]:
 def _frames(state: State) -> do.Command | None:
     free = state.opening.film is not None and state.scene.job is None
     return do.ShowDialog(Dialog.FILM) if free else None
+
+
+def _pause(state: State) -> do.Command | None:
+    job = state.scene.job
+    return show.PauseJob() if job is not None and job.pausable and not job.cancelling else None
 
 
 def _room_before(state: State) -> do.Command | None:

@@ -17,7 +17,8 @@ from ..filming.state import NO_FILMING
 from ..state import State
 from .drops import MAX_PHOTOS
 from .memory import SceneMemory
-from .state import MOST_ROOMS, RECONSTRUCTING, RESTORING, Job, Photo, Room, SceneInfo, head_of
+from .state import MOST_ROOMS, PAUSED, RECONSTRUCTING, RESTORING, Job, Photo, Room, SceneInfo, head_of
+from .unfinished import FEWEST
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
@@ -175,7 +176,8 @@ class Reconstruct:
     def apply(self, state: State) -> State:
         if not state.scene.photos:
             return Notify("There is no photo to reconstruct; drop two photos on the window.").apply(state)
-        return state.with_scene(job=Job(RECONSTRUCTING, "starting", started=state.now))
+        pausable = len(state.scene.photos) >= FEWEST
+        return state.with_scene(job=Job(RECONSTRUCTING, "starting", started=state.now, pausable=pausable))
 
 
 @dataclass(frozen=True)
@@ -485,6 +487,30 @@ class CancelJob:
 
 
 @dataclass(frozen=True)
+class PauseJob:
+    """As `CancelJob`, but what is done stays, and the photos in the tray."""
+
+    def apply(self, state: State) -> State:
+        job = state.scene.job
+        if job is None or not job.pausable:
+            return state
+        return state.with_scene(job=replace(job, cancelling=True, pausing=True))
+
+
+@dataclass(frozen=True)
+class WorkFound:
+    """Whether work on these photos was begun and kept."""
+
+    paths: tuple[Path, ...]
+    there: bool
+
+    def apply(self, state: State) -> State:
+        if tuple(photo.path for photo in state.scene.photos) != self.paths:
+            return state
+        return state.with_scene(unfinished=self.paths if self.there else ())
+
+
+@dataclass(frozen=True)
 class Progressed:
     """A stage of the job, 0 to 1; a new stage files the last one with its seconds."""
 
@@ -519,7 +545,11 @@ class JobCancelled:
     """The job ended because the person stopped it."""
 
     def apply(self, state: State) -> State:
-        return Notify("Stopped.", "info").apply(_ended(state))
+        job = state.scene.job
+        if job is None or not job.pausing:
+            return Notify("Stopped.", "info").apply(_ended(state.with_scene(unfinished=())))
+        paths = tuple(photo.path for photo in state.scene.photos)
+        return Notify(PAUSED, "info").apply(state.with_scene(job=None, unfinished=paths))
 
 
 def _ended(state: State) -> State:

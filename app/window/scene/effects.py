@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 
 from langflash_core.colormaps import colour_bar
 from langflash_core.errors import LangFlashError
@@ -32,6 +33,7 @@ from .commands import (
     MergeScene,
     OpenPaths,
     OpenScene,
+    PauseJob,
     Reconstruct,
     SaveScene,
     SceneArrived,
@@ -41,10 +43,13 @@ from .commands import (
 )
 from .drops import sort_drop
 from .state import WHOLE, WHOLE_PHOTOS, SceneInfo
+from .unfinished import FEWEST
 from .work import (
+    DropWork,
     FindPair,
     JoinScenes,
     LoadScene,
+    LookForWork,
     MakeThumbnails,
     ReconstructPhotos,
     ShrinkPhotos,
@@ -81,8 +86,14 @@ class SceneEffects(Effects):
                 submit(LoadScene(path, edits, alone))
             case SaveScene(path) if state.scene.info is not None:
                 submit(WriteScene(state.scene.info.scene, path, state.editing.marks))
-            case CancelJob():
+            case CancelJob() | PauseJob():
                 self._hands.cancel()
+                if (
+                    isinstance(command, CancelJob)
+                    and before.scene.job is not None
+                    and before.scene.job.pausable
+                ):
+                    submit(DropWork(_paths(before)))
             case ChoosePair() if state.scene.choosing and not before.scene.choosing:
                 submit(FindPair(tuple(photo.path for photo in state.scene.photos)))
             case SceneArrived(info):
@@ -95,6 +106,8 @@ class SceneEffects(Effects):
                 self._hands.dispatch(Loaded())
             case _:
                 self._go_on(command, before, state)
+        if _paths(before) != _paths(state) and len(state.scene.photos) >= FEWEST and state.scene.job is None:
+            submit(LookForWork(_paths(state)))
         self._show_whole(before, state)
 
     def _go_on(self, command: Command, before: State, state: State) -> None:
@@ -168,3 +181,8 @@ class SceneEffects(Effects):
         for colormap in COLOUR_MAPS:
             self._thumbnails.put(f"bar {colormap}", colour_bar(colormap))
         self._entitle(f"{info.name} - LangFlash")
+
+
+def _paths(state: State) -> tuple[Path, ...]:
+    """Of the photos in the tray."""
+    return tuple(photo.path for photo in state.scene.photos)

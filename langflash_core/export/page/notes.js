@@ -36,7 +36,7 @@ class Notes {
     button.append(text);
     const item = element("li", "", note.to ? { class: "measure" } : {});
     item.append(button);
-    const line = note.to && document.createElementNS("http://www.w3.org/2000/svg", "line");
+    const line = note.to && document.createElementNS(this.lines.namespaceURI, "line");
     const label = { note, item, button, line, sees: true, whole, text };
     button.addEventListener("click", () => this.press(label));
     button.addEventListener("focus", () => label.away && this.reached(note));
