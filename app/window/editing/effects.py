@@ -9,12 +9,12 @@ from ..commands import Command, Notify
 from ..effects import Effects, Hands
 from ..places import config_folder
 from ..scene.commands import SceneArrived
-from ..scene.mended import FillHole, HidePart
+from ..scene.mended import CopyPart, FillHole, HidePart
 from ..scene.state import Room, SceneInfo
 from ..state import State
 from ..viewport import Viewport
 from .commands import FindFloaters, StopWaiting
-from .mending import BringBack, FillSelection, HiddenForGood, HideForGood, RememberUnhidden
+from .mending import BringBack, CopySelection, FillSelection, HiddenForGood, HideForGood, RememberUnhidden
 from .pointing import CardOpened, Named, ReadingTaken, RulerPlaced
 from .state import Reading, Tool
 from .teaching import WORDS, KeepWords, TakeWords
@@ -96,6 +96,8 @@ class EditingEffects(Effects):
                 self._hands.submit(FindLessons(info.serial, info.memory, marks, config_folder() / WORDS))
             case FillSelection() if info is not None and marks is not None and marks.selected:
                 self._hands.submit(FillHole(info, marks))
+            case CopySelection() if info is not None and marks is not None and marks.selected:
+                self._hands.submit(CopyPart(info, marks))
             case HideForGood(how) if info is not None and marks is not None and marks.selected:
                 self._hands.submit(HidePart(info, marks, how))
             case HiddenForGood() if command.fits(before):
