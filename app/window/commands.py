@@ -7,25 +7,20 @@ after its pure change. Times come from `state.now`.
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
 from langflash_core.geometry import poses
 
-from .asking.state import PROMPT_DIALOGS, PROMPTS_SUFFIX
+from .asking.state import PROMPTS_SUFFIX
+from .dialogs import Dialog
+from .protocol import Command as Command
 from .scene import samples
-from .scene.drops import SCENE_SUFFIX
+from .scene.drops import SCENE_SUFFIX, There, Typed
 from .scene.state import FLIGHT_SECONDS
 from .state import MOST_LINES, NO_PALETTE, TOAST_SECONDS, Line, Palette, State, Stats, Toast
 
 NOTHING_TO_SAVE = "There is no scene to save; drop photos on the window first."
-
-
-class Command(Protocol):
-    """Anything with a pure change of state."""
-
-    def apply(self, state: State) -> State: ...
 
 
 def apply(state: State, command: Command) -> State:
@@ -42,7 +37,7 @@ class OfScene:
 
     def holds(self, state: State) -> bool:
         """Whether its scene is on show; 0 is the number of no scene."""
-        return self.serial == (state.info.serial if state.info else 0)
+        return self.serial == (state.scene.info.serial if state.scene.info else 0)
 
     def apply(self, state: State) -> State:
         return self.command.apply(state) if self.holds(state) else state
@@ -56,16 +51,18 @@ class Tick:
 
     def apply(self, state: State) -> State:
         toasts = tuple(t for t in state.toasts if t.until > self.now)
-        pose, flight = state.pose, state.flight
+        pose, flight = state.scene.pose, state.scene.flight
         if flight is not None:
             fraction = (self.now - flight.began) / FLIGHT_SECONDS
             pose = poses.blend(flight.start, flight.end, fraction)
             flight = flight if fraction < 1.0 else None
-        tour = state.tour
+        tour = state.filming.tour
         if tour is not None:
             there = tour.at(self.now)
             pose, tour = (tour.poses[-1], None) if there is None else (there, tour)
-        return replace(state, now=self.now, toasts=toasts, pose=pose, flight=flight, tour=tour)
+        return replace(
+            state.with_scene(pose=pose, flight=flight).with_filming(tour=tour), now=self.now, toasts=toasts
+        )
 
 
 @dataclass(frozen=True)
@@ -126,17 +123,17 @@ class ShowPicture:
 
 @dataclass(frozen=True)
 class ShowDialog:
-    """`which` is a key of `frame.dialogs.TITLES`; None closes. Nothing waits for an answer any more."""
+    """None closes the one that is open. Nothing waits for an answer any more."""
 
-    which: str | None
+    which: Dialog | None
 
     def apply(self, state: State) -> State:
-        if self.which == "save" and state.info is None:
+        if self.which is Dialog.SAVE and state.scene.info is None:
             return Notify(NOTHING_TO_SAVE).apply(state)
-        path = str(_place_to_save(state)) if self.which == "save" else ""
-        if self.which in PROMPT_DIALOGS:
+        path = str(_place_to_save(state)) if self.which is Dialog.SAVE else ""
+        if self.which in (Dialog.SAVE_PROMPTS, Dialog.LOAD_PROMPTS):
             path = str(state.asking.prompts_path or Path.home() / f"my{PROMPTS_SUFFIX}")
-        return replace(state, dialog=self.which, dialog_path=path, palette=NO_PALETTE, pending=())
+        return replace(state.with_scene(pending=()), dialog=self.which, typed=Typed(path), palette=NO_PALETTE)
 
 
 @dataclass(frozen=True)
@@ -146,7 +143,18 @@ class EditDialogPath:
     path: str
 
     def apply(self, state: State) -> State:
-        return replace(state, dialog_path=self.path)
+        return replace(state, typed=Typed(self.path))
+
+
+@dataclass(frozen=True)
+class LookedUp:
+    """What the disk has at the path that is typed."""
+
+    text: str
+    there: There
+
+    def apply(self, state: State) -> State:
+        return replace(state, typed=Typed(self.text, self.there)) if state.typed.text == self.text else state
 
 
 @dataclass(frozen=True)
@@ -166,9 +174,9 @@ class Leave:
     sure: bool = False
 
     def apply(self, state: State) -> State:
-        unsaved = state.info is not None and state.info.path is None
+        unsaved = state.scene.info is not None and state.scene.info.path is None
         if unsaved and not self.sure:
-            return replace(state, dialog="leave")
+            return replace(state, dialog=Dialog.LEAVE)
         return replace(state, leaving=True, dialog=None)
 
 
@@ -192,6 +200,6 @@ class Measured:
 
 def _place_to_save(state: State) -> Path:
     """The scene's own file, or one beside its photos."""
-    if state.info is not None and state.info.path is not None:
-        return state.info.path
-    return samples.beside(state.photos).with_suffix(SCENE_SUFFIX)
+    if state.scene.info is not None and state.scene.info.path is not None:
+        return state.scene.info.path
+    return samples.beside(state.scene.photos).with_suffix(SCENE_SUFFIX)

@@ -42,6 +42,7 @@ from .rest import RestEffects
 from .scene.commands import OpenPaths
 from .scene.effects import SceneEffects
 from .state import State, Stats
+from .typed import TypedEffects
 from .viewport import Viewport
 from .worker import Worker
 
@@ -110,6 +111,7 @@ class Session:
             ExportingEffects(hands, keeper),
             FilmingEffects(hands),
             LogEffects(hands),
+            TypedEffects(hands),
             RestEffects(hands),
         )
         opening.begin()
@@ -210,13 +212,13 @@ class Session:
     @property
     def _flying(self) -> bool:
         """Whether the camera moves by itself."""
-        return self.state.flight is not None or self.state.tour is not None
+        return self.state.scene.flight is not None or self.state.filming.tour is not None
 
     def _due(self, now: float) -> bool:
         """Whether the next frame would show something new."""
         blink = imgui.get_io().want_text_input and now - self.state.now >= BLINK_SECONDS
         expired = any(t.until <= now for t in self.state.toasts)
-        working = self.state.job is not None and now - self.state.now >= 0.1
+        working = self.state.scene.job is not None and now - self.state.now >= 0.1
         settle = now >= self._viewport_wants
         return self._busy or self._flying or blink or expired or working or settle
 
@@ -229,7 +231,7 @@ class Session:
         moments += [t.until for t in self.state.toasts]
         if imgui.get_io().want_text_input:
             moments.append(self.state.now + BLINK_SECONDS)
-        if self.state.job is not None:
+        if self.state.scene.job is not None:
             moments.append(self.state.now + 0.1)
         return min(max(min(moments) - now, 0.0), LONGEST_NAP)
 

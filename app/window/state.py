@@ -1,22 +1,21 @@
 """Everything the window shows, as one frozen value. Commands make the next one; panels read it."""
 
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any
 
-from langflash_core import pictures
 from langflash_core.colormaps import HeatColours
-from langflash_core.geometry.poses import START, Pose
-from langflash_core.pictures import Picture
+from langflash_core.geometry.poses import Pose
 
-from .asking.state import FIRST_PROMPT, NO_ASKING, Asking, Prompt, usable
+from .asking.state import NO_ASKING, Asking
+from .dialogs import Dialog
 from .editing.state import NO_EDITING, Editing
 from .exporting.state import NO_EXPORTING, Exporting
-from .filming.state import Tour, read
+from .filming.state import NO_FILMING, Filming, read
 from .opening.state import NO_OPENING, Opening
 from .recovery.preferences import DEFAULTS, Preferences
 from .recovery.state import NO_RECOVERY, Recovery
-from .scene.state import Flight, Job, Photo, Room, SceneInfo
+from .scene.drops import NOT_TYPED, Typed
+from .scene.state import NO_SCENE, Showing
 
 TOAST_SECONDS = {"info": 5.0, "error": 20.0}
 MOST_LINES = 300
@@ -72,48 +71,54 @@ NO_PALETTE = Palette()
 
 @dataclass(frozen=True)
 class State:
-    """The whole program.
+    """The whole program: what belongs to no feature, and of every feature its half.
 
-    now: seconds of the session's clock, set at the start of a frame. aside: photos of the scene on show while
-    those of a new room are in the tray. choosing: the best pair is being looked
-    for. tour: a flight along the key frames. view: of the photo stood at, if any. compare: where the photo
-    begins, 0 to 1 across the picture; None: not compared. negatives: the person's own; none: those of the
-    scene. lines: the log, oldest first. rooms: scenes that were on show before, the last one first. dropped:
-    photos while it is asked where they belong. pending: commands that wait for an answer about unsaved edits.
+    now: seconds of the session's clock, set at the start of a frame. next_key: of a toast or a prompt. typed:
+    in the open dialog's field for a path. lines: the log, oldest first.
     """
 
     now: float = 0.0
-    photos: tuple[Photo, ...] = ()
-    aside: tuple[Photo, ...] | None = None
-    choosing: bool = False
-    info: SceneInfo | None = None
-    rooms: tuple[Room, ...] = ()
-    dropped: tuple[Path, ...] = ()
-    pending: tuple[Any, ...] = ()
-    prompts: tuple[Prompt, ...] = (FIRST_PROMPT,)
-    active: int = 0
-    negatives: tuple[str, ...] = ()
-    mode: Picture = pictures.RGB
-    pose: Pose = START
-    flight: Flight | None = None
-    tour: Tour | None = None
-    view: int | None = None
-    compare: float | None = None
-    job: Job | None = None
-    toasts: tuple[Toast, ...] = ()
     next_key: int = 1
-    dialog: str | None = None
-    dialog_path: str = ""
+    dialog: Dialog | None = None
+    typed: Typed = NOT_TYPED
     palette: Palette = NO_PALETTE
+    toasts: tuple[Toast, ...] = ()
+    lines: tuple[Line, ...] = ()
     stats: Stats = NO_STATS
-    editing: Editing = NO_EDITING
+    leaving: bool = False
+    preferences: Preferences = DEFAULTS
+    scene: Showing = NO_SCENE
     asking: Asking = NO_ASKING
+    editing: Editing = NO_EDITING
+    filming: Filming = NO_FILMING
     exporting: Exporting = NO_EXPORTING
     opening: Opening = NO_OPENING
     recovery: Recovery = NO_RECOVERY
-    preferences: Preferences = DEFAULTS
-    lines: tuple[Line, ...] = ()
-    leaving: bool = False
+
+    # The state with another half; `changes` are that half's fields
+
+    def with_scene(self, **changes: Any) -> "State":
+        return replace(self, scene=replace(self.scene, **changes))
+
+    def with_asking(self, **changes: Any) -> "State":
+        return replace(self, asking=replace(self.asking, **changes))
+
+    def with_editing(self, **changes: Any) -> "State":
+        return replace(self, editing=replace(self.editing, **changes))
+
+    def with_filming(self, **changes: Any) -> "State":
+        return replace(self, filming=replace(self.filming, **changes))
+
+    def with_exporting(self, **changes: Any) -> "State":
+        return replace(self, exporting=replace(self.exporting, **changes))
+
+    def with_opening(self, **changes: Any) -> "State":
+        return replace(self, opening=replace(self.opening, **changes))
+
+    def with_recovery(self, **changes: Any) -> "State":
+        return replace(self, recovery=replace(self.recovery, **changes))
+
+    # What follows from several halves
 
     @property
     def keys(self) -> tuple[Pose, ...]:
@@ -126,17 +131,6 @@ class State:
         return self.editing.marks.metric_scale if self.editing.marks else None
 
     @property
-    def asked(self) -> tuple[Prompt, ...]:
-        """Prompts to answer: visible ones that say something whole."""
-        return tuple(p for p in self.prompts if p.visible and usable(p.text))
-
-    @property
-    def active_prompt(self) -> Prompt | None:
-        """The prompt whose heat-map is on show: the active one, or else the first that is asked."""
-        asked = self.asked
-        return next((p for p in asked if p.key == self.active), asked[0] if asked else None)
-
-    @property
     def heat_colours(self) -> HeatColours:
         """How heat-maps are coloured, here and in files."""
         return HeatColours(self.preferences.colormap, self.asking.span)
@@ -145,5 +139,6 @@ class State:
     def wants_maps(self) -> bool:
         """Whether the picture needs the weight maps and not only colour and depth: to show them, or
         for a phrase that has no score yet."""
-        waiting = any(prompt.score is None for prompt in self.asked)
-        return self.mode.maps or waiting or (self.mode.answers and bool(self.asked))
+        asked, mode = self.asking.asked, self.scene.mode
+        waiting = any(prompt.score is None for prompt in asked)
+        return mode.maps or waiting or (mode.answers and bool(asked))

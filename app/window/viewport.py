@@ -22,6 +22,7 @@ from .drawing.marked import Marked
 from .drawing.picture import ScenePicture
 from .drawing.values import Stand, View
 from .editing.state import Point, Reading
+from .scene.memory import SceneMemory
 from .state import State
 
 if TYPE_CHECKING:
@@ -106,16 +107,20 @@ class Viewport:
             self.picture.ask(keys, query, lapses)
 
     def mark(
-        self, scene: "Scene | None", marks: Marks | None, doomed: Mask | None, gesture: Change | None = None
+        self,
+        memory: SceneMemory | None,
+        marks: Marks | None,
+        doomed: Mask | None,
+        gesture: Change | None = None,
     ) -> None:
         """Show the scene as marked: without what is deleted or hidden, the selection in a tint, things where
         they were moved to.
 
         doomed: what a preview would delete, in another tint. gesture: a change under way.
         """
-        if self.picture is None or marks is None or scene is None:
+        if self.picture is None or marks is None or memory is None:
             return
-        marked = Marked(scene, marks, doomed, gesture)
+        marked = Marked(memory, marks, doomed, gesture)
         if marked != self.picture.easel.marked:
             self._adjusting = gesture is not None
             self.picture.mark(marked)
@@ -137,11 +142,11 @@ class Viewport:
         size: of the panel in framebuffer pixels. touched: when the last key or pointer event came,
         on the clock of `state.now`.
         """
-        if self.picture is None or state.info is None or min(size) < 8:
+        if self.picture is None or state.scene.info is None or min(size) < 8:
             return float("inf")
-        if (state.pose, size) != (self._stand.pose, self._stand.size) or self._adjusting:
+        if (state.scene.pose, size) != (self._stand.pose, self._stand.size) or self._adjusting:
             self._adjusting = False
-            self._stand = Stand(state.pose, size, state.now)
+            self._stand = Stand(state.scene.pose, size, state.now)
         if self._fresh:  # to take a scene took a frame's time
             self._fresh = False
             return 0.0

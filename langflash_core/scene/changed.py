@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
-from weakref import ref
 
 import torch
 from torch import Tensor
@@ -39,11 +38,9 @@ def changed(gaussians: Gaussians, changes: Iterable[Change], rows: Tensor | None
 def changed_scene(scene: Scene, marks: Marks, more: Change | None = None) -> Scene:
     """The scene with its Gaussians as the marks changed them, every one still in its row.
 
-    more: a change that is not in the marks yet. The last two results are kept as long as their scene, since
-    every question about a moved scene begins with it.
+    more: a change that is not in the marks yet.
     """
-    gaussians = _kept(scene.gaussians, marks.changes) if marks.changes else scene.gaussians
-    gaussians = changed(gaussians, () if more is None else (more,))
+    gaussians = changed(scene.gaussians, (*marks.changes, *(() if more is None else (more,))))
     return scene if gaussians is scene.gaussians else replace(scene, gaussians=gaussians)
 
 
@@ -55,26 +52,6 @@ def mean_luma(gaussians: Gaussians, rows: Tensor) -> float:
     weights = some.opacities.double()
     total = float(weights.sum())
     return float((luma * weights).sum()) / total if total > 0 else 0.0
-
-
-_last: list[tuple[ref[Gaussians], tuple[Change, ...], Gaussians]] = []
-
-
-def _kept(gaussians: Gaussians, changes: tuple[Change, ...]) -> Gaussians:
-    """`changed`, going on from a result that is still there where it is the beginning of this one."""
-    best, start = (), gaussians
-    for source, done, result in tuple(_last):  # any thread may ask
-        if source() is gaussians and len(done) >= len(best) and changes[: len(done)] == done:
-            best, start = done, result
-    made = changed(start, changes[len(best) :])
-    if len(best) < len(changes) and made is not gaussians:
-        _last[:] = [*_last[-1:], (ref(gaussians, _forget), changes, made)]
-    return made
-
-
-def _forget(source: ref[Gaussians]) -> None:
-    """What was made of Gaussians goes with them."""
-    _last[:] = [each for each in _last if each[0] is not source]
 
 
 def _moved(gaussians: Gaussians, chosen: Tensor, change: Moved) -> Gaussians:

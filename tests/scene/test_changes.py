@@ -1,9 +1,7 @@
 """Gaussians moved and recoloured, against a float64 twin; two scenes as one; a history with an end."""
 
-import gc
 import subprocess
 import sys
-import weakref
 from dataclasses import replace
 from pathlib import Path
 
@@ -109,19 +107,6 @@ def test_turns_against_the_formulas_of_quaternions() -> None:
 def test_who_turns_nothing_waits_for_no_scipy() -> None:
     code = "import sys, langflash_core.scene.edits; sys.exit('scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
-
-
-def test_what_was_computed_of_a_scene_goes_with_it() -> None:
-    scene = wide_cloud()
-    first = changed_scene(scene, edited(scene, a_move(some_rows())).marks)
-    again = changed_scene(scene, edited(scene, a_move(some_rows())).marks)
-    assert again.gaussians is first.gaussians  # it is remembered
-    kept = weakref.ref(first.gaussians)
-    del first, again
-    assert kept() is not None
-    del scene
-    gc.collect()
-    assert kept() is None
 
 
 def test_what_the_camera_moves_along_with_looks_the_same() -> None:

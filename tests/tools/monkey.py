@@ -134,7 +134,7 @@ def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
             frames, latest = frames + 1, max(latest, session.lag)
         if asked.is_set():
             asked.clear()
-            for prompt in session.state.prompts:
+            for prompt in session.state.asking.prompts:
                 session.dispatch(ask.RemovePrompt(prompt.key))
             session.dispatch(camera.SetMode(pictures.RGB))
             glfw.set_window_size(session._window, width, height)
@@ -145,13 +145,13 @@ def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
                 "frames": frames,
                 "latest": latest,
                 "rss": resident_mb(os.getpid()),
-                "rooms": held_mb(state.rooms) if state.rooms else 0.0,
-                "scene": state.info.serial if state.info and state.job is None else None,
-                "gaussians": state.info.num_gaussians if state.info else 0,
+                "rooms": held_mb(state.scene.rooms) if state.scene.rooms else 0.0,
+                "scene": state.scene.info.serial if state.scene.info and state.scene.job is None else None,
+                "gaussians": state.scene.info.num_gaussians if state.scene.info else 0,
                 "unexpected": [t.text for t in state.toasts if "unexpected" in t.text],
                 "gl_errors": session.gl_errors,
-                "dialog": state.dialog,
-                "job": None if state.job is None else state.job.stage,
+                "dialog": None if state.dialog is None else state.dialog.name,
+                "job": None if state.scene.job is None else state.scene.job.stage,
                 "discard": next((now[name][0] for name in SURE if now.get(name)), None),
             }
             sys.stdout.write(json.dumps(line) + "\n")
@@ -167,8 +167,8 @@ def _see_everything(session: Session) -> None:
         while time.monotonic() < end and not until():
             session.step(0.25)
 
-    goes_on(PATIENCE, lambda: session.state.info is not None)
-    session.dispatch(ask.EditPrompt(session.state.prompts[0].key, "plant"))
+    goes_on(PATIENCE, lambda: session.state.scene.info is not None)
+    session.dispatch(ask.EditPrompt(session.state.asking.prompts[0].key, "plant"))
     for mode in PICTURES:
         session.dispatch(camera.SetMode(mode))
         goes_on(MODE_SECONDS, lambda: False)
@@ -176,7 +176,7 @@ def _see_everything(session: Session) -> None:
         session.dispatch(camera.Orbit(turn, 0.0))
         session.dispatch(film.AddKey())
     session.dispatch(film.Preview())
-    goes_on(PATIENCE, lambda: session.state.tour is not None)
+    goes_on(PATIENCE, lambda: session.state.filming.tour is not None)
     session.dispatch(film.StopTour())
     session.dispatch(film.ClearKeys())
     session.dispatch(camera.SetMode(pictures.RGB))

@@ -73,8 +73,10 @@ class Guide:
 
         def settled() -> bool:
             state = self.session.state
-            answered = all(prompt.score is not None for prompt in state.asked) or not state.mode.answers
-            quiet = not (state.job or state.flight or state.editing.waiting)
+            answered = (
+                all(prompt.score is not None for prompt in state.asking.asked) or not state.scene.mode.answers
+            )
+            quiet = not (state.scene.job or state.scene.flight or state.editing.waiting)
             return quiet and answered and state.stats.picture_size == full
 
         self.steps(1.0)
@@ -92,7 +94,7 @@ class Guide:
 
     @property
     def keys(self) -> list[int]:
-        return [prompt.key for prompt in self.session.state.prompts]
+        return [prompt.key for prompt in self.session.state.asking.prompts]
 
     def ask(self, *phrases: str) -> None:
         """These phrases instead of the present ones."""
@@ -173,7 +175,7 @@ def dictionary(guide: Guide, folder: Path) -> None:
 
 
 def trust(guide: Guide, folder: Path) -> None:
-    aside = poses.orbit(guide.session.state.pose, 0.35, -0.1)
+    aside = poses.orbit(guide.session.state.scene.pose, 0.35, -0.1)
     guide.tell(camera.SetMode(pictures.COVERAGE), camera.MoveTo(aside))
     guide.rest()
     write_picture(guide.screen(), folder / "tour_trust.png")
@@ -210,7 +212,7 @@ def main() -> int:
         guide = Guide(display)
         recovery(guide, folder)
         guide.tell(show.OpenPaths(tuple(map(str, PHOTOS))))
-        guide.until(lambda: guide.session.state.info is not None, "the scene")
+        guide.until(lambda: guide.session.state.scene.info is not None, "the scene")
         for each in wanted:
             each(guide, folder)
         guide.close()

@@ -16,15 +16,10 @@ if TYPE_CHECKING:
     from langflash_core.language.relevance import CompiledQuery
 
 
-def change(state: State, **changes) -> State:
-    """The state with another asking half."""
-    return replace(state, asking=replace(state.asking, **changes))
-
-
 def lapsed(state: State) -> State:
     """The state without scores: the Gaussians, the atoms or the negatives that they rest on are others."""
-    prompts = tuple(replace(p, score=None) for p in state.prompts)
-    return change(replace(state, prompts=prompts), histograms=(), lapses=state.asking.lapses + 1)
+    prompts = tuple(replace(p, score=None) for p in state.asking.prompts)
+    return state.with_asking(prompts=prompts).with_asking(histograms=(), lapses=state.asking.lapses + 1)
 
 
 # Phrases
@@ -35,12 +30,12 @@ class AddPrompt:
     """A new, empty row in a colour of its own, where the next letters go."""
 
     def apply(self, state: State) -> State:
-        used = {p.colour for p in state.prompts}
-        free = [c for c in PALETTE if c not in used] or [PALETTE[len(state.prompts) % len(PALETTE)]]
+        used = {p.colour for p in state.asking.prompts}
+        free = [c for c in PALETTE if c not in used] or [PALETTE[len(state.asking.prompts) % len(PALETTE)]]
         prompt = Prompt(state.next_key, colour=free[0])
-        prompts = (*state.prompts, prompt)
-        state = replace(state, prompts=prompts, active=prompt.key, next_key=state.next_key + 1)
-        return change(state, caret=prompt.key)
+        prompts = (*state.asking.prompts, prompt)
+        state = replace(state.with_asking(prompts=prompts, active=prompt.key), next_key=state.next_key + 1)
+        return state.with_asking(caret=prompt.key)
 
 
 @dataclass(frozen=True)
@@ -50,10 +45,10 @@ class NextPrompt:
     key: int
 
     def apply(self, state: State) -> State:
-        empty = next((p for p in state.prompts if not p.text.strip() and p.key != self.key), None)
+        empty = next((p for p in state.asking.prompts if not p.text.strip() and p.key != self.key), None)
         if empty is not None:
-            return change(replace(state, active=empty.key), caret=empty.key)
-        return state if len(state.prompts) >= MOST_PROMPTS else AddPrompt().apply(state)
+            return state.with_asking(active=empty.key).with_asking(caret=empty.key)
+        return state if len(state.asking.prompts) >= MOST_PROMPTS else AddPrompt().apply(state)
 
 
 @dataclass(frozen=True)
@@ -61,8 +56,10 @@ class FocusPhrase:
     """The next letters go to the active phrase."""
 
     def apply(self, state: State) -> State:
-        chosen = next((p for p in state.prompts if p.key == state.active), state.prompts[0])
-        return change(state, caret=chosen.key)
+        chosen = next(
+            (p for p in state.asking.prompts if p.key == state.asking.active), state.asking.prompts[0]
+        )
+        return state.with_asking(caret=chosen.key)
 
 
 @dataclass(frozen=True)
@@ -70,7 +67,7 @@ class CaretTaken:
     """The field has the keys."""
 
     def apply(self, state: State) -> State:
-        return change(state, caret=None)
+        return state.with_asking(caret=None)
 
 
 @dataclass(frozen=True)
@@ -80,12 +77,12 @@ class RemovePrompt:
     key: int
 
     def apply(self, state: State) -> State:
-        prompts = tuple(p for p in state.prompts if p.key != self.key)
+        prompts = tuple(p for p in state.asking.prompts if p.key != self.key)
         if not prompts:
             prompts = (Prompt(state.next_key),)
             state = replace(state, next_key=state.next_key + 1)
-        active = state.active if any(p.key == state.active for p in prompts) else prompts[0].key
-        return _with_prompts(replace(state, active=active), prompts)
+        active = state.asking.active if any(p.key == state.asking.active for p in prompts) else prompts[0].key
+        return _with_prompts(state.with_asking(active=active), prompts)
 
 
 @dataclass(frozen=True)
@@ -99,9 +96,9 @@ class EditPrompt:
         after = _change_prompt(
             state, self.key, text=self.text, score=None, like=b"", place=None, foreign=False
         )
-        first = not state.asked and bool(after.asked)
-        mode = pictures.HEAT if first and state.mode is pictures.RGB else after.mode
-        return change(replace(after, mode=mode, active=self.key), named=False)
+        first = not state.asking.asked and bool(after.asking.asked)
+        mode = pictures.HEAT if first and state.scene.mode is pictures.RGB else after.scene.mode
+        return after.with_scene(mode=mode).with_asking(active=self.key).with_asking(named=False)
 
 
 @dataclass(frozen=True)
@@ -134,9 +131,9 @@ class SetSpan:
 
     def apply(self, state: State) -> State:
         if self.span is None:
-            return change(state, span=None)
+            return state.with_asking(span=None)
         low, high = sorted(min(max(end, 0.0), 1.0) for end in self.span)
-        return change(state, span=(min(low, 1 - LEAST_SPAN), max(high, low + LEAST_SPAN)))
+        return state.with_asking(span=(min(low, 1 - LEAST_SPAN), max(high, low + LEAST_SPAN)))
 
 
 @dataclass(frozen=True)
@@ -157,7 +154,7 @@ class SelectPrompt:
     key: int
 
     def apply(self, state: State) -> State:
-        return replace(state, active=self.key)
+        return state.with_asking(active=self.key)
 
 
 @dataclass(frozen=True)
@@ -167,7 +164,7 @@ class SetNegatives:
     negatives: tuple[str, ...]
 
     def apply(self, state: State) -> State:
-        return lapsed(replace(state, negatives=self.negatives))
+        return lapsed(state.with_asking(negatives=self.negatives))
 
 
 @dataclass(frozen=True)
@@ -181,7 +178,7 @@ class Remember:
         if not text:
             return state
         others = (t for t in state.asking.recent if t != text)
-        return change(state, recent=(text, *others)[:MOST_RECENT])
+        return state.with_asking(recent=(text, *others)[:MOST_RECENT])
 
 
 @dataclass(frozen=True)
@@ -191,10 +188,10 @@ class AskAgain:
     text: str
 
     def apply(self, state: State) -> State:
-        empty = next((p for p in state.prompts if not p.text.strip()), None)
-        if empty is None and len(state.prompts) >= MOST_PROMPTS:
+        empty = next((p for p in state.asking.prompts if not p.text.strip()), None)
+        if empty is None and len(state.asking.prompts) >= MOST_PROMPTS:
             return state
-        prompts, key = state.prompts, state.next_key
+        prompts, key = state.asking.prompts, state.next_key
         if empty is None:
             used = {p.colour for p in prompts}
             colour = next((c for c in PALETTE if c not in used), PALETTE[len(prompts) % len(PALETTE)])
@@ -204,9 +201,13 @@ class AskAgain:
             key = empty.key
             asked = replace(empty, text=self.text, score=None, visible=True)
             prompts = tuple(asked if p.key == key else p for p in prompts)
-        mode = pictures.HEAT if state.mode is pictures.RGB and not state.asked else state.mode
-        after = replace(state, prompts=prompts, active=key, mode=mode, next_key=state.next_key + 1)
-        return Remember(self.text).apply(change(after, named=False))
+        mode = (
+            pictures.HEAT if state.scene.mode is pictures.RGB and not state.asking.asked else state.scene.mode
+        )
+        after = replace(
+            state.with_asking(prompts=prompts, active=key).with_scene(mode=mode), next_key=state.next_key + 1
+        )
+        return Remember(self.text).apply(after.with_asking(named=False))
 
 
 @dataclass(frozen=True)
@@ -216,7 +217,7 @@ class SavePrompts:
     path: Path
 
     def apply(self, state: State) -> State:
-        return replace(change(state, prompts_path=self.path), dialog=None)
+        return replace(state.with_asking(prompts_path=self.path), dialog=None)
 
 
 @dataclass(frozen=True)
@@ -237,21 +238,19 @@ class PromptsRead:
     chosen: PromptSet
 
     def apply(self, state: State) -> State:
-        first, calibrated = state.next_key, state.prompts[0].calibrated
+        first, calibrated = state.next_key, state.asking.prompts[0].calibrated
         prompts = tuple(
             replace(p, key=first + place, calibrated=calibrated)
             for place, p in enumerate(self.chosen.prompts)
         )
-        mode = pictures.LABELS if state.mode is pictures.RGB else state.mode
+        mode = pictures.LABELS if state.scene.mode is pictures.RGB else state.scene.mode
         state = replace(
-            state,
-            prompts=prompts,
-            active=first,
+            state.with_asking(
+                prompts=prompts, active=first, negatives=self.chosen.negatives or state.asking.negatives
+            ).with_scene(mode=mode),
             next_key=first + len(prompts),
-            negatives=self.chosen.negatives or state.negatives,
-            mode=mode,
         )
-        return change(state, prompts_path=self.path)
+        return state.with_asking(prompts_path=self.path)
 
 
 # Answers
@@ -271,7 +270,7 @@ class Answered:
     def apply(self, state: State) -> State:
         if self.lapses != state.asking.lapses:
             return state
-        current = {p.key: p.text.strip() for p in state.prompts}
+        current = {p.key: p.text.strip() for p in state.asking.prompts}
         for (key, text, score), place in zip_longest(self.scores, self.places):
             if current.get(key) == text:
                 state = _change_prompt(state, key, score=score, place=place)
@@ -285,7 +284,9 @@ class Calibrated:
     threshold: float
 
     def apply(self, state: State) -> State:
-        return _with_prompts(state, tuple(replace(p, calibrated=self.threshold) for p in state.prompts))
+        return _with_prompts(
+            state, tuple(replace(p, calibrated=self.threshold) for p in state.asking.prompts)
+        )
 
 
 @dataclass(frozen=True)
@@ -302,7 +303,7 @@ class PhrasesCompiled:
         state = Calibrated(self.query.threshold).apply(state)
         for key in self.keys:
             state = _change_prompt(state, key, foreign=key in self.foreign)
-        return state if state.negatives else change(state, usual=self.query.negative_texts)
+        return state if state.asking.negatives else state.with_asking(usual=self.query.negative_texts)
 
 
 @dataclass(frozen=True)
@@ -315,7 +316,7 @@ class Binned:
     def apply(self, state: State) -> State:
         if self.lapses != state.asking.lapses:
             return state
-        return change(state, histograms=self.histograms)
+        return state.with_asking(histograms=self.histograms)
 
 
 @dataclass(frozen=True)
@@ -325,7 +326,7 @@ class NameThings:
     named: bool
 
     def apply(self, state: State) -> State:
-        return change(state, named=self.named and state.info is not None)
+        return state.with_asking(named=self.named and state.scene.info is not None)
 
 
 # The dictionary
@@ -349,7 +350,7 @@ class AtomsDescribed:
     insight: Insight
 
     def apply(self, state: State) -> State:
-        return change(state, insight=self.insight)
+        return state.with_asking(insight=self.insight)
 
 
 @dataclass(frozen=True)
@@ -364,7 +365,7 @@ class AtomsWeighed:
         if insight is None:
             return state
         places = self.places or insight.places
-        return change(state, insight=replace(insight, shares=self.shares, places=places))
+        return state.with_asking(insight=replace(insight, shares=self.shares, places=places))
 
 
 @dataclass(frozen=True)
@@ -374,9 +375,9 @@ class ShowAtom:
     atom: int
 
     def apply(self, state: State) -> State:
-        if state.info is None or not 0 <= self.atom < state.info.num_atoms:
+        if state.scene.info is None or not 0 <= self.atom < state.scene.info.num_atoms:
             return state
-        return replace(change(state, atom=self.atom), mode=pictures.WEIGHT)
+        return state.with_asking(atom=self.atom).with_scene(mode=pictures.WEIGHT)
 
 
 @dataclass(frozen=True)
@@ -388,7 +389,7 @@ class ChooseAtom:
 
     def apply(self, state: State) -> State:
         others = tuple(k for k in state.asking.chosen if k != self.atom)
-        return change(state, chosen=(*others, self.atom) if self.chosen else others)
+        return state.with_asking(chosen=(*others, self.atom) if self.chosen else others)
 
 
 @dataclass(frozen=True)
@@ -396,12 +397,14 @@ class ChooseNone:
     """No atom is marked for merging."""
 
     def apply(self, state: State) -> State:
-        return change(state, chosen=())
+        return state.with_asking(chosen=())
 
 
 def _with_prompts(state: State, prompts: tuple[Prompt, ...]) -> State:
-    return replace(state, prompts=prompts)
+    return state.with_asking(prompts=prompts)
 
 
 def _change_prompt(state: State, key: int, **changes) -> State:
-    return _with_prompts(state, tuple(replace(p, **changes) if p.key == key else p for p in state.prompts))
+    return _with_prompts(
+        state, tuple(replace(p, **changes) if p.key == key else p for p in state.asking.prompts)
+    )

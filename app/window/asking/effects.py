@@ -30,14 +30,14 @@ class AskingEffects(Effects):
         if now < self._encode_at:
             return
         self._encode_at = float("inf")
-        info, asked = state.info, state.asked
+        info, asked = state.scene.info, state.asking.asked
         if info is None or info.num_atoms == 0 or not asked:
             self._viewport.ask((), None)
             return
         keys, texts = tuple(p.key for p in asked), tuple(p.text.strip() for p in asked)
         likes, marks = tuple(p.like for p in asked), state.editing.marks
         scene, lapses = (info.serial, info.scene), state.asking.lapses
-        self._hands.submit(Encode(*scene, keys, texts, state.negatives, likes, marks, lapses))
+        self._hands.submit(Encode(*scene, keys, texts, state.asking.negatives, likes, marks, lapses))
 
     def follow(self, command: Command, before: State, state: State) -> None:
         """Prompt sets to the disk and from it; compiled phrases to the renderer."""
@@ -46,7 +46,7 @@ class AskingEffects(Effects):
             case SceneArrived(info):
                 submit(DescribeAtoms(info.serial, info.scene, state.editing.marks))
             case SavePrompts(path):
-                submit(WritePrompts(PromptSet(state.prompts, state.negatives), path))
+                submit(WritePrompts(PromptSet(state.asking.prompts, state.asking.negatives), path))
             case LoadPrompts(path):
                 submit(ReadPrompts(path))
             case PhrasesCompiled(keys, query, lapses):
@@ -59,8 +59,8 @@ class AskingEffects(Effects):
 
     def _weigh(self, before: State, state: State) -> None:
         """Have the atoms weighed again once something was deleted or is back."""
-        old, new, info = before.editing.marks, state.editing.marks, state.info
-        if info is None or info is not before.info or old is None or new is None:
+        old, new, info = before.editing.marks, state.editing.marks, state.scene.info
+        if info is None or info is not before.scene.info or old is None or new is None:
             return
         if info.num_atoms and (old.left, old.changes) != (new.left, new.changes):
             self._hands.submit(WeighAtoms(info.serial, info.scene, new))
@@ -75,5 +75,5 @@ class AskingEffects(Effects):
 
 def _question(state: State) -> tuple:
     """What an encoding depends on."""
-    serial = state.info.serial if state.info else 0
-    return serial, tuple((p.key, p.text.strip(), p.like) for p in state.asked), state.asking.lapses
+    serial = state.scene.info.serial if state.scene.info else 0
+    return serial, tuple((p.key, p.text.strip(), p.like) for p in state.asking.asked), state.asking.lapses

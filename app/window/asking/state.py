@@ -22,7 +22,6 @@ PALETTE = (
 
 MOST_RECENT = 20
 LEAST_SPAN = 0.01  # of relevance, between the first and the last colour
-PROMPT_DIALOGS = ("save prompts", "load prompts")
 PROMPTS_SUFFIX = ".prompts.json"
 BINS = 50  # of a histogram of scores, over [0, 1]
 _OPERATOR = re.compile(r"\s+[+-]\s+")  # as langflash_core/language/algebra.py, which loads torch
@@ -109,13 +108,17 @@ class Histogram:
 class Asking:
     """The asking half of the state.
 
-    recent: phrases asked, the newest first. atom: whose weight map is on show. chosen: atoms to
-    merge. prompts_path: where the last set was. usual: what the scene compares phrases with, by its
-    own calibration, once it has said so. lapses: how often what scores rest on has changed. caret: the
-    prompt whose field takes the keys next. span: relevance of the first and the last colour of a heat-map,
-    the person's own; None: by the threshold. named: names of things stand in the picture.
+    active: key of the prompt in hand. negatives: the person's own; none: those of the scene. recent: phrases
+    asked, the newest first. atom: whose weight map is on show. chosen: atoms to merge. prompts_path: where
+    the last set was. usual: what the scene compares phrases with, by its own calibration, once it has said
+    so. lapses: how often what scores rest on has changed. caret: the prompt whose field takes the keys next.
+    span: relevance of the first and the last colour of a heat-map, the person's own; None: by the threshold.
+    named: names of things stand in the picture.
     """
 
+    prompts: tuple[Prompt, ...] = (FIRST_PROMPT,)
+    active: int = 0
+    negatives: tuple[str, ...] = ()
     recent: tuple[str, ...] = ()
     histograms: tuple[Histogram, ...] = ()
     insight: Insight | None = None
@@ -128,13 +131,27 @@ class Asking:
     span: tuple[float, float] | None = None
     named: bool = False
 
+    @property
+    def asked(self) -> tuple[Prompt, ...]:
+        """Prompts to answer: visible ones that say something whole."""
+        return tuple(p for p in self.prompts if p.visible and usable(p.text))
+
+    @property
+    def active_prompt(self) -> Prompt | None:
+        """The prompt whose heat-map is on show: the active one, or else the first that is asked."""
+        asked = self.asked
+        return next((p for p in asked if p.key == self.active), asked[0] if asked else None)
+
     def histogram(self, key: int, text: str) -> Histogram | None:
         """Of a prompt as it reads now; None until it is answered."""
         return next((h for h in self.histograms if h.key == key and h.text == text.strip()), None)
 
     def without_scene(self) -> "Asking":
         """For another scene: what belongs to the old one goes."""
-        return replace(self, histograms=(), insight=None, atom=0, chosen=(), usual=(), named=False)
+        prompts = tuple(replace(prompt, score=None) for prompt in self.prompts)
+        return replace(
+            self, prompts=prompts, histograms=(), insight=None, atom=0, chosen=(), usual=(), named=False
+        )
 
 
 NO_ASKING = Asking()

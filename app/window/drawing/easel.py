@@ -78,7 +78,7 @@ class Easel:
 
     def wanted(self, state: State, stand: Stand, plan: Plan) -> Drawn:
         """The name of the picture that a plan makes now."""
-        return Drawn(self._serial, state.pose, stand.size, plan, self._times_marked)
+        return Drawn(self._serial, state.scene.pose, stand.size, plan, self._times_marked)
 
     def covers(self, wanted: Drawn) -> bool:
         """Whether what is on show is at least what is wanted."""
@@ -119,12 +119,12 @@ class Easel:
         """
         if self.drawn is None:
             return
-        shown = {p.key: p for p in state.prompts}
+        shown = {p.key: p for p in state.asking.prompts}
         asked = [shown[key] for key in self.asked.keys if key in shown]
         mode = self._mode(state, self.drawn, asked)
         if (mode.answers or mode.columns) and not tells():
             return
-        active = next((i for i, p in enumerate(asked) if p.key == state.active), 0)
+        active = next((i for i, p in enumerate(asked) if p.key == state.asking.active), 0)
         fill, faded = fills_gaps(state), mode is pictures.RGB and keeps_near(state, self.drawn.pose)
         cuts = tuple((p.colour, p.cut, p.shown_from) for p in asked)
         wanted = (mode, active, state.asking.atom, faded, fill, cuts, state.heat_colours)
@@ -140,9 +140,9 @@ class Easel:
         """That is wanted, or colours where the picture, the question or the scene lack what it needs."""
         if not drawn.plan.covers(replace(drawn.plan, kind=kind_of(state))):
             return pictures.RGB
-        if state.mode.answers and (not asked or len(asked) != len(self.asked.keys)):
+        if state.scene.mode.answers and (not asked or len(asked) != len(self.asked.keys)):
             return pictures.RGB
-        return state.mode if possible(state.mode, state.info) else pictures.RGB
+        return state.scene.mode if possible(state.scene.mode, state.scene.info) else pictures.RGB
 
     def _texture_of(self, mode: Picture, asked: list[Prompt], active: int, state: State) -> moderngl.Texture:
         """The texture that shows a mode; `asked` in the order of the query, not empty where it `answers`."""

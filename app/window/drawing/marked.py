@@ -10,15 +10,17 @@ from langflash_core.scene.changes import Change, Recoloured
 from langflash_core.scene.edits import Marks
 from langflash_core.scene.mask import Mask
 
+from ..scene.memory import SceneMemory
+
 if TYPE_CHECKING:
     from langflash_core.types import Scene
 
 
 @dataclass(frozen=True)
 class Marked:
-    """N Gaussians. doomed: what a preview would delete. gesture: a change under way."""
+    """N Gaussians. memory: of the scene. doomed: what a preview would delete. gesture: a change under way."""
 
-    scene: "Scene" = field(compare=False)
+    memory: SceneMemory = field(compare=False)
     marks: Marks
     doomed: Mask | None = None
     gesture: Change | None = None
@@ -41,6 +43,4 @@ class Marked:
     @cached_property
     def edited(self) -> "Scene":
         """All Gaussians, moved and recoloured."""
-        from langflash_core.scene.changed import changed_scene
-
-        return changed_scene(self.scene, self.marks, self.gesture)
+        return self.memory.changed(self.marks, self.gesture)

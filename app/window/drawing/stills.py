@@ -117,7 +117,7 @@ class Stills:
         if still is None or self._tells(still, state):
             self._failed = None  # there is all that is wanted
             return
-        answers = (still.key, self._easel.asked.number, state.mode)
+        answers = (still.key, self._easel.asked.number, state.scene.mode)
         if not self._waits(answers, state.now):
             ask = self._questions(state)
             self._artist.order(answers, lambda stopping: ask(still) or True)
@@ -155,8 +155,8 @@ class Stills:
     def _questions(self, state: State) -> Callable[[Still], None]:
         """What is to be made of a still picture on the thread, so that showing it is quick."""
         query, columns = self._easel.asked.query, None
-        if state.mode.columns:
-            columns = self._easel.renderer.columns(state.mode.columns == "features")
+        if state.scene.mode.columns:
+            columns = self._easel.renderer.columns(state.scene.mode.columns == "features")
 
         def ask(still: Still) -> None:
             if still.maps is not None:
@@ -175,6 +175,6 @@ class Stills:
             return True
         if query is not None and not still.maps.answers(query):
             return False
-        if not state.mode.columns:
+        if not state.scene.mode.columns:
             return True
-        return still.maps.mixes(self._easel.renderer.columns(state.mode.columns == "features"))
+        return still.maps.mixes(self._easel.renderer.columns(state.scene.mode.columns == "features"))

@@ -73,6 +73,6 @@ class View:
 
 def kind_of(state: State) -> Kind:
     """What a picture must hold to show what is wanted while the camera moves."""
-    if not state.wants_maps or state.info is None or state.info.num_atoms == 0:
+    if not state.wants_maps or state.scene.info is None or state.scene.info.num_atoms == 0:
         return Kind.COLOUR
-    return Kind.MAPS if state.mode.maps else Kind.FAST
+    return Kind.MAPS if state.scene.mode.maps else Kind.FAST

@@ -16,11 +16,6 @@ from .state import STRICTNESS_RANGE, Floaters, Point, Region
 FELL_OFF = "The oldest edits can no longer be undone: the list holds the last 1,000, or 32 MB of them."
 
 
-def change(state: State, **changes) -> State:
-    """The state with another editing half."""
-    return replace(state, editing=replace(state.editing, **changes))
-
-
 def with_edit(state: State, label: str, marks: Marks) -> State:
     """The state after an edit, named for the list; the same where nothing has become of it. Says so when the
     first of the oldest edits can no longer be undone."""
@@ -43,7 +38,7 @@ class SelectRegion:
     combine: Combine = "replace"
 
     def apply(self, state: State) -> State:
-        return change(state, drag=(), waiting="" if state.info is None else "Selecting")
+        return state.with_editing(drag=(), waiting="" if state.scene.info is None else "Selecting")
 
 
 @dataclass(frozen=True)
@@ -54,7 +49,7 @@ class SelectThing:
     combine: Combine = "replace"
 
     def apply(self, state: State) -> State:
-        return change(state, drag=(), waiting="" if state.info is None else "Selecting")
+        return state.with_editing(drag=(), waiting="" if state.scene.info is None else "Selecting")
 
 
 @dataclass(frozen=True)
@@ -66,7 +61,7 @@ class SelectSphere:
     combine: Combine = "replace"
 
     def apply(self, state: State) -> State:
-        return change(state, drag=(), waiting="" if state.info is None else "Selecting")
+        return state.with_editing(drag=(), waiting="" if state.scene.info is None else "Selecting")
 
 
 @dataclass(frozen=True)
@@ -77,7 +72,7 @@ class SelectByPhrase:
     combine: Combine = "replace"
 
     def apply(self, state: State) -> State:
-        return change(replace(state, mode=pictures.RGB), waiting="Selecting")
+        return state.with_scene(mode=pictures.RGB).with_editing(waiting="Selecting")
 
 
 @dataclass(frozen=True)
@@ -88,7 +83,7 @@ class SelectAtom:
     combine: Combine = "replace"
 
     def apply(self, state: State) -> State:
-        return change(state, waiting="Selecting")
+        return state.with_editing(waiting="Selecting")
 
 
 @dataclass(frozen=True)
@@ -98,7 +93,7 @@ class Grow:
     phrase: bool = False
 
     def apply(self, state: State) -> State:
-        return change(state, waiting="Growing" if state.editing.num_selected else "")
+        return state.with_editing(waiting="Growing" if state.editing.num_selected else "")
 
 
 @dataclass(frozen=True)
@@ -110,7 +105,7 @@ class Found:
     what: str
 
     def apply(self, state: State) -> State:
-        state = change(state, waiting="")
+        state = state.with_editing(waiting="")
         marks = state.editing.marks
         if marks is None or self.mask.count != marks.deleted.count:
             return state
@@ -126,7 +121,7 @@ class StopWaiting:
     """Nothing is being looked for any more."""
 
     def apply(self, state: State) -> State:
-        return change(state, waiting="")
+        return state.with_editing(waiting="")
 
 
 @dataclass(frozen=True)
@@ -293,7 +288,7 @@ class FindFloaters:
         if state.editing.history is None:
             return state
         strictness = state.editing.floaters.strictness if state.editing.floaters else Floaters().strictness
-        return change(state, floaters=Floaters(strictness=strictness))
+        return state.with_editing(floaters=Floaters(strictness=strictness))
 
 
 @dataclass(frozen=True)
@@ -306,7 +301,7 @@ class FloatersFound:
         marks, preview = state.editing.marks, state.editing.floaters
         if marks is None or preview is None or len(self.scores) != 4 * marks.deleted.count:
             return state
-        return change(state, floaters=replace(preview, scores=self.scores))
+        return state.with_editing(floaters=replace(preview, scores=self.scores))
 
 
 @dataclass(frozen=True)
@@ -319,7 +314,7 @@ class SetStrictness:
         if state.editing.floaters is None:
             return state
         strictness = min(max(self.strictness, STRICTNESS_RANGE[0]), STRICTNESS_RANGE[1])
-        return change(state, floaters=replace(state.editing.floaters, strictness=strictness))
+        return state.with_editing(floaters=replace(state.editing.floaters, strictness=strictness))
 
 
 @dataclass(frozen=True)
@@ -333,7 +328,7 @@ class EndFloaters:
         if marks is None or preview is None:
             return state
         found = preview.mask(marks.visible)
-        state = change(state, floaters=None)
+        state = state.with_editing(floaters=None)
         if self.then == "delete":
             return with_edit(state, f"Delete {len(found):,} floaters", edits.delete(marks, found))
         if self.then == "select":
@@ -356,7 +351,7 @@ def _rewound(state: State, step) -> State:
 def _with_history(state: State, history: History) -> State:
     """Another history; scores hold on only while it shows the same Gaussians with the same atoms."""
     before = state.editing.marks
-    state = change(state, history=history, gesture=None, tint=None)
+    state = state.with_editing(history=history, gesture=None, tint=None)
     return state if _spoken_of(before) == _spoken_of(history.marks) else lapsed(state)
 
 

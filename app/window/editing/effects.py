@@ -29,12 +29,12 @@ class EditingEffects(Effects):
         """Bring deletions, selection and preview into the picture."""
         marks, preview = state.editing.marks, state.editing.floaters
         doomed = preview.mask(marks.visible) if marks is not None and preview is not None else None
-        scene = None if state.info is None else state.info.scene
-        self._viewport.mark(scene, marks, doomed, state.editing.gesture)
+        memory = None if state.scene.info is None else state.scene.info.memory
+        self._viewport.mark(memory, marks, doomed, state.editing.gesture)
 
     def after_picture(self, state: State) -> None:
         """Read what is under the pointer, and what a click asked about once the picture rests."""
-        editing, info = state.editing, state.info
+        editing, info = state.editing, state.scene.info
         if info is None:
             return
         hover = editing.hover
@@ -47,13 +47,13 @@ class EditingEffects(Effects):
                 if weights is None and reading.point is not None and editing.tool is Tool.POINT:
                     self._weigh(state, info, reading)
         self._read = key
-        if editing.asked is not None and state.pose == self._viewport.pose:
+        if editing.asked is not None and state.scene.pose == self._viewport.pose:
             self._ask(state, info)
 
     def _weigh(self, state: State, info: SceneInfo, reading: Reading) -> None:
         marks, size = state.editing.marks, self._viewport.size
-        if marks is not None and info.num_atoms and state.pose == self._viewport.pose:
-            self._hands.submit(Weigh(info.serial, info.scene, marks, reading, state.pose, size))
+        if marks is not None and info.num_atoms and state.scene.pose == self._viewport.pose:
+            self._hands.submit(Weigh(info.serial, info.memory, marks, reading, state.scene.pose, size))
 
     def _ask(self, state: State, info: SceneInfo) -> None:
         """Send the place that was clicked on."""
@@ -69,38 +69,38 @@ class EditingEffects(Effects):
         if reading.point is None or not info.num_atoms:
             self._hands.perform(Named(reading, reading, (), b""))
             return
-        extra = tuple(p.text.strip() for p in state.asked if not p.like)
+        extra = tuple(p.text.strip() for p in state.asking.asked if not p.like)
         content = b"" if weights is None else weights.astype(np.float32).tobytes()
-        scene = (info.serial, info.scene, state.editing.marks)
-        place = (reading, state.pose, self._viewport.size)
-        self._hands.submit(NamePlace(*scene, *place, content, extra, state.negatives))
+        scene = (info.serial, info.memory, state.editing.marks)
+        place = (reading, state.scene.pose, self._viewport.size)
+        self._hands.submit(NamePlace(*scene, *place, content, extra, state.asking.negatives))
 
     # Commands
 
     def follow(self, command: Command, before: State, state: State) -> None:
         """What must be computed for a command goes to the worker."""
-        info, marks = state.info, state.editing.marks
+        info, marks = state.scene.info, state.editing.marks
         match command:
             case SceneArrived():
                 if info is not None and info.num_atoms and marks is not None:
-                    self._hands.submit(NameAtoms(info.serial, info.scene, marks))
+                    self._hands.submit(NameAtoms(info.serial, info.memory, marks))
             case FindFloaters() if info is not None and marks is not None:
-                self._hands.submit(ScoreFloaters(info.serial, info.scene, marks))
+                self._hands.submit(ScoreFloaters(info.serial, info.memory, marks))
             case _ if info is not None and marks is not None:
                 request = request_for(command, state, info, marks, self._viewport.size)
                 if request is not None:
                     self._hands.submit(request)
                 elif state.editing.waiting and not before.editing.waiting:
                     self._hands.perform(StopWaiting())
-        if marks != before.editing.marks and state.info is before.info:
+        if marks != before.editing.marks and state.scene.info is before.scene.info:
             self._atoms_changed(before, state)
 
     def _atoms_changed(self, before: State, state: State) -> None:
         """Merged and corrected atoms have other words."""
         old, new = before.editing.marks, state.editing.marks
-        if old is None or new is None or state.info is None:
+        if old is None or new is None or state.scene.info is None:
             return
         if [(atom.into, atom.denied) for atom in old.atoms] != [
             (atom.into, atom.denied) for atom in new.atoms
         ]:
-            self._hands.submit(NameAtoms(state.info.serial, state.info.scene, new))
+            self._hands.submit(NameAtoms(state.scene.info.serial, state.scene.info.memory, new))

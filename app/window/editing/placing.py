@@ -5,9 +5,7 @@ A gesture is a change that is shown and not yet made: `Adjust` shows it as often
 """
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
-from weakref import ref
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,12 +25,10 @@ from langflash_core.scene.changes import (
 )
 from langflash_core.scene.edits import Marks
 
+from ..scene.state import SceneInfo
 from ..state import State
-from .commands import change, with_edit
+from .commands import with_edit
 from .state import Handle, Tint, Tool
-
-if TYPE_CHECKING:
-    from langflash_core.types import Scene
 
 STEP = 0.02  # of the way to the pivot, by which a key moves
 TURN_STEP = 5.0  # degrees
@@ -48,8 +44,8 @@ class SetHandle:
     handle: Handle
 
     def apply(self, state: State) -> State:
-        taken = change(state, tool=Tool.PLACE, drag=(), hover=None, asked=None, card=None, ruler=())
-        return change(taken, handle=self.handle, gesture=None, tint=None)
+        taken = state.with_editing(tool=Tool.PLACE, drag=(), hover=None, asked=None, card=None, ruler=())
+        return taken.with_editing(handle=self.handle, gesture=None, tint=None)
 
 
 @dataclass(frozen=True)
@@ -62,7 +58,7 @@ class Adjust:
         marks = state.editing.marks
         if marks is None or not marks.selected or self.gesture.rows != marks.selected:
             return state
-        return change(state, gesture=self.gesture, tint=None)
+        return state.with_editing(gesture=self.gesture, tint=None)
 
 
 @dataclass(frozen=True)
@@ -77,7 +73,9 @@ class ShowTint:
         if marks is None or not marks.selected:
             return state
         gesture = Recoloured.tinted(marks.selected, self.tint.colour, self.tint.strength, self.luma)
-        return change(replace(state, mode=pictures.RGB), tint=self.tint, gesture=gesture, last_tint=self.tint)
+        return state.with_scene(mode=pictures.RGB).with_editing(
+            tint=self.tint, gesture=gesture, last_tint=self.tint
+        )
 
 
 @dataclass(frozen=True)
@@ -85,10 +83,10 @@ class BeginTint:
     """Offer to recolour the selection, with the last colour."""
 
     def apply(self, state: State) -> State:
-        marks, info = state.editing.marks, state.info
+        marks, info = state.editing.marks, state.scene.info
         if marks is None or info is None or not marks.selected:
             return state
-        return ShowTint(state.editing.last_tint, luma_of(info.scene, marks)).apply(state)
+        return ShowTint(state.editing.last_tint, luma_of(info, marks)).apply(state)
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ class EndGesture:
 
     def apply(self, state: State) -> State:
         gesture, marks = state.editing.gesture, state.editing.marks
-        state = change(state, gesture=None, tint=None)
+        state = state.with_editing(gesture=None, tint=None)
         if not self.keep or gesture is None or marks is None:
             return state
         if isinstance(gesture, Moved) and gesture.still:
@@ -118,14 +116,14 @@ class Nudge:
     ahead: float = 0.0
 
     def apply(self, state: State) -> State:
-        marks, info = state.editing.marks, state.info
-        centre = None if marks is None or info is None else pivot_of(info.scene, marks)
+        marks, info = state.editing.marks, state.scene.info
+        centre = None if marks is None or info is None else pivot_of(info, marks)
         if marks is None or centre is None:
             return state
-        axes = state.pose.axes
+        axes = state.scene.pose.axes
         match state.editing.handle:
             case Handle.MOVE:
-                way = axes @ np.array([self.right, self.down, self.ahead]) * STEP * state.pose.distance
+                way = axes @ np.array([self.right, self.down, self.ahead]) * STEP * state.scene.pose.distance
                 gesture = Moved(marks.selected, offset=_spot(way))
             case Handle.TURN:
                 axis = (
@@ -135,7 +133,7 @@ class Nudge:
             case Handle.SCALE:
                 larger = self.right - self.down + self.ahead
                 gesture = Moved.about(marks.selected, centre, scale=SCALE_STEP**larger)
-        return EndGesture().apply(change(state, gesture=gesture))
+        return EndGesture().apply(state.with_editing(gesture=gesture))
 
 
 def verb(gesture: Change) -> str:
@@ -150,37 +148,29 @@ def verb(gesture: Change) -> str:
 # What is selected
 
 
-_pivots: list[tuple["ref[Scene]", object, object, Spot | None]] = []  # the last one that was computed
-_lumas: list[tuple["ref[Scene]", object, object, float]] = []
-
-
-def pivot_of(scene: "Scene", marks: Marks) -> Spot | None:
+def pivot_of(info: SceneInfo, marks: Marks) -> Spot | None:
     """The middle of the box around nearly all that is selected; None where nothing is."""
-    for source, selected, changes, found in tuple(_pivots):
-        if source() is scene and selected == marks.selected and changes == marks.changes:
-            return found
-    from langflash_core.scene.changed import changed_scene
 
-    points = changed_scene(scene, marks).gaussians.means.double().numpy()[marks.selected.rows()]
-    points = points[np.isfinite(points).all(1)]
-    found = _spot(np.quantile(points, _OUTLIERS, axis=0).mean(0)) if len(points) else None
-    _pivots[:] = [(ref(scene), marks.selected, marks.changes, found)]
-    return found
+    def middle() -> Spot | None:
+        points = info.memory.changed(marks).gaussians.means.double().numpy()[marks.selected.rows()]
+        points = points[np.isfinite(points).all(1)]
+        return _spot(np.quantile(points, _OUTLIERS, axis=0).mean(0)) if len(points) else None
+
+    return info.memory.answered("pivot", (marks.selected, marks.changes), middle)
 
 
-def luma_of(scene: "Scene", marks: Marks) -> float:
+def luma_of(info: SceneInfo, marks: Marks) -> float:
     """Mean brightness of what is selected."""
-    for source, selected, changes, found in tuple(_lumas):
-        if source() is scene and selected == marks.selected and changes == marks.changes:
-            return found
-    import torch
 
-    from langflash_core.scene.changed import changed_scene, mean_luma
+    def mean() -> float:
+        import torch
 
-    rows = torch.from_numpy(marks.selected.rows())
-    found = mean_luma(changed_scene(scene, marks).gaussians, rows)
-    _lumas[:] = [(ref(scene), marks.selected, marks.changes, found)]
-    return found
+        from langflash_core.scene.changed import mean_luma
+
+        rows = torch.from_numpy(marks.selected.rows())
+        return mean_luma(info.memory.changed(marks).gaussians, rows)
+
+    return info.memory.answered("luma", (marks.selected, marks.changes), mean)
 
 
 # A gesture as the matrix that a gizmo turns, and as the numbers of a field

@@ -12,7 +12,7 @@ from langflash_core.scene.edits import Combine
 from ..asking.state import PALETTE, Prompt
 from ..scene.state import Flight
 from ..state import State
-from .commands import change, with_edit
+from .commands import with_edit
 from .state import RADIUS_RANGE, REACH_RANGE, Card, Point, Reading, Spot, Tool
 
 LIKE_THIS = "like this"
@@ -29,8 +29,8 @@ class SetTool:
     tool: Tool
 
     def apply(self, state: State) -> State:
-        state = change(state, tool=self.tool, drag=(), hover=None, asked=None, card=None, ruler=())
-        return change(state, gesture=None, tint=None)
+        state = state.with_editing(tool=self.tool, drag=(), hover=None, asked=None, card=None, ruler=())
+        return state.with_editing(gesture=None, tint=None)
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class SetCombine:
     combine: Combine
 
     def apply(self, state: State) -> State:
-        return change(state, combine=self.combine)
+        return state.with_editing(combine=self.combine)
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class SetRadius:
     radius: float
 
     def apply(self, state: State) -> State:
-        return change(state, radius=min(max(self.radius, RADIUS_RANGE[0]), RADIUS_RANGE[1]))
+        return state.with_editing(radius=min(max(self.radius, RADIUS_RANGE[0]), RADIUS_RANGE[1]))
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class SetThrough:
     through: bool
 
     def apply(self, state: State) -> State:
-        return change(state, through=self.through)
+        return state.with_editing(through=self.through)
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class SetReach:
     reach: float
 
     def apply(self, state: State) -> State:
-        return change(state, reach=min(max(self.reach, REACH_RANGE[0]), REACH_RANGE[1]))
+        return state.with_editing(reach=min(max(self.reach, REACH_RANGE[0]), REACH_RANGE[1]))
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Drag:
     points: tuple[Point, ...]
 
     def apply(self, state: State) -> State:
-        return change(state, drag=self.points)
+        return state.with_editing(drag=self.points)
 
 
 # Pointing
@@ -94,7 +94,7 @@ class Hover:
 
     def apply(self, state: State) -> State:
         hover = None if self.at is None else Reading(self.at)
-        return change(state, hover=hover)
+        return state.with_editing(hover=hover)
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class ReadingTaken:
         hover = state.editing.hover
         if hover is None or hover.at != self.reading.at:
             return state
-        return change(state, hover=self.reading)
+        return state.with_editing(hover=self.reading)
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class Ask:
     at: Point
 
     def apply(self, state: State) -> State:
-        return change(state, asked=self.at, card=None)
+        return state.with_editing(asked=self.at, card=None)
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class CardOpened:
     reading: Reading
 
     def apply(self, state: State) -> State:
-        return change(state, asked=None, card=Card(self.reading))
+        return state.with_editing(asked=None, card=Card(self.reading))
 
 
 @dataclass(frozen=True)
@@ -139,8 +139,8 @@ class RulerPlaced:
     def apply(self, state: State) -> State:
         ends, place = state.editing.ruler, self.reading.point
         if place is None:
-            return change(state, asked=None)
-        return change(state, asked=None, ruler=(place,) if len(ends) != 1 else (*ends, place))
+            return state.with_editing(asked=None)
+        return state.with_editing(asked=None, ruler=(place,) if len(ends) != 1 else (*ends, place))
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ class ClearRuler:
     """Measure nothing."""
 
     def apply(self, state: State) -> State:
-        return change(state, ruler=(), asked=None)
+        return state.with_editing(ruler=(), asked=None)
 
 
 @dataclass(frozen=True)
@@ -187,7 +187,7 @@ class Named:
         card = state.editing.card
         if card is None or card.reading != self.asked:
             return state
-        return change(state, card=Card(self.reading, self.words, self.vector))
+        return state.with_editing(card=Card(self.reading, self.words, self.vector))
 
 
 @dataclass(frozen=True)
@@ -195,7 +195,7 @@ class CloseCard:
     """Take the answer away."""
 
     def apply(self, state: State) -> State:
-        return change(state, card=None, asked=None)
+        return state.with_editing(card=None, asked=None)
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,7 @@ class AtomsNamed:
     names: tuple[tuple[str, ...], ...]
 
     def apply(self, state: State) -> State:
-        return change(state, names=self.names)
+        return state.with_editing(names=self.names)
 
 
 @dataclass(frozen=True)
@@ -218,14 +218,17 @@ class FindSimilar:
             return state
         word = card.words[0][0] if card.words else ""
         text = f"{LIKE_THIS} ({word})" if word else LIKE_THIS
-        empty = next((p for p in state.prompts if not p.text.strip()), None)
-        used = {p.colour for p in state.prompts if p is not empty}
-        free = [c for c in PALETTE if c not in used] or [PALETTE[len(state.prompts) % len(PALETTE)]]
+        empty = next((p for p in state.asking.prompts if not p.text.strip()), None)
+        used = {p.colour for p in state.asking.prompts if p is not empty}
+        free = [c for c in PALETTE if c not in used] or [PALETTE[len(state.asking.prompts) % len(PALETTE)]]
         prompt = Prompt(state.next_key, text, free[0], LIKE_THRESHOLD, like=card.vector)
-        prompts = (*(p for p in state.prompts if p is not empty), prompt)
-        mode = pictures.HEAT if state.mode is pictures.RGB else state.mode
-        state = replace(state, prompts=prompts, active=prompt.key, next_key=state.next_key + 1, mode=mode)
-        return change(state, card=None)
+        prompts = (*(p for p in state.asking.prompts if p is not empty), prompt)
+        mode = pictures.HEAT if state.scene.mode is pictures.RGB else state.scene.mode
+        state = replace(
+            state.with_asking(prompts=prompts, active=prompt.key).with_scene(mode=mode),
+            next_key=state.next_key + 1,
+        )
+        return state.with_editing(card=None)
 
 
 @dataclass(frozen=True)
@@ -234,14 +237,12 @@ class FrameSelection:
 
     def apply(self, state: State) -> State:
         marks = state.editing.marks
-        if marks is None or state.info is None:
+        if marks is None or state.scene.info is None:
             return state
-        from langflash_core.scene.changed import changed_scene  # loads torch; a scene is there, so it is
-
         rows = (marks.selected or marks.visible).rows()
-        points = changed_scene(state.info.scene, marks).gaussians.means.numpy()[rows]
+        points = state.scene.info.memory.changed(marks).gaussians.means.numpy()[rows]
         if not len(points):
             return state
         low, high = np.quantile(points, (0.02, 0.98), axis=0)
-        pose = poses.framing(state.pose, Vector(*low.tolist()), Vector(*high.tolist()))
-        return replace(state, flight=Flight(state.pose, pose, state.now), view=None)
+        pose = poses.framing(state.scene.pose, Vector(*low.tolist()), Vector(*high.tolist()))
+        return state.with_scene(flight=Flight(state.scene.pose, pose, state.now), view=None)

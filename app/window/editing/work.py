@@ -16,6 +16,7 @@ from langflash_core.scene.mask import Mask
 
 from ..commands import Command, Notify
 from ..requests import Asked, SceneErrand
+from ..scene.memory import SceneMemory
 from ..scene.state import SceneInfo
 from ..state import State
 from .commands import (
@@ -45,14 +46,16 @@ WORDS_ASKED, WORDS_OF_ATOM = 6, 3
 class EditErrand(SceneErrand):
     """About a scene as its marks show it."""
 
-    scene: "Scene" = field(repr=False)
+    memory: SceneMemory = field(repr=False)
     marks: Marks = field(repr=False)
+
+    @property
+    def scene(self) -> "Scene":
+        return self.memory.scene
 
     def placed(self) -> "Gaussians":
         """Its Gaussians where edits moved them."""
-        from langflash_core.scene.changed import changed_scene
-
-        return changed_scene(self.scene, self.marks).gaussians
+        return self.memory.changed(self.marks).gaussians
 
     def spoken(self) -> "Scene":
         """The scene with its atoms merged and silenced as marked."""
@@ -255,31 +258,38 @@ def request_for(
     command: Command, state: State, info: SceneInfo, marks: Marks, size: tuple[int, int]
 ) -> Selection | None:
     """What the worker must find for a command. size: of the picture's place, pixels."""
-    scene = (info.serial, info.scene, marks)
+    scene = (info.serial, info.memory, marks)
     match command:
         case SelectRegion(region, combine) if min(size) > 0:
-            return FindInRegion(*scene, region, state.pose, size, state.editing.through, combine)
+            return FindInRegion(*scene, region, state.scene.pose, size, state.editing.through, combine)
         case SelectThing(at, combine) if min(size) > 0:
-            return FindThing(*scene, at, state.pose, size, combine)
+            return FindThing(*scene, at, state.scene.pose, size, combine)
         case SelectSphere(at, radius, combine) if min(size) > 0:
-            return FindInSphere(*scene, at, state.pose, size, combine, radius)
+            return FindInSphere(*scene, at, state.scene.pose, size, combine, radius)
         case SelectByPhrase(key, combine):
             return _phrase(state, info, marks, key, combine)
         case SelectAtom(atom, combine) if 0 <= atom < len(marks.atoms):
             return FindAtom(*scene, atom, combine)
         case Grow(phrase) if marks.selected:
-            active = state.active_prompt
+            active = state.asking.active_prompt
             within = _phrase(state, info, marks, active.key, "add") if phrase and active else None
             return GrowSelection(*scene, state.editing.reach, within)
     return None
 
 
 def _phrase(state: State, info: SceneInfo, marks: Marks, key: int, combine: Combine) -> FindByPhrase | None:
-    prompt = next((p for p in state.prompts if p.key == key and p.text.strip()), None)
+    prompt = next((p for p in state.asking.prompts if p.key == key and p.text.strip()), None)
     if prompt is None or not info.num_atoms:
         return None
     return FindByPhrase(
-        info.serial, info.scene, marks, prompt.text.strip(), prompt.like, state.negatives, prompt.cut, combine
+        info.serial,
+        info.memory,
+        marks,
+        prompt.text.strip(),
+        prompt.like,
+        state.asking.negatives,
+        prompt.cut,
+        combine,
     )
 
 
@@ -301,29 +311,20 @@ class Weigh(EditErrand):
 
     def weigh(self) -> np.ndarray:
         """Weights (K,) of the pixel, composed exactly; a view is projected once for all its pixels."""
-        from langflash_core.splat.picking import weights_at
+        from langflash_core.splat.picking import projected, weights_at
 
         x, y = (min(max(int(at), 0), side - 1) for at, side in zip(self.reading.at, self.size, strict=True))
-        rows, footprints = _projected(self.placed(), self.marks.visible, self.pose, self.size)
+        visible, camera = self.marks.visible, to_camera(self.pose, *self.size)
+        rows, footprints = self.memory.answered(
+            "footprints",
+            (self.marks.changes, visible, self.pose, self.size),
+            lambda: projected(self.placed(), visible.rows(), camera),
+        )
         return weights_at(self.scene.semantics, rows, footprints, x, y).numpy()
 
     def weighed(self, weights: np.ndarray) -> Reading:
         """The reading with its groups."""
         return replace(self.reading, atoms=strongest(weights))
-
-
-_views: dict[tuple, tuple] = {}  # the last view that was projected
-
-
-def _projected(gaussians: "Gaussians", visible: Mask, pose: Pose, size: tuple[int, int]):
-    """Rows of what is shown, and their footprints in a view."""
-    from langflash_core.splat.picking import projected
-
-    key = (id(gaussians), visible, pose, size)
-    if key not in _views:
-        _views.clear()
-        _views[key] = gaussians, *projected(gaussians, visible.rows(), to_camera(pose, *size))
-    return _views[key][1:]
 
 
 @dataclass(frozen=True)

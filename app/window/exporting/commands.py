@@ -2,19 +2,14 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from langflash_core.outputs import Output
 
 from ..commands import Notify
+from ..dialogs import Dialog
 from ..scene import samples
 from ..state import State
-from .state import ExportForm, Running
-
-
-def change(state: State, **changes: Any) -> State:
-    """The state with another exporting half."""
-    return replace(state, exporting=replace(state.exporting, **changes))
+from .state import ExportForm, Running, Target
 
 
 @dataclass(frozen=True)
@@ -28,7 +23,7 @@ class EditForm:
         if form.what is not old.what:
             path = _renamed(form.path, old.what, form.what) if form.path == old.path else form.path
             form = replace(form, path=path, proposed=_renamed(form.proposed, old.what, form.what))
-        return change(state, form=form)
+        return state.with_exporting(form=form)
 
 
 @dataclass(frozen=True)
@@ -37,21 +32,21 @@ class ShowExport:
     that is named after it."""
 
     def apply(self, state: State) -> State:
-        if state.info is None:
+        if state.scene.info is None:
             text = "There is no scene to export; drop photos on the window first."
             return Notify(text).apply(state)
         form = state.exporting.form
         proposed = str(_place(state, form.what))
-        own = form.path not in ("", form.proposed) and form.serial == state.info.serial
+        own = form.path not in ("", form.proposed) and form.serial == state.scene.info.serial
         selected = form.only_selected and state.editing.num_selected > 0
         form = replace(
             form,
             path=form.path if own else proposed,
             proposed=proposed,
-            serial=state.info.serial,
+            serial=state.scene.info.serial,
             only_selected=selected,
         )
-        return replace(change(state, form=form), dialog="export")
+        return replace(state.with_exporting(form=form), dialog=Dialog.EXPORT)
 
 
 @dataclass(frozen=True)
@@ -71,7 +66,17 @@ class AskToReplace:
     there: tuple[Path, ...]
 
     def apply(self, state: State) -> State:
-        return replace(change(state, there=self.there), dialog="replace")
+        return replace(state.with_exporting(there=self.there), dialog=Dialog.REPLACE)
+
+
+@dataclass(frozen=True)
+class TargetLookedUp:
+    """What the disk says of the path in the form."""
+
+    target: Target
+
+    def apply(self, state: State) -> State:
+        return state.with_exporting(target=self.target)
 
 
 @dataclass(frozen=True)
@@ -81,7 +86,7 @@ class ExportBegan:
     target: Path
 
     def apply(self, state: State) -> State:
-        return change(replace(state, dialog=None), running=Running(self.target))
+        return replace(state, dialog=None).with_exporting(running=Running(self.target))
 
 
 @dataclass(frozen=True)
@@ -96,7 +101,7 @@ class ExportProgressed:
         if now is None:
             return state
         fraction = min(max(self.fraction, 0.0), 1.0)
-        return change(state, running=replace(now, stage=self.stage, fraction=fraction))
+        return state.with_exporting(running=replace(now, stage=self.stage, fraction=fraction))
 
 
 @dataclass(frozen=True)
@@ -105,7 +110,7 @@ class CancelExport:
 
     def apply(self, state: State) -> State:
         now = state.exporting.running
-        return state if now is None else change(state, running=replace(now, cancelling=True))
+        return state if now is None else state.with_exporting(running=replace(now, cancelling=True))
 
 
 @dataclass(frozen=True)
@@ -118,7 +123,7 @@ class ExportEnded:
 
     def apply(self, state: State) -> State:
         was = state.exporting.running
-        state = change(state, running=None)
+        state = state.with_exporting(running=None)
         if was is not None and was.cancelling and self.code != 0:
             return Notify("The export was stopped; nothing was written.", "info").apply(state)
         if self.code == 0:
@@ -134,13 +139,13 @@ class CopiesAt:
     selection: Path | None
 
     def apply(self, state: State) -> State:
-        return change(state, edited=self.edited, selection=self.selection)
+        return state.with_exporting(edited=self.edited, selection=self.selection)
 
 
 def _place(state: State, what: Output) -> Path:
     """Beside the scene, or beside its photos, by a name of its own for each kind."""
-    assert state.info is not None
-    beside = state.info.path or samples.beside(state.photos)
+    assert state.scene.info is not None
+    beside = state.scene.info.path or samples.beside(state.scene.photos)
     return beside.with_name(f"{beside.stem}{what.ends}{what.suffix}")
 
 

@@ -8,6 +8,7 @@ from langflash_core.files import make_folder, write_atomically
 from langflash_core.scene.edits import Marks, Mask
 
 from ..commands import Command, Notify
+from ..dialogs import Dialog
 from ..effects import Effects, Hands
 from ..recovery.commands import CopyKept
 from ..recovery.keeper import Keeper
@@ -23,8 +24,9 @@ from .commands import (
     ExportEnded,
     ExportProgressed,
     ShowExport,
+    TargetLookedUp,
 )
-from .order import Order, order, pixels, source, there
+from .order import Order, look_up, order, pixels, source, there
 from .process import Exporter, camera_json, keys_json
 
 
@@ -40,10 +42,12 @@ class ExportingEffects(Effects):
 
     def follow(self, command: Command, before: State, state: State) -> None:
         """The dialog has copies made, its button starts the process."""
+        if state.dialog is Dialog.EXPORT and (target := look_up(state)) != state.exporting.target:
+            self._hands.perform(TargetLookedUp(target))  # other programs write files too
         match command:
             case SceneArrived():
                 self._ready.clear()
-            case ShowExport() if state.dialog == "export":
+            case ShowExport() if state.dialog is Dialog.EXPORT:
                 self._make_copies(state)
             case CopyKept(path):
                 self._ready.add(path)
@@ -63,7 +67,7 @@ class ExportingEffects(Effects):
 
     def _make_copies(self, state: State) -> None:
         """Write what the scene's own file does not hold: unsaved edits, and the selection."""
-        info, marks = state.info, state.editing.marks
+        info, marks = state.scene.info, state.editing.marks
         self._waits = False
         if info is None or marks is None:
             return
@@ -85,6 +89,7 @@ class ExportingEffects(Effects):
         if self._exporter.running:
             perform(Notify("An export is under way; wait for it, or stop it."))
             return
+        state = TargetLookedUp(look_up(state)).apply(state)
         wanted = order(state)
         if isinstance(wanted, str):
             perform(Notify(wanted))
@@ -94,7 +99,7 @@ class ExportingEffects(Effects):
             perform(AskToReplace(found))
             return
         read = source(state)
-        if state.info is not None and read != state.info.path and read not in self._ready:
+        if state.scene.info is not None and read != state.scene.info.path and read not in self._ready:
             self._waits = True  # goes on when the copy is complete
             return
         try:
@@ -113,9 +118,9 @@ class ExportingEffects(Effects):
         """
         make_folder(wanted.target.parent)
         if wanted.camera_file is not None:
-            size = pixels(state.exporting.form.side, state.pose.aspect)
+            size = pixels(state.exporting.form.side, state.scene.pose.aspect)
             keys = state.keys if state.exporting.form.what.moves else ()
-            content = keys_json(keys, *size) if keys else camera_json(state.pose, *size)
+            content = keys_json(keys, *size) if keys else camera_json(state.scene.pose, *size)
             write_atomically(wanted.camera_file, content)
         self._exporter.start(replace(wanted.request, replace=replaces).words())
 

@@ -14,7 +14,7 @@ from langflash_core.request import ExportRequest
 from ..scene.drops import typed_path
 from ..scene.near import fills_gaps, keeps_near, photos_known
 from ..state import State
-from .state import ExportForm
+from .state import ExportForm, Target
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def order(state: State) -> Order | str:
         threshold=_threshold(state) if phrases else None,
         fade=fades(state),
         fill=what.fills and fills_gaps(state) and (what.phrases == "one" or not phrases),
-        size=pixels(form.side, state.pose.aspect) if what.sized else None,
+        size=pixels(form.side, state.scene.pose.aspect) if what.sized else None,
         **_seen_from(state, camera_file),
         **(_colours(state) if what.colours else {}),
     )
@@ -72,20 +72,34 @@ def order(state: State) -> Order | str:
 
 def _target(state: State) -> Path | str:
     """The file, or what is wrong with its name."""
-    form, info = state.exporting.form, state.info
+    form, info = state.exporting.form, state.scene.info
     if info is None:
         return "There is no scene to export; drop photos on the window first."
     scene_file = source(state)
     if scene_file is None:
         return "The scene has no file yet; save it first."
-    target = typed_target(form)
-    if target is None:
+    target, there = typed_target(form), state.exporting.target
+    if target is None or (there.folder and form.what.suffix):
         return "Type a file name."
-    if os.path.realpath(target) in _real(scene_file, info.path):
+    if there.scene:
         return "This file is the scene itself; choose another name."
-    if _real(target, *_written(state, target)) & _real(*(photo.path for photo in state.photos)):
+    if there.photo:
         return "This would replace a photo of the tray; choose another name."
     return target
+
+
+def look_up(state: State) -> Target:
+    """Ask the disk about the path in the form; effects do, and what they learn is for `order`."""
+    form, info = state.exporting.form, state.scene.info
+    target, folder = typed_target(form), os.path.isdir(typed_path(form.path))
+    if target is None or info is None:
+        return Target(folder)
+    photos = _real(*(photo.path for photo in state.scene.photos))
+    return Target(
+        folder,
+        scene=os.path.realpath(target) in _real(source(state), info.path),
+        photo=not photos.isdisjoint(_real(target, *_written(state, target))),
+    )
 
 
 def fades(state: State) -> bool:
@@ -115,7 +129,7 @@ def _rounded(value: float) -> float:
 
 def _written(state: State, target: Path) -> tuple[Path, ...]:
     """What the command writes: one file, or one a view, and what lies beside."""
-    form, info = state.exporting.form, state.info
+    form, info = state.exporting.form, state.scene.info
     all_views = form.all_views and form.what.looks and info is not None
     return form.what.files(target, len(info.views) if all_views and info is not None else None)
 
@@ -130,7 +144,7 @@ def _camera_file(state: State, target: Path) -> Path | None:
     form = state.exporting.form
     if form.what.moves:
         return target.with_name(f"{target.stem}.keys.json") if way(state) == "keys" else None
-    looks = form.what.looks and not form.all_views and state.view is None
+    looks = form.what.looks and not form.all_views and state.scene.view is None
     return target.with_name(f"{target.stem}.camera.json") if looks else None
 
 
@@ -143,7 +157,7 @@ def _seen_from(state: State, camera_file: Path | None) -> dict[str, Any]:
         return {}
     if form.all_views:
         return {"all_views": form.what is not SEGMENTED}
-    return {"view": state.view, "camera": camera_file}
+    return {"view": state.scene.view, "camera": camera_file}
 
 
 def _real(*files: Path | None) -> set[str]:
@@ -157,14 +171,14 @@ def source(state: State) -> Path | None:
         return state.exporting.selection
     if state.editing.exported_anew:
         return state.exporting.edited
-    return None if state.info is None else state.info.path or state.recovery.copy
+    return None if state.scene.info is None else state.scene.info.path or state.recovery.copy
 
 
 def typed_target(form: ExportForm) -> Path | None:
     """The file, or folder, as typed, with the ending of what is written; None while it names none."""
     text = form.path.strip()
     path = typed_path(text)
-    if not text or not path.name or (os.path.isdir(path) and form.what.suffix):
+    if not text or not path.name:
         return None
     ends = not form.what.suffix or path.suffix.lower() == form.what.suffix
     return path if ends else path.with_name(path.name + form.what.suffix)
@@ -180,11 +194,11 @@ def pixels(side: int, aspect: float) -> tuple[int, int]:
 def _phrases(state: State) -> tuple[tuple[str, ...], str]:
     """Those that take part, and what is wrong with them."""
     what = state.exporting.form.what
-    asked = tuple(prompt.text.strip() for prompt in state.asked)
+    asked = tuple(prompt.text.strip() for prompt in state.asking.asked)
     if what.needs_phrases and not asked:
         return (), f"{what.label} needs a phrase; type one under Find first."
     if what.phrases == "one":
-        active = state.active_prompt
+        active = state.asking.active_prompt
         return ((active.text.strip(),) if active else asked[:1]), ""
     if what is PAGE:
         return asked, ""
@@ -196,8 +210,8 @@ def _phrases(state: State) -> tuple[tuple[str, ...], str]:
 
 def _threshold(state: State) -> float | None:
     """The person's own threshold, where all phrases that take part share one."""
-    active = state.active_prompt
-    part = [active] if state.exporting.form.what.phrases == "one" and active else list(state.asked)
+    active = state.asking.active_prompt
+    part = [active] if state.exporting.form.what.phrases == "one" and active else list(state.asking.asked)
     own = {prompt.threshold for prompt in part}
     threshold = next(iter(own)) if len(own) == 1 else None
     if threshold is None or not 0.0 < threshold < 1.0:
@@ -208,14 +222,14 @@ def _threshold(state: State) -> float | None:
 def remarks(state: State) -> list[str]:
     """What the command cannot carry over from the window."""
     form, notes = state.exporting.form, []
-    if state.info is not None and source(state) != state.info.path:
+    if state.scene.info is not None and source(state) != state.scene.info.path:
         unsaved = "edits are" if state.editing.exported_anew else "scene is"
         why = "selection is" if form.only_selected and form.what.splats else unsaved
         notes.append(f"The {why} not saved: the command reads a copy that goes when the window closes.")
     if not (form.what.needs_phrases or form.only_found):
         return notes
-    if form.what.phrases != "one" and len({prompt.threshold for prompt in state.asked}) > 1:
+    if form.what.phrases != "one" and len({prompt.threshold for prompt in state.asking.asked}) > 1:
         notes.append("The thresholds differ, so the calibrated one is used for all.")
-    if state.negatives:
+    if state.asking.negatives:
         notes.append("Phrases are compared with the usual ones, not with your own.")
     return notes

@@ -8,6 +8,7 @@ from imgui_bundle import icons_fontawesome_6 as fa
 from langflash_core.outputs import OFFERED
 
 from .. import commands as do
+from ..dialogs import Dialog
 from ..filming.state import WAYS
 from ..kit import theme, widgets
 from ..kit.look import Look
@@ -62,7 +63,7 @@ def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
     what = form.what
     if what.looks:
         _label("Seen from", look)
-        count = len(state.info.views) if state.info else 0
+        count = len(state.scene.info.views) if state.scene.info else 0
         options = (("the view on show", False), (f"all {count} photos' views", True))
         form = replace(form, all_views=widgets.choice(options, form.all_views))
     if what.sized:
@@ -100,7 +101,7 @@ def _narrowed(state: State, form: ExportForm, look: Look) -> ExportForm:
     """To what the phrases find, or to what is selected."""
     what = form.what
     if what.takes_phrases and not what.needs_phrases:
-        imgui.begin_disabled(not state.asked)
+        imgui.begin_disabled(not state.asking.asked)
         changed, only = widgets.checkbox("Only what the phrases find", form.only_found)
         imgui.end_disabled()
         if changed:
@@ -157,7 +158,7 @@ def draw_replacing(state: State, look: Look) -> list[do.Command]:
         issued.append(export.Export(sure=True))
     imgui.same_line()
     if imgui.button("Choose another name", look.vec(190, 0)):
-        issued.append(do.ShowDialog("export"))
+        issued.append(do.ShowDialog(Dialog.EXPORT))
     return issued
 
 

@@ -43,15 +43,30 @@ NO_FORM = ExportForm()
 
 
 @dataclass(frozen=True)
+class Target:
+    """What the disk says of the path in the form. folder: it is one. scene, photo: what is written there
+    would replace the scene that is read, a photo of the tray."""
+
+    folder: bool = False
+    scene: bool = False
+    photo: bool = False
+
+
+NO_TARGET = Target()
+
+
+@dataclass(frozen=True)
 class Exporting:
     """The exporting half of the state. edited, selection: copies that an export reads, of the scene
-    with unsaved edits and of what is selected. there: files that it would replace, while it is asked."""
+    with unsaved edits and of what is selected. there: files that it would replace, while it is asked.
+    target: what the disk said of the path in the form."""
 
     form: ExportForm = NO_FORM
     running: Running | None = None
     edited: Path | None = None
     selection: Path | None = None
     there: tuple[Path, ...] = ()
+    target: Target = NO_TARGET
 
 
 NO_EXPORTING = Exporting()

@@ -16,12 +16,12 @@ class AddKey:
     """The present view is the next key frame."""
 
     def apply(self, state: State) -> State:
-        if state.info is None:
+        if state.scene.info is None:
             return state
         if len(state.keys) >= MOST_KEYS:
             text = f"A camera path has at most {MOST_KEYS} key frames; remove one before you add another."
             return Notify(text).apply(state)
-        return _with_keys(state, f"Key frame {len(state.keys) + 1}", (*state.keys, state.pose))
+        return _with_keys(state, f"Key frame {len(state.keys) + 1}", (*state.keys, state.scene.pose))
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class RemoveKey:
             return state
         label = f"Remove key frame {self.place % len(keys) + 1}"
         del keys[self.place]
-        return replace(_with_keys(state, label, keys), tour=None)
+        return _with_keys(state, label, keys).with_filming(tour=None)
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class ClearKeys:
     """No key frames."""
 
     def apply(self, state: State) -> State:
-        return replace(_with_keys(state, "Forget the key frames", ()), tour=None)
+        return _with_keys(state, "Forget the key frames", ()).with_filming(tour=None)
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,9 @@ class TourReady:
     def apply(self, state: State) -> State:
         if self.keys != state.keys:
             return state
-        return replace(state, tour=Tour(self.poses, self.seconds, state.now), flight=None, view=None)
+        return state.with_filming(tour=Tour(self.poses, self.seconds, state.now)).with_scene(
+            flight=None, view=None
+        )
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class StopTour:
     """Stay where the flight is."""
 
     def apply(self, state: State) -> State:
-        return replace(state, tour=None)
+        return state.with_filming(tour=None)
 
 
 def _with_keys(state: State, label: str, keys: Sequence[Pose]) -> State:

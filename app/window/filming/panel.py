@@ -37,8 +37,8 @@ def _bar(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
     count = len(state.keys)
-    imgui.begin_disabled(count < 2 and state.tour is None)
-    playing = state.tour is not None
+    imgui.begin_disabled(count < 2 and state.filming.tour is None)
+    playing = state.filming.tour is not None
     if imgui.button(f"{fa.ICON_FA_STOP if playing else fa.ICON_FA_PLAY}##tour"):
         issued.append(film.StopTour() if playing else film.Preview())
     imgui.end_disabled()

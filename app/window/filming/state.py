@@ -26,6 +26,16 @@ class Tour:
         return self.poses[int(fraction * (len(self.poses) - 1))] if 0 <= fraction < 1 else None
 
 
+@dataclass(frozen=True)
+class Filming:
+    """The filming half of the state; the key frames themselves are edits. tour: the flight along them."""
+
+    tour: Tour | None = None
+
+
+NO_FILMING = Filming()
+
+
 def stored(keys: Iterable[Pose]) -> tuple[dict[str, Any], ...]:
     """Key frames as plain values for a scene's record."""
     lists = ("centre", "rotation", "shift")  # as a file gives them back

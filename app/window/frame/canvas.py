@@ -38,11 +38,11 @@ def draw(state: State, look: Look) -> list[do.Command]:
     imgui.set_next_item_allow_overlap()
     flags = buttons.mouse_button_left | buttons.mouse_button_right | buttons.mouse_button_middle
     imgui.invisible_button("picture", ImVec2(max(size.x, 1), max(size.y, 1)), flags)
-    if state.info is None:
+    if state.scene.info is None:
         return over
     if taken:  # the picture is there even so: a press that comes right beside the gizmo finds it hovered
-        pose = moving.flown(state.pose, state.preferences.speed)
-        return over + ([camera.MoveTo(pose)] if pose != state.pose else [])
+        pose = moving.flown(state.scene.pose, state.preferences.speed)
+        return over + ([camera.MoveTo(pose)] if pose != state.scene.pose else [])
     issued = over + hands.hover(state, corner)
     if state.editing.tool.selects and not imgui.get_io().key_alt:
         issued += hands.region(state, look, corner)
@@ -52,4 +52,4 @@ def draw(state: State, look: Look) -> list[do.Command]:
         issued += hands.ask(look, corner)
     pose = moving.pointed(state, look, size)
     pose = moving.flown(pose, state.preferences.speed)
-    return issued + ([camera.MoveTo(pose)] if pose != state.pose else [])
+    return issued + ([camera.MoveTo(pose)] if pose != state.scene.pose else [])

@@ -1,6 +1,5 @@
 """The few dialogs."""
 
-import os
 from collections.abc import Callable
 from itertools import groupby
 
@@ -9,6 +8,7 @@ from imgui_bundle import icons_fontawesome_6 as fa
 
 from .. import commands as do
 from ..asking import commands as ask
+from ..dialogs import Dialog
 from ..exporting import commands as export
 from ..exporting import panel as export_panel
 from ..kit import theme, widgets
@@ -17,41 +17,22 @@ from ..opening import commands as opening
 from ..opening.panels import browser, strip
 from ..recovery import panels as recovery_panels
 from ..scene import commands as show
-from ..scene.drops import typed_path, typed_scene
+from ..scene.drops import There, typed_path, typed_scene
 from ..scene.panels import rooms
 from ..state import State
 from . import palette, table
 
-TITLES = {
-    "save": "Save the scene",
-    "open": "Open",
-    "help": "Mouse and keys",
-    "leave": "Leave?",
-    "drop": "Where do these photos belong?",
-    "drop scene": "Open or merge?",
-    "merge": "Merge a scene into this one",
-    "place": "Where to write it",
-    "film": "Frames of a film",
-    "unsaved": "Edits are not saved",
-    "save prompts": "Save the phrases",
-    "load prompts": "Load phrases",
-    "export": "Export",
-    "replace": "Replace?",
-    "settings": "Preferences",
-    "log": "Log",
-    "palette": "All commands",
-}
 _HELP, _HANDS, _KEYS = 940.0, 208.0, 170.0  # design pixels of the help, and of its keys
 WIDTHS = {  # design pixels; others 520
-    "export": export_panel.WIDTH,
-    "settings": 560.0,
-    "log": 640.0,
-    "help": _HELP,
-    "palette": palette.WIDTH,
-    "open": browser.WIDTH,
-    "merge": browser.WIDTH,
-    "place": browser.WIDTH,
-    "film": strip.WIDTH,
+    Dialog.EXPORT: export_panel.WIDTH,
+    Dialog.SETTINGS: 560.0,
+    Dialog.LOG: 640.0,
+    Dialog.HELP: _HELP,
+    Dialog.PALETTE: palette.WIDTH,
+    Dialog.OPEN: browser.WIDTH,
+    Dialog.MERGE: browser.WIDTH,
+    Dialog.PLACE: browser.WIDTH,
+    Dialog.FILM: strip.WIDTH,
 }
 GESTURES = (
     ("Left drag", "orbit"),
@@ -76,8 +57,8 @@ def draw(state: State, look: Look) -> list[do.Command]:
     """The dialog that is open, if any."""
     if state.dialog is None:
         return []
-    title = TITLES[state.dialog]
-    _place(state.dialog, title, look)
+    title = state.dialog.value
+    _place(state.dialog, look)
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     opened, kept = imgui.begin_popup_modal(title, True, imgui.WindowFlags_.no_resize)
     issued: list[do.Command] = []
@@ -93,14 +74,14 @@ def draw(state: State, look: Look) -> list[do.Command]:
     return issued
 
 
-def _place(dialog: str, title: str, look: Look) -> None:
+def _place(dialog: Dialog, look: Look) -> None:
     """Open it in the middle, as wide as it wants and no higher than the window. One of many heights begins
     where the highest would."""
-    if not imgui.is_popup_open(title):
-        imgui.open_popup(title)
+    if not imgui.is_popup_open(dialog.value):
+        imgui.open_popup(dialog.value)
     middle = imgui.get_main_viewport().get_center()
     room, margin = imgui.get_io().display_size, look.px(24)
-    if dialog == "export":
+    if dialog is Dialog.EXPORT:
         top = max((room.y - look.px(export_panel.HEIGHT)) / 2, margin / 2)
         imgui.set_next_window_pos(ImVec2(middle.x, top), imgui.Cond_.appearing, ImVec2(0.5, 0))
     else:
@@ -118,33 +99,32 @@ def _keep_inside() -> None:
         imgui.set_window_pos(inside)
 
 
-def _body(dialog: str) -> Callable[[State, Look], list[do.Command]]:
+def _body(dialog: Dialog) -> Callable[[State, Look], list[do.Command]]:
     """What draws the inside of a dialog."""
     return {
-        "save": _save,
-        "open": browser.draw,
-        "help": _help,
-        "leave": _leave,
-        "drop": rooms.draw_drop,
-        "drop scene": rooms.draw_scene_drop,
-        "merge": browser.draw,
-        "place": browser.draw,
-        "film": strip.draw,
-        "unsaved": rooms.draw_unsaved,
-        "save prompts": _save_prompts,
-        "load prompts": _load_prompts,
-        "export": export_panel.draw,
-        "replace": export_panel.draw_replacing,
-        "settings": recovery_panels.draw_settings,
-        "log": _log,
-        "palette": palette.draw,
+        Dialog.SAVE: _save,
+        Dialog.OPEN: browser.draw,
+        Dialog.HELP: _help,
+        Dialog.LEAVE: _leave,
+        Dialog.DROP: rooms.draw_drop,
+        Dialog.DROP_SCENE: rooms.draw_scene_drop,
+        Dialog.MERGE: browser.draw,
+        Dialog.PLACE: browser.draw,
+        Dialog.FILM: strip.draw,
+        Dialog.UNSAVED: rooms.draw_unsaved,
+        Dialog.SAVE_PROMPTS: _save_prompts,
+        Dialog.LOAD_PROMPTS: _load_prompts,
+        Dialog.EXPORT: export_panel.draw,
+        Dialog.REPLACE: export_panel.draw_replacing,
+        Dialog.SETTINGS: recovery_panels.draw_settings,
+        Dialog.LOG: _log,
+        Dialog.PALETTE: palette.draw,
     }[dialog]
 
 
 def _save(state: State, look: Look) -> list[do.Command]:
     issued, confirmed = _path_field(state, "Where to write it", place=True)
-    path = typed_scene(state.dialog_path)
-    exists = path is not None and os.path.isfile(path)
+    path, exists = typed_scene(state.typed), state.typed.there is There.FILE
     consequence = f"{path} will be replaced." if exists else f"Writes {path}"
     widgets.muted("Type a file name." if path is None else consequence)
     imgui.begin_disabled(path is None)
@@ -157,8 +137,8 @@ def _save(state: State, look: Look) -> list[do.Command]:
 
 def _save_prompts(state: State, look: Look) -> list[do.Command]:
     issued, confirmed = _path_field(state, "Where to write them")
-    text = state.dialog_path.strip()
-    exists = bool(text) and os.path.isfile(typed_path(text))
+    text = state.typed.text.strip()
+    exists = state.typed.there is There.FILE
     imgui.begin_disabled(not text)
     pressed = widgets.primary_button("Replace" if exists else "Save", look.vec(120, 0))
     imgui.end_disabled()
@@ -169,7 +149,7 @@ def _save_prompts(state: State, look: Look) -> list[do.Command]:
 
 def _load_prompts(state: State, look: Look) -> list[do.Command]:
     issued, confirmed = _path_field(state, "A set of phrases (.prompts.json); they replace the present ones")
-    text = state.dialog_path.strip()
+    text = state.typed.text.strip()
     imgui.begin_disabled(not text)
     pressed = widgets.primary_button("Load", look.vec(120, 0))
     imgui.end_disabled()
@@ -185,7 +165,7 @@ def _path_field(state: State, label: str, place: bool = False) -> tuple[list[do.
     imgui.set_next_item_width(-widgets.folder_room() if place else -1)
     if imgui.is_window_appearing():
         imgui.set_keyboard_focus_here()
-    changed, path = imgui.input_text("##path", state.dialog_path)
+    changed, path = imgui.input_text("##path", state.typed.text)
     confirmed = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
     issued: list[do.Command] = [do.EditDialogPath(path)] if changed else []
     if place and widgets.folder_button():
@@ -236,7 +216,7 @@ def _leave(state: State, look: Look) -> list[do.Command]:
     imgui.text_wrapped("The scene is not saved.")
     issued: list[do.Command] = []
     if widgets.primary_button("Save first", look.vec(120, 0)):
-        issued.append(do.ShowDialog("save"))
+        issued.append(do.ShowDialog(Dialog.SAVE))
     imgui.same_line()
     if imgui.button("Leave", look.vec(120, 0)):
         issued.append(do.Leave(sure=True))

@@ -3,6 +3,7 @@
 from imgui_bundle import imgui
 
 from .. import commands as do
+from ..dialogs import Dialog
 from ..editing import commands as edit
 from ..editing import placing
 from ..editing import pointing as point
@@ -82,13 +83,13 @@ def _escape(state: State) -> list[do.Command]:
     would end the program."""
     editing = state.editing
     if state.dialog:
-        return [opening.PlaceFound(None) if state.dialog == "place" else do.ShowDialog(None)]
+        return [opening.PlaceFound(None) if state.dialog is Dialog.PLACE else do.ShowDialog(None)]
     if imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
         imgui.internal.close_popups_except_modals()
         return []
-    if state.tour is not None:
+    if state.filming.tour is not None:
         return [film.StopTour()]
-    if state.job is not None and not state.job.cancelling:
+    if state.scene.job is not None and not state.scene.job.cancelling:
         return [show.CancelJob()]
     if editing.gesture is not None:
         gizmo.let_go()

@@ -45,7 +45,7 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
         status.draw(state, look)
     issued += splitter.draw(state, look, left, height - bar)
     legend.draw(state, look, place, size)
-    if state.info is not None:
+    if state.scene.info is not None:
         issued += tools.draw(state, look, place, size)
         issued += pointing.draw(state, look, place, size)
         issued += ruler.draw(state, look, place, size)
@@ -76,7 +76,7 @@ def _picture(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.C
     with widgets.window("##picture", place, size, imgui.WindowFlags_.no_background | widgets.NO_KEYS):
         imgui.pop_style_var()
         issued = canvas.draw(state, look)
-    if state.info is not None and state.info.views:
+    if state.scene.info is not None and state.scene.info.views:
         corner = ImVec2(place.x, place.y + size.y - look.px(_VIEWS))
         flags = imgui.WindowFlags_.no_background | imgui.WindowFlags_.always_auto_resize
         imgui.set_next_window_pos(corner)

@@ -38,10 +38,10 @@ def figures(state: State) -> list[str]:
     aside = degrees_from_photos(state)
     if aside > FADING:
         said.append(f"{aside:.0f} degrees aside of the photos: less is known here")
-    if state.info is not None:
+    if state.scene.info is not None:
         width, height = stats.picture_size
         marks = state.editing.marks
-        there = marks.there if marks else (state.info.num_gaussians, state.info.num_atoms)
+        there = marks.there if marks else (state.scene.info.num_gaussians, state.scene.info.num_atoms)
         if stats.failing:
             said.append("a finer picture could not be drawn (F2: why); it is tried again")
         elif stats.settling:

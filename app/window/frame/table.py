@@ -16,6 +16,7 @@ from langflash_core.pictures import KEYED, PICTURES, Picture
 from .. import commands as do
 from ..asking import commands as ask
 from ..asking.prompt_sets import MOST_PROMPTS
+from ..dialogs import Dialog
 from ..editing import commands as edit
 from ..editing import placing
 from ..editing import pointing as point
@@ -119,7 +120,7 @@ def _always(command: do.Command) -> Callable[[State], do.Command | None]:
 
 def _shown(command: do.Command) -> Callable[[State], do.Command | None]:
     """Once there is a scene."""
-    return lambda state: command if state.info is not None else None
+    return lambda state: command if state.scene.info is not None else None
 
 
 def _selected(command: do.Command) -> Callable[[State], do.Command | None]:
@@ -133,59 +134,65 @@ def _files() -> Iterable[Entry]:
     yield Entry("Open ...", group, looking, _ctrl("o"), fa.ICON_FA_FOLDER_OPEN, in_fields=True)
     yield Entry("Frames of the film ...", group, _frames, icon=fa.ICON_FA_FILM)
     yield Entry("Paste photos", group, _always(opening.Paste()), _ctrl("v"), fa.ICON_FA_PASTE)
-    yield Entry("Save ...", group, _shown(dialog("save")), _ctrl("s"), fa.ICON_FA_FLOPPY_DISK, in_fields=True)
+    yield Entry(
+        "Save ...", group, _shown(dialog(Dialog.SAVE)), _ctrl("s"), fa.ICON_FA_FLOPPY_DISK, in_fields=True
+    )
     exporting = fa.ICON_FA_FILE_EXPORT
     yield Entry("Export ...", group, _shown(export.ShowExport()), _ctrl("e"), exporting, in_fields=True)
     merging = _shown(opening.OpenFiles(merging=True))
     yield Entry("Merge a scene into this one ...", group, merging, _ctrl("m"), fa.ICON_FA_OBJECT_GROUP)
     reconstruct = show.Instead((show.Reconstruct(),))
-    yield Entry("Reconstruct the photos", group, lambda s: reconstruct if s.photos else None)
+    yield Entry("Reconstruct the photos", group, lambda s: reconstruct if s.scene.photos else None)
     yield Entry("Back to the room before", group, _room_before)
-    yield Entry("Cancel the reconstruction", group, lambda s: show.CancelJob() if s.job else None)
-    yield Entry("Clear the tray", group, lambda s: show.ClearPhotos() if s.photos and not s.job else None)
+    yield Entry("Cancel the reconstruction", group, lambda s: show.CancelJob() if s.scene.job else None)
+    yield Entry(
+        "Clear the tray", group, lambda s: show.ClearPhotos() if s.scene.photos and not s.scene.job else None
+    )
     yield Entry(
         "Leave", group, _always(do.Leave()), _ctrl("q"), fa.ICON_FA_RIGHT_FROM_BRACKET, in_fields=True
     )
 
 
 def _frames(state: State) -> do.Command | None:
-    free = state.opening.film is not None and state.job is None
-    return do.ShowDialog("film") if free else None
+    free = state.opening.film is not None and state.scene.job is None
+    return do.ShowDialog(Dialog.FILM) if free else None
 
 
 def _room_before(state: State) -> do.Command | None:
-    free = state.rooms and state.job is None
-    return show.GoToRoom(state.rooms[0].info.serial) if free else None
+    free = state.scene.rooms and state.scene.job is None
+    return show.GoToRoom(state.scene.rooms[0].info.serial) if free else None
 
 
 def _program() -> Iterable[Entry]:
     group, dialog = "Program", do.ShowDialog
     palette = fa.ICON_FA_TERMINAL
-    yield Entry("All commands", group, _always(dialog("palette")), _ctrl("p"), palette, in_fields=True)
-    settings = _always(dialog("settings"))
+    yield Entry("All commands", group, _always(dialog(Dialog.PALETTE)), _ctrl("p"), palette, in_fields=True)
+    settings = _always(dialog(Dialog.SETTINGS))
     yield Entry("Preferences", group, settings, _ctrl("comma"), fa.ICON_FA_GEAR, in_fields=True)
-    yield Entry("Log", group, _always(dialog("log")), _plain("f2"), fa.ICON_FA_LIST, in_fields=True)
-    help_ = _always(dialog("help"))
+    yield Entry("Log", group, _always(dialog(Dialog.LOG)), _plain("f2"), fa.ICON_FA_LIST, in_fields=True)
+    help_ = _always(dialog(Dialog.HELP))
     yield Entry("Mouse and keys", group, help_, _plain("f1"), fa.ICON_FA_KEYBOARD, in_fields=True)
 
 
 def _asking() -> Iterable[Entry]:
     group = "Find"
     yield Entry("Type a phrase", group, _always(ask.FocusPhrase()), _ctrl("f"), in_fields=True)
-    yield Entry("Add a phrase", group, lambda s: ask.AddPrompt() if len(s.prompts) < MOST_PROMPTS else None)
+    yield Entry(
+        "Add a phrase", group, lambda s: ask.AddPrompt() if len(s.asking.prompts) < MOST_PROMPTS else None
+    )
     yield Entry("Select what the phrase means", group, _meant)
-    yield Entry("Save the phrases ...", group, _always(do.ShowDialog("save prompts")))
-    yield Entry("Load phrases ...", group, _always(do.ShowDialog("load prompts")))
+    yield Entry("Save the phrases ...", group, _always(do.ShowDialog(Dialog.SAVE_PROMPTS)))
+    yield Entry("Load phrases ...", group, _always(do.ShowDialog(Dialog.LOAD_PROMPTS)))
     yield Entry("Dictionary", group, _dictionary)
 
 
 def _meant(state: State) -> do.Command | None:
-    prompt = state.active_prompt if state.info is not None else None
+    prompt = state.asking.active_prompt if state.scene.info is not None else None
     return None if prompt is None else edit.SelectByPhrase(prompt.key, state.editing.combine)
 
 
 def _dictionary(state: State) -> do.Command | None:
-    if state.info is None or state.info.num_atoms == 0:
+    if state.scene.info is None or state.scene.info.num_atoms == 0:
         return None
     return ask.OpenDictionary(not state.preferences.dictionary_open)
 
@@ -219,35 +226,35 @@ def _looking() -> Iterable[Entry]:
 
 
 def _mode(mode: Picture) -> Callable[[State], do.Command | None]:
-    return lambda state: camera.SetMode(mode) if possible(mode, state.info) else None
+    return lambda state: camera.SetMode(mode) if possible(mode, state.scene.info) else None
 
 
 def _compare(state: State) -> do.Command | None:
-    if state.info is None or state.view is None:
+    if state.scene.info is None or state.scene.view is None:
         return None
     return camera.Compare(None if in_space.comparing(state) else 0.5)
 
 
 def _names(state: State) -> do.Command | None:
-    return ask.NameThings(not state.asking.named) if state.info is not None else None
+    return ask.NameThings(not state.asking.named) if state.scene.info is not None else None
 
 
 def _cameras(state: State) -> do.Command | None:
     wanted = state.preferences
     prefer = keep.Prefer(replace(wanted, photos_in_space=not wanted.photos_in_space))
-    return prefer if state.info is not None else None
+    return prefer if state.scene.info is not None else None
 
 
 def _near_photos(state: State) -> do.Command | None:
     wanted = state.preferences
     prefer = keep.Prefer(replace(wanted, near_photos=not wanted.near_photos))
-    return prefer if state.info is not None else None
+    return prefer if state.scene.info is not None else None
 
 
 def _fill_gaps(state: State) -> do.Command | None:
     wanted = state.preferences
     prefer = keep.Prefer(replace(wanted, fill_gaps=not wanted.fill_gaps))
-    return prefer if state.info is not None else None
+    return prefer if state.scene.info is not None else None
 
 
 def _tools() -> Iterable[Entry]:
@@ -270,7 +277,7 @@ def _tools() -> Iterable[Entry]:
 
 
 def _brush(factor: float) -> Callable[[State], do.Command | None]:
-    return lambda s: point.SetRadius(s.editing.radius * factor) if s.info is not None else None
+    return lambda s: point.SetRadius(s.editing.radius * factor) if s.scene.info is not None else None
 
 
 def _editing() -> Iterable[Entry]:

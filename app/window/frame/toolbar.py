@@ -35,14 +35,14 @@ def draw(state: State, look: Look) -> list[do.Command]:
 
 
 def _fov(state: State, look: Look) -> list[do.Command]:
-    flat = state.pose.span is not None
-    imgui.begin_disabled(state.info is None or flat)
+    flat = state.scene.pose.span is not None
+    imgui.begin_disabled(state.scene.info is None or flat)
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, "FOV")
     imgui.same_line()
     tip = "Parallel rays have none" if flat else "Field of view over the longer side of the photo"
-    degrees = f"{state.pose.fov:.0f}°"
-    changed, fov = widgets.slider("##fov", state.pose.fov, FOV_RANGE, degrees, tip, look.px(_FOV))
+    degrees = f"{state.scene.pose.fov:.0f}°"
+    changed, fov = widgets.slider("##fov", state.scene.pose.fov, FOV_RANGE, degrees, tip, look.px(_FOV))
     imgui.end_disabled()
     imgui.same_line()
     return [camera.SetFov(fov)] if changed else []
@@ -51,7 +51,7 @@ def _fov(state: State, look: Look) -> list[do.Command]:
 def _home(state: State) -> list[do.Command]:
     issued: list[do.Command] = []
     imgui.same_line()
-    imgui.begin_disabled(state.info is None)
+    imgui.begin_disabled(state.scene.info is None)
     if imgui.button(fa.ICON_FA_HOUSE):
         issued.append(camera.Home())
     widgets.tooltip("Back to the first photo's view  (H)")
@@ -62,7 +62,7 @@ def _home(state: State) -> list[do.Command]:
 def _files(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     imgui.same_line()
-    imgui.begin_disabled(state.info is None)
+    imgui.begin_disabled(state.scene.info is None)
     if imgui.button(fa.ICON_FA_EXPAND):
         issued.append(camera.FrameAll())
     widgets.tooltip("Show all of the scene  (Z)")

@@ -7,10 +7,11 @@ from langflash_core.errors import FilmError
 from langflash_core.images.strip import Strip, choose, notes_on
 
 from ..commands import Notify, ShowDialog
-from ..scene.drops import FILM_PHOTOS, MAX_PHOTOS
+from ..dialogs import Dialog
+from ..scene.drops import FILM_PHOTOS, MAX_PHOTOS, NOT_TYPED, Typed
 from ..scene.state import LOOKING_THROUGH, Job, Photo
 from ..state import State
-from .state import LOOKING, NO_OPENING, Film, Folder
+from .state import NO_OPENING, Film, Folder
 
 
 @dataclass(frozen=True)
@@ -28,17 +29,17 @@ class OpenFiles:
 
 @dataclass(frozen=True)
 class LookInto:
-    """Our own dialog, at a folder; None: where one was last. It stays `dialog`, one of `LOOKING`, while it is
-    open."""
+    """Our own dialog, at a folder; None: where one was last. `dialog` is one that shows a folder; where such
+    a one is open already it stays."""
 
     folder: Path | None = None
-    dialog: str = "open"
+    dialog: Dialog = Dialog.OPEN
 
     def apply(self, state: State) -> State:
-        if state.dialog not in LOOKING:
+        if state.dialog is None or not state.dialog.looks:
             state = ShowDialog(self.dialog).apply(state)
-        kept = state.opening if state.dialog == "place" else replace(NO_OPENING, film=state.opening.film)
-        return replace(state, opening=replace(kept, folder=None, chosen=()), dialog_path="")
+        kept = state.opening if state.dialog is Dialog.PLACE else replace(NO_OPENING, film=state.opening.film)
+        return replace(state, opening=replace(kept, folder=None, chosen=()), typed=NOT_TYPED)
 
 
 @dataclass(frozen=True)
@@ -46,12 +47,12 @@ class LookForPlace:
     """Look for the folder that the file of the dialog on show is written to."""
 
     def apply(self, state: State) -> State:
-        wanted = state.exporting.form.path if state.dialog == "export" else state.dialog_path
+        wanted = state.exporting.form.path if state.dialog is Dialog.EXPORT else state.typed.text
         asked = replace(
             NO_OPENING,
-            asker=state.dialog or "",
+            asker=state.dialog,
             name=Path(wanted).name,
-            pending=state.pending,
+            pending=state.scene.pending,
             film=state.opening.film,
         )
         return replace(state, opening=asked)
@@ -65,13 +66,13 @@ class PlaceFound:
 
     def apply(self, state: State) -> State:
         asked, form = state.opening, state.exporting.form
-        if asked.asker != "export":
+        if asked.asker is not Dialog.EXPORT:
             state = ShowDialog(asked.asker).apply(state)
-            path = Path(state.dialog_path) if self.folder is None else self.folder / asked.name
-            return replace(state, dialog_path=str(path), pending=asked.pending)
+            path = Path(state.typed.text) if self.folder is None else self.folder / asked.name
+            return replace(state.with_scene(pending=asked.pending), typed=Typed(str(path)))
         path = Path(form.path) if self.folder is None else self.folder / asked.name
-        exporting = replace(state.exporting, form=replace(form, path=str(path)))
-        return replace(state, exporting=exporting, dialog="export", dialog_path="")
+        state = state.with_exporting(form=replace(form, path=str(path)))
+        return replace(state, dialog=Dialog.EXPORT, typed=NOT_TYPED)
 
 
 @dataclass(frozen=True)
@@ -81,10 +82,10 @@ class FolderRead:
     folder: Folder
 
     def apply(self, state: State) -> State:
-        if not self.folder.problem and state.dialog != "place":
+        if not self.folder.problem and state.dialog is not Dialog.PLACE:
             wanted = replace(state.preferences, folder=str(self.folder.path))
             state = replace(state, preferences=wanted)
-        return replace(state, opening=replace(state.opening, folder=self.folder))
+        return state.with_opening(folder=self.folder)
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ class Choose:
     def apply(self, state: State) -> State:
         others = tuple(path for path in state.opening.chosen if path != self.path)
         chosen = others if self.path in state.opening.chosen else (*others, self.path)
-        return replace(state, opening=replace(state.opening, chosen=chosen))
+        return state.with_opening(chosen=chosen)
 
 
 @dataclass(frozen=True)
@@ -129,7 +130,7 @@ class OpenFilm:
 
     def apply(self, state: State) -> State:
         job = Job(f"Opening {self.path.name}", LOOKING_THROUGH, started=state.now)
-        return replace(state, job=job, dialog=None)
+        return replace(state.with_scene(job=job), dialog=None)
 
 
 @dataclass(frozen=True)
@@ -140,13 +141,13 @@ class FilmRead:
     strip: Strip
 
     def apply(self, state: State) -> State:
-        state = replace(state, job=None)
+        state = state.with_scene(job=None)
         try:
             film = proposed(self.path, self.strip, min(room_for_frames(state), FILM_PHOTOS))
         except FilmError as error:
             return Notify(str(error)).apply(state)
-        state = replace(state, opening=replace(state.opening, film=film))
-        return ShowDialog("film").apply(state)
+        state = state.with_opening(film=film)
+        return ShowDialog(Dialog.FILM).apply(state)
 
 
 @dataclass(frozen=True)
@@ -187,8 +188,8 @@ class TakeFrames:
     room where a scene is on show; and a scene is made of them."""
 
     def apply(self, state: State) -> State:
-        if state.info is None:
-            state = replace(state, photos=beside_frames(state))
+        if state.scene.info is None:
+            state = state.with_scene(photos=beside_frames(state))
         return replace(state, dialog=None)
 
 
@@ -210,10 +211,12 @@ def room_for_frames(state: State) -> int:
 def beside_frames(state: State) -> tuple[Photo, ...]:
     """Photos in the tray that stay with a film's frames: none where these make a new room."""
     film = state.opening.film
-    if state.info is not None:
+    if state.scene.info is not None:
         return ()
-    return tuple(photo for photo in state.photos if film is None or photo.path.parent != film.strip.folder)
+    return tuple(
+        photo for photo in state.scene.photos if film is None or photo.path.parent != film.strip.folder
+    )
 
 
 def _with_film(state: State, film: Film) -> State:
-    return replace(state, opening=replace(state.opening, film=film))
+    return state.with_opening(film=film)

@@ -5,6 +5,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlparse
 
 from ..commands import Command
+from ..dialogs import Dialog
 from ..effects import Effects, Hands
 from ..kit.textures import Thumbnails
 from ..scene import samples
@@ -23,7 +24,7 @@ from .commands import (
     PlaceFound,
     TakeFrames,
 )
-from .state import LOOKING, small
+from .state import small
 from .work import LookThrough, PastePicture, ReadFolder, SampleTiles, SmallPictures
 
 POLL_SECONDS = 0.1  # of the desktop's dialog
@@ -65,7 +66,7 @@ class OpeningEffects(Effects):
         """What is to be done with what was chosen in the desktop's dialog."""
         if state.opening.asker:
             return PlaceFound(Path(chosen[0]))
-        merging = self._merging and state.info is not None
+        merging = self._merging and state.scene.info is not None
         return MergeScene(Path(chosen[0])) if merging else OpenPaths(chosen)
 
     def follow(self, command: Command, before: State, state: State) -> None:
@@ -76,13 +77,13 @@ class OpeningEffects(Effects):
                 if native.is_there():
                     self._dialog = native.NativeDialog(state.preferences.folder, merging)
                 else:
-                    self._hands.perform(LookInto(dialog="merge" if merging else "open"))
+                    self._hands.perform(LookInto(dialog=Dialog.MERGE if merging else Dialog.OPEN))
             case LookForPlace() if self._dialog is None:
                 beside = _beside(before)
                 if native.is_there():
                     self._dialog = native.NativePlace(str(beside))
                 else:
-                    self._hands.perform(LookInto(beside, dialog="place"))
+                    self._hands.perform(LookInto(beside, dialog=Dialog.PLACE))
             case LookInto(folder):
                 self._forget(before)
                 self._hands.submit(ReadFolder(folder or _start(state)))
@@ -97,7 +98,7 @@ class OpeningEffects(Effects):
             case TakeFrames() if before.opening.film is not None:
                 self._take(state)
             case _:
-                if before.dialog in LOOKING and state.dialog not in LOOKING:
+                if _looks(before) and not _looks(state):
                     self._forget(before)
         self._show_film(before, state)
 
@@ -105,18 +106,20 @@ class OpeningEffects(Effects):
         """Frames into the tray, and a scene of them."""
         film = state.opening.film
         assert film is not None
-        aside = () if state.info is None else (SetPhotosAside(),)
+        aside = () if state.scene.info is None else (SetPhotosAside(),)
         self._hands.perform(Instead((*aside, AddPhotos(film.frames), Reconstruct())))
 
     def _show_film(self, before: State, state: State) -> None:
         """Small pictures of a film's frames, as long as its dialog is open."""
         film, was = state.opening.film, before.opening.film
-        opened = state.dialog == "film" and (before.dialog != "film" or film != was)
-        same = was is not None and film is not None and was.strip is film.strip and before.dialog == "film"
+        opened = state.dialog is Dialog.FILM and (before.dialog is not Dialog.FILM or film != was)
+        same = (
+            was is not None and film is not None and was.strip is film.strip and before.dialog is Dialog.FILM
+        )
         if opened and film is not None and not same:
             paths = tuple(map(film.strip.path, range(len(film.strip.stills))))
             self._hands.submit(SmallPictures(film.strip.folder, paths))
-        if before.dialog == "film" and state.dialog != "film" and was is not None:
+        if before.dialog is Dialog.FILM and state.dialog is not Dialog.FILM and was is not None:
             for index in range(len(was.strip.stills)):
                 self._thumbnails.drop(small(was.strip.path(index)))
 
@@ -135,9 +138,14 @@ class OpeningEffects(Effects):
 def _shows(state: State, folder: Path) -> bool:
     """Whether small pictures of what lies in a folder are on show."""
     looked, film = state.opening.folder, state.opening.film
-    if state.dialog == "film":
+    if state.dialog is Dialog.FILM:
         return film is not None and film.strip.folder == folder
-    return state.dialog in LOOKING and looked is not None and looked.path == folder
+    return _looks(state) and looked is not None and looked.path == folder
+
+
+def _looks(state: State) -> bool:
+    """Whether a dialog that shows a folder is open."""
+    return state.dialog is not None and state.dialog.looks
 
 
 def _start(state: State) -> Path:
@@ -145,12 +153,12 @@ def _start(state: State) -> Path:
     last = Path(state.preferences.folder)
     if state.preferences.folder and last.is_dir():
         return last
-    return samples.beside(state.photos).parent
+    return samples.beside(state.scene.photos).parent
 
 
 def _beside(state: State) -> Path:
     """The folder of the file that the dialog on show writes; at home where it is not there yet."""
-    wanted = state.exporting.form.path if state.dialog == "export" else state.dialog_path
+    wanted = state.exporting.form.path if state.dialog is Dialog.EXPORT else state.typed.text
     folder = typed_path(wanted).parent
     return folder if folder.is_dir() else Path.home()
 

@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from langflash_core.images.strip import Strip
 
-LOOKING = ("open", "merge", "place")  # dialogs that show a folder
+from ..dialogs import Dialog
+from ..protocol import Command
+
 MOST_FILES = 300  # of a folder that are shown
 
 
@@ -49,9 +50,9 @@ class Opening:
 
     folder: Folder | None = None
     chosen: tuple[Path, ...] = ()
-    asker: str = ""
+    asker: Dialog | None = None
     name: str = ""
-    pending: tuple[Any, ...] = ()
+    pending: tuple[Command, ...] = ()
     film: Film | None = None
 
 

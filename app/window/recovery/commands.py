@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any
 
 from langflash_core.geometry.poses import Pose
 from langflash_core.pictures import NAMED
@@ -16,12 +15,6 @@ from ..scene.state import Photo
 from ..state import State
 from .preferences import PANEL_WIDTHS, SCALES, SPEEDS, Preferences
 from .state import Kept, KeptPhoto, Offer
-
-
-def change(state: State, **changes: Any) -> State:
-    """The state with another recovery half."""
-    return replace(state, recovery=replace(state.recovery, **changes))
-
 
 # Preferences
 
@@ -73,7 +66,7 @@ class CopyAt:
     path: Path
 
     def apply(self, state: State) -> State:
-        return change(state, copy=self.path)
+        return state.with_recovery(copy=self.path)
 
 
 @dataclass(frozen=True)
@@ -83,7 +76,7 @@ class OfferSession:
     kept: Kept
 
     def apply(self, state: State) -> State:
-        return change(state, session=self.kept)
+        return state.with_recovery(session=self.kept)
 
 
 @dataclass(frozen=True)
@@ -94,7 +87,7 @@ class EndSessionOffer:
 
     def apply(self, state: State) -> State:
         kept = state.recovery.session
-        state = change(state, session=None)
+        state = state.with_recovery(session=None)
         if kept is None or not self.restore:
             return state
         state = restored_tray(state, tuple(zip(kept.photos, kept.fovs, strict=True)), kept.missing)
@@ -103,7 +96,7 @@ class EndSessionOffer:
 
 def restored_tray(state: State, photos: Iterable[KeptPhoto], missing: Sequence[str]) -> State:
     """The tray with the photos of an earlier session, and a sentence on those that have gone."""
-    state = replace(state, photos=tuple(Photo(Path(path), fov=fov) for path, fov in photos))
+    state = state.with_scene(photos=tuple(Photo(Path(path), fov=fov) for path, fov in photos))
     if not missing:
         return state
     others = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
@@ -127,7 +120,9 @@ def restored_phrases(state: State, kept: Kept) -> State:
         rows.append(row)
     if not rows:
         return state
-    return replace(state, prompts=tuple(rows), active=rows[0].key, next_key=state.next_key + len(rows))
+    return replace(
+        state.with_asking(prompts=tuple(rows), active=rows[0].key), next_key=state.next_key + len(rows)
+    )
 
 
 @dataclass(frozen=True)
@@ -141,13 +136,13 @@ class StandAgain:
     saved: bool
 
     def apply(self, state: State) -> State:
-        if state.info is None:
+        if state.scene.info is None:
             return state
-        info = state.info if self.saved else replace(state.info, name=self.name, path=None)
-        mode = NAMED.get(self.mode.lower(), state.mode)  # earlier versions wrote capitals
-        pose = self.pose or state.pose
-        view = state.view if pose == state.pose else None
-        return replace(state, info=info, mode=mode, pose=pose, view=view)
+        info = state.scene.info if self.saved else replace(state.scene.info, name=self.name, path=None)
+        mode = NAMED.get(self.mode.lower(), state.scene.mode)  # earlier versions wrote capitals
+        pose = self.pose or state.scene.pose
+        view = state.scene.view if pose == state.scene.pose else None
+        return state.with_scene(info=info, mode=mode, pose=pose, view=view)
 
 
 @dataclass(frozen=True)
@@ -170,7 +165,7 @@ class EditsKept:
     file: Path | None
 
     def apply(self, state: State) -> State:
-        return change(state, kept=self.file)
+        return state.with_recovery(kept=self.file)
 
 
 @dataclass(frozen=True)
@@ -180,7 +175,7 @@ class OfferEdits:
     offer: Offer
 
     def apply(self, state: State) -> State:
-        return change(state, edits=self.offer)
+        return state.with_recovery(edits=self.offer)
 
 
 @dataclass(frozen=True)
@@ -193,11 +188,11 @@ class EndOffer:
 
     def apply(self, state: State) -> State:
         offer = state.recovery.edits
-        state = change(state, edits=None)
+        state = state.with_recovery(edits=None)
         if offer is None or not self.restore or not (offer.photos or offer.missing):
             return state
-        before = scene_photos(state) if state.info is not None else None
-        return restored_tray(replace(state, aside=before), offer.photos, offer.missing)
+        before = scene_photos(state) if state.scene.info is not None else None
+        return restored_tray(state.with_scene(aside=before), offer.photos, offer.missing)
 
 
 def _within(value: float, limits: tuple[float, float]) -> float:

@@ -103,7 +103,7 @@ class RecoveryEffects(Effects):
             self._keeper.close()
 
     def _close_edits(self, state: State) -> None:
-        info, history = state.info, state.editing.history
+        info, history = state.scene.info, state.editing.history
         if info is None or history is None:
             return
         try:
@@ -145,7 +145,7 @@ class RecoveryEffects(Effects):
         self._note_changes(before, state)
 
     def _note_changes(self, before: State, state: State) -> None:
-        if state.editing.marks != before.editing.marks and state.info is before.info:
+        if state.editing.marks != before.editing.marks and state.scene.info is before.scene.info:
             self._keep_edits_at = state.now + KEEP_AFTER
         if state.preferences != before.preferences:
             self._save_at = state.now + SAVE_AFTER
@@ -162,10 +162,14 @@ class RecoveryEffects(Effects):
     def _take_edits(self, info: SceneInfo, before: State, state: State, replaces: bool) -> None:
         """Keep those of the scene before, unless they are those of the scene that has come as well; those are
         restored or looked for."""
-        if not replaces and before.info is not None and before.editing.unsaved and before.editing.dirty:
+        if not replaces and before.scene.info is not None and before.editing.unsaved and before.editing.dirty:
             self._keep_edits(before)
-            if before.info.path is None or before.editing.history is None or before.editing.history.done:
-                text = f"The edits of {before.info.name} are kept; go back to it to go on with them."
+            if (
+                before.scene.info.path is None
+                or before.editing.history is None
+                or before.editing.history.done
+            ):
+                text = f"The edits of {before.scene.info.name} are kept; go back to it to go on with them."
                 self._hands.perform(Notify(text, "info"))
         self._edits_kept, self._edits_wrote, self._keep_edits_at = False, False, NEVER
         self._replaced = []
@@ -176,8 +180,10 @@ class RecoveryEffects(Effects):
                 self._replaced.append(ForgetFile(restored))
         else:
             self._hands.submit(LookForEdits(info.serial, info.scene, info.path))
-        if replaces and before.info is not None:  # the same edits are to lie beside the scene that has come
-            self._replaced.append(ForgetEdits(before.info.scene, self._keeper.token))
+        if (
+            replaces and before.scene.info is not None
+        ):  # the same edits are to lie beside the scene that has come
+            self._replaced.append(ForgetEdits(before.scene.info.scene, self._keeper.token))
 
     def _end_offer(self, offer: Offer, restore: bool, forget: bool) -> None:
         if restore:
@@ -192,13 +198,13 @@ class RecoveryEffects(Effects):
         self._keep_edits_at = NEVER
         if state.editing.dirty:
             self._keep_edits(state)
-        elif self._edits_kept and state.info is not None:
-            self._hands.submit(ForgetEdits(state.info.scene, self._keeper.token))
+        elif self._edits_kept and state.scene.info is not None:
+            self._hands.submit(ForgetEdits(state.scene.info.scene, self._keeper.token))
             self._hands.perform(EditsKept(None))
             self._edits_kept = False
 
     def _keep_edits(self, state: State) -> None:
-        info, history = state.info, state.editing.history
+        info, history = state.scene.info, state.editing.history
         if info is not None and history is not None and history.done:
             self._write_edits(info, history, state)
 
@@ -264,12 +270,12 @@ class RecoveryEffects(Effects):
             self._hands.dispatch(Log("error", f"The session is not kept: {error}."))
 
     def _kept(self, state: State) -> Kept:
-        info = state.info
+        info = state.scene.info
         path = None if info is None else info.path or (self._keeper.scene_file if self._copied else None)
-        prompts = [prompt for prompt in state.prompts if prompt.text.strip()]
+        prompts = [prompt for prompt in state.asking.prompts if prompt.text.strip()]
         return Kept(
-            photos=tuple(str(photo.path) for photo in state.photos),
-            fovs=tuple(photo.fov for photo in state.photos),
+            photos=tuple(str(photo.path) for photo in state.scene.photos),
+            fovs=tuple(photo.fov for photo in state.scene.photos),
             scene="" if path is None else str(path),
             edits="" if state.recovery.kept is None else str(state.recovery.kept),
             saved=info is None or info.path is not None,
@@ -279,14 +285,14 @@ class RecoveryEffects(Effects):
             thresholds=tuple(prompt.threshold for prompt in prompts),
             colours=tuple(prompt.colour for prompt in prompts),
             visible=tuple(prompt.visible for prompt in prompts),
-            mode=state.mode.name,
-            pose=None if info is None else state.pose,
+            mode=state.scene.mode.name,
+            pose=None if info is None else state.scene.pose,
         )
 
 
 def _snapshot(state: State) -> tuple[Any, ...]:
     """What a change of must be kept."""
-    where = None if state.info is None else (state.info.serial, state.info.path)
-    phrases = tuple((p.text, p.like, p.threshold, p.colour, p.visible) for p in state.prompts)
-    photos = tuple((photo.path, photo.fov) for photo in state.photos)
-    return photos, where, phrases, state.mode, state.pose, state.recovery.kept
+    where = None if state.scene.info is None else (state.scene.info.serial, state.scene.info.path)
+    phrases = tuple((p.text, p.like, p.threshold, p.colour, p.visible) for p in state.asking.prompts)
+    photos = tuple((photo.path, photo.fov) for photo in state.scene.photos)
+    return photos, where, phrases, state.scene.mode, state.scene.pose, state.recovery.kept

@@ -74,7 +74,7 @@ def _label(text: str, look: Look) -> None:
 def draw_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
     """A session that ended badly, offered without standing in the way."""
     kept = state.recovery.session
-    if kept is None or state.job is not None or state.info is not None:
+    if kept is None or state.scene.job is not None or state.scene.info is not None:
         return []
     issued: list[do.Command] = []
     middle = ImVec2(place.x + size.x / 2, place.y + look.px(16))
@@ -100,7 +100,7 @@ def draw_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do
 def draw_edits_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
     """Edits that nobody saved, offered without standing in the way."""
     offer = state.recovery.edits
-    if offer is None or state.job is not None:
+    if offer is None or state.scene.job is not None:
         return []
     issued: list[do.Command] = []
     corner = ImVec2(place.x + size.x / 2, place.y + size.y - look.px(14))

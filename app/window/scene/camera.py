@@ -1,6 +1,6 @@
 """What can happen to the picture: its mode, the pose it is seen from, the photo beside it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Pose, Vector
@@ -19,7 +19,7 @@ class SetMode:
     mode: Picture
 
     def apply(self, state: State) -> State:
-        return replace(state, mode=self.mode)
+        return state.with_scene(mode=self.mode)
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,10 @@ class JumpTo:
     view: int
 
     def apply(self, state: State) -> State:
-        if state.info is None or not 0 <= self.view < len(state.info.views):
+        if state.scene.info is None or not 0 <= self.view < len(state.scene.info.views):
             return state
-        flight = Flight(state.pose, state.info.views[self.view], state.now)
-        return replace(state, flight=flight, tour=None, view=self.view)
+        flight = Flight(state.scene.pose, state.scene.info.views[self.view], state.now)
+        return state.with_scene(flight=flight, view=self.view).with_filming(tour=None)
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,9 @@ class FlyTo:
     pose: Pose
 
     def apply(self, state: State) -> State:
-        return replace(state, flight=Flight(state.pose, self.pose, state.now), tour=None, view=None)
+        return state.with_scene(
+            flight=Flight(state.scene.pose, self.pose, state.now), view=None
+        ).with_filming(tour=None)
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,8 @@ class Face:
     forward: Vector
 
     def apply(self, state: State) -> State:
-        pose = poses.facing_near(state.pose, self.forward, places_to_keep_to(state))
-        if pose != poses.facing(state.pose, self.forward):
+        pose = poses.facing_near(state.scene.pose, self.forward, places_to_keep_to(state))
+        if pose != poses.facing(state.scene.pose, self.forward):
             state = Notify(NOT_SEEN, "info").apply(state)
         return FlyTo(pose).apply(state)
 
@@ -64,16 +66,16 @@ class SwitchRays:
     """Parallel rays (orthographic) for perspective, and back; what is looked at stays as large."""
 
     def apply(self, state: State) -> State:
-        info = state.info
+        info = state.scene.info
         if info is None:
             return state
-        there = state.flight.end if state.flight else state.pose
+        there = state.scene.flight.end if state.scene.flight else state.scene.pose
         if there.span is not None:
             switched = poses.perspective(there)
         else:
             at = Vector(*there.pivot.tolist())
             switched = poses.orthographic(there, *(info.extent or (at, at)))
-        return FlyTo(switched).apply(state) if state.flight else MoveTo(switched).apply(state)
+        return FlyTo(switched).apply(state) if state.scene.flight else MoveTo(switched).apply(state)
 
 
 NOT_SEEN = (
@@ -108,7 +110,7 @@ class MoveTo:
     pose: Pose
 
     def apply(self, state: State) -> State:
-        return replace(state, pose=self.pose, flight=None, tour=None, view=None)
+        return state.with_scene(pose=self.pose, flight=None, view=None).with_filming(tour=None)
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,7 @@ class Orbit:
     pitch: float = 0.0
 
     def apply(self, state: State) -> State:
-        pose = poses.orbit_near(state.pose, self.yaw, self.pitch, places_to_keep_to(state))
+        pose = poses.orbit_near(state.scene.pose, self.yaw, self.pitch, places_to_keep_to(state))
         return MoveTo(pose).apply(state)
 
 
@@ -130,7 +132,7 @@ class SetFov:
     degrees: float
 
     def apply(self, state: State) -> State:
-        return MoveTo(poses.with_fov(state.pose, self.degrees)).apply(state)
+        return MoveTo(poses.with_fov(state.scene.pose, self.degrees)).apply(state)
 
 
 @dataclass(frozen=True)
@@ -138,10 +140,10 @@ class FrameAll:
     """Fly back until the whole scene is in view, looking the same way."""
 
     def apply(self, state: State) -> State:
-        info = state.info
+        info = state.scene.info
         if info is None or info.extent is None:
             return state
-        return FlyTo(poses.framing(state.pose, *info.extent)).apply(state)
+        return FlyTo(poses.framing(state.scene.pose, *info.extent)).apply(state)
 
 
 @dataclass(frozen=True)
@@ -152,4 +154,4 @@ class Compare:
 
     def apply(self, state: State) -> State:
         place = None if self.place is None else min(max(self.place, 0.0), 1.0)
-        return replace(state, compare=place)
+        return state.with_scene(compare=place)

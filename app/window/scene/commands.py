@@ -11,9 +11,12 @@ from langflash_core.scene.edits import Marks
 from langflash_core.scene.mask import Mask
 
 from ..commands import NOTHING_TO_SAVE, Command, Notify, ShowDialog
+from ..dialogs import Dialog
 from ..editing.state import fresh
+from ..filming.state import NO_FILMING
 from ..state import State
 from .drops import MAX_PHOTOS
+from .memory import SceneMemory
 from .state import MOST_ROOMS, RECONSTRUCTING, RESTORING, Job, Photo, Room, SceneInfo, head_of
 
 if TYPE_CHECKING:
@@ -29,10 +32,10 @@ class AddPhotos:
     paths: tuple[Path, ...]
 
     def apply(self, state: State) -> State:
-        known = {p.path for p in state.photos}
+        known = {p.path for p in state.scene.photos}
         fresh = tuple(Photo(p) for p in dict.fromkeys(self.paths) if p not in known)
-        photos = (*state.photos, *fresh)
-        after = replace(state, photos=photos[:MAX_PHOTOS])
+        photos = (*state.scene.photos, *fresh)
+        after = state.with_scene(photos=photos[:MAX_PHOTOS])
         if len(photos) > MAX_PHOTOS:
             left = len(photos) - MAX_PHOTOS
             text = f"{left} photos were left out: at most {MAX_PHOTOS} make one scene; clear the tray first."
@@ -47,7 +50,9 @@ class RemovePhoto:
     index: int
 
     def apply(self, state: State) -> State:
-        return replace(state, photos=state.photos[: self.index] + state.photos[self.index + 1 :])
+        return state.with_scene(
+            photos=state.scene.photos[: self.index] + state.scene.photos[self.index + 1 :]
+        )
 
 
 @dataclass(frozen=True)
@@ -55,7 +60,7 @@ class ClearPhotos:
     """Empty the tray; the scene stays."""
 
     def apply(self, state: State) -> State:
-        return replace(state, photos=())
+        return state.with_scene(photos=())
 
 
 @dataclass(frozen=True)
@@ -63,7 +68,7 @@ class SetPhotosAside:
     """Empty the tray for a new room; the photos come back where it cannot be made."""
 
     def apply(self, state: State) -> State:
-        return replace(state, photos=(), aside=scene_photos(state))
+        return state.with_scene(photos=(), aside=scene_photos(state))
 
 
 @dataclass(frozen=True)
@@ -74,8 +79,8 @@ class PhotoFailed:
     problem: str
 
     def apply(self, state: State) -> State:
-        photos = (replace(p, problem=self.problem) if p.path == self.path else p for p in state.photos)
-        return replace(state, photos=tuple(photos))
+        photos = (replace(p, problem=self.problem) if p.path == self.path else p for p in state.scene.photos)
+        return state.with_scene(photos=tuple(photos))
 
 
 @dataclass(frozen=True)
@@ -98,10 +103,10 @@ class SetPhotoFov:
     fov: float | None
 
     def apply(self, state: State) -> State:
-        if not 0 <= self.index < len(state.photos):
+        if not 0 <= self.index < len(state.scene.photos):
             return state
         fov = None if self.fov is None else min(max(self.fov, poses.FOV_RANGE[0]), poses.FOV_RANGE[1])
-        return _change_photo(state, state.photos[self.index].path, fov=fov)
+        return _change_photo(state, state.scene.photos[self.index].path, fov=fov)
 
 
 @dataclass(frozen=True)
@@ -112,12 +117,12 @@ class MovePhoto:
     place: int
 
     def apply(self, state: State) -> State:
-        photos = list(state.photos)
+        photos = list(state.scene.photos)
         if not 0 <= self.index < len(photos):
             return state
         photo = photos.pop(self.index)
         photos.insert(min(max(self.place, 0), len(photos)), photo)
-        return replace(state, photos=tuple(photos))
+        return state.with_scene(photos=tuple(photos))
 
 
 @dataclass(frozen=True)
@@ -125,10 +130,10 @@ class ChoosePair:
     """Look for the two photos that make the best scene."""
 
     def apply(self, state: State) -> State:
-        if len(state.photos) < 3:
+        if len(state.scene.photos) < 3:
             text = "Choosing needs three photos or more; drop some on the window."
             return Notify(text).apply(state)
-        return replace(state, choosing=True)
+        return state.with_scene(choosing=True)
 
 
 @dataclass(frozen=True)
@@ -139,15 +144,15 @@ class PairChosen:
     pair: tuple[int, int] | None
 
     def apply(self, state: State) -> State:
-        state = replace(state, choosing=False)
-        if tuple(photo.path for photo in state.photos) != self.paths:
+        state = state.with_scene(choosing=False)
+        if tuple(photo.path for photo in state.scene.photos) != self.paths:
             return state  # the tray has changed meanwhile: the answer is about other photos
         if self.pair is None:
             text = "No two of these photos match; take photos that share at least a third of the picture."
             return Notify(text).apply(state)
-        chosen = tuple(state.photos[index] for index in self.pair)
+        chosen = tuple(state.scene.photos[index] for index in self.pair)
         names = " and ".join(photo.path.name for photo in chosen)
-        return Notify(f"Kept {names}.", "info").apply(replace(state, photos=chosen))
+        return Notify(f"Kept {names}.", "info").apply(state.with_scene(photos=chosen))
 
 
 @dataclass(frozen=True)
@@ -157,7 +162,7 @@ class ChoosingFailed:
     sentence: str
 
     def apply(self, state: State) -> State:
-        return Notify(self.sentence).apply(replace(state, choosing=False))
+        return Notify(self.sentence).apply(state.with_scene(choosing=False))
 
 
 # Scenes
@@ -168,9 +173,9 @@ class Reconstruct:
     """Make a scene of the photos in the tray; replaces a job under way."""
 
     def apply(self, state: State) -> State:
-        if not state.photos:
+        if not state.scene.photos:
             return Notify("There is no photo to reconstruct; drop two photos on the window.").apply(state)
-        return replace(state, job=Job(RECONSTRUCTING, "starting", started=state.now))
+        return state.with_scene(job=Job(RECONSTRUCTING, "starting", started=state.now))
 
 
 @dataclass(frozen=True)
@@ -184,7 +189,7 @@ class OpenScene:
 
     def apply(self, state: State) -> State:
         title = RESTORING if self.edits else f"Opening {self.path.name}"
-        return replace(state, job=Job(title, "reading", started=state.now))
+        return state.with_scene(job=Job(title, "reading", started=state.now))
 
 
 @dataclass(frozen=True)
@@ -194,7 +199,7 @@ class SaveScene:
     path: Path
 
     def apply(self, state: State) -> State:
-        if state.info is None:
+        if state.scene.info is None:
             return Notify(NOTHING_TO_SAVE).apply(state)
         return replace(state, dialog=None)
 
@@ -231,49 +236,45 @@ class SceneArrived:
     replaces: bool = False
 
     def apply(self, state: State) -> State:
-        state = replace(self._shown(state), rooms=self._others(state))
+        state = self._shown(state).with_scene(rooms=self._others(state))
         if self.room is None:
             return state
-        editing = replace(state.editing, saved=self.room.saved)
-        return replace(
-            state,
-            photos=self.room.photos,
-            editing=editing,
-            pose=self.room.pose,
-            view=None,
-        )
+        state = state.with_editing(saved=self.room.saved)
+        return state.with_scene(photos=self.room.photos, pose=self.room.pose, view=None)
 
     def _others(self, state: State) -> tuple[Room, ...]:
-        return state.rooms if self.replaces else _rooms(state, self.info)
+        return state.scene.rooms if self.replaces else _rooms(state, self.info)
 
     def _shown(self, state: State) -> State:
-        prompts = tuple(replace(p, score=None) for p in state.prompts)
-        history = self.info.history
-        saved = None if history is None else history.first
-        made = state.job is not None and state.job.title == RECONSTRUCTING
+        old, info, asking = state.scene, self.info, state.asking.without_scene()
+        made = old.job is not None and old.job.title == RECONSTRUCTING
+        saved = None if info.history is None else info.history.first
         return replace(
             state,
-            editing=fresh(state.editing, history, saved),
+            scene=replace(
+                old,
+                info=info,
+                photos=() if self.alone else old.photos,
+                aside=None,
+                pose=info.views[0] if info.views else poses.START,
+                flight=None,
+                view=0 if info.views else None,
+                job=None,
+            ),
+            asking=replace(asking, named=made and not asking.asked),
+            editing=fresh(state.editing, info.history, saved),
+            filming=NO_FILMING,
             recovery=replace(state.recovery, edits=None, kept=None),
-            asking=replace(state.asking.without_scene(), named=made and not state.asked),
-            info=self.info,
-            photos=() if self.alone else state.photos,
-            prompts=prompts,
-            job=None,
-            aside=None,
-            flight=None,
-            tour=None,
-            pose=self.info.views[0] if self.info.views else poses.START,
-            view=0 if self.info.views else None,
         )
 
 
 def _rooms(state: State, coming: SceneInfo) -> tuple[Room, ...]:
     """Those to go back to once `coming` is on show; the same file twice only where there are edits."""
-    info, editing, left = state.info, state.editing, ()
+    info, editing, left = state.scene.info, state.editing, ()
     if info is not None:
-        left = (Room(info, scene_photos(state), editing.history, editing.saved, state.pose),)
-    rooms = (room for room in (*left, *state.rooms) if room.info.serial != coming.serial)
+        rested = replace(info, memory=SceneMemory(info.scene))  # one not on show holds its scene alone
+        left = (Room(rested, scene_photos(state), editing.history, editing.saved, state.scene.pose),)
+    rooms = (room for room in (*left, *state.scene.rooms) if room.info.serial != coming.serial)
     kept = (room for room in rooms if room.edited or room.info.path is None or room.info.path != coming.path)
     return tuple(kept)[:MOST_ROOMS]
 
@@ -311,8 +312,8 @@ class Instead:
     commands: tuple[Command, ...]
 
     def apply(self, state: State) -> State:
-        asks = state.info is not None and state.editing.unsaved
-        return replace(state, pending=self.commands, dialog="unsaved" if asks else None)
+        asks = state.scene.info is not None and state.editing.unsaved
+        return replace(state.with_scene(pending=self.commands), dialog=Dialog.UNSAVED if asks else None)
 
 
 @dataclass(frozen=True)
@@ -320,7 +321,7 @@ class GoOn:
     """Do what has waited, edits saved or not."""
 
     def apply(self, state: State) -> State:
-        return replace(state, pending=(), dialog=None)
+        return replace(state.with_scene(pending=()), dialog=None)
 
 
 @dataclass(frozen=True)
@@ -328,7 +329,7 @@ class SaveFirst:
     """Save, and go on once that is done."""
 
     def apply(self, state: State) -> State:
-        return replace(ShowDialog("save").apply(state), pending=state.pending)
+        return ShowDialog(Dialog.SAVE).apply(state).with_scene(pending=state.scene.pending)
 
 
 @dataclass(frozen=True)
@@ -338,7 +339,7 @@ class AskAboutDrop:
     photos: tuple[Path, ...]
 
     def apply(self, state: State) -> State:
-        return replace(state, dropped=self.photos, dialog="drop")
+        return replace(state.with_scene(dropped=self.photos), dialog=Dialog.DROP)
 
 
 def dropped(state: State, photos: tuple[Path, ...], new: bool) -> Command:
@@ -355,7 +356,7 @@ class AskAboutScene:
     path: Path
 
     def apply(self, state: State) -> State:
-        return replace(state, dropped=(self.path,), dialog="drop scene")
+        return replace(state.with_scene(dropped=(self.path,)), dialog=Dialog.DROP_SCENE)
 
 
 # Two scenes as one
@@ -368,10 +369,10 @@ class MergeScene:
     path: Path
 
     def apply(self, state: State) -> State:
-        if state.info is None:
+        if state.scene.info is None:
             return Notify(NOTHING_TO_MERGE).apply(state)
         job = Job(f"Merging {self.path.name}", "reading", started=state.now)
-        return replace(state, job=job, dialog=None)
+        return replace(state.with_scene(job=job), dialog=None)
 
 
 @dataclass(frozen=True)
@@ -387,8 +388,8 @@ class Merged:
         """Whether it still holds the scene on show."""
         marks = state.editing.marks
         return (
-            state.info is not None
-            and state.info.serial == self.serial
+            state.scene.info is not None
+            and state.scene.info.serial == self.serial
             and (marks is not None and marks.there == self.there)
         )
 
@@ -396,7 +397,7 @@ class Merged:
         if self.fits(state):
             return state
         text = f"{self.name} was not merged, since another scene is on show by now; merge it again."
-        return Notify(text).apply(replace(state, job=None))
+        return Notify(text).apply(state.with_scene(job=None))
 
     def arrival(self, state: State) -> "SceneArrived":
         """What brings it into a state that it fits: the merge is one more edit, its things selected."""
@@ -411,7 +412,7 @@ class Merged:
         history = before.edited(f"Merge {self.name}", after)
         if saved is not None:
             saved = saved.of_size(self.there[0], saved.atoms[: self.there[1]]).of_size(count, whole.atoms)
-        room = Room(self.info, state.photos, history, saved, state.pose)
+        room = Room(self.info, state.scene.photos, history, saved, state.scene.pose)
         return SceneArrived(replace(self.info, history=history), room=room, replaces=True)
 
 
@@ -436,9 +437,13 @@ class SceneSaved:
     marks: Marks | None = None
 
     def apply(self, state: State) -> State:
-        info = None if state.info is None else replace(state.info, path=self.path, name=self.path.name)
+        info = (
+            None
+            if state.scene.info is None
+            else replace(state.scene.info, path=self.path, name=self.path.name)
+        )
         saved = self.marks or state.editing.saved
-        state = replace(state, info=info, editing=replace(state.editing, saved=saved))
+        state = state.with_scene(info=info).with_editing(saved=saved)
         return Notify(f"Saved {self.path}", "info").apply(state)
 
 
@@ -450,7 +455,11 @@ class CancelJob:
     """Ask the job to stop; it ends after its present stage."""
 
     def apply(self, state: State) -> State:
-        return state if state.job is None else replace(state, job=replace(state.job, cancelling=True))
+        return (
+            state
+            if state.scene.job is None
+            else state.with_scene(job=replace(state.scene.job, cancelling=True))
+        )
 
 
 @dataclass(frozen=True)
@@ -461,15 +470,15 @@ class Progressed:
     fraction: float
 
     def apply(self, state: State) -> State:
-        job = state.job
+        job = state.scene.job
         if job is None:
             return state
         fraction = min(max(self.fraction, 0.0), 1.0)
         if head_of(self.stage) == head_of(job.stage):  # the same, at another of its photos
-            return replace(state, job=replace(job, stage=self.stage, fraction=fraction))
+            return state.with_scene(job=replace(job, stage=self.stage, fraction=fraction))
         done = (*job.done, (head_of(job.stage), state.now - job.started))
-        return replace(
-            state, job=replace(job, stage=self.stage, fraction=fraction, started=state.now, done=done)
+        return state.with_scene(
+            job=replace(job, stage=self.stage, fraction=fraction, started=state.now, done=done)
         )
 
 
@@ -494,16 +503,16 @@ class JobCancelled:
 def _ended(state: State) -> State:
     """Without its job; where that was to make a new room, or to restore one, the tray is that of the scene on
     show again."""
-    if state.job is not None and state.job.title not in (RECONSTRUCTING, RESTORING):
-        return replace(state, job=None)
-    return replace(state, job=None, photos=scene_photos(state), aside=None)
+    if state.scene.job is not None and state.scene.job.title not in (RECONSTRUCTING, RESTORING):
+        return state.with_scene(job=None)
+    return state.with_scene(job=None, photos=scene_photos(state), aside=None)
 
 
 def scene_photos(state: State) -> tuple[Photo, ...]:
     """Those of the scene on show, while the tray may hold a new room's."""
-    return state.photos if state.aside is None else state.aside
+    return state.scene.photos if state.scene.aside is None else state.scene.aside
 
 
 def _change_photo(state: State, path: Path, **changes: Any) -> State:
-    photos = (replace(photo, **changes) if photo.path == path else photo for photo in state.photos)
-    return replace(state, photos=tuple(photos))
+    photos = (replace(photo, **changes) if photo.path == path else photo for photo in state.scene.photos)
+    return state.with_scene(photos=tuple(photos))

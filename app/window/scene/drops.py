@@ -6,6 +6,7 @@
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 
 from langflash_core.formats import FILMS_IN, is_film
@@ -31,6 +32,26 @@ class Drop:
     rejected: tuple[str, ...] = ()
 
 
+class There(Enum):
+    """What the disk has at a path."""
+
+    NOTHING = "nothing"
+    FILE = "a file"
+    FOLDER = "a folder"
+
+
+@dataclass(frozen=True)
+class Typed:
+    """The path that is typed in a dialog. there: what a file written to it would find, since the disk was
+    asked; that the effects do, and no panel."""
+
+    text: str = ""
+    there: There = There.NOTHING
+
+
+NOT_TYPED = Typed()
+
+
 def still_there(
     photos: Iterable[tuple[str, float | None]],
 ) -> tuple[tuple[tuple[str, float | None], ...], tuple[str, ...]]:
@@ -49,11 +70,22 @@ def typed_path(text: str) -> Path:
     return Path(os.path.expanduser(text.strip()))
 
 
-def typed_scene(text: str) -> Path | None:
+def typed_scene(typed: Typed) -> Path | None:
     """Where to write the scene that a person typed a name for; None while it names no file."""
+    named = typed.text.strip() and typed_path(typed.text).name
+    return _with_ending(typed.text) if named and typed.there is not There.FOLDER else None
+
+
+def look_up(text: str, scene: bool) -> There:
+    """Ask the disk about a path that is typed, or about the file of a `scene` that is called so."""
+    if os.path.isdir(typed_path(text)):
+        return There.FOLDER
+    wanted = _with_ending(text) if scene and typed_path(text).name else typed_path(text)
+    return There.FILE if os.path.isfile(wanted) else There.NOTHING
+
+
+def _with_ending(text: str) -> Path:
     path = typed_path(text)
-    if not text.strip() or not path.name or os.path.isdir(path):
-        return None
     return path if path.suffix else path.with_suffix(SCENE_SUFFIX)
 
 

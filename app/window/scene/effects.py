@@ -70,28 +70,28 @@ class SceneEffects(Effects):
         match command:
             case OpenPaths(paths, was_dropped):
                 self._open(paths, was_dropped, state)
-            case MergeScene(path) if state.info is not None and state.editing.marks is not None:
-                submit(JoinScenes(state.info, state.editing.marks, path))
+            case MergeScene(path) if state.scene.info is not None and state.editing.marks is not None:
+                submit(JoinScenes(state.scene.info, state.editing.marks, path))
             case AddPhotos(paths):
                 submit(MakeThumbnails(paths))
-            case Reconstruct() if state.photos:
-                photos, detail = state.photos, state.preferences.detail
+            case Reconstruct() if state.scene.photos:
+                photos, detail = state.scene.photos, state.preferences.detail
                 submit(ReconstructPhotos(tuple(p.path for p in photos), tuple(p.fov for p in photos), detail))
             case OpenScene(path, edits, alone):
                 submit(LoadScene(path, edits, alone))
-            case SaveScene(path) if state.info is not None:
-                submit(WriteScene(state.info.scene, path, state.editing.marks))
+            case SaveScene(path) if state.scene.info is not None:
+                submit(WriteScene(state.scene.info.scene, path, state.editing.marks))
             case CancelJob():
                 self._hands.cancel()
-            case ChoosePair() if state.choosing and not before.choosing:
-                submit(FindPair(tuple(photo.path for photo in state.photos)))
+            case ChoosePair() if state.scene.choosing and not before.scene.choosing:
+                submit(FindPair(tuple(photo.path for photo in state.scene.photos)))
             case SceneArrived(info):
                 self._show(info)
                 for share in self._viewport.shares:
                     submit(Thin(info.serial, info.scene, share))
             case Thinned(scene, share, thinned, rows):
                 self._viewport.thin(scene, share, thinned, rows)
-            case Loaded() if state.info is None and self._viewport.warm():
+            case Loaded() if state.scene.info is None and self._viewport.warm():
                 self._hands.dispatch(Loaded())
             case _:
                 self._go_on(command, before, state)
@@ -103,16 +103,16 @@ class SceneEffects(Effects):
         match command:
             case Instead() if state.dialog is None:
                 self._hands.perform(GoOn())
-            case SceneSaved() if before.pending:
+            case SceneSaved() if before.scene.pending:
                 self._hands.perform(GoOn())
             case GoOn():
-                waited = before.pending
+                waited = before.scene.pending
             case All(commands):
                 waited = commands
             case Merged() if command.fits(before):
                 waited = [command.arrival(before), SetHandle(Handle.MOVE), FrameAll()]
             case GoToRoom(serial):
-                rooms = (room for room in state.rooms if room.info.serial == serial)
+                rooms = (room for room in state.scene.rooms if room.info.serial == serial)
                 waited = [SceneArrived(replace(r.info, history=r.history), room=r) for r in rooms]
             case _:
                 pass
@@ -121,10 +121,10 @@ class SceneEffects(Effects):
 
     def _show_whole(self, before: State, state: State) -> None:
         """Of many photos the one that the scene is compared with, whole."""
-        view, info = state.view, state.info
-        if info is None or view is None or state.compare is None:
+        view, info = state.scene.view, state.scene.info
+        if info is None or view is None or state.scene.compare is None:
             return
-        known = before.info is info and before.view == view and before.compare is not None
+        known = before.scene.info is info and before.scene.view == view and before.scene.compare is not None
         if len(info.scene.photos) <= WHOLE_PHOTOS or view >= len(info.scene.photos) or known:
             return
         with suppress(OSError):
@@ -139,13 +139,13 @@ class SceneEffects(Effects):
             perform(OpenFilm(drop.films[0]))
         if len(drop.films) > 1:
             perform(Notify(f"Only {drop.films[0].name} was opened; drop one film at a time."))
-        if drop.photos and state.info is not None:
+        if drop.photos and state.scene.info is not None:
             perform(AskAboutDrop(drop.photos))
         elif drop.photos and drop.films:
             perform(AddPhotos(drop.photos))
         elif drop.photos:
             perform(dropped(state, drop.photos, new=False))
-        elif drop.scenes and was_dropped and state.info is not None:
+        elif drop.scenes and was_dropped and state.scene.info is not None:
             perform(AskAboutScene(drop.scenes[0]))
         elif drop.scenes and not drop.films:
             perform(Instead((OpenScene(drop.scenes[0], alone=True),)))

@@ -4,9 +4,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from langflash_core import pictures
 from langflash_core.geometry.poses import START, Pose, Vector
 from langflash_core.pictures import Picture
 from langflash_core.scene.edits import History, Marks
+
+from ..protocol import Command
+from .memory import SceneMemory
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
@@ -98,6 +102,7 @@ class SceneInfo:
     """The scene on show. `scene` is the immutable snapshot; `views` are poses of its photos.
 
     history: edits that came with it, none of them or those of an earlier session.
+    memory: of what was computed about it last; goes on with the same scene.
     own_views: whether it says which photo made which Gaussian, so that photos can be compared.
     extent: corners (low, high) of the box around nearly all of it, world axes, scene units.
     """
@@ -114,6 +119,11 @@ class SceneInfo:
     history: "History | None" = field(default=None, compare=False, repr=False)
     own_views: bool = False
     extent: tuple[Vector, Vector] | None = None
+    memory: SceneMemory = field(default=None, compare=False, repr=False)  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        if self.memory is None or self.memory.scene is not self.scene:
+            object.__setattr__(self, "memory", SceneMemory(self.scene))
 
 
 @dataclass(frozen=True)
@@ -139,3 +149,31 @@ class Flight:
     start: Pose
     end: Pose
     began: float
+
+
+@dataclass(frozen=True)
+class Showing:
+    """The scene's half of the state: the tray, the scene on show, how it is looked at, the work on it.
+
+    aside: photos of the scene on show while those of a new room are in the tray. choosing: the best pair is
+    being looked for. rooms: scenes that were on show before, the last one first. dropped: photos while it is
+    asked where they belong. pending: commands that wait for an answer about unsaved edits. view: of the photo
+    stood at, if any. compare: where the photo begins, 0 to 1 across the picture; None: not compared.
+    """
+
+    photos: tuple[Photo, ...] = ()
+    aside: tuple[Photo, ...] | None = None
+    choosing: bool = False
+    info: SceneInfo | None = None
+    rooms: tuple[Room, ...] = ()
+    dropped: tuple[Path, ...] = ()
+    pending: tuple[Command, ...] = ()
+    mode: Picture = pictures.RGB
+    pose: Pose = START
+    flight: Flight | None = None
+    view: int | None = None
+    compare: float | None = None
+    job: Job | None = None
+
+
+NO_SCENE = Showing()

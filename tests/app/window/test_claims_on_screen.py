@@ -33,10 +33,10 @@ def place(size: tuple[int, int]) -> tuple[ImVec2, ImVec2]:
 
 def all_selected() -> State:
     state = shown_scene()
-    assert state.info is not None
-    count = len(state.info.scene.gaussians)
-    history = History(first_marks(state.info.scene))
-    state = replace(state, editing=replace(state.editing, history=history, names=(("a",), ("b",), ("c",))))
+    assert state.scene.info is not None
+    count = len(state.scene.info.scene.gaussians)
+    history = History(first_marks(state.scene.info.scene))
+    state = state.with_editing(history=history, names=(("a",), ("b",), ("c",)))
     state = after(state, edit.Found(Mask.of(np.ones(count, bool)), "replace", "all"))
     return replace(state, preferences=replace(state.preferences, dictionary_open=True, dictionary=None))
 
@@ -56,10 +56,10 @@ def test_the_selections_bar_ends_before_the_dictionary(size: tuple[int, int]) ->
 
 def test_a_warning_that_every_photo_and_the_scene_repeat_is_said_once() -> None:
     state = shown_scene()
-    assert state.info is not None
+    assert state.scene.info is not None
     said = "it is dark"
     photos = tuple(Photo(path, notes=(said,)) for path in map(Path, "abcdefgh"))
-    state = replace(state, photos=photos, info=replace(state.info, warnings=(said, said)))
+    state = state.with_scene(photos=photos, info=replace(state.scene.info, warnings=(said, said)))
     assert tray._sentences(state) == ["It is dark."]
 
 
@@ -84,9 +84,9 @@ def drawn_over(state: State) -> int:
 def test_the_best_candidate_of_a_maybe_is_marked_and_that_of_nothing_is_not() -> None:
     shown = replace(shown_scene(), preferences=replace(State().preferences, photos_in_space=False))
     row = Prompt(9, "curtain", score=0.82, calibrated=0.83, place=Vector(0.0, 0.0, 1.0))
-    assert row.maybe and drawn_over(replace(shown, prompts=(row,))) > 0
+    assert row.maybe and drawn_over(shown.with_asking(prompts=(row,))) > 0
     missed = replace(row, score=0.3)
-    assert not missed.maybe and drawn_over(replace(shown, prompts=(missed,))) == 0
+    assert not missed.maybe and drawn_over(shown.with_asking(prompts=(missed,))) == 0
 
 
 def test_the_kind_of_rays_is_a_button_beside_the_axes() -> None:

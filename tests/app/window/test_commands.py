@@ -8,6 +8,7 @@ import torch
 
 from app.window import commands as do
 from app.window.asking import commands as ask
+from app.window.dialogs import Dialog
 from app.window.frame.status import figures, fitting
 from app.window.kit.widgets import sentence
 from app.window.scene import camera
@@ -44,16 +45,16 @@ def test_toasts_are_shown_once_expire_and_close() -> None:
 def test_leaving_asks_while_a_scene_is_unsaved(shown: State) -> None:
     assert after(State(), do.Leave()).leaving
     asked = after(shown, do.Leave())
-    assert not asked.leaving and asked.dialog == "leave"
+    assert not asked.leaving and asked.dialog is Dialog.LEAVE
     assert after(asked, do.Leave(sure=True)).leaving
     assert after(shown, show.SceneSaved(Path("s.langflash")), do.Leave()).leaving
 
 
 def test_the_save_dialog_proposes_a_place(shown: State) -> None:
-    state = after(shown, show.AddPhotos((Path("/p/left.jpg"),)), do.ShowDialog("save"))
-    assert state.dialog_path == str(Path("/p/left.langflash"))
-    saved = after(state, show.SceneSaved(Path("/q/s.langflash")), do.ShowDialog("save"))
-    assert saved.dialog_path == str(Path("/q/s.langflash"))
+    state = after(shown, show.AddPhotos((Path("/p/left.jpg"),)), do.ShowDialog(Dialog.SAVE))
+    assert state.typed.text == str(Path("/p/left.langflash"))
+    saved = after(state, show.SceneSaved(Path("/q/s.langflash")), do.ShowDialog(Dialog.SAVE))
+    assert saved.typed.text == str(Path("/q/s.langflash"))
     assert "no scene to save" in after(State(), show.SaveScene(Path("s"))).toasts[0].text
 
 

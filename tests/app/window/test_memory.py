@@ -148,15 +148,15 @@ def resident_mb():
     return next(int(line.split()[1]) for line in lines if line.startswith("RssAnon:")) / 1024
 
 def asked(text):
-    session.dispatch(EditPrompt(session.state.prompts[0].key, text))
-    until(lambda: session.state.prompts[0].text == text)
-    until(lambda: session.state.prompts[0].score is not None and not session.state.stats.settling)
+    session.dispatch(EditPrompt(session.state.asking.prompts[0].key, text))
+    until(lambda: session.state.asking.prompts[0].text == text)
+    until(lambda: session.state.asking.prompts[0].score is not None and not session.state.stats.settling)
 
 session.dispatch(OpenScene(Path(sys.argv[1]), alone=True))
-until(lambda: session.state.info is not None and session.state.job is None)
-if not session.state.prompts:
+until(lambda: session.state.scene.info is not None and session.state.scene.job is None)
+if not session.state.asking.prompts:
     session.dispatch(AddPrompt())
-    until(lambda: session.state.prompts)
+    until(lambda: session.state.asking.prompts)
 for text in ("armchair", "wall", "floor"):
     asked(text)
 end = time.monotonic() + 4

@@ -1,7 +1,5 @@
 """Nothing covers anything else where the window is small or the interface large."""
 
-from dataclasses import replace
-
 import pytest
 from imgui_bundle import ImVec2, imgui
 
@@ -36,10 +34,10 @@ def test_the_legend_makes_room_for_the_viewpoints() -> None:
 def edited(**changes) -> State:
     """Everything is selected, as Ctrl+A does."""
     state = shown_scene()
-    assert state.info is not None
-    marks = first_marks(state.info.scene)
-    state = after(replace(state, editing=replace(state.editing, history=History(marks))), edit.SelectAll())
-    return replace(state, editing=replace(state.editing, **changes))
+    assert state.scene.info is not None
+    marks = first_marks(state.scene.info.scene)
+    state = after(state.with_editing(history=History(marks)), edit.SelectAll())
+    return state.with_editing(**changes)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.5])

@@ -13,6 +13,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app.window.asking.panels import known, prompts, scores
 from app.window.commands import Command, ShowDialog, apply
+from app.window.dialogs import Dialog
 from app.window.editing import commands as edit
 from app.window.editing import pointing as point
 from app.window.editing.panels import pointing as card_panel
@@ -105,7 +106,7 @@ def middle(items: Items, label: str) -> tuple[float, float]:
 
 
 def browsing(folder: Folder) -> State:
-    return replace(State(), dialog="open", opening=replace(State().opening, folder=folder))
+    return replace(State().with_opening(folder=folder), dialog=Dialog.OPEN)
 
 
 def test_a_double_click_walks_into_one_folder(items: Items) -> None:
@@ -146,10 +147,10 @@ def test_keys_walk_through_folders_and_choose_photos() -> None:
 
 def test_a_card_is_asked_again_once_its_thing_has_another_name(items: Items) -> None:
     state = shown_scene()
-    assert state.info is not None
-    history = History(first_marks(state.info.scene))
+    assert state.scene.info is not None
+    history = History(first_marks(state.scene.info.scene))
     card = Card(Reading((300, 200), None, 1.0, ((1, 1.0),)), (("tv stand", 0.93),))
-    state = replace(state, editing=replace(state.editing, history=history, card=card, names=(("a",),) * 3))
+    state = state.with_editing(history=history, card=card, names=(("a",),) * 3)
     hands = Hands(lambda seen: card_panel.draw(state, seen, PLACE, ROOM))
     with context(SIZE):
         hands.frames(4)
@@ -183,23 +184,23 @@ def test_enter_opens_what_the_space_bar_has_chosen() -> None:
     assert hands.of(ShowDialog) == []
 
 
-@pytest.mark.parametrize("asker", ["export", "save"])
-def test_a_file_is_written_to_a_folder_that_was_walked_to(asker: str, items: Items) -> None:
-    first = export.ShowExport() if asker == "export" else ShowDialog("save")
+@pytest.mark.parametrize("asker", [Dialog.EXPORT, Dialog.SAVE])
+def test_a_file_is_written_to_a_folder_that_was_walked_to(asker: Dialog, items: Items) -> None:
+    first = export.ShowExport() if asker is Dialog.EXPORT else ShowDialog(Dialog.SAVE)
     states = [after(shown_scene(), first)]
     hands = Hands(lambda seen: dialogs.draw(states[-1], seen))
 
     def wanted() -> str:
-        return states[-1].exporting.form.path if asker == "export" else states[-1].dialog_path
+        return states[-1].exporting.form.path if asker is Dialog.EXPORT else states[-1].typed.text
 
     with context(SIZE):
         hands.frames(6)
         before = Path(wanted())
         hands.click(*middle(items, "##folder"))
-        look_at = opening.LookInto(Path("/home"), dialog="place")
+        look_at = opening.LookInto(Path("/home"), dialog=Dialog.PLACE)
         read = opening.FolderRead(Folder(Path("/home"), (Path("/home/out"),), (Path("/home/a.png"),)))
         assert hands.of(opening.LookForPlace) == [opening.LookForPlace()]
-        waiting = replace(states[-1], pending=(show.Reconstruct(),))
+        waiting = states[-1].with_scene(pending=(show.Reconstruct(),))
         states.append(after(waiting, opening.LookForPlace(), look_at, read))
         hands.frames(6)
         assert not any(name.endswith("a.png") for name in items.now())  # a photo is no place
@@ -209,8 +210,8 @@ def test_a_file_is_written_to_a_folder_that_was_walked_to(asker: str, items: Ite
         states.append(after(states[-1], *hands.of(opening.PlaceFound)))
         hands.frames(6)
     assert (states[-1].dialog, Path(wanted())) == (asker, Path("/home") / before.name)
-    if asker == "save":
-        assert back.pending == states[-1].pending == waiting.pending
+    if asker is Dialog.SAVE:
+        assert back.scene.pending == states[-1].scene.pending == waiting.scene.pending
     states.append(back)
     assert (back.dialog, Path(wanted())) == (asker, before)
 
@@ -230,8 +231,8 @@ def test_the_kinds_of_export_are_where_they_were_when_the_dialog_opens_again(ite
 def test_buttons_of_a_selection_stay_as_it_grows(items: Items, monkeypatch) -> None:
     places = set()
     state = shown_scene()
-    assert state.info is not None
-    state = replace(state, info=replace(state.info, num_gaussians=92_440))
+    assert state.scene.info is not None
+    state = state.with_scene(info=replace(state.scene.info, num_gaussians=92_440))
     for count in (1, 22, 333, 4_444, 92_440):
         monkeypatch.setattr(Editing, "num_selected", property(lambda editing, count=count: count))
         with context(SIZE):
@@ -253,10 +254,10 @@ def test_keys_lead_around_the_scene(way: str, axis: int, sign: int) -> None:
     state = shown_scene()
     command = named(f"Orbit: a step {way}").make(state)
     assert command is not None
-    turned = apply(state, command).pose
-    moved = state.pose.axes.T @ (np.array(turned.centre) - np.array(state.pose.centre))
+    turned = apply(state, command).scene.pose
+    moved = state.scene.pose.axes.T @ (np.array(turned.centre) - np.array(state.scene.pose.centre))
     assert sign * moved[axis] > 0.01  # the camera's right and down
-    assert np.allclose(turned.pivot, state.pose.pivot)
+    assert np.allclose(turned.pivot, state.scene.pose.pivot)
 
 
 def test_every_window_with_something_to_press_is_an_area(items: Items) -> None:
@@ -298,9 +299,11 @@ def test_arrows_with_ctrl_lead_to_no_other_control(ctrl: bool) -> None:
 
 def test_a_colour_is_chosen_by_the_key_that_began() -> None:
     state = shown_scene()
-    assert state.info is not None
-    marks = replace(first_marks(state.info.scene), selected=Mask.first(len(state.info.scene.gaussians), 500))
-    state = replace(state, editing=replace(state.editing, history=History(marks)))
+    assert state.scene.info is not None
+    marks = replace(
+        first_marks(state.scene.info.scene), selected=Mask.first(len(state.scene.info.scene.gaussians), 500)
+    )
+    state = state.with_editing(history=History(marks))
     entry = named("Recolour the selection")
     begin = entry.make(state)
     assert begin is not None
@@ -316,7 +319,7 @@ def test_a_colour_is_chosen_by_the_key_that_began() -> None:
 def measuring() -> State:
     state = shown_scene()
     spots = ((-0.3, 0.0, 1.0), (0.3, 0.0, 1.0))
-    return replace(state, editing=replace(state.editing, tool=Tool.RULER, ruler=spots))
+    return state.with_editing(tool=Tool.RULER, ruler=spots)
 
 
 def test_the_rulers_line_is_below_its_field() -> None:
@@ -337,7 +340,7 @@ def test_the_rulers_line_is_below_its_field() -> None:
 @pytest.mark.parametrize("mark", ["asked", "card", "region"])
 def test_marks_on_the_picture_are_below_a_dialog(mark: str) -> None:
     """A dot of the place that was asked about shone through the list of scenes to merge."""
-    state, before = replace(shown_scene(), dialog="help"), list[int]()
+    state, before = replace(shown_scene(), dialog=Dialog.HELP), list[int]()
     place, path = (400.0, 300.0), ((400.0, 300.0), (500.0, 420.0))
     marked = {
         "asked": replace(state.editing, asked=place),
@@ -371,7 +374,7 @@ def test_an_answer_is_over_the_dictionary() -> None:
         return window.name
 
     card = Card(Reading((200.0, 100.0)), (("chair", 0.9),))  # of the picture's place
-    answered = replace(states[0], editing=replace(states[0].editing, card=card))
+    answered = states[0].with_editing(card=card)
     with context(SIZE):
         hands = Hands(lambda seen: layout.draw_all(states[-1], shown)[0])
         for state in (answered, states[0]):  # the window of answers is older than the dictionary's last click
@@ -430,20 +433,20 @@ def test_the_first_length_is_typed_without_a_click() -> None:
 
 def test_a_dialog_stays_in_the_window() -> None:
     """Also where it was dragged to its edge, or the window became smaller: its buttons were outside."""
-    state = replace(shown_scene(), dialog="settings")
+    state = replace(shown_scene(), dialog=Dialog.SETTINGS)
     hands = Hands(lambda seen: dialogs.draw(state, seen))
     with context(SIZE):
         hands.frames(4)
         for far in (ImVec2(-300, -200), ImVec2(SIZE[0] - 40, SIZE[1] - 40)):
-            imgui.set_window_pos(dialogs.TITLES["settings"], far)
+            imgui.set_window_pos(Dialog.SETTINGS.value, far)
             hands.frames(3)
-            left, top, right, bottom = box(dialogs.TITLES["settings"])
+            left, top, right, bottom = box(Dialog.SETTINGS.value)
             assert left >= 0 and top >= 0 and right <= SIZE[0] and bottom <= SIZE[1]
 
 
 def test_an_export_moves_nothing_in_the_panel(items: Items, monkeypatch) -> None:
     state = shown_scene()
-    running = replace(state, exporting=replace(state.exporting, running=Running(Path("mask.png"))))
+    running = state.with_exporting(running=Running(Path("mask.png")))
     monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
     places = []
     with context(SIZE):
@@ -468,7 +471,7 @@ def test_a_film_follows_the_key_frames_where_there_are_some() -> None:
 def test_an_export_that_begins_takes_no_keys(monkeypatch) -> None:
     """Enter would stop it."""
     state = shown_scene()
-    running = replace(state, exporting=replace(state.exporting, running=Running(Path("mask.png"))))
+    running = state.with_exporting(running=Running(Path("mask.png")))
     states = [state]
     monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
     hands = Hands(lambda seen: layout.draw_all(states[-1], seen)[0])
@@ -496,7 +499,7 @@ def test_chips_keep_their_place_where_there_is_room(height: int, first: str, mon
     monkeypatch.setattr(known, "draw", lambda state, look: drawn.append("known") or [])
     monkeypatch.setattr(scores, "draw", lambda state, look: drawn.append("scores") or [])
     state = shown_scene()
-    assert state.asked
+    assert state.asking.asked
     with context((1280, height)):
         Hands(lambda seen: prompts.draw(state, seen), bare=True).frames(1)
     assert drawn[0] == first

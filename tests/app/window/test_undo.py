@@ -113,17 +113,17 @@ def value(name: str, hint, chance: np.random.Generator, state: State):
     if hint is Marks:
         return state.editing.marks
     if hint is CompiledQuery:
-        assert state.info is not None
-        return compile_query(state.info.scene, language_space("minilm"), ["wall"])
+        assert state.scene.info is not None
+        return compile_query(state.scene.info.scene, language_space("minilm"), ["wall"])
     if hint is Scene:
-        assert state.info is not None
-        return state.info.scene
+        assert state.scene.info is not None
+        return state.scene.info.scene
     if hint is do.Command:
         return show.ClearPhotos()
     if hint is SceneInfo:
-        return state.info
+        return state.scene.info
     if hint is Pose:
-        return state.pose
+        return state.scene.pose
     if hint is Vector:
         return Vector(*chance.normal(size=3).tolist())
     if isinstance(hint, type) and (hint in TABLES or issubclass(hint, Enum)):
@@ -158,8 +158,8 @@ def test_a_command_can_be_undone_or_changes_no_edit(cls: type, edited: State) ->
     for _ in range(8):
         after = apply(edited, cls(**arguments(cls, chance, edited)))
         now = after.editing.history
-        assert now is not None and after.info is not None and edited.info is not None
-        assert after.info.scene is edited.info.scene  # the scene itself never changes
+        assert now is not None and after.scene.info is not None and edited.scene.info is not None
+        assert after.scene.info.scene is edited.scene.info.scene  # the scene itself never changes
         if now == history:
             continue
         there = apply(after, edit.GoTo(len(history.done)))
@@ -174,11 +174,11 @@ def test_a_command_can_be_undone_or_changes_no_edit(cls: type, edited: State) ->
 def answered(state: State, command: do.Command) -> State:
     """A command, and what the worker finds for it."""
     after = apply(state, command)
-    info, marks = after.info, after.editing.marks
+    info, marks = after.scene.info, after.editing.marks
     assert info is not None and marks is not None
     request = request_for(command, after, info, marks, SIZE)
     if isinstance(command, edit.FindFloaters):
-        request = ScoreFloaters(info.serial, info.scene, marks)
+        request = ScoreFloaters(info.serial, info.memory, marks)
     for found in () if request is None else request.run(lambda: False):
         after = apply(after, found)
     return after
@@ -225,7 +225,7 @@ def test_200_random_edits_undone_give_the_first_state_bit_for_bit(shown: State) 
         "Hide", "Isolate", "ShowAll", "EndFloaters", "RenameAtom", "ToggleAtom", "MergeAtoms", "AddKey",
         "RemoveKey", "ClearKeys", "SetLength", "Undo", "Redo", "Nudge", "EndGesture",
     }  # fmt: skip
-    last, scene = bits(state), shown.info.scene  # type: ignore[union-attr]
+    last, scene = bits(state), shown.scene.info.scene  # type: ignore[union-attr]
     assert last != bits(shown)
     back = state
     for _ in range(200):

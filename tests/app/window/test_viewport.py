@@ -11,6 +11,7 @@ from app.gl.processor import still
 from app.window.drawing.processor import ProcessorPicture
 from app.window.drawing.stills import RETRY_SECONDS
 from app.window.governor import Governor, Kind, Plan
+from app.window.scene.memory import SceneMemory
 from app.window.viewport import Viewport
 from langflash_core import pictures
 from langflash_core.geometry.poses import orbit
@@ -43,9 +44,9 @@ def test_a_picture_comes_to_rest_in_full(context) -> None:
     """A half-size picture that does not cover what moves would be drawn over, and ordered again, for ever."""
     space = language_space("minilm")
     shown = shown_scene()
-    assert shown.info is not None
+    assert shown.scene.info is not None
     scene = room(space.encode(list(PHRASES)))
-    state = replace(shown, mode=pictures.HEAT, info=replace(shown.info, scene=scene))
+    state = shown.with_scene(mode=pictures.HEAT, info=replace(shown.scene.info, scene=scene))
     with context:
         viewport = Viewport(context)
         viewport.set_scene(1, scene)
@@ -73,8 +74,8 @@ def test_what_moves_in_full_size_is_followed_by_the_exact_picture(context) -> No
     """In a small room it has all pixels, and still ends footprints early: at rest it is not the last one."""
     shown = shown_scene()
     scene = room(language_space("minilm").encode(list(PHRASES)))
-    assert shown.info is not None
-    state = replace(shown, prompts=(), info=replace(shown.info, scene=scene))
+    assert shown.scene.info is not None
+    state = shown.with_asking(prompts=()).with_scene(info=replace(shown.scene.info, scene=scene))
     with context:
         viewport = Viewport(context)
         viewport.set_scene(1, scene)
@@ -100,9 +101,9 @@ def test_a_scene_begins_without_the_targets_of_the_one_before(context) -> None:
     """What its modes took: 30 MB at 652 x 616 after a look at a heat-map, weight maps more."""
     space = language_space("minilm")
     shown = shown_scene()
-    assert shown.info is not None
+    assert shown.scene.info is not None
     scene, other = (room(space.encode(list(PHRASES))) for _ in range(2))
-    state = replace(shown, mode=pictures.HEAT, info=replace(shown.info, scene=scene))
+    state = shown.with_scene(mode=pictures.HEAT, info=replace(shown.scene.info, scene=scene))
     with context:
         viewport = Viewport(context)
         viewport.set_scene(1, scene)
@@ -114,7 +115,9 @@ def test_a_scene_begins_without_the_targets_of_the_one_before(context) -> None:
         viewport.set_scene(2, other)
         held = viewport._made().canvas.holds(view)
         for _ in range(3):
-            state = replace(state, now=state.now + 0.05, info=replace(shown.info, serial=2, scene=other))
+            state = replace(
+                state.with_scene(info=replace(shown.scene.info, serial=2, scene=other)), now=state.now + 0.05
+            )
             viewport.update(state, SIZE, touched=0.0)
         drawn = viewport.texture
         viewport.release()
@@ -134,8 +137,8 @@ def test_a_picture_that_could_not_be_drawn_is_told_and_tried_again(context, monk
     monkeypatch.setattr("app.window.drawing.stills.draw_still", draw_still)
     scene = room(language_space("minilm").encode(list(PHRASES)))
     shown = shown_scene()
-    assert shown.info is not None
-    state = replace(shown, info=replace(shown.info, scene=scene))
+    assert shown.scene.info is not None
+    state = shown.with_scene(info=replace(shown.scene.info, scene=scene))
     with context:
         viewport = Viewport(context)
         viewport.set_scene(1, scene)
@@ -168,9 +171,9 @@ def test_only_the_picture_on_show_is_scored(context) -> None:
     """A score and the picture beside it are of the same place, the same marks and the same question."""
     space = language_space("minilm")
     shown = shown_scene()
-    assert shown.info is not None
+    assert shown.scene.info is not None
     scene = room(space.encode(list(PHRASES)))
-    state = replace(shown, mode=pictures.HEAT, info=replace(shown.info, scene=scene))
+    state = shown.with_scene(mode=pictures.HEAT, info=replace(shown.scene.info, scene=scene))
     query = compile_query(scene, space, list(PHRASES[:1]))
     with context:
         viewport = Viewport(context)
@@ -186,8 +189,10 @@ def test_only_the_picture_on_show_is_scored(context) -> None:
             time.sleep(0.01)
         assert view is not None and viewport.view(state) is None, "once"
         viewport.ask((0,), query, state.asking.lapses)
-        assert viewport.view(replace(state, pose=orbit(state.pose, 0.2, 0.0))) is None, "of another place"
-        lapsed = replace(state, asking=replace(state.asking, lapses=state.asking.lapses + 1))
+        assert viewport.view(state.with_scene(pose=orbit(state.scene.pose, 0.2, 0.0))) is None, (
+            "of another place"
+        )
+        lapsed = state.with_asking(lapses=state.asking.lapses + 1)
         assert viewport.view(lapsed) is None, "of a question that holds no more"
         assert viewport.view(state) is not None
         viewport.release()
@@ -196,11 +201,11 @@ def test_only_the_picture_on_show_is_scored(context) -> None:
 def test_gaps_are_filled_as_the_preference_says(context) -> None:
     """The picture follows it at once, without another drawing."""
     shown = shown_scene()
-    assert shown.info is not None
+    assert shown.scene.info is not None
     plain = room(language_space("minilm").encode(list(PHRASES)))
     scene = replace(plain, view_ids=torch.zeros(len(plain.gaussians), dtype=torch.int64))
-    aside = orbit(shown.pose, 1.0, 0.0)  # beside the wall nothing is drawn
-    state = replace(shown, info=replace(shown.info, scene=scene), pose=aside)
+    aside = orbit(shown.scene.pose, 1.0, 0.0)  # beside the wall nothing is drawn
+    state = shown.with_scene(info=replace(shown.scene.info, scene=scene), pose=aside)
     with context:
         viewport = Viewport(context)
         viewport.set_scene(1, scene)
@@ -225,8 +230,8 @@ def test_a_scene_with_levels_moves_coarse_and_rests_whole(context, monkeypatch) 
     levels = (torch.arange(len(scene.gaussians)) % 4 > 0).to(torch.uint8)
     scene = replace(scene, levels=levels)
     shown = shown_scene()
-    assert shown.info is not None
-    state = replace(shown, prompts=(), info=replace(shown.info, scene=scene))
+    assert shown.scene.info is not None
+    state = shown.with_asking(prompts=()).with_scene(info=replace(shown.scene.info, scene=scene))
     with context:
         viewport = Viewport(context)
         viewport.set_scene(1, scene)
@@ -237,13 +242,13 @@ def test_a_scene_with_levels_moves_coarse_and_rests_whole(context, monkeypatch) 
             pytest.skip("OpenGL here has a graphics card, which draws all pictures itself")
         plans = []
         for turn in range(40):
-            pose = orbit(shown.pose, 0.02 * min(turn, 20), 0.0)
-            state = replace(state, now=state.now + 0.05, pose=pose)
+            pose = orbit(shown.scene.pose, 0.02 * min(turn, 20), 0.0)
+            state = replace(state.with_scene(pose=pose), now=state.now + 0.05)
             viewport.update(state, SIZE, touched=state.now)
             plans.append(getattr(viewport.drawn, "plan", None))
             if turn == 20:
                 marks = first_marks(scene)
-                viewport.mark(scene, delete(marks, Mask.first(marks.selected.count, 90)), None)
+                viewport.mark(SceneMemory(scene), delete(marks, Mask.first(marks.selected.count, 90)), None)
         moved = {plan.share for plan in plans if plan is not None}
         live = viewport._made()._scene
         assert live is not None and {*live._levels} == {0.25}

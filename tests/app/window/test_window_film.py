@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.window.frame.dialogs import TITLES
+from app.window.dialogs import Dialog
 from tests import films
 from tests.app.window import test_window
 from tests.app.window.test_window import MIDDLE, Program, x_server
@@ -55,7 +55,7 @@ def test_what_is_no_film_is_said(program: Program, folder: Path) -> None:
 def test_a_film_becomes_a_scene(program: Program, folder: Path) -> None:
     walk = films.write(folder / "walk.mp4", films.walk(10, 10.0))
     drop(program, walk)
-    program.until(lambda s: s["dialog"] == "film", TITLES["film"])
+    program.until(lambda s: s["dialog"] == "film", Dialog.FILM.value)
     program.until(lambda s: any(name.endswith("Reconstruct") for name in s["items"]), "the strip")
     picture = program.client.picture(*SIZE)
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 500, "frames are seen"

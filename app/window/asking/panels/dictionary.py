@@ -27,7 +27,7 @@ _AXIS = implot.AxisFlags_.lock | implot.AxisFlags_.no_grid_lines | implot.AxisFl
 
 def button(state: State) -> list[do.Command]:
     """Opens the dictionary, or closes it."""
-    imgui.begin_disabled(state.info is None or state.info.num_atoms == 0)
+    imgui.begin_disabled(state.scene.info is None or state.scene.info.num_atoms == 0)
     opened = state.preferences.dictionary_open
     label = f"{fa.ICON_FA_BOOK}##dictionary"
     pressed = widgets.primary_button(label) if opened else imgui.button(label)
@@ -39,7 +39,7 @@ def button(state: State) -> list[do.Command]:
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
     """The window over the picture, whose corner is `place`."""
     marks, wanted = state.editing.marks, state.preferences
-    if not wanted.dictionary_open or state.info is None or marks is None or not marks.atoms:
+    if not wanted.dictionary_open or state.scene.info is None or marks is None or not marks.atoms:
         return []
     left, top, width, height = wanted.dictionary or _usual(look, place, size)
     display = imgui.get_io().display_size
@@ -181,7 +181,7 @@ def _picture(state: State, k: int, look: Look) -> list[do.Command]:
     """What a photo shows of the atom, in a frame of its colour; a click shows its weight map."""
     insight = state.asking.insight
     colour = widgets.rgba(insight.colours[k]) if insight else theme.LINE
-    shown = state.mode is pictures.WEIGHT and state.asking.atom == k
+    shown = state.scene.mode is pictures.WEIGHT and state.asking.atom == k
     ring = theme.ACCENT if shown else colour
     picture = look.thumbnails.get(f"atom {k}")
     side = 2 * imgui.get_frame_height() + imgui.get_style().item_spacing.y

@@ -4,6 +4,7 @@ from imgui_bundle import icons_fontawesome_6 as fa
 from imgui_bundle import imgui
 
 from ... import commands as do
+from ...dialogs import Dialog
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State
@@ -66,7 +67,7 @@ def unfinished_hint() -> None:
 def tools(state: State, look: Look) -> list[do.Command]:
     """Add a phrase; recent ones; a set from a file or into one; how to combine phrases."""
     issued: list[do.Command] = []
-    full = len(state.prompts) >= MOST_PROMPTS
+    full = len(state.asking.prompts) >= MOST_PROMPTS
     imgui.begin_disabled(full)
     if imgui.button(f"{fa.ICON_FA_PLUS}  Add a phrase"):
         issued.append(ask.AddPrompt())
@@ -79,11 +80,11 @@ def tools(state: State, look: Look) -> list[do.Command]:
     imgui.end_disabled()
     imgui.same_line(0, look.px(2))
     if widgets.quiet_button(f"{fa.ICON_FA_FILE_IMPORT}##load", "Load a set of phrases"):
-        issued.append(do.ShowDialog("load prompts"))
+        issued.append(do.ShowDialog(Dialog.LOAD_PROMPTS))
     imgui.same_line(0, look.px(2))
-    imgui.begin_disabled(not any(p.text.strip() for p in state.prompts))
+    imgui.begin_disabled(not any(p.text.strip() for p in state.asking.prompts))
     if widgets.quiet_button(f"{fa.ICON_FA_FILE_EXPORT}##save", "Save these phrases as a set"):
-        issued.append(do.ShowDialog("save prompts"))
+        issued.append(do.ShowDialog(Dialog.SAVE_PROMPTS))
     imgui.end_disabled()
     imgui.same_line(0, look.px(2))
     widgets.quiet_button(f"{fa.ICON_FA_PLUS_MINUS}##algebra", ALGEBRA)

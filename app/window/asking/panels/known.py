@@ -16,10 +16,10 @@ KNOWS = "Names 68 % of a real room right among 37 kinds of things; understands E
 def draw(state: State, look: Look) -> list[do.Command]:
     """A row or two of chips; nothing without a scene that has names."""
     found = things(state)
-    if not found or state.info is None:
+    if not found or state.scene.info is None:
         return []
     issued: list[do.Command] = []
-    asked = {prompt.text.strip().lower() for prompt in state.prompts}
+    asked = {prompt.text.strip().lower() for prompt in state.asking.prompts}
     imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(8, 3))
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, "Here are")
@@ -31,6 +31,6 @@ def draw(state: State, look: Look) -> list[do.Command]:
             issued.append(ask.AskAgain(name))
         imgui.end_disabled()
     imgui.pop_style_var()
-    if state.info.scene.record.preset == "mini":
+    if state.scene.info.scene.record.preset == "mini":
         widgets.muted(KNOWS)
     return issued

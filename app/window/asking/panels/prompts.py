@@ -20,12 +20,12 @@ def draw(state: State, look: Look) -> list[do.Command]:
     """The prompts section."""
     issued: list[do.Command] = []
     widgets.heading("Find")
-    for prompt in state.prompts:
+    for prompt in state.asking.prompts:
         imgui.push_id(prompt.key)
         issued += _row(state, prompt, look)
         imgui.pop_id()
     issued += entry.tools(state, look)
-    first = not state.asked or imgui.get_io().display_size.y >= look.px(_HIGH)
+    first = not state.asking.asked or imgui.get_io().display_size.y >= look.px(_HIGH)
     if first:  # what there is to ask
         issued += known.draw(state, look)
     issued += scores.draw(state, look)
@@ -40,10 +40,10 @@ def _row(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     corner = imgui.get_cursor_screen_pos()
     issued = _phrase(state, prompt, look)
     issued += _row_buttons(state, prompt, look)
-    if prompt.text.strip() and prompt.visible and state.info is not None:
+    if prompt.text.strip() and prompt.visible and state.scene.info is not None:
         issued += _verdict(prompt, look)
-    shown = state.active_prompt
-    if shown is not None and shown.key == prompt.key and len(state.asked) > 1:
+    shown = state.asking.active_prompt
+    if shown is not None and shown.key == prompt.key and len(state.asking.asked) > 1:
         end = ImVec2(corner.x - look.px(6), imgui.get_cursor_screen_pos().y - look.px(10))
         start = ImVec2(end.x - look.px(3), corner.y)
         imgui.get_window_draw_list().add_rect_filled(start, end, widgets.u32(theme.ACCENT), look.px(2))
@@ -68,7 +68,7 @@ def _phrase(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     issued += entry.finished(prompt.key, text)
     if prompt.like:
         widgets.tooltip("Asks for what the place you clicked says; type to ask for words instead")
-    if imgui.is_item_activated() and state.active != prompt.key:
+    if imgui.is_item_activated() and state.asking.active != prompt.key:
         issued.append(ask.SelectPrompt(prompt.key))
     if changed and not imgui.is_key_pressed(imgui.Key.escape):  # ImGui would take back what was typed
         issued.append(ask.EditPrompt(prompt.key, text))
@@ -142,9 +142,9 @@ def _negatives(state: State) -> list[do.Command]:
         return issued
     widgets.muted("A phrase counts where it fits better than each of these, separated by commas.")
     imgui.set_next_item_width(-1)
-    changed, text = imgui.input_text("##negatives", ", ".join(state.negatives or state.asking.usual))
+    changed, text = imgui.input_text("##negatives", ", ".join(state.asking.negatives or state.asking.usual))
     if changed:
         issued.append(ask.SetNegatives(tuple(part.strip() for part in text.split(",") if part.strip())))
-    if state.negatives and imgui.button("Back to the usual ones"):
+    if state.asking.negatives and imgui.button("Back to the usual ones"):
         issued.append(ask.SetNegatives(()))
     return issued

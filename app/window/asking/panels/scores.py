@@ -21,7 +21,7 @@ MIDDLES = np.arange(BINS) / BINS + 0.5 / BINS  # the bins' middles
 
 def draw(state: State, look: Look) -> list[do.Command]:
     """The histogram; nothing before an answer."""
-    prompt = state.active_prompt
+    prompt = state.asking.active_prompt
     found = None if prompt is None else state.asking.histogram(prompt.key, prompt.text)
     if prompt is None or found is None:
         return []
@@ -33,7 +33,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
         opened = imgui.tree_node_ex(f"{title}###scores", shape | imgui.TreeNodeFlags_.default_open)
     if not opened:
         return []
-    known = None if state.info is None else reliability(state.info.scene.record.calibration)
+    known = None if state.scene.info is None else reliability(state.scene.info.scene.record.calibration)
     issued = _plot(prompt, np.array(found.counts, float), known, look)
     if known is not None and prompt.score is not None:
         share = 100 * known.at(prompt.score)

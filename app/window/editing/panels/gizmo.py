@@ -26,22 +26,22 @@ _MOVE_SNAP = 0.05  # of the distance to the pivot
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> tuple[list[do.Command], bool]:
     """The gizmo on the picture in the present window, and whether the pointer is the gizmo's."""
-    editing, info = state.editing, state.info
+    editing, info = state.editing, state.scene.info
     marks = editing.marks
     if info is None or marks is None or not editing.placing:
         return [], False
-    pivot = placing.pivot_of(info.scene, marks)
+    pivot = placing.pivot_of(info, marks)
     if pivot is None:
         return [], False
     before = editing.gesture if isinstance(editing.gesture, placing.Moved) else placing.Moved(marks.selected)
     standing = placing.to_matrix(before, pivot)
-    shown = poses.project(standing[None, :3, 3], state.pose, (size.x, size.y))
+    shown = poses.project(standing[None, :3, 3], state.scene.pose, (size.x, size.y))
     if shown is None:
         return _rest(state), False
     _style(look, size)
     gizmo.begin_frame()
     gizmo.set_drawlist(imgui.get_window_draw_list())
-    gizmo.set_orthographic(state.pose.span is not None)
+    gizmo.set_orthographic(state.scene.pose.span is not None)
     gizmo.set_rect(place.x, place.y, size.x, size.y)
     context = imgui.get_current_context()
     hovered, context.hovered_id_previous_frame = (
@@ -49,7 +49,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> tuple[list[do
         0,
     )  # the picture is no obstacle
     matrix = _matrix(standing)
-    view, projection = _matrix(view_of(state.pose)), _matrix(projection_of(state.pose, size))
+    view, projection = _matrix(view_of(state.scene.pose)), _matrix(projection_of(state.scene.pose, size))
     operation = _OPERATIONS[editing.handle]
     mode = gizmo.MODE.world if editing.handle is Handle.MOVE else gizmo.MODE.local
     moved = gizmo.manipulate(view, projection, operation, mode, matrix, snap=_snap(state))
@@ -105,7 +105,7 @@ def _snap(state: State) -> "gizmo.Matrix3 | None":
     if not imgui.get_io().key_ctrl:
         return None
     step = {
-        Handle.MOVE: _MOVE_SNAP * state.pose.distance,
+        Handle.MOVE: _MOVE_SNAP * state.scene.pose.distance,
         Handle.TURN: _TURN_SNAP,
         Handle.SCALE: _SCALE_SNAP,
     }[state.editing.handle]

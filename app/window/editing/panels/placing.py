@@ -26,7 +26,7 @@ def draw(state: State, look: Look, right: float) -> list[do.Command]:
     """What the gizmo does, and by how much: drag a number, or double-click and type it. right: where a line
     ends."""
     issued: list[do.Command] = []
-    editing, info = state.editing, state.info
+    editing, info = state.editing, state.scene.info
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
     for handle, icon, tip in _HANDLES:
         chosen, label = editing.handle is handle, f"{icon}##{handle.name}"
@@ -41,7 +41,7 @@ def draw(state: State, look: Look, right: float) -> list[do.Command]:
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.MUTED, said)
         return issued
-    pivot = placing.pivot_of(info.scene, editing.marks)
+    pivot = placing.pivot_of(info, editing.marks)
     return issued if pivot is None else issued + _fields(state, pivot, look, right)
 
 
@@ -74,7 +74,7 @@ def _fields(state: State, pivot: placing.Spot, look: Look, right: float) -> list
 
 def draw_tint(state: State, tint: Tint, look: Look, right: float) -> list[do.Command]:
     """Colour and strength, as the picture shows them; made or taken away. right: where a line ends."""
-    editing, info = state.editing, state.info
+    editing, info = state.editing, state.scene.info
     if editing.marks is None or info is None:
         return []
     imgui.align_text_to_frame_padding()
@@ -92,7 +92,7 @@ def draw_tint(state: State, tint: Tint, look: Look, right: float) -> list[do.Com
     if repainted or moved:
         red, green, blue = (min(max(float(each), 0.0), 1.0) for each in colour)
         wanted = Tint((red, green, blue), strength)
-        issued.append(placing.ShowTint(wanted, placing.luma_of(info.scene, editing.marks)))
+        issued.append(placing.ShowTint(wanted, placing.luma_of(info, editing.marks)))
     if widgets.primary_button("Recolour"):
         issued.append(placing.EndGesture())
     widgets.tooltip("Keep it so  (Ctrl+T)")

@@ -141,7 +141,7 @@ def _pinned_at(state: State, reading: Reading, place: ImVec2, size: ImVec2) -> I
     """Where the place asked about is on the screen now; None behind the camera or beside the picture."""
     if reading.point is None:
         return _on_screen(reading.at, place)
-    found = poses.project(np.array([reading.point]), state.pose, (size.x, size.y))
+    found = poses.project(np.array([reading.point]), state.scene.pose, (size.x, size.y))
     if found is None:
         return None
     x, y = found[1][0]

@@ -38,7 +38,7 @@ def _ends(state: State, place: ImVec2, size: ImVec2) -> list[ImVec2]:
     """On the screen; none without the ruler in hand, or behind the camera."""
     if state.editing.tool is not Tool.RULER or not state.editing.ruler:
         return []
-    found = poses.project(np.array(state.editing.ruler), state.pose, (size.x, size.y))
+    found = poses.project(np.array(state.editing.ruler), state.scene.pose, (size.x, size.y))
     return [] if found is None else [ImVec2(place.x + float(x), place.y + float(y)) for x, y in found[1]]
 
 

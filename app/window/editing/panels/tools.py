@@ -188,7 +188,7 @@ def _selection(state: State, look: Look, right: float) -> list[do.Command]:
     imgui.text(f"{editing.waiting} ..." if editing.waiting else f"{editing.num_selected:,} selected")
     if not editing.num_selected:
         return issued
-    count = 0 if state.info is None else state.info.num_gaussians
+    count = 0 if state.scene.info is None else state.scene.info.num_gaussians
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
     imgui.same_line(begin + imgui.calc_text_size(f"{count:,} selected").x + look.px(14))
     issued += _actions(right)
@@ -226,7 +226,7 @@ def _growing(state: State, look: Look) -> list[do.Command]:
     if imgui.button(f"{fa.ICON_FA_MAXIMIZE}  Grow"):
         issued.append(edit.Grow())
     widgets.tooltip(f"Add everything within {editing.reach:.0f} spacings  (G)")
-    active = state.active_prompt
+    active = state.asking.active_prompt
     if active is not None:
         imgui.same_line()
         if imgui.button(fa.ICON_FA_MAGNIFYING_GLASS_PLUS):

@@ -8,10 +8,11 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from ... import commands as do
+from ...dialogs import Dialog
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...scene import commands as show
-from ...scene.drops import typed_path
+from ...scene.drops import There, typed_path
 from ...state import State
 from .. import commands as opening
 from ..state import Folder, small
@@ -19,9 +20,9 @@ from ..state import Folder, small
 WIDTH = 760.0  # design pixels
 _HEIGHT, _CELL = 330.0, 132.0
 _HINTS = {
-    "open": "a scene, a photo, a film or a folder; or choose below",
-    "merge": "a scene or a folder; or choose below",
-    "place": "a folder; or walk to it below",
+    Dialog.OPEN: "a scene, a photo, a film or a folder; or choose below",
+    Dialog.MERGE: "a scene or a folder; or choose below",
+    Dialog.PLACE: "a folder; or walk to it below",
 }
 
 
@@ -40,7 +41,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
             imgui.set_keyboard_focus_here()
         issued += _inside(state, folder, look)
     imgui.end_child()
-    return issued + (_place_buttons if state.dialog == "place" else _buttons)(state, confirmed, look)
+    return issued + (_place_buttons if state.dialog is Dialog.PLACE else _buttons)(state, confirmed, look)
 
 
 def _path(state: State) -> tuple[list[do.Command], bool]:
@@ -48,8 +49,8 @@ def _path(state: State) -> tuple[list[do.Command], bool]:
     imgui.set_next_item_width(-1)
     if imgui.is_window_appearing():
         imgui.set_keyboard_focus_here()
-    hint = _HINTS[state.dialog or "open"]
-    changed, path = imgui.input_text_with_hint("##path", hint, state.dialog_path)
+    hint = _HINTS[state.dialog or Dialog.OPEN]
+    changed, path = imgui.input_text_with_hint("##path", hint, state.typed.text)
     confirmed = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
     return ([do.EditDialogPath(path)] if changed else []), confirmed
 
@@ -74,8 +75,8 @@ def _way(folder: Folder, look: Look) -> list[do.Command]:
 def _inside(state: State, folder: Folder, look: Look) -> list[do.Command]:
     """Folders, scenes, then photos as a grid."""
     issued: list[do.Command] = []
-    scenes = () if state.dialog == "place" else folder.scenes
-    photos, films = (folder.photos, folder.films) if state.dialog == "open" else ((), ())
+    scenes = () if state.dialog is Dialog.PLACE else folder.scenes
+    photos, films = (folder.photos, folder.films) if state.dialog is Dialog.OPEN else ((), ())
     if folder.problem:
         widgets.muted(folder.problem)
     for path in folder.folders:
@@ -94,7 +95,9 @@ def _inside(state: State, folder: Folder, look: Look) -> list[do.Command]:
     if folder.left_out:
         widgets.muted(f"and {folder.left_out} more; type the path of one of those")
     if not (folder.folders or photos or films or scenes or folder.problem):
-        widgets.muted("No folder lies here." if state.dialog == "place" else "Nothing to open lies here.")
+        widgets.muted(
+            "No folder lies here." if state.dialog is Dialog.PLACE else "Nothing to open lies here."
+        )
     return issued
 
 
@@ -142,7 +145,7 @@ def _enters() -> bool:
 
 def _opened(state: State, paths: tuple[Path, ...]) -> do.Command:
     """Open files, each once; or merge the last of them."""
-    if state.dialog == "merge":
+    if state.dialog is Dialog.MERGE:
         return show.MergeScene(paths[-1])
     return show.OpenPaths(tuple(map(str, dict.fromkeys(paths))))
 
@@ -155,8 +158,8 @@ def _again() -> bool:
 
 def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
-    typed, chosen = state.dialog_path.strip(), state.opening.chosen
-    count, merging = len(chosen), state.dialog == "merge"
+    typed, chosen = state.typed.text.strip(), state.opening.chosen
+    count, merging = len(chosen), state.dialog is Dialog.MERGE
     label = "Merge" if merging else "Open" if typed or count < 2 else f"Open {count} files"
     imgui.begin_disabled(not typed and not chosen)
     pressed = widgets.primary_button(f"{label}###open", look.vec(140, 0))
@@ -170,7 +173,7 @@ def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
     imgui.text_colored(theme.MUTED, told)
     if typed and (pressed or confirmed):
         path = typed_path(typed)
-        walks = confirmed and not pressed and os.path.isdir(path) and typed.endswith(os.sep)
+        walks = confirmed and not pressed and state.typed.there is There.FOLDER and typed.endswith(os.sep)
         merge_or_open = show.MergeScene(path) if merging else show.OpenPaths((str(path),))
         issued.append(opening.LookInto(path) if walks else merge_or_open)
     elif chosen and (pressed or confirmed):
@@ -180,7 +183,7 @@ def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
 
 def _place_buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
     """Of the dialog for a folder to write to: the one that was typed, or the one on show."""
-    folder, typed = state.opening.folder, state.dialog_path.strip()
+    folder, typed = state.opening.folder, state.typed.text.strip()
     imgui.begin_disabled(folder is None or bool(folder.problem and not typed))
     pressed = widgets.primary_button("Write here", look.vec(140, 0))
     imgui.end_disabled()

@@ -22,15 +22,15 @@ _GAP = 12.0
 
 def working(state: State) -> bool:
     """Whether the photos at work on are to be seen instead of a scene that is not theirs."""
-    job = state.job
-    ours = job is not None and job.title == RECONSTRUCTING and bool(state.photos)
-    return ours and (state.info is None or state.aside is not None)
+    job = state.scene.job
+    ours = job is not None and job.title == RECONSTRUCTING and bool(state.scene.photos)
+    return ours and (state.scene.info is None or state.scene.aside is not None)
 
 
 def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Command]:
     """On the canvas at `corner` while there is no scene."""
-    if state.job is not None:
-        doing = f"{state.job.title}: {said(state.job.stage)}"
+    if state.scene.job is not None:
+        doing = f"{state.scene.job.title}: {said(state.scene.job.stage)}"
         _line(doing, ImVec2(corner.x + size.x / 2, corner.y + size.y / 2))
         return []
     top = corner.y + max(size.y / 2 - look.px(170), look.px(12))
@@ -53,7 +53,7 @@ def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Comm
 
 def draw_photos(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
     """The photos side by side as large as they fit, until their scene takes their place."""
-    pictures = [look.thumbnails.get(str(photo.path)) for photo in state.photos]
+    pictures = [look.thumbnails.get(str(photo.path)) for photo in state.scene.photos]
     shown = [picture for picture in pictures if picture is not None]
     if not shown:
         return

@@ -18,7 +18,7 @@ _LETTERS = "XYZ"
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
     """A ball at each end of an axis; the near ones last, on top."""
-    if state.info is None or size.x < look.px(3 * SIZE) or size.y < look.px(4 * SIZE):
+    if state.scene.info is None or size.x < look.px(3 * SIZE) or size.y < look.px(4 * SIZE):
         return []
     issued: list[do.Command] = []
     middle = ImVec2(place.x + size.x - look.px(SIZE / 2 + 8), place.y + look.px(SIZE / 2 + 8))
@@ -67,7 +67,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
 
 def _rays(state: State, side: float) -> list[do.Command]:
     """A button that shows the kind of rays and changes it."""
-    flat = state.pose.span is not None
+    flat = state.scene.pose.span is not None
     icon = fa.ICON_FA_BORDER_ALL if flat else fa.ICON_FA_CUBE
     imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(0, 0))
     with widgets.colours(text=theme.ACCENT if flat else theme.TEXT):
@@ -83,7 +83,7 @@ def ends(state: State) -> list[tuple[str, camera.Vector, tuple[float, float], fl
 
     The end that one looks from is opposite to the direction.
     """
-    axes = state.pose.axes
+    axes = state.scene.pose.axes
     found = []
     for name, forward in camera.SIDES:
         x, y, z = (-np.array(forward)) @ axes

@@ -25,26 +25,26 @@ _HANDLE = 13.0  # design pixels
 def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Command]:
     """Frusta and comparison on the picture at `corner` of `size`; call it inside the picture's window,
     before the picture takes the pointer."""
-    if state.info is None:
+    if state.scene.info is None:
         return []
     if comparing(state):
         return _compare(state, look, corner, size)
     _candidates(state, look, corner, size)
-    if state.asking.named and state.mode is pictures.RGB:
+    if state.asking.named and state.scene.mode is pictures.RGB:
         _names(state, look, corner, size)
-    if state.keys and state.tour is None:
+    if state.keys and state.filming.tour is None:
         _keys(state, look, corner, size)
-    if state.preferences.photos_in_space and state.flight is None:
+    if state.preferences.photos_in_space and state.scene.flight is None:
         return _frusta(state, look, corner, size)
     return []
 
 
 def _candidates(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
     """A ring around what comes nearest to each phrase that may be there."""
-    for prompt in state.asked:
+    for prompt in state.asking.asked:
         if not prompt.maybe or prompt.place is None:
             continue
-        found = poses.project(np.array([prompt.place]), state.pose, (size.x, size.y))
+        found = poses.project(np.array([prompt.place]), state.scene.pose, (size.x, size.y))
         if found is None:
             continue
         x, y = found[1][0]
@@ -60,7 +60,7 @@ def _keys(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
     """The camera's key frames, numbered, joined in their order."""
     canvas, before = imgui.get_window_draw_list(), None
     for number, key in enumerate(state.keys, start=1):
-        found = poses.project(np.array([key.centre]), state.pose, (size.x, size.y))
+        found = poses.project(np.array([key.centre]), state.scene.pose, (size.x, size.y))
         if found is None:
             before = None
             continue
@@ -80,7 +80,9 @@ def _names(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
     walls = boxes.windows_over(picture)
     for name, k in told(state).items():
         place = insight.places[k] if insight is not None and k < len(insight.places) else None
-        found = None if place is None else poses.project(np.array([place]), state.pose, (size.x, size.y))
+        found = (
+            None if place is None else poses.project(np.array([place]), state.scene.pose, (size.x, size.y))
+        )
         if found is None:
             continue
         (x, y), extent = found[1][0], imgui.calc_text_size(name)
@@ -95,21 +97,21 @@ def _names(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
 
 def comparing(state: State) -> bool:
     """Whether the photo of the view on show lies over a part of the picture."""
-    return state.compare is not None and state.view is not None and state.flight is None
+    return state.scene.compare is not None and state.scene.view is not None and state.scene.flight is None
 
 
 # Frusta
 
 
 def _frusta(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Command]:
-    assert state.info is not None
+    assert state.scene.info is not None
     issued: list[do.Command] = []
     canvas = imgui.get_window_draw_list()
     shown = [
         (float(pos_c[:, 2].mean()), view, points)
-        for view, pose in enumerate(state.info.views)
-        if (projected := poses.project(frustum(pose), state.pose, (size.x, size.y))) is not None
-        and state.view != view
+        for view, pose in enumerate(state.scene.info.views)
+        if (projected := poses.project(frustum(pose), state.scene.pose, (size.x, size.y))) is not None
+        and state.scene.view != view
         for pos_c, points in [projected]
     ]
     for _, view, points in sorted(shown, key=lambda each: -each[0]):  # far ones first
@@ -167,11 +169,11 @@ def photo_box(pose: Pose, size: tuple[float, float]) -> tuple[float, float, floa
 
 def _compare(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Command]:
     """The photo to the right of a line that can be dragged."""
-    many = state.info is not None and len(state.info.scene.photos) > WHOLE_PHOTOS
-    place, picture = state.compare, look.thumbnails.get(WHOLE if many else f"view {state.view}")
+    many = state.scene.info is not None and len(state.scene.info.scene.photos) > WHOLE_PHOTOS
+    place, picture = state.scene.compare, look.thumbnails.get(WHOLE if many else f"view {state.scene.view}")
     if place is None or picture is None:
         return []
-    left, top, right, bottom = photo_box(state.pose, (size.x, size.y))
+    left, top, right, bottom = photo_box(state.scene.pose, (size.x, size.y))
     x = left + place * (right - left)
     canvas = imgui.get_window_draw_list()
     low, high = ImVec2(corner.x + x, corner.y + top), ImVec2(corner.x + right, corner.y + bottom)

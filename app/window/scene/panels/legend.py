@@ -19,9 +19,9 @@ _FLAGS = widgets.PLAIN | imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_fo
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
     """The legend of the present mode; nothing for plain colours."""
-    if state.info is None or state.mode.legend is None:
+    if state.scene.info is None or state.scene.mode.legend is None:
         return
-    raised = look.px(_VIEWS) if covers_views(size.x / look.scale, len(state.info.views)) else 0.0
+    raised = look.px(_VIEWS) if covers_views(size.x / look.scale, len(state.scene.info.views)) else 0.0
     corner = ImVec2(place.x + size.x - look.px(_MARGIN), place.y + size.y - look.px(_MARGIN) - raised)
     imgui.set_next_window_pos(corner, 0, ImVec2(1, 1))
     imgui.set_next_window_size(ImVec2(look.px(_WIDTH), 0))
@@ -48,11 +48,11 @@ class _Told(Facts):
 
     @property
     def phrases(self) -> list[tuple[str, Colour, bool]]:
-        return [(p.text, p.colour, p.found is None or p.found) for p in self._state.asked]
+        return [(p.text, p.colour, p.found is None or p.found) for p in self._state.asking.asked]
 
     @property
     def heat(self) -> tuple[str, float, float]:
-        prompt = self._state.active_prompt
+        prompt = self._state.asking.active_prompt
         assert prompt is not None
         return prompt.text, *self._state.heat_colours.ends(prompt.cut)
 
@@ -80,15 +80,15 @@ class _Told(Facts):
 
     @property
     def warnings(self) -> list[str]:
-        info = self._state.info
+        info = self._state.scene.info
         return list(tray.sentences(info.warnings)[:2]) if info is not None else []
 
 
 def _body(state: State, look: Look) -> None:
-    mode = state.mode
-    if not possible(mode, state.info):
+    mode = state.scene.mode
+    if not possible(mode, state.scene.info):
         widgets.muted("This scene has no data for it.")
-    elif mode.answers and not state.asked:
+    elif mode.answers and not state.asking.asked:
         widgets.muted("Type a phrase to see this.")
     elif mode.legend is not None:
         _draw(mode.legend(_Told(state)), state.preferences.colormap, look)

@@ -21,16 +21,16 @@ _MENU = 296.0  # design pixels wide
 def draw(state: State, look: Look, room: float) -> list[do.Command]:
     """Buttons for as many of the usual modes as `room` (interface pixels) has, and the menu."""
     issued: list[do.Command] = []
-    imgui.begin_disabled(state.info is None)
+    imgui.begin_disabled(state.scene.info is None)
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 0))
     shown = _fitting(look, room)
     for mode in shown:
-        if _choice(mode.label, state.mode is mode):
+        if _choice(mode.label, state.scene.mode is mode):
             issued.append(camera.SetMode(mode))
         widgets.tooltip(f"{mode.tip}{_key(mode)}")
         imgui.same_line()
-    named = state.mode not in shown
-    if _choice(f"{state.mode.label if named else 'More'}  {fa.ICON_FA_CARET_DOWN}###menu", named):
+    named = state.scene.mode not in shown
+    if _choice(f"{state.scene.mode.label if named else 'More'}  {fa.ICON_FA_CARET_DOWN}###menu", named):
         imgui.open_popup("modes")
     corner = ImVec2(imgui.get_item_rect_min().x, imgui.get_item_rect_max().y + look.px(6))
     imgui.pop_style_var()
@@ -65,12 +65,12 @@ def _menu(state: State, look: Look) -> list[do.Command]:
             widgets.gap(look.px(2))
         imgui.text_colored(theme.MUTED, title)
         for mode in in_group(title):
-            there = possible(mode, state.info)
+            there = possible(mode, state.scene.info)
             imgui.begin_disabled(not there)
             if imgui.selectable(f"##{mode.name}", False, 0, ImVec2(look.px(_MENU - 24), 0))[0]:
                 issued.append(camera.SetMode(mode))
             hovered = imgui.is_item_hovered(_RESTING)
-            if state.mode is mode:
+            if state.scene.mode is mode:
                 imgui.same_line(look.px(12))
                 imgui.text(fa.ICON_FA_CHECK)
             imgui.same_line(look.px(36))

@@ -15,11 +15,11 @@ _NAMED = 4  # dropped photos that the question names
 
 def draw(state: State, look: Look) -> list[do.Command]:
     """Rooms to go back to, a button each: the one before in the heading's line at its right, others below."""
-    if not state.rooms:
+    if not state.scene.rooms:
         return []
-    first, *others = state.rooms
+    first, *others = state.scene.rooms
     imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(6, 0))  # no higher than the heading
-    imgui.begin_disabled(state.job is not None)
+    imgui.begin_disabled(state.scene.job is not None)
     text = f"{fa.ICON_FA_ARROW_LEFT}  {_name(first, look.px(150))}"
     width = imgui.calc_text_size(text).x + 2 * imgui.get_style().frame_padding.x
     imgui.same_line(imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - width)
@@ -47,22 +47,24 @@ def _name(room: Room, width: float) -> str:
 
 def draw_drop(state: State, look: Look) -> list[do.Command]:
     """The question where dropped photos belong."""
-    assert state.info is not None
-    names = [path.name for path in state.dropped]
+    assert state.scene.info is not None
+    names = [path.name for path in state.scene.dropped]
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     imgui.text_wrapped(", ".join(names[:_NAMED]) + more)
-    widgets.muted(f"{state.info.name} is open.")
+    widgets.muted(f"{state.scene.info.name} is open.")
     widgets.gap(look.px(4))
     issued: list[do.Command] = []
-    imgui.begin_disabled(not state.photos)
+    imgui.begin_disabled(not state.scene.photos)
     if imgui.button("Add to this room", look.vec(160, 0)):
-        issued.append(show.dropped(state, state.dropped, new=False))
+        issued.append(show.dropped(state, state.scene.dropped, new=False))
     imgui.end_disabled()
     known = "Reconstruct it from the photos in the tray and these"
-    widgets.tooltip(known if state.photos else "This room came from a file; its photos are not in the tray")
+    widgets.tooltip(
+        known if state.scene.photos else "This room came from a file; its photos are not in the tray"
+    )
     imgui.same_line()
     if widgets.primary_button("New room", look.vec(130, 0)):
-        issued.append(show.dropped(state, state.dropped, new=True))
+        issued.append(show.dropped(state, state.scene.dropped, new=True))
     widgets.tooltip("Of these photos alone; the present room stays one click away")
     imgui.same_line()
     if imgui.button("Cancel", look.vec(110, 0)):
@@ -72,12 +74,12 @@ def draw_drop(state: State, look: Look) -> list[do.Command]:
 
 def draw_scene_drop(state: State, look: Look) -> list[do.Command]:
     """The question what becomes of a dropped scene."""
-    assert state.info is not None
-    if not state.dropped:
+    assert state.scene.info is not None
+    if not state.scene.dropped:
         return [do.ShowDialog(None)]
-    path = state.dropped[0]
+    path = state.scene.dropped[0]
     imgui.text_wrapped(path.name)
-    widgets.muted(f"{state.info.name} is open.")
+    widgets.muted(f"{state.scene.info.name} is open.")
     widgets.gap(look.px(4))
     issued: list[do.Command] = []
     if widgets.primary_button("Open it", look.vec(130, 0)):
@@ -95,7 +97,7 @@ def draw_scene_drop(state: State, look: Look) -> list[do.Command]:
 
 def draw_unsaved(state: State, look: Look) -> list[do.Command]:
     """The question what becomes of edits before another scene takes the place."""
-    name = "" if state.info is None else state.info.name
+    name = "" if state.scene.info is None else state.scene.info.name
     imgui.text_wrapped(f"The edits of {name} are not saved.")
     with widgets.colours(text=theme.MUTED):
         imgui.text_wrapped("Discarded ones can be had back for a while: the room stays in the list of rooms.")

@@ -32,9 +32,9 @@ def table(timings: Mapping[str, float]) -> list[tuple[str, float]]:
 
 def draw(state: State, look: Look) -> None:
     """Both, folded away until they are asked for."""
-    if state.info is None:
+    if state.scene.info is None:
         return
-    record = state.info.scene.record
+    record = state.scene.info.scene.record
     rows, detail = table(record.cost.timings), detail_line(record.detail)
     if rows and _opened(f"Made in {rows[-1][1]:.1f} s###cost"):
         _costs(rows, record.cost.peak_memory_mb)

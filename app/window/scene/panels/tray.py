@@ -35,13 +35,13 @@ def draw(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     widgets.heading("Photos")
     issued += rooms.draw(state, look)
-    if state.photos:
+    if state.scene.photos:
         issued += _tray(state, look)
     else:
         _hint(look)
-    if state.job is not None:
-        issued += _progress(state.job, state.now, look)
-    elif state.photos:
+    if state.scene.job is not None:
+        issued += _progress(state.scene.job, state.now, look)
+    elif state.scene.photos:
         issued += _buttons(state, look)
     else:
         issued += _open_button()
@@ -53,12 +53,12 @@ def draw(state: State, look: Look) -> list[do.Command]:
 
 def _sentences(state: State) -> list[str]:
     """Each once: what the tray says of a photo, the scene made of it says again."""
-    said = [photo.problem for photo in state.photos if photo.problem]
-    said += [note for photo in state.photos for note in photo.notes]
-    said += state.info.warnings if state.info else ()
-    if state.info is not None and len(state.info.views) == 1 and state.info.scene.photos:
+    said = [photo.problem for photo in state.scene.photos if photo.problem]
+    said += [note for photo in state.scene.photos for note in photo.notes]
+    said += state.scene.info.warnings if state.scene.info else ()
+    if state.scene.info is not None and len(state.scene.info.views) == 1 and state.scene.info.scene.photos:
         said.append(ONE_PHOTO)
-    return sentences(said, HOW_TO_TELL if state.photos else WITHOUT_PHOTOS)
+    return sentences(said, HOW_TO_TELL if state.scene.photos else WITHOUT_PHOTOS)
 
 
 def sentences(said: Iterable[str], how: str = HOW_TO_TELL) -> list[str]:
@@ -92,15 +92,15 @@ def _hint(look: Look) -> None:
 def _tray(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     spacing = imgui.get_style().item_spacing.x
-    columns = COLUMNS if len(state.photos) <= 12 else MORE
+    columns = COLUMNS if len(state.scene.photos) <= 12 else MORE
     width = (imgui.get_content_region_avail().x - (columns - 1) * spacing) / columns
     size = ImVec2(width, width * 0.75)
-    for index, photo in enumerate(state.photos):
+    for index, photo in enumerate(state.scene.photos):
         if index % columns:
             imgui.same_line()
         imgui.push_id(str(photo.path))
-        removed = _card(look, photo, size, state.job is None)
-        if state.job is None:
+        removed = _card(look, photo, size, state.scene.job is None)
+        if state.scene.job is None:
             issued += _drag(index)
             if removed:
                 issued.append(show.RemovePhoto(index))
@@ -229,7 +229,7 @@ def _order(state: State, index: int) -> list[do.Command]:
         (fa.ICON_FA_ARROW_RIGHT, index + 1, "Later"),
     ):
         imgui.same_line()
-        imgui.begin_disabled(not 0 <= place < len(state.photos))
+        imgui.begin_disabled(not 0 <= place < len(state.scene.photos))
         if imgui.button(label):
             issued.append(show.MovePhoto(index, place))
         imgui.end_disabled()
@@ -245,16 +245,16 @@ def _open_button() -> list[do.Command]:
 
 def _buttons(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
-    few = len(state.photos) < 3
+    few = len(state.scene.photos) < 3
     side, gap = imgui.get_frame_height() + look.px(6), imgui.get_style().item_spacing.x
     others = side + gap if few else 2 * (side + gap)
     width = imgui.get_content_region_avail().x - others
-    imgui.begin_disabled(state.choosing)
+    imgui.begin_disabled(state.scene.choosing)
     if widgets.primary_button(f"{fa.ICON_FA_CUBES}  Reconstruct", ImVec2(width, 0)):
         issued.append(show.Instead((show.Reconstruct(),)))
     if not few:
         imgui.same_line()
-        icon = fa.ICON_FA_HOURGLASS_HALF if state.choosing else fa.ICON_FA_WAND_MAGIC_SPARKLES
+        icon = fa.ICON_FA_HOURGLASS_HALF if state.scene.choosing else fa.ICON_FA_WAND_MAGIC_SPARKLES
         if imgui.button(f"{icon}##pair", ImVec2(side, 0)):
             issued.append(show.ChoosePair())
         widgets.tooltip("Keep only the two photos that make the best scene together")

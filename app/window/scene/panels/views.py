@@ -22,10 +22,10 @@ _BESIDE, _HIGHEST = 116.0, 62.0  # the switches' room at their right, and their 
 def draw(state: State, look: Look) -> list[do.Command]:
     """Buttons with the scene's own photos, to jump to their views."""
     issued: list[do.Command] = []
-    if state.info is None:
+    if state.scene.info is None:
         return issued
     height = look.px(_VIEW)
-    scrolls = len(state.info.views) > _SCROLLS
+    scrolls = len(state.scene.info.views) > _SCROLLS
     flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
     if scrolls:  # the switches stay in sight; the photos go by below the wheel
         room = imgui.get_main_viewport().size.x - imgui.get_window_pos().x - look.px(_BESIDE)
@@ -34,10 +34,10 @@ def draw(state: State, look: Look) -> list[do.Command]:
         imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(max(room, height), look.px(_HIGHEST)))
         imgui.begin_child("##all", ImVec2(0, 0), shape, flags)
         _roll()
-    for view in range(len(state.info.views)):
+    for view in range(len(state.scene.info.views)):
         if view:
             imgui.same_line()
-        chosen = state.view == view
+        chosen = state.scene.view == view
         ring = theme.ACCENT if chosen else theme.RAISED
         picture = look.thumbnails.get(f"view {view}")
         imgui.push_id(view)
@@ -79,7 +79,7 @@ def _in_space(state: State, look: Look) -> list[do.Command]:
     imgui.begin_group()
     imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(4, 4))
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
-    imgui.begin_disabled(state.view is None)
+    imgui.begin_disabled(state.scene.view is None)
     if _switch(fa.ICON_FA_LEFT_RIGHT, in_space.comparing(state), size):
         issued.append(camera.Compare(None if in_space.comparing(state) else 0.5))
     imgui.end_disabled()

@@ -31,7 +31,7 @@ def asked(*texts: str) -> State:
     state = after(State(), ask.EditPrompt(0, texts[0]))
     for text in texts[1:]:
         state = after(state, ask.AddPrompt())
-        state = after(state, ask.EditPrompt(state.active, text))
+        state = after(state, ask.EditPrompt(state.asking.active, text))
     return state
 
 
@@ -44,11 +44,14 @@ def test_recent_phrases_are_kept_once_newest_first_and_bounded() -> None:
 
 def test_a_recent_phrase_takes_an_empty_row_or_a_new_one() -> None:
     state = after(State(), ask.Calibrated(0.7), ask.AskAgain("sofa"))
-    assert [p.text for p in state.prompts] == ["sofa"] and state.mode is pictures.HEAT
+    assert [p.text for p in state.asking.prompts] == ["sofa"] and state.scene.mode is pictures.HEAT
     state = after(state, camera.SetMode(pictures.DEPTH), ask.AskAgain("rug"))
-    assert [p.text for p in state.prompts] == ["sofa", "rug"]
-    assert state.active == state.prompts[1].key and state.mode is pictures.DEPTH
-    assert state.prompts[1].colour != state.prompts[0].colour and state.prompts[1].cut == 0.7
+    assert [p.text for p in state.asking.prompts] == ["sofa", "rug"]
+    assert state.asking.active == state.asking.prompts[1].key and state.scene.mode is pictures.DEPTH
+    assert (
+        state.asking.prompts[1].colour != state.asking.prompts[0].colour
+        and state.asking.prompts[1].cut == 0.7
+    )
     assert state.asking.recent == ("rug", "sofa")
     full = asked(*(str(n) for n in range(MOST_PROMPTS)))
     assert after(full, ask.AskAgain("one more")) == full
@@ -57,23 +60,23 @@ def test_a_recent_phrase_takes_an_empty_row_or_a_new_one() -> None:
 @pytest.mark.parametrize("text", ["chair -", "+ chair", "chair - ", "- ", "-", " sofa +  "])
 def test_an_unfinished_sum_is_not_asked(text: str) -> None:
     assert unfinished(text) and not usable(text)
-    assert asked(text).asked == ()
+    assert asked(text).asking.asked == ()
     with pytest.raises(PromptError):  # the library refuses what the window holds back
         terms(text)
 
 
 @pytest.mark.parametrize("text", ["chair - armchair", "t-shirt", "C++ book", "sofa + cushion", "-5"])
 def test_a_whole_phrase_is_asked(text: str) -> None:
-    assert usable(text) and len(asked(text).asked) == 1
+    assert usable(text) and len(asked(text).asking.asked) == 1
     assert terms(text)
 
 
 def test_what_each_mode_needs() -> None:
     for mode in PICTURES:
-        silent, spoken = (replace(state, mode=mode) for state in (State(), asked("door")))
+        silent, spoken = (state.with_scene(mode=mode) for state in (State(), asked("door")))
         assert silent.wants_maps == mode.maps
         assert spoken.wants_maps  # to be answered
-        answered = replace(spoken, prompts=tuple(replace(p, score=0.9) for p in spoken.prompts))
+        answered = spoken.with_asking(prompts=tuple(replace(p, score=0.9) for p in spoken.asking.prompts))
         assert answered.wants_maps == (mode.maps or mode.answers)
     assert not any(mode.maps and mode.answers for mode in PICTURES)
 
@@ -108,7 +111,11 @@ def test_atoms_are_shown_and_chosen(info) -> None:
     state = after(State(), show.SceneArrived(info))
     assert after(state, ask.ShowAtom(3)) == state and after(State(), ask.ShowAtom(0)) == State()
     state = after(state, ask.ShowAtom(2), ask.OpenDictionary(True))
-    assert (state.mode, state.asking.atom, state.preferences.dictionary_open) == (pictures.WEIGHT, 2, True)
+    assert (state.scene.mode, state.asking.atom, state.preferences.dictionary_open) == (
+        pictures.WEIGHT,
+        2,
+        True,
+    )
     state = after(state, ask.ChooseAtom(2, True), ask.ChooseAtom(0, True), ask.ChooseAtom(2, True))
     assert state.asking.chosen == (0, 2)
     assert after(state, ask.ChooseAtom(0, False)).asking.chosen == (2,)
@@ -121,52 +128,56 @@ def test_one_phrase_may_have_a_negative_margin() -> None:
 
 def test_the_first_phrase_turns_the_heat_map_on_and_only_the_first() -> None:
     state = after(State(), ask.EditPrompt(0, "d"))
-    assert state.mode is pictures.HEAT
+    assert state.scene.mode is pictures.HEAT
     state = after(state, camera.SetMode(pictures.RGB), ask.EditPrompt(0, "do"))
-    assert state.mode is pictures.RGB
-    assert after(State(), ask.EditPrompt(0, "  ")).mode is pictures.RGB
+    assert state.scene.mode is pictures.RGB
+    assert after(State(), ask.EditPrompt(0, "  ")).scene.mode is pictures.RGB
 
 
 def test_prompts_are_edited_by_key() -> None:
     state = after(State(), ask.EditPrompt(0, "door"), ask.AddPrompt())
-    second = state.prompts[1]
-    assert second.colour != state.prompts[0].colour and state.active == second.key
+    second = state.asking.prompts[1]
+    assert second.colour != state.asking.prompts[0].colour and state.asking.active == second.key
     state = after(state, ask.EditPrompt(second.key, "floor"), ask.ShowPrompt(second.key, False))
-    assert [p.text for p in state.asked] == ["door"]
-    assert state.active_prompt == state.prompts[0]
+    assert [p.text for p in state.asking.asked] == ["door"]
+    assert state.asking.active_prompt == state.asking.prompts[0]
     state = after(state, ask.RemovePrompt(0), ask.RemovePrompt(second.key))
-    assert len(state.prompts) == 1 and state.prompts[0].text == "" and state.active_prompt is None
+    assert (
+        len(state.asking.prompts) == 1
+        and state.asking.prompts[0].text == ""
+        and state.asking.active_prompt is None
+    )
 
 
 def test_found_follows_the_threshold_in_force() -> None:
     state = after(State(), ask.EditPrompt(0, "door"))
-    assert state.prompts[0].found is None
+    assert state.asking.prompts[0].found is None
     state = after(state, ask.Calibrated(0.8), ask.Answered(((0, "door", 0.7), (99, "x", 0.9))))
-    assert state.prompts[0].found is False
-    assert after(state, ask.SetThreshold(0, 0.6)).prompts[0].found is True
+    assert state.asking.prompts[0].found is False
+    assert after(state, ask.SetThreshold(0, 0.6)).asking.prompts[0].found is True
     back = after(state, ask.SetThreshold(0, 0.6), ask.SetThreshold(0, None))
-    assert back.prompts[0].cut == 0.8
+    assert back.asking.prompts[0].cut == 0.8
     edited = after(state, ask.EditPrompt(0, "doors"))
-    assert edited.prompts[0].score is None
-    assert after(edited, ask.Answered(((0, "door", 0.7),))).prompts[0].score is None  # of the old text
+    assert edited.asking.prompts[0].score is None
+    assert after(edited, ask.Answered(((0, "door", 0.7),))).asking.prompts[0].score is None  # of the old text
 
 
 def test_negatives_and_what_needs_weight_maps() -> None:
     state = after(State(), ask.SetNegatives(("thing",)))
-    assert state.negatives == ("thing",) and State().negatives == ()
+    assert state.asking.negatives == ("thing",) and State().asking.negatives == ()
     assert not after(State(), camera.SetMode(pictures.HEAT)).wants_maps
     assert after(State(), camera.SetMode(pictures.ATOMS)).wants_maps
     asked = after(State(), ask.EditPrompt(0, "door"))
     assert asked.wants_maps and after(asked, camera.SetMode(pictures.DEPTH)).wants_maps  # it has no score yet
     answered = after(asked, ask.Answered(((0, "door", 0.9),)), camera.SetMode(pictures.DEPTH))
-    assert answered.prompts[0].score == 0.9 and not answered.wants_maps
+    assert answered.asking.prompts[0].score == 0.9 and not answered.wants_maps
 
 
 def test_without_own_negatives_the_scene_says_what_phrases_are_compared_with() -> None:
     query: Any = SimpleNamespace(threshold=0.7, negative_texts=("wall",))
     state = ask.PhrasesCompiled((), query).apply(State())
-    assert (state.negatives, state.asking.usual) == ((), ("wall",))
-    own = ask.PhrasesCompiled((), query).apply(replace(State(), negatives=("thing",)))
+    assert (state.asking.negatives, state.asking.usual) == ((), ("wall",))
+    own = ask.PhrasesCompiled((), query).apply(State().with_asking(negatives=("thing",)))
     assert own.asking.usual != ("wall",)
 
 

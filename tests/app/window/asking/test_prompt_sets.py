@@ -9,6 +9,7 @@ from app.window import commands as do
 from app.window.asking import commands as ask
 from app.window.asking.prompt_sets import PromptSet, read_prompts, write_prompts
 from app.window.asking.state import PALETTE, Prompt
+from app.window.dialogs import Dialog
 from app.window.state import State
 from langflash_core import pictures
 from langflash_core.errors import OutputError, PromptError
@@ -29,11 +30,13 @@ def test_a_prompt_set_comes_back_as_it_was(tmp_path: Path) -> None:
     assert (one.text, one.colour, one.threshold, one.visible) == ("été à la mer", PALETTE[3], 0.625, False)
     assert (two.text, two.threshold, two.visible) == ("chair - armchair", None, True)
     state = after(State(), ask.Calibrated(0.7), ask.PromptsRead(path, found))
-    assert [p.text for p in state.prompts] == [p.text for p in found.prompts]
-    assert len({p.key for p in state.prompts}) == 2 and state.next_key > max(p.key for p in state.prompts)
-    assert (state.active, state.mode) == (state.prompts[0].key, pictures.LABELS)
-    assert [p.cut for p in state.prompts] == [0.625, 0.7]
-    assert state.asking.prompts_path == path and state.negatives == ("stuff", "things")
+    assert [p.text for p in state.asking.prompts] == [p.text for p in found.prompts]
+    assert len({p.key for p in state.asking.prompts}) == 2 and state.next_key > max(
+        p.key for p in state.asking.prompts
+    )
+    assert (state.asking.active, state.scene.mode) == (state.asking.prompts[0].key, pictures.LABELS)
+    assert [p.cut for p in state.asking.prompts] == [0.625, 0.7]
+    assert state.asking.prompts_path == path and state.asking.negatives == ("stuff", "things")
 
 
 GOOD = {"format": "langflash prompts", "version": 1, "prompts": [{"text": "door"}], "negatives": []}
@@ -77,7 +80,7 @@ def test_the_smallest_set_written_by_hand_is_read(tmp_path: Path) -> None:
     found = read_prompts(path)
     assert found.prompts[0] == Prompt(0, "door", PALETTE[0])
     state = after(State(), ask.PromptsRead(path, found))
-    assert state.negatives == State().negatives  # none in the file: the usual ones stay
+    assert state.asking.negatives == State().asking.negatives  # none in the file: the usual ones stay
 
 
 def test_a_set_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
@@ -87,10 +90,10 @@ def test_a_set_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
 
 
 def test_the_dialogs_propose_a_place_and_close(tmp_path: Path) -> None:
-    state = after(State(), do.ShowDialog("save prompts"))
-    assert state.dialog == "save prompts" and state.dialog_path.endswith(".prompts.json")
-    state = after(state, ask.SavePrompts(tmp_path / "a.json"), do.ShowDialog("load prompts"))
-    assert state.dialog_path == str(tmp_path / "a.json")
+    state = after(State(), do.ShowDialog(Dialog.SAVE_PROMPTS))
+    assert state.dialog is Dialog.SAVE_PROMPTS and state.typed.text.endswith(".prompts.json")
+    state = after(state, ask.SavePrompts(tmp_path / "a.json"), do.ShowDialog(Dialog.LOAD_PROMPTS))
+    assert state.typed.text == str(tmp_path / "a.json")
     assert after(state, ask.LoadPrompts(tmp_path / "a.json")).dialog is None
 
 

@@ -45,9 +45,9 @@ def test_what_fits_no_better_than_anything_is_never_maybe() -> None:
 def test_an_answer_says_where_it_fits_best_until_the_words_change() -> None:
     place = Vector(1.0, 2.0, 3.0)
     state = after(shown_scene(), ask.Answered(((0, "door", 0.8),), 0, (place,)))
-    assert state.prompts[0].place == place
-    assert after(state, ask.EditPrompt(0, "doors")).prompts[0].place is None
-    assert after(shown_scene(), ask.Answered(((0, "door", 0.8),))).prompts[0].score == 0.8
+    assert state.asking.prompts[0].place == place
+    assert after(state, ask.EditPrompt(0, "doors")).asking.prompts[0].place is None
+    assert after(shown_scene(), ask.Answered(((0, "door", 0.8),))).asking.prompts[0].score == 0.8
 
 
 def test_the_best_place_is_where_the_map_is_highest() -> None:
@@ -82,9 +82,9 @@ def test_a_foreign_phrase_is_marked_with_its_compiled_question() -> None:
     )
     (compiled,) = encode.run(lambda: False)
     assert isinstance(compiled, ask.PhrasesCompiled) and compiled.foreign == (4,)
-    state = replace(shown_scene(), prompts=(Prompt(4, "stuhl"), Prompt(7, "chair", foreign=True)))
+    state = shown_scene().with_asking(prompts=(Prompt(4, "stuhl"), Prompt(7, "chair", foreign=True)))
     state = after(state, compiled)
-    assert [prompt.foreign for prompt in state.prompts] == [True, False]
+    assert [prompt.foreign for prompt in state.asking.prompts] == [True, False]
 
 
 def test_chips_are_what_the_scene_shows_most_of_each_once() -> None:
@@ -93,20 +93,20 @@ def test_chips_are_what_the_scene_shows_most_of_each_once() -> None:
     black = (0.0, 0.0, 0.0)
     insight = Insight((0.2, 0.5, 0.001), (black, black, black), (0, 1, 2), np.eye(3))
     names = AtomsNamed((("wall", "side"), ("Floor",), ("crumb",)))
-    assert state.info is not None
-    history = History(first_marks(state.info.scene))
-    state = replace(state, editing=replace(state.editing, history=history))
+    assert state.scene.info is not None
+    history = History(first_marks(state.scene.info.scene))
+    state = state.with_editing(history=history)
     state = after(state, ask.AtomsDescribed(insight), names)
     assert things.things(state) == ("floor", "wall")
     silent = tuple(replace(atom, on=k != 1) for k, atom in enumerate(history.marks.atoms))
     marks = replace(history.marks, atoms=silent)
-    muted = replace(state, editing=replace(state.editing, history=History(marks)))
+    muted = state.with_editing(history=History(marks))
     assert things.things(muted) == ("wall",)
 
 
 def test_a_chip_asks_its_word() -> None:
     state = after(shown_scene(), ask.AskAgain("floor"))
-    assert [prompt.text for prompt in state.prompts] == ["door", "floor"]
+    assert [prompt.text for prompt in state.asking.prompts] == ["door", "floor"]
 
 
 def test_what_the_model_knows_is_what_its_card_says() -> None:
@@ -116,8 +116,8 @@ def test_what_the_model_knows_is_what_its_card_says() -> None:
 
 def test_one_photo_is_told_to_leave_depth_a_guess() -> None:
     state = shown_scene()
-    assert state.info is not None
-    one = replace(state, info=replace(state.info, views=state.info.views[:1]))
+    assert state.scene.info is not None
+    one = state.with_scene(info=replace(state.scene.info, views=state.scene.info.views[:1]))
     told = [sentence for sentence in tray._sentences(one) if "depth is a guess" in sentence.lower()]
     assert len(told) == 1
     assert not any("guess" in sentence.lower() for sentence in tray._sentences(state))
@@ -125,9 +125,9 @@ def test_one_photo_is_told_to_leave_depth_a_guess() -> None:
 
 def test_the_lens_is_told_by_photos_that_are_there() -> None:
     state = shown_scene()
-    assert state.info is not None
+    assert state.scene.info is not None
     said = "assumed field of view 65 degrees; on the command line, --fov tells it"
-    state = replace(state, info=replace(state.info, warnings=(said,)), photos=())
+    state = state.with_scene(info=replace(state.scene.info, warnings=(said,)), photos=())
     assert tray.WITHOUT_PHOTOS in tray._sentences(state)[0] and "--fov" not in tray._sentences(state)[0]
-    beside = replace(state, photos=(Photo(Path("a.jpg")),))
+    beside = state.with_scene(photos=(Photo(Path("a.jpg")),))
     assert tray.HOW_TO_TELL in tray._sentences(beside)[0]

@@ -162,13 +162,17 @@ def test_a_click_is_answered_and_becomes_a_prompt(shown: State) -> None:
     state = after(state, point.Named(reading, weighed, (("armchair", 0.9), ("sofa", 0.7)), vector))
     assert state.editing.card is not None and state.editing.card.reading.atoms == ((0, 1.0),)
     similar = after(state, point.FindSimilar())
-    prompt = similar.prompts[-1]
-    assert (len(similar.prompts), prompt.text, prompt.like) == (1, "like this (armchair)", vector)
-    assert similar.mode is pictures.HEAT and similar.active == prompt.key and similar.editing.card is None
+    prompt = similar.asking.prompts[-1]
+    assert (len(similar.asking.prompts), prompt.text, prompt.like) == (1, "like this (armchair)", vector)
+    assert (
+        similar.scene.mode is pictures.HEAT
+        and similar.asking.active == prompt.key
+        and similar.editing.card is None
+    )
     typed = after(similar, ask.EditPrompt(prompt.key, "sofa"))
-    assert typed.prompts[0].like == b""
+    assert typed.asking.prompts[0].like == b""
     again = after(replace(similar, editing=state.editing), point.FindSimilar())
-    assert len(again.prompts) == 2 and again.prompts[0].colour != again.prompts[1].colour
+    assert len(again.asking.prompts) == 2 and again.asking.prompts[0].colour != again.asking.prompts[1].colour
 
 
 def test_what_the_pointer_left_is_forgotten(shown: State) -> None:
@@ -191,7 +195,7 @@ def test_names_and_denials_make_scores_lapse_and_can_be_undone(shown: State) -> 
     scored = after(shown, ask.EditPrompt(0, "wall"), ask.Answered(((0, "wall", 0.9),)))
     for lesson in (edit.RenameAtom(0, "wall"), edit.DenyAtom(0, "wall")):
         taught = after(scored, lesson)
-        assert taught.prompts[0].score is None and taught.asking.lapses > scored.asking.lapses
+        assert taught.asking.prompts[0].score is None and taught.asking.lapses > scored.asking.lapses
         assert after(taught, edit.Undo()).editing.marks == shown.editing.marks
     assert after(scored, edit.DenyAtom(9, "wall"), edit.DenyAtom(0, " ")).editing == scored.editing
 
@@ -199,8 +203,8 @@ def test_names_and_denials_make_scores_lapse_and_can_be_undone(shown: State) -> 
 def test_framing_the_selection_flies_to_it(shown: State) -> None:
     state = after(shown, found(0, CHAIRS), point.FrameSelection(), do.Tick(shown.now + FLIGHT_SECONDS))
     # Its front is a square of 0.4 around (x, y), at the block's z - 0.2.
-    assert state.pose.pivot == pytest.approx((CHAIR[0], CHAIR[1], CHAIR[2] - 0.2), abs=0.01)
-    assert state.pose.reach < shown.pose.reach * 2 and state.view is None
+    assert state.scene.pose.pivot == pytest.approx((CHAIR[0], CHAIR[1], CHAIR[2] - 0.2), abs=0.01)
+    assert state.scene.pose.reach < shown.scene.pose.reach * 2 and state.scene.view is None
 
 
 def test_commands_without_a_scene_do_nothing() -> None:
@@ -243,23 +247,23 @@ def answered(state: State) -> State:
 def test_a_score_goes_with_what_it_rests_on(shown: State, change: do.Command) -> None:
     """Otherwise what was deleted would still be found, and what is back would not."""
     before = answered(after(shown, found(0, CHAIRS)))
-    assert before.prompts[0].found and before.asking.histograms
+    assert before.asking.prompts[0].found and before.asking.histograms
     state = after(before, change)
-    assert state.prompts[0].score is None and state.asking.histograms == () and state.wants_maps
+    assert state.asking.prompts[0].score is None and state.asking.histograms == () and state.wants_maps
     late = after(state, ask.Answered(((0, "door", 0.99),), before.asking.lapses))
     assert late == state  # the answer was about Gaussians that are gone
     again = answered(state)
-    assert again.prompts[0].score == 0.99
-    assert after(again, edit.Undo()).prompts[0].score is None
+    assert again.asking.prompts[0].score == 0.99
+    assert after(again, edit.Undo()).asking.prompts[0].score is None
 
 
 def test_selecting_keeps_the_scores(shown: State) -> None:
     state = after(answered(shown), found(0, CHAIRS), edit.Undo())
-    assert state.prompts[0].score == 0.99 and state.asking.histograms
+    assert state.asking.prompts[0].score == 0.99 and state.asking.histograms
 
 
 def test_other_negatives_take_the_scores_away(shown: State) -> None:
-    assert after(answered(shown), ask.SetNegatives(("thing",))).prompts[0].score is None
+    assert after(answered(shown), ask.SetNegatives(("thing",))).asking.prompts[0].score is None
 
 
 def test_the_status_bar_counts_what_is_left(shown: State) -> None:

@@ -53,8 +53,8 @@ def labels(state: State) -> list[str]:
 
 
 def means(state: State) -> np.ndarray:
-    assert state.info is not None and state.editing.marks is not None
-    return changed_scene(state.info.scene, state.editing.marks).gaussians.means.numpy()
+    assert state.scene.info is not None and state.editing.marks is not None
+    return changed_scene(state.scene.info.scene, state.editing.marks).gaussians.means.numpy()
 
 
 def test_a_gesture_is_one_edit_however_often_the_hand_moves(chosen: State) -> None:
@@ -82,9 +82,9 @@ def test_what_is_not_selected_or_no_longer_does_not_move(chosen: State) -> None:
 
 
 def test_numbers_and_matrices_say_the_same_gesture(chosen: State) -> None:
-    assert chosen.info is not None and chosen.editing.marks is not None
+    assert chosen.scene.info is not None and chosen.editing.marks is not None
     marks, rest = chosen.editing.marks, Moved(BLOCK)
-    pivot = placing.pivot_of(chosen.info.scene, marks)
+    pivot = placing.pivot_of(chosen.scene.info, marks)
     assert pivot is not None
     np.testing.assert_allclose(pivot, (CHAIR[0], CHAIR[1], CHAIR[2] - 0.2), atol=1e-6)  # of the block's front
     for handle, numbers in (
@@ -118,9 +118,9 @@ def test_keys_move_turn_and_scale_by_steps_as_the_picture_shows_it(chosen: State
 
 
 def test_a_step_of_a_key_is_as_far_by_parallel_rays(chosen: State) -> None:
-    far = poses.orthographic(chosen.pose, Vector(-9.0, -9.0, -9.0), Vector(9.0, 9.0, 9.0))
-    assert far.reach > 5 * chosen.pose.reach, "it stands clear of the scene"
-    flat = means(after(replace(chosen, pose=far), Nudge(right=1))) - means(chosen)
+    far = poses.orthographic(chosen.scene.pose, Vector(-9.0, -9.0, -9.0), Vector(9.0, 9.0, 9.0))
+    assert far.reach > 5 * chosen.scene.pose.reach, "it stands clear of the scene"
+    flat = means(after(chosen.with_scene(pose=far), Nudge(right=1))) - means(chosen)
     plain = means(after(chosen, Nudge(right=1))) - means(chosen)
     np.testing.assert_allclose(flat, plain, atol=1e-6)  # float32 places
 
@@ -132,21 +132,21 @@ def test_a_number_that_is_none_moves_nothing(chosen: State) -> None:
 
 
 def test_a_tint_is_shown_made_undone_and_saved(chosen: State) -> None:
-    assert chosen.info is not None and chosen.editing.marks is not None
-    luma = placing.luma_of(chosen.info.scene, chosen.editing.marks)
+    assert chosen.scene.info is not None and chosen.editing.marks is not None
+    luma = placing.luma_of(chosen.scene.info, chosen.editing.marks)
     blue = Tint((0.1, 0.2, 0.9), 1.0)
     shown = after(chosen, BeginTint(), ShowTint(blue, luma))
     assert shown.editing.tint == blue and not shown.editing.placing and labels(shown)[1:] == []
     made = after(shown, EndGesture())
     assert labels(made)[1:] == ["Recolour 2,500"] and made.editing.tint is None
-    assert made.info is not None and made.editing.marks is not None
-    scene = edited_scene(made.info.scene, made.editing.marks)
+    assert made.scene.info is not None and made.editing.marks is not None
+    scene = edited_scene(made.scene.info.scene, made.editing.marks)
     ahead = torch.tensor([0.0, 0.0, 1.0]).expand(12_300, 3)
     colours = sh_to_colour(scene.gaussians.sh, ahead)
     # On average the tint; the block's own two shades of red stay two shades of blue.
     np.testing.assert_allclose(colours[:2500].mean(0), blue.colour, atol=1e-4)
     assert np.ptp(colours[:2500, 2].numpy()) > 0.1
-    assert torch.equal(scene.gaussians.sh[2500:], made.info.scene.gaussians.sh[2500:])
+    assert torch.equal(scene.gaussians.sh[2500:], made.scene.info.scene.gaussians.sh[2500:])
     assert after(made, edit.Undo(), edit.Undo()).editing.unsaved is False
     assert after(shown, EndGesture(keep=False)).editing.unsaved is False
     assert after(made, BeginTint()).editing.tint == blue  # the last colour is offered again
@@ -158,7 +158,7 @@ def test_moved_things_are_found_where_they_are(chosen: State, info) -> None:
     assert marks is not None
     size, focal = (224, 168), 0.5 * 224 / np.tan(np.radians(30))
     at = (112 + focal * (CHAIR[0] + 0.5) / (CHAIR[2] - 0.2), 84 + focal * CHAIR[1] / (CHAIR[2] - 0.2))
-    (found,) = FindThing(1, info.scene, marks, at, made.pose, size, "replace").run(lambda: False)
+    (found,) = FindThing(1, info.memory, marks, at, made.scene.pose, size, "replace").run(lambda: False)
     assert isinstance(found, edit.Found) and len(found.mask & BLOCK) == 2500
     (weighed,) = WeighAtoms(1, info.scene, marks).run(lambda: False)
     assert isinstance(weighed, AtomsWeighed) and weighed.places[0] is not None
@@ -166,14 +166,16 @@ def test_moved_things_are_found_where_they_are(chosen: State, info) -> None:
     (weighed,) = WeighAtoms(1, info.scene, core.delete(marks, BLOCK)).run(lambda: False)
     assert isinstance(weighed, AtomsWeighed) and weighed.places[0] is None, "nothing of it is left"
     seen = after(made, edit.Found(BLOCK, "replace", "here"), point.FrameSelection())
-    assert seen.flight is not None and seen.flight.end.pivot[0] == pytest.approx(CHAIR[0] + 0.5, abs=0.1)
+    assert seen.scene.flight is not None and seen.scene.flight.end.pivot[0] == pytest.approx(
+        CHAIR[0] + 0.5, abs=0.1
+    )
 
 
 @pytest.mark.parametrize("parallel", [False, True])
 def test_the_gizmo_stands_where_the_picture_shows_the_thing(chosen: State, parallel: bool) -> None:
     """Its projection, with the principal point and the rays of the pose, against the camera's own."""
     size, points = ImVec2(640, 400), np.array([[0.1, -0.2, 1.5], [-0.3, 0.1, 0.9]])
-    pose = replace(chosen.pose, shift=(0.1, -0.2), span=3.0 if parallel else None)
+    pose = replace(chosen.scene.pose, shift=(0.1, -0.2), span=3.0 if parallel else None)
     clip = np.c_[points, np.ones(2)] @ (projection_of(pose, size) @ view_of(pose)).T
     seen = poses.project(points, pose, (640, 400))
     assert seen is not None

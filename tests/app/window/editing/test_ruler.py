@@ -58,9 +58,9 @@ def test_lengths_are_told_in_metres_where_there_is_a_scale() -> None:
 
 def test_the_scale_is_saved_and_comes_back(tmp_path: Path) -> None:
     state = after(measured(), point.SetLength(0.76), film.AddKey())
-    assert state.info is not None
+    assert state.scene.info is not None
     path = tmp_path / "room.langflash"
-    list(WriteScene(state.info.scene, path, state.editing.marks).run(lambda: False))
+    list(WriteScene(state.scene.info.scene, path, state.editing.marks).run(lambda: False))
     again = describe_scene(load(path), 7, "room")
     back = after(State(), show.SceneArrived(again))
-    assert back.metric == pytest.approx(1.52) and back.keys == (state.pose,)
+    assert back.metric == pytest.approx(1.52) and back.keys == (state.scene.pose,)

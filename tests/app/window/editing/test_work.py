@@ -33,7 +33,7 @@ def info():
 
 
 def scene_of(info, marks=None):
-    return info.serial, info.scene, marks or info.history.marks
+    return info.serial, info.memory, marks or info.history.marks
 
 
 def result(request: SceneErrand) -> Any:
@@ -135,19 +135,19 @@ def test_a_place_has_words_also_the_persons_own(info) -> None:
 
 
 def test_a_place_answers_to_its_new_name_with_the_score_of_a_phrase(info) -> None:
-    serial, scene, marks = scene_of(info)
+    serial, memory, marks = scene_of(info)
     marks = deny_atom(rename_atom(marks, 1, "fresco"), 1, "wall")
     drawn = np.array([0.0, 0.7, 0.0], np.float32)
     place = (Reading((1.0, 2.0), (0, 0, 1), 1.0), info.views[0], (64, 48))
-    named = result(work.NamePlace(serial, scene, marks, *place, drawn.tobytes(), ()))
+    named = result(work.NamePlace(serial, memory, marks, *place, drawn.tobytes(), ()))
     word, score = named.words[0]
     assert word == "fresco"
-    query = compile_query(spoken_scene(scene, marks), language_space("minilm"), ["fresco", "wall"])
+    query = compile_query(spoken_scene(info.scene, marks), language_space("minilm"), ["fresco", "wall"])
     relevance = relevance_maps(torch.from_numpy(drawn)[None], query)[:, 0].tolist()
     assert score == pytest.approx(relevance[0], abs=1e-6) and relevance[0] > query.threshold
     assert relevance[1] < 0.5 and "wall" not in dict(named.words)
     strange = rename_atom(marks, 0, "\U0001f6cb")  # a name without a word that the tower knows breaks nothing
-    assert result(work.NamePlace(serial, scene, strange, *place, drawn.tobytes(), ())).words
+    assert result(work.NamePlace(serial, memory, strange, *place, drawn.tobytes(), ())).words
 
 
 def thing_at(info, at: tuple[float, float], marks=None) -> np.ndarray:

@@ -9,6 +9,7 @@ import torch
 
 from app.window import commands as do
 from app.window.asking import commands as ask
+from app.window.dialogs import Dialog
 from app.window.effects import Hands
 from app.window.exporting import commands as export
 from app.window.exporting import order as export_form
@@ -55,10 +56,10 @@ def test_every_kind_says_the_command_that_does_it(what: Output) -> None:
 def of_photos() -> State:
     """A scene that knows which photo made what."""
     state = scene()
-    assert state.info is not None
-    splat = state.info.scene
+    assert state.scene.info is not None
+    splat = state.scene.info.scene
     known = replace(splat, view_ids=torch.zeros(len(splat.gaussians), dtype=torch.int64))
-    return replace(state, info=replace(state.info, scene=known))
+    return state.with_scene(info=replace(state.scene.info, scene=known))
 
 
 def test_what_fades_on_show_fades_in_files_unless_said_otherwise() -> None:
@@ -99,13 +100,13 @@ def test_what_no_photo_made_does_not_fade_since_its_file_does_not_say_where_phot
         order = export_form.order(form(scene(), path="/out/a picture", what=outputs.RGB, fade=fade))
         assert not isinstance(order, str) and "--fade" not in order.words
     state = of_photos()
-    assert state.info is not None and state.info.scene.view_ids is not None
+    assert state.scene.info is not None and state.scene.info.scene.view_ids is not None
     marks = state.editing.marks
     assert marks is not None
-    merged = state.info.scene.view_ids.clone()
+    merged = state.scene.info.scene.view_ids.clone()
     merged[-9:] = -1
-    info = replace(state.info, scene=replace(state.info.scene, view_ids=merged))
-    state = replace(state, info=info)
+    info = replace(state.scene.info, scene=replace(state.scene.info.scene, view_ids=merged))
+    state = state.with_scene(info=info)
     assert not photos_known(state)
     undone = replace(marks, there=(len(merged) - 9, marks.there[1]))
     editing = replace(state.editing, history=History(undone))
@@ -114,7 +115,8 @@ def test_what_no_photo_made_does_not_fade_since_its_file_does_not_say_where_phot
 
 def wrong(state: State) -> str:
     """What the form lacks."""
-    order = export_form.order(state)
+    looked = export.TargetLookedUp(export_form.look_up(state)).apply(state)
+    order = export_form.order(looked)
     assert isinstance(order, str), order
     return order
 
@@ -163,7 +165,7 @@ def test_unsaved_edits_and_a_selection_are_read_from_their_copies() -> None:
     assert "selection is not saved" in export_form.remarks(state)[0]
     nothing = replace(state.editing, history=History(marks))
     again = after(replace(state, editing=nothing), export.ShowExport())
-    assert not again.exporting.form.only_selected and again.dialog == "export"
+    assert not again.exporting.form.only_selected and again.dialog is Dialog.EXPORT
 
 
 def test_an_export_is_followed_to_its_end() -> None:
@@ -181,14 +183,14 @@ def test_an_export_is_followed_to_its_end() -> None:
 def test_an_export_never_replaces_a_photo() -> None:
     """Neither by the name it offers, nor by one that is typed, nor by one of several views' files."""
     photos = (Photo(Path("/p/left.png")), Photo(Path("/p/left_1.png")))
-    state = replace(scene(None), photos=photos)
+    state = scene(None).with_scene(photos=photos)
     state = after(state, keep.CopyAt(Path("/state/copy.langflash")), export.ShowExport())
     assert state.exporting.form.path == "/p/left_picture.png"
     assert not isinstance(export_form.order(state), str)
     for path in ("/p/left.png", "/p/left"):
-        assert "photo" in str(export_form.order(form(state, path=path)))
+        assert "photo" in wrong(form(state, path=path))
     views = form(state, path="/p/left.png", all_views=True)
-    assert "photo" in str(export_form.order(replace(views, photos=photos[1:])))
+    assert "photo" in wrong(views.with_scene(photos=photos[1:]))
 
 
 def written(state: State) -> set[Path]:
@@ -246,8 +248,8 @@ def test_the_name_follows_the_scene() -> None:
     """Also one that was typed: it was for the scene before. A saved scene gives its name at once."""
     first = after(scene(), export.ShowExport())
     assert first.exporting.form.path == "/rooms/my room_picture.png"
-    assert first.info is not None
-    other = replace(first.info, serial=2, path=Path("/rooms/kitchen.langflash"))
+    assert first.scene.info is not None
+    other = replace(first.scene.info, serial=2, path=Path("/rooms/kitchen.langflash"))
     for state in (first, form(first, path="/out/x.png")):
         state = after(state, do.ShowDialog(None), show.SceneArrived(other), export.ShowExport())
         assert state.exporting.form.path == "/rooms/kitchen_picture.png"
@@ -277,9 +279,9 @@ def test_it_is_asked_before_a_file_is_replaced(monkeypatch, folders: Path) -> No
     desk.perform(export.ExportEnded(0, "done", ""))
     (folders / "a.json").write_text("boxes")  # where the legend would go
     desk.perform(export.Export())
-    assert len(desk.ran) == 1 and desk.state.dialog == "replace"
+    assert len(desk.ran) == 1 and desk.state.dialog is Dialog.REPLACE
     assert desk.state.exporting.there == (folders / "a.json",)
-    desk.perform(do.ShowDialog("export"))
+    desk.perform(do.ShowDialog(Dialog.EXPORT))
     assert desk.state.exporting.form.path == str(folders / "a.png")
     desk.perform(export.Export(sure=True))
     assert len(desk.ran) == 2 and "--replace" in desk.ran[1] and desk.state.dialog is None

@@ -34,13 +34,13 @@ def shown() -> State:
 
 def with_keys(state: State, count: int = 3) -> State:
     for step in range(count):
-        state = after(state, camera.MoveTo(orbit(state.pose, 0.1 * step, 0.02)), film.AddKey())
+        state = after(state, camera.MoveTo(orbit(state.scene.pose, 0.1 * step, 0.02)), film.AddKey())
     return state
 
 
 def test_key_frames_are_added_and_removed(shown: State) -> None:
     state = with_keys(shown)
-    assert len(state.keys) == 3 and state.keys[-1] == state.pose
+    assert len(state.keys) == 3 and state.keys[-1] == state.scene.pose
     assert after(state, film.RemoveKey(0)).keys == state.keys[1:]
     assert after(state, film.RemoveKey()).keys == state.keys[:-1]
     assert after(state, film.RemoveKey(7)).keys == state.keys
@@ -72,18 +72,18 @@ def test_a_preview_passes_every_key_frame_and_ends_at_the_last(shown: State) -> 
         assert pose.rotation == pytest.approx(key.rotation, abs=1e-5)
         assert pose.fov == pytest.approx(key.fov, abs=0.3)  # sides of the film are even
     flown = after(state, ready)
-    assert flown.tour is not None and after(flown, do.Tick(flown.now + 1.0)).tour is not None
+    assert flown.filming.tour is not None and after(flown, do.Tick(flown.now + 1.0)).filming.tour is not None
     there = after(flown, do.Tick(flown.now + 2.5))
-    assert there.tour is None and there.pose == ready.poses[-1]
-    assert after(flown, camera.MoveTo(state.pose)).tour is None, "hands on the picture end it"
-    assert after(flown, film.StopTour()).tour is None
-    assert after(with_keys(state, 1), ready).tour is None, "the key frames are others by now"
+    assert there.filming.tour is None and there.scene.pose == ready.poses[-1]
+    assert after(flown, camera.MoveTo(state.scene.pose)).filming.tour is None, "hands on the picture end it"
+    assert after(flown, film.StopTour()).filming.tour is None
+    assert after(with_keys(state, 1), ready).filming.tour is None, "the key frames are others by now"
 
 
 def test_after_a_preview_one_orbits_around_what_the_last_key_frame_looked_at(shown: State) -> None:
-    near = replace(shown.pose, reach=shown.pose.reach / 4)
-    poses = way((shown.pose, near), 1.0)
-    assert poses[0].reach == pytest.approx(shown.pose.reach)
+    near = replace(shown.scene.pose, reach=shown.scene.pose.reach / 4)
+    poses = way((shown.scene.pose, near), 1.0)
+    assert poses[0].reach == pytest.approx(shown.scene.pose.reach)
     assert poses[-1].reach == pytest.approx(near.reach)
 
 
@@ -108,7 +108,7 @@ def test_key_frames_survive_a_file_and_damaged_ones_are_none(shown: State) -> No
 def test_an_export_takes_the_way_that_was_chosen(shown: State) -> None:
     def ordered(state: State, way: str) -> Order | str:
         form = replace(state.exporting.form, what=outputs.VIDEO, way=way, path="/out/film")
-        return order(replace(state, exporting=replace(state.exporting, form=form)))
+        return order(state.with_exporting(form=form))
 
     orbits, keyed = ordered(shown, "orbit"), ordered(with_keys(shown), "keys")
     assert isinstance(orbits, Order) and isinstance(keyed, Order)
@@ -131,24 +131,28 @@ def test_the_preview_is_the_way_of_the_exported_film(shown: State) -> None:
 
 def test_one_can_look_along_every_axis(shown: State) -> None:
     for _, forward in camera.SIDES:
-        pose = facing(orbit(shown.pose, 0.3, 0.2), forward)
+        pose = facing(orbit(shown.scene.pose, 0.3, 0.2), forward)
         assert pose.axes[:, 2] == pytest.approx(np.array(forward), abs=1e-6)
         assert np.linalg.det(pose.axes) == pytest.approx(1, abs=1e-6)
-        assert pose.pivot == pytest.approx(orbit(shown.pose, 0.3, 0.2).pivot, abs=1e-6)
+        assert pose.pivot == pytest.approx(orbit(shown.scene.pose, 0.3, 0.2).pivot, abs=1e-6)
         if not forward.y:
             assert pose.axes[1, 1] > 0.999, "upright"
     state = after(shown, camera.Face(Vector(0.0, 1.0, 0.0)), do.Tick(shown.now + FLIGHT_SECONDS))
-    assert state.pose.axes[:, 2] == pytest.approx((0, 1, 0), abs=1e-6) and not state.toasts
+    assert state.scene.pose.axes[:, 2] == pytest.approx((0, 1, 0), abs=1e-6) and not state.toasts
 
 
 def test_looking_from_where_no_photo_did_ends_where_the_scene_can_be_trusted() -> None:
     state = shown_scene()
-    assert state.info is not None
-    scene = replace(state.info.scene, view_ids=torch.zeros(len(state.info.scene.gaussians), dtype=torch.long))
-    state = replace(state, info=replace(state.info, scene=scene))
+    assert state.scene.info is not None
+    scene = replace(
+        state.scene.info.scene, view_ids=torch.zeros(len(state.scene.info.scene.gaussians), dtype=torch.long)
+    )
+    state = state.with_scene(info=replace(state.scene.info, scene=scene))
     above = after(state, camera.Face(Vector(0.0, 1.0, 0.0)), do.Tick(state.now + FLIGHT_SECONDS))
     assert "No photo looked from there" in above.toasts[-1].text
-    assert poses.degrees_aside(above.pose, places_to_keep_to(above)) == pytest.approx(poses.NEAR, abs=1e-6)
+    assert poses.degrees_aside(above.scene.pose, places_to_keep_to(above)) == pytest.approx(
+        poses.NEAR, abs=1e-6
+    )
     front = after(state, camera.Face(Vector(0.0, 0.0, 1.0)))
     assert front.toasts == state.toasts
 

@@ -7,6 +7,7 @@ import pytest
 from imgui_bundle import imgui
 
 from app.window.commands import Command
+from app.window.dialogs import Dialog
 from app.window.editing import commands as edit
 from app.window.frame import dialogs, table
 from app.window.kit import theme
@@ -23,9 +24,9 @@ from tests.app.window.scenes import after, shown_scene
 def with_marks() -> State:
     """With a history, as an opened scene has."""
     state = shown_scene()
-    assert state.info is not None
-    marks = first_marks(state.info.scene)
-    return replace(state, editing=replace(state.editing, history=History(marks), saved=marks))
+    assert state.scene.info is not None
+    marks = first_marks(state.scene.info.scene)
+    return state.with_editing(history=History(marks), saved=marks)
 
 
 def test_names_and_keys_are_each_given_once() -> None:
@@ -88,11 +89,11 @@ def test_what_has_nothing_to_do_says_so() -> None:
 
 
 def test_help_fits_a_window_of_800_lines() -> None:
-    shown = replace(State(), dialog="help")
+    shown = replace(State(), dialog=Dialog.HELP)
     with headless.context((1280, 800)):
         theme.set_up(1.0)
         headless.frames(lambda look: dialogs.draw(shown, look), headless.look(), 5)
-        window = imgui.internal.find_window_by_name(dialogs.TITLES["help"])
+        window = imgui.internal.find_window_by_name(Dialog.HELP.value)
         assert window is not None and window.scroll_max.y == 0
     assert ("1 to 0", "Show: RGB to Features") in dialogs.help_rows("View")
     assert ("Ctrl+Z", "Undo") in dialogs.help_rows("Edit")

@@ -7,6 +7,7 @@ import pytest
 from imgui_bundle import imgui
 
 from app.window.commands import Command, ShowDialog, ShowPicture, apply
+from app.window.dialogs import Dialog
 from app.window.effects import Effects, Hands
 from app.window.frame import dialogs, table
 from app.window.kit import theme
@@ -80,14 +81,14 @@ class Desk:
 def desk(walk: Path) -> Desk:
     made = Desk()
     made.perform(show.OpenPaths((str(walk),), dropped=True))
-    assert made.state.job is not None and made.state.job.title == "Opening walk.mp4"
+    assert made.state.scene.job is not None and made.state.scene.job.title == "Opening walk.mp4"
     made.look_through()
     return made
 
 
 def test_a_dropped_film_shows_its_strip(desk: Desk, walk: Path) -> None:
-    assert desk.state.dialog == "film" and desk.state.job is None and desk.film.path == walk
-    assert 10 < len(desk.film.chosen) <= FILM_PHOTOS and desk.state.photos == ()
+    assert desk.state.dialog is Dialog.FILM and desk.state.scene.job is None and desk.film.path == walk
+    assert 10 < len(desk.film.chosen) <= FILM_PHOTOS and desk.state.scene.photos == ()
     pictures = [command for command in desk.performed if isinstance(command, ShowPicture)]
     assert len(pictures) == len(desk.film.strip.stills)
     assert "Of 40 frames" in panel.told(desk.film) and "lay between them" in panel.told(desk.film)
@@ -95,7 +96,7 @@ def test_a_dropped_film_shows_its_strip(desk: Desk, walk: Path) -> None:
     assert len(desk.dropped) == len(pictures), "small pictures go with the dialog"
     entry = next(each for each in table.ENTRIES if each.name.startswith("Frames of the film"))
     again = entry.make(desk.state)
-    assert again == ShowDialog("film") and entry.make(State()) is None
+    assert again == ShowDialog(Dialog.FILM) and entry.make(State()) is None
     assert again is not None
     desk.perform(again)
     assert isinstance(desk.asked[-1], work.SmallPictures)
@@ -120,13 +121,13 @@ def test_frames_are_put_in_and_taken_out(desk: Desk) -> None:
 def test_the_chosen_frames_become_a_scene(desk: Desk) -> None:
     desk.perform(opening.ProposeFrames(4, exactly=True))
     desk.perform(opening.TakeFrames())
-    assert desk.state.dialog is None and desk.state.job is not None
-    assert tuple(photo.path for photo in desk.state.photos) == desk.film.frames
+    assert desk.state.dialog is None and desk.state.scene.job is not None
+    assert tuple(photo.path for photo in desk.state.scene.photos) == desk.film.frames
     job = next(each for each in desk.asked if isinstance(each, ReconstructPhotos))
     assert job.paths == desk.film.frames and len(job.paths) == 4
     desk.perform(opening.ProposeFrames(3, exactly=True))
     desk.perform(opening.TakeFrames())
-    assert len(desk.state.photos) == 3, "frames of the same film that were in the tray before are not"
+    assert len(desk.state.scene.photos) == 3, "frames of the same film that were in the tray before are not"
 
 
 def test_beside_photos_and_beside_a_scene(walk: Path, tmp_path: Path) -> None:
@@ -141,14 +142,14 @@ def test_beside_photos_and_beside_a_scene(walk: Path, tmp_path: Path) -> None:
     desk.perform(opening.SwitchFrame(left))
     assert len(desk.film.chosen) == 3 and "At most 3 frames" in desk.state.toasts[-1].text
     desk.perform(opening.TakeFrames())
-    assert len(desk.state.photos) == MAX_PHOTOS and desk.state.photos[0].path == photos[0]
+    assert len(desk.state.scene.photos) == MAX_PHOTOS and desk.state.scene.photos[0].path == photos[0]
 
     desk = Desk(shown_scene())
     desk.perform(show.OpenPaths((str(walk),), dropped=True))
     desk.look_through()
     desk.perform(opening.TakeFrames())
-    assert desk.state.aside is not None, "the scene's own photos come back if this fails"
-    assert tuple(photo.path for photo in desk.state.photos) == desk.film.frames
+    assert desk.state.scene.aside is not None, "the scene's own photos come back if this fails"
+    assert tuple(photo.path for photo in desk.state.scene.photos) == desk.film.frames
 
 
 def test_what_cannot_be_used_is_said(tmp_path: Path, walk: Path) -> None:
@@ -165,7 +166,9 @@ def test_what_cannot_be_used_is_said(tmp_path: Path, walk: Path) -> None:
     assert "one film at a time" in desk.state.toasts[-1].text
     desk.look_through()
     assert (
-        desk.state.dialog is None and desk.state.job is None and "stands still" in desk.state.toasts[-1].text
+        desk.state.dialog is None
+        and desk.state.scene.job is None
+        and "stands still" in desk.state.toasts[-1].text
     )
 
 
@@ -181,7 +184,7 @@ def test_the_dialog_fits_and_switches(desk: Desk) -> None:
     with headless.context((900, 600)):
         theme.set_up(1.0)
         headless.frames(lambda look: dialogs.draw(desk.state, look), headless.look())
-        box = headless.box(dialogs.TITLES["film"])
+        box = headless.box(Dialog.FILM.value)
         assert box[0] >= 0 and box[1] >= 0 and box[2] <= 900 and box[3] <= 600
         assert imgui.is_popup_open("", imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level)
 

@@ -7,6 +7,7 @@ import pytest
 from PIL import Image, ImageGrab
 
 from app.window.commands import Command, ShowDialog, ShowPicture, apply
+from app.window.dialogs import Dialog
 from app.window.effects import Hands
 from app.window.opening import commands as opening
 from app.window.opening import effects, native, work
@@ -80,7 +81,7 @@ def test_small_pictures_come_a_few_at_a_time_and_go_with_the_dialog(folder: Path
     desk = Desk()
     desk.perform(show.AddPhotos((folder / "b.jpg",)))
     desk.perform(opening.OpenFiles())
-    assert desk.state.dialog == "open" and desk.state.opening.folder is None
+    assert desk.state.dialog is Dialog.OPEN and desk.state.opening.folder is None
     desk.work()
     assert sum(isinstance(c, ShowPicture) for c in desk.performed) == 7, "the broken one is left out"
     assert sum(isinstance(c, opening.MorePictures) for c in desk.performed) == 2

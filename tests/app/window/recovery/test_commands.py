@@ -41,14 +41,17 @@ def test_a_restored_session_has_its_photos_phrases_camera_and_mode() -> None:
     pose = Pose(Vector(0.0, 0.5, 0.0))
     kept = Kept(photos=("/p/a.jpg",), fovs=(60.0,), phrases=("door", "rug"), mode="DEPTH", pose=pose)
     state = after(State(), keep.OfferSession(kept), keep.EndSessionOffer(restore=True))
-    assert [photo.fov for photo in state.photos] == [60.0] and state.recovery.session is None
-    assert [prompt.text for prompt in state.prompts] == ["door", "rug"]
+    assert [photo.fov for photo in state.scene.photos] == [60.0] and state.recovery.session is None
+    assert [prompt.text for prompt in state.asking.prompts] == ["door", "rug"]
     assert after(state, keep.StandAgain(pose, "DEPTH", "kitchen", False)) == state  # no scene yet
-    info = scene().info
+    info = scene().scene.info
     assert info is not None
     shown = after(state, show.SceneArrived(info), keep.StandAgain(pose, "DEPTH", "kitchen", False))
-    assert shown.mode is pictures.DEPTH and shown.pose == pose and shown.view is None
-    assert shown.info is not None and (shown.info.name, shown.info.path) == ("kitchen", None)
+    assert shown.scene.mode is pictures.DEPTH and shown.scene.pose == pose and shown.scene.view is None
+    assert shown.scene.info is not None and (shown.scene.info.name, shown.scene.info.path) == (
+        "kitchen",
+        None,
+    )
     turned_down = after(State(), keep.OfferSession(kept), keep.EndSessionOffer(restore=False))
     assert turned_down == State()
 

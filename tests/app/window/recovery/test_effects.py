@@ -132,9 +132,9 @@ def test_a_merge_takes_the_kept_edits_along_and_is_restored(desk: Desk, info, tm
     desk.pass_time(2 * KEEP_AFTER)
     desk.work()
     first = desk.state.recovery.kept
-    assert first is not None and desk.state.editing.marks is not None and desk.state.info is not None
+    assert first is not None and desk.state.editing.marks is not None and desk.state.scene.info is not None
     save(info.scene, tmp_path / "b.langflash")
-    request = JoinScenes(desk.state.info, desk.state.editing.marks, tmp_path / "b.langflash")
+    request = JoinScenes(desk.state.scene.info, desk.state.editing.marks, tmp_path / "b.langflash")
     merged = request.run(2, lambda *_: None, lambda: False)
     desk.perform(merged.arrival(desk.state))
     desk.work()
@@ -158,9 +158,9 @@ def test_kept_edits_stay_where_those_of_the_merged_scene_cannot_be_written(
     desk.pass_time(2 * KEEP_AFTER)
     desk.work()
     first = desk.state.recovery.kept
-    assert first is not None and desk.state.editing.marks is not None and desk.state.info is not None
+    assert first is not None and desk.state.editing.marks is not None and desk.state.scene.info is not None
     save(info.scene, tmp_path / "b.langflash")
-    request = JoinScenes(desk.state.info, desk.state.editing.marks, tmp_path / "b.langflash")
+    request = JoinScenes(desk.state.scene.info, desk.state.editing.marks, tmp_path / "b.langflash")
     desk.perform(request.run(2, lambda *_: None, lambda: False).arrival(desk.state))
     desk.asked = [each for each in desk.asked if not isinstance(each, work.KeepEdits)]  # the disk is full
     desk.work()
@@ -188,9 +188,11 @@ def test_a_session_of_the_version_before_is_restored_with_its_edits(desk: Desk, 
     desk.perform(keep.EndSessionOffer(restore=True))
     desk.perform(scene_work.LoadScene(file.with_suffix(".langflash"), file).run(3, print, lambda: False))
     state = desk.state
-    assert state.editing.history == history and state.info is not None
-    assert (state.info.name, state.info.path, state.mode.name) == ("kitchen", None, "depth")
-    assert tuple(state.pose.centre) == (0.1, 0.2, -0.3) and [p.text for p in state.prompts] == ["armchair"]
+    assert state.editing.history == history and state.scene.info is not None
+    assert (state.scene.info.name, state.scene.info.path, state.scene.mode.name) == ("kitchen", None, "depth")
+    assert tuple(state.scene.pose.centre) == (0.1, 0.2, -0.3) and [p.text for p in state.asking.prompts] == [
+        "armchair"
+    ]
     desk.work()
     assert not file.exists()  # this window keeps them under its own name
     again = edits.find(info.scene)
@@ -239,8 +241,11 @@ def test_restored_edits_bring_the_photos_of_the_tray_back(desk: Desk, info, tmp_
     desk.perform(keep.EndOffer(restore=True))
     assert any(isinstance(each, scene_work.MakeThumbnails) and each.paths == paths for each in desk.asked)
     desk.perform(scene_work.LoadScene(offer.scene, offer.edits).run(3, print, lambda: False))
-    assert [(photo.path, photo.fov) for photo in desk.state.photos] == [(paths[0], None), (paths[1], 70.0)]
-    assert desk.state.info is not None and desk.state.toasts == ()
+    assert [(photo.path, photo.fov) for photo in desk.state.scene.photos] == [
+        (paths[0], None),
+        (paths[1], 70.0),
+    ]
+    assert desk.state.scene.info is not None and desk.state.toasts == ()
 
 
 def test_photos_that_have_gone_are_named_in_one_sentence(desk: Desk, info, tmp_path: Path) -> None:
@@ -250,7 +255,7 @@ def test_photos_that_have_gone_are_named_in_one_sentence(desk: Desk, info, tmp_p
     desk.effects.begin(DEFAULTS, "", empty=True)
     desk.work()
     desk.perform(keep.EndOffer(restore=True))
-    assert [photo.path for photo in desk.state.photos] == [paths[1]]
+    assert [photo.path for photo in desk.state.scene.photos] == [paths[1]]
     assert "photo 0.jpg of the tray cannot be found" in desk.state.toasts[-1].text
 
 
@@ -263,12 +268,12 @@ def test_the_room_that_restored_edits_replace_keeps_its_own_photos(desk: Desk, i
     offer = desk.state.recovery.edits
     assert offer is not None  # of the same content
     desk.perform(keep.EndOffer(restore=True))
-    assert [photo.path for photo in desk.state.photos] == [paths[0]]
+    assert [photo.path for photo in desk.state.scene.photos] == [paths[0]]
     failed = apply(desk.state, show.JobFailed("It is damaged."))
-    assert [photo.path for photo in failed.photos] == list(paths[1:]) and failed.aside is None
+    assert [photo.path for photo in failed.scene.photos] == list(paths[1:]) and failed.scene.aside is None
     desk.perform(scene_work.LoadScene(offer.scene, offer.edits).run(3, print, lambda: False))
-    assert [photo.path for photo in desk.state.photos] == [paths[0]]
-    assert [photo.path for photo in desk.state.rooms[0].photos] == list(paths[1:])
+    assert [photo.path for photo in desk.state.scene.photos] == [paths[0]]
+    assert [photo.path for photo in desk.state.scene.rooms[0].photos] == list(paths[1:])
 
 
 def test_what_holds_for_one_scene_is_nothing_for_another(info) -> None:
@@ -283,7 +288,7 @@ def test_a_phrase_that_asks_for_a_place_comes_back_as_what_it_was(desk: Desk, in
     desk.perform(show.SceneArrived(info))
     vector = np.array([0.6, 0.8, 0.0], np.float32).tobytes()
     similar = Prompt(5, "like this (armchair)", threshold=LIKE_THRESHOLD, like=vector)
-    desk.state = replace(desk.state, prompts=(Prompt(0, "door"), similar))
+    desk.state = desk.state.with_asking(prompts=(Prompt(0, "door"), similar))
     desk.perform(Notify("anything"))
     desk.pass_time(1.1 * KEEP_AFTER)
     desk.effects.close(desk.state, crashed=True)
@@ -291,7 +296,7 @@ def test_a_phrase_that_asks_for_a_place_comes_back_as_what_it_was(desk: Desk, in
     kept = sessions.read(file)
     assert kept is not None
     state = apply(apply(State(), keep.OfferSession(kept)), keep.EndSessionOffer(restore=True))
-    door, again = state.prompts
+    door, again = state.asking.prompts
     assert (door.text, door.like, door.threshold) == ("door", b"", None)
     assert (again.text, again.like, again.threshold) == (similar.text, vector, LIKE_THRESHOLD)
     file.write_text(json.dumps({**json.loads(file.read_bytes()), "likes": ["", "0f"]}))

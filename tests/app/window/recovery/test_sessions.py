@@ -102,7 +102,7 @@ def test_phrases_come_back_in_their_colours_shown_or_not(folders: Path) -> None:
     path.write_text(json.dumps(sessions.fields(kept)))
     read = sessions.read(path)
     assert read is not None and (read.colours, read.visible) == (colours, (False, True))
-    rows = restored_phrases(State(), read).prompts
+    rows = restored_phrases(State(), read).asking.prompts
     assert [(row.colour, row.visible) for row in rows] == [(colours[0], False), (colours[1], True)]
 
 

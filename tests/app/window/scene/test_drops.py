@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from app.window.scene.drops import sort_drop, typed_path, typed_scene
+from app.window.scene.drops import There, Typed, look_up, sort_drop, typed_path, typed_scene
 from langflash_core.errors import OutputError
 from langflash_core.files import write_atomically
 
 
 def test_paths_that_no_disk_takes_are_said_to_be_missing() -> None:
     long = "a" * 300  # of a name most file systems take 255 bytes
-    assert typed_scene(long) == Path(f"{long}.langflash")  # writing it fails, with a sentence
+    assert typed_scene(Typed(long)) == Path(f"{long}.langflash")  # writing it fails, with a sentence
     assert sort_drop([long, "nul\0"]).rejected == tuple(
         f"{path} does not exist; check the path." for path in (long, "nul\0")
     )
@@ -20,9 +20,13 @@ def test_paths_that_no_disk_takes_are_said_to_be_missing() -> None:
 
 
 def test_typed_paths_name_a_scene_or_nothing(tmp_path: Path) -> None:
-    assert [typed_scene(text) for text in ("", "  ", "/", "~", str(tmp_path))] == [None] * 5
-    assert typed_scene(" room ") == Path("room.langflash")
-    assert typed_scene("~/a.scene") == Path.home() / "a.scene"
+    (tmp_path / "a room.langflash").touch()
+    looked = [Typed(text, look_up(text, scene=True)) for text in ("", "  ", "/", "~", str(tmp_path))]
+    assert [typed_scene(typed) for typed in looked] == [None] * 5
+    assert look_up(f"{tmp_path}/a room", scene=True) is There.FILE, "what would be written"
+    assert look_up(f"{tmp_path}/a room", scene=False) is There.NOTHING
+    assert typed_scene(Typed(" room ")) == Path("room.langflash")
+    assert typed_scene(Typed("~/a.scene")) == Path.home() / "a.scene"
     assert typed_path("~nobody-here/x") == Path("~nobody-here/x")
 
 

@@ -29,13 +29,17 @@ def test_many_photos_are_shown_small_and_a_damaged_one_by_its_number() -> None:
 
 
 def test_a_stage_is_one_whatever_photo_it_is_at() -> None:
-    state = replace(State(), job=Job("Reconstructing"), now=10.0)
+    state = replace(State().with_scene(job=Job("Reconstructing")), now=10.0)
     state = Progressed("refinement: photo 1 of 3", 0.5).apply(state)
-    assert state.job is not None and state.job.started == 10.0
+    assert state.scene.job is not None and state.scene.job.started == 10.0
     state = Progressed("refinement: photo 2 of 3", 0.6).apply(replace(state, now=14.0))
-    assert state.job is not None and state.job.stage.endswith("2 of 3") and state.job.started == 10.0
+    assert (
+        state.scene.job is not None
+        and state.scene.job.stage.endswith("2 of 3")
+        and state.scene.job.started == 10.0
+    )
     state = Progressed("light", 0.7).apply(replace(state, now=16.0))
-    assert state.job is not None and state.job.done[-1] == ("refinement", 6.0)
+    assert state.scene.job is not None and state.scene.job.done[-1] == ("refinement", 6.0)
     assert head_of("refinement: photo 1 of 3") == "refinement" == head_of("refinement")
     assert said("refinement: photo 1 of 3").endswith(": photo 1 of 3") != said("refinement")
 

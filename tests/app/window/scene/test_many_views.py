@@ -13,8 +13,8 @@ from tests.app.window.scenes import shown_scene
 @pytest.mark.parametrize("count", (2, 9, 32))
 def test_the_switches_beside_the_photos_are_in_sight(count: int) -> None:
     state = shown_scene()
-    assert state.info is not None
-    state = replace(state, info=replace(state.info, views=state.info.views[:1] * count))
+    assert state.scene.info is not None
+    state = state.with_scene(info=replace(state.scene.info, views=state.scene.info.views[:1] * count))
     with headless.context((900, 600)):
         theme.set_up(1.0)
         headless.frames(lambda look: layout.draw_all(state, look), headless.look())

@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from app.window import commands as do
+from app.window.dialogs import Dialog
 from app.window.editing import commands as edit
 from app.window.editing.placing import Nudge
 from app.window.editing.state import Handle, Tool
@@ -62,16 +63,21 @@ def test_a_merge_is_an_edit_whose_things_are_selected_with_the_gizmo_in_hand(
 ) -> None:
     desk.perform(joined(desk, block, 2))
     state, editing = desk.state, desk.state.editing
-    assert state.info is not None and editing.history is not None and editing.marks is not None
-    assert (state.info.serial, state.info.name, state.rooms, state.job) == (2, "room", (), None)
+    assert state.scene.info is not None and editing.history is not None and editing.marks is not None
+    assert (state.scene.info.serial, state.scene.info.name, state.scene.rooms, state.scene.job) == (
+        2,
+        "room",
+        (),
+        None,
+    )
     assert [each.label for each in editing.history.done] == ["Select 9 here", "Delete 9", "Merge b.langflash"]
     assert editing.marks.selected.rows()[COUNT:].all() and editing.num_selected == OTHERS
-    assert (editing.tool, editing.handle) == (Tool.PLACE, Handle.MOVE) and state.flight is not None
+    assert (editing.tool, editing.handle) == (Tool.PLACE, Handle.MOVE) and state.scene.flight is not None
     assert editing.unsaved and editing.marks.atoms[3].name == "crate"
     desk.perform(Nudge(right=1))
     nudged = desk.state.editing.marks
     assert nudged is not None and len(nudged.changes) == 1
-    whole = edited_scene(state.info.scene, nudged)
+    whole = edited_scene(state.scene.info.scene, nudged)
     save(whole, tmp_path / "whole.langflash")
     again = load(tmp_path / "whole.langflash")
     assert len(again.gaussians) == COUNT - 9 + OTHERS and again.record.atom_names == {3: "crate"}
@@ -95,13 +101,13 @@ def test_what_is_merged_comes_beside_moved_things_in_the_unit_that_was_told(
 
 
 def test_undoing_a_merge_leaves_the_scene_as_it_was_and_another_can_follow(desk: Desk, block: Path) -> None:
-    assert desk.state.info is not None and desk.state.editing.marks is not None
-    wanted = edited_scene(desk.state.info.scene, desk.state.editing.marks)
+    assert desk.state.scene.info is not None and desk.state.editing.marks is not None
+    wanted = edited_scene(desk.state.scene.info.scene, desk.state.editing.marks)
     saved = desk.state.editing.unsaved
     desk.perform(joined(desk, block, 2), edit.Undo())
     state = desk.state
-    assert state.info is not None and state.editing.marks is not None and state.editing.unsaved == saved
-    alone = edited_scene(state.info.scene, state.editing.marks)
+    assert state.scene.info is not None and state.editing.marks is not None and state.editing.unsaved == saved
+    alone = edited_scene(state.scene.info.scene, state.editing.marks)
     assert torch.equal(alone.gaussians.means, wanted.gaussians.means)
     assert alone.view_ids is not None and wanted.view_ids is not None
     assert torch.equal(alone.view_ids, wanted.view_ids) and alone.record == wanted.record
@@ -112,9 +118,9 @@ def test_undoing_a_merge_leaves_the_scene_as_it_was_and_another_can_follow(desk:
     desk.perform(joined(desk, block, 3))
     desk.perform(joined(desk, block, 4))
     state = desk.state
-    assert state.info is not None and state.editing.marks is not None
-    assert state.info.num_gaussians == COUNT + 2 * OTHERS  # without what was undone
-    assert state.info.num_atoms == 9 and len(state.editing.marks.visible) == COUNT + 2 * OTHERS
+    assert state.scene.info is not None and state.editing.marks is not None
+    assert state.scene.info.num_gaussians == COUNT + 2 * OTHERS  # without what was undone
+    assert state.scene.info.num_atoms == 9 and len(state.editing.marks.visible) == COUNT + 2 * OTHERS
     desk.perform(edit.Undo())
     assert desk.state.editing.marks is not None
     assert desk.state.editing.marks.there == (COUNT + OTHERS, 6)
@@ -123,7 +129,11 @@ def test_undoing_a_merge_leaves_the_scene_as_it_was_and_another_can_follow(desk:
 def test_a_merge_that_comes_too_late_is_told(desk: Desk, block: Path, info: SceneInfo) -> None:
     late = joined(desk, block, 2)
     desk.perform(show.SceneArrived(replace(info, serial=7)), late)
-    assert desk.state.info is not None and desk.state.info.serial == 7 and desk.state.job is None
+    assert (
+        desk.state.scene.info is not None
+        and desk.state.scene.info.serial == 7
+        and desk.state.scene.job is None
+    )
     assert "merge it again" in desk.state.toasts[-1].text
 
 
@@ -141,8 +151,8 @@ def test_a_scene_dropped_on_a_scene_is_asked_about_and_an_opened_one_not(
     desk.perform(show.OpenPaths((str(block),), dropped=True))
     assert desk.state.dialog is None and desk.jobs == ["LoadScene"]  # nothing is there to merge into
     desk.perform(show.SceneArrived(info), show.OpenPaths((str(block),), dropped=True))
-    assert desk.state.dialog == "drop scene" and desk.jobs == ["LoadScene"]
-    desk.perform(show.MergeScene(desk.state.dropped[0]))
+    assert desk.state.dialog is Dialog.DROP_SCENE and desk.jobs == ["LoadScene"]
+    desk.perform(show.MergeScene(desk.state.scene.dropped[0]))
     assert desk.state.dialog is None and desk.jobs[-1] == "JoinScenes"
     desk.perform(show.OpenPaths((str(block),)))
     assert desk.jobs[-1] == "LoadScene"
@@ -152,5 +162,5 @@ def test_without_a_scene_there_is_nothing_to_merge_into(block: Path) -> None:
     desk = Desk()
     desk.perform(show.MergeScene(block))
     assert desk.jobs == [] and desk.state.toasts[-1].text == show.NOTHING_TO_MERGE
-    desk.perform(opening.LookInto(dialog="merge"), do.ShowDialog(None))
+    desk.perform(opening.LookInto(dialog=Dialog.MERGE), do.ShowDialog(None))
     assert desk.state.dialog is None

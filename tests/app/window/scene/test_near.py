@@ -21,13 +21,13 @@ from tests.app.window.scenes import VIEWS, shown_scene
 def state() -> State:
     """A scene that is known to be of two photos, seen from 40 degrees to the left of the first."""
     shown = shown_scene()
-    assert shown.info is not None
-    scene = shown.info.scene
+    assert shown.scene.info is not None
+    scene = shown.scene.info.scene
     known = replace(scene, view_ids=torch.zeros(len(scene.gaussians), dtype=torch.int64))
     aside = poses.orbit(VIEWS[0], math.radians(40), 0.0)
     if aside.centre.x > 0:
         aside = poses.orbit(VIEWS[0], math.radians(-40), 0.0)
-    return replace(shown, info=replace(shown.info, scene=known), pose=aside)
+    return shown.with_scene(info=replace(shown.scene.info, scene=known), pose=aside)
 
 
 def test_how_far_the_photos_are_is_told_where_the_picture_fades(state: State) -> None:
@@ -35,7 +35,7 @@ def test_how_far_the_photos_are_is_told_where_the_picture_fades(state: State) ->
     assert places_to_keep_to(state) == tuple(view.centre for view in VIEWS)
     assert degrees_from_photos(state) == pytest.approx(40)
     assert any("40 degrees aside" in text for text in figures(state))
-    home = replace(state, pose=VIEWS[1])
+    home = state.with_scene(pose=VIEWS[1])
     assert degrees_from_photos(home) < 1e-5 and not any("aside" in text for text in figures(home))
 
 
@@ -48,13 +48,13 @@ def test_nothing_is_kept_to_where_nobody_knows_the_photos_or_wants_to(state: Sta
 def test_gaps_are_filled_in_scenes_of_photos_and_not_around_a_thing(state: State) -> None:
     assert fills_gaps(state) and not fills_gaps(shown_scene()) and not fills_gaps(State())
     assert not fills_gaps(replace(state, preferences=replace(state.preferences, fill_gaps=False)))
-    assert state.info is not None
-    marks = first_marks(state.info.scene)
+    assert state.scene.info is not None
+    marks = first_marks(state.scene.info.scene)
     count = marks.deleted.count
 
     def filled(deleted: int, hidden: int) -> bool:
         gone = replace(marks, deleted=Mask.first(count, deleted), hidden=Mask.first(count, hidden))
-        return fills_gaps(replace(state, editing=replace(state.editing, history=History(gone))))
+        return fills_gaps(state.with_editing(history=History(gone)))
 
     assert filled(0, 0) and filled(count // 2, 0) and filled(count // 3, count // 2)
     assert not filled(count // 2 + 1, 0) and not filled(0, count - 1)

@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from app.window import commands as do
+from app.window.dialogs import Dialog
 from app.window.editing import commands as edit
 from app.window.effects import Hands
 from app.window.scene import commands as show
@@ -84,17 +85,17 @@ def photo(tmp_path: Path) -> Path:
 
 
 def names(desk: Desk) -> list[str]:
-    return [photo.path.name for photo in desk.state.photos]
+    return [photo.path.name for photo in desk.state.scene.photos]
 
 
 def test_photos_dropped_on_a_scene_are_asked_about(desk: Desk, photo: Path) -> None:
     desk.perform(show.OpenPaths((str(photo),)))
-    assert desk.state.dialog == "drop" and names(desk) == ["a.jpg", "b.jpg"] and desk.jobs == []
+    assert desk.state.dialog is Dialog.DROP and names(desk) == ["a.jpg", "b.jpg"] and desk.jobs == []
     desk.perform(do.ShowDialog(None))
     assert names(desk) == ["a.jpg", "b.jpg"] and desk.jobs == []
     for new, wanted in ((False, ["a.jpg", "b.jpg", "c.jpg"]), (True, ["c.jpg"])):
         desk.perform(show.OpenPaths((str(photo),)))
-        desk.perform(show.dropped(desk.state, desk.state.dropped, new))
+        desk.perform(show.dropped(desk.state, desk.state.scene.dropped, new))
         assert desk.state.dialog is None and names(desk) == wanted and len(desk.jobs) == 1 + new
 
 
@@ -107,7 +108,7 @@ def test_without_a_scene_a_drop_starts_at_once(photo: Path) -> None:
 def test_scenes_have_the_detail_that_is_preferred(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     for detail in ("normal", "high"):
         wanted = replace(desk.state.preferences, detail=detail)
-        desk.state = replace(desk.state, preferences=wanted, job=None)
+        desk.state = replace(desk.state.with_scene(job=None), preferences=wanted)
         desk.perform(show.Reconstruct())
         assert desk.asked[-1].detail == detail
     told = {}
@@ -126,7 +127,7 @@ def test_a_person_who_starts_by_hand_still_says_where_photos_belong(edited: Desk
     wanted = replace(edited.state.preferences, start_at_once=False)
     edited.state = replace(edited.state, preferences=wanted)
     edited.perform(show.OpenPaths((str(photo),)))
-    edited.perform(show.dropped(edited.state, edited.state.dropped, new=True))
+    edited.perform(show.dropped(edited.state, edited.state.scene.dropped, new=True))
     assert names(edited) == ["c.jpg"] and edited.jobs == [] and edited.state.dialog is None
 
 
@@ -142,16 +143,16 @@ def test_unsaved_edits_are_asked_about_before_anything_takes_their_place(
         show.dropped(desk.state, (photo,), new=True),
     ):
         desk.perform(begins)
-        assert desk.state.dialog == "unsaved" and desk.jobs == []
+        assert desk.state.dialog is Dialog.UNSAVED and desk.jobs == []
         desk.perform(do.ShowDialog(None))  # cancel
-        assert desk.state.pending == () and names(desk) == ["a.jpg", "b.jpg"] and desk.jobs == []
+        assert desk.state.scene.pending == () and names(desk) == ["a.jpg", "b.jpg"] and desk.jobs == []
     desk.perform(show.Instead((show.Reconstruct(),)), show.GoOn())
-    assert desk.jobs == ["ReconstructPhotos"] and desk.state.pending == ()
+    assert desk.jobs == ["ReconstructPhotos"] and desk.state.scene.pending == ()
 
 
 def test_saving_first_goes_on_when_it_is_done(edited: Desk) -> None:
     edited.perform(show.Instead((show.Reconstruct(),)), show.SaveFirst())
-    assert edited.state.dialog == "save" and edited.jobs == []
+    assert edited.state.dialog is Dialog.SAVE and edited.jobs == []
     edited.perform(show.SaveScene(Path("/x/a.langflash")))
     assert edited.jobs == []  # not before it is written
     edited.perform(show.SceneSaved(Path("/x/a.langflash"), edited.state.editing.marks))
@@ -167,12 +168,12 @@ def test_a_save_dialog_that_is_closed_ends_what_waited(edited: Desk) -> None:
 def test_the_room_before_comes_back_as_it_was_left(edited: Desk, info) -> None:
     before = edited.state
     edited.perform(show.SceneArrived(replace(info, serial=2, name="kitchen"), alone=True))
-    assert edited.state.photos == () and [r.info.name for r in edited.state.rooms] == ["room"]
+    assert edited.state.scene.photos == () and [r.info.name for r in edited.state.scene.rooms] == ["room"]
     edited.perform(show.GoToRoom(1))
     state = edited.state
     assert state.editing.history == before.editing.history and state.editing.unsaved
-    assert state.photos == before.photos and state.pose == before.pose
-    assert [r.info.name for r in state.rooms] == ["kitchen"]
+    assert state.scene.photos == before.scene.photos and state.scene.pose == before.scene.pose
+    assert [r.info.name for r in state.scene.rooms] == ["kitchen"]
     edited.perform(edit.Undo(), edit.Undo())
     assert not edited.state.editing.unsaved
 
@@ -180,49 +181,49 @@ def test_the_room_before_comes_back_as_it_was_left(edited: Desk, info) -> None:
 def test_rooms_are_few_and_a_file_is_there_once(desk: Desk, info) -> None:
     for serial in range(2, MOST_ROOMS + 4):
         desk.perform(show.SceneArrived(replace(info, serial=serial, name=str(serial))))
-    assert [room.info.serial for room in desk.state.rooms] == [5, 4, 3]
+    assert [room.info.serial for room in desk.state.scene.rooms] == [5, 4, 3]
     path = Path("/x/a.langflash")
     for serial in (10, 11, 12):
         desk.perform(show.SceneArrived(replace(info, serial=serial, path=path)))
-    assert [room.info.serial for room in desk.state.rooms] == [6, 5, 4]
+    assert [room.info.serial for room in desk.state.scene.rooms] == [6, 5, 4]
 
 
 @pytest.mark.parametrize("end", [show.JobFailed("nothing to see"), show.JobCancelled()])
 def test_where_a_new_room_cannot_be_made_the_tray_is_as_before(end) -> None:
-    state = replace(shown_scene(), photos=(Photo(Path("old.png")),))
+    state = shown_scene().with_scene(photos=(Photo(Path("old.png")),))
     state = after(state, show.SetPhotosAside(), show.AddPhotos((Path("new.png"),)), show.Reconstruct())
-    assert [p.path.name for p in state.photos] == ["new.png"]
+    assert [p.path.name for p in state.scene.photos] == ["new.png"]
     state = after(state, end)
-    assert [p.path.name for p in state.photos] == ["old.png"] and state.job is None
+    assert [p.path.name for p in state.scene.photos] == ["old.png"] and state.scene.job is None
 
 
 def test_the_room_left_keeps_its_own_photos() -> None:
-    state = replace(shown_scene(), photos=(Photo(Path("old.png")),))
+    state = shown_scene().with_scene(photos=(Photo(Path("old.png")),))
     state = after(state, show.SetPhotosAside(), show.AddPhotos((Path("new.png"),)), show.Reconstruct())
-    assert state.info is not None
-    state = after(state, show.SceneArrived(replace(state.info, serial=2, path=None)))
-    assert [p.path.name for p in state.photos] == ["new.png"]
-    assert [p.path.name for p in state.rooms[0].photos] == ["old.png"]
+    assert state.scene.info is not None
+    state = after(state, show.SceneArrived(replace(state.scene.info, serial=2, path=None)))
+    assert [p.path.name for p in state.scene.photos] == ["new.png"]
+    assert [p.path.name for p in state.scene.rooms[0].photos] == ["old.png"]
 
 
 def test_photos_set_aside_twice_are_not_lost() -> None:
-    state = replace(shown_scene(), photos=(Photo(Path("old.png")),))
+    state = shown_scene().with_scene(photos=(Photo(Path("old.png")),))
     state = after(state, show.SetPhotosAside(), show.AddPhotos((Path("new.png"),)))
     state = after(state, show.SetPhotosAside(), show.AddPhotos((Path("newer.png"),)), show.Reconstruct())
     state = after(state, show.JobFailed("nothing to see"))
-    assert [p.path.name for p in state.photos] == ["old.png"]
+    assert [p.path.name for p in state.scene.photos] == ["old.png"]
 
 
 def test_a_scene_that_has_no_photos_gets_nobody_elses() -> None:
     state = after(
         shown_scene(), show.SetPhotosAside(), show.AddPhotos((Path("new.png"),)), show.Reconstruct()
     )
-    assert state.info is not None
-    state = after(state, show.SceneArrived(replace(state.info, serial=2, path=None)))
-    assert state.rooms[0].photos == ()
+    assert state.scene.info is not None
+    state = after(state, show.SceneArrived(replace(state.scene.info, serial=2, path=None)))
+    assert state.scene.rooms[0].photos == ()
 
 
 def test_a_scene_that_cannot_be_opened_leaves_waiting_photos() -> None:
     state = after(shown_scene(), show.SetPhotosAside(), show.AddPhotos((Path("new.png"),)))
     state = after(state, show.OpenScene(Path("missing.langflash")), show.JobFailed("there is no such file"))
-    assert [p.path.name for p in state.photos] == ["new.png"]
+    assert [p.path.name for p in state.scene.photos] == ["new.png"]

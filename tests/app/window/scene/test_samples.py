@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from app.window import commands as do
+from app.window.dialogs import Dialog
 from app.window.exporting.commands import ShowExport
 from app.window.scene.samples import beside, pairs
 from app.window.scene.state import Photo
@@ -20,8 +21,8 @@ def test_files_go_beside_a_persons_photos_but_not_among_the_programs_own() -> No
 
 def test_save_and_export_propose_that_place() -> None:
     state: State = shown_scene()
-    assert state.info is not None
+    assert state.scene.info is not None
     left = pairs()[0][1][0]
-    state = replace(state, photos=(Photo(left),), info=replace(state.info, path=None))
+    state = state.with_scene(photos=(Photo(left),), info=replace(state.scene.info, path=None))
     assert Path(after(state, ShowExport()).exporting.form.path).parent == Path.home()
-    assert Path(after(state, do.ShowDialog("save")).dialog_path).parent == Path.home()
+    assert Path(after(state, do.ShowDialog(Dialog.SAVE)).typed.text).parent == Path.home()

@@ -27,9 +27,9 @@ def said(state: State, monkeypatch: pytest.MonkeyPatch) -> tuple[list[str], list
 
 def test_detail_is_told_where_it_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     state = shown_scene()
-    assert state.info is not None and said(state, monkeypatch) == ([], [])
+    assert state.scene.info is not None and said(state, monkeypatch) == ([], [])
     detail = {"level": "normal", "elements": 12_300, "photos_psnr_db": [31.2, 30.8]}
-    info = replace(state.info, scene=state.info.scene.with_record(detail=detail))
-    headings, texts = said(replace(state, info=info), monkeypatch)
+    info = replace(state.scene.info, scene=state.scene.info.scene.with_record(detail=detail))
+    headings, texts = said(state.with_scene(info=info), monkeypatch)
     assert headings == ["Detail: normal"]
     assert texts == ["normal, 12,300 Gaussians\nfrom the photos' places 31.2, 30.8 dB"]

@@ -23,7 +23,8 @@ from tests.app.window.items import Items
 
 def places(session):
     for _ in range(4):
-        session.dispatch(Progressed(session.state.job.stage, 0.5) if session.state.job else Progressed("", 0))
+        job = session.state.scene.job
+        session.dispatch(Progressed(job.stage, 0.5) if job else Progressed("", 0))
         session.step(0)
     found = {name.split()[-1]: boxes for name, boxes in items.now().items()}
     return {name: boxes for name, boxes in found.items() if name in ("Cancel", "##text")}

@@ -1,0 +1,35 @@
+"""Which dialogs there are, and which of them have a path that is typed."""
+
+from enum import Enum
+
+
+class Dialog(Enum):
+    """A dialog of the window; the value is its title."""
+
+    SAVE = "Save the scene"
+    OPEN = "Open"
+    HELP = "Mouse and keys"
+    LEAVE = "Leave?"
+    DROP = "Where do these photos belong?"
+    DROP_SCENE = "Open or merge?"
+    MERGE = "Merge a scene into this one"
+    PLACE = "Where to write it"
+    FILM = "Frames of a film"
+    UNSAVED = "Edits are not saved"
+    SAVE_PROMPTS = "Save the phrases"
+    LOAD_PROMPTS = "Load phrases"
+    EXPORT = "Export"
+    REPLACE = "Replace?"
+    SETTINGS = "Preferences"
+    LOG = "Log"
+    PALETTE = "All commands"
+
+    @property
+    def looks(self) -> bool:
+        """Whether it shows a folder."""
+        return self in (Dialog.OPEN, Dialog.MERGE, Dialog.PLACE)
+
+    @property
+    def types(self) -> bool:
+        """Whether a path is typed there; the export's lies in its form."""
+        return self.looks or self in (Dialog.SAVE, Dialog.SAVE_PROMPTS, Dialog.LOAD_PROMPTS)
