@@ -1,6 +1,7 @@
 """What one photo sees through cannot be there. N Gaussians of V views, order (v h w)."""
 
 import torch
+from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -19,13 +20,13 @@ _AROUND, _JUMP = 5, 0.1  # pixels of a window, and log depth within it from whic
 
 
 def seen_through(
-    means: Tensor,
-    viewmats: Tensor,
-    Ks: Tensor,
-    depths: Tensor,
-    confidences: Tensor,
+    means: Float[Tensor, "N 3"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+    depths: Float[Tensor, "V H W"],
+    confidences: Float[Tensor, "V H W"],
     tolerance: float = TOLERANCE,
-) -> Tensor:
+) -> Bool[Tensor, " N"]:
     """Gaussians that stand in free space of a photo which knows its depth better.
 
     Gaussian i of view v is projected into every other view u. If it lies in front of u's surface
@@ -73,7 +74,12 @@ def _witnesses(view: int, points: Tensor, viewmats: Tensor, Ks: Tensor, size: tu
     return [seeing[(2 * k + 1) * len(seeing) // (2 * _ASKED)] for k in range(_ASKED)]
 
 
-def outvoted(points: Tensor, viewmats: Tensor, Ks: Tensor, depths: Tensor) -> Tensor:
+def outvoted(
+    points: Float[Tensor, "V n 3"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+    depths: Float[Tensor, "V H W"],
+) -> Bool[Tensor, "V H W"]:
     """(V, H, W) bool: what lies beside a jump of depth, where two other photos and more see through it, and
     more than see it as their surface.
 

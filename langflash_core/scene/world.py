@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.geometry.cameras import invert_rigid, transform
@@ -10,7 +11,7 @@ from langflash_core.geometry.turning import turned_quats, turned_sh
 from langflash_core.types import Scene
 
 
-def in_world(scene: Scene, viewmat: Tensor, unit: float) -> Scene:
+def in_world(scene: Scene, viewmat: Float[Tensor, "4 4"], unit: float) -> Scene:
     """The scene with its first camera at `viewmat`.
 
     Args:
