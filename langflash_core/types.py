@@ -161,7 +161,7 @@ class Gaussians:
         """Apply `change` to every field (casting, moving)."""
         return Gaussians(*(change(v) for v in (self.means, self.quats, self.scales, self.opacities, self.sh)))
 
-    def rows(self, keep: Shaped[Tensor, "..."]) -> "Gaussians":
+    def rows(self, keep: Shaped[Tensor, " n"]) -> "Gaussians":
         """Some of the Gaussians, as `Scene.rows`."""
         return self.map(lambda values: values[keep.to(values.device)])
 
@@ -204,7 +204,7 @@ class Semantics:
             return dense
         return dense.scatter_add(1, self.weight_ids, self.weight_values)
 
-    def rows(self, keep: Shaped[Tensor, "..."]) -> "Semantics":
+    def rows(self, keep: Shaped[Tensor, " n"]) -> "Semantics":
         """What some of the Gaussians carry, as `Scene.rows`; the dictionary stays whole."""
         keep = keep.to(self.weight_ids.device)
         return replace(self, weight_ids=self.weight_ids[keep], weight_values=self.weight_values[keep])
@@ -300,7 +300,7 @@ class Scene:
         own = Camera(self.viewmats[view], self.Ks[view], *self.view_size)
         return own if width is None or height is None else own.resized(width, height)
 
-    def rows(self, keep: Shaped[Tensor, "..."]) -> "Scene":
+    def rows(self, keep: Shaped[Tensor, " n"]) -> "Scene":
         """The scene with some of its Gaussians; dictionary, views, photos and record stay.
 
         Args:

@@ -96,6 +96,7 @@ def placed_views(prediction: Prediction, views: Views) -> tuple[Prediction, View
             viewmats=prediction.viewmats[keep],
             depths=prediction.depths[keep],
             confidences=prediction.confidences[keep],
+            Ks=None if prediction.Ks is None else prediction.Ks[keep],
             unplaced=(),
         ),
         replace(
