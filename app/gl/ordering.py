@@ -20,13 +20,11 @@ class Ordering:
         self.order = np.zeros(0, np.uint32)
         self.depth_range = (NEAR, 1.0)
         self.shown = np.ones(len(means), bool)
-        self.place(means, scales)
+        self._means, self._coordinates, self._widest = _places(means, scales)
 
     def place(self, means: Tensor, scales: Tensor) -> None:
         """The same Gaussians elsewhere: means and scales (N, 3), scene units."""
-        self._means = means.numpy()
-        self._coordinates = np.ascontiguousarray(self._means.T, np.float64)
-        self._widest = scales.abs().amax(-1).numpy()
+        self._means, self._coordinates, self._widest = _places(means, scales)
 
     def sort(self, camera: Camera) -> None:
         """Choose the Gaussians that may touch the image and order them back to front.
@@ -73,6 +71,12 @@ class Ordering:
             place = pos_c * inverse * np.float32(K[axis, axis]) + np.float32(K[axis, 2])
             seen &= (place + radius > 0) & (place - radius < extent)
         return seen
+
+
+def _places(means: Tensor, scales: Tensor) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Means (N, 3), the same in float64 with a row an axis, and the largest scales (N,)."""
+    places = means.numpy()
+    return places, np.ascontiguousarray(places.T, np.float64), scales.abs().amax(-1).numpy()
 
 
 def stable_order(keys: np.ndarray) -> np.ndarray:

@@ -30,8 +30,8 @@ class Correction:
     mean_log_depth: float
 
     def at(
-        self, x: Float[np.ndarray, "... 2"], log_depths: Float[np.ndarray, "h w"]
-    ) -> Float[np.ndarray, "..."]:
+        self, x: Float[np.ndarray, "*n 2"], log_depths: Float[np.ndarray, "*n"]
+    ) -> Float[np.ndarray, "*n"]:
         """Correction of log depth (...) at normalised coordinates x (..., 2)."""
         columns = (np.ones_like(log_depths), x[..., 0], x[..., 1], log_depths - self.mean_log_depth)
         return np.clip(np.stack(columns, -1) @ self.coefficients, -_LIMIT, _LIMIT)
