@@ -21,6 +21,7 @@ EXTRAS = {
     "tensorboard": "board",
     "transformers": "sam2",
     "pycolmap": "colmap",
+    "anywidget": "notebook",
 }
 """Top-level import name -> extra in pyproject.toml."""
 

@@ -150,12 +150,17 @@ def _cleared(path: Path, *temporaries: Path) -> Iterator[None]:
 
 def part_beside(path: Path) -> Path:
     """The hidden file or folder to write to beside `path`; those of processes that are gone are swept up."""
+    _sweep(path.parent)
+    return path.parent / f".{path.name[:100]}.{_HOST}-{os.getpid()}-{secrets.token_hex(6)}.part"
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what processes left half-written that are gone."""
     with suppress(OSError):
-        for name in os.listdir(path.parent):
+        for name in os.listdir(folder):
             found = _PART.fullmatch(name)
             if found and not _runs(int(found[1])):
-                _remove(path.parent / name)
-    return path.parent / f".{path.name[:100]}.{_HOST}-{os.getpid()}-{secrets.token_hex(6)}.part"
+                _remove(folder / name)
 
 
 def _runs(process: int) -> bool:
@@ -302,6 +307,7 @@ def staged_folder(folder: Path) -> Iterator[Path]:
         OutputError: a file cannot be moved, because a folder of its name is in the way.
     """
     staging = part_beside(_nearest(folder) / "export")  # "." has no name of its own
+    _sweep(folder.absolute().parent)  # where it lay before `folder` was there
     staging.mkdir(mode=0o700)
     try:
         yield staging

@@ -10,6 +10,7 @@ from typing import overload
 
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 from langflash_core.detail import Detail
 from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
@@ -19,10 +20,13 @@ from langflash_core.scene.assemble import placed_views
 from langflash_core.scene.detailed import assemble_detailed, working_photo
 from langflash_core.scene.light import Light, photo_light
 from langflash_core.scene.prune import prune
+from langflash_core.scene.report import left_out_line
+from langflash_core.scene.strangers import strangers
 from langflash_core.splat.colours import ROUNDS, solved_colours
 from langflash_core.types import Cost, Prediction, Scene, Views
 
 _HELD = 8  # photos that stay decoded
+_LEFT_OUT = "{} something that the others do not ({}); it is left out"
 _RINGING = 0.3
 """Of what a photo varies by around a Gaussian, how far its colour may go beyond: blur needs some of it."""
 
@@ -56,23 +60,27 @@ def fine_scene(
     grid = (views.images.shape[-2], views.images.shape[-1])
     photos = _Photos(views, light, grid)
     views = replace(views, images=light.corrected(views.images).clamp(0, 1))
+    left = strangers(views.images, prediction.depths, prediction.viewmats, views.Ks)
     scene = assemble_detailed(
         prediction,
         views,
         photos,
         detail,
         gaussians=gaussians,
+        strangers=left if bool(left.any()) else None,
         preset=preset,
         progress=lambda done: progress("elements", 0.1 + 0.3 * done),
     )
     solving = time.perf_counter()
-    scene = _coloured(scene, photos, lambda done: progress("colours", 0.4 + 0.5 * done))
+    scene = _coloured(scene, _Silent(photos, left), lambda done: progress("colours", 0.4 + 0.5 * done))
     timings = {
         **prediction.timings,
         "assembly": solving - start,
         "colours": time.perf_counter() - solving,
     }
-    scene = scene.with_record(light=light.stored(), cost=Cost(timings))
+    left_out = _shares(left)
+    said = (*scene.record.warnings, *([_LEFT_OUT.format(*_counted(left_out))] if left_out else []))
+    scene = scene.with_record(light=light.stored(), left_out=left_out, warnings=said, cost=Cost(timings))
     progress("prune", 0.9)
     return prune(scene, merge=False), light
 
@@ -111,7 +119,47 @@ class _Photos(Sequence[Tensor]):
         return photo.shape[-1], photo.shape[-2]
 
 
-def _coloured(scene: Scene, photos: _Photos, progress: Callable[[float], None]) -> Scene:
+class _Silent(Sequence[Tensor]):
+    """Photos which say nothing, are no numbers, where `left` (V, H, W) is."""
+
+    def __init__(self, photos: _Photos, left: Tensor):
+        self._photos, self._left = photos, left
+        self._some = left.flatten(1).any(1).tolist()
+
+    def __len__(self) -> int:
+        return len(self._photos)
+
+    @overload
+    def __getitem__(self, index: int) -> Tensor: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Tensor]: ...
+    def __getitem__(self, index: int | slice) -> Tensor | Sequence[Tensor]:
+        if isinstance(index, slice):
+            return [self[v] for v in range(*index.indices(len(self)))]
+        photo = self._photos[index]
+        if not self._some[index]:
+            return photo
+        left = F.interpolate(self._left[index][None, None].float(), size=photo.shape[-2:], mode="nearest")
+        return torch.where(left[0] > 0, torch.nan, photo)
+
+    def size(self, index: int) -> tuple[int, int]:
+        """(width, height) of one."""
+        return self._photos.size(index)
+
+
+def _shares(left: Tensor) -> dict[str, list[float]]:
+    """What a record says of what was left out of photos (V, H, W): nothing of nothing."""
+    shares = [round(share, 4) for share in left.flatten(1).float().mean(1).tolist()]
+    return {"shares": shares} if any(shares) else {}
+
+
+def _counted(left_out: dict[str, list[float]]) -> tuple[str, str]:
+    """Which photos show what others do not, and how much of them that is."""
+    count = sum(share > 0 for share in left_out["shares"])
+    return ("1 photo shows" if count == 1 else f"{count} photos show"), left_out_line(left_out)
+
+
+def _coloured(scene: Scene, photos: _Silent, progress: Callable[[float], None]) -> Scene:
     """The scene in the colours that make its photos (3, h, w) again; its record says how near they come."""
     solved = solved_colours(
         scene.gaussians,

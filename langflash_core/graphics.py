@@ -6,7 +6,8 @@ so the package loads without it.
 
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,10 +42,10 @@ def offscreen_context() -> "moderngl.Context":
     settings: dict[str, Any] = {"backend": "egl"} if sys.platform.startswith("linux") else {}
     try:
         context = moderngl.create_context(require=OPENGL, standalone=True, **settings)
+        context.gc_mode = None  # pyright: ignore[reportAttributeAccessIssue] - owners release
+        bound_framebuffer(context)
     except Exception as error:  # glcontext raises bare Exception whatever went wrong
         raise GraphicsError(_explain(error)) from error
-    context.gc_mode = None  # pyright: ignore[reportAttributeAccessIssue] - owners release
-    bound_framebuffer(context)
     return context
 
 
@@ -65,6 +66,36 @@ def _explain(error: Exception) -> str:
             "libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri"
         )
     return f"OpenGL 3.3 could not start ({error}); update the graphics driver"
+
+
+@contextmanager
+def refusals_said(ctx: "moderngl.Context | None", remedy: str) -> Iterator[None]:
+    """What the driver refuses inside is one sentence: an object, a program, memory. Without this a picture
+    for which there was no memory would be taken for one, since OpenGL only sets a flag.
+
+    Args:
+        ctx: whose flag is read at the end; None: whoever calls reads it.
+        remedy: ends the sentence, after a semicolon.
+
+    Raises:
+        GraphicsError: it refused something.
+    """
+    import moderngl
+
+    try:
+        yield
+        flag = None if ctx is None else ctx.error
+    except moderngl.Error as error:
+        raise GraphicsError(f"the graphics driver refused ({_one_line(error)}); {remedy}") from error
+    if flag == "GL_OUT_OF_MEMORY":
+        raise GraphicsError(f"the graphics driver is out of memory; {remedy}")
+
+
+def _one_line(error: Exception) -> str:
+    """Compilers and linkers say pages; the first line says what."""
+    return next((line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__)[
+        :200
+    ]
 
 
 def draws_in_software(ctx: "moderngl.Context") -> bool:

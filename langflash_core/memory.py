@@ -1,12 +1,13 @@
-"""What a long session no longer needs goes back to the system.
+"""What a long session no longer needs goes back to the system; and which errors say that there is no more.
 
-With the GNU C library alone: elsewhere memory is kept and given back in the system's own way.
+Giving back works with the GNU C library alone: elsewhere memory is kept and given back in the system's own way.
 """
 
 import ctypes
 import sys
 from contextlib import suppress
 
+_SAID = ("not enough memory", "can't allocate memory", "out of memory", "insufficient memory", "bad_alloc")
 _MMAP_THRESHOLD, _TRIM_THRESHOLD = -3, -1  # M_* of malloc.h
 LARGE_BYTES = 4 << 20
 """From here on an array has pages of its own, which go with it.
@@ -31,6 +32,12 @@ def give_back() -> None:
     Tensors that nobody holds are gone without Python's collector, which would stop the window for a while.
     """
     _call("malloc_trim", 0)
+
+
+def out_of_memory(error: BaseException) -> bool:
+    """Whether an error says that memory has run out; torch and OpenCV have no class of their own for it."""
+    words = str(error).lower()
+    return isinstance(error, MemoryError) or any(said in words for said in _SAID)
 
 
 def _call(name: str, *arguments: int) -> None:

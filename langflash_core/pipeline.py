@@ -5,7 +5,7 @@ render -> query.relevance_maps -> query.answer
 """
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import asdict, replace
@@ -17,11 +17,12 @@ from torch import Tensor
 from langflash_core.ahead import Ahead, begin
 from langflash_core.detail import DEFAULT_DETAIL, check_gaussians, chosen_detail
 from langflash_core.errors import InputError, PromptError, ViewError, WeightsError
-from langflash_core.export.html import Phrases, TextModel, write_html
+from langflash_core.export.html import Beside, Phrases, TextModel, write_html
 from langflash_core.fine import fine_scene
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.straight import after, straightened
+from langflash_core.images.triage import check_shown
 from langflash_core.images.views import load_views, source_pictures
 from langflash_core.keeping import Keep, not_kept
 from langflash_core.kept_prediction import arrays_of, prediction_of
@@ -49,6 +50,7 @@ from langflash_core.resources import asset_path
 from langflash_core.running import Kept, Progress, Run
 from langflash_core.scene.assemble import assemble
 from langflash_core.scene.prune import prune
+from langflash_core.scene.tour import Note, Stop, read_tour
 from langflash_core.scene.world import in_world
 from langflash_core.splat import render as render_reference
 from langflash_core.splat.refine import Budget, refine
@@ -148,6 +150,7 @@ def reconstruct(
         views = load_views(
             photos, fov=fov, intrinsics=intrinsics, check=run.check, pictures=ahead.pictures.result
         )
+        check_shown(views.names, list(views.images))
     views = _posed(views, viewmats, preset)
     with run.stage("weights"):
         network = _network(preset, weights, device, precision, ahead.stored)
@@ -301,6 +304,7 @@ def web_page(
     threshold: float | None = None,
     with_text: bool = False,
     title: str | None = None,
+    beside: Mapping[str, Scene] | None = None,
 ) -> Phrases | None:
     """Write a web page that shows the scene and answers these phrases and the whole vocabulary.
 
@@ -309,40 +313,69 @@ def web_page(
         threshold: relevancy in [0, 1] from which a phrase counts as present; None: the scene's calibration.
         with_text: the page holds the text tower of `minilm`, too, and answers any phrase; 28 MB more.
         title: of the page; None: the file's name.
+        beside: other scenes in the same page, by their titles; asked the same.
 
     Returns:
         What the page answers; None for a scene without language that was asked nothing.
 
     Raises:
         PromptError: a prompt or the threshold cannot be used. WeightsError: the space has no text weights.
-        InputError: `with_text`, and the scene speaks another space.
+        InputError: a scene speaks another space than the first, or none that `with_text` reads.
         OutputError: the scene holds no Gaussians, or the path cannot be written.
     """
+    others = beside or {}
+    said = {other.semantics.space for other in (scene, *others.values())}
+    if len(said) > 1:
+        raise InputError(
+            f"scenes of one page speak one language, not {', '.join(sorted(said))}; leave some out"
+        )
     if with_text and scene.semantics.space != "minilm":
         raise InputError(f"a page reads words of 'minilm' only, the scene speaks '{scene.semantics.space}'")
-    phrases = None
-    if prompts or scene.semantics.num_atoms:
-        compiled = compile_query(
-            scene,
-            language_space(scene.semantics.space),
-            list(dict.fromkeys((*prompts, *all_phrases()))),
-        )
-        limit = compiled.threshold if threshold is None else threshold
-        _check_threshold(limit)
-        atoms = compiled.factor  # of which D = atoms Q: products with phrases are the same
-        phrases = Phrases(
-            texts=compiled.texts,
-            num_asked=len(dict.fromkeys(prompts)),
-            scores=compiled.prompts @ atoms.T,
-            negatives=compiled.negatives @ atoms.T,
-            gram=atoms @ atoms.T,
-            temperature=compiled.temperature,
-            threshold=limit,
-            dictionary=finite_dictionary(scene, language_space("minilm")) if with_text else None,
-        )
-    text_model = _text_model() if with_text else None
-    write_html(scene, path, phrases=phrases, text_model=text_model, title=title)
-    return phrases
+    toured = [each.phrase for s in (scene, *others.values()) for each in _of_tour(s) if each.phrase]
+    texts = tuple(dict.fromkeys((*prompts, *toured, *all_phrases())))
+    asked = len(dict.fromkeys(prompts))
+    first, *rest = (
+        _page_phrases(each, texts, asked, threshold, with_text) if asked or each.semantics.num_atoms else None
+        for each in (scene, *others.values())
+    )
+    write_html(
+        scene,
+        path,
+        phrases=first,
+        text_model=_text_model() if with_text else None,
+        title=title,
+        beside=[Beside(s, name, own) for (name, s), own in zip(others.items(), rest, strict=True)],
+    )
+    return first
+
+
+def _of_tour(scene: Scene) -> tuple[Stop | Note, ...]:
+    tour = read_tour(scene.record.tour)
+    return (*tour.stops, *tour.notes)
+
+
+def _page_phrases(
+    scene: Scene, texts: Sequence[str], num_asked: int, threshold: float | None, with_text: bool
+) -> Phrases:
+    """What a page answers of a scene.
+
+    Raises:
+        PromptError: a text or the threshold cannot be used.
+    """
+    compiled = compile_query(scene, language_space(scene.semantics.space), list(texts))
+    limit = compiled.threshold if threshold is None else threshold
+    _check_threshold(limit)
+    atoms = compiled.factor  # of which D = atoms Q: products with phrases are the same
+    return Phrases(
+        texts=compiled.texts,
+        num_asked=num_asked,
+        scores=compiled.prompts @ atoms.T,
+        negatives=compiled.negatives @ atoms.T,
+        gram=atoms @ atoms.T,
+        temperature=compiled.temperature,
+        threshold=limit,
+        dictionary=finite_dictionary(scene, language_space("minilm")) if with_text else None,
+    )
 
 
 def _text_model() -> TextModel:

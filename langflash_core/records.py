@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 
@@ -71,6 +71,89 @@ class FoundLens:
 
 
 @dataclass(frozen=True)
+class Guess:
+    """How large a scene may be, where nobody told: metres per scene unit, the bounds between which it is in
+    two of three rooms, and the names of what tells it."""
+
+    metres: float
+    low: float
+    high: float
+    by: tuple[str, ...]
+
+    @property
+    def spread(self) -> float:
+        """The half width, as a share."""
+        return math.sqrt(self.high / self.low) - 1
+
+
+_KNOWN = {
+    "up_by": ("edges", "surfaces", "told"),
+    "floor_by": ("floor", "lowest", "told"),
+    "north_by": ("walls", "told"),
+}
+"""How it is known where a scene stands."""
+
+
+@dataclass(frozen=True)
+class World:
+    """Where a scene stands: level, on its floor, turned north.
+
+    A point p of the scene is at turn (p - origin) in the world, scene units: +x east, +y down, +z north, and
+    y = 0 the floor.
+
+    turn: unit quaternion wxyz. origin: the scene's point that lies at 0. up_by: "edges" of photos,
+    "surfaces" of the scene, or "told". up_error: degrees expected, 0 where it was told. floor_by: "floor"
+    (what is called so), "lowest" (of what is there), or "told". north_by: "walls" (the wall that the first
+    photo looks at most squarely) or "told". guess: of metres, None: nothing tells any.
+    """
+
+    turn: tuple[float, float, float, float]
+    origin: tuple[float, float, float]
+    up_by: str = "told"
+    up_error: float = 0.0
+    floor_by: str = "told"
+    north_by: str = "told"
+    guess: Guess | None = None
+
+
+def world_to_json(world: World) -> dict[str, Any]:
+    """Plain values, as scene files have them."""
+    return asdict(world) | {"guess": asdict(world.guess) if world.guess else None}
+
+
+def world_from_json(values: Mapping[str, Any]) -> World:
+    """The world of plain values; keys that this version does not know are left out.
+
+    Raises:
+        ValueError: numbers that are none, no rotation, or a way of knowing that there is not.
+    """
+    try:
+        w, x, y, z = map(float, values["turn"])
+        right, down, ahead = map(float, values["origin"])
+        error, length = float(values.get("up_error", 0.0)), math.hypot(w, x, y, z)
+        known = {name: values.get(name, "told") for name in _KNOWN}
+        guess = None if values.get("guess") is None else _guess_from_json(values["guess"])
+    except (TypeError, LookupError, AttributeError) as problem:
+        raise ValueError(f"world: expected turn, origin and how they are known ({problem})") from problem
+    if not (abs(length - 1) < 1e-3 and all(map(math.isfinite, (right, down, ahead, error)))):
+        raise ValueError(f"world: expected a unit quaternion and a place, received {values}")
+    for name, value in known.items():
+        if value not in _KNOWN[name]:
+            raise ValueError(
+                f"world: expected {name} as one of {', '.join(_KNOWN[name])}, received {value!r}"
+            )
+    turn = (w, x, y, z) if abs(length - 1) < 1e-12 else (w / length, x / length, y / length, z / length)
+    return World(turn, (right, down, ahead), up_error=error, guess=guess, **known)
+
+
+def _guess_from_json(values: Mapping[str, Any]) -> Guess:
+    metres, low, high = (float(values[name]) for name in ("metres", "low", "high"))
+    if not (math.isfinite(high) and 0 < low <= metres <= high):
+        raise ValueError(f"world: expected a guess of 0 < low <= metres <= high, received {values}")
+    return Guess(metres, low, high, tuple(map(str, values.get("by", ()))))
+
+
+@dataclass(frozen=True)
 class Record:
     """What is known of a scene besides its tensors. Mappings hold plain JSON values; empty: unknown.
 
@@ -80,11 +163,14 @@ class Record:
     it. refinement: what a fit to the photos brought. detail: what was spent on how fine elements, and what
     it bought. light: `gains` and `offsets`, a row of
     red, green and blue for each view, by which `scene.light` brought the photos' colours to one light. lens:
-    `found`, a mapping of `FoundLens` for each lens that the photos told.
+    `found`, a mapping of `FoundLens` for each lens that the photos told. left_out:
+    `shares`, of each view what was left out since the others do not show it (`scene.strangers`). world: where
+    it stands; None: nobody looked. thing_names: a person's own, by what the inventory calls a thing.
     calibration: what the network's checkpoint says about scores, instead of its language space. atom_names:
     a person's own, by atom, which it answers to. atom_denials: what a person said that an atom is not.
     silent_atoms: those that answer no phrase. num_deleted: Gaussians that edits took away. camera_path:
-    the window's key frames. others: what a file says under keys that this version does not know.
+    the window's key frames. tour: stops and notes, as `scene.tour` has them. others: what a file says under
+    keys that this version does not know.
     """
 
     preset: str | None = None
@@ -99,12 +185,16 @@ class Record:
     detail: Mapping[str, Any] = field(default_factory=dict)
     light: Mapping[str, Any] = field(default_factory=dict)
     lens: Mapping[str, Any] = field(default_factory=dict)
+    left_out: Mapping[str, Any] = field(default_factory=dict)
+    world: World | None = None
+    thing_names: Mapping[str, str] = field(default_factory=dict)
     calibration: Mapping[str, Any] = field(default_factory=dict)
     atom_names: Mapping[int, str] = field(default_factory=dict)
     atom_denials: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
     silent_atoms: tuple[int, ...] = ()
     num_deleted: int = 0
     camera_path: tuple[Mapping[str, Any], ...] = ()
+    tour: Mapping[str, Any] = field(default_factory=dict)
     cost: Cost = Cost()
     others: Mapping[str, Any] = field(default_factory=dict)
 

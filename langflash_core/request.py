@@ -24,9 +24,10 @@ class ExportRequest:
     threshold: relevance to keep, in (0, 1); None: the calibrated one. view: a photo's camera, from 0.
     camera: a JSON file of one. all_views: from every photo. size: (width, height), pixels. ortho: parallel
     rays. fade: leave out what no photo looked at. fill: fill gaps. colormap, span: of heat-maps. detail: of
-    Gaussians and pages. seconds, path: of a film, its length and "photos", "orbit" or a file of key frames.
-    with_text: a page answers any phrase. replace: also what is there as something else. backend: "gl",
-    "torch" or None.
+    Gaussians and pages. seconds, path: of a film, its length and "photos", "orbit", "tour" or a file of key
+    frames. with_text: a page answers any phrase. beside: files of other scenes in the same page. upright:
+    Gaussians stand in the scene's world, in metres where they are known. replace: also what is there as
+    something else. backend: "gl", "torch" or None.
     """
 
     output: Path
@@ -48,6 +49,8 @@ class ExportRequest:
     seconds: float | None = None
     path: str | None = None
     with_text: bool = False
+    beside: tuple[Path, ...] = ()
+    upright: bool = False
     replace: bool = False
     backend: str | None = None
 
@@ -87,8 +90,9 @@ class ExportRequest:
             low_high = _said(self.span)
             words += [f"--span={low_high}"] if low_high.startswith("-") else ["--span", low_high]
         words += [] if self.detail == EXPORT_DETAILS[0] else ["--detail", self.detail]
-        for name in ("all_views", "fade", "fill", "ortho", "with_text", "replace"):
+        for name in ("all_views", "fade", "fill", "ortho", "with_text", "upright", "replace"):
             words += [f"--{name.replace('_', '-')}"] if getattr(self, name) else []
+        words += ["--beside", *map(str, self.beside)] if self.beside else []
         return [*words, *(["--prompt", *self.prompts] if self.prompts else [])]
 
     @property
@@ -158,8 +162,12 @@ def _check_options(request: ExportRequest, kind: Output) -> None:
         raise InputError("--colormap and --span colour heat-maps; add --what heat, or leave them away")
     if request.with_text and kind.subject != "page":
         raise InputError("--with-text is for web pages; name an .html, or leave it away")
+    if request.beside and kind.subject != "page":
+        raise InputError("--beside is for web pages; name an .html, or leave it away")
     if request.detail == "low" and not kind.splats:
         raise InputError("--detail low is for splats, scenes and web pages; name one, or leave it away")
+    if request.upright and kind.subject not in ("scene", "photos"):
+        raise InputError("--upright is for splats, scenes and poses of photos; name one, or leave it away")
     if request.fill and not (kind.fills and (kind.phrases == "one" or not request.prompts)):
         raise InputError("--fill is for pictures and films of the whole scene and heat-maps; leave it away")
 

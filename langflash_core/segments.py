@@ -57,14 +57,14 @@ def segment(scene: Scene, prompts: Sequence[str], *, threshold: float | None = N
         raise PromptError(f"the threshold {limit} is out of range; relevancy needs 0 to 1")
     relevance = gaussian_relevance(scene.semantics, compiled)  # (P, N)
     members = ((relevance >= limit) & (scene.semantics.num_atoms > 0)).cpu()
-    shares = _shares(scene)  # (V, N)
-    numbers = torch.stack([_things(scene, row, shares) for row in members])
+    shares = photo_shares(scene)  # (V, N)
+    numbers = torch.stack([connected_things(scene, row, shares) for row in members])
     members &= (numbers > 0).any(1, keepdim=True)
     scores = _scores(relevance.cpu(), shares.mean(0))
     return Segments(compiled.texts, tuple(scores.tolist()), float(limit), members, numbers)
 
 
-def _shares(scene: Scene) -> Tensor:
+def photo_shares(scene: Scene) -> Tensor:
     """(V, N) of the photos that each Gaussian makes up; of the scene's surface, (1 or V, N), what no photo is
     known of."""
     areas = torch.from_numpy(covered_areas(scene.gaussians)).float()
@@ -74,7 +74,7 @@ def _shares(scene: Scene) -> Tensor:
     return torch.where(scene.view_ids.cpu() < 0, areas, seen_shares(scene))
 
 
-def _things(scene: Scene, members: Tensor, shares: Tensor) -> Tensor:
+def connected_things(scene: Scene, members: Tensor, shares: Tensor) -> Tensor:
     """(N,) numbers of `instances`, without those that no photo shows well enough; 0 where that is all."""
     numbers = torch.from_numpy(instances(scene.gaussians, members.numpy()))
     if not numbers.any() or float(shares[:, members].sum(1).max()) < MIN_AREA:
@@ -102,11 +102,11 @@ def boxes(scene: Scene, segments: Segments) -> list[dict]:
     found = []
     for phrase, number in segments.things:
         rows = (segments.instances[phrase] == number).numpy().nonzero()[0]
-        found.append(oriented_box(means[torch.from_numpy(rows[_evenly(areas[rows])])]))
+        found.append(oriented_box(means[torch.from_numpy(rows[evenly(areas[rows])])]))
     return found
 
 
-def _evenly(areas: np.ndarray) -> np.ndarray:
+def evenly(areas: np.ndarray) -> np.ndarray:
     """Rows, each as often as its area (n,) has it: their quantiles are those of the surface. Where all areas
     are the same, or 0, each of few rows once."""
     ends = np.cumsum(areas if areas.sum() > 0 else np.ones_like(areas))

@@ -22,6 +22,8 @@ Checks    constructors refuse shapes that disagree and numbers that name nothing
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from importlib import import_module
+from typing import Any
 
 import torch
 from jaxtyping import Bool, Float, Int, Integer, Shaped
@@ -299,6 +301,10 @@ class Scene:
         """Camera of input view `view` (from 0), optionally drawn at another size."""
         own = Camera(self.viewmats[view], self.Ks[view], *self.view_size)
         return own if width is None or height is None else own.resized(width, height)
+
+    def show(self, prompts: Sequence[str] | str = (), **options: Any) -> Any:
+        """The scene in a cell of a notebook, as `showing.notebook.show` has it."""
+        return import_module("langflash_core.showing.notebook").show(self, prompts, **options)
 
     def rows(self, keep: Shaped[Tensor, " n"]) -> "Scene":
         """The scene with some of its Gaussians; dictionary, views, photos and record stay.

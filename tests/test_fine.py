@@ -148,6 +148,37 @@ def test_the_number_asked_for_is_kept():
     assert scene.record.detail["asked"] == 4000
 
 
+def with_somebody(given: Photographed, view: int) -> Photographed:
+    """Somebody red stands before one of the photos, at half the depth of the wall."""
+    depths, images = given.prediction.depths.clone(), given.views.images.clone()
+    depths[view, 5:27, 2:12] = 1.5
+    photo = given.photos[view].clone()
+    photo[:, 15:81, 6:36] = torch.tensor([0.9, 0.1, 0.1])[:, None, None]
+    images[view] = torch.nn.functional.interpolate(photo[None], GRID, mode="area")[0]
+    sources = tuple(png(photo) if v == view else source for v, source in enumerate(given.views.sources))
+    views = replace(given.views, images=images, sources=sources)
+    return replace(given, prediction=replace(given.prediction, depths=depths), views=views)
+
+
+def test_somebody_before_one_photo_leaves_no_trace_in_the_scene():
+    given = photographed(4)
+    scene, light = made(with_somebody(given, 2))
+    shares = scene.record.left_out["shares"]
+    assert [share > 0 for share in shares] == [False, False, True, False]
+    said = [warning for warning in scene.record.warnings if "left out" in warning]
+    here = f"{round(100 * shares[2])} % of photo 3"
+    assert said == [f"1 photo shows something that the others do not ({here}); it is left out"]
+    drawn = render(scene, scene.camera(2, 120, 90), weight_maps=False).rgb.movedim(-1, 0)
+    behind = light.corrected(given.photos[2], view=2)[:, 15:81, 6:36]
+    assert float((drawn[:, 15:81, 6:36] - behind).abs().mean()) < 0.05  # .4 with somebody there
+
+
+def test_of_two_photos_nothing_is_left_out():
+    scene, _ = made(with_somebody(photographed(2), 1))
+    assert scene.record.left_out == {}
+    assert not any("left out" in warning for warning in scene.record.warnings)
+
+
 def test_equal_calls_give_equal_scenes(given, fine):
     first, second = fine[0], made(given)[0]
     assert first.record.light == second.record.light and first.record.detail == second.record.detail

@@ -10,16 +10,21 @@ from langflash_core.errors import InputError
 from .words.judging import add_bench, add_bench_network, add_eval
 from .words.scenes import (
     add_batch,
+    add_clean,
     add_export,
     add_frames,
+    add_hide,
     add_info,
+    add_level,
     add_lift,
     add_query,
     add_reconstruct,
     add_render,
     add_view,
     add_weights,
+    add_words,
 )
+from .words.showing import add_completion, add_desktop, add_tour
 from .words.training import add_labels, add_rooms, add_train
 
 LAB = ("bench-network", "eval", "labels", "rooms", "train")
@@ -59,7 +64,11 @@ def build_parser() -> Parser:
         add_query,
         add_render,
         add_export,
+        add_tour,
+        add_hide,
+        add_clean,
         add_lift,
+        add_level,
         add_info,
         add_bench,
         add_bench_network,
@@ -68,6 +77,9 @@ def build_parser() -> Parser:
         add_train,
         add_eval,
         add_weights,
+        add_words,
+        add_desktop,
+        add_completion,
     ):
         add(commands)
     return parser

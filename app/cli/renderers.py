@@ -33,13 +33,13 @@ class GlRenderer:
             from ..gl import SplatRenderer, offscreen_context
 
         self._context = offscreen_context()
-        with self._context:
+        with self._current():
             self._splats = SplatRenderer(self._context)
         self._scene: Scene | None = None
         self._asked: CompiledQuery | None = None
 
     def __call__(self, scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame:
-        with self._context:  # another renderer may have been current
+        with self._current():
             self._show(scene)
             self._splats.draw(camera, weight_maps=weight_maps)
             return self._splats.frame(weight_maps=weight_maps)
@@ -51,18 +51,27 @@ class GlRenderer:
 
         if fade:
             check_photos(scene)
-        with self._context:
+        with self._current():
             self._show(scene)
             return self._splats.colours(camera, fade=fade, fill=fill)
 
     def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
-        with self._context:
+        with self._current():
             self._show(scene)
             if compiled is not self._asked:
                 self._splats.ask(compiled)
                 self._asked = compiled
             self._splats.draw(camera, weight_maps=False, fast=True)
             return self._splats.frame(), self._splats.relevance()
+
+    @contextmanager
+    def _current(self) -> Iterator[None]:
+        """The context is the one in use, since another renderer's may have been; what its driver refuses is
+        a sentence."""
+        from langflash_core.graphics import refusals_said
+
+        with self._context, refusals_said(self._context, "try a smaller --size, or --backend torch"):
+            yield
 
     def _show(self, scene: Scene) -> None:
         if scene is not self._scene:

@@ -12,6 +12,7 @@ from typing import Any, TextIO
 
 from langflash_core.errors import LangFlashError
 from langflash_core.files import make_folder, write_atomically
+from langflash_core.memory import out_of_memory
 from langflash_core.running import left
 
 INTERRUPTED = 130
@@ -30,7 +31,7 @@ def explained(error: Exception) -> str:
         return one_sentence(str(error))
     if isinstance(error, OSError):
         return f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
-    if isinstance(error, MemoryError):
+    if out_of_memory(error):
         return "out of memory; try a smaller --size or fewer photos"
     if os.environ.get("LANGFLASH_DEBUG"):
         traceback.print_exception(error)

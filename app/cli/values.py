@@ -25,6 +25,15 @@ def pixel_side(text: str) -> int:
     return _whole(text, 56, 1024)
 
 
+def point(text: str) -> tuple[float, float, float]:
+    """`X,Y,Z` in scene units."""
+    parts = text.split(",")
+    if len(parts) != 3:
+        raise ArgumentTypeError(f"expected X,Y,Z such as 0.2,-0.1,1.4, received {text!r}")
+    x, y, z = map(_number, parts)
+    return x, y, z
+
+
 def view_index(text: str) -> int:
     """Index of a photo, from 0."""
     return _whole(text, 0, 10**6)
@@ -104,6 +113,14 @@ def open_fov(text: str) -> float:
     return value
 
 
+def share(text: str) -> float:
+    """A number from 0 to 1."""
+    value = _number(text)
+    if not 0.0 <= value <= 1.0:
+        raise ArgumentTypeError(f"expected a number from 0 to 1, received {text}")
+    return value
+
+
 def kept_fraction(text: str) -> float:
     """A relevancy threshold, strictly between 0 and 1."""
     value = _number(text)
@@ -121,6 +138,15 @@ def intrinsics(text: str) -> tuple[float, float, float, float]:
     if fx <= 0 or fy <= 0:
         raise ArgumentTypeError(f"expected focal lengths above 0, received {text}")
     return fx, fy, cx, cy
+
+
+def spot(text: str) -> tuple[float, float, float]:
+    """`X,Y,Z`: a point or a direction."""
+    words = text.split(",")
+    if len(words) != 3:
+        raise ArgumentTypeError(f"expected three numbers X,Y,Z, received {text!r}")
+    x, y, z = (_number(word) for word in words)
+    return x, y, z
 
 
 def crop(text: str) -> tuple[int, int, int, int]:

@@ -8,7 +8,8 @@ awake; a resting window draws nothing.
 import logging
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import glfw
@@ -16,6 +17,7 @@ from imgui_bundle import imgui, implot
 from imgui_bundle.python_backends.glfw_backend import GlfwRenderer
 
 from langflash_core.errors import LangFlashError
+from langflash_core.graphics import refusals_said
 from langflash_core.memory import keep_large_apart
 
 from . import desktop
@@ -263,17 +265,16 @@ class Session:
     def _update_picture(self) -> float:
         """Returns the seconds that drawing took."""
         began = time.perf_counter()
-        try:
+        wait = float("inf")
+        with self._living():
             for effects in self._effects:
                 effects.before_picture(self.state)
             wait = self._viewport.update(self.state, self._panel, self._touched)
-        except LangFlashError as error:
-            self._perform(Notify(str(error)))
-            wait = float("inf")
         drawing = time.perf_counter() - began
         self._viewport_wants = self._now() + wait
-        for effects in self._effects:
-            effects.after_picture(self.state)
+        with self._living():
+            for effects in self._effects:
+                effects.after_picture(self.state)
         stats = Stats(
             self._frame_seconds,
             self._viewport.picture_seconds,
@@ -300,6 +301,8 @@ class Session:
         if error != "GL_NO_ERROR":
             log.error("OpenGL error %s after the %s", error, where)
             self.gl_errors.append(f"{error} after the {where}")
+        if error == "GL_OUT_OF_MEMORY":
+            self._perform(Notify("The graphics card is out of memory; close other programs."))
 
     # Commands
 
@@ -323,7 +326,17 @@ class Session:
         if self.state.dialog != before.dialog:
             self._awake = MOST_AWAKE  # while what is behind it darkens
         for effects in self._effects:
-            effects.follow(command, before, self.state)
+            with self._living():
+                effects.follow(command, before, self.state)
+
+    @contextmanager
+    def _living(self) -> Iterator[None]:
+        """What goes wrong inside is said, also what the graphics driver refuses: edits hang on none of it."""
+        try:
+            with refusals_said(None, "edits stay; close other programs, or make this window smaller"):
+                yield
+        except LangFlashError as error:
+            self._perform(Notify(str(error)))
 
     def _entitle(self, title: str) -> None:
         glfw.set_window_title(self._window, title)

@@ -5,6 +5,8 @@ from typing import Any
 
 from langflash_core.colormaps import HeatColours
 from langflash_core.geometry.poses import Pose
+from langflash_core.scene.tour import NO_TOUR, read_tour
+from langflash_core.scene.tour import Tour as ToldTour
 
 from .asking.state import NO_ASKING, Asking
 from .dialogs import Dialog
@@ -16,6 +18,7 @@ from .recovery.preferences import DEFAULTS, Preferences
 from .recovery.state import NO_RECOVERY, Recovery
 from .scene.drops import NOT_TYPED, Typed
 from .scene.state import NO_SCENE, Showing
+from .touring.state import NO_TOURING, Touring
 
 TOAST_SECONDS = {"info": 5.0, "error": 20.0}
 MOST_LINES = 300
@@ -94,6 +97,7 @@ class State:
     exporting: Exporting = NO_EXPORTING
     opening: Opening = NO_OPENING
     recovery: Recovery = NO_RECOVERY
+    touring: Touring = NO_TOURING
 
     # The state with another half; `changes` are that half's fields
 
@@ -118,12 +122,20 @@ class State:
     def with_recovery(self, **changes: Any) -> "State":
         return replace(self, recovery=replace(self.recovery, **changes))
 
+    def with_touring(self, **changes: Any) -> "State":
+        return replace(self, touring=replace(self.touring, **changes))
+
     # What follows from several halves
 
     @property
     def keys(self) -> tuple[Pose, ...]:
         """Key frames of the camera's path."""
         return read(self.editing.marks.camera_path) if self.editing.marks else ()
+
+    @property
+    def tour(self) -> ToldTour:
+        """Stops and notes of the scene on show."""
+        return read_tour(self.editing.marks.tour) if self.editing.marks else NO_TOUR
 
     @property
     def metric(self) -> float | None:

@@ -156,8 +156,9 @@ class Viewport:
 
     @property
     def texture(self) -> moderngl.Texture | None:
-        """The picture to show, or None before the first scene."""
-        return None if self.picture is None else self.picture.easel.texture
+        """The picture to show, or None before the first scene, and where one that failed took its texture."""
+        shown = None if self.picture is None else self.picture.easel.texture
+        return shown if shown is not None and hasattr(shown.mglo, "use") else None
 
     @property
     def pose(self) -> Pose:

@@ -21,7 +21,7 @@ from queue import Empty, SimpleQueue
 from PIL import Image
 
 from langflash_core.errors import Cancelled, LangFlashError
-from langflash_core.memory import give_back
+from langflash_core.memory import give_back, out_of_memory
 
 from .commands import Command, Notify, OfScene
 from .requests import Errand, Job, SceneErrand
@@ -226,5 +226,7 @@ def _import_ahead(name: str) -> None:
 
 
 def _unexpected(error: Exception) -> str:
+    if out_of_memory(error):
+        return "There was not enough memory; close other programs, or take fewer or smaller photos."
     log.exception("the worker met an unexpected error")
     return f"Something unexpected went wrong ({type(error).__name__}: {error}); please report it."

@@ -8,6 +8,9 @@ camera, at most four weights each in 8 bits. Phrases are numbers per atom, d_k .
 needs neither dictionary nor text tower, and answers those that it was made with. With a text model it holds
 both, deflated as they are, and answers any phrase.
 
+A page may hold several scenes; the first one is shown, and each answers the same phrases. Stops and notes
+of a scene's tour come along, cameras with the page's own lens.
+
 Axes and units are the scene's own. What is lost: photos, weights beyond the fourth, and without a text
 model the dictionary.
 """
@@ -16,8 +19,10 @@ import base64
 import hashlib
 import html
 import json
+import math
 import re
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,11 +36,16 @@ from langflash_core.export.png import DIM, GLOW
 from langflash_core.export.quantised import quantised
 from langflash_core.files import write_atomically
 from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.geometry.poses import from_view
 from langflash_core.graphics import shader_source
+from langflash_core.scene.tour import Stop, read_tour
 from langflash_core.types import Scene
 
 MOST_WEIGHTS = 4  # of a Gaussian; `langflash bench` says what the others are worth
-SCRIPTS = ("decode", "cameras", "sorting", "answers", "drawing", "moving", "asking", "main")
+SCRIPTS = (
+    "decode", "cameras", "sorting", "answers", "drawing", "worlds", "moving", "asking", "touring", "notes",
+    "plan", "embedding", "main",
+)  # fmt: skip
 READING = "words"  # beside a text model
 _SHADERS = ("splat.vert", "splat.frag", "screen.vert", "show.frag")
 _FORMAT, _VERSION = "langflash-page", 1
@@ -61,6 +71,15 @@ class Phrases:
     temperature: float
     threshold: float
     dictionary: Tensor | None = None
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Another scene of a page: its title, and its phrases, whose texts are those of the first."""
+
+    scene: Scene
+    title: str
+    phrases: Phrases | None = None
 
 
 @dataclass(frozen=True)
@@ -99,23 +118,28 @@ def write_html(
     phrases: Phrases | None = None,
     text_model: TextModel | None = None,
     title: str | None = None,
+    beside: Sequence[Beside] = (),
 ) -> None:
     """A page of the scene; without phrases it is looked at only.
 
     Args:
+        beside: other scenes in the same page.
         text_model: reads other phrases in the page; the phrases come with their dictionary.
         title: of the page; None: the file's name.
 
     Raises:
         OutputError: no Gaussian, or an unwritable path.
     """
-    check_some(scene.gaussians, path)
-    header, payload = _encoded(scene, phrases)
-    header["title"] = path.stem if title is None else title
-    write_atomically(path, _page(header, payload, text_model).encode())
+    first = Beside(scene, path.stem if title is None else title, phrases)
+    scenes = []
+    for each in (first, *beside):
+        check_some(each.scene.gaussians, path)
+        header, payload = _encoded(each.scene, each.phrases)
+        scenes.append(({**header, "title": each.title}, payload))
+    write_atomically(path, _page(scenes, text_model).encode())
 
 
-def _page(header: dict, payload: bytes, text_model: TextModel | None) -> str:
+def _page(scenes: Sequence[tuple[dict, bytes]], text_model: TextModel | None) -> str:
     """The whole page; what is put in is not looked through for more places to fill."""
     folder = Path(__file__).parent / "page"
 
@@ -126,11 +150,15 @@ def _page(header: dict, payload: bytes, text_model: TextModel | None) -> str:
     program = _COMMENT.sub("", "\n".join(source(f"{name}.js") for name in names))
     script = f'\n"use strict";\n(() => {{\n{program}}})();\n'
     shaders = {name: _COMMENT.sub("", shader_source(f"web/{name}")) for name in _SHADERS}
+    drawn = {"shaders": shaders, "constants": _constants()}
     parts = {
-        "title": html.escape(header["title"]),
+        "title": html.escape(scenes[0][0]["title"]),
         "style": f"<style>\n{source('page.css')}</style>",
-        "header": _json_script("header", {**header, "shaders": shaders, "constants": _constants()}),
-        "payload": _packed_script("payload", payload),
+        "scenes": "\n".join(
+            _json_script(f"header{number or ''}", header if number else {**header, **drawn})
+            + _packed_script(f"payload{number or ''}", payload)
+            for number, (header, payload) in enumerate(scenes)
+        ),
         "text": _text_scripts(text_model),
         "program": f"<script>{script}</script>",
         "policy": _policy(script),
@@ -190,6 +218,7 @@ def _encoded(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
         "origin": origin.tolist(),
         "views": _views(scene, origin),
         "viewSize": list(scene.view_size),
+        **_tour(scene, origin.numpy()),
         **books,
     }
     if phrases is not None:
@@ -221,6 +250,30 @@ def _views(scene: Scene, origin: Tensor) -> list[dict]:
             }
         )
     return views
+
+
+def _tour(scene: Scene, origin: np.ndarray) -> dict:
+    """Stops as cameras of the page's lens, their subject as large; notes around the origin; metres per
+    unit."""
+    tour = read_tour(scene.record.tour)
+    first = from_view(np.eye(4), scene.Ks[0].double().numpy(), scene.view_size, 1.0)
+    told: dict = {"stops": [_stop(stop, first.fov, origin) for stop in tour.stops], "notes": []}
+    for note in tour.notes:
+        ends = {"at": (np.array(note.at) - origin).tolist()}
+        ends |= {} if note.to is None else {"to": (np.array(note.to) - origin).tolist()}
+        told["notes"].append({"text": note.text, "phrase": note.phrase, **ends})
+    told |= {"start": tour.names.index(tour.start)} if tour.start else {}
+    metric = scene.record.metric_scale
+    return told | ({"metric": metric} if metric else {})
+
+
+def _stop(stop: Stop, fov: float, origin: np.ndarray) -> dict:
+    pose = stop.pose
+    wide, own = (math.tan(math.radians(degrees) / 2) for degrees in (pose.fov, fov))
+    distance = pose.distance * wide / own
+    eye = pose.pivot - distance * pose.axes[:, 2] - origin
+    said = {"name": stop.name, "text": stop.text, "phrase": stop.phrase}
+    return {**said, "eye": eye.tolist(), "turn": pose.axes.T.tolist(), "distance": distance}
 
 
 def _gaussian_columns(scene: Scene, origin: Tensor) -> tuple[dict, list[_Column]]:

@@ -21,6 +21,7 @@ from langflash_core.export.packing import told
 from langflash_core.limits import ATOMS, VIEWS
 from langflash_core.scene.assemble import renormalised
 from langflash_core.scene.checks import check_scene
+from langflash_core.scene.container import in_order
 from langflash_core.scene.fields import to_fields
 from langflash_core.scene.record import from_json, to_json
 from langflash_core.types import Gaussians, Scene, Semantics
@@ -51,7 +52,7 @@ def packed_language(scene: Scene) -> bytes:
         "positions": _fingerprint(scene.gaussians),
     }
     header = {"format": _FORMAT, "version": str(_VERSION), "language": json.dumps(described, allow_nan=False)}
-    return safetensors.torch.save(fields, header)
+    return in_order(safetensors.torch.save(fields, header))
 
 
 def with_language(scene: Scene, block: bytes, name: str) -> Scene:

@@ -9,9 +9,9 @@ behind it is not drawn: how large things are follows from the span, not from whe
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Num
@@ -30,6 +30,7 @@ FOV_RANGE = (15.0, 120.0)
 FRAME_MARGIN = 1.08  # around what is framed
 NEAR, FARTHEST = 45.0, 70.0  # degrees aside of the photos: orbits slow down, and stop
 SLOWING_STEP = 2.0  # degrees
+STAY, FLIGHT = 1.5, 2.5  # seconds at a stop of a tour, and to the next one
 
 
 class Vector(NamedTuple):
@@ -341,10 +342,62 @@ def blend(start: Pose, end: Pose, fraction: float) -> Pose:
     )
 
 
+def tour_seconds(count: int) -> float:
+    """How long a tour of so many stops takes: `STAY` at each of them, `FLIGHT` between two."""
+    return STAY * count + FLIGHT * (count - 1)
+
+
+def on_tour(stops: Sequence[Pose], passed: float) -> Pose:
+    """Where a tour is that began so many seconds ago: it stays at every stop, at least one, for a while and
+    flies smoothly to the next."""
+    place, since = divmod(max(passed, 0.0), STAY + FLIGHT)
+    here = min(int(place), len(stops) - 1)
+    there = min(here + 1, len(stops) - 1)
+    return blend(stops[here], stops[there], max(0.0, since - STAY) / FLIGHT)
+
+
 def alike(all_poses: Sequence[Pose]) -> tuple[Pose, ...]:
     """As they are where all see by parallel rays, else all in perspective."""
     flat = all(pose.span is not None for pose in all_poses)
     return tuple(pose if flat or pose.span is None else perspective(pose) for pose in all_poses)
+
+
+def told_pose(pose: Pose) -> dict[str, Any]:
+    """A pose as plain values, as a file gives them back."""
+    lists = ("centre", "rotation", "shift")
+    return asdict(pose) | {name: list(getattr(pose, name)) for name in lists}
+
+
+def read_pose(entry: Mapping[str, Any]) -> Pose:
+    """A pose out of a file; one of an earlier version has no span.
+
+    Raises:
+        KeyError, TypeError, ValueError, IndexError: it is damaged, or no picture can be drawn from there.
+    """
+    pose = Pose(
+        Vector(*map(float, entry["centre"])),
+        Rotation(*map(float, entry["rotation"])),
+        *(float(entry[name]) for name in ("reach", "fov", "aspect")),
+        shift=(float(entry["shift"][0]), float(entry["shift"][1])),
+        span=None if entry.get("span") is None else float(entry["span"]),
+    )
+    if not _can_look(pose):
+        raise ValueError(f"pose: expected one from which a picture can be drawn, received {pose}")
+    return pose
+
+
+def _can_look(pose: Pose) -> bool:
+    span = 1.0 if pose.span is None else pose.span
+    numbers = (*pose.centre, *pose.rotation, pose.reach, pose.fov, pose.aspect, *pose.shift, span)
+    turned = sum(part * part for part in pose.rotation)
+    return (
+        all(map(math.isfinite, numbers))
+        and turned > 0
+        and pose.reach > 0
+        and 0 < pose.fov < 180
+        and pose.aspect > 0
+        and span > 0
+    )
 
 
 def _rotation(axes: np.ndarray) -> Rotation:

@@ -11,11 +11,13 @@ import torch
 from torch import Tensor
 from torch.nn.functional import max_pool2d
 
+from langflash_core.errors import ImageError
 from langflash_core.geometry.cameras import fov_degrees
 from langflash_core.images.decode import PhotoFacts
 
 SMALL_SIDE = 200  # pixels of the short side
 DARK_LIGHTS = 0.22  # a photo whose brightest 10 % stay below this is too dark
+BLANK_SPREAD = 4 / 255  # a photo whose pixels differ by less shows nothing; the darkest usable ones have 7
 BURNT_SHARE = 0.5  # share of pixels at the top of the range
 BLUR_WIDTH = 4.0  # pixels at that size over which even the sharpest edges rise
 EDGE_CONTRAST = 0.12  # an edge weaker than this says nothing about sharpness
@@ -48,6 +50,24 @@ def photo_notes(photo: PhotoFacts, image: Tensor, grey: np.ndarray) -> list[str]
     elif is_blurred(luma):
         notes.append(f"{photo.name} is blurred; hold the camera still and take it again")
     return notes
+
+
+def check_shown(names: Sequence[str], images: Sequence[Tensor]) -> None:
+    """Something is to be seen on one photo at least; images (3, H, W) in [0, 1].
+
+    Raises:
+        ImageError: all are black, white, or of one colour, as with a lens cap on.
+    """
+    if any(_spread(image) >= BLANK_SPREAD for image in images):
+        return
+    subject = f"{names[0]} shows" if len(names) == 1 else "the photos show"
+    raise ImageError(f"{subject} nothing, all pixels are alike; take photos of a place, with light")
+
+
+def _spread(image: Tensor) -> float:
+    """Between the first and the last hundredth of an image's pixels."""
+    low, high = torch.quantile(image.mean(0).flatten(), torch.tensor([0.01, 0.99])).tolist()
+    return high - low
 
 
 def crop_notes(photo: PhotoFacts, box: tuple[float, float, float, float] | None, first: str) -> list[str]:

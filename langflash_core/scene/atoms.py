@@ -87,8 +87,8 @@ def _carried(scene: Scene) -> np.ndarray:
 
 def atom_pictures(scene: Scene) -> tuple[UInt8[np.ndarray, "_ _ 3"] | None, ...]:
     """For each atom the part of a photo that carries it most, (side, side, 3) uint8; None where none does."""
-    maps = [_cells(scene, view) for view in range(len(scene.photos))]
-    photos = [_decoded(photo) for photo in scene.photos]
+    maps = [atom_cells(scene, view) for view in range(len(scene.photos))]
+    photos = [decoded_photo(photo) for photo in scene.photos]
     made: list[np.ndarray | None] = []
     for k in range(scene.semantics.num_atoms):
         totals = [cells[k].sum() for cells in maps]
@@ -98,7 +98,7 @@ def atom_pictures(scene: Scene) -> tuple[UInt8[np.ndarray, "_ _ 3"] | None, ...]
     return tuple(made)
 
 
-def _cells(scene: Scene, view: int) -> np.ndarray:
+def atom_cells(scene: Scene, view: int) -> Float[np.ndarray, "K h w"]:
     """(K, h, w): how much of each atom the cells of a photo show, of what is not hidden there."""
     camera = scene.camera(view)
     viewmat, K = camera.viewmat.double().numpy(), camera.K.double().numpy()
@@ -139,7 +139,8 @@ def _crop(photo: np.ndarray, cells: np.ndarray) -> np.ndarray:
     return np.asarray(Image.fromarray(photo).resize(size, Image.Resampling.BILINEAR, box))
 
 
-def _decoded(photo: bytes) -> np.ndarray | None:
+def decoded_photo(photo: bytes) -> UInt8[np.ndarray, "H W 3"] | None:
+    """A scene's small photo as (H, W, 3) uint8; None where it is damaged."""
     try:
         with opened_picture(photo, STORED) as opened:
             return np.asarray(opened.convert("RGB"))

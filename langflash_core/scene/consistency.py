@@ -46,7 +46,7 @@ def seen_through(
     blocked = torch.zeros(num_views, height * width, dtype=torch.bool, device=means.device)
     limits, trusts = (1 - tolerance) * depths.flatten(1), confidences.flatten(1)
     for view, own in enumerate(means.reshape(num_views, -1, 3)):
-        for other in _witnesses(view, own, viewmats, Ks, (height, width)):
+        for other in witnesses(view, own, viewmats, Ks, (height, width)):
             x, y, z = pictured(viewmats[other], Ks[other], own.T)
             inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
             places = torch.where(inside, y.floor() * width + x.floor(), 0.0).long()
@@ -56,7 +56,13 @@ def seen_through(
     return blocked.flatten()
 
 
-def _witnesses(view: int, points: Tensor, viewmats: Tensor, Ks: Tensor, size: tuple[int, int]) -> list[int]:
+def witnesses(
+    view: int,
+    points: Float[Tensor, "n 3"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+    size: tuple[int, int],
+) -> list[int]:
     """The other photos that are asked about a photo's points (n, 3): all of `_ASKED` and fewer; of more so
     many, spread evenly over those that have some of the points before them, so that the work grows with the
     photos."""
@@ -95,7 +101,7 @@ def outvoted(
     nearest = -F.max_pool2d(-depths[:, None], 3, 1, 1)[:, 0].flatten(1)
     farthest = F.max_pool2d(depths[:, None], 3, 1, 1)[:, 0].flatten(1)
     for view, own in enumerate(points):
-        for other in _witnesses(view, own, viewmats, Ks, (height, width)):
+        for other in witnesses(view, own, viewmats, Ks, (height, width)):
             x, y, z = pictured(viewmats[other], Ks[other], own.T)
             inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
             places = torch.where(inside, y.floor() * width + x.floor(), 0.0).long()

@@ -15,6 +15,7 @@ from jaxtyping import Shaped
 from safetensors import SafetensorError
 
 from langflash_core.errors import SceneFileError
+from langflash_core.files import write_atomically
 from langflash_core.limits import ATOMS, GAUSSIANS, HEADER, VIEWS
 
 FORMAT, VERSION = "langflash-scene", 3
@@ -60,6 +61,28 @@ def read_container(path: Path) -> Container:
         )
     except (SafetensorError, ValueError, LookupError, TypeError, RuntimeError, ArithmeticError) as error:
         raise damaged(path, error) from error
+
+
+def write_container(found: Container, path: Path) -> None:
+    """A scene file of the same arrays, bit by bit, and of what else a container says.
+
+    Raises:
+        OutputError: the path cannot be written.
+    """
+    described = {"space": found.space, "view_size": found.view_size, "metadata": found.metadata}
+    text = json.dumps(described, allow_nan=False)
+    said = {"version": str(found.version), "scene": text, "digest": digest(text, found.arrays)}
+    write_atomically(path, in_order(safetensors.numpy.save(found.arrays, {"format": FORMAT, **said})))
+
+
+def in_order(content: bytes) -> bytes:
+    """The same safetensors file with its strings sorted, which its library writes in any order."""
+    length = struct.unpack("<Q", content[:8])[0]
+    header = json.loads(content[8 : 8 + length])
+    header["__metadata__"] = dict(sorted(header["__metadata__"].items()))
+    head = json.dumps(header, ensure_ascii=False, separators=(",", ":")).encode()
+    head += b" " * (-len(head) % 8)
+    return struct.pack("<Q", len(head)) + head + content[8 + length :]
 
 
 def check_container(path: Path) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TypeVar, overload
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -77,6 +77,7 @@ def assemble_detailed(
     detail: Detail,
     *,
     gaussians: int | None = None,
+    strangers: Bool[Tensor, "V H W"] | None = None,
     top_m: int = 8,
     preset: str = "mini",
     progress: Callable[[float], None] = lambda done: None,
@@ -87,6 +88,8 @@ def assemble_detailed(
         photos: (3, h, w) in [0, 1] of every view, `working_photo`; each may have its own size. Of many
             each is asked for several times and not kept.
         gaussians: about as many; None: as `detail` has it.
+        strangers: (V, H, W) bool, of the placed views: what gets no Gaussians, and says nothing of those of
+            others; None: nothing.
         progress: called with the share that is done, twice a photo; what it raises ends the work.
 
     Returns:
@@ -102,7 +105,7 @@ def assemble_detailed(
     prediction, views = placed_views(prediction, views)
     if not bool(torch.isfinite(prediction.viewmats).all()):
         raise ValueError("viewmats: expected finite poses, received others")
-    known, keep, unit, through = _kept(prediction, views)
+    known, keep, unit, through = _kept(prediction, views, strangers)
     sights = _Sights(lambda v: _Sight.of(photos[v], views.images[v], known[v].log(), keep[v]), len(photos))
     budget = gaussians or round(detail.most * _area(keep))
     trees, limit = _trees(sights, detail, budget, 0.0 if gaussians else detail.gain, progress)
@@ -195,7 +198,9 @@ def _area(keep: Tensor) -> float:
     return usual if len(keep) <= 2 else min(usual, _FINENESS * float(keep.sum()))
 
 
-def _kept(prediction: Prediction, views: Views) -> tuple[Tensor, Tensor, float, int]:
+def _kept(
+    prediction: Prediction, views: Views, strangers: Tensor | None = None
+) -> tuple[Tensor, Tensor, float, int]:
     """Depths (V, H, W) with what is no number put right; cells (V, H, W) bool that each photo covers itself;
     the scene's unit; how many cells others see through."""
     usable = torch.isfinite(prediction.depths) & (prediction.depths > 0)
@@ -207,9 +212,10 @@ def _kept(prediction: Prediction, views: Views) -> tuple[Tensor, Tensor, float, 
     points = pos_c @ poses[:, :3, :3].transpose(1, 2) + poses[:, None, :3, 3]
     nowhere = torch.where(usable.flatten(1)[..., None], points, torch.nan)
     unit = mean_distance(nowhere[0], prediction.viewmats[0])
-    through = seen_through(
-        points.flatten(0, 1), prediction.viewmats, Ks, depths, prediction.confidences
-    ).view_as(usable)
+    trusts = prediction.confidences
+    if strangers is not None:
+        usable, trusts = usable & ~strangers, trusts * ~strangers
+    through = seen_through(points.flatten(0, 1), prediction.viewmats, Ks, depths, trusts).view_as(usable)
     between = outvoted(points, prediction.viewmats, Ks, depths)
     keep = owned(depths, prediction.viewmats, Ks, usable & ~through & ~between)
     keep |= usable & ~covered(depths, prediction.viewmats, Ks, keep, between)

@@ -48,7 +48,7 @@ def spoken_scene(scene: Scene, marks: Marks) -> Scene:
 
 def edited_scene(scene: Scene, marks: Marks) -> Scene:
     """The scene to save: its Gaussians moved and recoloured, without deleted ones; merged atoms as one;
-    names, key frames and scale in its record.
+    names, key frames, tour and scale in its record.
 
     Hidden Gaussians are kept. Untouched marks give back the scene itself.
     """
@@ -57,8 +57,9 @@ def edited_scene(scene: Scene, marks: Marks) -> Scene:
         scene = replace(scene, view_ids=None)
     marks = marks.of_size(len(scene.gaussians), marks.atoms[: marks.there[1]])
     record = scene.record
-    if (marks.camera_path, marks.metric_scale) != (record.camera_path, record.metric_scale):
-        scene = scene.with_record(camera_path=marks.camera_path, metric_scale=marks.metric_scale)
+    told = {name: getattr(marks, name) for name in ("camera_path", "metric_scale", "tour")}
+    if any(value != getattr(record, name) for name, value in told.items()):
+        scene = scene.with_record(**told)
     if not marks.deleted and marks.atoms == atoms_of(scene):
         return scene
     joined = _joined(scene, marks.atoms)
@@ -121,6 +122,7 @@ def first_marks(scene: Scene) -> Marks:
         atoms=atoms_of(scene),
         camera_path=tuple(scene.record.camera_path),
         metric_scale=scene.record.metric_scale,
+        tour=scene.record.tour,
     )
 
 

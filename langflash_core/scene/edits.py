@@ -19,7 +19,7 @@ from langflash_core.scene.changes import Change, with_change
 from langflash_core.scene.mask import Mask
 
 MASKS = ("deleted", "hidden", "selected")
-TOLD = ("camera_path", "metric_scale", "there")
+TOLD = ("camera_path", "metric_scale", "there", "tour")
 MOST_EDITS = 1000
 MOST_BYTES = 32 * 2**20  # of the edits of one scene
 Combine = Literal["replace", "add", "remove"]
@@ -43,8 +43,9 @@ class Atom:
 class Marks:
     """What edits made of a scene. A deleted or hidden Gaussian is never selected.
 
-    camera_path, metric_scale: as in `Record`; plain values of JSON. changes: of Gaussians, in order. there:
-    how many of the scene's first Gaussians and atoms there are; others came with a merge that was undone.
+    camera_path, metric_scale, tour: as in `Record`; plain values of JSON. changes: of Gaussians, in order.
+    there: how many of the scene's first Gaussians and atoms there are; others came with a merge that was
+    undone.
     """
 
     deleted: Mask
@@ -55,6 +56,7 @@ class Marks:
     camera_path: tuple[Mapping[str, Any], ...] = ()
     metric_scale: float | None = None
     changes: tuple[Change, ...] = ()
+    tour: Mapping[str, Any] = field(default_factory=dict)
 
     @staticmethod
     def untouched(num_gaussians: int, num_atoms: int) -> "Marks":
@@ -76,7 +78,8 @@ class Marks:
     @property
     def written(self) -> tuple[Any, ...]:
         """What a saved scene holds of them: all but what is hidden or selected."""
-        return self.left, self.atoms[: self.there[1]], self.camera_path, self.metric_scale, self.changes
+        told = self.camera_path, self.metric_scale, self.tour
+        return self.left, self.atoms[: self.there[1]], *told, self.changes
 
     def of_size(self, num_gaussians: int, atoms: tuple[Atom, ...]) -> "Marks":
         """The same marks where the scene has other Gaussians and atoms behind the ones they are about, which
@@ -104,7 +107,9 @@ class Edit:
     def num_bytes(self) -> int:
         """About what it takes in memory."""
         flips = sum(len(packed) for _, packed in self.flips)
-        values = sum(300 * len(value) for _, *pair in self.told for value in pair if isinstance(value, tuple))
+        pairs = [(name, value) for name, *pair in self.told for value in pair]
+        values = sum(300 * len(value) for _, value in pairs if isinstance(value, tuple))
+        values += sum(len(str(value)) for name, value in pairs if name == "tour")
         moved = (
             0 if self.changes is None else sum(len(c.rows.bits) for c in self.changes[1] + self.changes[2])
         )

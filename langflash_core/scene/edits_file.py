@@ -1,6 +1,6 @@
 """A history of edits as JSON: small, readable, whole or refused.
 
-    {"format": "langflash-edits", "version": 2, "digest": of the scene, "gaussians": N, "atoms": K,
+    {"format": "langflash-edits", "version": 3, "digest": of the scene, "gaussians": N, "atoms": K,
      "about": {...}, "done": [...], "undone": [...]}
 
 An edit is {"label", "flips": {mask: base64 of zlib}, "swaps": [[atom, [into, name, on, denied...], [...]]]},
@@ -8,7 +8,8 @@ where key frames or the scale changed with "told": [[name, before, after]], wher
 recoloured with "changes": [stayed, [went], [came]], each of those [kind, base64 of zlib, numbers].
 What came before the first edit of "done" is in "before": edits without a name, from the scene to the marks
 that its history began with and on to those that can still be undone to; "forgotten" counts the latter.
-Version 1 had neither "changes" nor "before"; who reads only that must not lose them in silence.
+Version 1 had neither "changes" nor "before", version 2 no tours; who reads only that must not lose them in
+silence.
 """
 
 import base64
@@ -28,9 +29,10 @@ from langflash_core.scene.changes import Change, checked, told
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import MASKS, TOLD, Atom, Edit, History, difference
 from langflash_core.scene.mask import Mask
+from langflash_core.scene.tour import read_tour, told_tour
 from langflash_core.types import Scene
 
-FORMAT, VERSION = "langflash-edits", 2
+FORMAT, VERSION = "langflash-edits", 3
 
 
 def scene_digest(scene: Scene) -> str:
@@ -164,6 +166,8 @@ def _told(name: str, value: Any) -> Any:
             return None
         case "metric_scale", (int() | float()) as metres if math.isfinite(metres) and metres > 0:
             return float(metres)
+        case "tour", dict():
+            return told_tour(read_tour(value))
         case "there", [int() as num_gaussians, int() as num_atoms] if min(num_gaussians, num_atoms) >= 0:
             return num_gaussians, num_atoms
     raise ValueError(f"told: expected a value of {' or '.join(TOLD)}, received {name} {value!r}")

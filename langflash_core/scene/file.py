@@ -12,7 +12,6 @@ they refuse one of version 3 with a sentence that says so.
 """
 
 import json
-import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,8 +20,9 @@ import torch
 from torch import Tensor
 
 from langflash_core.files import write_atomically
+from langflash_core.memory import out_of_memory
 from langflash_core.scene.checks import check_scene
-from langflash_core.scene.container import FORMAT, VERSION, damaged, digest, read_container
+from langflash_core.scene.container import FORMAT, VERSION, damaged, digest, in_order, read_container
 from langflash_core.scene.fields import NEWER, from_fields, to_fields
 from langflash_core.scene.record import counts_per_view, from_json, to_json
 from langflash_core.types import Scene
@@ -45,17 +45,7 @@ def save(scene: Scene, path: Path | str) -> None:
     text = json.dumps(described, allow_nan=False)
     version = VERSION if any(name in fields for name in NEWER) else 2
     header = {"format": FORMAT, "version": str(version), "scene": text, "digest": _digest(text, fields)}
-    write_atomically(Path(path), _in_order(safetensors.torch.save(fields, header)))
-
-
-def _in_order(content: bytes) -> bytes:
-    """The same safetensors file with its strings sorted, which its library writes in any order."""
-    length = struct.unpack("<Q", content[:8])[0]
-    header = json.loads(content[8 : 8 + length])
-    header["__metadata__"] = dict(sorted(header["__metadata__"].items()))
-    head = json.dumps(header, ensure_ascii=False, separators=(",", ":")).encode()
-    head += b" " * (-len(head) % 8)
-    return struct.pack("<Q", len(head)) + head + content[8 + length :]
+    write_atomically(Path(path), in_order(safetensors.torch.save(fields, header)))
 
 
 def load(path: Path | str) -> Scene:
@@ -75,6 +65,8 @@ def load(path: Path | str) -> Scene:
             scene = replace(scene, view_ids=_view_ids(scene, counts_per_view(found.metadata)))
         check_scene(scene)
     except (ValueError, LookupError, TypeError, RuntimeError, ArithmeticError) as error:
+        if out_of_memory(error):
+            raise
         raise damaged(path, error) from error
     return scene
 

@@ -31,20 +31,29 @@ def instances(
     Returns:
         From 1, the largest surface (sum of r^2) first; 0 for others, and for crumbs below `SMALLEST` of it.
     """
-    numbers = np.zeros(len(members), np.int64)
-    rows = np.flatnonzero(members & np.isfinite(gaussians.means.detach().cpu().numpy()).all(1))
-    if not len(rows):
-        return numbers
-    means = gaussians.means.detach().cpu().double().numpy()[rows]
-    radii = disc_radii(gaussians)[rows]
-    parts = _touching(means, radii, link)
-    surfaces = np.bincount(parts, radii**2)
+    parts, radii = connected(gaussians, members, link)
+    some = parts >= 0
+    if not some.any():
+        return np.zeros(len(members), np.int64)
+    surfaces = np.bincount(parts[some], radii[some] ** 2)
     order = np.argsort(-surfaces, kind="stable")
     kept = order[surfaces[order] >= SMALLEST * surfaces.max()]
-    names = np.zeros(len(surfaces), np.int64)
+    names = np.zeros(len(surfaces) + 1, np.int64)  # the last for those that take no part
     names[kept] = np.arange(1, len(kept) + 1)
-    numbers[rows] = names[parts]
-    return numbers
+    return names[parts]
+
+
+def connected(
+    gaussians: Gaussians, members: Bool[np.ndarray, " N"], link: float = LINK
+) -> tuple[Integer[np.ndarray, " N"], Float[np.ndarray, " N"]]:
+    """A number from 0 for the connected part of each, -1 of what is no member or not finite; and their
+    radii."""
+    parts, radii = np.full(len(members), -1, np.int64), disc_radii(gaussians)
+    means = gaussians.means.detach().cpu().double().numpy()
+    rows = np.flatnonzero(members & np.isfinite(means).all(1))
+    if len(rows):
+        parts[rows] = _touching(means[rows], radii[rows], link)
+    return parts, radii
 
 
 def disc_radii(gaussians: Gaussians) -> Float[np.ndarray, " N"]:

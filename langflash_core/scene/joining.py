@@ -68,6 +68,39 @@ def joined(
     )
 
 
+def appended(scene: Scene, part: Scene) -> Scene:
+    """The scene with a part of its own kind behind its Gaussians: of the same dictionary, in the same world.
+
+    Raises:
+        ValueError: the part has another dictionary.
+    """
+    if part.semantics.num_atoms != scene.semantics.num_atoms:
+        raise ValueError(
+            f"part: expected {scene.semantics.num_atoms} atoms, received {part.semantics.num_atoms}"
+        )
+    if not len(part.gaussians):
+        return scene
+    ours, theirs = scene.semantics, part.semantics
+    most = max(ours.weight_ids.shape[1], theirs.weight_ids.shape[1])
+    semantics = replace(
+        ours,
+        weight_ids=torch.cat([_padded(each.weight_ids, most) for each in (ours, theirs)]),
+        weight_values=torch.cat([_padded(each.weight_values, most) for each in (ours, theirs)]),
+    )
+    view_ids = None
+    if scene.view_ids is not None:
+        unknown = scene.view_ids.new_full((len(part.gaussians),), -1)
+        view_ids = torch.cat((scene.view_ids, unknown if part.view_ids is None else part.view_ids))
+    return replace(
+        scene,
+        gaussians=_stacked(scene.gaussians, part.gaussians),
+        semantics=semantics,
+        view_ids=view_ids,
+        levels=_known_of_both(scene, part, scene.levels, part.levels, 0),
+        confidences=_known_of_both(scene, part, scene.confidences, part.confidences, 1),
+    )
+
+
 def _known_of_both(
     first: Scene, second: Scene, ours: Tensor | None, theirs: Tensor | None, unknown: int
 ) -> Tensor | None:

@@ -58,7 +58,7 @@ def prune(
     merged = bright
     if merge:
         merged = _merged(bright, _parents(_sight(bright), bright, merge_radius, colour_tolerance))
-    small = _sparser(merged)
+    small = sparser(merged)
     report = {
         "gaussians_before": len(scene.gaussians),
         "faint": len(scene.gaussians) - len(bright.gaussians),
@@ -234,7 +234,7 @@ def _blended_weights(members: Semantics, shares: Tensor, group: Tensor) -> tuple
     return torch.cat([part.indices for part in parts]), renormalised(top_values)
 
 
-def _sparser(scene: Scene) -> Scene:
+def sparser(scene: Scene) -> Scene:
     """Weights below 1/255 become 0, empty columns and unused atoms go, ids are renumbered."""
     semantics, ids, values = scene.semantics, scene.semantics.weight_ids, scene.semantics.weight_values
     values = renormalised(torch.where(values >= CUT, values, 0.0))

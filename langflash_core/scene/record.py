@@ -5,12 +5,13 @@ from run to run, and equal photos are to give equal files. Keys that this versio
 read into `Record.others` and written back as they are.
 """
 
-from langflash_core.records import Cost, Record
+from langflash_core.records import Cost, Record, world_from_json, world_to_json
+from langflash_core.scene.tour import read_tour, told_tour
 
 _COST = ("timings", "seconds", "peak_memory_mb")
 _VERSION_1 = "gaussians_per_view"  # a tensor since
 _TEXTS = ("photos", "warnings")
-_MAPPINGS = ("counts", "pruning", "refinement", "detail", "light", "lens", "calibration")
+_MAPPINGS = ("counts", "pruning", "refinement", "detail", "light", "lens", "left_out", "calibration")
 _PLAIN: dict[str, tuple[type, ...]] = {
     "preset": (str,),
     "source": (str,),
@@ -26,7 +27,10 @@ def to_json(record: Record) -> dict:
     known["atom_names"] = {str(k): name for k, name in record.atom_names.items()}
     known["atom_denials"] = {str(k): list(said) for k, said in record.atom_denials.items()}
     known["silent_atoms"] = record.silent_atoms
+    known["world"] = None if record.world is None else world_to_json(record.world)
+    known["thing_names"] = dict(record.thing_names)
     known["camera_path"] = record.camera_path
+    known["tour"] = record.tour
     known["edits"] = {"deleted": record.num_deleted} if record.num_deleted else None
     written = {
         name: list(value) if isinstance(value, tuple) else value
@@ -47,13 +51,20 @@ def from_json(values: dict) -> Record:
     names = _of_type(values, "atom_names", dict) or {}
     denials = _of_type(values, "atom_denials", dict) or {}
     edits = _of_type(values, "edits", dict) or {}
-    ours = {*known, "atom_names", "atom_denials", "silent_atoms", "edits", "camera_path", _VERSION_1, *_COST}
+    world, things = _of_type(values, "world", dict), _of_type(values, "thing_names", dict) or {}
+    ours = {
+        *known, "atom_names", "atom_denials", "silent_atoms", "edits", "camera_path", "tour", "world",
+        "thing_names", _VERSION_1, *_COST,
+    }  # fmt: skip
     return Record(
         **{name: value for name, value in known.items() if value is not None},
         atom_names={_number(k): str(name) for k, name in names.items()},
         atom_denials={_number(k): tuple(_list(denials, k, str)) for k in denials},
         silent_atoms=tuple(_list(values, "silent_atoms", int)),
+        world=None if world is None else world_from_json(world),
+        thing_names={str(thing): str(name) for thing, name in things.items()},
         camera_path=tuple(_list(values, "camera_path", dict)),
+        tour=told_tour(read_tour(_of_type(values, "tour", dict) or {})),
         num_deleted=int(_of_type(edits, "deleted", int) or 0),
         cost=Cost(
             timings=_of_type(values, "timings", dict) or {},

@@ -6,15 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from langflash_core.records import FoundLens, Record, check_light
+from langflash_core.records import FoundLens, Guess, Record, World, check_light, world_to_json
 from langflash_core.scene.container import damaged, read_container
 from langflash_core.scene.record import from_json
+from langflash_core.scene.tour import read_tour
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
 
 _CORE = (0.01, 0.99)  # the middle 98 % along each axis: stray points do not stretch the box
 _PHOTO = "photo_"
+_NAMED = 4  # photos, of which it is said what was left out
 
 
 def describe(scene: "Scene") -> dict:
@@ -24,11 +26,12 @@ def describe(scene: "Scene") -> dict:
         `gaussians, atoms, channels, weights_per_gaussian (mean), sh_degree, views, view_size,
         photos, preset, source (the splat file it came from, or None), space, bytes {field: bytes,
         total}, bounding_box and core_box {min, max} in scene units (None when empty), metric_scale
-        (metres per unit or None), counts, pruning (as `prune` left it, with `psnr_db` and
-        `relevance_error` where they were measured), refinement (None, or kept, held_out and the PSNR
-        before and after), detail (None, or as `Record` has it), light (None, or gains and offsets, a row
-        of red, green and blue per view), lens (None, or found, as `Record` has it), timings {stage: seconds,
-        total} (None where they are not known, as in files), warnings`.
+        (metres per unit or None), world (None, or as `Record` has it), counts, pruning (as `prune` left it,
+        with `psnr_db` and `relevance_error` where they were measured), refinement (None, or kept, held_out
+        and the PSNR before and after), detail (None, or as `Record` has it), light (None, or gains and
+        offsets, a row of red, green and blue per view), lens and left_out (None, or as `Record` has them),
+        tour (None, or the names of stops, how many notes, and the start), timings {stage: seconds, total}
+        (None where they are not known, as in files), warnings`.
     """
     from langflash_core.scene.fields import to_fields  # torch
 
@@ -94,6 +97,44 @@ def lens_line(lens: Mapping[str, Any]) -> str:
         return ""
 
 
+def left_out_line(left_out: Mapping[str, Any]) -> str:
+    """What was left out of photos since the others do not show it, for people: "6 % of photo 3"; "" of
+    nothing, and where something else is said.
+
+    Args:
+        left_out: as `Record` has it.
+    """
+    shares = left_out.get("shares")
+    if not isinstance(shares, list | tuple) or not all(isinstance(share, int | float) for share in shares):
+        return ""
+    some = [(share, number) for number, share in enumerate(shares, 1) if share > 0]
+    most = sorted(sorted(some, reverse=True)[:_NAMED], key=lambda one: one[1])
+    parts = [f"{max(1, round(100 * share))} % of photo {number}" for share, number in most]
+    return ", ".join(parts) + (f" and some of {len(some) - _NAMED} others" if len(some) > _NAMED else "")
+
+
+def world_line(world: World | None) -> str:
+    """How a scene stands and how large it may be, for people; "" where nobody looked."""
+    if world is None:
+        return ""
+    known = {"edges": "edges of the photos", "surfaces": "surfaces", "told": "you"}[world.up_by]
+    up = f"up as {known} tell it" + (f" (± {world.up_error:.1f} degrees)" if world.up_error else "")
+    floor = {"floor": "on its floor", "lowest": "on what is lowest, for no floor is seen"}
+    north = {"walls": "north along the wall that the first photo faces", "told": "north as you told it"}
+    parts = [up, floor.get(world.floor_by, "on the point that you told"), north[world.north_by]]
+    if world.guess is not None:
+        parts.append(guess_line(world.guess))
+    return "; ".join(parts)
+
+
+def guess_line(guess: Guess) -> str:
+    """A guessed scale, for people."""
+    by = (
+        ", ".join(guess.by[:-1]) + (" and " if guess.by[1:] else "") + guess.by[-1] if guess.by else "nothing"
+    )
+    return f"a guess from {by}: a unit is {guess.metres:.2f} m (± {guess.spread:.0%})"
+
+
 def _count(value: object) -> str:
     return f"{value:,}" if isinstance(value, int) and not isinstance(value, bool) else ""
 
@@ -128,15 +169,26 @@ def _document(
         "bounding_box": _box(means, (0.0, 1.0)),
         "core_box": _box(means, _CORE),
         "metric_scale": known.metric_scale,
+        "world": None if known.world is None else world_to_json(known.world),
         "counts": dict(known.counts),
         "pruning": dict(known.pruning) or None,
         "refinement": dict(known.refinement) or None,
         "detail": dict(known.detail) or None,
         "light": dict(known.light) or None,
         "lens": dict(known.lens) or None,
+        "tour": _tour(known),
+        "left_out": dict(known.left_out) or None,
         "timings": {**timings, "total": sum(timings.values())} if timings else None,
         "warnings": list(known.warnings),
     }
+
+
+def _tour(known: Record) -> dict | None:
+    """Names of stops, and how many notes; None where there is neither."""
+    tour = read_tour(known.tour)
+    return (
+        {"stops": list(tour.names), "notes": len(tour.notes), "start": tour.start or None} if tour else None
+    )
 
 
 def _box(means: np.ndarray, quantiles: tuple[float, float]) -> dict | None:

@@ -1,14 +1,19 @@
-"""A scene in the frame and the unit of poses that were given, instead of its first camera's."""
+"""A scene in another frame and unit: that of poses which were given, or the world it stands in."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from langflash_core.geometry import rotations
 from langflash_core.geometry.cameras import invert_rigid, transform
 from langflash_core.geometry.turning import turned_quats, turned_sh
-from langflash_core.types import Scene
+from langflash_core.records import World
+from langflash_core.types import Gaussians, Scene
 
 
 def in_world(scene: Scene, viewmat: Float[Tensor, "4 4"], unit: float) -> Scene:
@@ -18,11 +23,52 @@ def in_world(scene: Scene, viewmat: Float[Tensor, "4 4"], unit: float) -> Scene:
         viewmat: (4, 4), world to camera of view 0. unit: world units per scene unit.
     """
     pose = invert_rigid(viewmat.double().cpu())
-    gaussians = scene.gaussians
-    means = transform(pose, gaussians.means.double() * unit).float()
-    quats = torch.nn.functional.normalize(turned_quats(gaussians.quats, pose[:3, :3]), dim=-1)
-    sh = turned_sh(gaussians.sh, pose[:3, :3])
-    moved = replace(gaussians, means=means, quats=quats, scales=gaussians.scales * unit, sh=sh)
+    means = transform(pose, scene.gaussians.means.double() * unit).float()
     viewmats = scene.viewmats.double().clone()
     viewmats[:, :3, 3] *= unit
+    moved = _turned(scene.gaussians, means, pose[:3, :3], unit)
     return replace(scene, gaussians=moved, viewmats=(viewmats @ viewmat.double().cpu()).float())
+
+
+def placed(
+    scene: Scene, turn: Float[np.ndarray, "3 3"], origin: Float[np.ndarray, " 3"], unit: float
+) -> Scene:
+    """The scene with every point p at unit turn (p - origin); its views look at the same things.
+
+    Key frames go along: the window's cameras are places of the scene, too.
+    """
+    matrix, start = torch.from_numpy(turn).double(), torch.from_numpy(origin).double()
+    means = (unit * (scene.gaussians.means.double() - start) @ matrix.T).float()
+    viewmats = scene.viewmats.double().clone()
+    rotation = viewmats[:, :3, :3] @ matrix.T
+    viewmats[:, :3, 3] = unit * (viewmats[:, :3, 3] + viewmats[:, :3, :3] @ start)
+    viewmats[:, :3, :3] = rotation
+    moved = _turned(scene.gaussians, means, matrix, unit)
+    path = tuple(_placed_key(key, turn, origin, unit) for key in scene.record.camera_path)
+    whole = replace(scene, gaussians=moved, viewmats=viewmats.float())
+    return whole.with_record(camera_path=path) if path else whole
+
+
+def turn_of(world: World) -> Float[np.ndarray, "3 3"]:
+    """Rows east, down and north of a world, in the scene's axes."""
+    return rotations.matrix(world.turn)
+
+
+def _turned(gaussians: Gaussians, means: Tensor, matrix: Tensor, unit: float) -> Gaussians:
+    """At these means, turned and scaled."""
+    quats = torch.nn.functional.normalize(turned_quats(gaussians.quats, matrix), dim=-1)
+    sh = turned_sh(gaussians.sh, matrix)
+    return replace(gaussians, means=means, quats=quats, scales=gaussians.scales * unit, sh=sh)
+
+
+def _placed_key(
+    key: Mapping[str, Any], turn: Float[np.ndarray, "3 3"], origin: Float[np.ndarray, " 3"], unit: float
+) -> Mapping[str, Any]:
+    """A key frame that sees the same; as it is where it is none."""
+    try:
+        centre = unit * turn @ (np.array(key["centre"], float) - origin)
+        rotation = rotations.quaternion(turn @ rotations.matrix(tuple(map(float, key["rotation"]))))
+        lengths = {name: unit * float(key[name]) for name in ("reach", "span") if key.get(name) is not None}
+    except (TypeError, ValueError, LookupError):
+        return key
+    return {**key, "centre": centre.tolist(), "rotation": list(rotation), **lengths}

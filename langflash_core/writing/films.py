@@ -1,9 +1,10 @@
-"""A scene as a film: from photo to photo, around it, or along key frames; in colours or as a heat-map."""
+"""A scene as a film: from photo to photo, around it, along its tour or key frames; in colours or as a
+heat-map."""
 
 import itertools
 import json
 import math
-from collections.abc import Generator
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,26 +13,37 @@ import torch
 
 from langflash_core import pipeline
 from langflash_core.colormaps import HeatColours
-from langflash_core.errors import InputError, LangFlashError, ViewError
+from langflash_core.errors import InputError, ViewError
 from langflash_core.export.png import USUAL, heat_over, to_8bit
 from langflash_core.files import readable_file, staged_folder
-from langflash_core.geometry.poses import Pose, Vector, blend, framing, from_view, orbit, to_camera
+from langflash_core.geometry.poses import (
+    Pose,
+    Vector,
+    alike,
+    blend,
+    framing,
+    from_view,
+    on_tour,
+    orbit,
+    to_camera,
+    tour_seconds,
+)
 from langflash_core.geometry.reach import median_reach
 from langflash_core.geometry.tours import RATE, along, even
 from langflash_core.language.relevance import CompiledQuery, compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.limits import TEXT
 from langflash_core.running import Progress
+from langflash_core.scene.tour import read_tour
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
 from langflash_core.writing.cameras import camera_of
+from langflash_core.writing.encoding import encoded
 from langflash_core.writing.job import Job
 from langflash_core.writing.renderers import Renderer
 
 SECONDS = 6.0
 LONGEST = 600.0  # seconds
 _SWAY = (math.radians(12), math.radians(4))  # yaw and pitch around a single photo: further out are holes
-_H264 = ("-preset", "veryfast")  # half the encoder's time; files grow a little
-_WEBP = ("-quality", "80", "-compression_level", "2", "-loop", "0")
 _MIDDLE = (0.02, 0.98)  # of what is orbited: stray Gaussians do not count
 
 
@@ -82,11 +94,14 @@ def way(
     """Cameras of a film, sides rounded down to even numbers of pixels as encoders want them.
 
     Args:
-        path: photos (None), orbit, or a file of key frames. shown: the part of the scene that is drawn.
+        path: photos (None), orbit, tour, or a file of key frames. shown: the part of the scene that is drawn.
 
     Raises:
-        ViewError: the key frames cannot be used.
+        ViewError: the key frames cannot be used, or the scene has no tour.
     """
+    if path == "tour":
+        size = even(size or scene.view_size)
+        return [to_camera(pose, *size) for pose in along_stops(_stops(scene), seconds)]
     if path in (None, "photos", "orbit"):
         width, height = even(size or scene.view_size)
         views = _poses(scene)
@@ -99,6 +114,28 @@ def way(
         ]
         return [to_camera(pose, width, height) for pose in poses]
     return along(*read_key_frames(Path(path), seconds), size)
+
+
+def _stops(scene: Scene) -> list[Pose]:
+    """Raises:
+    ViewError: the scene has none.
+    """
+    stops = read_tour(scene.record.tour).stops
+    if not stops:
+        raise ViewError('the scene has no tour; give it stops with: langflash tour stop SCENE "The window"')
+    return [stop.pose for stop in stops]
+
+
+def along_stops(stops: Sequence[Pose], seconds: float | None) -> list[Pose]:
+    """Poses of a film of a tour.
+
+    Args:
+        seconds: of all of it; None: as long as in the window.
+    """
+    whole = tour_seconds(len(stops))
+    seconds = whole if seconds is None else seconds
+    stops, count = alike(stops), max(1, round(RATE * seconds))
+    return [on_tour(stops, index / RATE * whole / seconds) for index in range(count)]
 
 
 def write(
@@ -116,18 +153,13 @@ def write(
         heat: over the colours; None: colours alone. colours: of the heat-map.
 
     Raises:
-        LangFlashError: the encoder stopped.
+        LangFlashError: the disk is full, or the encoder stopped otherwise.
     """
-    film = _encoder(path, (cameras[0].width, cameras[0].height))
-    try:
-        film.send(None)
+    size = (cameras[0].width, cameras[0].height)
+    with encoded(path, size) as add:
         for index, camera in enumerate(cameras):
             progress("drawing", index / len(cameras))
-            film.send(picture(scene, camera, renderer, heat, colours).tobytes())
-    except OSError as error:
-        raise LangFlashError(f"the video encoder stopped ({error}); try another --size") from error
-    finally:
-        film.close()
+            add(picture(scene, camera, renderer, heat, colours).tobytes())
 
 
 def picture(
@@ -142,16 +174,6 @@ def picture(
         return renderer.colours(scene, camera)
     frame, relevance = renderer.answered(scene, camera, heat)
     return to_8bit(heat_over(relevance[0], frame.rgb, heat.threshold, heat.mode, colours))
-
-
-def _encoder(path: Path, size: tuple[int, int]) -> Generator[None, bytes | None, None]:
-    import imageio_ffmpeg
-
-    if path.suffix.lower() == ".webp":
-        own = {"codec": "libwebp_anim", "quality": None, "output_params": list(_WEBP)}  # None: not theirs
-        return imageio_ffmpeg.write_frames(str(path), size, fps=RATE, macro_block_size=2, **own)
-    own = {"quality": 8, "output_params": list(_H264)}
-    return imageio_ffmpeg.write_frames(str(path), size, fps=RATE, macro_block_size=2, **own)
 
 
 def _poses(scene: Scene) -> list[Pose]:

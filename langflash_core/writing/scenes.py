@@ -3,10 +3,13 @@
 from pathlib import Path
 
 from langflash_core import pipeline
+from langflash_core.errors import InputError
+from langflash_core.export import read
 from langflash_core.export.language import side_car
 from langflash_core.export.sog import sog_files
 from langflash_core.files import make_folder
 from langflash_core.formats import SOG_FOLDER, kind_of
+from langflash_core.level import upright
 from langflash_core.outputs import PLY, loaded
 from langflash_core.scene.thin import coarse_level
 from langflash_core.types import Scene
@@ -23,6 +26,7 @@ def write_scene(job: Job) -> str:
     chosen = _as_fine(job)
     if job.prompts:
         chosen = pipeline.select(chosen, job.prompts, threshold=job.request.threshold)
+    chosen = upright(chosen) if job.request.upright else chosen
     make_folder(path.parent)
     loaded(job.kind.of_scene)(chosen, path)
     if job.kind.subject == "photos":
@@ -41,6 +45,7 @@ def write_page(job: Job) -> str:
         LangFlashError: a phrase cannot be used, or the file cannot be written.
     """
     request, shown = job.request, _as_fine(job)
+    beside = _beside(job)
     job.progress("reading the vocabulary", 0.2)
     make_folder(request.output.parent)
     phrases = pipeline.web_page(
@@ -50,15 +55,35 @@ def write_page(job: Job) -> str:
         threshold=request.threshold,
         with_text=request.with_text,
         title=(request.scene or request.output).stem,
+        beside=beside,
     )
     known = "any phrase" if request.with_text else f"{len(phrases.texts)} phrases" if phrases else ""
     answers = f", answers {known}" if known else ""
     share = f" of {len(job.scene.gaussians):,}" if shown is not job.scene else ""
-    return f"{len(shown.gaussians):,}{share} Gaussians, {_megabytes(request.output):.1f} MB{answers}"
+    more = f" and {len(beside)} scenes more" if beside else ""
+    return f"{len(shown.gaussians):,}{share} Gaussians{more}, {_megabytes(request.output):.1f} MB{answers}"
 
 
-def _as_fine(job: Job) -> Scene:
-    return coarse_level(job.scene) if job.request.detail == "low" else job.scene
+def _beside(job: Job) -> dict[str, Scene]:
+    """Other scenes of a page by their names, each as fine as the first.
+
+    Raises:
+        LangFlashError: one cannot be read, or two have the same name.
+    """
+    scenes: dict[str, Scene] = {}
+    own = (job.request.scene or job.request.output).stem
+    for path in job.request.beside:
+        if path.stem in scenes or path.stem == own:
+            raise InputError(
+                f"two scenes are called {path.stem}; rename one, so that the page tells them apart"
+            )
+        scenes[path.stem] = _as_fine(job, read(path))
+    return scenes
+
+
+def _as_fine(job: Job, scene: Scene | None = None) -> Scene:
+    scene = job.scene if scene is None else scene
+    return coarse_level(scene) if job.request.detail == "low" else scene
 
 
 def _megabytes(path: Path) -> float:

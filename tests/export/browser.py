@@ -158,8 +158,8 @@ class Browser:
 
 
 @contextmanager
-def browser(profile: Path) -> Iterator[Browser]:
-    """A browser with an empty profile in a folder, ended with the block."""
+def browser(profile: Path, *more: str) -> Iterator[Browser]:
+    """A browser with an empty profile in a folder, and more switches; ended with the block."""
     found = program()
     assert found is not None
     to_read, to_write = os.pipe()
@@ -171,7 +171,7 @@ def browser(profile: Path) -> Iterator[Browser]:
             os.dup2(fd, wanted)
 
     running = subprocess.Popen(
-        [found, *SWITCHES, f"--user-data-dir={profile}", "about:blank"],
+        [found, *SWITCHES, *more, f"--user-data-dir={profile}", "about:blank"],
         pass_fds=(3, 4), preexec_fn=place, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL, start_new_session=True,
     )  # fmt: skip

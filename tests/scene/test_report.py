@@ -6,7 +6,7 @@ import pytest
 
 from langflash_core.scene.assemble import assemble
 from langflash_core.scene.file import load, save
-from langflash_core.scene.report import describe, describe_file, detail_line, lens_line
+from langflash_core.scene.report import describe, describe_file, detail_line, left_out_line, lens_line
 from langflash_core.types import Scene
 from tests.scene.plane import wall_prediction
 
@@ -81,3 +81,20 @@ def test_a_found_lens_is_one_line():
     found = {"fov": 61.23, "error": 0.81, "photos": 8, "said": 65.0, "recorded": False}
     assert lens_line({"found": [found]}) == "61.2 ± 0.8 degrees, found from 8 photos (assumed: 65.0)"
     assert lens_line({}) == lens_line({"found": [{"fov": 1}]}) == lens_line({"found": 3}) == ""
+
+
+@pytest.mark.parametrize(
+    ("shares", "said"),
+    [
+        ([0, 0, 0.0612], "6 % of photo 3"),
+        ([0.3, 0.001, 0], "30 % of photo 1, 1 % of photo 2"),
+        ([0.1, 0.2, 0.05, 0.3, 0.4, 0.02], "10 % of photo 1, 20 % of photo 2, 30 % of photo 4, 40 % of photo 5 and some of 2 others"),  # noqa: E501
+        ([0.0, 0.0], ""),
+        ([], ""),
+        (["much"], ""),
+        (None, ""),
+    ],
+)  # fmt: skip
+def test_what_was_left_out_is_one_line(shares, said):
+    assert left_out_line({"shares": shares}) == said
+    assert left_out_line({}) == ""

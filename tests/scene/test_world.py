@@ -2,13 +2,15 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
 
 from langflash_core.geometry.quaternions import quats_to_matrices
+from langflash_core.geometry.rotations import matrix
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
-from langflash_core.scene.world import in_world
+from langflash_core.scene.world import in_world, placed
 from langflash_core.splat import render
 from tests.export.splats import random_gaussians
 
@@ -35,3 +37,32 @@ def test_moving_a_scene_does_not_change_what_its_cameras_see(degree):
         before, after = render(scene, scene.camera(view)), render(moved, moved.camera(view))
         assert torch.allclose(before.rgb, after.rgb, atol=1e-3)
         assert torch.allclose(before.depths * 2.5, after.depths, rtol=1e-3, atol=1e-3)
+
+
+def test_a_scene_that_is_placed_shows_its_views_the_same():
+    gaussians = random_gaussians(60, 2)
+    means = gaussians.means + torch.tensor([0.0, 0, 4])
+    gaussians = replace(gaussians, means=means, scales=gaussians.scales.clamp(0.05, 0.5))
+    second = torch.eye(4)
+    second[0, 3] = -0.3
+    K = torch.tensor([[30.0, 0, 16], [0, 30, 12], [0, 0, 1]])
+    key = {"centre": [0.1, 0.2, 0.3], "rotation": [1.0, 0, 0, 0], "reach": 2.0, "fov": 60.0, "span": None}
+    scene = replace(
+        bare_scene(gaussians, "made"),
+        viewmats=torch.stack((torch.eye(4), second)), Ks=K.repeat(2, 1, 1), view_size=(32, 24),
+    ).with_record(camera_path=(key, {"centre": "nowhere"}))  # fmt: skip
+    turn = quats_to_matrices(torch.tensor([0.8, 0.3, -0.4, 0.3], dtype=torch.float64)).numpy()
+    origin = np.array([0.5, -1.0, 2.0])
+    moved = placed(scene, turn, origin, 2.5)
+    check_scene(moved)
+    for view in range(2):
+        before, after = render(scene, scene.camera(view)), render(moved, moved.camera(view))
+        assert torch.allclose(before.rgb, after.rgb, atol=1e-3)
+        assert torch.allclose(before.depths * 2.5, after.depths, rtol=1e-3, atol=1e-3)
+    first, odd = moved.record.camera_path
+    assert np.allclose(first["centre"], 2.5 * turn @ (np.array(key["centre"]) - origin))
+    assert np.allclose(matrix(tuple(first["rotation"])), turn, atol=1e-9)
+    assert first["reach"] == 5.0 and first["fov"] == 60.0 and odd == {"centre": "nowhere"}
+    back = placed(moved, turn.T, -2.5 * turn @ origin, 1 / 2.5)
+    assert torch.allclose(back.gaussians.means, scene.gaussians.means, atol=1e-5)
+    assert torch.allclose(back.viewmats, scene.viewmats, atol=1e-5)

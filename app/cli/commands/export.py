@@ -26,7 +26,8 @@ def run(args: Namespace, out: TextIO) -> None:
 
     request = request_of(args)
     prepared(request)
-    readable_file(args.scene, "scene", SceneFileError)
+    for path in (args.scene, *args.beside):
+        readable_file(path, "scene", SceneFileError)
     scene = open_scene(args.scene)
     with ProgressBar() as progress:
         said = write(scene, request, renderers=partial(open_renderer, args.backend), progress=progress)
@@ -42,4 +43,5 @@ def request_of(args: Namespace) -> ExportRequest:
     said = {
         field.name: getattr(args, field.name) for field in fields(ExportRequest) if field.name != "prompts"
     }
-    return ExportRequest(**{**said, "ortho": bool(args.ortho)}, prompts=tuple(spoken(args.prompt or [])))
+    said |= {"ortho": bool(args.ortho), "beside": tuple(args.beside)}
+    return ExportRequest(**said, prompts=tuple(spoken(args.prompt or [])))

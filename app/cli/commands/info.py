@@ -58,10 +58,13 @@ def _described(path: Path) -> dict[str, Any]:
 
 
 def _for_people(document: dict[str, Any]) -> dict[str, Any]:
-    """With detail and lens as one line each, and none where there is nothing to say of it."""
-    from langflash_core.scene.report import detail_line, lens_line
+    """With detail, lens, world and what was left out as a line each, none where there is nothing to say."""
+    from langflash_core.records import world_from_json
+    from langflash_core.scene.report import detail_line, left_out_line, lens_line, world_line
 
-    lines = {"detail": detail_line(document["detail"] or {}), "lens": lens_line(document["lens"] or {})}
+    says = {"detail": detail_line, "lens": lens_line, "left_out": left_out_line}
+    lines = {name: line(document[name] or {}) for name, line in says.items()}
+    lines["world"] = world_line(world_from_json(document["world"]) if document["world"] else None)
     return {name: lines.get(name, value) for name, value in document.items() if lines.get(name) != ""}
 
 

@@ -4,22 +4,38 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any, TextIO
 
+from langflash_core.errors import InputError
 from langflash_core.files import check_folder, staged_folder
+from langflash_core.phrases import read_phrases
 from langflash_core.request import spoken
 
 from ..files import checked_scene
 from ..report import ProgressBar, write_json
+from ..survey import run_survey
+from ..vocabulary import taught_by
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """Answer every phrase in one view and write the pictures, all or none.
+    """Answer every phrase in one view and write the pictures, all or none; or ask all scenes of a folder.
 
     Raises:
         LangFlashError: the scene, a phrase, the camera or the folder cannot be used.
     """
-    prompts = spoken(args.prompts)
+    words = [args.scene, *args.phrases] if args.scenes and args.scene else args.phrases
+    prompts = spoken([*words, *([] if args.phrase_file is None else read_phrases(args.phrase_file))])
+    if not prompts or not (args.scene or args.scenes):
+        raise InputError("name a scene, or --scenes, and at least one phrase; see langflash query --help")
     negatives = None if args.negatives is None else spoken(args.negatives)
-    checked_scene(args.scene)
+    if args.scenes:
+        run_survey(args, prompts, negatives, out)
+    else:
+        _one_scene(args, Path(args.scene), prompts, negatives, out)
+
+
+def _one_scene(
+    args: Namespace, path: Path, prompts: list[str], negatives: list[str] | None, out: TextIO
+) -> None:
+    checked_scene(path)
     check_folder(args.output)
     from langflash_core import pipeline
     from langflash_core.colormaps import HeatColours
@@ -30,7 +46,7 @@ def run(args: Namespace, out: TextIO) -> None:
     from ..scenes import open_scene
 
     choice = chosen_camera(args)
-    scene = open_scene(args.scene)
+    scene = taught_by(args.vocabulary)(open_scene(path))
     camera = choice.of(scene)
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
         progress("drawing", 0.2)
@@ -43,7 +59,7 @@ def run(args: Namespace, out: TextIO) -> None:
                 result, staging, npz=args.npz, colours=HeatColours(args.colormap, args.span)
             )
     files = [{kind: str(args.output / Path(path).name) for kind, path in entry.items()} for entry in staged]
-    document = {"scene": str(args.scene), "view": choice.view, "backend": renderer.backend}
+    document = {"scene": str(path), "view": choice.view, "backend": renderer.backend}
     document.update(answers_document(scene, result, files))
     if args.json:
         write_json(document, out)

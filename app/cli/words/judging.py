@@ -258,6 +258,12 @@ def _add_walk(actions) -> None:
     command.add_argument(
         "--blur", type=above_zero, metavar="DEG", help="a hand turns so far in each photo of a room"
     )
+    command.add_argument(
+        "--passers", type=whole_count, metavar="N", help="somebody stands in so many photos of a room"
+    )
+    command.add_argument(
+        "--screens", type=whole_count, metavar="N", help="a screen shows another picture in so many photos"
+    )
     command.add_argument("--assume-lens", action="store_true", help="do not say which lens the photos have")
     command.add_argument("--given-poses", action="store_true", help="say where the photos were taken")
     command.add_argument(

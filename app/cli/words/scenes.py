@@ -4,6 +4,7 @@ from pathlib import Path
 
 from langflash_core import pictures
 from langflash_core.detail import EXPORT_DETAILS
+from langflash_core.mending.recipes import HOWS, KINDS
 from langflash_core.outputs import WORDS, help_of_files, help_of_words
 
 from ..values import (
@@ -14,6 +15,8 @@ from ..values import (
     kept_fraction,
     open_fov,
     pixel_side,
+    share,
+    spot,
     what,
     whole_count,
 )
@@ -189,8 +192,28 @@ def add_batch(commands) -> None:
 def add_query(commands) -> None:
     """`langflash query`."""
     command = new_command(commands, "query", "where in a scene is each phrase? heat-maps, masks and numbers")
-    command.add_argument("scene", type=Path, metavar="SCENE")
-    command.add_argument("prompts", nargs="+", metavar="PROMPT", help='a phrase, e.g. "armchair"')
+    command.add_argument("scene", nargs="?", metavar="SCENE", help="the scene to ask")
+    command.add_argument("phrases", nargs="*", metavar="PROMPT", help='a phrase, e.g. "armchair"')
+    command.add_argument(
+        "--scenes",
+        type=Path,
+        metavar="FOLDER",
+        help="ask all scenes of a folder: a table of answers, the surest first, and a page of pictures",
+    )
+    command.add_argument(
+        "--prompts",
+        dest="phrase_file",
+        type=Path,
+        metavar="FILE",
+        help="phrases from a text file, one a line",
+    )
+    command.add_argument(
+        "--words",
+        dest="vocabulary",
+        type=Path,
+        metavar="FILE",
+        help="what `langflash words learn` kept: groups that look alike answer to it",
+    )
     add_camera(command)
     command.add_argument(
         "--mode", choices=("relevancy", "cosine"), default="relevancy", help="(default: relevancy)"
@@ -271,18 +294,33 @@ def add_export(commands) -> None:
         "--with-text", action="store_true", help="an .html answers any phrase, and is 28 MB larger"
     )
     command.add_argument(
+        "--beside",
+        nargs="+",
+        type=Path,
+        default=(),
+        metavar="SCENE",
+        help="other scenes in the same .html, which are asked the same phrases",
+    )
+    command.add_argument(
         "--detail",
         choices=EXPORT_DETAILS,
         default=EXPORT_DETAILS[0],
         help="of Gaussians and web pages: low keeps the coarse ones alone, for small files, slow machines; "
         f"of a scene without levels a third, wider (default: {EXPORT_DETAILS[0]})",
     )
+    command.add_argument(
+        "--upright",
+        action="store_true",
+        help="of Gaussians and poses: level, on the floor and turned north as `langflash level` found it, in "
+        "metres where they are known",
+    )
     command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of a video (default: 6)")
     command.add_argument(
         "--path",
         metavar="WAY",
-        help="of a video: photos, from one to the next and back (default); orbit, around what is shown; or a "
-        "JSON list of cameras as of --camera, each with its time in seconds, or evenly spread",
+        help="of a video: photos, from one to the next and back (default); orbit, around what is shown; "
+        "tour, along the scene's stops; or a JSON list of cameras as of --camera, each with its time in "
+        "seconds, or evenly spread",
     )
     command.add_argument(
         "--replace",
@@ -323,6 +361,120 @@ def add_lift(commands) -> None:
     add_json(command)
 
 
+def add_hide(commands) -> None:
+    """`langflash hide`."""
+    command = new_command(
+        commands,
+        "hide",
+        "blur, pixelate or remove what answers a phrase, in the scene and its photos, for good",
+        epilog="What was hidden is not in the file that is written. The scene that was read, and "
+        "photos and films on the disk, still show it.",
+    )
+    command.add_argument("scene", type=Path, metavar="SCENE")
+    command.add_argument("prompts", nargs="+", metavar="PHRASE", help='such as "person", "picture", "screen"')
+    add_output(command, "SCENE", "the .langflash to write")
+    command.add_argument(
+        "--how",
+        choices=HOWS,
+        default=HOWS[0],
+        help=f"as colours that run together, as large pixels, or not at all (default: {HOWS[0]})",
+    )
+    command.add_argument(
+        "--blocks",
+        type=above_zero,
+        metavar="N",
+        help="blur and pixels: blocks along the longest side of the largest thing, 1 to 16 (default: 6)",
+    )
+    command.add_argument(
+        "--margin",
+        type=share,
+        metavar="SHARE",
+        help="around it, of a photo's longer side: hidden, too (default: 0.02)",
+    )
+    command.add_argument(
+        "--threshold",
+        type=kept_fraction,
+        metavar="T",
+        help="relevancy from which it is hidden, between 0 and 1",
+    )
+    command.add_argument(
+        "--open",
+        action="store_true",
+        help="remove: leave the hole open instead of filling it by what is around",
+    )
+    command.add_argument(
+        "--photos",
+        choices=("painted", "none"),
+        default="painted",
+        help="inside the file: painted over where they show it, or left out (default: painted)",
+    )
+    command.add_argument(
+        "--preview", type=Path, metavar="IMG", help="a .png: what is hidden, in red, and after"
+    )
+    add_backend(command)
+    add_json(command)
+
+
+def add_clean(commands) -> None:
+    """`langflash clean`."""
+    command = new_command(
+        commands,
+        "clean",
+        "take away floaters, sheets, flyaways and crumbs, by strength, by rules, or as a recipe says",
+        epilog='A rule is a condition or several: "opacity<.1", "size>.2,depth>5", "photos<2", '
+        '"confidence<.2", "colour~#808080:.1". Photos inside the file stay as they are.',
+    )
+    command.add_argument("scene", type=Path, metavar="SCENE")
+    add_output(command, "SCENE", "the .langflash to write")
+    command.add_argument(
+        "--strength", type=share, metavar="T", help="0 to 1 (default: 0.5 where nothing else is asked for)"
+    )
+    command.add_argument(
+        "--kinds", nargs="+", choices=KINDS, metavar="KIND", help=f"of {', '.join(KINDS)} (default: all)"
+    )
+    command.add_argument(
+        "--where", nargs="+", metavar="RULE", help="also what meets all conditions of one of these"
+    )
+    command.add_argument("--within", nargs="+", metavar="PHRASE", help="only of what answers one of these")
+    command.add_argument("--invert", action="store_true", help="the others instead")
+    command.add_argument(
+        "--crop",
+        metavar="BOX",
+        help="only what is inside stays: core, room, or --crop=X,Y,Z,X,Y,Z, low and high corner",
+    )
+    command.add_argument("--recipe", type=Path, metavar="FILE", help="all of that, as a file says")
+    command.add_argument("--save-recipe", type=Path, metavar="FILE", help="a .json, for other scenes")
+    command.add_argument("--fill", action="store_true", help="fill what was removed from what is around it")
+    command.add_argument("--preview", type=Path, metavar="IMG", help="a .png: what goes, in red, and after")
+    add_backend(command)
+    add_json(command)
+
+
+def add_level(commands) -> None:
+    """`langflash level`."""
+    command = new_command(
+        commands, "level", "which way is up, where the floor is, which way is north, and how large it may be"
+    )
+    command.add_argument("scene", type=Path, metavar="SCENE")
+    command.add_argument(
+        "-o", "--output", type=Path, metavar="SCENE", help="the scene with that in it (default: only say it)"
+    )
+    command.add_argument("--up", type=spot, metavar="X,Y,Z", help="this way is up, in the scene's own axes")
+    command.add_argument("--north", type=spot, metavar="X,Y,Z", help="this way is north")
+    command.add_argument("--origin", type=spot, metavar="X,Y,Z", help="this point lies at 0, on the floor")
+    lengths = command.add_mutually_exclusive_group()
+    lengths.add_argument(
+        "--length",
+        nargs=3,
+        metavar=("A", "B", "METRES"),
+        help="from A to B it is so long; A and B are points X,Y,Z of the scene, or pixels VIEW:U,V of a "
+        "photo as the scene has it",
+    )
+    lengths.add_argument("--ceiling", type=above_zero, metavar="METRES", help="the ceiling is so high")
+    lengths.add_argument("--door", type=above_zero, metavar="METRES", help="the door is so high")
+    add_json(command)
+
+
 def add_info(commands) -> None:
     """`langflash info`."""
     command = new_command(commands, "info", "what a scene file holds, and what pruning saved")
@@ -334,6 +486,25 @@ def add_info(commands) -> None:
         "--limits", action="store_true", help="how much readers take of a file, and the variables that say so"
     )
     add_json(command)
+
+
+def add_words(commands) -> None:
+    """`langflash words`."""
+    actions = new_actions(commands, "words", "what was taught in some scenes, kept and taught to others")
+    learn = new_command(actions, "learn", "names and denials that scenes were given, into a vocabulary")
+    learn.add_argument(
+        "scenes", nargs="+", type=Path, metavar="SCENE", help="scenes in which groups were named"
+    )
+    add_output(learn, "FILE", "the vocabulary, .words.json; one that is there is added to")
+    add_json(learn)
+    teach = new_command(actions, "teach", "a scene whose groups take what a vocabulary says of such things")
+    teach.add_argument("scene", type=Path, metavar="SCENE")
+    teach.add_argument("words", type=Path, metavar="FILE", help="the vocabulary")
+    add_output(teach, "SCENE", "the scene to write")
+    add_json(teach)
+    listing = new_command(actions, "list", "what a vocabulary holds")
+    listing.add_argument("words", type=Path, metavar="FILE", help="the vocabulary")
+    add_json(listing)
 
 
 def add_weights(commands) -> None:

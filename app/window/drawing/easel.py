@@ -91,6 +91,7 @@ class Easel:
         self.camera = to_camera(wanted.pose, width, height)
         renderer.upload(plan.share)  # once, and no matter of what pictures cost
         start = time.perf_counter()
+        self.drawn = None  # should it fail: what was drawn may have made room for it
         renderer.draw(
             self.camera,
             background=BACKGROUND,
@@ -103,6 +104,7 @@ class Easel:
 
     def bring(self, still: "Still", name: Drawn, seconds: float) -> None:
         """Show a picture so named that was drawn elsewhere."""
+        self.drawn = None  # as above
         self.renderer.bring(still, BACKGROUND)
         self.camera = still.camera
         self._takes(name, seconds, (still.camera.width, still.camera.height))

@@ -5,6 +5,7 @@ import numpy as np
 
 from ..commands import Command
 from ..effects import Effects, Hands
+from ..places import config_folder
 from ..scene.commands import SceneArrived
 from ..scene.state import SceneInfo
 from ..state import State
@@ -12,7 +13,8 @@ from ..viewport import Viewport
 from .commands import FindFloaters, StopWaiting
 from .pointing import CardOpened, Named, ReadingTaken, RulerPlaced
 from .state import Reading, Tool
-from .work import NameAtoms, NamePlace, ScoreFloaters, Weigh, request_for
+from .teaching import WORDS, KeepWords, TakeWords
+from .work import FindLessons, KeepLessons, NameAtoms, NamePlace, ScoreFloaters, Weigh, request_for
 
 
 class EditingEffects(Effects):
@@ -84,6 +86,10 @@ class EditingEffects(Effects):
             case SceneArrived():
                 if info is not None and info.num_atoms and marks is not None:
                     self._hands.submit(NameAtoms(info.serial, info.memory, marks))
+            case KeepWords() if info is not None and marks is not None:
+                self._hands.submit(KeepLessons(info.serial, info.memory, marks, config_folder() / WORDS))
+            case TakeWords() if info is not None and marks is not None:
+                self._hands.submit(FindLessons(info.serial, info.memory, marks, config_folder() / WORDS))
             case FindFloaters() if info is not None and marks is not None:
                 self._hands.submit(ScoreFloaters(info.serial, info.memory, marks))
             case _ if info is not None and marks is not None:

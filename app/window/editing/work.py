@@ -6,10 +6,12 @@ Heavy imports wait until they are needed. No OpenGL, no ImGui.
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from langflash_core.files import make_folder
 from langflash_core.geometry.poses import Pose, to_camera
 from langflash_core.scene.edits import Combine, Marks
 from langflash_core.scene.mask import Mask
@@ -32,6 +34,7 @@ from .commands import (
 )  # fmt: skip
 from .pointing import AtomsNamed, Named, ReadingTaken
 from .state import PICK_RADIUS, Point, Reading, Region, strongest
+from .teaching import WordsFound
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -377,6 +380,51 @@ class NameAtoms(EditErrand):
         words, embeddings = _vocabulary(self.scene.semantics.space, ())
         rows = (nearest_words(d, words, embeddings, WORDS_OF_ATOM) for d in self.dictionary())
         yield AtomsNamed(tuple(tuple(each.word for each in row) for row in rows))
+
+
+@dataclass(frozen=True)
+class KeepLessons(EditErrand):
+    """Add what was taught in the scene to the person's own vocabulary."""
+
+    path: Path
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.appearance import appearances
+        from langflash_core.language.lessons import lessons_of, read_lessons, write_lessons
+        from langflash_core.scene.edited import spoken_scene
+
+        record = spoken_scene(self.scene, self.marks).record
+        if not record.atom_names and not record.atom_denials:
+            yield Notify("Name a group first; what you name is then known in other scenes, too.", "info")
+            return
+        looks = appearances(self.scene)
+        lessons = lessons_of(record, looks.rows, looks.network)
+        known = read_lessons(self.path).joined(lessons) if self.path.exists() else lessons
+        make_folder(self.path.parent)
+        write_lessons(known, self.path)
+        yield Notify(f"Kept {len(lessons)} for other scenes; you taught {len(known)} in all.", "info")
+
+
+@dataclass(frozen=True)
+class FindLessons(EditErrand):
+    """Which groups look like what was taught in other scenes."""
+
+    path: Path
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.appearance import taken
+        from langflash_core.language.lessons import read_lessons
+        from langflash_core.scene.edited import spoken_scene
+
+        try:
+            if not self.path.exists():
+                yield Notify("Nothing is kept yet: name a group, and keep it for other scenes.", "info")
+                return
+            record = spoken_scene(self.scene, self.marks).record
+            found = taken(replace(self.scene, record=record), read_lessons(self.path))
+            yield WordsFound(tuple((k, one.name, one.denied) for k, one in sorted(found.items())))
+        finally:
+            yield StopWaiting()
 
 
 def household_words() -> tuple[str, ...]:

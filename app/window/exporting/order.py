@@ -52,6 +52,8 @@ def order(state: State) -> Order | str:
         return problem
     if state.exporting.form.what.moves and way(state) == "keys" and len(state.keys) < 2:
         return "A film along key frames needs two of them; fly somewhere and add one (M)."
+    if state.exporting.form.what.moves and way(state) == "tour" and not state.tour.stops:
+        return "A film along the tour needs a stop; fly somewhere and add one in the tour's panel."
     what, form = state.exporting.form.what, state.exporting.form
     camera_file = _camera_file(state, target)
     request = ExportRequest(
@@ -111,8 +113,9 @@ def fades(state: State) -> bool:
 
 
 def way(state: State) -> str:
-    """Of a film: along the key frames where there are some, unless said otherwise."""
-    return state.exporting.form.way or ("keys" if len(state.keys) > 1 else "photos")
+    """Of a film: along the key frames or the tour where there are some, unless said otherwise."""
+    usual = "keys" if len(state.keys) > 1 else "tour" if state.tour.stops else "photos"
+    return state.exporting.form.way or usual
 
 
 def _colours(state: State) -> dict[str, Any]:

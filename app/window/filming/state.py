@@ -1,14 +1,18 @@
 """Key frames as the state and a scene file have them."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
-from math import isfinite
+from dataclasses import dataclass
 from typing import Any
 
-from langflash_core.geometry.poses import Pose, Rotation, Vector
+from langflash_core.geometry.poses import Pose, alike, on_tour, read_pose, told_pose, tour_seconds
 
 MOST_KEYS = 50
-WAYS = (("past the photos", "photos"), ("around it", "orbit"), ("along the key frames", "keys"))
+WAYS = (
+    ("past the photos", "photos"),
+    ("around it", "orbit"),
+    ("along the key frames", "keys"),
+    ("along the tour", "tour"),
+)
 """How a film goes: for people, and for `--path`."""
 
 
@@ -27,10 +31,24 @@ class Tour:
 
 
 @dataclass(frozen=True)
-class Filming:
-    """The filming half of the state; the key frames themselves are edits. tour: the flight along them."""
+class Walk:
+    """A flight past the stops of a scene's tour. poses: of the stops. began: on the session's clock."""
 
-    tour: Tour | None = None
+    poses: tuple[Pose, ...]
+    began: float
+
+    def at(self, now: float) -> Pose | None:
+        """Where it is; None at its end."""
+        passed = now - self.began
+        return on_tour(alike(self.poses), passed) if passed < tour_seconds(len(self.poses)) else None
+
+
+@dataclass(frozen=True)
+class Filming:
+    """The filming half of the state; key frames and stops themselves are edits. tour: the flight along
+    them."""
+
+    tour: Tour | Walk | None = None
 
 
 NO_FILMING = Filming()
@@ -38,8 +56,7 @@ NO_FILMING = Filming()
 
 def stored(keys: Iterable[Pose]) -> tuple[dict[str, Any], ...]:
     """Key frames as plain values for a scene's record."""
-    lists = ("centre", "rotation", "shift")  # as a file gives them back
-    return tuple(asdict(key) | {name: list(getattr(key, name)) for name in lists} for key in keys)
+    return tuple(map(told_pose, keys))
 
 
 def read(entries: Iterable[Mapping[str, Any]]) -> tuple[Pose, ...]:
@@ -48,36 +65,3 @@ def read(entries: Iterable[Mapping[str, Any]]) -> tuple[Pose, ...]:
         return tuple(map(read_pose, entries))[:MOST_KEYS]
     except (KeyError, TypeError, ValueError, IndexError):
         return ()
-
-
-def read_pose(entry: Mapping[str, Any]) -> Pose:
-    """A pose out of a file; one of an earlier version has no span.
-
-    Raises:
-        KeyError, TypeError, ValueError, IndexError: it is damaged, or no picture can be drawn from there.
-    """
-    pose = Pose(
-        Vector(*map(float, entry["centre"])),
-        Rotation(*map(float, entry["rotation"])),
-        *(float(entry[name]) for name in ("reach", "fov", "aspect")),
-        shift=(float(entry["shift"][0]), float(entry["shift"][1])),
-        span=None if entry.get("span") is None else float(entry["span"]),
-    )
-    if not _can_look(pose):
-        raise ValueError(f"pose: expected one from which a picture can be drawn, received {pose}")
-    return pose
-
-
-def _can_look(pose: Pose) -> bool:
-    """Whether a picture can be drawn from there."""
-    span = 1.0 if pose.span is None else pose.span
-    numbers = (*pose.centre, *pose.rotation, pose.reach, pose.fov, pose.aspect, *pose.shift, span)
-    turned = sum(part * part for part in pose.rotation)
-    return (
-        all(map(isfinite, numbers))
-        and turned > 0
-        and pose.reach > 0
-        and 0 < pose.fov < 180
-        and pose.aspect > 0
-        and span > 0
-    )

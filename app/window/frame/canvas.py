@@ -10,6 +10,7 @@ from ..opening.panels import welcome
 from ..scene import camera
 from ..scene.panels import in_space, moving
 from ..state import State
+from ..touring import panel as tour_panel
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
@@ -31,6 +32,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     ruler.draw_line(state, look, corner, size)
     placed, taken = gizmo.draw(state, look, corner, size)
     over = placed if taken else placed + in_space.draw(state, look, corner, size)
+    tour_panel.draw_notes(state, look, corner, size)
     pointing.draw_marks(state, look, corner, size)
     if any(isinstance(command, camera.JumpTo) for command in over):
         return over  # the click was on a camera

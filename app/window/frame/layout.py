@@ -12,6 +12,7 @@ from ..kit.look import Look
 from ..recovery import panels as recovery_panels
 from ..scene.panels import axes, legend, tray, views
 from ..state import State
+from ..touring import panel as tour_panel
 from . import canvas, dialogs, keys, splitter, status, toasts, toolbar
 
 CANVAS_TOP = 52.0  # design pixels
@@ -51,6 +52,7 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
         issued += ruler.draw(state, look, place, size)
         issued += axes.draw(state, look, place, size)
         issued += film_panel.draw(state, look, place, size)
+        issued += tour_panel.draw(state, look, place, size)
         issued += dictionary.draw(state, look, place, size)
     issued += recovery_panels.draw_offer(state, look, place, size)
     issued += recovery_panels.draw_edits_offer(state, look, place, size)

@@ -20,6 +20,7 @@ from ..dialogs import Dialog
 from ..editing import commands as edit
 from ..editing import placing
 from ..editing import pointing as point
+from ..editing import teaching as teach
 from ..editing.state import Handle, Tool
 from ..exporting import commands as export
 from ..filming import commands as film
@@ -30,6 +31,7 @@ from ..scene import commands as show
 from ..scene.panels import in_space
 from ..scene.state import possible
 from ..state import State
+from ..touring import commands as tour
 
 BRUSH_STEP = 1.15  # of its radius, per press of [ or ]
 ORBIT_STEP = math.radians(5.0)
@@ -184,11 +186,17 @@ def _asking() -> Iterable[Entry]:
     yield Entry("Save the phrases ...", group, _always(do.ShowDialog(Dialog.SAVE_PROMPTS)))
     yield Entry("Load phrases ...", group, _always(do.ShowDialog(Dialog.LOAD_PROMPTS)))
     yield Entry("Dictionary", group, _dictionary)
+    yield Entry("Keep names for other scenes", group, _taught(teach.KeepWords()))
+    yield Entry("Take names from other scenes", group, _taught(teach.TakeWords()))
 
 
 def _meant(state: State) -> do.Command | None:
     prompt = state.asking.active_prompt if state.scene.info is not None else None
     return None if prompt is None else edit.SelectByPhrase(prompt.key, state.editing.combine)
+
+
+def _taught(command: do.Command) -> Callable[[State], do.Command | None]:
+    return lambda state: command if state.scene.info is not None and state.scene.info.num_atoms else None
 
 
 def _dictionary(state: State) -> do.Command | None:
@@ -220,9 +228,22 @@ def _looking() -> Iterable[Entry]:
     yield Entry("Add a key frame", group, _shown(film.AddKey()), _plain("m"))
     yield Entry("Remove the last key frame", group, lambda s: film.RemoveKey() if s.keys else None)
     yield Entry("Fly along the key frames", group, _shown(film.Preview()), _plain("j"))
+    yield Entry("Tour: stops and notes", group, _tour, icon=fa.ICON_FA_SIGNS_POST)
+    yield Entry("Tour: the present view is a stop", group, _shown(tour.AddStop()))
+    yield Entry("Tour: play", group, lambda s: tour.Play() if s.tour.stops else None)
+    yield Entry(
+        "Tour: next stop", group, lambda s: tour.Step(1) if s.tour.stops else None, _plain("page_down")
+    )
+    yield Entry(
+        "Tour: previous stop", group, lambda s: tour.Step(-1) if s.tour.stops else None, _plain("page_up")
+    )
     for mode in PICTURES:
         keys = _plain(f"_{_DIGITS[KEYED.index(mode)]}") if mode in KEYED else ()
         yield Entry(f"Show: {mode.label}", group, _mode(mode), keys)
+
+
+def _tour(state: State) -> do.Command | None:
+    return tour.ShowTour(not state.touring.open) if state.scene.info is not None else None
 
 
 def _mode(mode: Picture) -> Callable[[State], do.Command | None]:

@@ -13,11 +13,12 @@ from ..kit.look import Look
 from ..scene import camera
 from ..scene.panels import modes
 from ..state import State
+from ..touring import panel as tour_panel
 from . import menu
 
 _FOV = 150.0  # design pixels of the slider; left out where the window is too narrow
 _LABEL = 40.0  # of its name
-_BUTTONS = 5 * 44.0
+_BUTTONS = 6 * 44.0
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
@@ -31,7 +32,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     width = width if roomy else look.px(_BUTTONS)
     imgui.same_line(imgui.get_window_width() - width - look.px(8))
     issued += _fov(state, look) if roomy else []
-    return issued + dictionary.button(state) + _home(state) + _files(state, look)
+    return issued + tour_panel.button(state) + dictionary.button(state) + _home(state) + _files(state, look)
 
 
 def _fov(state: State, look: Look) -> list[do.Command]:

@@ -103,5 +103,10 @@ def _place(digest: str, token: str) -> Path:
 
 
 def _newest_first() -> list[Path]:
-    found = [file for file in state_folder().glob(f"*{SUFFIX}") if file.is_file()]
-    return sorted(found, key=lambda file: file.stat().st_mtime, reverse=True)
+    """Kept edits; none where the folder cannot be looked into, and without those that go meanwhile."""
+    found = []
+    with suppress(OSError):
+        for file in state_folder().glob(f"*{SUFFIX}"):
+            with suppress(OSError):
+                found.append((file.stat().st_mtime, file))
+    return [file for _, file in sorted(found, reverse=True)]

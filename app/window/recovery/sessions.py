@@ -14,40 +14,50 @@ from pathlib import Path
 from typing import BinaryIO
 
 from langflash_core.errors import OutputError
+from langflash_core.geometry.poses import read_pose
 
-from ..filming.state import read_pose
 from ..places import state_folder
 from ..scene.drops import SCENE_SUFFIX, still_there
 from .state import Kept
 
 PREFIX = "session-"
+MOST_LEFT = 8  # as many as there may be edits of
 EDITED, SELECTION = f".edited{SCENE_SUFFIX}", f".selection{SCENE_SUFFIX}"
 CONTENTS = (".json", SCENE_SUFFIX, EDITED, SELECTION)
 
 
 def left_behind() -> Kept | None:
-    """The newest session that ended badly and holds something; older and empty ones are removed."""
+    """The newest session that ended badly and holds something; the one before it is offered once that is
+    done with, and so on. Empty ones are removed, and those that are older than the newest `MOST_LEFT`."""
     found: list[tuple[float, Kept]] = []
     with suppress(OSError):
         for path in state_folder().glob(f"{PREFIX}*.json"):
             if not _abandoned(path.with_suffix(".lock")):
                 continue
-            kept = read(path)
+            try:
+                kept = read(path)
+            except OSError:
+                continue  # what cannot be read today may be read tomorrow
             if kept is None or kept.empty:
                 forget(path)
             else:
                 found.append((path.stat().st_mtime, kept))
     found.sort(key=lambda each: each[0], reverse=True)
-    for _, old in found[1:]:
+    for _, old in found[MOST_LEFT:]:
         if old.file is not None:
             forget(old.file)
     return found[0][1] if found else None
 
 
 def read(path: Path) -> Kept | None:
-    """A kept session without what has gone since; None where the file is damaged."""
+    """A kept session without what has gone since; None where the file is damaged.
+
+    Raises:
+        OSError: the system does not give it.
+    """
+    stored = path.read_bytes()
     try:
-        content = json.loads(path.read_bytes())
+        content = json.loads(stored)
         pose = content.pop("pose")
         placed = None if pose is None else read_pose(pose)
         lists = {name: tuple(content.pop(name)) for name in ("photos", "fovs", "phrases")}

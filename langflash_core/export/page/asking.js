@@ -64,6 +64,12 @@ class Asking {
     this.choose(this.chosen === row ? null : this.chosen);
   }
 
+  // What was answered is of another scene.
+  forget() {
+    this.answers = new Map();
+    this.draw();
+  }
+
   // What the picture on show answers, {score, found} by row.
   answer(answers) {
     this.answers = answers;

@@ -97,11 +97,12 @@ class Drawing {
     this.gl.deleteFramebuffer(target.framebuffer);
   }
 
-  // Splat the scene into the corner of a target that the lens fills, with numbers of `upload` or null.
-  splat(target, camera, lens, numbers) {
+  // Splat the scene into the corner of a target that the lens fills, with numbers of `upload` or null; what is nearer
+  // than `near` is left out.
+  splat(target, camera, lens, numbers, near = NEAR) {
     const { gl } = this;
     const layers = numbers ? numbers.layers : 0;
-    const count = this.sort(camera);
+    const count = this.sort(camera, near);
     target.drawn = lens.size;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
     gl.drawBuffers(target.textures.map((_, place) => (place <= layers ? gl.COLOR_ATTACHMENT0 + place : gl.NONE)));
@@ -125,9 +126,9 @@ class Drawing {
   }
 
   // Bring the Gaussians in the order of a camera to the graphics card; how many there are to draw.
-  sort(camera) {
+  sort(camera, near) {
     const { gl } = this;
-    const sorted = this.sorter.order(camera.eye, camera.turn[2]);
+    const sorted = this.sorter.order(camera.eye, camera.turn[2], near);
     const width = Math.min(2048, this.header.count);
     this.rows.set(sorted);
     gl.activeTexture(gl.TEXTURE0);

@@ -1,87 +1,136 @@
 // Puts the page together: reads the scene, draws on demand, answers when the camera rests.
-// The address may say more: #view=1&ask=plant&mode=photo&bare
+// The address may say more: #view=1&ask=plant&mode=photo&bare, #stop=NAME, #plan
 
 const MOST_PIXELS = 2.1e6;         // of a picture
-const MOST_JUDGED = 320 * 320;     // pixels that scores are taken from
 const REST = 160;                  // milliseconds without a movement
 const SLOW = 40, QUICK = 22;       // milliseconds a frame, beyond which moving pictures get fewer or more pixels
 const LEAST_SCALE = 0.35;
 
 const find = (id) => document.getElementById(id);
 
-// The middle depth of what lies near the middle of a view; 1 where nothing does.
-function middleDepth(texels, view, lens) {
-  const [width, height] = lens.size;
-  const near = depthsAround(texels, view, lens, [width / 2, height / 2], 0.12 * Math.min(width, height));
-  return near.length ? near[Math.floor(near.length / 2)] : 1;
-}
-
-// Depths, nearest first, of the solid Gaussians within so many pixels of a place.
-function depthsAround(texels, view, lens, [x, y], radius) {
-  const [fx, fy, cx, cy] = lens.pinhole;
-  const depths = [];
-  for (let at = 0; at < texels.length; at += 16) {
-    const offset = [texels[at] - view.eye[0], texels[at + 1] - view.eye[1], texels[at + 2] - view.eye[2]];
-    const z = dot(offset, view.turn[2]);
-    if (z < NEAR || texels[at + 3] < 0.3) continue;
-    const off = [dot(offset, view.turn[0]) / z * fx + cx - x, dot(offset, view.turn[1]) / z * fy + cy - y];
-    if (Math.hypot(...off) < radius) depths.push(z);
-  }
-  return depths.sort((a, b) => a - b);
-}
-
 class Page {
-  constructor(header, columns) {
-    this.header = header;
+  // world: the first scene; `add` brings others.
+  constructor(world) {
     this.canvas = find("stage");
-    this.texels = gaussianTexels(header, columns);
-    this.drawing = new Drawing(this.canvas, header, this.texels, paletteTexels(header, columns));
-    const phrases = readPhrases(header, columns);
-    this.answers = phrases && new Answers(phrases, header.count);
-    this.lens = { pinhole: header.views[0].pinhole, size: header.viewSize };
+    this.worlds = [world];
+    this.world = world;
     this.scale = 1;  // of the picture's sides while it moves
     this.pace = QUICK;  // milliseconds a frame, on average
     this.heat = true;
     this.carried = null;
-    const distance = middleDepth(this.texels, header.views[0], this.lens);
-    this.orbit = new Orbit(header.views[0], distance);
-    this.moving = new Moving(this.canvas, this.orbit, 0.05 * distance, {
+    this.orbit = new Orbit(world.start, world.start.distance);
+    this.orbit.down = unit(world.header.views[0].turn[1]);
+    this.moving = new Moving(this.canvas, this.orbit, 0.05 * this.orbit.distance, {
       focal: () => this.shown(1).pinhole[0] / this.ratio,
       changed: () => this.moved(),
       aimed: (x, y) => this.aim(x, y),
+      taken: () => this.touring.stop(),
     });
-    this.asking = this.answers && new Asking(phrases.texts, [...Array(phrases.asked).keys()], {
+    this.asking = this.answers && new Asking(this.answers.texts, [...Array(this.answers.asked).keys()], {
       changed: () => this.asked(),
       learn: find("tower") && ((text) => this.learn(text)),
     });
+    this.touring = new Touring((stop, milliseconds) => this.arrive(stop, milliseconds));
+    this.notes = new Notes({ chosen: (note) => this.ask(note.phrase), reached: (note) => this.turnTo(note) });
+    this.plan = new Plan((place) => this.touring.go(place));
+    this.embedding = new Embedding(this);
     this.furnish();
     addEventListener("resize", () => this.resize());
     this.canvas.addEventListener("webglcontextlost", () => location.reload());
     this.resize();
   }
 
+  get header() { return this.world.header; }
+  get drawing() { return this.world.drawing; }
+  get answers() { return this.world.answers; }
+  get lens() { return this.world.lens; }
+
   // Buttons, keys and what the address says.
   furnish() {
-    document.title = find("title").textContent = this.header.title;
-    const views = this.header.views.map((_, index) => {
-      const button = element("button", String(index + 1), { title: `photo ${index + 1}` });
-      button.addEventListener("click", () => this.visit(index));
-      return button;
-    });
-    find("views").append(...views);
     for (const name of ["photo", "heat"]) find(name).addEventListener("click", () => this.setHeat(name === "heat"));
     find("credit").hidden = !find("tower");
     document.querySelectorAll(".asking").forEach((part) => (part.hidden = !this.answers));
     find("helper").addEventListener("click", () => this.help());
     find("help").addEventListener("click", () => find("help").close());
+    find("planner").addEventListener("click", () => this.showPlan(!this.plan.open));
+    find("noter").addEventListener("click", () => this.showNotes(document.body.classList.contains("unnoted")));
     addEventListener("keydown", (event) => this.key(event));
+    this.enter(this.world);
     const said = new URLSearchParams(location.hash.slice(1));
     document.body.classList.toggle("bare", said.has("bare"));
-    this.orbit.set(this.header.views[said.get("view")] || this.header.views[0], this.orbit.distance);
+    const view = this.header.views[said.get("view")];
+    if (view) this.orbit.set(view, this.world.depth(view));
+    const stop = this.header.stops.findIndex(({ name }) => name === said.get("stop"));
+    if (stop >= 0) this.orbit.set(this.header.stops[stop], this.header.stops[stop].distance);
+    if (view || stop >= 0) this.touring.show(this.header.stops, stop);
     const row = this.answers ? this.answers.texts.indexOf(said.get("ask")) : -1;
     if (row >= 0) this.asking.ask(row);
     else if (this.answers && this.answers.asked) this.asking.choose(0);
     this.setHeat(said.get("mode") !== "photo");
+    if (said.has("plan")) this.showPlan(true);
+  }
+
+  // What belongs to one scene: its title, photos, stops and notes.
+  enter(world) {
+    const { header } = world;
+    this.world = world;
+    document.title = find("title").textContent = header.title;
+    find("views").replaceChildren(...header.views.map((_, index) => {
+      const button = element("button", String(index + 1), { title: `photo ${index + 1}`, "aria-label": `photo ${index + 1}` });
+      button.addEventListener("click", () => this.visit(index));
+      return button;
+    }));
+    this.touring.show(header.stops, header.stops.length && header.start !== undefined ? header.start : -1);
+    this.notes.show(world);
+    find("noter").hidden = !header.notes.length;
+    document.querySelectorAll(".touring").forEach((part) => (part.hidden = !header.stops.length));
+    document.querySelectorAll(".noting").forEach((part) => (part.hidden = !header.notes.length));
+    if (this.plan.open) this.plan.toggle(true, world);
+  }
+
+  // Another scene of the page, with the phrase that is asked.
+  change(world) {
+    if (world === this.world) return;
+    this.enter(world);
+    this.orbit.down = unit(world.header.views[0].turn[1]);
+    this.orbit.set(world.start, world.start.distance);
+    this.moving.nearest = 0.05 * this.orbit.distance;
+    this.moving.flight = null;
+    if (this.asking) this.asking.forget();
+    this.asked();
+    this.listRooms();
+  }
+
+  // One more scene that the page holds.
+  add(world) {
+    this.worlds.push(world);
+    this.listRooms();
+    this.moved();
+  }
+
+  // The scenes, each with what it says to the chosen phrase.
+  listRooms() {
+    find("rooms").hidden = this.worlds.length < 2;
+    if (this.worlds.length < 2) return;
+    const row = this.asking ? this.asking.chosen : null;
+    find("rooms").replaceChildren(...this.worlds.map((world) => {
+      const button = element("button", world.header.title, { "aria-pressed": world === this.world });
+      const best = row === null ? null : world.found.get(row);
+      if (row !== null) button.dataset.state = !best ? "pending" : best.found ? "found" : "missing";
+      if (best) button.setAttribute("aria-label", `${world.header.title}: ${best.found ? "found" : "not found"}`);
+      button.addEventListener("click", () => this.change(world));
+      return button;
+    }));
+  }
+
+  // Ask one more scene, if there is one that was not asked yet.
+  askOthers() {
+    const row = this.asking.chosen;
+    const world = this.worlds.find((other) => row !== null && other.answers && !other.found.has(row));
+    if (!world || this.worlds.length < 2) return;
+    world.best(row);
+    this.listRooms();
+    this.others = setTimeout(() => this.askOthers(), 0);
   }
 
   key(event) {
@@ -91,6 +140,55 @@ class Page {
     else if (event.key === "h" && this.answers) this.setHeat(!this.heat);
     else if (event.key === "/" && this.answers) { event.preventDefault(); find("box").focus(); }
     else if (event.key === "?") this.help();
+    else if (event.key === "p") this.showPlan(!this.plan.open);
+    else if (event.key === "n" && this.header.notes.length) this.showNotes(document.body.classList.contains("unnoted"));
+    else if (event.key === "t" && this.header.stops.length) this.touring.timer ? this.touring.stop() : this.touring.play();
+    else if (event.key === "PageDown") this.touring.step(1);
+    else if (event.key === "PageUp") this.touring.step(-1);
+  }
+
+  showPlan(open) {
+    this.plan.toggle(open, this.world);
+    this.request();
+  }
+
+  showNotes(shown) {
+    document.body.classList.toggle("unnoted", !shown);
+    find("noter").setAttribute("aria-pressed", shown);
+  }
+
+  // A stop: its view, and its phrase.
+  arrive(stop, milliseconds) {
+    this.moving.fly(stop, stop.distance, milliseconds);
+    if (stop.phrase) this.ask(stop.phrase);
+    else if (this.asking) this.asking.choose(null);
+    this.embedding.say("stop", { name: stop.name });
+  }
+
+  // A phrase by its text; nothing where the page does not know it.
+  async ask(text) {
+    if (!text || !this.answers) return;
+    const row = this.answers.texts.indexOf(text);
+    if (row >= 0) this.asking.ask(row);
+    else if (find("tower")) this.asking.ask(await this.learn(text));
+  }
+
+  // The camera where it is, turned to a note.
+  turnTo(note) {
+    const there = new Orbit({ eye: this.orbit.eye, turn: this.orbit.turn }, 1);
+    there.down = this.orbit.down;
+    there.aim(note.at);
+    this.moving.fly({ eye: there.eye, turn: there.turn }, there.distance);
+  }
+
+  // At once to a camera of the scene's own world, rows of world to camera.
+  look(viewmat) {
+    const turn = viewmat.slice(0, 3).map((row) => row.slice(0, 3));
+    const eye = [0, 1, 2].map((axis) => -turn.reduce((sum, row, i) => sum + row[axis] * viewmat[i][3], 0));
+    const view = { turn, eye: plus(eye, this.header.origin, -1) };
+    this.moving.flight = null;
+    this.orbit.set(view, this.world.depth(view));
+    this.moved();
   }
 
   help() {
@@ -99,7 +197,7 @@ class Page {
 
   visit(index) {
     const view = this.header.views[index];
-    this.moving.fly(view, middleDepth(this.texels, view, this.lens));
+    this.moving.fly(view, this.world.depth(view));
   }
 
   // Turn around what lies under a place of the canvas, in the page's pixels.
@@ -107,7 +205,7 @@ class Page {
     const lens = this.shown(1);
     const place = [x * this.ratio, y * this.ratio];
     const view = { eye: this.orbit.eye, turn: this.orbit.turn };
-    const depths = depthsAround(this.texels, view, lens, place, 0.015 * lens.size[1] + 2);
+    const depths = this.world.depthsAround(view, lens, place, 0.015 * lens.size[1] + 2);
     if (!depths.length) return;
     const depth = depths[Math.floor(depths.length / 5)];
     const [fx, fy, cx, cy] = lens.pinhole;
@@ -130,8 +228,10 @@ class Page {
   asked() {
     if (this.carried) this.drawing.drop(this.carried);
     const row = this.asking.chosen;
-    this.carried = row === null ? null : this.drawing.upload(this.answers.numbers([row]));
+    this.carried = row === null || !this.answers ? null : this.drawing.upload(this.answers.numbers([row]));
     if (row !== null && !this.heat) this.setHeat(true);
+    clearTimeout(this.others);
+    this.listRooms();
     this.moved();
   }
 
@@ -139,7 +239,8 @@ class Page {
   async learn(text) {
     this.tower ??= Promise.all(["tower", "tokens"].map((name) => inflated(find(name).textContent)))
       .then(([weights, tokens]) => new TextTower(weights, new TextDecoder().decode(tokens).split("\n")));
-    return this.answers.learn(text, (await this.tower).encode(text));
+    const vector = (await this.tower).encode(text);
+    return this.worlds.filter((world) => world.answers).map((world) => world.answers.learn(text, vector))[0];
   }
 
   // --- sizes ---
@@ -184,45 +285,35 @@ class Page {
     if (more) this.moved();
   }
 
-  draw(scale) {
+  // Every label's sight is judged where `all` is true, else one more of them.
+  draw(scale, all = false) {
     const glows = this.heat && this.carried !== null;
     this.sharp = scale === 1;
     this.drawing.splat(this.target, this.orbit, this.shown(scale), glows ? this.carried : null);
     this.drawing.show(this.target, glows ? this.answers : null);
+    this.notes.place(this.orbit, this.shown(1), this.ratio, all);
+    this.plan.here(this.orbit);
   }
 
   // The camera stands still: all pixels, and scores.
   rest() {
     this.last = undefined;
-    if (!this.sharp) this.draw(1);
-    if (this.asking) this.asking.answer(this.judge(this.asking.asked, this.shown(this.judgedScale())));
+    this.draw(1, true);
+    this.embedding.camera();
+    if (!this.asking || !this.answers) return;
+    const answers = this.judge(this.asking.asked, this.shown(this.judgedScale()));
+    this.asking.answer(answers);
+    const told = [...answers].map(([row, { found, score }]) => ({ phrase: this.answers.texts[row], found, score }));
+    this.embedding.say("answers", { answers: told });
+    this.askOthers();
   }
 
   judgedScale() {
     return Math.min(1, Math.sqrt(MOST_JUDGED / (this.canvas.width * this.canvas.height)));
   }
 
-  // {score, found, area, relevance} by row, of phrases in the picture of a lens.
   judge(rows, lens, camera = this.orbit) {
-    const answers = new Map();
-    for (let first = 0; first < rows.length; first += PHRASES_A_PASS) {
-      const some = rows.slice(first, first + PHRASES_A_PASS);
-      const numbers = this.drawing.upload(this.answers.numbers(some));
-      const target = this.drawing.target(lens.size, numbers.layers);
-      this.drawing.splat(target, camera, lens, numbers);
-      const read = target.textures.map((_, place) => this.drawing.read(target, place));
-      const alpha = new Float32Array(read[0].length / 4).map((_, pixel) => read[0][4 * pixel + 3]);
-      some.forEach((row, place) => {
-        const [layer, channel] = [1 + Math.floor((place + 1) / 3), (place + 1) % 3];
-        const relevance = alpha.map((_, pixel) => {
-          return this.answers.relevance(read[1][4 * pixel], read[layer][4 * pixel + channel]);
-        });
-        answers.set(row, { ...judged(relevance, alpha, this.answers.threshold), relevance });
-      });
-      this.drawing.drop(numbers);
-      this.drawing.release(target);
-    }
-    return answers;
+    return this.world.judge(rows, lens, camera);
   }
 
   // A picture as numbers: colours (height, width, 4) float32, premultiplied; the answer to a phrase, if one is named.
@@ -237,14 +328,27 @@ class Page {
   }
 }
 
+// A scene of the page by its number; the first one has what all are drawn by.
+async function world(number, first) {
+  const header = { ...first, ...JSON.parse(find(`header${number || ""}`).textContent) };
+  const columns = readColumns(header.columns, await inflated(find(`payload${number || ""}`).textContent));
+  find(`payload${number || ""}`).remove();
+  return new World(find("stage"), header, columns);
+}
+
 async function open() {
-  const header = JSON.parse(find("header").textContent);
-  const columns = readColumns(header.columns, await inflated(find("payload").textContent));
-  find("payload").remove();
-  const page = new Page(header, columns);
+  const page = new Page(await world(0, {}));
   await new Promise(requestAnimationFrame);
   find("waiting").remove();
+  page.rooms = others(page);
+  page.embedding.say("ready", { title: page.header.title, stops: page.header.stops.map(({ name }) => name) });
   return page;
+}
+
+// The scenes after the first, one by one.
+async function others(page) {
+  const { shaders, constants } = page.header;
+  for (let number = 1; find(`header${number}`); ++number) page.add(await world(number, { shaders, constants }));
 }
 
 // For programs that drive the page: a promise of it.

@@ -13,9 +13,9 @@ const KEYS = {
 
 class Moving {
   // stage: the element that is dragged. nearest: distance. focal(): pixels. changed(): the camera moved.
-  // aimed(x, y): a double click.
-  constructor(stage, orbit, nearest, { focal, changed, aimed }) {
-    Object.assign(this, { stage, orbit, nearest, focal, changed });
+  // aimed(x, y): a double click. taken(): somebody took the camera into the own hands.
+  constructor(stage, orbit, nearest, { focal, changed, aimed, taken }) {
+    Object.assign(this, { stage, orbit, nearest, focal, changed, taken });
     this.fingers = new Map();
     this.pressed = new Set();
     this.flight = null;
@@ -34,7 +34,12 @@ class Moving {
   press(event) {
     this.stage.setPointerCapture(event.pointerId);
     this.fingers.set(event.pointerId, [event.clientX, event.clientY]);
+    this.halt();
+  }
+
+  halt() {
     this.flight = null;
+    this.taken();
   }
 
   drag(event) {
@@ -65,7 +70,7 @@ class Moving {
 
   wheel(event) {
     event.preventDefault();
-    this.flight = null;
+    this.halt();
     const lines = event.deltaMode === 1 ? 16 : 1;
     this.orbit.zoom(Math.exp(Math.max(-120, Math.min(120, lines * event.deltaY)) * WHEEL), this.nearest);
     this.changed();
@@ -74,17 +79,17 @@ class Moving {
   key(event) {
     if (event.target.matches("input") || event.ctrlKey || event.metaKey || event.altKey || !KEYS[event.code]) return;
     event.preventDefault();
-    this.flight = null;
+    this.halt();
     this.pressed.add(event.code);
     this.changed();
   }
 
   // Fly to a view {eye, turn} whose subject is at `distance`; at once where people want no motion.
-  fly(view, distance) {
+  fly(view, distance, milliseconds = FLIGHT) {
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
     const from = { eye: this.orbit.eye, turn: this.orbit.turn, distance: this.orbit.distance };
     if (calm) this.orbit.set(view, distance);
-    else this.flight = { from, view, distance, passed: 0 };
+    else this.flight = { from, view, distance, milliseconds, passed: 0 };
     this.changed();
   }
 
@@ -102,9 +107,9 @@ class Moving {
   }
 
   soar(elapsed) {
-    const { from, view, distance } = this.flight;
+    const { from, view, distance, milliseconds } = this.flight;
     this.flight.passed += elapsed;
-    const share = Math.min(1, this.flight.passed / FLIGHT);
+    const share = Math.min(1, this.flight.passed / milliseconds);
     const eased = share * share * (3 - 2 * share);
     const between = (a, b) => a.map((value, axis) => value + eased * (b[axis] - value));
     const forward = unit(between(from.turn[2], view.turn[2]));

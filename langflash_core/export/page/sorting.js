@@ -16,15 +16,15 @@ class Sorter {
     this.starts = new Uint32Array(1 << BITS);
   }
 
-  // The rows to draw (a view that the next call overwrites), seen along unit `forward` from `eye`.
-  order(eye, forward) {
+  // The rows to draw (a view that the next call overwrites), seen along unit `forward` from `eye`, from `near` on.
+  order(eye, forward, near = NEAR) {
     const { texels, depths } = this;
     let seen = 0;
     for (let i = this.count - 1; i >= 0; --i) {
       const at = 16 * i;
       depths[i] = (texels[at] - eye[0]) * forward[0] + (texels[at + 1] - eye[1]) * forward[1]
         + (texels[at + 2] - eye[2]) * forward[2];
-      if (depths[i] >= NEAR) this.rows[seen++] = i;
+      if (depths[i] >= near) this.rows[seen++] = i;
     }
     for (let shift = 0; shift < 32; shift += BITS) this.pass(seen, shift);
     return this.rows.subarray(0, seen);

@@ -26,9 +26,12 @@ from jaxtyping import Float
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.lab.evaluation.sharp_subjects import MOST
+from langflash_core.lab.evaluation.walk_passers import Screen, screen_in, with_somebody
 from langflash_core.lab.evaluation.walk_rooms import Way, found_way, shaken
 from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
 from langflash_core.lab.rooms import Pack, RoomRenderer, StagedRoom, staged_room
+from langflash_core.lab.rooms.layout import Room
+from langflash_core.lab.rooms.render import Picture
 from langflash_core.lab.rooms.sensor import expose
 from langflash_core.lab.training.commands import cache_plan
 
@@ -152,12 +155,16 @@ class Camcorder:
     exposure: stops by which each photo's exposure may differ, either way, white balance by a sixth of it.
     blur: degrees by which a hand turns while a photo is taken. times: the network's grid a photo is large.
     bend: Brown's first radial term of the lens; kept frames are as a straight one takes them.
+    passers, screens: photos in which somebody stands, and in which a screen shows another picture; kept
+    frames show nobody, and the screen as it is in the others.
     """
 
     exposure: float = 0.0
     blur: float = 0.0
     bend: float = 0.0
     times: int = MOST
+    passers: int = 0
+    screens: int = 0
 
 
 def room_walks(
@@ -197,11 +204,11 @@ def _room_walk(
 ) -> Walk:
     """Frames are drawn when they are asked for, which is while `renderer` has this room, and remembered."""
     known: dict[tuple[int, bool], LabelledPhoto] = {}
-    grey = staged.grey
+    stage = _Stage.of(staged, renderer, way, plan, camcorder)
 
     def frame(number: int, kept: bool) -> LabelledPhoto:
         if (number, kept) not in known:
-            known[number, kept] = _taken(staged, renderer, way, (number, plan.last), grey, camcorder, kept)
+            known[number, kept] = _taken(stage, number, camcorder, kept)
         return known[number, kept]
 
     return Walk(
@@ -213,40 +220,77 @@ def _room_walk(
     )
 
 
-def _taken(
-    staged: StagedRoom,
-    renderer: RoomRenderer,
-    way: Way,
-    place: tuple[int, int],
-    grey: float,
-    camcorder: Camcorder,
-    kept: bool,
-) -> LabelledPhoto:
+@dataclass(frozen=True)
+class _Stage:
+    """A room with what happens in it. K: of the photos' size (height, width). crowded: by frame the room with
+    somebody in it. screen: on a wall; changed: frames in which it shows another picture."""
+
+    staged: StagedRoom
+    renderer: RoomRenderer
+    way: Way
+    last: int
+    K: np.ndarray
+    size: tuple[int, int]
+    crowded: dict[int, Room]
+    screen: Screen | None
+    changed: tuple[int, ...]
+
+    @staticmethod
+    def of(
+        staged: StagedRoom, renderer: RoomRenderer, way: Way, plan: Plan, camcorder: Camcorder
+    ) -> "_Stage":
+        """`renderer` has the staged room, before and after."""
+        height, width = (side * camcorder.times for side in staged.views.depths.shape[1:])
+        K, seed = staged.views.Ks[0].astype(float), staged.views.seed
+        K[:2] *= camcorder.times
+        frames = plan.chosen[max(plan.chosen)]
+        views = [way(frame / plan.last) for frame in frames]
+        crowded = {
+            frame: with_somebody(staged, renderer, way(frame / plan.last), K, seed + frame)
+            for frame in _evenly(frames, camcorder.passers)
+        }
+        renderer.set_room(staged.room)
+        screen = screen_in(staged, renderer, views, K, seed) if camcorder.screens else None
+        there = {frame: room for frame, room in crowded.items() if room is not None}
+        changed = _evenly(frames, camcorder.screens)
+        return _Stage(staged, renderer, way, plan.last, K, (height, width), there, screen, changed)
+
+    def draw(self, view: np.ndarray, frame: int, kept: bool) -> Picture:
+        """The room as it is at a frame; kept: as it is without whoever passes."""
+        crowded = None if kept else self.crowded.get(frame)
+        if crowded is not None:
+            self.renderer.set_room(crowded)
+        picture = self.renderer.draw(view, self.K, self.size)
+        if crowded is not None:
+            self.renderer.set_room(self.staged.room)
+        if self.screen is None:
+            return picture
+        number = self.staged.views.seed + (frame + 1 if frame in self.changed and not kept else 0)
+        return self.screen.shown(picture, view, self.K, number, self.staged.grey)
+
+
+def _taken(stage: _Stage, number: int, camcorder: Camcorder, kept: bool) -> LabelledPhoto:
     """One frame. Kept ones have the walk's own exposure, no blur, no noise and no JPEG."""
-    number, last = place
-    seed = staged.views.seed
+    seed, way, last = stage.staged.views.seed, stage.way, stage.last
     rng = np.random.default_rng([seed, 36, number])
-    height, width = (side * camcorder.times for side in staged.views.depths.shape[1:])
-    K = staged.views.Ks[0].astype(float)
-    K[:2] *= camcorder.times
     view = way(number / last)
-    picture = renderer.draw(view, K, (height, width))
-    sensor, light = staged.sensor, picture.radiance
+    picture = stage.draw(view, number, kept)
+    sensor, light = stage.staged.sensor, picture.radiance
     if kept:
         sensor = replace(sensor, noise=0.0, quality=0)
     else:
         if camcorder.blur:
             moments = shaken(way, number / last, 0.1 / last, rng, camcorder.blur, _MOMENTS)
-            light = np.mean([renderer.draw(m, K, (height, width)).radiance for m in moments], axis=0)
+            light = np.mean([stage.draw(m, number, kept).radiance for m in moments], axis=0)
         stops = rng.uniform(-1, 1, 4) * camcorder.exposure * np.array([1, 1 / 6, 0, 1 / 6])
         gains = 2.0 ** (stops[0] + stops[1:])
         balance = tuple(float(b * g) for b, g in zip(sensor.balance, gains, strict=True))
         sensor = replace(sensor, balance=balance)
     return LabelledPhoto(
         f"{seed}_{number:03d}",
-        expose(light.astype(np.float32), sensor, rng, grey),
+        expose(light.astype(np.float32), sensor, rng, stage.staged.grey),
         depths=picture.depth.astype(np.float32),
         metric=True,
-        K=torch.from_numpy(K).float(),
+        K=torch.from_numpy(stage.K).float(),
         pose=invert_rigid(torch.from_numpy(view).double()),
     )

@@ -1,11 +1,14 @@
 """A small scene on disk whose dictionary holds real text embeddings, and a way to run commands."""
 
+import io
 import json
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 from app.cli import main
 from langflash_core.language.spaces import language_space
@@ -66,6 +69,17 @@ def stripes() -> Scene:
         view_size=(WIDTH, HEIGHT),
         record=Record(preset="mini"),
     )
+
+
+def striped_photo(seed: int) -> bytes:
+    """Three stripes of different texture, as the groups of the scene lie."""
+    rng, stream = np.random.default_rng(seed), io.BytesIO()
+    pixels = rng.normal(128, 6, (HEIGHT, WIDTH, 3))
+    pixels[:, : WIDTH // 3] += 90 * np.sin(np.arange(HEIGHT))[:, None, None]
+    pixels[:, WIDTH // 3 : 2 * WIDTH // 3, 0] += 80
+    pixels[:, 2 * WIDTH // 3 :] -= 90
+    Image.fromarray(pixels.clip(0, 255).astype(np.uint8)).save(stream, "JPEG", quality=92)
+    return stream.getvalue()
 
 
 @pytest.fixture(scope="session")

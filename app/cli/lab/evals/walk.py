@@ -28,7 +28,7 @@ NUMBERS, WALKS, PICTURES = "walk.json", "walks", "pictures"
 """What --results holds."""
 OPTIONS = (
     "size", "set", "way", "exposure", "blur", "step", "assume_lens", "given_poses", "no_own", "align",
-    "memory", "colmap", "depth_unit", "crop", "intrinsics",
+    "memory", "colmap", "depth_unit", "crop", "intrinsics", "passers", "screens",
 )  # fmt: skip
 """By which numbers of a walk change."""
 
@@ -67,8 +67,10 @@ def _check(args: Namespace) -> None:
     """What can be known before any work."""
     if (args.pack is None) == (args.folder is None):
         raise InputError("give either a furniture pack or a folder with --posed; not both, not none")
-    if args.folder is not None and (args.exposure or args.blur):
-        raise InputError("--exposure and --blur change rooms that are drawn; leave them out with --posed")
+    if args.folder is not None and (args.exposure or args.blur or args.passers or args.screens):
+        raise InputError(
+            "--exposure, --blur, --passers and --screens change drawn rooms; leave them out with --posed"
+        )
     if args.output is not None:
         check_output_file(args.output, (".md",))
     if args.results is not None:
@@ -188,7 +190,9 @@ def _walks(args: Namespace, plan: "Plan") -> "Iterator[tuple[Iterator[Walk], int
         yield posed_walks(folder, plan, count, args.step), count
         return
     pack, count = load_pack(readable_file(args.pack, "furniture pack", InputError)), args.limit or ROOMS
-    camcorder = Camcorder(args.exposure or 0.0, args.blur or 0.0)
+    camcorder = Camcorder(
+        args.exposure or 0.0, args.blur or 0.0, passers=args.passers or 0, screens=args.screens or 0
+    )
     with RoomRenderer(pack) as drawer:
         walks = room_walks(
             pack,

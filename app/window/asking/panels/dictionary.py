@@ -11,6 +11,7 @@ from langflash_core.scene.edits import Atom
 
 from ... import commands as do
 from ...editing import commands as edit
+from ...editing import teaching as teach
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...recovery import commands as keep
@@ -112,6 +113,20 @@ def _atoms(state: State, atoms: tuple[Atom, ...], look: Look) -> list[do.Command
         issued += [edit.MergeAtoms(chosen), ask.ChooseNone()]
     imgui.end_disabled()
     widgets.tooltip("Tick two or more groups; the first ticked keeps its name.  Ctrl+Z undoes")
+    imgui.same_line()
+    return issued + _others()
+
+
+def _others() -> list[do.Command]:
+    """What leads from scene to scene, at the right of the merging."""
+    issued: list[do.Command] = []
+    if imgui.button(f"{fa.ICON_FA_BOOKMARK}  Keep names"):
+        issued.append(teach.KeepWords())
+    widgets.tooltip("For other scenes: there, groups that look like these can take your names")
+    imgui.same_line()
+    if imgui.button(f"{fa.ICON_FA_WAND_MAGIC_SPARKLES}  Take names"):
+        issued.append(teach.TakeWords())
+    widgets.tooltip("Groups that look like what you taught in other scenes take its name.  Ctrl+Z undoes")
     return issued
 
 

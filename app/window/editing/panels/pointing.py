@@ -9,11 +9,13 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from langflash_core.geometry import poses
+from langflash_core.geometry.poses import Vector
 
 from ... import commands as do
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State
+from ...touring import commands as tour
 from .. import commands as edit
 from .. import pointing as point
 from ..state import PICK_RADIUS, Card, Point, Reading, Tool
@@ -199,6 +201,11 @@ def _answer(state: State, card: Card, look: Look) -> list[do.Command]:
         imgui.text_colored(theme.MUTED, _coordinates(card.reading))
     if group is not None:
         issued += _group(state, card, group, look)
+    if card.reading.point is not None:
+        word = card.words[0][0] if card.words else ""
+        if imgui.button(f"{fa.ICON_FA_THUMBTACK}  Pin a note here", ImVec2(look.px(_CARD - 32), 0)):
+            issued.append(tour.AddNote(word or "note", Vector(*card.reading.point), phrase=word))
+        widgets.tooltip("A note of the scene's tour: here, in web pages and in the file")
     if card.vector:
         if widgets.primary_button(
             f"{fa.ICON_FA_MAGNIFYING_GLASS}  Find similar", ImVec2(look.px(_CARD - 32), 0)

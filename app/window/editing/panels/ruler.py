@@ -4,13 +4,16 @@ from contextlib import suppress
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
 
 from langflash_core.geometry import poses
+from langflash_core.geometry.poses import Vector
 
 from ... import commands as do
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State
+from ...touring import commands as tour
 from .. import pointing as point
 from ..state import Tool
 
@@ -65,6 +68,12 @@ def _field(state: State, look: Look, ends: list[ImVec2]) -> list[do.Command]:
             if (entered or imgui.is_item_deactivated_after_edit()) and text != known:
                 issued.append(point.SetLength(float(text.replace(",", ".")) / 100))
         widgets.tooltip("How long it is in truth: the scene and its exports are in metres then")
+        imgui.same_line()
+        if widgets.quiet_button(
+            f"{fa.ICON_FA_THUMBTACK}##measure", "Keep this measure as a note of the tour"
+        ):
+            start, end = (Vector(*spot) for spot in state.editing.ruler)
+            issued += [tour.AddNote("Measure", start, end), point.ClearRuler()]
         imgui.end()
     imgui.pop_style_var(2)
     return issued

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,61 +10,22 @@ import pytest
 import torch
 
 from app.window.asking.state import Prompt
-from app.window.commands import Command, Notify, OfScene, Tick, apply
+from app.window.commands import Command, Notify, OfScene, apply
 from app.window.editing import commands as edit
 from app.window.editing.pointing import LIKE_THRESHOLD
-from app.window.effects import Hands
 from app.window.places import state_folder
 from app.window.recovery import commands as keep
 from app.window.recovery import edits, sessions, work
-from app.window.recovery.effects import KEEP_AFTER, RecoveryEffects
-from app.window.recovery.keeper import Keeper
+from app.window.recovery.effects import KEEP_AFTER
 from app.window.recovery.preferences import DEFAULTS
-from app.window.requests import Errand, Job, SceneErrand
 from app.window.scene import commands as show
 from app.window.scene import work as scene_work
 from app.window.scene.work import JoinScenes, LoadScene, describe_scene
 from app.window.state import State
 from langflash_core.scene.edits import Mask, delete
 from langflash_core.scene.file import save
+from tests.app.window.recovery.desk import Desk
 from tests.app.window.scenes import room
-
-
-@dataclass
-class Desk:
-    """A session without its window: performs commands, and runs requests when told to."""
-
-    state: State = field(default_factory=State)
-    asked: list[Job | Errand] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self.keeper = Keeper()
-        hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: self.state.now)
-        self.effects = RecoveryEffects(hands, self.keeper)
-
-    def perform(self, command: Command) -> None:
-        if isinstance(command, OfScene):
-            if not command.holds(self.state):
-                return
-            command = command.command
-        before = self.state
-        self.state = apply(before, command)
-        self.effects.follow(command, before, self.state)
-
-    def work(self) -> None:
-        """Everything that was asked of the worker."""
-        while self.asked:
-            request = self.asked.pop(0)
-            if isinstance(request, Job):
-                self.perform(request.run(7, lambda *_: None, lambda: False))
-                continue
-            for command in request.run(lambda: False):
-                about = isinstance(request, SceneErrand)
-                self.perform(OfScene(request.serial, command) if about else command)
-
-    def pass_time(self, seconds: float) -> None:
-        self.perform(Tick(self.state.now + seconds))
-        self.effects.tick(self.state, self.state.now)
 
 
 @pytest.fixture

@@ -1,0 +1,94 @@
+"""`langflash level`: how a scene stands, and how large it is."""
+
+import re
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+from langflash_core.errors import InputError
+from langflash_core.files import check_output_file, make_folder
+
+from ..files import checked_scene
+from ..report import write_json
+
+if TYPE_CHECKING:
+    from langflash_core.types import Scene
+
+_PIXEL = re.compile(r"(\d+):([\d.]+),([\d.]+)")
+
+
+def run(args: Namespace, out: TextIO) -> None:
+    """Find or take up, floor, north and scale, say them, and keep them in the scene of -o.
+
+    Raises:
+        LangFlashError: the scene, a point, a length or the output cannot be used.
+    """
+    checked_scene(args.scene)
+    if args.output is not None:
+        same = args.scene.suffix.lower() == ".langflash"  # which nothing is lost of
+        check_output_file(args.output, (".langflash", ".ply", ".glb"), inputs=[] if same else [args.scene])
+    metres = None if args.length is None else _metres(args.length[2])
+    from langflash_core import level
+    from langflash_core.records import world_to_json
+    from langflash_core.scene.report import world_line
+
+    from ..scenes import open_scene
+
+    scene = open_scene(args.scene)
+    world = level.found_world(scene, up=args.up, north=args.north, origin=args.origin)
+    scene = scene.with_record(world=world)
+    if metres is not None:
+        scene = level.measured(scene, *(_place(scene, text) for text in args.length[:2]), metres)
+    for name in ("ceiling", "door"):
+        if getattr(args, name) is not None:
+            scene = level.measured_by(scene, name, getattr(args, name))
+    if args.output is not None:
+        _write(scene, args.output)
+    document = {
+        "scene": str(args.output or args.scene),
+        "metric_scale": scene.record.metric_scale,
+        "world": world_to_json(world),
+    }
+    if args.json:
+        return write_json(document, out)
+    known = scene.record.metric_scale
+    print(f"{document['scene']}: {world_line(world)}", file=out)
+    if known:
+        print(f"a unit is {known:.4g} m, as you told it", file=out)
+    elif world.guess is not None:
+        print("tell a length, --ceiling or --door, and the scene is in metres", file=out)
+
+
+def _write(scene: "Scene", output: Path) -> None:
+    from langflash_core.export import export
+
+    make_folder(output.parent)
+    export(scene, output)
+
+
+def _place(scene: "Scene", text: str) -> tuple[float, float, float]:
+    """A point of the scene, or what a pixel of a photo shows.
+
+    Raises:
+        InputError: it is neither.
+    """
+    from langflash_core.level import seen_at
+
+    pixel = _PIXEL.fullmatch(text)
+    if pixel:
+        return seen_at(scene, int(pixel[1]), float(pixel[2]), float(pixel[3]))
+    try:
+        x, y, z = map(float, text.split(","))
+    except ValueError:
+        raise InputError(f"--length takes points X,Y,Z or pixels VIEW:U,V; received {text!r}") from None
+    return x, y, z
+
+
+def _metres(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.001 <= value <= 1000:
+        raise InputError(f"--length takes metres from 0.001 to 1000; received {text!r}")
+    return value

@@ -1,0 +1,185 @@
+"""`langflash tour`: stops and notes of a scene, listed, changed, and as JSON."""
+
+import json
+from argparse import Namespace
+from pathlib import Path
+from typing import Any, TextIO
+
+from langflash_core.errors import InputError, SceneFileError, ViewError
+from langflash_core.files import (
+    check_output_file,
+    check_same_kind,
+    make_folder,
+    readable_file,
+    write_atomically,
+)
+from langflash_core.geometry.poses import Vector
+from langflash_core.limits import TEXT
+from langflash_core.scene.container import Container
+from langflash_core.scene.tour import Note, Stop, Tour, checked, read_tour, told_tour
+from langflash_core.showing.tours import (
+    place_of,
+    pose_of_camera,
+    pose_of_view,
+    stop_at,
+    tour_in,
+    write_tour,
+)
+
+from ..report import write_json
+
+FORMAT, VERSION = "langflash-tour", 1
+SUFFIX = ".langflash"
+
+
+def run(args: Namespace, out: TextIO) -> None:
+    """List, change or exchange the tour of a scene file; its Gaussians stay as they are, bit by bit.
+
+    Raises:
+        LangFlashError: the scene, a stop, a note or the output cannot be used.
+    """
+    readable_file(args.scene, "scene", SceneFileError)
+    if args.scene.suffix.lower() != SUFFIX:
+        raise InputError(f"{args.scene.name} cannot hold a tour; export it to a {SUFFIX} scene first")
+    output = getattr(args, "output", None)
+    if output is not None:
+        suffix = ".json" if args.action == "export" else SUFFIX
+        check_output_file(output, (suffix,), inputs=[args.scene])
+        if args.action == "export":
+            check_same_kind(output, ("format", "version"))
+    tour, found = tour_in(args.scene)
+    if args.action == "list":
+        return _list(tour, found, args.json, out)
+    if output is not None:
+        make_folder(output.parent)
+    if args.action == "export":
+        content = {"format": FORMAT, "version": VERSION, **told_tour(tour)}
+        write_atomically(output, json.dumps(content, indent=1, ensure_ascii=False).encode())
+        return print(f"{output}: {_counted(tour)}", file=out)
+    changed = _CHANGES[args.action](args, tour, found)
+    write_tour(changed, found, output or args.scene)
+    return print(f"{output or args.scene}: {_counted(changed)}", file=out)
+
+
+def _counted(tour: Tour) -> str:
+    start = f", opens at {tour.start}" if tour.start else ""
+    return f"{len(tour.stops)} stops, {len(tour.notes)} notes{start}"
+
+
+def _list(tour: Tour, found: Container, as_json: bool, out: TextIO) -> None:
+    if as_json:
+        return write_json({**told_tour(tour), "metric_scale": found.metadata.get("metric_scale")}, out)
+    for number, stop in enumerate(tour.stops, 1):
+        start = " (start)" if stop.name == tour.start else ""
+        print(f"stop {number}: {stop.name}{start}{_more(stop.text, stop.phrase)}", file=out)
+    for number, note in enumerate(tour.notes, 1):
+        place = ", ".join(f"{value:.2f}" for value in note.at)
+        length = "" if note.length is None else f", {_length(note.length, found)}"
+        print(f"note {number} at {place}{length}{_more(note.text, note.phrase)}", file=out)
+    if not tour:
+        print('no tour; begin one with: langflash tour stop SCENE "The window"', file=out)
+    return None
+
+
+def _more(text: str, phrase: str) -> str:
+    said = f": {text}" if text else ""
+    return said + (f' [asks "{phrase}"]' if phrase else "")
+
+
+def _length(length: float, found: Container) -> str:
+    scale = found.metadata.get("metric_scale")
+    return f"{length * scale:.2f} m" if scale else f"{length:.3f} scene units"
+
+
+# What each action makes of the tour
+
+
+def _with_stop(args: Namespace, tour: Tour, found: Container) -> Tour:
+    if args.camera is None:
+        pose = pose_of_view(found, args.view or 0)
+    else:
+        readable_file(args.camera, "camera file", ViewError)
+        from langflash_core.writing.cameras import read_camera
+
+        pose = pose_of_camera(found, read_camera(args.camera))
+    place = None if args.place is None else args.place - 1
+    tour = tour.with_stop(Stop(args.name, pose, args.text, args.phrase), place)
+    return tour.started(" ".join(args.name.split())) if args.start else tour
+
+
+def _with_note(args: Namespace, tour: Tour, found: Container) -> Tour:
+    if args.at is None and not args.phrase:
+        raise InputError('a note needs a place: say --at X,Y,Z, or --phrase "armchair" for what that finds')
+    to = None if args.to is None else Vector(*args.to)
+    at = _found(args) if args.at is None else Vector(*args.at)
+    return tour.with_note(Note(args.text or args.phrase, at, to, args.phrase))
+
+
+def _found(args: Namespace) -> Vector:
+    from ..renderers import open_renderer
+    from ..scenes import open_scene
+
+    scene = open_scene(args.scene)
+    with open_renderer(args.backend) as renderer:
+        return place_of(scene, args.phrase, renderer)
+
+
+def _without(args: Namespace, tour: Tour, found: Container) -> Tour:
+    if not args.stops and not args.note:
+        raise InputError("nothing was named; name stops, or notes with --note 1")
+    for number in args.note:
+        if number > len(tour.notes):
+            raise InputError(f"there is no note {number}; the tour has {len(tour.notes)}")
+    places = {stop_at(tour, said) for said in args.stops}
+    for place in sorted(places, reverse=True):
+        tour = tour.without_stop(place)
+    for number in sorted(set(args.note), reverse=True):
+        tour = tour.without_note(number - 1)
+    return tour
+
+
+def _ordered(args: Namespace, tour: Tour, found: Container) -> Tour:
+    first = list(dict.fromkeys(stop_at(tour, said) for said in args.stops))
+    rest = [place for place in range(len(tour.stops)) if place not in first]
+    return Tour(tuple(tour.stops[place] for place in first + rest), tour.notes, tour.start)
+
+
+def _started(args: Namespace, tour: Tour, found: Container) -> Tour:
+    return tour.started("" if args.stop is None else tour.stops[stop_at(tour, args.stop)].name)
+
+
+def _imported(args: Namespace, tour: Tour, found: Container) -> Tour:
+    other = _read(args.file)
+    if not args.add:
+        return other
+    return checked(Tour((*tour.stops, *other.stops), (*tour.notes, *other.notes), tour.start or other.start))
+
+
+def _read(path: Path) -> Tour:
+    """Raises:
+    InputError: missing, or no tour.
+    """
+    readable_file(path, "tour", InputError)
+    TEXT.check(path.stat().st_size, path.name, InputError)
+    try:
+        content: Any = json.loads(path.read_bytes())
+        if content["format"] != FORMAT:
+            raise ValueError("it is of another kind")
+        if int(content["version"]) > VERSION:
+            raise InputError(f"{path.name} was written by a newer LangFlash; update LangFlash")
+        return read_tour(content)
+    except (ValueError, LookupError, TypeError, RecursionError) as error:
+        said = " ".join(str(error).split())[:100]
+        raise InputError(
+            f"{path.name} holds no tour ({said}); write one with: langflash tour export"
+        ) from error
+
+
+_CHANGES = {
+    "stop": _with_stop,
+    "note": _with_note,
+    "remove": _without,
+    "order": _ordered,
+    "start": _started,
+    "import": _imported,
+}

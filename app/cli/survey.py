@@ -1,0 +1,80 @@
+"""`langflash query --scenes FOLDER`: phrases asked of all scenes of a folder."""
+
+from argparse import Namespace
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import TextIO
+
+from langflash_core.errors import InputError, LangFlashError, PromptError
+from langflash_core.files import check_folder, staged_folder
+
+from .report import ProgressBar, say_warnings, write_json
+
+
+def run_survey(args: Namespace, phrases: Sequence[str], negatives: Sequence[str] | None, out: TextIO) -> None:
+    """Ask scene after scene; those that cannot be asked are left out and named.
+
+    Raises:
+        LangFlashError: there is no scene, none can be asked, a phrase or the folder cannot be used.
+    """
+    if args.view is not None or args.camera or args.size or args.ortho or args.npz:
+        raise InputError("--scenes chooses the views; leave out --view, --camera, --size, --ortho and --npz")
+    paths = scene_files(args.scenes)
+    check_folder(args.output)
+    from langflash_core.colormaps import HeatColours
+    from langflash_core.writing.survey import Reply, ask_scene, write_survey
+
+    from .renderers import open_renderer
+    from .scenes import open_scene
+    from .vocabulary import taught_by
+
+    teach = taught_by(args.vocabulary)
+    colours = HeatColours(args.colormap, args.span)
+    replies: list[Reply] = []
+    left_out: list[tuple[str, str]] = []
+    with (
+        ProgressBar() as progress,
+        open_renderer(args.backend) as renderer,
+        staged_folder(args.output) as staging,
+    ):
+        asked = partial(
+            ask_scene, folder=staging, render=renderer, mode=args.mode, negatives=negatives, colours=colours
+        )
+        for place, path in enumerate(paths):
+            progress(f"scene {place + 1} of {len(paths)}", 0.95 * place / len(paths))
+            name = path.relative_to(args.scenes).with_suffix("").as_posix()
+            try:
+                replies += asked(teach(open_scene(path)), name, phrases)
+            except PromptError:  # of the phrases, so the next scene would say the same
+                raise
+            except LangFlashError as error:
+                left_out.append((name, str(error)))
+        if not replies:
+            name, why = left_out[0]
+            raise InputError(f"no scene of {args.scenes} can be asked ({name}: {why})")
+        progress("writing", 0.95)
+        document = write_survey(replies, left_out, staging)
+    say_warnings(f"{name} was left out: {why}" for name, why in left_out)
+    if args.json:
+        write_json({"folder": str(args.output), **document}, out)
+        return
+    for row in document["prompts"]:
+        found = [one for one in row["scenes"] if one["found"]]
+        surest = ", ".join(f"{one['scene']} {one['score']:.2f}" for one in found[:3]) or "-"
+        print(f"{row['prompt']}: found in {len(found)} of {len(row['scenes'])} scenes: {surest}", file=out)
+    print(f"-> {args.output / 'index.html'}", file=out)
+
+
+def scene_files(folder: Path) -> list[Path]:
+    """Scenes of a folder and of those in it, by name.
+
+    Raises:
+        InputError: there is no such folder, or no scene in it.
+    """
+    if not folder.is_dir():
+        raise InputError(f"there is no folder {folder}; give one with .langflash files in it")
+    paths = sorted(path for path in folder.rglob("*.langflash") if path.is_file())
+    if not paths:
+        raise InputError(f"{folder} holds no .langflash file; make some with `langflash batch`")
+    return paths

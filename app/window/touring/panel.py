@@ -1,0 +1,192 @@
+"""The tour beside the picture: its stops in their order, its notes; and the notes at their points in the
+picture."""
+
+import numpy as np
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as fa
+
+from langflash_core.geometry import poses
+from langflash_core.scene.tour import Note, Stop
+
+from .. import commands as do
+from ..filming import commands as film
+from ..kit import theme, widgets
+from ..kit.look import Look
+from ..state import State
+from . import commands as tour
+
+_SIZE = (330.0, 400.0)  # design pixels, the height at most
+_BELOW = 150.0  # of the axes and the key frames, which are above
+_MARGIN, _BUTTON = 12.0, 30.0
+_LETTERS = 40  # of a note that are shown in the picture
+
+
+def button(state: State) -> list[do.Command]:
+    """Opens the tour, or closes it."""
+    imgui.begin_disabled(state.scene.info is None)
+    label = f"{fa.ICON_FA_SIGNS_POST}##tour"
+    pressed = widgets.primary_button(label) if state.touring.open else imgui.button(label)
+    imgui.end_disabled()
+    widgets.tooltip("A guided tour: stops with names, and notes; films and web pages follow it")
+    imgui.same_line()
+    return [tour.ShowTour(not state.touring.open)] if pressed else []
+
+
+def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
+    """The window over the picture's right side."""
+    if not state.touring.open:
+        return []
+    top = place.y + look.px(_BELOW)
+    room = max(place.y + size.y - top - look.px(_MARGIN), look.px(120))
+    corner = ImVec2(place.x + size.x - look.px(_MARGIN), top)
+    imgui.set_next_window_pos(corner, imgui.Cond_.appearing, ImVec2(1, 0))
+    width = min(look.px(_SIZE[0]), size.x - 2 * look.px(_MARGIN))
+    imgui.set_next_window_size(ImVec2(width, min(look.px(_SIZE[1]), room)), imgui.Cond_.appearing)
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
+    flags = imgui.WindowFlags_.no_collapse | imgui.WindowFlags_.no_saved_settings
+    issued: list[do.Command] = []
+    shown, kept = imgui.begin("Tour", True, flags)
+    if shown:
+        issued += _bar(state, look)
+        for number, stop in enumerate(state.tour.stops):
+            issued += _stop(state, number, stop, look)
+        if state.tour.notes:
+            imgui.separator_text("Notes")
+        for number, note in enumerate(state.tour.notes):
+            issued += _note(state, number, note, look)
+        widgets.muted("Notes are pinned with “What is this?” (X) or the ruler (T).")
+    imgui.end()
+    imgui.pop_style_var()
+    return issued if kept else [*issued, tour.ShowTour(False)]
+
+
+def _bar(state: State, look: Look) -> list[do.Command]:
+    issued: list[do.Command] = []
+    wide, playing = ImVec2(look.px(_BUTTON), 0), state.filming.tour is not None
+    imgui.begin_disabled(not state.tour.stops)
+    for icon, tip, command in (
+        (fa.ICON_FA_BACKWARD_STEP, "The stop before  (Page up)", tour.Step(-1)),
+        (fa.ICON_FA_STOP if playing else fa.ICON_FA_PLAY, "Past all stops, as a film goes",
+         film.StopTour() if playing else tour.Play()),
+        (fa.ICON_FA_FORWARD_STEP, "The next stop  (Page down)", tour.Step(1)),
+    ):  # fmt: skip
+        if imgui.button(f"{icon}##{tip}", wide):
+            issued.append(command)
+        widgets.tooltip(tip)
+        imgui.same_line(0, look.px(4))
+    imgui.end_disabled()
+    if widgets.primary_button(f"{fa.ICON_FA_PLUS}  Add this view"):
+        issued.append(tour.AddStop())
+    widgets.tooltip("The present view as the next stop, with the phrase that is on show")
+    return issued
+
+
+def _stop(state: State, number: int, stop: Stop, look: Look) -> list[do.Command]:
+    """One line: go there, name, start, order, away."""
+    issued: list[do.Command] = []
+    imgui.push_id(f"stop {number}")
+    wide, gap = ImVec2(look.px(_BUTTON), 0), look.px(4)
+    here = number == state.touring.place
+    if (widgets.primary_button if here else imgui.button)(f"{number + 1}##go", wide):
+        issued.append(tour.GoToStop(number))
+    widgets.tooltip(f'Fly there, and ask "{stop.phrase}"' if stop.phrase else "Fly there")
+    imgui.same_line(0, gap)
+    imgui.set_next_item_width(imgui.get_content_region_avail().x - 4 * (look.px(_BUTTON) + gap))
+    _, name = imgui.input_text("##name", stop.name)
+    if imgui.is_item_deactivated_after_edit() and name != stop.name:
+        issued.append(tour.ChangeStop(number, name=name))
+    widgets.tooltip("Its name")
+    start, last = state.tour.start == stop.name, len(state.tour.stops) - 1
+    for icon, tip, command, can in (
+        (fa.ICON_FA_FLAG, "Pages open at the first photo" if start else "Pages of the scene open here",
+         tour.StartAt("" if start else stop.name), True),
+        (fa.ICON_FA_ARROW_UP, "Earlier", tour.MoveStop(number, number - 1), number > 0),
+        (fa.ICON_FA_ARROW_DOWN, "Later", tour.MoveStop(number, number + 1), number < last),
+        (fa.ICON_FA_TRASH, "Remove it", tour.RemoveStop(number), True),
+    ):  # fmt: skip
+        imgui.same_line(0, gap)
+        imgui.begin_disabled(not can)
+        marked = start and icon == fa.ICON_FA_FLAG
+        if (widgets.primary_button if marked else imgui.button)(f"{icon}##{icon}", wide):
+            issued.append(command)
+        imgui.end_disabled()
+        widgets.tooltip(tip)
+    if here:
+        issued += _told(number, stop)
+    imgui.pop_id()
+    return issued
+
+
+def _told(number: int, stop: Stop) -> list[do.Command]:
+    """What is told at the stop where one is."""
+    imgui.set_next_item_width(-1)
+    _, text = imgui.input_text_with_hint("##text", "what is told here", stop.text)
+    changed = imgui.is_item_deactivated_after_edit() and text != stop.text
+    return [tour.ChangeStop(number, text=text)] if changed else []
+
+
+def _note(state: State, number: int, note: Note, look: Look) -> list[do.Command]:
+    issued: list[do.Command] = []
+    imgui.push_id(f"note {number}")
+    wide, gap = ImVec2(look.px(_BUTTON), 0), look.px(4)
+    imgui.begin_disabled(not note.phrase)
+    icon = fa.ICON_FA_RULER if note.to else fa.ICON_FA_THUMBTACK
+    if imgui.button(f"{icon}##ask", wide):
+        issued.append(tour.AskNote(number))
+    imgui.end_disabled()
+    widgets.tooltip(f'Ask "{note.phrase}"' if note.phrase else _measured(state, note) or "It asks nothing")
+    imgui.same_line(0, gap)
+    imgui.set_next_item_width(imgui.get_content_region_avail().x - look.px(_BUTTON) - gap)
+    _, text = imgui.input_text("##text", note.text)
+    if imgui.is_item_deactivated_after_edit() and text != note.text:
+        issued.append(tour.ChangeNote(number, text))
+    imgui.same_line(0, gap)
+    if imgui.button(f"{fa.ICON_FA_TRASH}##gone", wide):
+        issued.append(tour.RemoveNote(number))
+    widgets.tooltip("Remove it")
+    imgui.pop_id()
+    return issued
+
+
+def _measured(state: State, note: Note) -> str:
+    """A length for people; "" of a note that measures none."""
+    if note.length is None:
+        return ""
+    if state.metric is None:
+        return f"{note.length:.2f} units"
+    metres = note.length * state.metric
+    return f"{100 * metres:.0f} cm" if metres < 1 else f"{metres:.2f} m"
+
+
+def draw_notes(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
+    """On the picture, in the present window: every note at its point, while the panel is open or a tour
+    plays."""
+    playing = state.filming.tour is not None
+    if state.scene.info is None or not (state.touring.open or playing):
+        return
+    canvas, colour = imgui.get_window_draw_list(), widgets.u32(theme.DARK.ACCENT)
+    canvas.push_clip_rect(corner, ImVec2(corner.x + size.x, corner.y + size.y), True)
+    for note in state.tour.notes:
+        ends = [note.at] if note.to is None else [note.at, note.to]
+        found = poses.project(np.array(ends), state.scene.pose, (size.x, size.y))
+        if found is None:
+            continue
+        points = [ImVec2(corner.x + float(x), corner.y + float(y)) for x, y in found[1]]
+        if len(points) == 2:
+            canvas.add_line(points[0], points[1], colour, look.px(2))
+        for point in points:
+            canvas.add_circle_filled(point, look.px(4), colour)
+        middle = ImVec2(sum(p.x for p in points) / len(points), sum(p.y for p in points) / len(points))
+        text = note.text if len(note.text) <= _LETTERS else note.text[: _LETTERS - 1] + "…"
+        _caption(look, middle, " · ".join(filter(None, (text, _measured(state, note)))))
+    canvas.pop_clip_rect()
+
+
+def _caption(look: Look, at: ImVec2, text: str) -> None:
+    """Words on a dark ground, right of a point."""
+    canvas, extent = imgui.get_window_draw_list(), imgui.calc_text_size(text)
+    corner = ImVec2(at.x + look.px(10), at.y - extent.y / 2 - look.px(3))
+    end = ImVec2(corner.x + extent.x + look.px(14), corner.y + extent.y + look.px(6))
+    canvas.add_rect_filled(corner, end, imgui.IM_COL32(14, 16, 20, 205), look.px(5))
+    ink = widgets.u32(theme.DARK.TEXT)
+    canvas.add_text(ImVec2(corner.x + look.px(7), corner.y + look.px(3)), ink, text)

@@ -1,0 +1,231 @@
+"""What is in a room, how many, how large, where, how sure, and seen by which photos.
+
+Every Gaussian is of the one kind of the vocabulary that it answers best, where it answers that at all; what
+touches and is of one kind is a thing (`langflash_core/segments.py`). Things stand upright: a box has a height
+and a rectangle on the floor, along the walls unless another turn saves `_SAVES` of its area. Sizes are those
+of what photos saw: the back of a cupboard that nobody saw is not measured.
+
+Lengths are metres where the scene's scale is known or guessed, else scene units. World: +x east, +y down,
++z north, the floor at y = 0 (`langflash_core.records.World`). Sizes: N Gaussians, G kinds, V views.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from langflash_core.errors import InputError
+from langflash_core.language.answers import BOX_QUANTILES
+from langflash_core.language.gaussians import gaussian_relevance
+from langflash_core.language.relevance import compile_query
+from langflash_core.language.spaces import language_space
+from langflash_core.language.vocabulary import OWN
+from langflash_core.level import found_world, metres_of
+from langflash_core.records import Guess, World
+from langflash_core.scene.thin import covered_areas
+from langflash_core.scene.world import turn_of
+from langflash_core.segments import connected_things, evenly, photo_shares
+from langflash_core.types import Scene, Segments
+
+STRUCTURE = ("wall", "floor", "ceiling")
+"""Kinds that rooms are made of: no things."""
+OPENINGS = ("door", "window")
+LEAST_SHARE = 0.002
+"""Of a photo: what no photo shows so large is no thing of an inventory."""
+SEEN = 0.0005  # of a photo that shows a thing
+_SAVES = 0.12
+_TURNS = np.radians(np.arange(0.0, 90.0, 3.0))
+
+
+@dataclass(frozen=True)
+class Thing:
+    """One thing.
+
+    id: its kind and a number, the largest first ("chair 1"). name: a person's own, or none. sure: mean
+    relevancy of its surface, in (0, 1). place: of its box's middle. size: width and depth on the floor, the
+    larger first, and height. turn: degrees of the width from east to north. bottom: height of its lower end
+    over the floor. photos: those that show it, the one that shows most first; shares: of their pixels. cut:
+    it goes on beyond the border of every photo that shows it, or nobody knows. rows: (N,) bool.
+    """
+
+    id: str
+    kind: str
+    name: str
+    sure: float
+    place: tuple[float, float, float]
+    size: tuple[float, float, float]
+    turn: float
+    bottom: float
+    photos: tuple[int, ...]
+    shares: tuple[float, ...]
+    cut: bool
+    rows: Bool[np.ndarray, " N"] = field(repr=False, compare=False)
+
+    @property
+    def title(self) -> str:
+        """What it is called: a person's name, or its id."""
+        return self.name or self.id
+
+    @property
+    def corners(self) -> Float[np.ndarray, "4 2"]:
+        """East and north of its box on the floor, in order around it."""
+        turn = math.radians(self.turn)
+        along = np.array([math.cos(turn), math.sin(turn)]) * self.size[0] / 2
+        across = np.array([-math.sin(turn), math.cos(turn)]) * self.size[1] / 2
+        middle = np.array([self.place[0], self.place[2]])
+        return np.stack((middle - along - across, middle + along - across, middle + along + across,
+                         middle - along + across))  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Inventory:
+    """The things of a room. scale: units of `unit` per scene unit. guess: where the scale is one."""
+
+    scene: Scene = field(repr=False)
+    world: World
+    unit: str
+    scale: float
+    guess: Guess | None
+    things: tuple[Thing, ...]
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Things of each kind, the most first."""
+        kinds = [thing.kind for thing in self.things]
+        return {kind: kinds.count(kind) for kind in sorted(set(kinds), key=lambda k: (-kinds.count(k), k))}
+
+    @cached_property
+    def stands(self) -> Float[np.ndarray, "N 3"]:
+        """Where the scene's Gaussians are in the world, in `unit`."""
+        means = self.scene.gaussians.means.detach().cpu().double().numpy()
+        return self.scale * (means - np.array(self.world.origin)) @ turn_of(self.world).T
+
+    def segments(self) -> Segments:
+        """Its things as phrases of one part each, for `langflash_core.segments`."""
+        members = torch.from_numpy(np.stack([thing.rows for thing in self.things]))
+        sure = tuple(thing.sure for thing in self.things)
+        return Segments(tuple(thing.id for thing in self.things), sure, 0.0, members, members.long())
+
+
+@torch.no_grad()
+def inventory(scene: Scene, *, threshold: float | None = None, least: float = LEAST_SHARE) -> Inventory:
+    """The things of a scene.
+
+    Args:
+        threshold: relevancy from which a Gaussian is of a kind; None: the scene's calibration. least: share
+            of a photo that a thing must fill in some photo.
+
+    Raises:
+        InputError: the scene holds nothing. PromptError: it has no language. WeightsError: it has no weights.
+    """
+    if not len(scene.gaussians):
+        raise InputError("this scene is empty; make it again, or undo what deleted it")
+    world = scene.record.world or found_world(scene)
+    scene = scene.with_record(world=world)
+    metres, guess = metres_of(scene)
+    scale = metres or (guess.metres if guess else 1.0)
+    unit = "m" if metres or guess else "units"
+    whole = Inventory(scene, world, unit, scale, guess, ())
+    kinds, relevance = _kinds(scene, threshold)
+    shares = photo_shares(scene)
+    things = [
+        thing
+        for kind in sorted(set(kinds) - {""})
+        if kind not in STRUCTURE
+        for thing in _of_kind(whole, kind, kinds == kind, relevance, shares, least)
+    ]
+    return replace(whole, things=tuple(sorted(things, key=lambda thing: -max(thing.shares))))
+
+
+def kinds_of(scene: Scene, threshold: float | None = None) -> np.ndarray:
+    """(N,) words of the vocabulary, "" of what answers none: the kind of each Gaussian."""
+    return _kinds(scene, threshold)[0]
+
+
+def _kinds(scene: Scene, threshold: float | None) -> tuple[np.ndarray, np.ndarray]:
+    """(N,) kinds, and (N,) how well each Gaussian answers its own."""
+    names = list(OWN)
+    compiled = compile_query(scene, language_space(scene.semantics.space), names)
+    best, which = gaussian_relevance(scene.semantics, compiled).max(0)
+    limit = compiled.threshold if threshold is None else threshold
+    found = np.where((best >= limit).numpy(), np.array(names)[which.numpy()], "")
+    return found, best.numpy()
+
+
+def _of_kind(
+    whole: Inventory,
+    kind: str,
+    members: np.ndarray,
+    relevance: np.ndarray,
+    shares: Tensor,
+    least: float,
+) -> list[Thing]:
+    """The things of one kind."""
+    scene = whole.scene
+    numbers = connected_things(scene, torch.from_numpy(members), shares).numpy()
+    things: list[Thing] = []
+    areas = covered_areas(scene.gaussians)
+    for number in range(1, int(numbers.max(initial=0)) + 1):
+        rows = numbers == number
+        seen = shares[:, torch.from_numpy(rows)].sum(1).numpy()  # (V,)
+        if float(seen.max()) < least:
+            continue
+        own = rows.nonzero()[0]
+        sure = float(np.average(relevance[own], weights=areas[own] + 1e-12))
+        order = [int(view) for view in np.argsort(-seen, kind="stable") if seen[view] >= SEEN]
+        id = f"{kind} {len(things) + 1}"
+        things.append(
+            Thing(
+                id, kind, scene.record.thing_names.get(id, ""), sure,
+                *upright_box(whole.stands[own[evenly(areas[own])]]),
+                tuple(order), tuple(float(seen[view]) for view in order), _cut(whole, rows, order), rows,
+            )
+        )  # fmt: skip
+    return things
+
+
+def upright_box(
+    points: Float[np.ndarray, "n 3"],
+) -> tuple[tuple[float, float, float], tuple[float, float, float], float, float]:
+    """Middle, size (width, depth, height), turn in degrees and height of the bottom of points in the world.
+
+    Extents are from the 2nd to the 98th of a hundred points.
+    """
+    heights = np.quantile(-points[:, 1], BOX_QUANTILES)
+    flat = points[:, [0, 2]]
+    options = []
+    for turn in _TURNS:
+        axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
+        low, high = np.quantile(flat @ axes.T, BOX_QUANTILES, axis=0)
+        options.append((float(np.prod(high - low + 0.02 * (high - low).max())), axes, low, high))
+    best = min(range(len(options)), key=lambda k: options[k][0])
+    if options[best][0] > (1 - _SAVES) * options[0][0]:
+        best = 0
+    _, axes, low, high = options[best]
+    east, north = (low + high) / 2 @ axes
+    (width, depth), turn = high - low, math.degrees(_TURNS[best])
+    if depth > width:
+        width, depth, turn = depth, width, turn + 90
+    place = (float(east), float(-heights.mean()), float(north))
+    return place, (float(width), float(depth), float(heights[1] - heights[0])), float(turn), float(heights[0])
+
+
+def _cut(whole: Inventory, rows: np.ndarray, views: Sequence[int]) -> bool:
+    """Whether the photos that show it show it only up to their border."""
+    means = whole.scene.gaussians.means.double().numpy()[rows]
+    for view in views:
+        camera = whole.scene.camera(view)
+        viewmat, K = camera.viewmat.double().numpy(), camera.K.double().numpy()
+        pos_c = means @ viewmat[:3, :3].T + viewmat[:3, 3]
+        with np.errstate(all="ignore"):
+            pixels = (pos_c / pos_c[:, 2:]) @ K[:2].T
+        size = np.array([camera.width, camera.height])
+        outside = (pos_c[:, 2] <= 0) | ((pixels < 0.01 * size) | (pixels > 0.99 * size)).any(1)
+        if outside.mean() < 0.02:
+            return False
+    return True

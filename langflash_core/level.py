@@ -1,0 +1,421 @@
+"""A scene upright and true: which way is up, where its floor is, which way is north, and how large it may be.
+
+Up is told by straight edges of the photos and by surfaces (`langflash_core/geometry/manhattan.py`), with what
+answers "floor" for a first direction; the height of the floor by what answers it, or else by the lowest level
+surface. North is the wall that the first photo looks at most squarely, so that a plan stands as the room is
+seen. A scene has a unit of its own; how many metres that is, ceilings and doors tell, which are built to
+measure, how high people hold cameras, and the network's depth, which was learned in metres: each with the
+error that such things have, and the guess is their mean by those errors. A guess stays one until somebody
+tells a length.
+
+Sizes: n points of the scene's surface, V views, L edges.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, UInt8
+from scipy.spatial.transform import Rotation
+
+from langflash_core.errors import InputError, LangFlashError
+from langflash_core.geometry.manhattan import Directions, Sights, found_directions
+from langflash_core.geometry.quaternions import quats_to_matrices
+from langflash_core.images.lines import line_segments
+from langflash_core.language.answers import world_points
+from langflash_core.language.gaussians import gaussian_relevance
+from langflash_core.language.relevance import compile_query
+from langflash_core.language.spaces import language_space
+from langflash_core.picture_files import STORED, opened_picture
+from langflash_core.records import Guess, World
+from langflash_core.scene.thin import covered_areas
+from langflash_core.scene.world import placed, turn_of
+from langflash_core.splat import render
+from langflash_core.types import NO_LANGUAGE, Camera, Scene
+
+SAMPLES = 6000
+"""Points of the surface that are looked at."""
+_WORDS = ("floor", "rug", "ceiling", "door")
+_FLAT = 0.5  # of a Gaussian's second axis, at most its third: it has a normal
+_SHARE = 0.02  # of the surface, from which what answers a word is believed in
+_LEVEL = math.cos(math.radians(30))  # of a surface that may be a floor or a ceiling
+_WINDOW = 0.04  # of the scene's height: surfaces so near in height are one
+_CONTRADICTED = 2.5
+_EDGE = 0.02  # of a picture's side: what reaches so near to its border may go on
+
+# What things measure: metres, and the standard deviation of its logarithm.
+CEILING = (2.60, 0.065)
+"""Of homes: minima of building codes are 2.3 to 2.5 m, and few ceilings are above 2.9 m."""
+DOOR = (2.03, 0.035)
+"""Of door leaves: 1.98 (UK), 2.01 (DIN), 2.03 (US), 2.10 m."""
+EYE = (1.50, 0.18)
+"""Of a camera above the floor, as people hold it."""
+DEPTH = (1.08, 0.20)
+"""Of a metre as the network learned it."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """n points of a scene's surface, as many of each piece as its area has.
+
+    places, normals: (n, 3). answers: (n, 4) bool, which of `_WORDS` each answers to.
+    """
+
+    places: Float[np.ndarray, "n 3"]
+    normals: Float[np.ndarray, "n 3"]
+    answers: Bool[np.ndarray, "n 4"]
+
+    def called(self, *words: str) -> Bool[np.ndarray, " n"]:
+        """What answers one of these words; nothing where too little does."""
+        found = self.answers[:, [_WORDS.index(word) for word in words]].any(1)
+        return found if len(found) and found.mean() >= _SHARE else np.zeros_like(found)
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """One thing that tells the scale: metres per scene unit, and the deviation of its logarithm."""
+
+    name: str
+    metres: float
+    error: float
+
+
+@torch.no_grad()
+def found_world(
+    scene: Scene,
+    *,
+    up: Sequence[float] | None = None,
+    north: Sequence[float] | None = None,
+    origin: Sequence[float] | None = None,
+) -> World:
+    """Where a scene stands; what is given is not sought.
+
+    Args:
+        up, north: directions (3,) of the scene's axes. origin: the scene's point that is to lie at 0, on the
+            floor; None: the floor under the first photo.
+
+    Raises:
+        InputError: the scene has no Gaussians, or a direction has no length, or north is up.
+    """
+    surface = surface_of(scene)
+    found = found_directions(_sights(scene, surface), None if up is None else _unit("up", up))
+    upward = found.up
+    ahead, north_by = _north(scene, found, north)
+    axes = np.stack((np.cross(ahead, upward), -upward, ahead))  # rows east, down, north
+    eyes = scene.viewmats.double().inverse()[:, :3, 3].numpy()
+    height, floor_by = _floor(surface, upward, float((eyes @ upward).min()) if scene.photos else math.inf)
+    if origin is None:
+        under = eyes[0]
+        place = under - upward * (under @ upward - height)
+    else:
+        place, floor_by = _vector("origin", origin), "told"
+    edged = found.edges > 0
+    up_by, error = (
+        ("told", 0.0) if up is not None else ("edges" if edged else "surfaces", round(found.error, 2))
+    )
+    w, x, y, z = Rotation.from_matrix(axes).as_quat(scalar_first=True).tolist()
+    world = World((w, x, y, z), tuple(place.tolist()), up_by, error, floor_by, north_by)
+    return replace(world, guess=guessed(evidence(scene, world, surface)))
+
+
+def metres_of(scene: Scene) -> tuple[float | None, Guess | None]:
+    """Metres per scene unit where they are known, and else the guess."""
+    if scene.record.metric_scale:
+        return scene.record.metric_scale, None
+    return None, scene.record.world.guess if scene.record.world else None
+
+
+def upright(scene: Scene) -> Scene:
+    """The scene in its world: level, its floor at y = 0, north ahead; in metres where they are known.
+
+    Raises:
+        InputError: nobody has looked where it stands.
+    """
+    world = scene.record.world
+    if world is None:
+        raise InputError("nobody has looked how this scene stands; run langflash level first")
+    metres = scene.record.metric_scale or 1.0
+    unit = None if scene.record.network_unit is None else scene.record.network_unit / metres
+    guess = world.guess
+    if guess is not None:
+        guess = Guess(guess.metres / metres, guess.low / metres, guess.high / metres, guess.by)
+    stands = replace(world, turn=(1.0, 0.0, 0.0, 0.0), origin=(0.0, 0.0, 0.0), guess=guess)
+    moved = placed(scene, turn_of(world), np.array(world.origin), metres)
+    known = 1.0 if scene.record.metric_scale else None
+    return moved.with_record(world=stands, metric_scale=known, network_unit=unit)
+
+
+def surface_of(scene: Scene) -> Surface:
+    """`SAMPLES` points of the surface; the same scene gives the same ones.
+
+    Raises:
+        InputError: there is no surface.
+    """
+    areas = covered_areas(scene.gaussians)
+    areas = np.where(np.isfinite(scene.gaussians.means.numpy()).all(1), np.nan_to_num(areas), 0.0)
+    total = float(areas.sum())
+    if not total > 0:
+        raise InputError("this scene holds no surface; make it again, or undo what deleted it")
+    places = (np.arange(SAMPLES) + 0.5) / SAMPLES * total
+    rows = np.searchsorted(np.cumsum(areas), places).clip(max=len(areas) - 1)
+    some = scene.rows(torch.from_numpy(rows))
+    scales = some.gaussians.scales.double().numpy()
+    ordered = np.sort(scales, 1)
+    axes = quats_to_matrices(some.gaussians.quats.double()).numpy()
+    normals = np.take_along_axis(axes, scales.argmin(1)[:, None, None], 2)[:, :, 0]
+    flat = ordered[:, 0] <= _FLAT * ordered[:, 1]
+    return Surface(
+        some.gaussians.means.double().numpy(), np.where(flat[:, None], normals, 0.0), _answers(some)
+    )
+
+
+def _answers(some: Scene) -> np.ndarray:
+    """(n, 4) of `_WORDS`; nothing where the scene has no language, or no weights for it."""
+    if some.semantics.space == NO_LANGUAGE or not some.semantics.num_atoms:
+        return np.zeros((len(some.gaussians), len(_WORDS)), bool)
+    try:
+        compiled = compile_query(some, language_space(some.semantics.space), list(_WORDS))
+    except LangFlashError:  # surfaces and photos tell it without words
+        return np.zeros((len(some.gaussians), len(_WORDS)), bool)
+    return (gaussian_relevance(some.semantics, compiled) >= compiled.threshold).T.numpy()
+
+
+def _sights(scene: Scene, surface: Surface) -> Sights:
+    """What photos and surfaces tell of directions."""
+    edges, lengths = [np.zeros((0, 3))], [np.zeros(0)]
+    for view, photo in enumerate(scene.photos):
+        grey = _grey(photo)
+        if grey is not None:
+            found, long = edge_planes(grey, scene.camera(view, grey.shape[1], grey.shape[0]))
+            edges.append(found)
+            lengths.append(long)
+    known, floor = surface.normals.any(1), surface.called("floor", "rug") & surface.normals.any(1)
+    across = None
+    if floor.any():
+        across = np.linalg.eigh(surface.normals[floor].T @ surface.normals[floor])[1][:, 2]
+    cameras = scene.viewmats[:, :3, :3].double().numpy()
+    return Sights(np.concatenate(edges), np.concatenate(lengths), surface.normals[known], cameras, across)
+
+
+def edge_planes(
+    grey: UInt8[np.ndarray, "H W"], camera: Camera
+) -> tuple[Float[np.ndarray, "L 3"], Float[np.ndarray, " L"]]:
+    """Unit normals, in the world, of the planes through the camera and a photo's straight edges; the edges'
+    lengths, in longer sides of the photo."""
+    ends = line_segments(grey)
+    inverse = np.linalg.inv(camera.K.double().numpy())
+    first, last = (
+        np.concatenate((ends[:, at : at + 2], np.ones((len(ends), 1))), 1) @ inverse.T for at in (0, 2)
+    )
+    normals = np.cross(first, last)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    lengths = np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1]) / max(grey.shape)
+    return normals @ camera.viewmat[:3, :3].double().numpy(), lengths
+
+
+def _grey(photo: bytes) -> np.ndarray | None:
+    try:
+        with opened_picture(photo, STORED) as opened:
+            return np.asarray(opened.convert("L"))
+    except (OSError, SyntaxError, ValueError):  # a scene whose small photos are damaged still has surfaces
+        return None
+
+
+def _north(scene: Scene, found: Directions, north: Sequence[float] | None) -> tuple[np.ndarray, str]:
+    """The level direction that is to be north, and who says so."""
+    if north is not None:
+        told = _unit("north", north)
+        level = told - found.up * (told @ found.up)
+        if np.linalg.norm(level) < 0.1:
+            raise InputError("north runs along up; give a direction along the floor")
+        return level / np.linalg.norm(level), "told"
+    ahead = scene.viewmats[0, 2, :3].double().numpy()
+    sides = np.concatenate((found.axes[:, :2].T, -found.axes[:, :2].T))
+    return sides[(sides @ ahead).argmax()], "walls"
+
+
+def _floor(surface: Surface, up: np.ndarray, most: float) -> tuple[float, str]:
+    """Height of the floor along up, below `most`, the lowest camera's; scene units, and who says so."""
+    heights = surface.places @ up
+    level = np.abs(surface.normals @ up) >= _LEVEL
+    window = _WINDOW * float(np.subtract(*np.quantile(heights, (0.99, 0.01))))
+    named = surface.called("floor") & level & (heights < most)
+    if named.any():
+        return densest(heights[named], window), "floor"
+    low = heights[level] if level.any() else heights
+    return densest(low[low <= np.quantile(heights, 0.01) + 3 * window], window), "lowest"
+
+
+def densest(values: Float[np.ndarray, " n"], width: float) -> float:
+    """Median of the window of that width that holds most values; the lowest such."""
+    ordered = np.sort(values)
+    ends = np.searchsorted(ordered, ordered + width, side="right")
+    start = int((ends - np.arange(len(ordered))).argmax())
+    return float(np.median(ordered[start : ends[start]]))
+
+
+# How large
+
+
+def evidence(scene: Scene, world: World, surface: Surface) -> list[Evidence]:
+    """What tells how many metres a scene unit is."""
+    stands = (surface.places - np.array(world.origin)) @ turn_of(world).T
+    heights = -stands[:, 1]
+    found = []
+    if world.floor_by != "lowest":
+        found += _of_ceiling(surface, heights, turn_of(world))
+        found += _of_door(scene, surface, heights)
+        eyes = scene.viewmats.double().inverse()[:, :3, 3].numpy() if scene.photos else np.zeros((0, 3))
+        eye = -((eyes - np.array(world.origin)) @ turn_of(world).T)[:, 1]
+        if len(eye) and np.median(eye) > 0:
+            found.append(Evidence("camera height", EYE[0] / float(np.median(eye)), EYE[1]))
+    posed = not torch.allclose(scene.viewmats[0], torch.eye(4), atol=1e-4)
+    if scene.record.network_unit and not posed:  # else its unit is that of the poses
+        found.append(Evidence("depth", DEPTH[0] * scene.record.network_unit, DEPTH[1]))
+    return found
+
+
+def guessed(found: Sequence[Evidence]) -> Guess | None:
+    """The mean of logarithms by their errors, without what all others contradict; None of nothing."""
+    found = list(found)
+    while len(found) > 2 and (wrong := _contradicted(found)) is not None:
+        found.remove(wrong)
+    if not found:
+        return None
+    weights = np.array([1 / each.error**2 for each in found])
+    logs = np.array([math.log(each.metres) for each in found])
+    mean, error = float(weights @ logs / weights.sum()), float(weights.sum() ** -0.5)
+    # Where they disagree by more than they should, the guess is as uncertain as they are.
+    error *= math.sqrt(max(1.0, float(weights @ (logs - mean) ** 2) / max(1, len(found) - 1)))
+    names = sorted(found, key=lambda each: each.error)
+    low, middle, high = (math.exp(mean + step) for step in (-error, 0.0, error))
+    return Guess(middle, low, high, tuple(each.name for each in names))
+
+
+def _contradicted(found: Sequence[Evidence]) -> Evidence | None:
+    """The one without which the others agree best, where it is `_CONTRADICTED` deviations from them: what is
+    called a door may be that of a cupboard."""
+
+    def rest(one: Evidence) -> tuple[float, float, float]:
+        """Mean and deviation of the others' logarithm, and how little they agree."""
+        others = [each for each in found if each is not one]
+        weights = np.array([1 / each.error**2 for each in others])
+        logs = np.array([math.log(each.metres) for each in others])
+        mean = float(weights @ logs / weights.sum())
+        return mean, float(weights.sum() ** -0.5), float(weights @ (logs - mean) ** 2)
+
+    worst = min(found, key=lambda each: rest(each)[2])
+    mean, error, _ = rest(worst)
+    far = abs(math.log(worst.metres) - mean) > _CONTRADICTED * math.hypot(worst.error, error)
+    return worst if far else None
+
+
+def _of_ceiling(surface: Surface, heights: np.ndarray, turn: np.ndarray) -> list[Evidence]:
+    """The height of what answers "ceiling", is level, and has little above it."""
+    level = np.abs(surface.normals @ turn[1]) >= _LEVEL
+    named = surface.called("ceiling") & level & (heights > 0)
+    if named.mean() < _SHARE / 2:
+        return []
+    top = float(np.quantile(heights, 0.995))
+    high = densest(heights[named], _WINDOW * top)
+    return [Evidence("ceiling", CEILING[0] / high, CEILING[1])] if high > 0.85 * top else []
+
+
+def _of_door(scene: Scene, surface: Surface, heights: np.ndarray) -> list[Evidence]:
+    """The height of what answers "door", where it stands on the floor and ends inside a photo."""
+    named = surface.called("door")
+    if not named.any():
+        return []
+    low, high = np.quantile(heights[named], (0.03, 0.97))
+    top = surface.places[named][heights[named] >= 0.97 * high]
+    if (
+        high <= 0
+        or low > 0.12 * high
+        or not any(_inside(scene, view, top) for view in range(scene.num_views))
+    ):
+        return []
+    return [Evidence("door", DOOR[0] / float(high), DOOR[1])]
+
+
+def _inside(scene: Scene, view: int, places: np.ndarray) -> bool:
+    """Whether a photo has most of these places, and none near its border."""
+    camera = scene.camera(view)
+    viewmat, K = camera.viewmat.double().numpy(), camera.K.double().numpy()
+    pos_c = places @ viewmat[:3, :3].T + viewmat[:3, 3]
+    with np.errstate(all="ignore"):
+        pixels = (pos_c / pos_c[:, 2:]) @ K[:2].T
+    size = np.array([camera.width, camera.height])
+    well = (pos_c[:, 2] > 0) & ((pixels > _EDGE * size) & (pixels < (1 - _EDGE) * size)).all(1)
+    return bool(well.mean() > 0.9)
+
+
+def _unit(name: str, values: Sequence[float]) -> np.ndarray:
+    vector = _vector(name, values)
+    length = float(np.linalg.norm(vector))
+    if length < 1e-9:
+        raise InputError(f"{name} has no length; give a direction such as 0,-1,0")
+    return vector / length
+
+
+def _vector(name: str, values: Sequence[float]) -> np.ndarray:
+    vector = np.array(values, float)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise InputError(f"{name} takes three finite numbers; received {tuple(values)}")
+    return vector
+
+
+# Told lengths
+
+
+def measured(scene: Scene, a: Sequence[float], b: Sequence[float], metres: float) -> Scene:
+    """The scene in the unit in which two of its points are so many metres apart.
+
+    Raises:
+        InputError: it is the same point.
+    """
+    length = float(np.linalg.norm(_vector("A", a) - _vector("B", b)))
+    if length < 1e-6:
+        raise InputError("both ends of the length are one point; name two ends of what you know")
+    return scene.with_record(metric_scale=metres / length)
+
+
+def measured_by(scene: Scene, name: str, metres: float) -> Scene:
+    """The scene in the unit in which its "ceiling" or "door" is so many metres high.
+
+    Raises:
+        InputError: the scene's world is not known, or it shows no such thing from floor to top.
+    """
+    world = scene.record.world
+    if world is None:
+        raise InputError("nobody has looked how this scene stands; run langflash level first")
+    usual = {"ceiling": CEILING, "door": DOOR}[name][0]
+    found = [each for each in evidence(scene, world, surface_of(scene)) if each.name == name]
+    if not found:
+        raise InputError(
+            f"no photo shows a {name} from the floor to its top; give a length A B METRES instead"
+        )
+    return scene.with_record(metric_scale=found[0].metres * metres / usual)
+
+
+def seen_at(scene: Scene, view: int, u: float, v: float) -> tuple[float, float, float]:
+    """The scene's point that a pixel of a photo shows, at the size that the scene has views at.
+
+    Raises:
+        InputError: there is no such photo or pixel, or it shows nothing.
+    """
+    width, height = scene.view_size
+    if not 0 <= view < scene.num_views or not (0 <= u <= width and 0 <= v <= height):
+        raise InputError(
+            f"{view}:{u:g},{v:g} is no pixel of a photo; this scene has photos 0 to {scene.num_views - 1} of "
+            f"{width} x {height} pixels"
+        )
+    whole = scene.camera(view)
+    K = whole.K.clone()
+    K[0, 2], K[1, 2] = K[0, 2] - u + 0.5, K[1, 2] - v + 0.5  # its middle is the pixel of a picture of one
+    frame = render(scene, Camera(whole.viewmat, K, 1, 1), weight_maps=False)
+    if float(frame.alphas[0, 0]) < 0.5:
+        raise InputError(f"nothing is seen at pixel {u:g},{v:g} of photo {view}; name another")
+    x, y, z = world_points(frame.depths, Camera(whole.viewmat, K, 1, 1))[0, 0].tolist()
+    return x, y, z

@@ -1,0 +1,191 @@
+"""A scene cleaned up as a recipe says (`recipes.py`): which Gaussians go, and why.
+
+Sizes: N Gaussians.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float
+
+from langflash_core.errors import InputError, PromptError
+from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.geometry.harmonics import SH_C0
+from langflash_core.language.gaussians import gaussian_relevance
+from langflash_core.language.relevance import compile_query
+from langflash_core.language.spaces import language_space
+from langflash_core.scene.instances import disc_radii
+from langflash_core.scene.joining import appended
+from langflash_core.splat.visibility import seen_shares
+from langflash_core.types import Scene
+
+from .filling import fill
+from .looks import Render
+from .recipes import COLOUR, Box, Recipe, Rule
+from .strength import chosen, kind_strengths
+
+_CORE = 0.01  # share of the places on either side of each axis that the box "core" leaves outside
+_ROOM = 0.1  # of its sides by which the box "room" goes beyond core and photos
+_SEEN = 0.05  # pixels of a photo that a Gaussian makes up: it is seen there
+_ALL = "everything else"
+
+
+@dataclass(frozen=True)
+class Cleaned:
+    """rows (N,) bool: what goes. counts: how many of them for each reason, each counted once."""
+
+    rows: Bool[np.ndarray, " N"]
+    counts: Mapping[str, int]
+
+
+def cleaned(
+    scene: Scene,
+    recipe: Recipe,
+    *,
+    visible: Bool[np.ndarray, " N"] | None = None,
+    within: Bool[np.ndarray, " N"] | None = None,
+) -> Cleaned:
+    """What of a scene a recipe takes away.
+
+    Args:
+        visible: what takes part; None: all. within: where anything may go, beside the recipe's phrases.
+
+    Raises:
+        InputError: the scene does not know what a rule asks for. PromptError: no Gaussian answers the
+        phrases.
+    """
+    visible = np.ones(len(scene.gaussians), bool) if visible is None else visible
+    scope = visible if within is None else visible & within
+    if recipe.within:
+        scope = scope & answering(scene, recipe.within)
+    reasons: dict[str, Bool[np.ndarray, " N"]] = {}
+    if recipe.strength:
+        found = kind_strengths(scene, visible, recipe.kinds)
+        reasons = {kind: chosen(least, recipe.strength) for kind, least in found.items()}
+    for rule in recipe.rules:
+        reasons[_said(rule)] = _meeting(scene, rule)
+    reasons = {name: rows & scope for name, rows in reasons.items()}
+    if recipe.invert:
+        found = np.logical_or.reduce([*reasons.values(), np.zeros(len(visible), bool)])
+        reasons = {_ALL: scope & ~found}
+    if recipe.crop is not None:
+        reasons["outside the box"] = visible & ~inside(scene, box_of(scene, recipe.crop, visible))
+    return _counted(reasons, len(visible))
+
+
+def taken_out(scene: Scene, rows: Bool[np.ndarray, " N"], fill_with: Render | None = None) -> Scene:
+    """The scene without some Gaussians; with their hole filled by what is around it, where somebody draws.
+
+    Raises:
+        InputError: nothing would be left.
+    """
+    if rows.all():
+        raise InputError("nothing would be left of the scene; choose less")
+    gone = torch.from_numpy(rows)
+    left = scene.rows(~gone).with_record(num_deleted=scene.record.num_deleted + int(rows.sum()))
+    return left if fill_with is None or not rows.any() else appended(left, fill(scene, gone, fill_with))
+
+
+def answering(
+    scene: Scene, phrases: tuple[str, ...], threshold: float | None = None
+) -> Bool[np.ndarray, " N"]:
+    """Gaussians that answer one of some phrases.
+
+    Args:
+        threshold: relevancy in [0, 1]; None: the scene's calibration.
+
+    Raises:
+        PromptError: none does, or a phrase cannot be used. WeightsError: the space has no text weights.
+    """
+    compiled = compile_query(scene, language_space(scene.semantics.space), list(phrases))
+    limit = compiled.threshold if threshold is None else threshold
+    best = gaussian_relevance(scene.semantics, compiled).amax(0)
+    found = (best >= limit).cpu().numpy() & (scene.semantics.num_atoms > 0)
+    if not found.any():
+        highest = float(best.max()) if len(best) else 0.0
+        raise PromptError(
+            f"nothing in the scene answers {', '.join(phrases)} (best score {highest:.3f}, "
+            f"threshold {limit:.3f}); ask another phrase"
+        )
+    return found
+
+
+def box_of(scene: Scene, crop: str | Box, visible: Bool[np.ndarray, " N"]) -> Box:
+    """The corners of a preset: "core" holds nearly all; "room" that and the photos' places, and a little
+    more."""
+    if isinstance(crop, tuple):
+        return crop
+    means = scene.gaussians.means.detach().cpu().double().numpy()
+    shown = means[visible & np.isfinite(means).all(1)]
+    if not len(shown):
+        raise InputError("the scene holds nothing that a box could be put around; open another")
+    low, high = np.quantile(shown, _CORE, axis=0), np.quantile(shown, 1 - _CORE, axis=0)
+    if crop == "room":
+        eyes = invert_rigid(scene.viewmats.cpu().double())[:, :3, 3].numpy()
+        low, high = np.minimum(low, eyes.min(0)), np.maximum(high, eyes.max(0))
+        low, high = low - _ROOM * (high - low), high + _ROOM * (high - low)
+    (a, b, c), (d, e, f) = low.tolist(), high.tolist()
+    return a, b, c, d, e, f
+
+
+def inside(scene: Scene, box: Box) -> Bool[np.ndarray, " N"]:
+    """Gaussians whose centre is in a box."""
+    means = scene.gaussians.means.detach().cpu().double().numpy()
+    return np.all((means >= box[:3]) & (means <= box[3:]), axis=1)
+
+
+def _meeting(scene: Scene, rule: Rule) -> Bool[np.ndarray, " N"]:
+    """Gaussians of which all conditions of a rule hold."""
+    rows = np.ones(len(scene.gaussians), bool)
+    for name, limits in rule.items():
+        if name == COLOUR:
+            *shade, off = np.array(limits, float)
+            colours = 0.5 + SH_C0 * scene.gaussians.sh[:, 0].detach().cpu().double().numpy()
+            rows &= (abs(colours - shade) <= off).all(1)
+            continue
+        values, (low, high) = _measured(scene, name), limits
+        rows &= (values > (-np.inf if low is None else low)) & (values < (np.inf if high is None else high))
+    return rows
+
+
+def _measured(scene: Scene, name: str) -> Float[np.ndarray, " N"]:
+    match name:
+        case "opacity":
+            return scene.gaussians.opacities.detach().cpu().double().numpy()
+        case "size":
+            return disc_radii(scene.gaussians)
+        case "depth":
+            eyes = invert_rigid(scene.viewmats.cpu().double())[:, :3, 3]
+            return torch.cdist(scene.gaussians.means.cpu().double(), eyes).amin(1).numpy()
+        case "photos":
+            pixels = scene.view_size[0] * scene.view_size[1]
+            return (seen_shares(scene) * pixels >= _SEEN).sum(0).double().numpy()
+    if scene.confidences is None:
+        raise InputError(
+            "this scene does not say how sure its depth is; leave the condition on confidence out"
+        )
+    return scene.confidences.cpu().double().numpy()
+
+
+def _said(rule: Rule) -> str:
+    """A rule for people."""
+    parts = []
+    for name, limits in rule.items():
+        if name == COLOUR:
+            parts.append("colour")
+            continue
+        parts += [
+            f"{name} {sign} {limit:g}" for sign, limit in zip("><", limits, strict=True) if limit is not None
+        ]
+    return " and ".join(parts)
+
+
+def _counted(reasons: Mapping[str, Bool[np.ndarray, " N"]], count: int) -> Cleaned:
+    """All of them, each counted for the first reason."""
+    rows, counts = np.zeros(count, bool), {}
+    for name, found in reasons.items():
+        counts[name] = int((found & ~rows).sum())
+        rows |= found
+    return Cleaned(rows, counts)

@@ -1,0 +1,318 @@
+"""What was behind a part that was taken out: walls and floors go on as planes, under what is left around.
+
+Where the part covered a pixel and nothing is left there, is a hole. Planes are found among what the views
+show around their holes. A ray through a hole meets the planes that lie around it there; it ends at the
+nearest one that is not before what was taken away: so two walls meet in their corner. Where no plane lies
+around, depth is interpolated from the edge as 1 / z, which a plane's is linear in. What another view sees
+through is not filled.
+
+Every plane becomes a flat picture, in which holes are filled by what is around them (`texture.py`), and one
+flat Gaussian per pixel of its hole, with the weights of the nearest known pixel. Nobody saw any of it:
+confidences of what is filled are 0.
+
+Sizes: H W pixels of a view, h w of a plane's picture, n points.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Integer
+from scipy import ndimage
+from torch import Tensor
+
+from langflash_core.geometry.cameras import invert_rigid, rays, transform, unproject
+from langflash_core.geometry.harmonics import colour_to_sh
+from langflash_core.geometry.quaternions import matrices_to_quats
+from langflash_core.geometry.surfels import ellipses, spans
+from langflash_core.scene.assemble import sparse_weights
+from langflash_core.scene.joining import appended
+from langflash_core.types import Camera, Gaussians, Scene
+
+from .looks import Render, mattes
+from .planes import Plane, planes
+from .texture import healed, spread
+
+OPACITY = 0.99
+_COVER, _THIN = 0.85, 0.1  # deviation over spacing, as elements of a scene have
+_FINER, _MOST_SIDE = 2, 512  # than the views' own grid they are looked at; pixels of the longer side
+_MOST_VIEWS = 12  # with the largest holes
+_LEAST = 12  # pixels of a hole
+_RING = 0.08  # of the longer side: what counts as around
+_FAR = 0.012  # of the depth: what lies on a plane
+_SHARE, _MOST_PLANES = 0.08, 6
+_REACHED = 2.5  # times as far as the nearest surface around: so far a plane goes on
+_BEFORE = 0.97  # of the depth of what was taken away: nearer is no background
+_THROUGH = 1.05  # times as deep: there another view sees through
+_CELL = 1.4  # pixels of a view
+_MOST_CELLS = 150_000
+_GRAZING = 0.04
+
+
+@dataclass(frozen=True)
+class _View:
+    """What one photo's place shows without the part. rays (H, W, 3) in the world, z = 1 in the camera; eye
+    (3,); colours (H, W, 3); depths (H, W), 0 for nothing; before (H, W), depths with the part; hole, ring
+    (H, W); number of the photo."""
+
+    camera: Camera
+    rays: Float[np.ndarray, "H W 3"]
+    eye: Float[np.ndarray, " 3"]
+    colours: Float[np.ndarray, "H W 3"]
+    depths: Float[np.ndarray, "H W"]
+    before: Float[np.ndarray, "H W"]
+    hole: Bool[np.ndarray, "H W"]
+    ring: Bool[np.ndarray, "H W"]
+    weights: Float[np.ndarray, "H W K"] | None
+    number: int
+
+    def points(self, depths: Float[np.ndarray, "H W"]) -> Float[np.ndarray, "H W 3"]:
+        return self.eye + self.rays * depths[..., None]
+
+    def pixels(
+        self, points: Float[np.ndarray, "n 3"]
+    ) -> tuple[
+        Bool[np.ndarray, " n"], Integer[np.ndarray, " n"], Integer[np.ndarray, " n"], Float[np.ndarray, " n"]
+    ]:
+        """Whether points are in the picture, their rows, columns and depths."""
+        viewmat, K = self.camera.viewmat.double().numpy(), self.camera.K.double().numpy()
+        x, y, z = (points @ viewmat[:3, :3].T + viewmat[:3, 3]).T
+        ahead = np.where(z > 1e-9, z, np.inf)
+        columns = np.floor(x / ahead * K[0, 0] + K[0, 2])
+        rows = np.floor(y / ahead * K[1, 1] + K[1, 2])
+        height, width = self.hole.shape
+        inside = (z > 1e-9) & (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
+        return inside, np.where(inside, rows, 0).astype(int), np.where(inside, columns, 0).astype(int), z
+
+
+def fill(scene: Scene, removed: Tensor, render: Render) -> Scene:
+    """What belongs where a part was, as Gaussians of the scene's own dictionary, to be appended to what is
+    left.
+
+    Args:
+        removed: (N,) bool, the part. render: draws scenes.
+
+    Returns:
+        A scene of n >= 0 Gaussians.
+    """
+    left = scene.rows(~removed)
+    views = _views(scene, left, removed, render)
+    none = left.rows(torch.zeros(0, dtype=torch.int64))
+    if not views:
+        return none
+    flat, rest = _on_planes(views, _planes_around(views), none)
+    for view, missing in zip(views, rest, strict=True):
+        flat = appended(flat, _bent(view, missing, appended(left, flat), render, none))
+    return flat
+
+
+def _views(scene: Scene, left: Scene, removed: Tensor, render: Render) -> list[_View]:
+    cameras = [_resized(scene.camera(view)) for view in range(scene.num_views)]
+    shown = mattes(scene, removed, cameras, render)
+    order = sorted(range(len(cameras)), key=lambda view: -float(shown[view][0].sum()))[:_MOST_VIEWS]
+    found = [
+        _view(left, cameras[v], *shown[v], v, render) for v in order if float(shown[v][0].sum()) >= _LEAST
+    ]
+    return [view for view in found if view.hole.sum() >= _LEAST]
+
+
+def _resized(camera: Camera) -> Camera:
+    longer = max(camera.width, camera.height)
+    ratio = min(_FINER, max(1, _MOST_SIDE / longer))
+    return camera.resized(max(1, round(camera.width * ratio)), max(1, round(camera.height * ratio)))
+
+
+def _view(left: Scene, camera: Camera, matte: Tensor, before: Tensor, number: int, render: Render) -> _View:
+    frame = render(left, camera)
+    alphas = frame.alphas.cpu().numpy()
+    hole = ((matte.numpy() > 0.1) & (alphas < 0.5)) | ((matte.numpy() >= 0.5) & (alphas < 0.9))
+    size = 2 * max(2, round(_RING * max(hole.shape))) + 1
+    ring = (cv2.dilate(hole.astype(np.uint8), np.ones((size, size), np.uint8)) > 0) & (alphas >= 0.9) & ~hole
+    pose = invert_rigid(camera.viewmat.cpu().double())
+    ahead = rays(camera.K.cpu().double(), camera.width, camera.height) @ pose[:3, :3].T
+    straight = frame.rgb.cpu().numpy() / np.maximum(alphas, 1 / 255)[..., None]
+    return _View(
+        camera, ahead.numpy(), pose[:3, 3].numpy(), straight.clip(0, 1).astype(np.float64),
+        np.where(alphas >= 0.9, frame.depths.cpu().numpy(), 0.0).astype(np.float64),
+        before.double().numpy(), hole, ring & (frame.depths.cpu().numpy() > 0),
+        None if frame.weight_maps is None else frame.weight_maps.cpu().numpy(), number,
+    )  # fmt: skip
+
+
+def _planes_around(views: Sequence[_View]) -> list[Plane]:
+    points = np.concatenate([view.points(view.depths)[view.ring] for view in views])
+    depths = np.concatenate([view.depths[view.ring] for view in views])
+    step = max(1, len(points) // 5000)
+    return planes(points[::step], _FAR * depths[::step], share=_SHARE, most=_MOST_PLANES)
+
+
+def _on_planes(
+    views: Sequence[_View], found: Sequence[Plane], none: Scene
+) -> tuple[Scene, list[Bool[np.ndarray, "H W"]]]:
+    """The patches of all planes, and the pixels of each view's hole that no plane lies around."""
+    chosen = [_chosen(view, found) for view in views]
+    flat = none
+    for number, plane in enumerate(found):
+        spots = [
+            view.points(depth)[which == number] for view, (which, depth) in zip(views, chosen, strict=True)
+        ]
+        if sum(map(len, spots)):
+            flat = appended(flat, _patch(plane, np.concatenate(spots), views, none))
+    return flat, [view.hole & (which < 0) for view, (which, _) in zip(views, chosen, strict=True)]
+
+
+def _chosen(
+    view: _View, found: Sequence[Plane]
+) -> tuple[Integer[np.ndarray, "H W"], Float[np.ndarray, "H W"]]:
+    """The plane that each pixel of the hole shows, -1 for none, and its depth there."""
+    which, depth = np.full(view.hole.shape, -1), np.full(view.hole.shape, np.inf)
+    if not found or not view.ring.any():
+        return which, depth
+    points = view.points(view.depths)
+    apart = np.stack([abs(plane.apart(points)) for plane in found])  # (p, H, W)
+    label = np.where(view.ring & (apart.min(0) <= 2 * _FAR * view.depths), apart.argmin(0), -1)
+    any_surface = np.asarray(ndimage.distance_transform_edt(~view.ring))
+    for number, plane in enumerate(found):
+        if not (label == number).any():
+            continue
+        reach = np.asarray(ndimage.distance_transform_edt(label != number))
+        down = view.rays @ plane.normal
+        hit = (plane.offset - plane.normal @ view.eye) / np.where(abs(down) > 1e-9, down, 1e-9)
+        steep = abs(down) > _GRAZING * np.linalg.norm(view.rays, axis=-1)
+        behind = (hit > _BEFORE * np.where(view.before > 0, view.before, 0)) & (hit > 1e-6)
+        there = view.hole & steep & behind & (reach <= _REACHED * any_surface + 3) & (hit < depth)
+        which[there], depth[there] = number, hit[there]
+    return which, depth
+
+
+def _patch(plane: Plane, spots: Float[np.ndarray, "n 3"], views: Sequence[_View], none: Scene) -> Scene:
+    """One plane's hole as Gaussians. spots: where rays through holes meet it."""
+    basis, pitch, low, shape = _raster(plane, spots, views)
+    places = np.floor((spots @ basis.T - low) / pitch).astype(int)[:, ::-1].clip(0, np.array(shape) - 1)
+    hole = np.zeros(shape, bool)
+    hole[tuple(places.T)] = True
+    hole = cv2.morphologyEx(hole.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)) > 0
+    rows, columns = np.indices(shape)
+    along = low + pitch * (np.stack((columns, rows), -1) + 0.5)
+    points = along @ basis + plane.normal * plane.offset  # (h, w, 3)
+    colours, weights, known, through = _seen(points.reshape(-1, 3), views)
+    known, through = (each.reshape(shape) for each in (known, through))
+    hole &= ~known & ~through
+    if not hole.any():
+        return none
+    coloured = healed(colours.reshape(*shape, 3), known, hole)
+    nearest = np.zeros((2, *shape), int)
+    if known.any():
+        nearest = np.asarray(
+            ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
+        )
+    carried = None if weights is None else weights.reshape(*shape, -1)[nearest[0][hole], nearest[1][hole]]
+    axes = np.broadcast_to(np.stack((*basis, np.cross(*basis)), -1), (int(hole.sum()), 3, 3))
+    sizes = np.full((len(axes), 2), pitch * _COVER)
+    return _elements(none, points[hole], axes, sizes, coloured[hole], carried, views[0].number)
+
+
+def _raster(
+    plane: Plane, spots: Float[np.ndarray, "n 3"], views: Sequence[_View]
+) -> tuple[Float[np.ndarray, "2 3"], float, Float[np.ndarray, " 2"], tuple[int, int]]:
+    """Axes of a plane's picture, the side of its pixels, its low corner, and its size (h, w), with
+    surroundings."""
+    basis = plane.basis()
+    flat = spots @ basis.T
+    nearest = min(float(np.median(np.linalg.norm(spots - view.eye, axis=1))) for view in views)
+    pitch = _CELL * nearest / float(views[0].camera.K[0, 0])
+    low, high = np.quantile(flat, 0.002, axis=0), np.quantile(flat, 0.998, axis=0)
+    margin = 0.6 * float((high - low).max()) + 8 * pitch
+    low, high = low - margin, high + margin
+    pitch = max(pitch, float(np.sqrt(np.prod(high - low) / _MOST_CELLS)))
+    width, height = np.ceil((high - low) / pitch).astype(int).clip(1).tolist()
+    return basis, pitch, low, (height, width)
+
+
+def _seen(
+    points: Float[np.ndarray, "n 3"], views: Sequence[_View]
+) -> tuple[
+    Float[np.ndarray, "n 3"], Float[np.ndarray, "n K"] | None, Bool[np.ndarray, " n"], Bool[np.ndarray, " n"]
+]:
+    """Colours and weights of points where a view shows a surface just there, whether one does, and whether
+    one sees through them."""
+    colours, known, through = (
+        np.zeros((len(points), 3)),
+        np.zeros(len(points), bool),
+        np.zeros(len(points), bool),
+    )
+    weights = (
+        None if views[0].weights is None else np.zeros((len(points), views[0].weights.shape[-1]), np.float32)
+    )
+    for view in views:
+        inside, rows, columns, z = view.pixels(points)
+        depth = view.depths[rows, columns]
+        open_there = inside & ~view.hole[rows, columns] & (depth > 0)
+        through |= open_there & (depth > _THROUGH * z)
+        new = open_there & (abs(depth - z) <= 2 * _FAR * z) & ~known
+        colours[new] = view.colours[rows[new], columns[new]]
+        if weights is not None and view.weights is not None:
+            weights[new] = view.weights[rows[new], columns[new]]
+        known |= new
+    return colours, weights, known, through
+
+
+def _bent(view: _View, missing: Bool[np.ndarray, "H W"], sofar: Scene, render: Render, none: Scene) -> Scene:
+    """Pixels that no plane lies around, on a surface that runs smoothly from their edge to their edge."""
+    if missing.sum() < _LEAST:
+        return none
+    frame = render(sofar, view.camera, weight_maps=False)
+    alphas, depths = frame.alphas.cpu().numpy(), frame.depths.cpu().double().numpy()
+    missing = missing & (alphas < 0.5)
+    known = (alphas >= 0.9) & (depths > 0) & ~missing
+    if missing.sum() < _LEAST or not known.any():
+        return none
+    straight = (frame.rgb.cpu().numpy() / np.maximum(alphas, 1 / 255)[..., None]).clip(0, 1)
+    inverse = np.repeat((1 / np.maximum(depths, 1e-9))[..., None], 3, -1)
+    depth = torch.from_numpy(1 / np.maximum(spread(inverse, known)[..., 0], 1e-9))
+    points = unproject(depth, view.camera.K.cpu().double())
+    footprint = depth / float(view.camera.K[0, 0])
+    axes, sizes = ellipses(*spans(points, footprint))
+    pose = invert_rigid(view.camera.viewmat.cpu().double())
+    rows = torch.from_numpy(missing)
+    nearest = np.asarray(ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True))
+    carried = None if view.weights is None else view.weights[nearest[0][missing], nearest[1][missing]]
+    return _elements(
+        none, transform(pose, points[rows]).numpy(), (pose[:3, :3] @ axes[rows]).numpy(),
+        _COVER * sizes[rows].clamp_min(1e-6).numpy(), spread(straight, known)[missing], carried, view.number,
+    )  # fmt: skip
+
+
+def _elements(
+    none: Scene,
+    means: Float[np.ndarray, "n 3"],
+    axes: Float[np.ndarray, "n 3 3"],
+    sizes: Float[np.ndarray, "n 2"],
+    colours: Float[np.ndarray, "n 3"],
+    weights: Float[np.ndarray, "n K"] | None,
+    view: int,
+) -> Scene:
+    """Flat Gaussians with weights over the atoms of `none`, an empty scene of them."""
+    count, semantics = len(means), none.semantics
+    thin = _THIN * sizes.min(1, keepdims=True)
+    gaussians = Gaussians(
+        means=torch.from_numpy(means).float(),
+        quats=matrices_to_quats(torch.from_numpy(np.ascontiguousarray(axes))).float(),
+        scales=torch.from_numpy(np.concatenate((sizes, thin), 1)).float(),
+        opacities=torch.full((count,), OPACITY),
+        sh=colour_to_sh(torch.from_numpy(colours))[:, None].float(),
+    )
+    most = semantics.weight_ids.shape[1]
+    ids, values = torch.zeros(count, most, dtype=torch.int64), torch.zeros(count, most)
+    if weights is not None and most and semantics.num_atoms:
+        ids, values = sparse_weights(torch.from_numpy(weights), most)
+    return replace(
+        none,
+        gaussians=gaussians,
+        semantics=replace(semantics, weight_ids=ids, weight_values=values),
+        view_ids=None if none.view_ids is None else torch.full((count,), view),
+        levels=None if none.levels is None else torch.zeros(count, dtype=torch.uint8),
+        confidences=None if none.confidences is None else torch.zeros(count),
+    )

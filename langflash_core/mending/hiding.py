@@ -1,0 +1,194 @@
+"""A part of a scene hidden for good: blurred, as pixels, or taken out, in its Gaussians and in its photos.
+
+1. Where photos show the part, and a margin around it, is its mask. All Gaussians that lie there, no farther
+   than what the view shows, belong to the rim and are hidden with the part: colours of a thing run over its
+   edge. So do all that this photo made there, also behind the part, where nobody saw anything.
+2. They become blocks (`coarse.py`), or go, and what was behind them is filled in (`filling.py`).
+3. Photos get what the scene shows now, in all of their masks (`photos.py`).
+4. What nobody needs any more goes: atoms that nothing carries, names that people gave to what was hidden, and
+   what a newer version put beside the scene.
+
+Sizes: N Gaussians, V views.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from langflash_core.errors import InputError
+from langflash_core.geometry.cameras import pictured
+from langflash_core.scene.instances import instances
+from langflash_core.scene.joining import appended
+from langflash_core.scene.prune import sparser
+from langflash_core.types import Camera, Scene
+
+from .coarse import coarsened
+from .filling import fill
+from .looks import Progress, Render, mattes
+from .photos import grown, painted_over, with_photos, without_photos
+
+How = Literal["blur", "pixels", "remove"]
+BLOCKS, MOST_BLOCKS = 6.0, 16.0
+MARGIN, MOST_MARGIN = 0.02, 0.25
+_MATTE = 0.02  # of a pixel's light: a photo shows the part from there on
+_BESIDE = 1.03  # times as deep as what a view shows: still that surface
+_OWN = 0.5  # of an atom's opacity in what is hidden: a name of it may say who that was
+
+
+@dataclass(frozen=True)
+class Hiding:
+    """How a part is hidden. blocks: along its longest side. margin: around it in photos, of their longer
+    side. photos: painted over; else left out. filled: of what is removed, what was behind it.
+
+    Raises:
+        InputError: out of range.
+    """
+
+    how: How = "blur"
+    blocks: float = BLOCKS
+    margin: float = MARGIN
+    photos: bool = True
+    filled: bool = True
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.blocks <= MOST_BLOCKS:
+            raise InputError(f"{self.blocks:g} blocks do not hide it; choose 1 to {MOST_BLOCKS:g}")
+        if not 0 <= self.margin <= MOST_MARGIN:
+            raise InputError(f"a margin of {self.margin:g} is out of range; choose 0 to {MOST_MARGIN:g}")
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """What was done. members: Gaussians of the part; rim: of its margin; made: in their place. side: of a
+    block, scene units, 0 where none are. photos: share of the pixels painted over, by view, of those that
+    were. names: that people gave and that went. unknown: keys of what is not known and went."""
+
+    how: How
+    members: int
+    rim: int
+    made: int
+    side: float
+    photos: Mapping[int, float]
+    photos_left_out: bool
+    names: tuple[str, ...]
+    unknown: tuple[str, ...]
+
+    def document(self) -> dict[str, Any]:
+        """Plain JSON values."""
+        return {**vars(self), "photos": {str(view): round(share, 4) for view, share in self.photos.items()}}
+
+
+def hide(
+    scene: Scene,
+    members: Tensor,
+    render: Render,
+    hiding: Hiding | None = None,
+    progress: Progress | None = None,
+) -> tuple[Scene, Hidden]:
+    """The scene with a part hidden so that it cannot be brought back, and what was done.
+
+    Args:
+        members: (N,) bool, the part. render: draws scenes. hiding: None: the usual.
+
+    Raises:
+        InputError: nothing is to be hidden. SceneFileError: a photo cannot be read.
+    """
+    hiding, told = hiding or Hiding(), progress or (lambda stage, share: None)
+    members = members.cpu()
+    if not bool(members.any()):
+        raise InputError("nothing was chosen to be hidden; name or select something that is there")
+    told("looking", 0.1)
+    masks, rows = _masked(scene, members, hiding.margin, render)
+    side = 0.0 if hiding.how == "remove" else _block_side(scene, members, hiding.blocks)
+    told("hiding", 0.3)
+    kept, names = _unnamed(scene, rows)
+    kept = kept.rows(~rows)
+    if hiding.how != "remove":
+        made = coarsened(scene.rows(rows), side, squares=hiding.how == "pixels")
+    elif hiding.filled:
+        made = fill(scene, rows, render)
+    else:
+        made = kept.rows(torch.zeros(0, dtype=torch.int64))
+    done = appended(kept, made).with_record(others={})
+    told("photos", 0.6)
+    done, shares = _with_photos(done, masks, hiding, render)
+    report = Hidden(
+        hiding.how, int(members.sum()), int(rows.sum() - members.sum()), len(made.gaussians), side, shares,
+        bool(scene.photos) and not hiding.photos, names, tuple(scene.record.others),
+    )  # fmt: skip
+    return sparser(done), report
+
+
+def preview(scene: Scene, members: Tensor, render: Render, margin: float = MARGIN) -> Tensor:
+    """(N,) bool: all Gaussians that `hide` would change."""
+    return _masked(scene, members.cpu(), margin, render)[1]
+
+
+def _masked(scene: Scene, members: Tensor, margin: float, render: Render) -> tuple[list[np.ndarray], Tensor]:
+    """Masks (H, W) of the part in all views, and (N,) bool of what is hidden with it."""
+    cameras = [scene.camera(view) for view in range(scene.num_views)]
+    rows, means, masks = members.clone(), scene.gaussians.means.cpu(), []
+    for camera, (matte, depths) in zip(cameras, mattes(scene, members, cameras, render), strict=True):
+        shown = (matte >= _MATTE).numpy()
+        mask = grown(shown, margin) if shown.any() else shown
+        masks.append(mask)
+        if mask.any():
+            inside, near = _lying_in(means, camera, torch.from_numpy(mask), depths)
+            own = torch.zeros_like(near) if scene.view_ids is None else scene.view_ids.cpu() == len(masks) - 1
+            rows |= inside & (near | own)
+    return masks, rows
+
+
+def _lying_in(means: Tensor, camera: Camera, mask: Tensor, depths: Tensor) -> tuple[Tensor, Tensor]:
+    """(N,) bool each: places in a view's mask (H, W); and those no farther than what it shows there (H,
+    W)."""
+    columns, lines, z = pictured(camera.viewmat.cpu(), camera.K.cpu(), means.T)
+    height, width = mask.shape
+    x, y = columns.floor(), lines.floor()
+    inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    pixels = torch.where(inside, y * width + x, 0).long()
+    shown = depths.flatten()[pixels]
+    return inside & mask.flatten()[pixels], (shown * _BESIDE >= z) | (shown <= 0)
+
+
+def _block_side(scene: Scene, members: Tensor, blocks: float) -> float:
+    """Scene units: the longest side of the largest connected thing of the part, over so many blocks."""
+    numbers = instances(scene.gaussians, members.numpy())
+    largest = torch.from_numpy(numbers == 1) if (numbers == 1).any() else members
+    means = scene.gaussians.means[largest].double()
+    low, high = means.quantile(0.02, dim=0), means.quantile(0.98, dim=0)
+    longest = float((high - low).max())
+    return max(longest / blocks, 2 * float(scene.gaussians.scales[largest].max()), 1e-6)
+
+
+def _unnamed(scene: Scene, rows: Tensor) -> tuple[Scene, tuple[str, ...]]:
+    """The scene without names and denials that people gave to atoms that mostly lie in what is hidden."""
+    record, semantics = scene.record, scene.semantics
+    told = {*record.atom_names, *record.atom_denials}
+    shares = semantics.weight_values * scene.gaussians.opacities[:, None]
+    sums = torch.zeros(2, semantics.num_atoms + 1)
+    for place, some in enumerate((rows, torch.ones_like(rows))):
+        sums[place].index_add_(0, semantics.weight_ids[some].flatten(), shares[some].flatten().float())
+    gone = {k for k in told if float(sums[0, k]) >= _OWN * float(sums[1, k])}
+    names = tuple(record.atom_names[k] for k in sorted(gone) if k in record.atom_names)
+    cleared = replace(
+        record,
+        atom_names={k: name for k, name in record.atom_names.items() if k not in gone},
+        atom_denials={k: said for k, said in record.atom_denials.items() if k not in gone},
+    )
+    return replace(scene, record=cleared), names
+
+
+def _with_photos(
+    scene: Scene, masks: list[np.ndarray], hiding: Hiding, render: Render
+) -> tuple[Scene, dict[int, float]]:
+    """The scene with photos painted over, or without any; and the share of each that was."""
+    if not scene.photos or not hiding.photos:
+        return without_photos(scene) if scene.photos else scene, {}
+    shares = {view: float(mask.mean()) for view, mask in enumerate(masks) if mask.any()}
+    photos = {view: painted_over(scene, view, masks[view], render) for view in shares}
+    return with_photos(scene, photos), shares

@@ -1,0 +1,89 @@
+"""Photos inside a scene, painted over where they show a part: with what the scene itself shows there now.
+
+Nothing of the old pixels goes into the new ones, so what the scene no longer holds, no photo does. A photo
+that shows nothing of the part keeps its bytes; the others are written anew, without any data beside their
+pixels.
+
+Sizes: H W pixels of a view, h w of its photo.
+"""
+
+import io
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Bool, UInt8
+from PIL import Image
+
+from langflash_core.errors import SceneFileError
+from langflash_core.picture_files import STORED, opened_picture
+from langflash_core.scene.gaps import filled
+from langflash_core.types import Frame, Scene
+
+from .looks import Render
+
+QUALITY = 90  # of JPEG
+_ROUNDED = 0.2  # of a blurred mask: it grows a little, and loses the corners of its pixels
+
+
+def grown(mask: Bool[np.ndarray, "H W"], margin: float) -> Bool[np.ndarray, "H W"]:
+    """The mask with all within a margin of it, as a share of the longer side; two pixels at least."""
+    reach = max(2, round(margin * max(mask.shape)))
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    return cv2.dilate(mask.astype(np.uint8), disc) > 0
+
+
+def painted_over(scene: Scene, view: int, mask: Bool[np.ndarray, "H W"], render: Render) -> bytes:
+    """A photo with what the scene shows in its place where the mask is, as JPEG.
+
+    Args:
+        scene: as it is to be written. mask: of the view.
+
+    Raises:
+        SceneFileError: the photo cannot be read.
+    """
+    photo = _decoded(scene.photos[view], view)
+    height, width = photo.shape[:2]
+    covered = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
+    covered = cv2.GaussianBlur((covered > 0).astype(np.float32), (0, 0), width / mask.shape[1]) > _ROUNDED
+    shown = _in_its_light(
+        _shown(render(scene, scene.camera(view, width, height), weight_maps=False)), scene, view
+    )
+    painted = np.where(covered[..., None], shown, photo)
+    stream = io.BytesIO()
+    Image.fromarray(painted).save(stream, "JPEG", quality=QUALITY)
+    return stream.getvalue()
+
+
+def with_photos(scene: Scene, photos: dict[int, bytes]) -> Scene:
+    """The scene with other photos in some views."""
+    return replace(scene, photos=tuple(photos.get(view, photo) for view, photo in enumerate(scene.photos)))
+
+
+def without_photos(scene: Scene) -> Scene:
+    """The scene without photos and their names."""
+    return replace(scene, photos=()).with_record(photos=())
+
+
+def _decoded(photo: bytes, view: int) -> UInt8[np.ndarray, "h w 3"]:
+    try:
+        with opened_picture(photo, STORED) as opened:
+            return np.asarray(opened.convert("RGB"))
+    except (OSError, SyntaxError, ValueError) as error:
+        raise SceneFileError(
+            f"photo {view} inside the scene is damaged; leave all photos out with --photos none"
+        ) from error
+
+
+def _shown(frame: Frame) -> torch.Tensor:
+    """(h, w, 3), its gaps filled by what is around them."""
+    return filled(frame.rgb.cpu().float(), frame.alphas.cpu().float())
+
+
+def _in_its_light(shown: torch.Tensor, scene: Scene, view: int) -> UInt8[np.ndarray, "h w 3"]:
+    """Colours as this photo has them: before all photos were brought to one light."""
+    light = scene.record.light
+    if light:
+        shown = (shown - torch.tensor(light["offsets"][view])) / torch.tensor(light["gains"][view])
+    return (shown.clamp(0, 1) * 255).round().byte().numpy()

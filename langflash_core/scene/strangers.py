@@ -1,0 +1,266 @@
+"""What one photo shows and the others do not: somebody who walks through, a screen whose picture changes,
+what a mirror shows.
+
+Each of the other photos says what a photo should show: its points, in its colours, are carried there. A cell
+is contradicted where two others and more foresee one colour at one depth, not before what the photo sees, and
+the photo shows another colour; and not where half as many others see what it sees. They must look at the
+place where the photo has its surface, or through it: a near thing that they do not have before them they
+cannot deny. Colours are compared with all that lies within `_AROUND` cells, both ways, so that poses and
+depths which are a pixel or two off say nothing. Small and loose parts are no regions; a region then goes on
+through what the others see through, and a little further, over blurred borders and what a thing shades.
+
+A thing whose depth is wrong is foreseen at the wrong place, too. So a region is left out only if most of
+those others show it nowhere along its rays. What is left out was foreseen by others: nothing stays uncovered.
+
+Sizes: V views, U others, H W pixels of the grid, h w cells of `_CELL` x `_CELL` pixels.
+
+Source: own derivation; change against what other pictures foresee: Palazzolo and Stachniss 2018, "Fast
+image-based geometric change detection given a 3D model".
+"""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import scipy.ndimage
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+from torch.nn import functional as F
+
+from langflash_core.geometry.cameras import invert_rigid, pictured, unproject
+from langflash_core.scene.consistency import witnesses
+
+LEAST = 3
+"""Photos, from which on two may contradict one."""
+_CELL = 2  # pixels a side
+_AROUND = 3  # cells a side of the window in which colours may lie
+_OTHER = 0.1  # sRGB, beyond all colours around, from which it is another colour
+_ALIKE = 0.1  # sRGB and log depth, within which others foresee one thing
+_THROUGH = 0.12  # log depth by which a surface lies behind another
+_VOTES = 2
+_WINDOW, _FULL = 5, 0.6  # cells a side, and the share of them that is contradicted inside a region
+_SMALLEST = 0.004  # of a photo
+_FARTHEST = 24  # cells, by which a region may go on
+_MARGIN = 2  # cells beyond its border
+_NEAR, _LIKE = 3, 0.06  # pixels a side of the window, and sRGB, within which a pixel is found again
+_FOUND = 0.5  # of a region's pixels, at one depth
+_DENIES = 0.5  # of a region, that another photo must look at or through to deny it
+_IN_VIEW = 0.3  # of a region, that another photo must have before it to say anything
+_LEAST_DEPTH = 1e-6  # unit of the depths
+_SQUARE = np.ones((3, 3), bool)
+_DEPTHS = (*(k / 20 for k in range(-12, 13)), 0.8, 1.1, 1.6, 2.5)
+"""Log depths, by which a region is moved: what is seen through a window or in a mirror is far."""
+
+
+def strangers(
+    images: Float[Tensor, "V 3 H W"],
+    depths: Float[Tensor, "V H W"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+) -> Bool[Tensor, "V H W"]:
+    """Pixels of each photo that the others contradict.
+
+    Args:
+        images: in [0, 1], in one light. depths: z > 0, finite. viewmats: of photos whose place is known. Ks:
+            pixels.
+
+    Returns:
+        Nothing of fewer than `LEAST` photos, and nothing of what fewer than two others foresee.
+    """
+    found = torch.zeros_like(depths, dtype=torch.bool)
+    if len(images) < LEAST or min(depths.shape[1:]) < _CELL * _WINDOW:
+        return found
+    looks = [_Look.of(*own) for own in zip(images, depths, viewmats, Ks, strict=True)]
+    for view, own in enumerate(looks):
+        size = (depths.shape[1], depths.shape[2])
+        others = [looks[other] for other in witnesses(view, own.points(), viewmats, Ks, size)]
+        if len(others) < _VOTES:
+            continue
+        said = _Foreseen.together([other.foreseen(own) for other in others])
+        faced = torch.stack([other.faces(own) for other in others])
+        contradicted, through = _contradicted(own, said, faced)
+        seeds = [seed for seed in _seeds(contradicted) if not _elsewhere(seed, own, others, faced)]
+        if seeds:
+            found[view] = _at_size(_grown(torch.stack(seeds).any(0), through | contradicted), found[view])
+    return found
+
+
+@dataclass(frozen=True)
+class _Look:
+    """A photo: image (3, H, W), depths (H, W), camera; and of its cells depth (h, w), the nearest in each,
+    colour, and least and most (3, h, w) within `_AROUND` of them."""
+
+    image: Tensor
+    depths: Tensor
+    viewmat: Tensor
+    K: Tensor
+    depth: Tensor
+    colour: Tensor
+    least: Tensor
+    most: Tensor
+
+    @staticmethod
+    def of(image: Tensor, depths: Tensor, viewmat: Tensor, K: Tensor) -> "_Look":
+        height, width = depths.shape
+        whole = (slice(None), slice(height // _CELL * _CELL), slice(width // _CELL * _CELL))
+        cut, side, reach = image[whole], _AROUND * _CELL, (_AROUND - 1) // 2 * _CELL
+        least, most = (
+            sign * F.max_pool2d(F.pad(sign * cut, (reach,) * 4, value=-torch.inf), side, _CELL)
+            for sign in (-1, 1)
+        )
+        depth = -F.max_pool2d(-depths[None][whole], _CELL)[0]
+        return _Look(image, depths, viewmat, K, depth, F.avg_pool2d(cut, _CELL), least, most)
+
+    @property
+    def centre(self) -> Tensor:
+        """(3, 1) world."""
+        return invert_rigid(self.viewmat)[:3, 3:]
+
+    def points(self, pixels: Tensor | slice = slice(None)) -> Tensor:
+        """(3, n) world, of some pixels by number."""
+        pose = invert_rigid(self.viewmat)
+        return pose[:3, :3] @ unproject(self.depths, self.K).flatten(0, 1)[pixels].T + pose[:3, 3:]
+
+    def pixels(self, cells: Tensor) -> Tensor:
+        """Numbers (n,) of a pixel in each of some cells (h, w) bool."""
+        rows, columns = cells.nonzero().T
+        return (rows * _CELL + _CELL // 2) * self.image.shape[2] + columns * _CELL + _CELL // 2
+
+    def before(self, points: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Rows and columns (n,) of the pixels where points (3, n) of the world are seen, z, and whether they
+        are."""
+        x, y, z = pictured(self.viewmat, self.K, points)
+        height, width = (_CELL * side for side in self.depth.shape)
+        inside = (z > _LEAST_DEPTH) & (x >= 0) & (y >= 0) & (x < width) & (y < height)
+        return torch.where(inside, y, 0.0).long(), torch.where(inside, x, 0.0).long(), z, inside
+
+    def foreseen(self, other: "_Look") -> "_Foreseen":
+        """What this photo says that another one shows."""
+        rows, columns, z, inside = other.before(self.points())
+        (height, width), some = other.depth.shape, inside.nonzero()[:, 0]
+        places, z = (rows // _CELL * width + columns // _CELL)[some], z[some]
+        nearest = z.new_full((height * width,), torch.inf).scatter_reduce(0, places, z, "amin")
+        front = z < (1 + _ALIKE) * nearest[places]
+        some, places = some[front], places[front]
+        at_row, at_column = (some // self.image.shape[2] // _CELL, some % self.image.shape[2] // _CELL)
+        own = at_row.clamp(max=self.depth.shape[0] - 1), at_column.clamp(max=self.depth.shape[1] - 1)
+        colours = torch.cat((self.image.flatten(1)[:, some], self.least[:, *own], self.most[:, *own]))
+        sums = z.new_zeros(9, height * width).index_add_(1, places, colours)
+        means = sums / torch.bincount(places, minlength=height * width).clamp_min(1)
+        return _Foreseen(nearest.view(height, width), *means.view(3, 3, height, width))
+
+    def faces(self, other: "_Look") -> Tensor:
+        """(h, w) bool: cells of another photo whose surface this one sees or looks through."""
+        points = other.points(other.pixels(torch.ones_like(other.depth, dtype=torch.bool)))
+        rows, columns, z, inside = self.before(points)
+        return (inside & (z < math.exp(_THROUGH) * self.depth[rows // _CELL, columns // _CELL])).view_as(
+            other.depth
+        )
+
+    def shows(self, other: "_Look", pixels: Tensor) -> float:
+        """The largest share of another photo's pixels (n,) that this one shows, wherever along their rays all
+        of them lie; NaN where it has them nowhere before it."""
+        rays, colours = other.points(pixels) - other.centre, other.image.flatten(1)[:, pixels]
+        least, most = (
+            sign * F.max_pool2d(sign * self.image, _NEAR, 1, _NEAR // 2).flatten(1) for sign in (-1, 1)
+        )
+        best = math.nan
+        for change in _DEPTHS:
+            rows, columns, _, inside = self.before(other.centre + math.exp(change) * rays)
+            if float(inside.float().mean()) < _IN_VIEW:
+                continue
+            places = (rows * self.image.shape[2] + columns)[inside]
+            off = _beyond(colours[:, inside], least[:, places], most[:, places]).amax(0)
+            best = np.fmax(best, float((off < _LIKE).float().mean()))
+        return float(best)
+
+
+@dataclass(frozen=True)
+class _Foreseen:
+    """What photos say of another's cells. depth: (*U, h, w), endless where they say nothing. colour, least,
+    most: (*U, 3, h, w)."""
+
+    depth: Tensor
+    colour: Tensor
+    least: Tensor
+    most: Tensor
+
+    @staticmethod
+    def together(some: "list[_Foreseen]") -> "_Foreseen":
+        names = ("depth", "colour", "least", "most")
+        return _Foreseen(*(torch.stack([getattr(one, name) for one in some]) for name in names))
+
+
+def _contradicted(own: _Look, said: _Foreseen, faced: Tensor) -> tuple[Tensor, Tensor]:
+    """(h, w) bool: cells where others foresee another colour; and those that they see through. faced: (U, h,
+    w) bool, where they look."""
+    told = torch.isfinite(said.depth) & faced
+    gap = said.depth.log() - own.depth.log()  # > 0: they see something behind
+    outside = torch.maximum(
+        _beyond(said.colour, own.least, own.most).amax(1), _beyond(own.colour, said.least, said.most).amax(1)
+    )  # (U, h, w)
+    other = told & (gap > -_THROUGH) & (outside > _OTHER)
+    one = other & _as_most(other, said)
+    votes, same = one.sum(0), (told & (outside <= _OTHER) & (gap.abs() < _THROUGH)).sum(0)
+    through = (told & (gap > _THROUGH)).sum(0)
+    return (votes >= _VOTES) & (votes >= 2 * same), (through >= _VOTES) & (through > 2 * same)
+
+
+def _beyond(colours: Tensor, least: Tensor, most: Tensor) -> Tensor:
+    """By how much colours leave a range."""
+    return torch.maximum(colours - most, least - colours).clamp_min(0)
+
+
+def _as_most(other: Tensor, said: _Foreseen) -> Tensor:
+    """(U, h, w) bool: whose colour and depth are about the median of all that contradict."""
+    nothing = torch.where(other, 0.0, torch.nan)
+    colour = (said.colour + nothing[:, None]).nanmedian(0).values
+    depth = (said.depth.log() + nothing).nanmedian(0).values
+    alike = (said.colour - colour).abs().amax(1) < _ALIKE
+    return alike & ((said.depth.log() - depth).abs() < _ALIKE)
+
+
+def _seeds(contradicted: Tensor) -> list[Tensor]:
+    """Regions (h, w) bool of what is contradicted as a whole."""
+    full = F.avg_pool2d(contradicted[None, None].float(), _WINDOW, 1, _WINDOW // 2)[0, 0] > _FULL
+    inside = _wider(full, _WINDOW // 2) & contradicted
+    count, numbers = cv2.connectedComponents(inside.cpu().numpy().astype(np.uint8))
+    sizes = np.bincount(numbers.ravel(), minlength=count)
+    large = [k for k in range(1, count) if sizes[k] >= _SMALLEST * numbers.size]
+    return [torch.from_numpy(numbers == k).to(contradicted.device) for k in large]
+
+
+def _elsewhere(seed: Tensor, own: _Look, others: list[_Look], faced: Tensor) -> bool:
+    """Whether half of the others that could deny a region (h, w) show it somewhere along its rays."""
+    pixels = own.pixels(seed)
+    shares = [
+        other.shows(own, pixels)
+        for other, cells in zip(others, faced, strict=True)
+        if float(cells[seed].float().mean()) > _DENIES
+    ]
+    return bool(np.isfinite(shares).any() and np.nanmedian(shares) >= _FOUND)
+
+
+def _grown(seeds: Tensor, may: Tensor) -> Tensor:
+    """(h, w) bool: seeds, what goes on from there, holes and a margin."""
+    grown = scipy.ndimage.binary_dilation(
+        seeds.cpu().numpy(), _SQUARE, _FARTHEST, (may | seeds).cpu().numpy()
+    )
+    closed = scipy.ndimage.binary_closing(np.pad(grown, _WINDOW), _SQUARE, 2)[
+        _WINDOW:-_WINDOW, _WINDOW:-_WINDOW
+    ]
+    return _wider(torch.from_numpy(scipy.ndimage.binary_fill_holes(closed)).to(seeds.device), _MARGIN)
+
+
+def _wider(mask: Tensor, cells: int) -> Tensor:
+    return F.max_pool2d(mask[None, None].float(), 2 * cells + 1, 1, cells)[0, 0] > 0
+
+
+def _at_size(cells: Tensor, like: Tensor) -> Tensor:
+    """Cells (h, w) as pixels (H, W); the last row and column go on where a side is no whole number of
+    cells."""
+    pixels = cells.repeat_interleave(_CELL, 0).repeat_interleave(_CELL, 1)
+    missing = (like.shape[0] - pixels.shape[0], like.shape[1] - pixels.shape[1])
+    return F.pad(pixels[None, None].float(), (0, missing[1], 0, missing[0]), mode="replicate")[0, 0] > 0

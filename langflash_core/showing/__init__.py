@@ -1,0 +1,1 @@
+"""Scenes as they are shown to others: tours of files, and scenes in notebooks."""

@@ -1,0 +1,90 @@
+"""`langflash level` and `export --upright`."""
+
+import numpy as np
+import pytest
+
+from langflash_core.export import read
+from langflash_core.scene.file import load, save
+from tests.boxroom import METRES, box_room
+
+
+@pytest.fixture(scope="module")
+def room_file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("room") / "room.langflash"
+    save(box_room(), path)
+    return path
+
+
+def test_it_says_how_a_scene_stands_and_keeps_it(run, room_file, tmp_path):
+    out = tmp_path / "new" / "level.langflash"
+    done = run("level", room_file, "-o", out)
+    assert done.code == 0, done.err
+    assert "on its floor" in done.out and "a guess from door and ceiling" in done.out
+    world = load(out).record.world
+    assert world is not None and world.guess is not None and load(out).record.metric_scale is None
+    told = run("info", out)
+    assert "world: up as surfaces tell it" in told.out
+    assert run("info", "--json", out).json()["world"]["floor_by"] == "floor"
+    again = run("level", room_file, "--json").json()
+    assert again["world"]["turn"] == list(world.turn) and again["metric_scale"] is None
+
+
+def test_a_known_length_puts_metres_into_the_scene(run, room_file, tmp_path):
+    out = tmp_path / "level.langflash"
+    done = run("level", room_file, "--ceiling", "2.6", "-o", out)
+    assert done.code == 0 and "as you told it" in done.out
+    assert load(out).record.metric_scale == pytest.approx(METRES, rel=0.02)
+    done = run("level", room_file, "--length", "0,0,0", "0,0,1.5", "3", "--json")
+    assert done.json()["metric_scale"] == pytest.approx(2.0)
+    done = run("level", room_file, "--length", "0:20,30", "0:70,30", "3", "--json")
+    assert done.json()["metric_scale"] > 0
+
+
+def test_an_upright_export_stands_level_in_metres_in_every_kind_of_file(run, room_file, tmp_path):
+    level = tmp_path / "level.langflash"
+    assert run("level", room_file, "--ceiling", "2.6", "-o", level).code == 0
+    for name in ("room.ply", "room.langflash", "room.splat", "room.glb", "room.spz", "room.sog"):
+        done = run("export", level, "--upright", "-o", tmp_path / name)
+        assert done.code == 0, done.err
+        heights = -read(tmp_path / name).gaussians.means[:, 1].numpy()
+        assert abs(np.quantile(heights, 0.005)) < 0.08 and abs(np.quantile(heights, 0.995) - 2.6) < 0.08
+    plain, stood = tmp_path / "plain.ply", tmp_path / "after.ply"
+    assert run("export", room_file, "-o", plain).code == run("export", level, "-o", stood).code == 0
+    assert plain.read_bytes() == stood.read_bytes()  # the world is beside the Gaussians, not in them
+    assert read(stood).record.world == load(level).record.world  # and in the language beside them
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--length", "0,0,0", "0,0,0", "2"), "one point"),
+        (("--length", "0,0", "0,0,1", "2"), "points"),
+        (("--length", "0,0,0", "0,0,1", "long"), "metres"),
+        (("--length", "9:1,1", "0,0,1", "2"), "no pixel"),
+        (("--up", "0,0,0"), "no length"),
+        (("--up", "0,1"), "three numbers"),
+        (("--ceiling", "-1"), "above 0"),
+    ],
+)
+def test_bad_words_are_one_sentence_and_nothing_is_written(run, room_file, tmp_path, words, said):
+    out = tmp_path / "level.langflash"
+    done = run("level", room_file, *words, "-o", out)
+    assert done.code == 2 and said in done.err and done.err.count("\n") == 1
+    assert not out.exists()
+
+
+def test_upright_needs_a_world_and_a_file_of_gaussians(run, room_file, tmp_path):
+    done = run("export", room_file, "--upright", "-o", tmp_path / "room.ply")
+    assert done.code == 2 and "langflash level" in done.err and not (tmp_path / "room.ply").exists()
+    done = run("export", room_file, "--upright", "-o", tmp_path / "room.png")
+    assert done.code == 2 and "--upright is for" in done.err
+
+
+def test_it_may_be_kept_in_the_scene_itself(run, room_file, tmp_path):
+    own = tmp_path / "own.langflash"
+    own.write_bytes(room_file.read_bytes())
+    assert run("level", own, "-o", own).code == 0 and load(own).record.world is not None
+    splats = tmp_path / "own.ply"
+    assert run("export", own, "-o", splats).code == 0
+    before = splats.read_bytes()
+    assert run("level", splats, "-o", splats).code == 2 and splats.read_bytes() == before

@@ -1,0 +1,105 @@
+"""`langflash words` and `query --scenes`: what one scene was taught, asked of others."""
+
+import csv
+import json
+from dataclasses import replace
+
+import pytest
+from PIL import Image
+
+from app.cli.survey import scene_files
+from langflash_core.errors import InputError
+from langflash_core.language.lessons import read_lessons
+from langflash_core.scene.file import load, save
+from tests.app.cli.conftest import HEIGHT, WIDTH, striped_photo, stripes
+
+TORCH = ("--backend", "torch")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Two photographed scenes, of which the first was taught, one without photos, and a broken one."""
+    root = tmp_path_factory.mktemp("scenes")
+    first = replace(stripes(), photos=(striped_photo(0), striped_photo(1)))
+    names = replace(first.record, atom_names={0: "heirloom"}, atom_denials={2: ("wooden floor",)})
+    save(replace(first, record=names), root / "first.langflash")
+    save(replace(stripes(), photos=(striped_photo(2), striped_photo(3))), root / "second.langflash")
+    save(stripes(), root / "third.langflash")
+    (root / "deep").mkdir()
+    (root / "deep" / "broken.langflash").write_bytes(b"no scene")
+    return root
+
+
+def test_what_one_scene_was_taught_another_takes(run, folder, tmp_path):
+    words, taught = tmp_path / "mine.words.json", tmp_path / "taught.langflash"
+    learned = run("words", "learn", folder / "first.langflash", folder / "third.langflash", "-o", words)
+    assert learned.code == 0 and "learned 2" in learned.out, learned.err
+    again = run("words", "learn", folder / "first.langflash", "-o", words, "--json").json()
+    assert again["learned"] == 2 and again["words"] == 2 == len(read_lessons(words))  # not twice
+    assert "heirloom" in run("words", "list", words).out
+
+    told = run("words", "teach", folder / "second.langflash", words, "-o", taught, "--json")
+    assert told.code == 0, told.err
+    groups = {group["group"]: group for group in told.json()["groups"]}
+    assert groups[0]["name"] == "heirloom" and groups[2]["denied"] == ["wooden floor"] and 1 not in groups
+    assert load(taught).record.atom_names == {0: "heirloom"}
+
+    asked = ("query", folder / "second.langflash", "heirloom", "-o", tmp_path / "out", "--json", *TORCH)
+    before, after = run(*asked).json(), run(*asked, "--words", words).json()
+    assert not before["prompts"][0]["found"] and after["prompts"][0]["found"]
+
+
+def test_nothing_taught_or_no_photo_is_one_sentence_and_writes_nothing(run, folder, tmp_path):
+    words = tmp_path / "mine.words.json"
+    for outcome in (
+        run("words", "learn", folder / "second.langflash", "-o", words),
+        run("words", "learn", folder / "first.langflash", "-o", tmp_path / "mine.txt"),
+    ):
+        assert outcome.code == 2 and len(outcome.err.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+    run("words", "learn", folder / "first.langflash", "-o", words)
+    outcome = run("words", "teach", folder / "third.langflash", words, "-o", tmp_path / "no.langflash")
+    assert outcome.code == 2 and "no photos" in outcome.err and not (tmp_path / "no.langflash").exists()
+
+
+def test_phrases_of_many_scenes_in_one_table(run, folder, tmp_path):
+    phrases, out = tmp_path / "phrases.txt", tmp_path / "out"
+    phrases.write_text("submarine\n\n# not this\narmchair\n")
+    outcome = run("query", "--scenes", folder, "--prompts", phrases, "-o", out, "--json", *TORCH)
+    assert outcome.code == 0, outcome.err
+    assert outcome.err.count("\n") == 1 and "deep/broken was left out" in outcome.err
+    document = json.loads((out / "answers.json").read_text())
+    assert {key: outcome.json()[key] for key in document} == document
+    chair = document["prompts"][1]
+    assert chair["prompt"] == "armchair" and sum(one["found"] for one in chair["scenes"]) == 3
+    scores = [one["score"] for one in chair["scenes"]]
+    assert scores == sorted(scores, reverse=True)
+    rows = list(csv.DictReader((out / "answers.csv").read_text().splitlines()))
+    assert len(rows) == 6 and [row["found"] for row in rows] == ["no"] * 3 + ["yes"] * 3
+    for row in rows:
+        with Image.open(out / row["picture"]) as picture:
+            assert picture.size == (WIDTH, HEIGHT)
+    page = (out / "index.html").read_text()
+    assert "armchair: found in 3 of 3" in page and "submarine: found in 0 of 3" in page
+    assert "deep/broken" in page and "<script" not in page
+
+
+def test_words_that_do_not_go_together_are_one_sentence(run, folder, tmp_path):
+    empty = tmp_path / "none.txt"
+    empty.write_text("# nothing\n")
+    (tmp_path / "bare").mkdir()
+    out = ("-o", tmp_path / "out", *TORCH)
+    for words in (
+        ("query", *out),
+        ("query", folder / "first.langflash", *out),
+        ("query", "--scenes", folder, *out),
+        ("query", "--scenes", folder, "chair", "--view", "1", *out),
+        ("query", "--scenes", tmp_path / "bare", "chair", *out),
+        ("query", folder / "first.langflash", "--prompts", empty, *out),
+        ("query", folder / "first.langflash", "chair", "--words", empty, *out),
+    ):
+        outcome = run(*words)
+        assert outcome.code == 2 and len(outcome.err.splitlines()) == 1, words
+    assert not (tmp_path / "out").exists()
+    with pytest.raises(InputError, match="no folder"):
+        scene_files(tmp_path / "gone")

@@ -1,0 +1,111 @@
+"""The three directions of a room from edges and normals that are made of known ones."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from langflash_core.geometry import manhattan
+from langflash_core.geometry.manhattan import Sights, found_directions
+
+NONE = np.zeros((0, 3))
+
+
+def angle(a, b) -> float:
+    return float(np.degrees(np.arccos(np.clip(a @ b, -1, 1))))
+
+
+def sights(up: np.ndarray, *, noise: float = 0.2, clutter: int = 0, seed: int = 0) -> Sights:
+    """Sixty edges along each direction of a room, off by `noise` degrees; edges along nothing."""
+    rng = np.random.default_rng(seed)
+    first = np.cross(up, [0.3, 0.1, 1.0])
+    axes = np.stack((first / np.linalg.norm(first), up, np.cross(first / np.linalg.norm(first), up)))
+    edges = []
+    for axis in axes:
+        eyes = rng.normal(size=(60, 3))
+        planes = np.cross(axis, eyes)
+        planes += np.radians(noise) * rng.normal(size=planes.shape)
+        edges.append(planes / np.linalg.norm(planes, axis=1, keepdims=True))
+    stray = rng.normal(size=(clutter, 3))
+    edges.append(stray / np.linalg.norm(stray, axis=1, keepdims=True))
+    every = np.concatenate(edges)
+    return Sights(every, np.full(len(every), 0.1), NONE, np.eye(3)[None])
+
+
+def leaning(pitch: float, roll: float) -> np.ndarray:
+    return Rotation.from_euler("zx", [roll, pitch], degrees=True).apply([0.0, -1.0, 0.0])
+
+
+@pytest.mark.parametrize(("pitch", "roll"), [(0, 0), (25, 3), (-20, -5), (40, 2)])
+def test_edges_tell_up_within_a_quarter_of_a_degree_among_as_many_that_tell_nothing(pitch, roll):
+    up = leaning(pitch, roll)
+    found = found_directions(sights(up, clutter=120, seed=pitch + 60))
+    # 60 edges, each off by .2 degrees, tell .2 / sqrt(30) = .04; what is stray pulls a little more.
+    assert angle(found.up, up) < 0.25
+    assert np.allclose(found.axes.T @ found.axes, np.eye(3), atol=1e-9)
+    assert np.linalg.det(found.axes) > 0 and found.error < 2
+
+
+def test_a_turned_world_has_turned_directions():
+    up = leaning(15, 2)
+    own = sights(up)
+    turn = Rotation.from_rotvec([0.4, -1.0, 0.7]).as_matrix()
+    other = Sights(own.edges @ turn.T, own.lengths, NONE, own.cameras @ turn.T)
+    assert angle(turn @ found_directions(own).up, found_directions(other).up) < 1e-5  # arccos near 1
+
+
+def test_surfaces_alone_tell_up():
+    up = leaning(20, -3)
+    rng = np.random.default_rng(3)
+    side = np.cross(up, [0.0, 0.2, 1.0])
+    side /= np.linalg.norm(side)
+    normals = np.repeat(np.stack((up, side, np.cross(up, side))), 200, 0) + 0.1 * rng.normal(size=(600, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    found = found_directions(Sights(NONE, np.zeros(0), normals, np.eye(3)[None]))
+    assert angle(found.up, up) < 1.5 and found.edges == 0  # normals off by 6 degrees, 400 of them: .3
+
+
+def test_what_is_known_to_be_level_decides_between_two_rooms():
+    first, second = leaning(30, 0), leaning(-15, 0)
+    both = [sights(up, seed=k) for k, up in enumerate((first, second))]
+    edges = np.concatenate([each.edges for each in both])
+    mixed = Sights(edges, np.full(len(edges), 0.1), NONE, np.eye(3)[None], floor=first)
+    assert angle(found_directions(mixed).up, first) < 0.5
+    mixed = Sights(edges, np.full(len(edges), 0.1), NONE, np.eye(3)[None], floor=-second)
+    assert angle(found_directions(mixed).up, second) < 0.5
+
+
+def test_nothing_leaves_the_cameras_own_up_and_says_how_little_is_known():
+    found = found_directions(Sights(NONE, np.zeros(0), NONE, np.eye(3)[None]))
+    assert angle(found.up, np.array([0.0, -1, 0])) < 1e-5 and found.error > 10
+
+
+def test_up_that_is_told_stays_and_the_walls_are_found_around_it():
+    up = leaning(10, 1)
+    found = found_directions(sights(up), up)
+    assert angle(found.up, up) < 1e-5 and found.error == 0
+    wall = np.cross(up, [0.3, 0.1, 1.0])
+    wall /= np.linalg.norm(wall)
+    assert max(abs(found.axes[:, :2].T @ wall)) > np.cos(np.radians(0.5))
+
+
+def test_the_fit_descends_the_error_that_it_says():
+    """The step of the normal equations is that of a slow one by finite differences, of fixed weights."""
+    own = sights(leaning(8, 1), noise=0.5)
+    axes = manhattan._walls_of(own, leaning(8.5, 1.5))
+    information, pull = manhattan._normal_equations(own, axes, 3.0)
+    fits = own.edges @ axes
+    best = np.abs(fits).argmin(1)
+    rows = np.arange(len(best))
+    second = np.sort(np.abs(fits), 1)[:, 1]
+    weights = (
+        own.lengths * manhattan._near(np.abs(fits[rows, best]), 3.0) * (1 - manhattan._near(second, 6.0))
+    )
+
+    def error(turn: np.ndarray) -> float:
+        turned = Rotation.from_rotvec(turn).as_matrix() @ axes
+        return float(weights @ (own.edges @ turned)[rows, best] ** 2) / 2
+
+    small = 1e-6
+    slow = np.array([error(small * e) - error(-small * e) for e in np.eye(3)]) / (2 * small)
+    assert np.allclose(-pull, slow, atol=1e-7)
+    assert error(np.linalg.solve(information, pull)) < error(np.zeros(3))

@@ -1,0 +1,171 @@
+"""What was hidden is not in the file: not in its photos, not in its tensors, from no side."""
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from langflash_core.errors import InputError, SceneFileError
+from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.mending.hiding import Hiding, hide, preview
+from langflash_core.mending.looks import drawn
+from langflash_core.scene.file import load, save
+from langflash_core.types import Camera, Record
+
+HOWS = ("blur", "pixels", "remove")
+BLOCKS = 2.5  # along the screen: each is longer than a period of its pattern
+
+
+@pytest.fixture(scope="module")
+def done(known, tmp_path_factory):
+    """Every way to hide the screen: the scene out of its file, the report, and the file's bytes."""
+    folder, made = tmp_path_factory.mktemp("hidden"), {}
+    for how in HOWS:
+        scene, report = hide(known.scene, known.members, drawn, Hiding(how, BLOCKS))
+        save(scene, folder / how)
+        made[how] = load(folder / how), report, (folder / how).read_bytes()
+    return made
+
+
+def pixels(photo: bytes) -> np.ndarray:
+    return np.asarray(Image.open(io.BytesIO(photo)).convert("RGB")) / 255
+
+
+def screens(known) -> list[np.ndarray]:
+    """(h, w) bool: where each photo shows the screen."""
+    return [
+        ((photo - wall).abs().amax(0) > 0.02).numpy()
+        for photo, wall in zip(known.photos, known.without, strict=True)
+    ]
+
+
+def likeness(shown: np.ndarray, secret: np.ndarray) -> float:
+    """Correlation of what varies along a column: the screen's pattern, or nothing of it."""
+    ours, theirs = (np.diff(values, axis=0)[..., 0].ravel() for values in (shown, secret))
+    both = np.std(ours) * np.std(theirs)
+    return 0.0 if both < 1e-9 else float(np.mean((ours - ours.mean()) * (theirs - theirs.mean())) / both)
+
+
+@pytest.mark.parametrize("how", HOWS)
+def test_no_photo_shows_the_pattern(known, done, how):
+    scene, report, _ = done[how]
+    for view, screen in enumerate(screens(known)):
+        rows, columns = np.nonzero(screen)
+        part = np.s_[rows.min() + 1 : rows.max(), columns.min() + 1 : columns.max()]
+        secret, before = known.photos[view].movedim(0, -1).numpy(), pixels(known.scene.photos[view])
+        assert likeness(before[part], secret[part]) > 0.9  # the measure finds it where it is
+        assert abs(likeness(pixels(scene.photos[view])[part], secret[part])) < 0.25
+        assert screen.mean() < report.photos[view] < 2 * screen.mean() + 0.1
+
+
+def test_what_was_removed_has_no_colour_left_at_its_rim(known, done):
+    """The screen is darker than all of the wall, by .2 and more."""
+    for view, photo in enumerate(done["remove"][0].photos):
+        assert pixels(photo)[..., 0].min() > float(known.without[view][0].min()) - 0.1
+    assert float(pixels(known.scene.photos[0])[..., 0].min()) < 0.1
+
+
+@pytest.mark.parametrize("how", HOWS)
+def test_pixels_elsewhere_stay(known, done, how):
+    for view, screen in enumerate(screens(known)):
+        after, before = pixels(done[how][0].photos[view]), pixels(known.scene.photos[view])
+        far = ~np.array(Image.fromarray(screen).resize(screen.shape[::-1])).astype(bool)
+        far &= np.abs(after - before).max(-1) < 0.1  # the margin is painted, too
+        assert far.mean() > 0.5
+        assert np.abs(after - before)[far].mean() < 0.02  # what JPEG takes
+
+
+@pytest.mark.parametrize("how", HOWS)
+def test_no_number_of_a_hidden_gaussian_is_in_the_file(known, done, how):
+    scene, _, content = done[how]
+    ours, hidden = scene.gaussians, known.scene.gaussians.rows(known.members)
+    for name in ("means", "scales", "quats", "sh"):
+        old = {row.tobytes() for row in getattr(hidden, name).half().flatten(1).numpy()}
+        kept = known.scene.gaussians.rows(~known.members)
+        elsewhere = {row.tobytes() for row in getattr(kept, name).half().flatten(1).numpy()}
+        secret = old - elsewhere
+        found = {row.tobytes() for row in getattr(ours, name).half().flatten(1).numpy()}
+        assert name != "means" or len(secret) > 100
+        assert not secret & found, name
+    for mean in hidden.means[::7].numpy():
+        assert mean.tobytes() not in content
+    for photo in known.scene.photos:
+        assert photo[len(photo) // 2 : len(photo) // 2 + 24] not in content
+
+
+@pytest.mark.parametrize("how", HOWS)
+def test_from_no_side_is_there_more_than_blocks(known, done, how, draw):
+    """Where the screen was, nothing varies as it did."""
+    scene, _, _ = done[how]
+    hidden = known.scene.gaussians.rows(known.members)
+    middle = hidden.means.double().mean(0)
+    for x, y in ((0, 0), (1.2, 0), (-1.2, 0), (0, 1.0), (0.6, -0.8)):
+        camera = looking(known.scene.camera(0), middle, torch.tensor([x, y, 0.0]))
+        part = draw(known.scene.rows(known.members), camera, weight_maps=False)
+        inside = (part.alphas > 0.95).numpy()
+        if inside.sum() < 40:
+            continue
+        before = np.where(inside[..., None], draw(known.scene, camera, weight_maps=False).rgb.numpy(), 0)
+        after = np.where(inside[..., None], draw(scene, camera, weight_maps=False).rgb.numpy(), 0)
+        assert fine(before, inside, before) > 0.99
+        assert abs(fine(after, inside, before)) < 0.15, (x, y)
+        if how == "remove":
+            assert np.median(after[inside][:, 0]) > 0.4  # the wall's
+
+
+def fine(shown: np.ndarray, inside: np.ndarray, secret: np.ndarray) -> float:
+    """The share that is left of how the secret varies, from a pixel to the one below, inside."""
+    both = inside[1:] & inside[:-1]
+    ours, theirs = (np.diff(each, axis=0)[..., 0][both] for each in (shown, secret))
+    return float((ours * (theirs - theirs.mean())).mean() / theirs.var())
+
+
+def looking(camera: Camera, middle: torch.Tensor, aside: torch.Tensor) -> Camera:
+    """From aside at a place, upright."""
+    eye = invert_rigid(camera.viewmat.double())[:3, 3] + aside.double() * float(middle.norm()) * 0.4
+    ahead = torch.nn.functional.normalize(middle - eye, dim=0)
+    down = torch.tensor([0.0, 1, 0]).double()
+    right = torch.nn.functional.normalize(torch.linalg.cross(down, ahead), dim=0)
+    viewmat = torch.eye(4, dtype=torch.float64)
+    viewmat[:3, :3] = torch.stack((right, torch.linalg.cross(ahead, right), ahead))
+    viewmat[:3, 3] = -viewmat[:3, :3] @ eye
+    return replace(camera, viewmat=viewmat.float())
+
+
+def test_names_and_what_nobody_knows_go_with_it(known, draw):
+    scene = known.scene.with_record(others={"thumbnail": "secret"}, atom_names={0: "Anna"})
+    members = known.members
+    only = scene.semantics.weight_values.clone()
+    only[~members] = torch.where(scene.semantics.weight_ids[~members] == 0, 0.0, only[~members])
+    scene = replace(scene, semantics=replace(scene.semantics, weight_values=only))
+    hidden, report = hide(scene, members, draw, Hiding("remove", filled=False))
+    assert report.names == ("Anna",) and report.unknown == ("thumbnail",)
+    assert not hidden.record.atom_names and not hidden.record.others
+    assert hidden.semantics.num_atoms < scene.semantics.num_atoms
+
+
+def test_photos_can_be_left_out(known, draw):
+    hidden, report = hide(known.scene, known.members, draw, Hiding("blur", photos=False))
+    assert hidden.photos == () and hidden.record.photos == () and report.photos_left_out
+
+
+def test_a_preview_is_what_changes(known, done, draw):
+    rows = preview(known.scene, known.members, draw)
+    report = done["blur"][1]
+    assert int(rows.sum()) == report.members + report.rim
+    assert bool(rows[known.members].all())
+
+
+def test_what_cannot_be_hidden_is_said(known, draw):
+    with pytest.raises(InputError, match="nothing was chosen"):
+        hide(known.scene, torch.zeros_like(known.members), draw)
+    with pytest.raises(InputError, match="30 blocks do not hide it"):
+        Hiding("pixels", blocks=30)
+    with pytest.raises(InputError, match="margin"):
+        Hiding(margin=-1)
+    broken = replace(known.scene, photos=(b"no photo", b"none"), record=Record())
+    with pytest.raises(SceneFileError, match="--photos none"):
+        hide(broken, known.members, draw)

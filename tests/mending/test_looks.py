@@ -1,0 +1,38 @@
+"""What draws here, against the reference; mattes; and the picture of before and after."""
+
+import torch
+
+from langflash_core.mending.looks import before_and_after, drawn, mattes, reddened
+from langflash_core.splat import render
+
+
+def test_it_draws_as_the_reference_does(known):
+    camera = known.scene.camera(1)
+    ours, theirs = drawn(known.scene, camera), render(known.scene, camera)
+    assert ours.weight_maps is not None and theirs.weight_maps is not None
+    for name in ("rgb", "alphas", "weight_maps"):
+        apart = (getattr(ours, name) - getattr(theirs, name)).abs().max()
+        assert float(apart) < 5e-4, name  # what tiles leave out, times the largest colour, and float32
+    assert torch.allclose(ours.depths, theirs.depths, atol=2e-3)
+
+
+def test_a_matte_is_what_a_part_adds(known, draw):
+    camera = known.scene.camera(0)
+    (ours, _), (others, _) = (
+        mattes(known.scene, part, [camera], draw)[0] for part in (known.members, ~known.members)
+    )
+    assert torch.allclose(ours + others, draw(known.scene, camera).alphas, atol=1e-4)
+    assert 0.03 < float((ours > 0.5).float().mean()) < 0.3
+
+
+def test_before_and_after_stand_beside_each_other(known, draw):
+    width, height = known.scene.view_size
+    picture = before_and_after(known.scene, known.members, known.scene, draw)
+    assert picture.shape == (known.scene.num_views * height, 2 * width, 3)
+    left, right = picture[:height, :width], picture[:height, width:]
+    changed = (left - right).abs().amax(-1) > 0.2
+    assert 0.02 < float(changed.float().mean()) < 0.3
+    assert float((left - right)[changed][:, 0].mean()) > 0.2  # red
+    assert torch.equal(
+        reddened(known.scene, torch.zeros_like(known.members)).gaussians.sh, known.scene.gaussians.sh
+    )

@@ -1,0 +1,74 @@
+"""Everything that LangFlash is to survive, by parts: `python -m tests.torture [PART ...] [--seed 1]`.
+
+Parts: `PARTS`. `make torture` runs them all in less than half an hour on two cores.
+"""
+
+import argparse
+import sys
+import tempfile
+import warnings
+from pathlib import Path
+
+
+def calls(args: argparse.Namespace, folder: Path) -> int:
+    """The n-th call fails: `nth.py`."""
+    from tests.torture.jobs import prepared
+    from tests.torture.nth import report, torture
+
+    jobs = [job for job in prepared(folder) if any(job.name.startswith(name) for name in args.only or [""])]
+    share = 60 * args.minutes / max(len(jobs), 1)
+    rows = (row for job in jobs for row in torture(job, folder, share, args.seed))
+    return report(rows, sys.stdout.write)
+
+
+def kills(args: argparse.Namespace, folder: Path) -> int:
+    """Killed at random moments: `kills.py`."""
+    from tests.torture.kills import everything, report
+
+    return report(everything(folder, args.count, args.seed), sys.stdout.write)
+
+
+def photos(args: argparse.Namespace, folder: Path) -> int:
+    """Photos that no scene is in, or that deceive: `hard_photos.py`."""
+    from tests.torture.hard_photos import everything, report
+
+    return report(everything(folder, args.only), sys.stdout.write)
+
+
+def window(args: argparse.Namespace, folder: Path) -> int:
+    """The window while the driver and the disk refuse: `window.py`."""
+    from tests.torture.jobs import prepared
+    from tests.torture.nth import report
+    from tests.torture.window import opened, torture
+
+    prepared(folder)
+    (folder / "out").mkdir()
+    with opened(folder / "in" / "s.langflash", folder / "out") as session:
+        return report(torture(session, folder, 60 * args.minutes, args.seed), sys.stdout.write)
+
+
+PARTS = {"calls": calls, "window": window, "kills": kills, "photos": photos}
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m tests.torture", description=str(__doc__).splitlines()[0])
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(PARTS)} (default: all)")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=5.0, help="of each part, about (default: 5)")
+    parser.add_argument("--count", type=int, default=200, help="of kills while it writes (default: 200)")
+    parser.add_argument("--only", nargs="+", help="of a part's rows those whose names begin so")
+    args = parser.parse_args()
+    unknown = [name for name in args.parts if name not in PARTS]
+    if unknown:
+        parser.error(f"no part {unknown[0]}; there are {', '.join(PARTS)}")
+    warnings.simplefilter("ignore")
+    finds = 0
+    for name in args.parts or PARTS:
+        with tempfile.TemporaryDirectory() as folder:
+            finds += PARTS[name](args, Path(folder))
+    sys.stdout.write(f"{finds} finds\n")
+    return 1 if finds else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
