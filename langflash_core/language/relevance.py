@@ -177,16 +177,16 @@ def relevancy(
 
 
 def relevance_maps(
-    weight_maps: Float[Tensor, "H W K"], compiled: CompiledQuery, eps: float = EMPTY_NORM
-) -> Float[Tensor, "P H W"]:
+    weight_maps: Float[Tensor, "*at K"], compiled: CompiledQuery, eps: float = EMPTY_NORM
+) -> Float[Tensor, " P *at"]:
     """Relevance of every prompt at every pixel.
 
     Args:
-        weight_maps: (H, W, K), composited w_ik.
+        weight_maps: (..., K), as (H, W, K), composited w_ik.
         eps: floor on |F(p)|.
 
     Returns:
-        (P, H, W), cosine or relevancy as `compiled.mode` says; exactly 0 at empty pixels.
+        (P, ...), cosine or relevancy as `compiled.mode` says; exactly 0 at empty pixels.
 
     Raises:
         ValueError: K disagrees.
@@ -195,11 +195,11 @@ def relevance_maps(
 
 
 def feature_relevance(
-    maps: Float[Tensor, "H W d"],
+    maps: Float[Tensor, "*at d"],
     compiled: CompiledQuery,
     decode: Callable[[Tensor], Tensor],
     eps: float = EMPTY_NORM,
-) -> Float[Tensor, "P H W"]:
+) -> Float[Tensor, " P *at"]:
     """`relevance_maps` of whatever a decoder makes vectors F of, in the phrases' own numbers.
 
     Args:

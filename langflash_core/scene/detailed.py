@@ -62,7 +62,7 @@ def working_size(photo: tuple[int, int], grid: tuple[int, int]) -> tuple[int, in
     return high[0], high[1]
 
 
-def working_photo(photo: Float[Tensor, "3 h w"], grid: tuple[int, int]) -> Float[Tensor, "3 h w"]:
+def working_photo(photo: Float[Tensor, "3 h w"], grid: tuple[int, int]) -> Float[Tensor, "3 H W"]:
     """A photo (3, h, w) in [0, 1] at its working size."""
     size = working_size((photo.shape[-2], photo.shape[-1]), grid)
     if size == (photo.shape[-2], photo.shape[-1]):
