@@ -35,7 +35,7 @@ class NormedFusion(nn.Module):
         self.out = nn.Conv2d(feature, feature, 1)
 
     def forward(
-        self, coarse: Float[Tensor, "n C h w"], lateral: Float[Tensor, "n C h w"] | None = None
+        self, coarse: Float[Tensor, "n C h w"], lateral: Float[Tensor, "n C _ _"] | None = None
     ) -> Float[Tensor, "n C H W"]:
         if self.lateral is not None and lateral is not None:
             # An odd grid makes the coarsest path a row too large; LSeg itself takes only even ones.
@@ -84,7 +84,7 @@ class LSeg(nn.Module):
             path = self.fuse[index](path, levels[index])
         return self.out(path).float()
 
-    def forward(self, images: Float[Tensor, "n 3 H W"]) -> Float[Tensor, "n C h w"]:
+    def forward(self, images: Float[Tensor, "B V 3 H W"]) -> Float[Tensor, "B V C h w"]:
         """L(x), (B, V, C, H/2, W/2), unit channel norm."""
         return F.normalize(self.features(images.flatten(0, 1)), dim=1).unflatten(0, images.shape[:2])
 

@@ -23,9 +23,9 @@ class Tokens:
     grouped: the hooks once more, from the encoder that the grouping was trained on; () where it is this one.
     """
 
-    hooks: tuple[Float[Tensor, "B V n C"], ...]
+    hooks: tuple[Float[Tensor, "B V _ _"], ...]
     grid: tuple[int, int]
-    named: tuple[Float[Tensor, "B V n C"], ...] = ()
+    named: tuple[Float[Tensor, "B V _ _"], ...] = ()
     grouped: tuple[Float[Tensor, "B V _ _"], ...] = ()
 
     @property

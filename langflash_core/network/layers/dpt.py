@@ -44,7 +44,7 @@ class Fusion(nn.Module):
         self.out = nn.Conv2d(feature, feature, 1)
 
     def forward(
-        self, coarse: Float[Tensor, "n C h w"], lateral: Float[Tensor, "n C h w"] | None = None
+        self, coarse: Float[Tensor, "n C h w"], lateral: Float[Tensor, "n C _ _"] | None = None
     ) -> Float[Tensor, "n C H W"]:
         if self.lateral is not None and lateral is not None:
             coarse = coarse[..., : lateral.shape[-2], : lateral.shape[-1]] + self.lateral(lateral)

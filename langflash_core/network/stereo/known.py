@@ -34,7 +34,7 @@ def log_scales(
     relative: Float[np.ndarray, "4 4"],
     depths_i: Float[np.ndarray, " n"],
     depths_j: Float[np.ndarray, " n"],
-) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
     """What the matches of a pair say each map has to be multiplied by, as logarithms.
 
     Args:
@@ -49,7 +49,7 @@ def log_scales(
     return np.log(true_i[sure] / depths_i[sure]), np.log(true_j[sure] / depths_j[sure])
 
 
-def depth_scales(said: list[Float[np.ndarray, "H W"]]) -> Float[np.ndarray, " V"]:
+def depth_scales(said: list[Float[np.ndarray, " _"]]) -> Float[np.ndarray, " V"]:
     """Factors (V,) from the logarithms that the matches of each view say; of all, where few do.
 
     Raises:

@@ -109,7 +109,7 @@ def joined(
 
 def with_pairs(
     tracks: Tracks,
-    pairs: Sequence[tuple[int, int, Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"], float]],
+    pairs: Sequence[tuple[int, int, Float[np.ndarray, "_ 2"], Float[np.ndarray, "_ 2"], float]],
 ) -> Tracks:
     """Tracks, and after them points that two views alone saw.
 
