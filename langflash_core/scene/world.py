@@ -18,7 +18,7 @@ from langflash_core.scene.tour import read_tour, told_tour
 from langflash_core.types import Gaussians, Scene
 
 
-def in_world(scene: Scene, viewmat: Tensor, unit: float) -> Scene:
+def in_world(scene: Scene, viewmat: Float[Tensor, "4 4"], unit: float) -> Scene:
     """The scene with its first camera at `viewmat`.
 
     Args:
