@@ -23,6 +23,8 @@ Arrays = Mapping[str, np.ndarray]
 Made = Callable[[], Arrays]
 STEPS = 1
 """Raised whenever a step comes to mean something else: what an older program kept is then made anew."""
+MATCHES = "matches"
+"""The step that finds key points and what corresponds: begun ahead, asked for by the network."""
 _ENDING = ".kept.npz"
 
 
@@ -68,6 +70,11 @@ def forget(folder: Path) -> None:
         path.unlink(missing_ok=True)
     with suppress(OSError):
         folder.rmdir()
+
+
+def holds_steps(folder: Path) -> bool:
+    """Whether steps were kept in a folder."""
+    return next(folder.glob(f"*{_ENDING}"), None) is not None
 
 
 def _read(path: Path) -> dict[str, np.ndarray] | None:

@@ -33,7 +33,7 @@ from langflash_core.records import Guess, World
 from langflash_core.scene.thin import covered_areas
 from langflash_core.scene.world import placed, turn_of
 from langflash_core.splat import render
-from langflash_core.types import NO_LANGUAGE, Camera, Scene
+from langflash_core.types import NO_LANGUAGE, Camera, Gaussians, Scene
 
 SAMPLES = 6000
 """Points of the surface that are looked at."""
@@ -161,14 +161,17 @@ def surface_of(scene: Scene) -> Surface:
     places = (np.arange(SAMPLES) + 0.5) / SAMPLES * total
     rows = np.searchsorted(np.cumsum(areas), places).clip(max=len(areas) - 1)
     some = scene.rows(torch.from_numpy(rows))
-    scales = some.gaussians.scales.double().numpy()
+    return Surface(some.gaussians.means.double().numpy(), normals_of(some.gaussians), _answers(some))
+
+
+def normals_of(gaussians: Gaussians) -> Float[np.ndarray, "N 3"]:
+    """The shortest axis of each Gaussian; 0 of those that are not flat."""
+    scales = gaussians.scales.double().numpy()
     ordered = np.sort(scales, 1)
-    axes = quats_to_matrices(some.gaussians.quats.double()).numpy()
+    axes = quats_to_matrices(gaussians.quats.double()).numpy()
     normals = np.take_along_axis(axes, scales.argmin(1)[:, None, None], 2)[:, :, 0]
     flat = ordered[:, 0] <= _FLAT * ordered[:, 1]
-    return Surface(
-        some.gaussians.means.double().numpy(), np.where(flat[:, None], normals, 0.0), _answers(some)
-    )
+    return np.where(flat[:, None], np.nan_to_num(normals), 0.0)
 
 
 def _answers(some: Scene) -> np.ndarray:

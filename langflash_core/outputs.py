@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from langflash_core.formats import COMPRESSED_PLY, SOG_FOLDER, USD, kind_of
 
-Subject = Literal["view", "answers", "film", "scene", "page", "photos", "folder"]
+Subject = Literal["view", "answers", "film", "scene", "page", "photos", "room", "folder"]
 Phrases = Literal["none", "narrow", "show", "some", "one"]
 
 _HOLDS = {
@@ -24,6 +24,7 @@ _HOLDS = {
     "scene": "Gaussians",
     "page": "a web page that shows the scene and answers phrases",
     "photos": "photos and their poses",
+    "room": "what is in the room, or its plan",
     "folder": "every photo's view taken apart by --prompt",
 }  # of subjects, for help
 
@@ -261,10 +262,32 @@ TRANSFORMS = Output(
     keys=("frames",), of_scene="export.cameras:write_transforms",
 )  # fmt: skip
 
+INVENTORY_PAGE = Output(
+    "inventory", (".html",), tip="What is in the room, with cut-outs and a plan, as a page to print",
+    subject="room", word="inventory", writer="writing.inventory:write_inventory",
+)  # fmt: skip
+INVENTORY_CSV = Output(
+    "inventory_table", (".csv",), tip="What is in the room as a table",
+    subject="room", word="inventory", noun="a .csv of things", writer="writing.inventory:write_inventory",
+)  # fmt: skip
+INVENTORY_JSON = Output(
+    "inventory_data", (".json",), tip="What is in the room, and its plan, as data",
+    subject="room", word="inventory", keys=("things",), writer="writing.inventory:write_inventory",
+)  # fmt: skip
+PLAN_SVG = Output(
+    "plan", (".svg",), tip="The room from above, to scale, with walls, things, names and measures",
+    subject="room", word="plan", unsaid=True, writer="writing.inventory:write_plan",
+)  # fmt: skip
+PLAN_DXF = Output(
+    "plan_cad", (".dxf",), tip="The same for CAD programs",
+    subject="room", word="plan", unsaid=True, writer="writing.inventory:write_plan",
+)  # fmt: skip
+
 OUTPUTS = (
     RGB, HEAT, MASK, SOFT, CUTOUT, LABELS, INSTANCES, DEPTH, DEPTH_EXR, SEGMENTED, COCO, BOXES_JSON,
     BOXES_CSV, BOXES_GLB, SURFACE, NUMBERS, VIDEO, WEBP, HEAT_VIDEO, PLY, COMPRESSED, SPZ, SOG, SPLAT, GLB,
-    OPEN_USD, PAGE, SCENE, COLMAP, TRANSFORMS,
+    OPEN_USD, PAGE, SCENE, COLMAP, TRANSFORMS, INVENTORY_PAGE, INVENTORY_CSV, INVENTORY_JSON, PLAN_SVG,
+    PLAN_DXF,
 )  # fmt: skip
 OFFERED = tuple(output for output in OUTPUTS if output.label)
 """By the window, in the order of its buttons."""

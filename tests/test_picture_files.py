@@ -13,7 +13,7 @@ from PIL import Image, ImageCms
 from langflash_core.errors import ImageError
 from langflash_core.images.decode import read_photo
 from langflash_core.picture_files import FORMATS, STORED, TooManyPixels, opened_picture
-from langflash_core.scene.atoms import _decoded
+from langflash_core.scene.atoms import decoded_photo
 
 ROOT = Path(__file__).resolve().parent.parent
 # The one place, and the process that decodes HEIC and AVIF.
@@ -60,7 +60,7 @@ def test_other_plug_ins_see_nothing(kind):
     content = b"SIMPLE  =                    T".ljust(2880) if kind == "FITS" else encoded(RED, kind)
     with pytest.raises(OSError, match="cannot identify"), opened_picture(content):
         pass
-    assert _decoded(content) is None, "a photo in a scene"
+    assert decoded_photo(content) is None, "a photo in a scene"
     with pytest.raises(OSError, match="cannot identify"), opened_picture(encoded(RED, "TIFF"), STORED):
         pass
 
@@ -75,7 +75,7 @@ def test_pixels_at_the_bound_and_one_past_it(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["AVIF", "HEIF"])
-def test_pixels_of_pictures_that_are_decoded_apart(kind, monkeypatch, tmp_path):
+def test_pixels_of_pictures_that_aredecoded_photo_apart(kind, monkeypatch, tmp_path):
     import pillow_heif
 
     (tmp_path / "a.avif").write_bytes(b"")
@@ -99,7 +99,7 @@ def test_a_bomb_is_refused_by_its_header(size, tmp_path):
     (tmp_path / "a.png").write_bytes(bomb)
     with pytest.raises(ImageError, match=r"too many pixels|damaged"):
         read_photo(tmp_path / "a.png")
-    assert _decoded(bomb) is None
+    assert decoded_photo(bomb) is None
 
 
 def test_of_pictures_that_move_the_first_is_read(tmp_path):

@@ -98,18 +98,19 @@ class ReadPage:
         return self.numbers("dictionary").reshape(self.header["phrases"]["atoms"], -1)
 
 
-def read_page(path: Path) -> ReadPage:
-    """A page of `write_html`."""
+def read_page(path: Path, number: int = 0) -> ReadPage:
+    """A page of `write_html`; number: of the scene in it."""
     parts = _Parts()
     parts.feed(path.read_text(encoding="utf-8"))
     scripts = dict(parts.scripts)
-    header = json.loads(scripts["header"])
+    header = json.loads(scripts[f"header{number or ''}"])
+    own = f"payload{number or ''}"
     packed = {
         name: zlib.decompress(base64.b64decode(scripts[name], validate=True))
-        for name in ("payload", "tower", "tokens")
+        for name in (own, "tower", "tokens")
         if name in scripts
     }
-    payload = packed.pop("payload")
+    payload = packed.pop(own)
     columns, start = {}, 0
     for name, count, width, differences in header["columns"]:
         planes = np.frombuffer(payload, np.uint8, count * width, start).reshape(width, count).astype(np.int64)

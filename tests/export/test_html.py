@@ -13,15 +13,17 @@ from langflash_core import pipeline
 from langflash_core.errors import InputError, OutputError, PromptError
 from langflash_core.export import export
 from langflash_core.export.html import MOST_WEIGHTS, READING, SCRIPTS, Phrases, write_html
+from langflash_core.geometry.poses import Pose, Vector, from_view
 from langflash_core.language.answers import COVERED_ALPHA, MIN_AREA, TOP_FRACTION
 from langflash_core.language.relevance import EMPTY_NORM, compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.language.vocabulary import all_phrases
 from langflash_core.resources import asset_path
 from langflash_core.scene.bare import bare_scene
+from langflash_core.scene.tour import Note, Stop, Tour, told_tour
 from langflash_core.splat.projection import NEAR
 from langflash_core.types import Scene
-from tests.app.window.scenes import PHRASES, room
+from tests.app.window.scenes import CHAIR, PHRASES, room
 from tests.export.pages import ReadPage, read_page
 from tests.export.splats import random_gaussians
 from tests.splat.scenes import cloud
@@ -206,7 +208,7 @@ def test_a_page_links_to_nothing_and_is_small(tmp_path):
     assert read_page(tmp_path / "a.html").addresses == []
     assert "http" not in text.replace("http-equiv", "")
     assert "default-src 'none'" in text
-    assert len(text) < 60_000
+    assert len(text) < 85_000
 
 
 def test_every_script_is_in_the_page():
@@ -221,3 +223,46 @@ def test_the_page_judges_by_our_numbers():
         "MIN_AREA": MIN_AREA, "NEAR": NEAR,
     }  # fmt: skip
     assert {name: said[name] for name in ours} == ours
+
+
+def test_stops_and_notes_come_along(tmp_path, spoken_room):
+    """A stop of another lens or of parallel rays shows its subject as large."""
+    wide = replace(pose_of(spoken_room), fov=90.0)
+    flat = replace(pose_of(spoken_room), span=2.0, reach=5.0)
+    notes = (Note("it", Vector(*CHAIR), phrase="cosy seat"), Note("", Vector(0, 0, 1), Vector(0.5, 0, 1)))
+    tour = Tour((Stop("Wide", wide, "All of it.", "old lamp"), Stop("Flat", flat)), notes, "Flat")
+    toured = spoken_room.with_record(tour=told_tour(tour), metric_scale=2.0)
+    moved = replace(toured, viewmats=toured.viewmats.clone())
+    moved.viewmats[:, 0, 3] -= 3.0  # the page's origin is elsewhere
+    pipeline.web_page(moved, tmp_path / "a.html", ["wall"])
+    header = read_page(tmp_path / "a.html").header
+    assert header["start"] == 1 and header["metric"] == 2.0 and header["phrases"]["asked"] == 1
+    assert header["phrases"]["texts"][:3] == ["wall", "old lamp", "cosy seat"]
+    assert [stop["name"] for stop in header["stops"]] == ["Wide", "Flat"]
+    origin = np.array(header["origin"])
+    assert origin[0] == pytest.approx(3.0)
+    assert np.allclose(np.array(header["notes"][0]["at"]) + origin, CHAIR)
+    half = np.tan(np.radians(60) / 2)  # of the page's lens
+    for stop, pose, across in zip(header["stops"], (wide, flat), (wide.reach, 1.0), strict=True):
+        pivot = np.array(stop["eye"]) + stop["distance"] * np.array(stop["turn"][2])
+        assert np.allclose(pivot + origin, pose.pivot) and np.allclose(stop["turn"], pose.axes.T)
+        assert stop["distance"] * half == pytest.approx(across)  # half of what is seen at the pivot
+
+
+def pose_of(scene: Scene) -> Pose:
+    return from_view(scene.viewmats[0].numpy(), scene.Ks[0].numpy(), scene.view_size, 1.2)
+
+
+def test_a_page_of_several_scenes_asks_all_the_same(tmp_path, spoken_room):
+    fewer = spoken_room.rows(torch.arange(3000))
+    pipeline.web_page(spoken_room, tmp_path / "a.html", ["lamp"], beside={"the other": fewer})
+    first, second = (read_page(tmp_path / "a.html", number) for number in (0, 1))
+    assert second.header["title"] == "the other" and second.header["count"] == 3000
+    assert first.header["phrases"]["texts"] == second.header["phrases"]["texts"]
+    assert "shaders" in first.header and "shaders" not in second.header
+    assert (tmp_path / "a.html").read_text().count("<script>") == 1
+    mute = bare_scene(random_gaussians(3), "made")
+    with pytest.raises(InputError, match="one language, not minilm, none"):
+        pipeline.web_page(spoken_room, tmp_path / "b.html", beside={"mute": mute})
+    pipeline.web_page(mute, tmp_path / "c.html", beside={"as mute": mute})
+    assert "phrases" not in read_page(tmp_path / "c.html", 1).header

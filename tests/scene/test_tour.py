@@ -7,7 +7,17 @@ import pytest
 import torch
 
 from langflash_core.errors import InputError, SceneFileError
-from langflash_core.geometry.poses import FLIGHT, STAY, Pose, Rotation, Vector, on_tour, orbit, tour_seconds
+from langflash_core.geometry.poses import (
+    FLIGHT,
+    STAY,
+    Pose,
+    Rotation,
+    Vector,
+    on_tour,
+    orbit,
+    told_pose,
+    tour_seconds,
+)
 from langflash_core.scene.container import read_container, write_container
 from langflash_core.scene.edited import edited_scene, first_marks
 from langflash_core.scene.edits import History
@@ -67,11 +77,11 @@ def test_what_cannot_be_is_one_sentence(change, hint):
     [
         {"stops": 3}, {"stops": [{"name": "a"}]}, {"notes": [{"text": "a", "at": [0, 0]}]}, {"stops": [7]},
         {"notes": [{"text": "a", "at": [0, 0, float("nan")]}]}, {"notes": [{"text": 3, "at": [0, 0, 1]}]},
-        {"start": "nowhere"}, {"stops": [{"name": "a", "pose": {**told_tour(TOUR)["stops"][0]["pose"], "fov": 0}}]},
+        {"start": "nowhere"}, {"stops": [{"name": "a", "pose": {**told_pose(A), "fov": 0}}]},
     ],
 )  # fmt: skip
 def test_damaged_tours_are_refused(damage):
-    with pytest.raises(ValueError, match="tour|pose"):
+    with pytest.raises(ValueError, match=r"tour|pose"):
         read_tour(damage)
 
 

@@ -52,7 +52,7 @@ def run(args: Namespace, out: TextIO) -> None:
             picture = (before_and_after(scene, rows, done, renderer) * 255).round().byte().numpy()
     make_folder(args.output.parent)
     save(done, args.output)
-    if picture is not None:
+    if args.preview is not None and picture is not None:
         write_picture(args.preview, picture)
     document = {"scene": str(args.output), "prompts": args.prompts, **report.document()}
     if args.json:

@@ -475,6 +475,39 @@ def add_level(commands) -> None:
     add_json(command)
 
 
+def add_inventory(commands) -> None:
+    """`langflash inventory`."""
+    command = new_command(
+        commands,
+        "inventory",
+        "what is in a room, how large, where, how sure; what changed since another scene",
+    )
+    command.add_argument("scene", type=Path, metavar="SCENE")
+    command.add_argument(
+        "-o",
+        "--output",
+        nargs="+",
+        type=Path,
+        metavar="FILE",
+        help=".html: a page to print, with cut-outs and a plan; .csv, .json: the list; .svg, .dxf: the plan "
+        "from above, to scale; .langflash: the scene with the names of --name",
+    )
+    command.add_argument(
+        "--name",
+        nargs="+",
+        metavar='"CHAIR 1=NAME"',
+        help="what you call a thing; nothing after = takes it away",
+    )
+    command.add_argument(
+        "--beside", type=Path, metavar="SCENE", help="a later scene of the room: what came, went and moved"
+    )
+    command.add_argument(
+        "--threshold", type=kept_fraction, metavar="T", help="relevancy of a thing to its name, from 0 to 1"
+    )
+    add_backend(command)
+    add_json(command)
+
+
 def add_info(commands) -> None:
     """`langflash info`."""
     command = new_command(commands, "info", "what a scene file holds, and what pruning saved")

@@ -11,7 +11,7 @@ from langflash_core.scene.mask import Mask
 from ..asking.commands import lapsed
 from ..commands import Notify
 from ..state import State
-from .state import STRICTNESS_RANGE, Floaters, Point, Region
+from .state import Floaters, Point, Region
 
 FELL_OFF = "The oldest edits can no longer be undone: the list holds the last 1,000, or 32 MB of them."
 
@@ -282,39 +282,41 @@ class GoTo:
 
 @dataclass(frozen=True)
 class FindFloaters:
-    """Look for floaters and preview them in red."""
+    """Look for floaters and preview them in red; within the selection, where there is one."""
 
     def apply(self, state: State) -> State:
-        if state.editing.history is None:
+        marks = state.editing.marks
+        if marks is None:
             return state
-        strictness = state.editing.floaters.strictness if state.editing.floaters else Floaters().strictness
-        return state.with_editing(floaters=Floaters(strictness=strictness))
+        strength = state.editing.floaters.strength if state.editing.floaters else Floaters().strength
+        within = marks.selected if marks.selected else None
+        return state.with_editing(floaters=Floaters(strength=strength, within=within))
 
 
 @dataclass(frozen=True)
 class FloatersFound:
-    """Scores (N,) of the preview that is open."""
+    """The least strengths (N,) of the preview that is open."""
 
-    scores: bytes
+    least: bytes
 
     def apply(self, state: State) -> State:
         marks, preview = state.editing.marks, state.editing.floaters
-        if marks is None or preview is None or len(self.scores) != 4 * marks.deleted.count:
+        if marks is None or preview is None or len(self.least) != 4 * marks.deleted.count:
             return state
-        return state.with_editing(floaters=replace(preview, scores=self.scores))
+        return state.with_editing(floaters=replace(preview, least=self.least))
 
 
 @dataclass(frozen=True)
-class SetStrictness:
-    """How far a Gaussian must stand out to count as a floater."""
+class SetStrength:
+    """How much is to be cleaned up, 0 to 1."""
 
-    strictness: float
+    strength: float
 
     def apply(self, state: State) -> State:
         if state.editing.floaters is None:
             return state
-        strictness = min(max(self.strictness, STRICTNESS_RANGE[0]), STRICTNESS_RANGE[1])
-        return state.with_editing(floaters=replace(state.editing.floaters, strictness=strictness))
+        strength = min(max(self.strength, 0.0), 1.0)
+        return state.with_editing(floaters=replace(state.editing.floaters, strength=strength))
 
 
 @dataclass(frozen=True)

@@ -1,16 +1,20 @@
 """What editing asks of the world: the worker for what must be computed, the picture for what is marked
 in it and what the pointer is on."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from ..commands import Command
+from ..commands import Command, Notify
 from ..effects import Effects, Hands
 from ..places import config_folder
 from ..scene.commands import SceneArrived
-from ..scene.state import SceneInfo
+from ..scene.mended import FillHole, HidePart
+from ..scene.state import Room, SceneInfo
 from ..state import State
 from ..viewport import Viewport
 from .commands import FindFloaters, StopWaiting
+from .mending import BringBack, FillSelection, HiddenForGood, HideForGood, RememberUnhidden
 from .pointing import CardOpened, Named, ReadingTaken, RulerPlaced
 from .state import Reading, Tool
 from .teaching import WORDS, KeepWords, TakeWords
@@ -90,6 +94,16 @@ class EditingEffects(Effects):
                 self._hands.submit(KeepLessons(info.serial, info.memory, marks, config_folder() / WORDS))
             case TakeWords() if info is not None and marks is not None:
                 self._hands.submit(FindLessons(info.serial, info.memory, marks, config_folder() / WORDS))
+            case FillSelection() if info is not None and marks is not None and marks.selected:
+                self._hands.submit(FillHole(info, marks))
+            case HideForGood(how) if info is not None and marks is not None and marks.selected:
+                self._hands.submit(HidePart(info, marks, how))
+            case HiddenForGood() if command.fits(before):
+                self._take_hidden(command, before)
+            case BringBack() if before.scene.unhidden is not None:
+                room = before.scene.unhidden
+                arrival = SceneArrived(replace(room.info, history=room.history), room=room, replaces=True)
+                self._hands.perform(arrival)
             case FindFloaters() if info is not None and marks is not None:
                 self._hands.submit(ScoreFloaters(info.serial, info.memory, marks))
             case _ if info is not None and marks is not None:
@@ -100,6 +114,15 @@ class EditingEffects(Effects):
                     self._hands.perform(StopWaiting())
         if marks != before.editing.marks and state.scene.info is before.scene.info:
             self._atoms_changed(before, state)
+
+    def _take_hidden(self, command: HiddenForGood, before: State) -> None:
+        """Show it, and remember what was on show until it is saved."""
+        scene, editing = before.scene, before.editing
+        assert scene.info is not None
+        room = Room(scene.info, scene.photos, editing.history, editing.saved, scene.pose)
+        self._hands.perform(command.arrival(before))
+        self._hands.perform(RememberUnhidden(room))
+        self._hands.perform(Notify(command.said, "info"))
 
     def _atoms_changed(self, before: State, state: State) -> None:
         """Merged and corrected atoms have other words."""

@@ -11,7 +11,6 @@ from langflash_core.scene.mask import Mask
 
 RADIUS_RANGE = (4.0, 160.0)  # design pixels
 PICK_RADIUS = 4.0
-STRICTNESS_RANGE = (1.0, 6.0)
 REACH_RANGE = (1.0, 12.0)
 TOP_ATOMS = 3
 
@@ -118,16 +117,22 @@ class Card:
 
 @dataclass(frozen=True)
 class Floaters:
-    """The preview of floaters. scores: (N,) float32 bytes in robust deviations, empty while computed."""
+    """The preview of floaters, sheets, flyaways and crumbs.
 
-    scores: bytes = field(default=b"", repr=False)
-    strictness: float = 2.0
+    least: (N,) float32 bytes, the strength from which each goes; empty while computed. within: only of these;
+    None: of all.
+    """
+
+    least: bytes = field(default=b"", repr=False)
+    strength: float = 0.5
+    within: Mask | None = None
 
     def mask(self, visible: Mask) -> Mask:
-        """Gaussians at least this strict, of what is shown."""
-        if not self.scores:
+        """Gaussians that go at this strength, of what is shown."""
+        if not self.least or not self.strength:
             return Mask.none(visible.count)
-        return Mask.of(np.frombuffer(self.scores, np.float32) >= self.strictness) & visible
+        found = Mask.of(np.frombuffer(self.least, np.float32) <= self.strength) & visible
+        return found if self.within is None else found & self.within
 
 
 @dataclass(frozen=True)
@@ -140,6 +145,7 @@ class Editing:
     hover: what is under the pointer. asked: where a click waits for the picture to rest.
     names: nearest words of each atom, best first. ruler: the ends of what is measured, world.
     gesture: a change of the selection that is shown and not made yet. tint: of it, while a colour is chosen.
+    hiding: the way in which the selection is to be hidden for good, while that is asked.
     """
 
     history: History | None = None
@@ -160,6 +166,7 @@ class Editing:
     handle: Handle = Handle.MOVE
     gesture: Change | None = None
     tint: Tint | None = None
+    hiding: str = ""
     last_tint: Tint = Tint()
 
     @property

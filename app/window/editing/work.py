@@ -248,13 +248,13 @@ class GrowSelection(Selection):
 
 @dataclass(frozen=True)
 class ScoreFloaters(EditErrand):
-    """How far every Gaussian stands out."""
+    """The strength of cleaning from which every Gaussian goes."""
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        from langflash_core.scene.selection import isolation
+        from langflash_core.mending.strength import least_strengths
 
-        scores = isolation(self.placed(), self.marks.visible.rows())
-        yield FloatersFound(scores.tobytes())
+        least = least_strengths(self.memory.changed(self.marks), self.marks.visible.rows())
+        yield FloatersFound(least.tobytes())
 
 
 def request_for(

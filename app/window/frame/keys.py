@@ -5,7 +5,7 @@ from imgui_bundle import imgui
 from .. import commands as do
 from ..dialogs import Dialog
 from ..editing import commands as edit
-from ..editing import placing
+from ..editing import mending, placing
 from ..editing import pointing as point
 from ..editing.panels import gizmo
 from ..editing.state import Tool
@@ -96,6 +96,8 @@ def _escape(state: State) -> list[do.Command]:
         return [placing.EndGesture(keep=False)]
     if editing.card is not None or editing.asked is not None:
         return [point.CloseCard()]
+    if editing.hiding:
+        return [mending.AskToHide("")]
     if editing.floaters is not None:
         return [edit.EndFloaters()]
     if editing.ruler:

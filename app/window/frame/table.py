@@ -18,7 +18,7 @@ from ..asking import commands as ask
 from ..asking.prompt_sets import MOST_PROMPTS
 from ..dialogs import Dialog
 from ..editing import commands as edit
-from ..editing import placing
+from ..editing import mending, placing
 from ..editing import pointing as point
 from ..editing import teaching as teach
 from ..editing.state import Handle, Tool
@@ -146,6 +146,7 @@ def _files() -> Iterable[Entry]:
     reconstruct = show.Instead((show.Reconstruct(),))
     yield Entry("Reconstruct the photos", group, lambda s: reconstruct if s.scene.photos else None)
     yield Entry("Back to the room before", group, _room_before)
+    yield Entry("Pause the reconstruction", group, _pause)
     yield Entry("Cancel the reconstruction", group, lambda s: show.CancelJob() if s.scene.job else None)
     yield Entry(
         "Clear the tray", group, lambda s: show.ClearPhotos() if s.scene.photos and not s.scene.job else None
@@ -158,6 +159,11 @@ def _files() -> Iterable[Entry]:
 def _frames(state: State) -> do.Command | None:
     free = state.opening.film is not None and state.scene.job is None
     return do.ShowDialog(Dialog.FILM) if free else None
+
+
+def _pause(state: State) -> do.Command | None:
+    job = state.scene.job
+    return show.PauseJob() if job is not None and job.pausable and not job.cancelling else None
 
 
 def _room_before(state: State) -> do.Command | None:
@@ -294,7 +300,7 @@ def _tools() -> Iterable[Entry]:
         yield Entry(name, group, _shown(placing.SetHandle(handle)), _plain(key))
     yield Entry("A smaller brush", group, _brush(1 / BRUSH_STEP), _plain("left_bracket"), repeats=True)
     yield Entry("A larger brush", group, _brush(BRUSH_STEP), _plain("right_bracket"), repeats=True)
-    yield Entry("Find floaters", group, _shown(edit.FindFloaters()))
+    yield Entry("Clean up", group, _shown(edit.FindFloaters()))
 
 
 def _brush(factor: float) -> Callable[[State], do.Command | None]:
@@ -311,6 +317,8 @@ def _editing() -> Iterable[Entry]:
     yield Entry("Grow the selection", group, _selected(edit.Grow()), _plain("g"))
     deleting = (*_plain("delete"), *_plain("backspace"))
     yield Entry("Delete the selection", group, _selected(edit.Delete()), deleting)
+    yield Entry("Delete the selection and fill its hole", group, _selected(mending.FillSelection()))
+    yield Entry("Hide the selection for good", group, _selected(mending.AskToHide()))
     yield Entry("Recolour the selection", group, _recolour, _ctrl("t"))
     for name, key, nudge in (
         ("left", "left_arrow", placing.Nudge(right=-1)), ("right", "right_arrow", placing.Nudge(right=1)),
@@ -336,7 +344,9 @@ def _placing(command: do.Command) -> Callable[[State], do.Command | None]:
 
 
 def _undo(state: State) -> do.Command | None:
-    return edit.Undo() if state.editing.history and state.editing.history.done else None
+    if state.editing.history and state.editing.history.done:
+        return edit.Undo()
+    return mending.BringBack() if state.scene.unhidden is not None else None
 
 
 def _redo(state: State) -> do.Command | None:

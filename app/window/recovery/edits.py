@@ -73,6 +73,18 @@ def forget_file(edits: Path) -> None:
             file.unlink(missing_ok=True)
 
 
+def forget_scene(scene: "Scene", path: Path | None) -> None:
+    """Remove the edits that all sessions kept of a scene, found by its content or its path."""
+    from langflash_core.scene.edits_file import read_about, scene_digest
+
+    digest = scene_digest(scene)
+    for edits in _newest_first():
+        with suppress(SceneFileError):
+            found, about, _ = read_about(edits)
+            if found == digest or (path is not None and about.get("path") == str(path)):
+                forget_file(edits)
+
+
 def find(scene: "Scene | None" = None, path: Path | None = None) -> Offer | None:
     """Edits kept of this scene, by its content or its path; without a scene the newest of all."""
     from langflash_core.scene.edits_file import read_about, scene_digest

@@ -35,7 +35,7 @@ from .commands import (
 from .keeper import Keeper
 from .preferences import Preferences
 from .state import Kept, Offer
-from .work import ForgetEdits, ForgetFile, KeepCopy, KeepEdits, LookForEdits
+from .work import ForgetEdits, ForgetFile, ForgetScene, KeepCopy, KeepEdits, LookForEdits
 
 KEEP_AFTER = 1.0  # seconds without a change before a session or edits are written, so that a burst is once
 SAVE_AFTER = 0.5  # the same for preferences
@@ -127,6 +127,9 @@ class RecoveryEffects(Effects):
                 self._arrived(info, before, state, replaces)
             case SceneSaved(path):
                 self._settle(state)
+                if before.scene.unhidden is not None:
+                    room = before.scene.unhidden
+                    self._hands.submit(ForgetScene(room.info.scene, room.info.path))
                 self._hands.perform(Opened(path))
             case CopyKept(path) if path == self._keeper.scene_file:
                 self._copied = True
@@ -180,10 +183,12 @@ class RecoveryEffects(Effects):
                 self._replaced.append(ForgetFile(restored))
         else:
             self._hands.submit(LookForEdits(info.serial, info.scene, info.path))
-        if (
-            replaces and before.scene.info is not None
-        ):  # the same edits are to lie beside the scene that has come
-            self._replaced.append(ForgetEdits(before.scene.info.scene, self._keeper.token))
+        if replaces and before.scene.info is not None:
+            errand = ForgetEdits(before.scene.info.scene, self._keeper.token)
+            if info.history is not None and info.history.done:  # the same edits are to lie beside this scene
+                self._replaced.append(errand)
+            else:  # something was hidden for good: nothing is kept that shows it
+                self._hands.submit(errand)
 
     def _end_offer(self, offer: Offer, restore: bool, forget: bool) -> None:
         if restore:

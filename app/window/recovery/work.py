@@ -67,6 +67,18 @@ class ForgetEdits(Errand):
 
 
 @dataclass(frozen=True)
+class ForgetScene(Errand):
+    """Remove all that any session kept of a scene, by its content or its path."""
+
+    scene: "Scene" = field(repr=False)
+    path: Path | None
+
+    def run(self, stopping: Asked) -> Iterable[Command]:
+        edits.forget_scene(self.scene, self.path)
+        return ()
+
+
+@dataclass(frozen=True)
 class ForgetFile(Errand):
     """Remove a file of kept edits."""
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from langflash_core.geometry import poses
-from langflash_core.scene.edits import Marks
+from langflash_core.scene.edits import Marks, delete
 from langflash_core.scene.mask import Mask
 
 from ..commands import NOTHING_TO_SAVE, Command, Notify, ShowDialog
@@ -17,7 +17,8 @@ from ..filming.state import NO_FILMING
 from ..state import State
 from .drops import MAX_PHOTOS
 from .memory import SceneMemory
-from .state import MOST_ROOMS, RECONSTRUCTING, RESTORING, Job, Photo, Room, SceneInfo, head_of
+from .state import MOST_ROOMS, PAUSED, RECONSTRUCTING, RESTORING, Job, Photo, Room, SceneInfo, head_of
+from .unfinished import FEWEST
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
@@ -175,7 +176,9 @@ class Reconstruct:
     def apply(self, state: State) -> State:
         if not state.scene.photos:
             return Notify("There is no photo to reconstruct; drop two photos on the window.").apply(state)
-        return state.with_scene(job=Job(RECONSTRUCTING, "starting", started=state.now))
+        pausable = len(state.scene.photos) >= FEWEST
+        job = Job(RECONSTRUCTING, "starting", started=state.now, pausable=pausable)
+        return state.with_scene(job=job, unfinished=())
 
 
 @dataclass(frozen=True)
@@ -259,6 +262,7 @@ class SceneArrived:
                 pose=info.views[0] if info.views else poses.START,
                 flight=None,
                 view=0 if info.views else None,
+                unhidden=None,
                 job=None,
             ),
             asking=replace(asking, named=made and not asking.asked),
@@ -377,12 +381,14 @@ class MergeScene:
 
 @dataclass(frozen=True)
 class Merged:
-    """The scene with number `serial`, of which there was so much, and another as one scene."""
+    """The scene with number `serial`, of which there was so much, and another as one scene; or, where `gone`
+    says what was taken away, what fills its hole."""
 
     serial: int
     there: tuple[int, int]
     info: SceneInfo
     name: str
+    gone: Mask | None = None
 
     def fits(self, state: State) -> bool:
         """Whether it still holds the scene on show."""
@@ -397,6 +403,8 @@ class Merged:
         if self.fits(state):
             return state
         text = f"{self.name} was not merged, since another scene is on show by now; merge it again."
+        if self.gone is not None:
+            text = "Nothing was filled, since the scene is another by now; fill it again."
         return Notify(text).apply(state.with_scene(job=None))
 
     def arrival(self, state: State) -> "SceneArrived":
@@ -408,8 +416,11 @@ class Merged:
         before = history.of_size(self.there[0], history.marks.atoms[: self.there[1]])
         before = before.of_size(count, whole.atoms)
         brought = Mask.full(count) - Mask.first(count, self.there[0])
-        after = replace(before.marks, there=whole.there, selected=brought)
-        history = before.edited(f"Merge {self.name}", after)
+        after, label = replace(before.marks, there=whole.there, selected=brought), f"Merge {self.name}"
+        if self.gone is not None:
+            none = replace(after, selected=Mask.none(count))
+            after, label = delete(none, self.gone.of_count(count)), f"Delete and fill {len(self.gone):,}"
+        history = before.edited(label, after)
         if saved is not None:
             saved = saved.of_size(self.there[0], saved.atoms[: self.there[1]]).of_size(count, whole.atoms)
         room = Room(self.info, state.scene.photos, history, saved, state.scene.pose)
@@ -443,8 +454,17 @@ class SceneSaved:
             else replace(state.scene.info, path=self.path, name=self.path.name)
         )
         saved = self.marks or state.editing.saved
-        state = state.with_scene(info=info).with_editing(saved=saved)
+        state = state.with_scene(info=info, rooms=self._others(state), unhidden=None)
+        state = state.with_editing(saved=saved)
         return Notify(f"Saved {self.path}", "info").apply(state)
+
+    def _others(self, state: State) -> tuple[Room, ...]:
+        """Rooms without those that show what is hidden in the file."""
+        before = state.scene.unhidden
+        if before is None:
+            return state.scene.rooms
+        paths = {before.info.path, self.path}
+        return tuple(room for room in state.scene.rooms if room.info.path not in paths)
 
 
 # The job under way
@@ -460,6 +480,30 @@ class CancelJob:
             if state.scene.job is None
             else state.with_scene(job=replace(state.scene.job, cancelling=True))
         )
+
+
+@dataclass(frozen=True)
+class PauseJob:
+    """As `CancelJob`, but what is done stays, and the photos in the tray."""
+
+    def apply(self, state: State) -> State:
+        job = state.scene.job
+        if job is None or not job.pausable:
+            return state
+        return state.with_scene(job=replace(job, cancelling=True, pausing=True))
+
+
+@dataclass(frozen=True)
+class WorkFound:
+    """Whether work on these photos was begun and kept."""
+
+    paths: tuple[Path, ...]
+    there: bool
+
+    def apply(self, state: State) -> State:
+        if tuple(photo.path for photo in state.scene.photos) != self.paths:
+            return state
+        return state.with_scene(unfinished=self.paths if self.there else ())
 
 
 @dataclass(frozen=True)
@@ -497,7 +541,11 @@ class JobCancelled:
     """The job ended because the person stopped it."""
 
     def apply(self, state: State) -> State:
-        return Notify("Stopped.", "info").apply(_ended(state))
+        job = state.scene.job
+        if job is None or not job.pausing:
+            return Notify("Stopped.", "info").apply(_ended(state.with_scene(unfinished=())))
+        paths = tuple(photo.path for photo in state.scene.photos)
+        return Notify(PAUSED, "info").apply(state.with_scene(job=None, unfinished=paths))
 
 
 def _ended(state: State) -> State:

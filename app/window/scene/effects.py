@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 
 from langflash_core.colormaps import colour_bar
 from langflash_core.errors import LangFlashError
@@ -32,6 +33,7 @@ from .commands import (
     MergeScene,
     OpenPaths,
     OpenScene,
+    PauseJob,
     Reconstruct,
     SaveScene,
     SceneArrived,
@@ -41,10 +43,13 @@ from .commands import (
 )
 from .drops import sort_drop
 from .state import WHOLE, WHOLE_PHOTOS, SceneInfo
+from .unfinished import FEWEST
 from .work import (
+    DropWork,
     FindPair,
     JoinScenes,
     LoadScene,
+    LookForWork,
     MakeThumbnails,
     ReconstructPhotos,
     ShrinkPhotos,
@@ -81,8 +86,8 @@ class SceneEffects(Effects):
                 submit(LoadScene(path, edits, alone))
             case SaveScene(path) if state.scene.info is not None:
                 submit(WriteScene(state.scene.info.scene, path, state.editing.marks))
-            case CancelJob():
-                self._hands.cancel()
+            case CancelJob() | PauseJob():
+                self._end_job(command, before)
             case ChoosePair() if state.scene.choosing and not before.scene.choosing:
                 submit(FindPair(tuple(photo.path for photo in state.scene.photos)))
             case SceneArrived(info):
@@ -95,7 +100,20 @@ class SceneEffects(Effects):
                 self._hands.dispatch(Loaded())
             case _:
                 self._go_on(command, before, state)
+        self._look_for_work(before, state)
         self._show_whole(before, state)
+
+    def _end_job(self, command: CancelJob | PauseJob, before: State) -> None:
+        """A job that is paused keeps its work, one that is cancelled does not."""
+        self._hands.cancel()
+        job = before.scene.job
+        if isinstance(command, CancelJob) and job is not None and job.pausable:
+            self._hands.submit(DropWork(_paths(before)))
+
+    def _look_for_work(self, before: State, state: State) -> None:
+        """Other photos in the tray may be ones on which work was begun."""
+        if _paths(before) != _paths(state) and len(state.scene.photos) >= FEWEST and state.scene.job is None:
+            self._hands.submit(LookForWork(_paths(state)))
 
     def _go_on(self, command: Command, before: State, state: State) -> None:
         """Commands that stand for others."""
@@ -109,6 +127,8 @@ class SceneEffects(Effects):
                 waited = before.scene.pending
             case All(commands):
                 waited = commands
+            case Merged(gone=gone) if gone is not None and command.fits(before):
+                waited = [command.arrival(before)]
             case Merged() if command.fits(before):
                 waited = [command.arrival(before), SetHandle(Handle.MOVE), FrameAll()]
             case GoToRoom(serial):
@@ -164,3 +184,8 @@ class SceneEffects(Effects):
         for colormap in COLOUR_MAPS:
             self._thumbnails.put(f"bar {colormap}", colour_bar(colormap))
         self._entitle(f"{info.name} - LangFlash")
+
+
+def _paths(state: State) -> tuple[Path, ...]:
+    """Of the photos in the tray."""
+    return tuple(photo.path for photo in state.scene.photos)

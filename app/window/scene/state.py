@@ -45,6 +45,7 @@ class Photo:
     notes: tuple[str, ...] = ()
 
 
+PAUSED = "Paused. Resume goes on from there, also when the program was closed and the same photos are opened."
 RECONSTRUCTING, RESTORING = "Reconstructing", "Restoring"
 """Titles of the jobs that make a scene out of the tray, and out of what an earlier session kept."""
 
@@ -87,7 +88,8 @@ def head_of(stage: str) -> str:
 
 @dataclass(frozen=True)
 class Job:
-    """Work under way. done: finished stages with their seconds; started: when `stage` began."""
+    """Work under way. done: finished stages with their seconds; started: when `stage` began. pausable: what
+    is done of it is kept; pausing: it is to stop and stay so."""
 
     title: str
     stage: str = ""
@@ -95,6 +97,8 @@ class Job:
     started: float = 0.0
     done: tuple[tuple[str, float], ...] = ()
     cancelling: bool = False
+    pausable: bool = False
+    pausing: bool = False
 
 
 @dataclass(frozen=True)
@@ -159,6 +163,8 @@ class Showing:
     being looked for. rooms: scenes that were on show before, the last one first. dropped: photos while it is
     asked where they belong. pending: commands that wait for an answer about unsaved edits. view: of the photo
     stood at, if any. compare: where the photo begins, 0 to 1 across the picture; None: not compared.
+    unfinished: photos on which work was begun and kept.
+    unhidden: the scene on show as it was before something in it was hidden for good, until that is saved.
     """
 
     photos: tuple[Photo, ...] = ()
@@ -173,7 +179,14 @@ class Showing:
     flight: Flight | None = None
     view: int | None = None
     compare: float | None = None
+    unhidden: Room | None = None
     job: Job | None = None
+    unfinished: tuple[Path, ...] = ()
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether work on the photos in the tray goes on from where it was."""
+        return bool(self.unfinished) and tuple(photo.path for photo in self.photos) == self.unfinished
 
 
 NO_SCENE = Showing()

@@ -22,6 +22,7 @@ from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command, ShowPicture
 from ..requests import Asked, Errand, Job, SceneErrand
+from . import unfinished
 from .commands import (
     ChoosingFailed,
     Merged,
@@ -31,6 +32,7 @@ from .commands import (
     SceneArrived,
     SceneSaved,
     Thinned,
+    WorkFound,
 )
 from .state import SceneInfo
 
@@ -46,8 +48,8 @@ THUMBNAIL_SIDE = 320  # pixels of the longer side
 
 @dataclass(frozen=True)
 class ReconstructPhotos(Job):
-    """Make a scene of photos. fovs: degrees of the longer side, one per photo; None: its record.
-    detail: its name, of `langflash_core.detail`."""
+    """Make a scene of photos; of many it goes on from what was kept (`unfinished`). fovs: degrees of the
+    longer side, one per photo; None: its record. detail: its name, of `langflash_core.detail`."""
 
     paths: tuple[Path, ...]
     fovs: tuple[float | None, ...] = ()
@@ -56,9 +58,11 @@ class ReconstructPhotos(Job):
     def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> SceneArrived:
         from langflash_core.pipeline import reconstruct
 
-        scene = reconstruct(
-            self.paths, fov=self.fovs or None, detail=self.detail, progress=progress, cancelled=cancelled
-        )
+        lenses = self.fovs or None
+        with unfinished.kept(self.paths) as keep:
+            scene = reconstruct(
+                self.paths, fov=lenses, detail=self.detail, keep=keep, progress=progress, cancelled=cancelled
+            )
         return SceneArrived(describe_scene(scene, serial, called(self.paths)))
 
 
@@ -218,6 +222,30 @@ class MakeThumbnails(Errand):
     def run(self, stopping: Asked) -> Iterator[Command]:
         for path in self.paths:
             yield from _thumbnail(path)
+
+
+@dataclass(frozen=True)
+class LookForWork(Errand):
+    """Whether work on these photos was begun and kept."""
+
+    paths: tuple[Path, ...]
+
+    newest_counts = True
+    light = True
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        yield WorkFound(self.paths, unfinished.is_unfinished(self.paths))
+
+
+@dataclass(frozen=True)
+class DropWork(Errand):
+    """Forget the work on these photos."""
+
+    paths: tuple[Path, ...]
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        unfinished.drop(self.paths)
+        yield WorkFound(self.paths, False)
 
 
 def _thumbnail(path: Path) -> Iterator[Command]:

@@ -21,6 +21,7 @@ def editing(now: Editing) -> dict:
         "tool": now.tool.name,
         "selected": now.num_selected,
         "deleted": len(history.marks.deleted) if history else 0,
+        "hiding": now.hiding,
         "hidden": len(history.marks.hidden) if history else 0,
         "edits": [edit.label for edit in history.done] if history else [],
         "undone": len(history.undone) if history else 0,
@@ -33,7 +34,7 @@ def editing(now: Editing) -> dict:
         "shares": None if now.hover is None or now.hover.atoms is None else dict(now.hover.atoms),
         "words": None if card is None or card.words is None else [word for word, _ in card.words],
         "floaters": None
-        if preview is None or not preview.scores or history is None
+        if preview is None or not preview.least or history is None
         else len(preview.mask(history.marks.visible)),
     }
 
@@ -48,6 +49,7 @@ def summary(session: Session) -> dict:
         "span": state.scene.pose.span,
         "view": state.scene.view,
         "flying": state.scene.flight is not None,
+        "unhidden": state.scene.unhidden is not None,
         "job": None if state.scene.job is None else state.scene.job.stage,
         "prompts": [[p.text, p.score, p.found, p.cut] for p in state.asking.prompts],
         "recent": list(state.asking.recent),

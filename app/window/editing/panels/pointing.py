@@ -163,7 +163,7 @@ def _card(state: State, card: Card, look: Look, place: ImVec2, size: ImVec2) -> 
             if at.x + look.px(_CARD + 30) < place.x + size.x
             else at.x - look.px(_CARD + 18)
         )
-        y = min(max(at.y - look.px(40), place.y + look.px(12)), place.y + size.y - look.px(330))
+        y = min(max(at.y - look.px(40), place.y + look.px(12)), place.y + size.y - look.px(372))
         corner = ImVec2(x, max(y, place.y + look.px(12)))
     imgui.set_next_window_pos(corner)
     imgui.set_next_window_size(ImVec2(look.px(_CARD), 0))

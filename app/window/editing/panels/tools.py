@@ -10,9 +10,9 @@ from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State
 from .. import commands as edit
-from .. import placing
+from .. import mending, placing
 from .. import pointing as point
-from ..state import RADIUS_RANGE, REACH_RANGE, STRICTNESS_RANGE, Floaters, Tool
+from ..state import RADIUS_RANGE, REACH_RANGE, Floaters, Tool
 from . import placing as placing_bar
 
 _TOOLS = (
@@ -30,6 +30,11 @@ _COMBINES: tuple[tuple[Combine, str, str], ...] = (
     ("replace", fa.ICON_FA_SQUARE, "A new selection each time"),
     ("add", fa.ICON_FA_PLUS, "Add to the selection  (Shift)"),
     ("remove", fa.ICON_FA_MINUS, "Take from the selection  (Ctrl)"),
+)
+_WAYS = (
+    ("blur", "Blur", "Colours that run together, of six blocks along its longest side"),
+    ("pixels", "Pixels", "Blocks of one colour, six along its longest side"),
+    ("remove", "Remove", "Nothing of it; the hole is filled from what is around"),
 )
 _BUTTON = 36.0  # design pixels of a tool's side
 _SMALLEST = 20.0
@@ -64,6 +69,8 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     if state.editing.tint is not None:
         tint = state.editing.tint
         bars.append(lambda: placing_bar.draw_tint(state, tint, look, right))
+    if state.editing.hiding and state.editing.num_selected:
+        bars.append(lambda: _hiding(state.editing.hiding, look, right))
     if state.editing.floaters is not None:
         found = state.editing.floaters
         bars.append(lambda: _floaters(state, found, look, right))
@@ -122,18 +129,23 @@ def _strip(state: State, look: Look, wide: float) -> list[do.Command]:
             issued.append(placing.SetHandle(editing.handle) if taken else point.SetTool(tool))
     imgui.separator()
     if _tool_button(
-        fa.ICON_FA_WAND_MAGIC_SPARKLES, editing.floaters is not None, side, "Find floaters, with a preview"
+        fa.ICON_FA_WAND_MAGIC_SPARKLES,
+        editing.floaters is not None,
+        side,
+        "Clean up what does not belong, with a preview; within the selection, if there is one",
     ):
         issued.append(edit.FindFloaters() if editing.floaters is None else edit.EndFloaters())
     imgui.separator()
     history = editing.history
     last = history.done[-1].label if history and history.done else ""
+    bring_back = not last and state.scene.unhidden is not None
+    last = "what was hidden" if bring_back else last
     following = history.undone[-1].label if history and history.undone else ""
     imgui.begin_disabled(not last)
     if _tool_button(
         fa.ICON_FA_ROTATE_LEFT, False, side, f"Undo: {last}  (Ctrl+Z)" if last else "Undo  (Ctrl+Z)"
     ):
-        issued.append(edit.Undo())
+        issued.append(mending.BringBack() if bring_back else edit.Undo())
     imgui.end_disabled()
     imgui.begin_disabled(not following)
     tip = f"Redo: {following}  (Ctrl+Shift+Z)" if following else "Redo  (Ctrl+Shift+Z)"
@@ -208,6 +220,8 @@ def _actions(right: float) -> list[do.Command]:
         (fa.ICON_FA_EXPAND, "Fly to it  (F)", point.FrameSelection()),
         (fa.ICON_FA_PALETTE, "Recolour  (Ctrl+T)", placing.BeginTint()),
         (fa.ICON_FA_TRASH, "Delete  (Del)", edit.Delete()),
+        (fa.ICON_FA_FILL_DRIP, "Delete, and fill the hole from what is around", mending.FillSelection()),
+        (fa.ICON_FA_USER_SECRET, "Hide for good: blur, pixelate or remove", mending.AskToHide()),
         (fa.ICON_FA_XMARK, "Select nothing  (Ctrl+D)", edit.Deselect()),
     ]
     for place, (icon, tip, command) in enumerate(actions):
@@ -247,18 +261,42 @@ def _floaters(state: State, found: Floaters, look: Look, right: float) -> list[d
     imgui.text_colored(theme.BAD, fa.ICON_FA_WAND_MAGIC_SPARKLES)
     imgui.same_line()
     marks = state.editing.marks
-    if not found.scores or marks is None:
-        imgui.text("Looking for floaters ...")
+    if not found.least or marks is None:
+        imgui.text("Looking for what does not belong ...")
         return issued
     count = len(found.mask(marks.visible))
-    imgui.text(f"{count:,} floaters")
-    tip, width = "How far a Gaussian must stand out from its surroundings; right is stricter", look.px(170)
+    imgui.text(f"{count:,} to clean up" + (" in the selection" if found.within is not None else ""))
+    tip, width = "Strength: how much is cleaned up", look.px(170)
     widgets.go_on(width, right, look.px(14))
-    text = f"{found.strictness:.1f}"
-    changed, strictness = widgets.slider("##strict", found.strictness, STRICTNESS_RANGE, text, tip, width)
+    text = f"{100 * found.strength:.0f} %"
+    changed, strength = widgets.slider("##strength", found.strength, (0.0, 1.0), text, tip, width)
     if changed:
-        issued.append(edit.SetStrictness(strictness))
+        issued.append(edit.SetStrength(strength))
     return issued + _end_floaters(count, look, right)
+
+
+def _hiding(chosen: str, look: Look, right: float) -> list[do.Command]:
+    """The ways to hide the selection for good."""
+    issued: list[do.Command] = []
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.SELECTED, fa.ICON_FA_USER_SECRET)
+    imgui.same_line()
+    imgui.text("Hide for good, in the photos too:")
+    for place, (how, name, tip) in enumerate(_WAYS):
+        widgets.go_on(widgets.button_width(name), right, look.px(14 if place == 0 else 4))
+        label = f"{name}##{how}"
+        if widgets.primary_button(label) if how == chosen else imgui.button(label):
+            issued.append(mending.AskToHide(how))
+        widgets.tooltip(tip)
+    widgets.go_on(widgets.button_width("Hide it"), right, look.px(14))
+    if widgets.primary_button("Hide it##for good"):
+        issued.append(mending.HideForGood(chosen))
+    widgets.tooltip("It can be brought back until the scene is saved, and never from the file")
+    widgets.go_on(widgets.button_width("Cancel"), right)
+    if imgui.button("Cancel##hiding"):
+        issued.append(mending.AskToHide(""))
+    widgets.tooltip("Leave all as it is  (Esc)")
+    return issued
 
 
 def _end_floaters(count: int, look: Look, right: float) -> list[do.Command]:

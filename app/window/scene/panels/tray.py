@@ -250,8 +250,12 @@ def _buttons(state: State, look: Look) -> list[do.Command]:
     others = side + gap if few else 2 * (side + gap)
     width = imgui.get_content_region_avail().x - others
     imgui.begin_disabled(state.scene.choosing)
-    if widgets.primary_button(f"{fa.ICON_FA_CUBES}  Reconstruct", ImVec2(width, 0)):
+    goes_on = state.scene.goes_on
+    label = f"{fa.ICON_FA_PLAY}  Resume" if goes_on else f"{fa.ICON_FA_CUBES}  Reconstruct"
+    if widgets.primary_button(f"{label}###reconstruct", ImVec2(width, 0)):
         issued.append(show.Instead((show.Reconstruct(),)))
+    if goes_on:
+        widgets.tooltip("Go on from what was kept of these photos")
     if not few:
         imgui.same_line()
         icon = fa.ICON_FA_HOURGLASS_HALF if state.scene.choosing else fa.ICON_FA_WAND_MAGIC_SPARKLES
@@ -267,24 +271,37 @@ def _buttons(state: State, look: Look) -> list[do.Command]:
 
 
 def _progress(job: Job, now: float, look: Look) -> list[do.Command]:
-    """Cancel, the stage under way and its bar, in the one line of the buttons: nothing moves by a stage.
-    The finished ones with their seconds on hover."""
+    """Cancel and pause, the stage under way and its bar, in the one line of the buttons: nothing moves by a
+    stage. The finished ones with their seconds on hover."""
+    issued: list[do.Command] = []
     imgui.begin_disabled(job.cancelling)
-    pressed = imgui.button(f"{fa.ICON_FA_STOP}  Cancel", look.vec(_CANCEL, 0))
-    imgui.end_disabled()
+    if imgui.button(f"{fa.ICON_FA_STOP}  Cancel", look.vec(_CANCEL, 0)):
+        issued.append(show.CancelJob())
     widgets.tooltip("Stop it  (Esc)")
     imgui.same_line()
+    if job.pausable:
+        if imgui.button(f"{fa.ICON_FA_PAUSE}##pause", ImVec2(imgui.get_frame_height() + look.px(6), 0)):
+            issued.append(show.PauseJob())
+        widgets.tooltip("Pause it: what is done stays, also when the program ends")
+        imgui.same_line()
+    imgui.end_disabled()
     corner, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
     seconds = _seconds(job, now)
     room = width - imgui.calc_text_size(seconds).x - look.px(8)
     imgui.align_text_to_frame_padding()
-    imgui.text(widgets.shortened("stopping" if job.cancelling else said(job.stage), room))
+    imgui.text(widgets.shortened(_doing(job), room))
     if imgui.is_item_hovered():
         imgui.set_tooltip(_told(job))
     with widgets.colours(text=theme.MUTED):
         widgets.at_right_edge(seconds)
     _bar(job.fraction, ImVec2(corner.x, corner.y + imgui.get_frame_height()), width, look)
-    return [show.CancelJob()] if pressed else []
+    return issued
+
+
+def _doing(job: Job) -> str:
+    if job.cancelling:
+        return "pausing" if job.pausing else "stopping"
+    return said(job.stage)
 
 
 def _seconds(job: Job, now: float) -> str:

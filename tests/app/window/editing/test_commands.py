@@ -139,14 +139,14 @@ def test_settings_stay_within_their_ranges(shown: State) -> None:
 
 
 def test_floaters_are_previewed_then_deleted(shown: State) -> None:
-    scores = np.zeros(12_300, np.float32)
-    scores[:5], scores[5:9] = 4.0, 2.5
-    state = after(shown, edit.FindFloaters(), edit.FloatersFound(scores.tobytes()), edit.SetStrictness(3.0))
+    least = np.full(12_300, np.inf, np.float32)
+    least[:5], least[5:9] = 0.2, 0.6
+    state = after(shown, edit.FindFloaters(), edit.FloatersFound(least.tobytes()), edit.SetStrength(0.4))
     assert state.editing.floaters is not None and state.editing.marks == shown.editing.marks
     assert len(state.editing.floaters.mask(state.editing.marks.visible)) == 5  # type: ignore[union-attr]
     gone = after(state, edit.EndFloaters("delete"))
     assert labels(gone) == ["Delete 5 floaters"] and gone.editing.floaters is None
-    chosen = after(state, edit.SetStrictness(2.2), edit.EndFloaters("select"))
+    chosen = after(state, edit.SetStrength(0.7), edit.EndFloaters("select"))
     assert labels(chosen) == ["Select 9 floaters"]
     assert labels(after(state, edit.EndFloaters())) == []
     assert after(shown, edit.FindFloaters(), edit.FloatersFound(b"1234")).editing.floaters == Floaters()

@@ -43,9 +43,10 @@ def test_names_that_are_kept_in_one_room_are_taken_in_another_and_undone(tmp_pat
     assert second.editing.waiting
     second = run(second, work.FindLessons(*errand(second), path))
     assert not second.editing.waiting and "heirloom" in told(second)
+    assert second.editing.marks is not None
     assert [atom.name for atom in second.editing.marks.atoms] == ["", "heirloom", ""]
     undone = apply(second, Undo())
-    assert not any(atom.name for atom in undone.editing.marks.atoms)
+    assert undone.editing.marks is not None and not any(atom.name for atom in undone.editing.marks.atoms)
 
 
 def test_nothing_to_keep_or_to_take_is_said(tmp_path):

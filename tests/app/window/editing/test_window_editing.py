@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from imgui_bundle import icons_fontawesome_6 as fa
 
 from langflash_core.scene.file import load
 from tests.app.window.test_window import (
@@ -26,6 +27,7 @@ __all__ = ["display", "pytestmark", "scene_file"]  # fixtures and the mark of th
 
 ACROSS, DOWN = SIZE[0] - LEFT, CANVAS[0].stop - TOP
 CHAIR = (LEFT + ACROSS * 3 // 10, TOP + DOWN * 6 // 10)  # as in test_the_scene_is_drawn
+HIDE = fa.ICON_FA_USER_SECRET
 WALL = (LEFT + ACROSS * 8 // 10, TOP + DOWN * 3 // 10)  # below the bars
 
 
@@ -196,3 +198,24 @@ def test_a_crash_loses_no_edit(display: str, scene_file: Path, state_folder: Pat
     again.xdotool("mousemove", *map(str, MIDDLE), "key", "ctrl+z")
     again.until(lambda s: s["deleted"] == 0, "undo over the crash")
     again.leave()
+
+
+def test_a_thing_is_hidden_for_good_and_brought_back_until_it_is_saved(program: Program) -> None:
+    plain = program.picture()
+    press(program, "c", "PICK")
+    move(program, CHAIR)
+    program.xdotool("click", "1")
+    program.until(lambda s: s["selected"] > 2000 and not s["waiting"], "the block")
+    program.click(HIDE)
+    program.until(lambda s: s["hiding"] == "blur", "the ways to hide it")
+    program.click("##pixels")
+    program.until(lambda s: s["hiding"] == "pixels", "the other way")
+    program.click("##for good")
+    state = program.until(lambda s: s["unhidden"] and s["job"] is None, "the hidden scene")
+    assert state["unsaved"] and any("Ctrl+Z brings it back" in toast for toast in state["toasts"])
+    move(program, WALL)
+    program.at_rest()
+    assert not np.array_equal(program.picture(), plain)
+    program.xdotool("key", "ctrl+z")
+    state = program.until(lambda s: not s["unhidden"] and s["selected"] > 2000, "what was on show before")
+    assert state["gl_errors"] == []

@@ -199,7 +199,7 @@ def test_atoms_are_named(info) -> None:
 
 def test_floaters_are_scored_for_every_row(info) -> None:
     floaters = result(work.ScoreFloaters(*scene_of(info)))
-    assert isinstance(floaters, edit.FloatersFound) and len(floaters.scores) == 4 * 12_300
+    assert isinstance(floaters, edit.FloatersFound) and len(floaters.least) == 4 * 12_300
 
 
 def test_with_parallel_rays_a_region_a_ball_and_a_click_take_what_they_show(info) -> None:

@@ -1,0 +1,96 @@
+"""What can happen while a part is hidden for good, or taken out and its hole filled.
+
+Hiding makes another scene: with the history of the one before, what was hidden could be brought back. That
+one is remembered until the hidden one is saved (`Showing.unhidden`), and can be gone back to until then.
+"""
+
+from dataclasses import dataclass
+
+from langflash_core.mending.recipes import HOWS
+from langflash_core.scene.edits import Marks
+
+from ..commands import Notify
+from ..scene.commands import SceneArrived
+from ..scene.state import Job, Room, SceneInfo
+from ..state import State
+
+HIDING, FILLING = "Hiding", "Filling"
+"""Titles of the jobs."""
+
+
+@dataclass(frozen=True)
+class AskToHide:
+    """Show the ways to hide the selection; another way; or "" for none."""
+
+    how: str = HOWS[0]
+
+    def apply(self, state: State) -> State:
+        asked = self.how if state.editing.num_selected and self.how in HOWS else ""
+        return state.with_editing(hiding=asked)
+
+
+@dataclass(frozen=True)
+class HideForGood:
+    """Hide the selection in scene and photos, as was chosen."""
+
+    how: str
+
+    def apply(self, state: State) -> State:
+        if not state.editing.num_selected:
+            return state
+        job = Job(HIDING, "looking", started=state.now)
+        return state.with_editing(hiding="").with_scene(job=job)
+
+
+@dataclass(frozen=True)
+class HiddenForGood:
+    """The scene with number `serial` with what its marks had selected hidden. said: what was done."""
+
+    serial: int
+    marks: Marks
+    info: SceneInfo
+    said: str
+
+    def fits(self, state: State) -> bool:
+        """Whether nothing has been edited meanwhile."""
+        info = state.scene.info
+        return info is not None and info.serial == self.serial and state.editing.marks == self.marks
+
+    def apply(self, state: State) -> State:
+        if self.fits(state):
+            return state
+        text = "Nothing was hidden, since the scene was edited meanwhile; hide it again."
+        return Notify(text).apply(state.with_scene(job=None))
+
+    def arrival(self, state: State) -> SceneArrived:
+        """What brings it into a state that it fits."""
+        room = Room(self.info, state.scene.photos, None, None, state.scene.pose)
+        return SceneArrived(self.info, room=room, replaces=True)
+
+
+@dataclass(frozen=True)
+class RememberUnhidden:
+    """The scene as it was before something in it was hidden, until it is saved without that."""
+
+    room: Room
+
+    def apply(self, state: State) -> State:
+        return state.with_scene(unhidden=self.room)
+
+
+@dataclass(frozen=True)
+class BringBack:
+    """Go back to the scene as it was before something was hidden."""
+
+    def apply(self, state: State) -> State:
+        return state
+
+
+@dataclass(frozen=True)
+class FillSelection:
+    """Take the selection away, and fill its hole from what is around it."""
+
+    def apply(self, state: State) -> State:
+        if not state.editing.num_selected:
+            return state
+        return state.with_scene(job=Job(FILLING, "looking", started=state.now))

@@ -1,0 +1,97 @@
+"""The worker's side of mending: jobs that make another scene of the one on show.
+
+Heavy imports wait until they are needed.
+"""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from langflash_core.errors import Cancelled
+from langflash_core.scene.edits import Marks
+from langflash_core.scene.mask import Mask
+
+from ..editing.mending import HiddenForGood
+from ..requests import Asked, Job
+from .commands import Merged
+from .state import SceneInfo
+from .work import describe_scene
+
+if TYPE_CHECKING:
+    from langflash_core.types import Frame
+
+_EDGE = 0.01  # of a photo's longer side: so far colours of a thing run over its edge
+
+
+@dataclass(frozen=True)
+class FillHole(Job):
+    """The selection taken away with what runs over its edge, and the hole filled from what is around."""
+
+    info: SceneInfo
+    marks: Marks = field(repr=False)
+
+    def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> Merged:
+        import torch
+
+        from langflash_core.mending.filling import fill
+        from langflash_core.mending.hiding import preview
+        from langflash_core.mending.looks import drawn
+        from langflash_core.scene.edited import there
+        from langflash_core.scene.joining import appended
+
+        progress("looking", 0.1)
+        own, marks = self.info, self.marks
+        kept = marks.left.rows()[: marks.there[0]]
+        shown = there(own.memory.changed(marks), marks).rows(torch.from_numpy(kept))
+        render = _watched(drawn, progress, cancelled)
+        gone = preview(shown, torch.from_numpy(marks.selected.rows()[: len(kept)][kept]), render, _EDGE)
+        patch, rows = fill(shown, gone, render), np.zeros(marks.selected.count, bool)
+        rows[np.flatnonzero(kept)] = gone.numpy()
+        info = describe_scene(appended(there(own.scene, marks), patch), serial, own.name, own.path)
+        return Merged(own.serial, marks.there, info, own.name, Mask.of(rows))
+
+
+@dataclass(frozen=True)
+class HidePart(Job):
+    """The scene as edited, with the selection hidden for good in Gaussians and photos."""
+
+    info: SceneInfo
+    marks: Marks = field(repr=False)
+    how: str
+
+    def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> HiddenForGood:
+        import torch
+
+        from langflash_core.mending.hiding import Hiding, hide
+        from langflash_core.mending.looks import drawn
+        from langflash_core.scene.edited import edited_scene
+
+        progress("looking", 0.1)
+        own, marks = self.info, self.marks
+        scene = edited_scene(own.scene, marks)
+        members = torch.from_numpy(marks.selected.rows()[marks.left.rows()])
+        render = _watched(drawn, progress, cancelled)
+        done, report = hide(scene, members, render, Hiding(self.how))  # type: ignore[arg-type]
+        count = report.members + report.rim
+        photos = f", {len(report.photos)} photos painted over" if report.photos else ""
+        still = "" if own.path is None else f" {own.path.name} on the disk still shows it."
+        said = f"Hidden: {count:,} Gaussians{photos}. Ctrl+Z brings it back until this is saved.{still}"
+        return HiddenForGood(own.serial, marks, describe_scene(done, serial, own.name), said)
+
+
+def _watched(
+    render: "Callable[..., Frame]", progress: Callable[[str, float], None], cancelled: Asked
+) -> "Callable[..., Frame]":
+    """Who draws, between whose pictures a job can end."""
+    made = itertools.count(1)
+
+    def drawn(*args, **kwargs) -> "Frame":
+        if cancelled():
+            raise Cancelled("stopped")
+        progress("drawing", 1 - 0.9 ** next(made))
+        return render(*args, **kwargs)
+
+    return drawn

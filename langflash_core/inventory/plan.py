@@ -1,0 +1,286 @@
+"""A room from above: walls, what opens in them, and where things stand.
+
+Walls are planes: what answers "wall", "door" or "window" and is upright lies, seen from above, on a few lines
+along two directions across each other. Their common turn is the mean of the normals' azimuths, modulo a
+quarter; along it and across it a histogram of offsets, weighted by area, has a peak a wall. A wall reaches as
+far as its points do, over gaps of `_GAP`, and to the wall it meets.
+
+Lengths are in the inventory's unit; places are (east, north). Sizes: n points.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.ndimage import gaussian_filter1d
+
+from langflash_core.inventory.things import OPENINGS, Inventory, Thing, kinds_of
+from langflash_core.level import normals_of
+from langflash_core.records import Guess
+from langflash_core.scene.thin import covered_areas
+from langflash_core.scene.world import turn_of
+
+# Of a room 4 m across; all are scaled where the unit is no metre.
+_BIN = 0.03  # m of offset
+_BLUR = 0.07  # m, of the histogram
+_THICK = 0.15  # m from a wall's plane, of what belongs to it
+_APART = 0.30  # m between two walls side by side
+_STEP, _GAP, _SHORTEST = 0.10, 1.2, 0.5  # m along a wall
+_MEETS = 0.6  # m by which a wall is lengthened to the wall that it meets
+_LEAST = 0.03  # of the area of all walls
+_BESIDE = 0.75  # m from a larger wall along the same piece of floor: what is there stands before it
+_LOW = 0.6  # of the height that walls are seen to: what ends below is furniture
+_UPRIGHT, _FACES = math.sin(math.radians(35)), math.cos(math.radians(40))
+_HANGS = 0.45  # m from a wall, of a door or window in it
+_OF_WALLS = ("wall", *OPENINGS)
+
+Place = tuple[float, float]  # east, north
+
+
+@dataclass(frozen=True)
+class PlanWall:
+    """A straight wall. share: of the area of all walls that photos saw."""
+
+    start: Place
+    end: Place
+    share: float
+
+    @property
+    def length(self) -> float:
+        return math.dist(self.start, self.end)
+
+
+@dataclass(frozen=True)
+class Opening:
+    """A door or a window, as it lies in its wall."""
+
+    thing: Thing
+    start: Place
+    end: Place
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A room from above. turn: degrees of its walls from east to north, in [-45, 45). things: what stands
+    there, without what is in walls. eyes: where the photos were taken. unit, guess: as the inventory's."""
+
+    walls: tuple[PlanWall, ...]
+    openings: tuple[Opening, ...]
+    things: tuple[Thing, ...]
+    eyes: tuple[Place, ...]
+    turn: float
+    unit: str
+    guess: Guess | None
+
+    @property
+    def bounds(self) -> tuple[Place, Place]:
+        """Corners (west, south) and (east, north) of all that is drawn."""
+        ends = [place for wall in self.walls for place in (wall.start, wall.end)]
+        ends += [tuple(corner) for thing in self.things for corner in thing.corners]
+        points = np.array([*ends, *self.eyes])
+        (west, south), (east, north) = points.min(0).tolist(), points.max(0).tolist()
+        return (west, south), (east, north)
+
+
+def floor_plan(found: Inventory) -> Plan:
+    """The plan of an inventory."""
+    metre = 1.0 if found.unit == "m" else _room_size(found) / 4
+    pieces = _upright_pieces(found)
+    turn = _common_turn(pieces)
+    matrix = _turned(turn)
+    walls = _met(_walls(pieces.along(matrix), metre), metre)
+    walls = [_back(wall, matrix) for wall in walls]
+    openings, others = [], []
+    for thing in found.things:
+        place = _in_wall(thing, walls, metre) if thing.kind in OPENINGS else None
+        if place is None:
+            others.append(thing)
+        else:
+            openings.append(Opening(thing, *place))
+    others = [thing for thing in others if thing.kind not in OPENINGS]
+    return Plan(
+        tuple(walls),
+        tuple(openings),
+        tuple(others),
+        _eyes(found),
+        math.degrees(turn),
+        found.unit,
+        found.guess,
+    )
+
+
+def _room_size(found: Inventory) -> float:
+    """Of a scene without a scale: the median of its extents on the floor."""
+    low, high = np.nanquantile(found.stands[:, [0, 2]], (0.02, 0.98), axis=0)
+    return float(max(np.median(high - low), 1e-6))
+
+
+@dataclass(frozen=True)
+class _Pieces:
+    """n pieces of what walls are made of: places and unit normals (n, 2) on the floor; heights, areas."""
+
+    places: Float[np.ndarray, "n 2"]
+    normals: Float[np.ndarray, "n 2"]
+    heights: Float[np.ndarray, " n"]
+    areas: Float[np.ndarray, " n"]
+
+    def along(self, matrix: Float[np.ndarray, "2 2"]) -> "_Pieces":
+        """Seen along other axes of the floor."""
+        return _Pieces(self.places @ matrix.T, self.normals @ matrix.T, self.heights, self.areas)
+
+
+def _upright_pieces(found: Inventory) -> _Pieces:
+    scene = found.scene
+    normals = normals_of(scene.gaussians) @ turn_of(found.world).T
+    flat = normals[:, [0, 2]]
+    length = np.linalg.norm(flat, axis=1)
+    kinds, areas = kinds_of(scene), covered_areas(scene.gaussians)
+    chosen = np.isin(kinds, _OF_WALLS) & (np.abs(normals[:, 1]) < _UPRIGHT) & (length > 0.5) & (areas > 0)
+    chosen &= np.isfinite(found.stands).all(1)
+    stands = found.stands[chosen]
+    return _Pieces(stands[:, [0, 2]], flat[chosen] / length[chosen, None], -stands[:, 1], areas[chosen])
+
+
+def _common_turn(pieces: _Pieces) -> float:
+    """Radians in [-pi/4, pi/4): the azimuth that most walls share, modulo a quarter; 0 of nothing."""
+    azimuths = 4 * np.arctan2(pieces.normals[:, 1], pieces.normals[:, 0])
+    mean = complex(pieces.areas @ np.exp(1j * azimuths)) if len(azimuths) else 0j
+    return 0.0 if abs(mean) < 1e-12 else math.atan2(mean.imag, mean.real) / 4
+
+
+def _turned(turn: float) -> np.ndarray:
+    return np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
+
+
+def _walls(pieces: _Pieces, metre: float) -> list[PlanWall]:
+    """Walls along both axes, the largest first."""
+    walls: list[PlanWall] = []
+    total = float(pieces.areas.sum())
+    tall = _LOW * weighted_quantile(pieces.heights, pieces.areas, 0.9) if total else 0.0
+    for axis in (0, 1):
+        facing = np.abs(pieces.normals[:, axis]) >= _FACES
+        offsets, along = pieces.places[facing, axis], pieces.places[facing, 1 - axis]
+        areas, heights = pieces.areas[facing], pieces.heights[facing]
+        for offset in _peaks(offsets, areas, metre, _LEAST * total):
+            near = np.abs(offsets - offset) <= _THICK * metre
+            exact = weighted_quantile(offsets[near], areas[near], 0.5)
+            for low, high in _runs(along[near], areas[near], metre):
+                own = near & (along >= low) & (along <= high)
+                share = float(areas[own].sum()) / total
+                if share >= _LEAST / 2 and weighted_quantile(heights[own], areas[own], 0.9) >= tall:
+                    ends = ((exact, low), (exact, high)) if axis == 0 else ((low, exact), (high, exact))
+                    walls.append(PlanWall(*ends, share))
+    walls.sort(key=lambda wall: -wall.share)
+    return [wall for row, wall in enumerate(walls) if not any(_before(wall, w, metre) for w in walls[:row])]
+
+
+def _before(wall: PlanWall, larger: PlanWall, metre: float) -> bool:
+    """Whether it stands close before a larger one, over most of its own length."""
+    axis = _axis(wall)
+    if axis != _axis(larger) or abs(wall.start[axis] - larger.start[axis]) > _BESIDE * metre:
+        return False
+    low = max(wall.start[1 - axis], larger.start[1 - axis])
+    high = min(wall.end[1 - axis], larger.end[1 - axis])
+    return high - low > wall.length / 2
+
+
+def _peaks(offsets: np.ndarray, weights: np.ndarray, metre: float, least: float) -> list[float]:
+    """Offsets of walls, the heaviest first, none nearer than `_APART` to a heavier one."""
+    if not len(offsets):
+        return []
+    step = _BIN * metre
+    start = float(offsets.min()) - 3 * step
+    counts = np.bincount(((offsets - start) / step).astype(int), weights)
+    smooth = gaussian_filter1d(np.pad(counts, 4), _BLUR / _BIN, mode="constant")
+    chosen: list[float] = []
+    for row in np.argsort(-smooth, kind="stable"):
+        place = start + (row - 4 + 0.5) * step
+        mass = float(weights[np.abs(offsets - place) <= _THICK * metre].sum())
+        if smooth[row] <= 0 or len(chosen) > 20:
+            break
+        if mass >= least and all(abs(place - other) >= _APART * metre for other in chosen):
+            chosen.append(place)
+    return chosen
+
+
+def _runs(along: np.ndarray, weights: np.ndarray, metre: float) -> list[tuple[float, float]]:
+    """From where to where a wall's points reach, in pieces where it stops for long."""
+    step = _STEP * metre
+    start = float(along.min())
+    counts = np.bincount(((along - start) / step).astype(int), weights)
+    full = np.flatnonzero(counts > 0.1 * np.median(counts[counts > 0]))
+    parts = np.split(full, np.flatnonzero(np.diff(full) * step > _GAP * metre) + 1)
+    runs = [(start + part[0] * step, start + (part[-1] + 1) * step) for part in parts if len(part)]
+    return [(low, high) for low, high in runs if high - low >= _SHORTEST * metre]
+
+
+def _met(walls: list[PlanWall], metre: float) -> list[PlanWall]:
+    """Walls whose ends lie on the walls that they meet."""
+    met = []
+    for wall in walls:
+        axis = _axis(wall)
+        ends = []
+        for end in (wall.start, wall.end):
+            near = [
+                other.start[1 - axis]
+                for other in walls
+                if _axis(other) != axis
+                and abs(other.start[1 - axis] - end[1 - axis]) <= _MEETS * metre
+                and min(other.start[axis], other.end[axis]) - _MEETS * metre
+                <= wall.start[axis]
+                <= max(other.start[axis], other.end[axis]) + _MEETS * metre
+            ]
+            place = min(near, key=lambda value: abs(value - end[1 - axis])) if near else end[1 - axis]
+            ends.append((end[0], place) if axis == 0 else (place, end[1]))
+        if math.dist(*ends) >= _SHORTEST * metre / 2:
+            met.append(PlanWall(ends[0], ends[1], wall.share))
+    return met
+
+
+def _axis(wall: PlanWall) -> int:
+    """Which coordinate is the same all along it."""
+    return int(abs(wall.start[1] - wall.end[1]) < abs(wall.start[0] - wall.end[0]))
+
+
+def _back(wall: PlanWall, matrix: np.ndarray) -> PlanWall:
+    ends = np.array([wall.start, wall.end]) @ matrix
+    return PlanWall(tuple(ends[0].tolist()), tuple(ends[1].tolist()), wall.share)
+
+
+def _in_wall(thing: Thing, walls: list[PlanWall], metre: float) -> tuple[Place, Place] | None:
+    """Where a door or window lies in the wall nearest to it; None where none is near."""
+    middle = np.array([thing.place[0], thing.place[2]])
+    best: tuple[float, Place, Place] | None = None
+    for wall in walls:
+        start, end = np.array(wall.start), np.array(wall.end)
+        along = (end - start) / wall.length
+        place = float((middle - start) @ along)
+        across = abs(float(np.cross(along, middle - start)))
+        reach = np.abs((thing.corners - middle) @ along).max()
+        if (
+            across <= _HANGS * metre
+            and -reach <= place <= wall.length + reach
+            and (best is None or across < best[0])
+        ):
+            ends = (start + along * np.clip(place + step * reach, 0, wall.length) for step in (-1, 1))
+            low, high = (tuple(point.tolist()) for point in ends)
+            best = (across, low, high)
+    return None if best is None else best[1:]
+
+
+def _eyes(found: Inventory) -> tuple[Place, ...]:
+    if not found.scene.photos:
+        return ()
+    eyes = found.scene.viewmats.double().inverse()[:, :3, 3].numpy()
+    stands = found.scale * (eyes - np.array(found.world.origin)) @ turn_of(found.world).T
+    return tuple((float(east), float(north)) for east, _, north in stands)
+
+
+def weighted_quantile(
+    values: Float[np.ndarray, " n"], weights: Float[np.ndarray, " n"], share: float
+) -> float:
+    """The value below which this share of the weight lies."""
+    order = np.argsort(values, kind="stable")
+    ends = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(ends, share * ends[-1]).clip(max=len(values) - 1)])

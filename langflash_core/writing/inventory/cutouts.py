@@ -1,0 +1,79 @@
+"""Small pictures of things, cut out of the photos that show them best."""
+
+import base64
+import io
+
+import numpy as np
+import torch
+from PIL import Image
+from torch.nn import functional as F
+
+from langflash_core.inventory.things import Inventory
+from langflash_core.picture_files import STORED, opened_picture
+from langflash_core.running import Progress
+from langflash_core.segments import carrying, segmented_view
+from langflash_core.writing.renderers import Renderer
+
+SIDE = 220  # pixels of the longer side, at most
+_MARGIN = 0.08  # of the thing's longer side, around it
+_QUALITY = 82
+_LEAST = 0.5  # of a pixel that is the thing's
+
+
+def cutouts_of(found: Inventory, renderer: Renderer, progress: Progress) -> dict[str, str]:
+    """A data URL by id, WebP with transparency, of every thing that some photo shows."""
+    if not found.things:
+        return {}
+    segments = found.segments()
+    scene, cutouts = carrying(found.scene, segments), {}
+    best = [thing.photos[0] if thing.photos else 0 for thing in found.things]
+    for view in sorted(set(best)):
+        progress("cutting out", 0.3 + 0.6 * view / found.scene.num_views)
+        seen = segmented_view(scene, segments, found.scene.camera(view), renderer)
+        photo = _photo(found, view, seen.frame.rgb)
+        for number, thing in enumerate(found.things):
+            if best[number] == view:
+                picture = _cut_out(photo, seen.mattes[number].cpu())
+                if picture is not None:
+                    cutouts[thing.id] = _url(picture)
+    return cutouts
+
+
+def _photo(found: Inventory, view: int, drawn: torch.Tensor) -> np.ndarray:
+    """(H, W, 3) uint8: the photo, or what is drawn of it where the scene has none."""
+    if view < len(found.scene.photos):
+        try:
+            with opened_picture(found.scene.photos[view], STORED) as opened:
+                return np.asarray(opened.convert("RGB"))
+        except (OSError, SyntaxError, ValueError):  # a damaged photo: what was made of it is there
+            pass
+    return (drawn.clamp(0, 1) * 255).round().byte().cpu().numpy()
+
+
+def _cut_out(photo: np.ndarray, matte: torch.Tensor) -> Image.Image | None:
+    """The thing on transparency, cropped; None where no pixel is mostly its own."""
+    height, width = photo.shape[:2]
+    alpha = F.interpolate(matte[None, None], (height, width), mode="bilinear", align_corners=False)[0, 0]
+    rows, columns = (alpha >= _LEAST).nonzero(as_tuple=True)
+    if not len(rows):
+        return None
+    left, top = int(columns.min()), int(rows.min())
+    right, bottom = int(columns.max()) + 1, int(rows.max()) + 1
+    margin = round(_MARGIN * max(right - left, bottom - top))
+    box = (
+        max(0, left - margin),
+        max(0, top - margin),
+        min(width, right + margin),
+        min(height, bottom + margin),
+    )
+    soft = ((alpha - 0.25) / 0.5).clamp(0, 1)
+    picture = np.dstack((photo, (soft * 255).round().byte().numpy()))
+    cut = Image.fromarray(picture, "RGBA").crop(box)
+    cut.thumbnail((SIDE, SIDE), Image.Resampling.LANCZOS)
+    return cut
+
+
+def _url(picture: Image.Image) -> str:
+    stream = io.BytesIO()
+    picture.save(stream, "WEBP", quality=_QUALITY)
+    return f"data:image/webp;base64,{base64.b64encode(stream.getvalue()).decode()}"

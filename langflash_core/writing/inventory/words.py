@@ -1,0 +1,25 @@
+"""How lengths and sureness are said on plans and pages."""
+
+from langflash_core.inventory.things import Thing
+from langflash_core.records import Guess
+
+SURE = 0.95
+"""From here on a thing is what it is called; below it may be."""
+
+
+def length(value: float, unit: str) -> str:
+    """`1.40 m`, or `0.55 units`."""
+    return f"{value:.2f} {unit}"
+
+
+def size(thing: Thing, unit: str) -> str:
+    """Width, depth and height in one line."""
+    return f"{' × '.join(f'{side:.2f}' for side in thing.size)} {unit}"
+
+
+def scale_note(guess: Guess | None, unit: str) -> str:
+    """Where lengths come from, in a sentence."""
+    if guess is not None:
+        by = ", ".join(guess.by)
+        return f"Lengths are a guess, within about {guess.spread:.0%}, from: {by}."
+    return "Lengths are as they were told." if unit == "m" else "Lengths are in the scene's own unit."

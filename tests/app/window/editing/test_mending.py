@@ -1,0 +1,170 @@
+"""Hiding for good and filling, without a window: what comes of them, what is kept, and what is not."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from app.window.commands import Command, OfScene, Tick, apply
+from app.window.editing import commands as edit
+from app.window.editing import mending
+from app.window.editing.effects import EditingEffects
+from app.window.effects import Hands
+from app.window.places import state_folder
+from app.window.recovery.effects import KEEP_AFTER, RecoveryEffects
+from app.window.recovery.keeper import Keeper
+from app.window.requests import Errand, Job, SceneErrand
+from app.window.scene import commands as show
+from app.window.scene.effects import SceneEffects
+from app.window.scene.work import describe_scene
+from app.window.state import State
+from langflash_core.scene.file import load, save
+from langflash_core.scene.mask import Mask
+from tests.app.window.scene.test_rooms import Nothing
+from tests.app.window.scenes import room
+
+COUNT, BLOCK = 12_300, 2500
+
+
+@dataclass
+class Desk:
+    """A session without its window, with the effects of scene, editing and recovery."""
+
+    state: State = field(default_factory=State)
+    asked: list[Job | Errand] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: self.state.now)
+        nothing = Nothing()
+        self.recovery = RecoveryEffects(hands, Keeper())
+        scene = SceneEffects(hands, nothing, nothing, str)  # type: ignore[arg-type]
+        self.effects = (scene, EditingEffects(hands, nothing), self.recovery)  # type: ignore[arg-type]
+
+    def perform(self, *commands: Command) -> None:
+        for command in commands:
+            if isinstance(command, OfScene):
+                if not command.holds(self.state):
+                    continue
+                command = command.command
+            before, self.state = self.state, apply(self.state, command)
+            for each in self.effects:
+                each.follow(command, before, self.state)
+
+    def work(self, serial: int = 7) -> None:
+        """All that was asked of the worker, but for words and what only draws."""
+        while self.asked:
+            request = self.asked.pop(0)
+            if type(request).__name__ in ("NameAtoms", "Thin"):
+                continue
+            if isinstance(request, Job):
+                self.perform(request.run(serial, lambda *_: None, lambda: False))
+                continue
+            for command in request.run(lambda: False):
+                about = isinstance(request, SceneErrand)
+                self.perform(OfScene(request.serial, command) if about else command)
+
+    def rest(self) -> None:
+        self.perform(Tick(self.state.now + 2 * KEEP_AFTER))
+        self.recovery.tick(self.state, self.state.now)
+        self.work()
+
+
+@pytest.fixture
+def desk(folders: Path, tmp_path: Path) -> Iterator[Desk]:
+    """The room, out of its file, its block selected, and that kept."""
+    save(room(torch.eye(3)), tmp_path / "room.langflash")
+    scene = load(tmp_path / "room.langflash")
+    desk = Desk()
+    desk.perform(show.SceneArrived(describe_scene(scene, 1, "room.langflash", tmp_path / "room.langflash")))
+    desk.perform(edit.Found(Mask.first(COUNT, BLOCK), "replace", "here"))
+    desk.rest()
+    yield desk
+    desk.recovery.close(desk.state, crashed=False)
+
+
+def kept_of(path: Path) -> list[bytes]:
+    """All files of a folder."""
+    return [file.read_bytes() for file in path.rglob("*") if file.is_file()]
+
+
+def test_a_hole_is_filled_as_one_edit(desk: Desk) -> None:
+    desk.perform(mending.FillSelection())
+    assert desk.state.scene.job is not None
+    desk.work()
+    editing = desk.state.editing
+    assert editing.history is not None and editing.marks is not None and desk.state.scene.info is not None
+    assert editing.history.done[-1].label == f"Delete and fill {editing.num_deleted:,}"
+    assert editing.marks.deleted.rows()[:BLOCK].all() and editing.num_deleted < 1.5 * BLOCK
+    assert editing.marks.there[0] >= COUNT and not editing.num_selected
+    assert desk.state.scene.job is None and desk.state.scene.rooms == ()
+    desk.perform(edit.Undo())
+    marks = desk.state.editing.marks
+    assert (
+        marks is not None and not marks.deleted and marks.there == (COUNT, 3) and len(marks.selected) == BLOCK
+    )
+
+
+@pytest.mark.parametrize("how", ["blur", "remove"])
+def test_what_is_hidden_is_another_scene_until_then_undone_at_once(desk: Desk, how: str) -> None:
+    before = desk.state.scene.info
+    desk.perform(mending.AskToHide(how))
+    assert desk.state.editing.hiding == how
+    desk.perform(mending.HideForGood(how))
+    desk.work()
+    scene = desk.state.scene
+    assert (
+        scene.info is not None and scene.info.serial == 7 and scene.info.path is None and before is not None
+    )
+    assert desk.state.editing.history is not None and not desk.state.editing.history.done
+    assert scene.unhidden is not None and scene.unhidden.info.scene is before.scene
+    assert any("Ctrl+Z brings it back" in toast.text for toast in desk.state.toasts)
+    means = {row.tobytes() for row in scene.info.scene.gaussians.means.numpy()}
+    assert not any(row.tobytes() in means for row in before.scene.gaussians.means[:BLOCK].numpy())
+    desk.perform(mending.BringBack())
+    again = desk.state
+    assert again.scene.info is not None and again.scene.info.scene is before.scene
+    assert again.editing.num_selected == BLOCK and again.scene.unhidden is None
+
+
+def test_once_saved_nothing_on_the_disk_brings_it_back(desk: Desk, tmp_path: Path) -> None:
+    secret = [row.tobytes() for row in room(torch.eye(3)).gaussians.means[:BLOCK:50].numpy()]
+    assert any(each in content for content in kept_of(state_folder()) for each in secret)
+    desk.perform(mending.HideForGood("blur"))
+    desk.work()
+    desk.rest()
+    assert not any(each in content for content in kept_of(state_folder()) for each in secret)
+    desk.perform(show.SaveScene(tmp_path / "room.langflash"))
+    desk.work()
+    desk.rest()
+    assert desk.state.scene.unhidden is None
+    for content in (*kept_of(state_folder()), (tmp_path / "room.langflash").read_bytes()):
+        assert not any(each in content for each in secret)
+    desk.perform(mending.BringBack())
+    assert desk.state.scene.info is not None and desk.state.scene.info.serial == 7
+
+
+def test_what_was_edited_meanwhile_is_not_lost(desk: Desk) -> None:
+    desk.perform(mending.HideForGood("blur"))
+    desk.perform(edit.Delete())
+    desk.work()
+    assert desk.state.scene.info is not None and desk.state.scene.info.serial == 1
+    assert any("edited meanwhile" in toast.text for toast in desk.state.toasts)
+
+
+def test_without_a_selection_nothing_happens(desk: Desk) -> None:
+    desk.perform(edit.Deselect())
+    before = desk.state
+    desk.perform(mending.AskToHide(), mending.HideForGood("blur"), mending.FillSelection())
+    assert desk.state == before and not desk.asked
+
+
+def test_clean_up_keeps_to_the_selection(desk: Desk) -> None:
+    desk.perform(edit.FindFloaters())
+    desk.work()
+    least = np.zeros(COUNT, np.float32)
+    desk.perform(edit.FloatersFound(least.tobytes()), edit.SetStrength(0.3), edit.EndFloaters("delete"))
+    marks = desk.state.editing.marks
+    assert marks is not None and len(marks.deleted) == BLOCK
