@@ -100,7 +100,7 @@ class SplatBuffers:
 
     def draw_in(self, order: np.ndarray) -> None:
         """Draw these rows of the Gaussians kept, the first first."""
-        self._ordering.order = order.astype(np.uint32)
+        self._ordering.order = np.ascontiguousarray(order, np.uint32)
         self.shapes.forget()
         if len(order):
             self._order_buffer.write(self.order.tobytes())

@@ -11,7 +11,7 @@ from langflash_core.types import Views
 @torch.inference_mode()
 def posed_semantics(
     network: LangFlashNet, views: Views, viewmats: Float[Tensor, "V 4 4"], depths: Float[Tensor, "V H W"]
-) -> tuple[Float[Tensor, "K C"], Float[Tensor, "V K H W"]]:
+) -> tuple[Float[Tensor, "V K H W"], Float[Tensor, "K C"]]:
     """What a network sees in V views, beside their own geometry.
 
     Args:
