@@ -1,8 +1,10 @@
 # make run    set up what is missing, then open the window on the demo photos
 # make test   set up what is missing, then every check and every test
+# make lint   the checks alone, without a test
 # make setup  the set-up alone
 # make portable        a folder that runs without Python, in dist/ (Linux; torch for processors)
-# make torture         100,000 hostile files for every reader of ours (SEED=1, COUNT=100000)
+# make test-all        every test with every optional package: Ray, SAM 2, TensorBoard, COLMAP, others' measures
+# make torture         what it is to survive (PARTS="calls kills", SEED=1; tests/torture/README.md)
 # make test-machines   every test three times, as three other processors and orders would run it
 #
 # Set-up is a virtual environment in .venv, this package in it, and (Debian, Ubuntu) the system's
@@ -31,9 +33,9 @@ APT := install() { \
 	echo "Installing $$*"; \
 	$$add "$$@" >/dev/null 2>&1 || { $$get update >/dev/null && $$add "$$@" >/dev/null; }; }
 
-.PHONY: help setup run test test-machines torture portable
+.PHONY: help setup run lint test test-all test-machines torture portable
 help:
-	@sed -n '1,6s/^# //p' Makefile
+	@sed -n '1,9s/^# //p' Makefile
 
 setup: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window $(STAMP)-browser
 
@@ -50,12 +52,21 @@ run: $(STAMP)-package $(STAMP)-gl
 	$(BIN)/langflash query out/living_room.langflash plant floor window --size 756x588 -o out/query; \
 	echo "The pictures are in $(CURDIR)/out and $(CURDIR)/out/query."
 
-test: setup
+lint: $(STAMP)-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
+	@if [ -x $(BIN)/biome ]; then echo $(BIN)/biome ci; $(BIN)/biome ci; \
+	else echo "The JavaScript of web pages is not checked: no Biome for this machine."; fi
+
+PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
+test: setup lint
+	$(PYTEST)
+
+# Where a package is missing its tests fail here, instead of being left out.
+test-all: setup lint $(STAMP)-everything
+	$(PYTEST) --nothing-missing
 
 # Results must not hang on the processor's vector units (ATEN_CPU_CAPABILITY: what torch uses of them,
 # all that is there where it is unset), on the number of threads, or on which test ran before. Three
@@ -67,9 +78,10 @@ test-machines: setup
 	ATEN_CPU_CAPABILITY=avx2 OMP_NUM_THREADS=1 $(BIN)/python -m pytest $(SHUFFLED)=$(SEED)
 	ATEN_CPU_CAPABILITY=default OMP_NUM_THREADS=2 $(BIN)/python -m pytest $(SHUFFLED)=$$(($(SEED) + 1))
 
-COUNT ?= 100000
+# Hostile files, failing calls, kills, hard photos, load: some 25 minutes on two cores.
+PARTS ?=
 torture: setup
-	PYTHONHASHSEED=0 OMP_NUM_THREADS=1 $(BIN)/python -m tests.torture.fuzz --seed $(SEED) --count $(COUNT)
+	PYTHONHASHSEED=0 OMP_NUM_THREADS=1 $(BIN)/python -m tests.torture $(PARTS) --seed $(SEED)
 
 # In an environment of its own, so that nothing else is packed; `make test` does not build it.
 PACKING := .venv-portable
@@ -115,6 +127,10 @@ $(STAMP)-package: pyproject.toml | $(BIN)/python
 
 $(STAMP)-dev: $(STAMP)-package
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+$(STAMP)-everything: $(STAMP)-dev
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[everything]'
 	@touch $@
 
 # OpenGL without a screen; macOS brings its own.

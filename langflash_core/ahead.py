@@ -12,9 +12,10 @@ from pathlib import Path
 
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.images.pictures import Picture, read_pictures
-from langflash_core.keeping import Keep, not_kept
+from langflash_core.keeping import MATCHES, Arrays, Keep, not_kept
 from langflash_core.network.checkpoints.stored import Stored, read_header, read_stored, weights_file
 from langflash_core.network.presets import PRESETS, GuidedDepth
+from langflash_core.running import Kept
 
 SIZES = (56, 1024)  # pixels: below, the encoder's grid is 4 patches; above, attention's memory runs away
 _WORKERS = 3  # at most; one processor stays with the import
@@ -22,11 +23,11 @@ _WORKERS = 3  # at most; one processor stays with the import
 
 @dataclass(frozen=True)
 class Ahead:
-    """What is under way: the photos, their key points (in the memory of `keypoints.match_sources`), and
-    the file of weights, where they were asked for."""
+    """What is under way: the photos, their key points as arrays where the preset matches photos, and the file
+    of weights, where it was asked for."""
 
     pictures: Future[list[Picture]]
-    matched: Future[None]
+    matched: Future[Arrays | None]
     stored: Future[Stored] | None
     matching: "Matching" = field(default_factory=lambda: Matching())
 
@@ -37,6 +38,13 @@ class Ahead:
             ImageError, InputError: one cannot be used.
         """
         self.pictures.result()
+
+    def handed(self, kept: Kept, sources: tuple[bytes, ...]) -> Kept:
+        """`kept`, but for the key points of these photos, where they are those that were matched here."""
+        found = self.matched.result()
+        if found is None or sources != _sources(self.pictures):
+            return kept
+        return lambda name, make: found if name == MATCHES else kept(name, make)
 
 
 @dataclass
@@ -111,16 +119,20 @@ def _stored(pictures: Future[list[Picture]], path: Path) -> Stored:
 
 def _match(
     pictures: Future[list[Picture]], check: Callable[[], None], matching: Matching, keep: Path | None
-) -> None:
+) -> Arrays | None:
     from langflash_core.network.stereo.keypoints import match_sources  # OpenCV
 
-    sources = tuple(picture.source for picture in pictures.result())
+    sources = _sources(pictures)
     kept = not_kept if keep is None else Keep.of(keep, {}, sources)
-    match_sources(sources, check, matching.tell, kept)
+    return kept(MATCHES, lambda: match_sources(sources, check, matching.tell).arrays())
 
 
-def _nothing() -> Future[None]:
-    done: Future[None] = Future()
+def _sources(pictures: Future[list[Picture]]) -> tuple[bytes, ...]:
+    return tuple(picture.source for picture in pictures.result())
+
+
+def _nothing() -> Future[Arrays | None]:
+    done: Future[Arrays | None] = Future()
     done.set_result(None)
     return done
 

@@ -23,6 +23,8 @@ Arrays = Mapping[str, np.ndarray]
 Made = Callable[[], Arrays]
 STEPS = 1
 """Raised whenever a step comes to mean something else: what an older program kept is then made anew."""
+MATCHES = "matches"
+"""The step that finds key points and what corresponds: begun ahead, asked for by the network."""
 _ENDING = ".kept.npz"
 
 

@@ -165,8 +165,9 @@ def reconstruct(
             told = run.within("network")
 
             def made(kept: Kept) -> Prediction:
+                handed = ahead.handed(kept, seen.sources)
                 return _on_cpu(
-                    network.predict(seen, told, cancelled, atoms, groups, redrawn, finer is None, kept)
+                    network.predict(seen, told, cancelled, atoms, groups, redrawn, finer is None, handed)
                 )
 
             if keep is None:
@@ -209,7 +210,8 @@ def _wait_for_matches(ahead: Ahead, run: Run) -> None:
     told = run.within("weights")
     while True:
         try:
-            return ahead.matched.result(timeout=_PATIENCE)
+            ahead.matched.result(timeout=_PATIENCE)
+            return
         except TimeoutError:
             if ahead.matched.done():
                 raise

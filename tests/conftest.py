@@ -2,9 +2,12 @@
 
 import os
 import random
+import re
 import socket
 import sys
+from collections.abc import Generator
 from pathlib import Path
+from typing import Any
 
 from jaxtyping import install_import_hook
 
@@ -26,6 +29,33 @@ import pytest  # noqa: E402 - after the hook
 import torch  # noqa: E402 - after the threads
 
 torch.set_num_threads(int(os.environ["OMP_NUM_THREADS"]))
+
+
+_MISSING = re.compile(r"could not import .(?!sam2\b)|is not installed")
+# sam2 is Meta's own package, of which there is no wheel.
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    told = "fail where an optional package is missing, instead of leaving its tests out"
+    parser.addoption("--nothing-missing", action="store_true", help=told)
+
+
+def _missing_fails(report: Any, config: pytest.Config) -> Any:
+    """The report of a test or a module; with `--nothing-missing` one without its package has failed."""
+    reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else ""
+    if config.getoption("nothing_missing") and report.skipped and _MISSING.search(reason):
+        report.outcome, report.longrepr = "failed", reason
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, Any]:
+    return _missing_fails((yield), item.config)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector: pytest.Collector) -> Generator[None, Any, Any]:
+    return _missing_fails((yield), collector.config)
 
 
 def pytest_runtest_setup() -> None:

@@ -14,7 +14,6 @@ from langflash_core.images.pictures import read_pictures
 from langflash_core.keeping import Keep, forget
 from langflash_core.kept_prediction import arrays_of, prediction_of
 from langflash_core.network import GuidedDepthNet
-from langflash_core.network.stereo import keypoints
 from langflash_core.network.stereo.keypoints import KeyPoints
 from langflash_core.records import FoundLens
 from langflash_core.resources import asset_path
@@ -104,7 +103,6 @@ def test_a_reconstruction_that_was_ended_goes_on_to_the_same_bits(tmp_path: Path
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     whole = lf.reconstruct(PHOTOS, size=84)
-    keypoints._last.clear()  # a new process remembers nothing
     stop = {"at": "refinement: photo 2 of 2"}
     told: list[str] = []
 

@@ -15,6 +15,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import rays
+from langflash_core.keeping import MATCHES
 from langflash_core.memory import give_back
 from langflash_core.network.encoders.late import LateHalf
 from langflash_core.network.encoders.local import LocalFeatures
@@ -367,9 +368,9 @@ def _corrected(log_depths: Tensor, K: Tensor, correction: Correction) -> Tensor:
 
 def _key_points(views: Views, run: Run) -> KeyPoints:
     """Of the largest version of the photos at hand."""
-    if views.sources:
-        return match_sources(views.sources, run.check)
-    return match_photos(_greys(views), run.check)
+    if not views.sources:
+        return match_photos(_greys(views), run.check)
+    return KeyPoints.of(run.kept(MATCHES, lambda: match_sources(views.sources, run.check).arrays()))
 
 
 def _greys(views: Views) -> list[np.ndarray]:

@@ -5,6 +5,7 @@ import json
 import os
 import sys
 from collections import OrderedDict
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -159,40 +160,33 @@ DAMAGE = {
 
 def _damaged(kind: str, path: Path) -> Path:
     state = published.draw_noposplat(TINY)
-    match kind:
-        case "missing file":
-            return path
-        case "empty file":
-            path.touch()
-        case "text":
-            path.write_text("404: not found")
-        case "truncated":
-            content = _saved(state, path).read_bytes()
-            path.write_bytes(content[: len(content) // 2])
-        case "code":
-            torch.save({"state_dict": _Code()}, path)
-        case "blocked code":
-            torch.save({"state_dict": state, "callbacks": _Shell()}, path)
-        case "half a framework":
-            torch.save({"state_dict": _Table(state)}, path)
-        case "list":
-            torch.save([torch.ones(3)], path)
-        case "not tensors":
-            _saved(state | {"encoder.note": "hello"}, path)
-        case "foreign":
-            _saved({"conv1.weight": torch.ones(3)}, path)
-        case "missing":
-            _saved({k: v for k, v in state.items() if k != KEY}, path)
-        case "surplus":
-            _saved(state | {"encoder.backbone.more": torch.ones(2)}, path)
-        case "misshaped":
-            _saved(state | {KEY: torch.ones(3, 5)}, path)
-        case "not finite":
-            _saved(state | {KEY: torch.full((32, 32), torch.nan)}, path)
-        case "another size":
-            from dataclasses import replace
-
-            _saved(published.draw_noposplat(replace(TINY, dpt_feature=20)), path)
+    other = {
+        "blocked code": {"state_dict": state, "callbacks": _Shell()},
+        "code": {"state_dict": _Code()},
+        "half a framework": {"state_dict": _Table(state)},
+        "list": [torch.ones(3)],
+    }
+    tensors = {
+        "another size": lambda: published.draw_noposplat(replace(TINY, dpt_feature=20)),
+        "foreign": lambda: {"conv1.weight": torch.ones(3)},
+        "misshaped": lambda: state | {KEY: torch.ones(3, 5)},
+        "missing": lambda: {k: v for k, v in state.items() if k != KEY},
+        "not finite": lambda: state | {KEY: torch.full((32, 32), torch.nan)},
+        "not tensors": lambda: state | {"encoder.note": "hello"},
+        "surplus": lambda: state | {"encoder.backbone.more": torch.ones(2)},
+    }
+    texts = {"empty file": "", "text": "404: not found"}
+    if kind in other:
+        torch.save(other[kind], path)
+    elif kind in tensors:
+        _saved(tensors[kind](), path)
+    elif kind in texts:
+        path.write_text(texts[kind])
+    elif kind == "truncated":
+        content = _saved(state, path).read_bytes()
+        path.write_bytes(content[: len(content) // 2])
+    else:
+        assert kind == "missing file"
     return path
 
 

@@ -177,7 +177,7 @@ def _streams(fault: Fault) -> Iterator[None]:
 
 @contextmanager
 def small_disk(size: int) -> Iterator[None]:
-    """No file may grow beyond `size` bytes, whoever writes it: of this process and of those that it starts."""
+    """No file may grow beyond `size` bytes, whoever writes it: this process, or one that it starts."""
     import resource
 
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -291,8 +291,8 @@ class _Ask:
 
 
 def _handler() -> list[object]:
-    """numpy's own handler, asking first. Its `free` stays numpy's: it runs while an error is on its way, which
-    a function of Python would lose."""
+    """numpy's own handler, asking first. Its `free` stays numpy's: it runs while an error is on its way,
+    which a function of Python would lose."""
     usual = ctypes.PYFUNCTYPE(ctypes.py_object)(_numpy_function(_SET_HANDLER + 1))()
     own = _Allocator.from_address(_pointer(usual, _HANDLER))
     place, size = ctypes.c_void_p, ctypes.c_size_t

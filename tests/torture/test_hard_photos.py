@@ -32,4 +32,4 @@ def test_two_photos_of_noise_make_a_finite_scene(tmp_path):
     scene = hard_photos.made(hard, hard_photos.written(hard, tmp_path), row)
     assert scene is not None and row.finds == []
     scene.gaussians.means[3] = torch.nan
-    assert list(hard_photos._wrong(scene))[0] == "means is not finite"
+    assert next(iter(hard_photos._wrong(scene))) == "means is not finite"

@@ -1,5 +1,5 @@
-"""The window lives while the graphics driver refuses the n-th thing, or everything from there on, and while the
-disk is full: the edits of its scene stay, and it draws again as soon as it can.
+"""The window lives while the graphics driver refuses the n-th thing, or everything from there on, and while
+the disk is full: the edits of its scene stay, and it draws again as soon as it can.
 
     python -m tests.torture window [--seed 1] [--minutes 5]
 

@@ -1,10 +1,10 @@
 // What Gaussians say to phrases, and whether a picture answers one. Twins: app/gl/fast.py and
 // langflash_core/language/answers.py, whose constants these are.
 
-const EMPTY_NORM = 1e-4;     // |F| of pixels that say nothing
-const COVERED_ALPHA = 0.5;   // from here on a pixel shows the scene
-const TOP_FRACTION = 0.001;  // of the covered pixels: their mean is the score
-const MIN_AREA = 0.0005;     // of all pixels: a smaller mask is noise
+const EMPTY_NORM = 1e-4; // |F| of pixels that say nothing
+const COVERED_ALPHA = 0.5; // from here on a pixel shows the scene
+const TOP_FRACTION = 0.001; // of the covered pixels: their mean is the score
+const MIN_AREA = 0.0005; // of all pixels: a smaller mask is noise
 const BINS = 4096;
 
 class Answers {
@@ -13,7 +13,7 @@ class Answers {
     Object.assign(this, phrases);
     this.count = count;
     this.norms = this.featureNorms();
-    this.against = new Float32Array(count).fill(-Infinity);  // the best negative of each Gaussian
+    this.against = new Float32Array(count).fill(-Infinity); // the best negative of each Gaussian
     for (const negative of this.negatives) {
       const mixed = this.mixed(negative);
       for (let i = 0; i < count; ++i) this.against[i] = Math.max(this.against[i], mixed[i]);
@@ -45,7 +45,7 @@ class Answers {
     if (!this.totals) {
       this.totals = new Float32Array(this.count);
       for (const { shares } of this.weights) for (let i = 0; i < this.count; ++i) this.totals[i] += shares[i];
-      this.totals.forEach((total, i) => (this.totals[i] = total || 1));
+      for (let i = 0; i < this.count; ++i) this.totals[i] = this.totals[i] || 1;
     }
     return this.totals;
   }
@@ -72,13 +72,16 @@ class Answers {
     };
     write(0, this.norms);
     rows.forEach((row, place) => {
-      write(place + 1, this.mixed(this.scores[row]).map((score, i) => score - this.against[i]));
+      write(
+        place + 1,
+        this.mixed(this.scores[row]).map((score, i) => score - this.against[i]),
+      );
     });
     return { texels, layers };
   }
 
   relevance(norm, difference) {
-    return norm < EMPTY_NORM ? 0 : 1 / (1 + Math.exp(-this.temperature * difference / norm));
+    return norm < EMPTY_NORM ? 0 : 1 / (1 + Math.exp((-this.temperature * difference) / norm));
   }
 }
 
@@ -97,6 +100,9 @@ function meanOfHighest(values, most) {
   for (const value of values) ++counts[bin(value)];
   let lowest = BINS - 1;
   for (let passed = counts[lowest]; passed < most && lowest > 0; passed += counts[lowest]) --lowest;
-  const highest = values.filter((value) => bin(value) >= lowest).sort().slice(-most);
+  const highest = values
+    .filter((value) => bin(value) >= lowest)
+    .sort()
+    .slice(-most);
   return most ? highest.reduce((sum, value) => sum + value, 0) / most : 0;
 }

@@ -22,7 +22,7 @@ function completions(texts, typed, without) {
 function element(name, text, attributes = {}) {
   const made = document.createElement(name);
   made.textContent = text;
-  Object.entries(attributes).forEach(([key, value]) => made.setAttribute(key, value));
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
   return made;
 }
 
@@ -32,7 +32,7 @@ class Asking {
   constructor(texts, asked, { changed, learn }) {
     Object.assign(this, { texts, asked, changed, learn });
     this.chosen = null;
-    this.answers = new Map();  // by row: {score, found}
+    this.answers = new Map(); // by row: {score, found}
     this.pointed = 0;
     this.rows = [];
     this.box = document.getElementById("box");
@@ -78,8 +78,8 @@ class Asking {
 
   suggest() {
     this.rows = completions(this.texts, this.box.value, this.asked);
-    this.pointed = this.learn ? -1 : 0;  // what is typed will do where any phrase will
-    this.picked = false;  // with the arrows
+    this.pointed = this.learn ? -1 : 0; // what is typed will do where any phrase will
+    this.picked = false; // with the arrows
     const unknown = this.box.value.trim() && !this.rows.length && !this.learn && this.known() < 0;
     this.say(unknown ? `This page knows ${this.texts.length} phrases; this is none of them.` : "");
     this.listed();
@@ -92,15 +92,17 @@ class Asking {
   }
 
   listed() {
-    this.list.replaceChildren(...this.rows.map((row, place) => {
-      const said = { role: "option", id: `option${place}`, "aria-selected": place === this.pointed };
-      const item = element("li", this.texts[row], said);
-      item.addEventListener("pointerdown", (event) => {
-        event.preventDefault();
-        this.ask(row);
-      });
-      return item;
-    }));
+    this.list.replaceChildren(
+      ...this.rows.map((row, place) => {
+        const said = { role: "option", id: `option${place}`, "aria-selected": place === this.pointed };
+        const item = element("li", this.texts[row], said);
+        item.addEventListener("pointerdown", (event) => {
+          event.preventDefault();
+          this.ask(row);
+        });
+        return item;
+      }),
+    );
     this.list.hidden = !this.rows.length;
     this.box.setAttribute("aria-expanded", this.rows.length > 0);
     this.box.setAttribute("aria-activedescendant", this.rows.length ? `option${this.pointed}` : "");
@@ -114,8 +116,10 @@ class Asking {
 
   key(event) {
     const steps = { ArrowDown: 1, ArrowUp: -1 };
-    if (event.key === "Escape") { this.close(); this.box.blur(); }
-    else if (event.key === "Enter") this.enter();
+    if (event.key === "Escape") {
+      this.close();
+      this.box.blur();
+    } else if (event.key === "Enter") this.enter();
     else if (steps[event.key] && this.rows.length) {
       event.preventDefault();
       this.pointed = (this.pointed + steps[event.key] + this.rows.length) % this.rows.length;
@@ -151,7 +155,10 @@ class Asking {
     const answer = this.answers.get(row);
     const chip = element("div", "", { class: "chip" });
     chip.dataset.state = !answer ? "pending" : answer.found ? "found" : "missing";
-    const body = element("button", this.texts[row], { "aria-pressed": row === this.chosen, title: "show where" });
+    const body = element("button", this.texts[row], {
+      "aria-pressed": row === this.chosen,
+      title: "show where",
+    });
     if (answer) body.append(element("small", (answer.found ? "" : "not found ") + answer.score.toFixed(2)));
     body.addEventListener("click", () => this.choose(row === this.chosen ? null : row));
     const gone = element("button", "×", { "aria-label": `remove ${this.texts[row]}`, class: "gone" });

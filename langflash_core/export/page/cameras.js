@@ -10,7 +10,15 @@ const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a
 // `a` turned about a unit axis by an angle in radians (Rodrigues).
 function turned(a, axis, angle) {
   const [c, s] = [Math.cos(angle), Math.sin(angle)];
-  return plus(plus(a.map((value) => c * value), cross(axis, a), s), axis, (1 - c) * dot(axis, a));
+  return plus(
+    plus(
+      a.map((value) => c * value),
+      cross(axis, a),
+      s,
+    ),
+    axis,
+    (1 - c) * dot(axis, a),
+  );
 }
 
 // A lens for another size that shows the whole of the photo, and `more` times as much magnified.
@@ -27,7 +35,7 @@ function magnified([width, height], [photoWidth, photoHeight]) {
   return Math.min(Math.sqrt(Math.max(ratio, 1 / ratio)), 1.6);
 }
 
-const LEAST_TILT = 0.15;  // radians that are left between the way one looks and straight up or down
+const LEAST_TILT = 0.15; // radians that are left between the way one looks and straight up or down
 
 // A camera that turns around a point ahead of it.
 class Orbit {
@@ -49,7 +57,7 @@ class Orbit {
   // Around the target, by angles in radians: sideways about the world's down, up and down about the own right.
   orbit(sideways, tilt) {
     const now = Math.acos(Math.max(-1, Math.min(1, dot(this.turn[2], this.down))));
-    const room = [now - (Math.PI - LEAST_TILT), now - LEAST_TILT];  // of angles away from down
+    const room = [now - (Math.PI - LEAST_TILT), now - LEAST_TILT]; // of angles away from down
     const right = this.turn[0];
     const allowed = Math.max(Math.min(tilt, Math.max(room[1], 0)), Math.min(room[0], 0));
     this.turn = this.turn.map((axis) => unit(turned(turned(axis, right, -allowed), this.down, sideways)));
@@ -64,8 +72,8 @@ class Orbit {
 
   // By lengths along the camera's own axes.
   move(right, down, forward) {
-    const steps = [right, down, forward];
-    steps.forEach((step, axis) => (this.target = plus(this.target, this.turn[axis], step)));
+    for (const [axis, step] of [right, down, forward].entries())
+      this.target = plus(this.target, this.turn[axis], step);
   }
 
   // Nearer (factor below 1) or farther; what is very near is pushed along.

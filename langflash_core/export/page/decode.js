@@ -1,6 +1,6 @@
 // The scene out of the page: base64, deflate, columns of small integers; export/html.py wrote them.
 
-const TEXELS = 4;  // a Gaussian takes in its texture: see shaders/web/project.vert
+const TEXELS = 4; // a Gaussian takes in its texture: see shaders/web/project.vert
 
 // Bytes of a base64 text that holds a zlib stream.
 async function inflated(text) {
@@ -91,9 +91,10 @@ function readPhrases(header, columns) {
     const unit = phrases[name + "Unit"];
     return Float32Array.from(new Int16Array(columns[name].buffer), (value) => value * unit);
   };
-  const rows = (table) => Array.from({ length: table.length / phrases.atoms }, (_, row) => {
-    return table.subarray(row * phrases.atoms, (row + 1) * phrases.atoms);
-  });
+  const rows = (table) =>
+    Array.from({ length: table.length / phrases.atoms }, (_, row) => {
+      return table.subarray(row * phrases.atoms, (row + 1) * phrases.atoms);
+    });
   return {
     ...phrases,
     weights,

@@ -1,16 +1,21 @@
 // The splat renderer of the page: WebGL 2, instanced quads back to front, premultiplied, targets of float16.
 // A target is a picture's colour (sum of T alpha c, sum of T alpha) and up to three layers of numbers.
 
-const MOST_LAYERS = 3;  // beside the colour: every WebGL 2 draws into four textures
-const BATCH = 256;  // quads an instance
+const MOST_LAYERS = 3; // beside the colour: every WebGL 2 draws into four textures
+const BATCH = 256; // quads an instance
 const PHRASES_A_PASS = 3 * MOST_LAYERS - 1;
 const BACKGROUND = [0.043, 0.051, 0.063];
 
 class Drawing {
   // Raises an Error whose message is for people.
   constructor(canvas, header, texels, palette) {
-    const gl = canvas.getContext("webgl2", { antialias: false, alpha: false, powerPreference: "high-performance" });
-    if (!gl) throw new Error("This browser has no WebGL 2, which the picture needs; try another, or update it.");
+    const gl = canvas.getContext("webgl2", {
+      antialias: false,
+      alpha: false,
+      powerPreference: "high-performance",
+    });
+    if (!gl)
+      throw new Error("This browser has no WebGL 2, which the picture needs; try another, or update it.");
     if (!gl.getExtension("EXT_color_buffer_float") && !gl.getExtension("EXT_color_buffer_half_float"))
       throw new Error("This graphics driver cannot draw into numbers of 16 bits; try another browser.");
     this.gl = gl;
@@ -93,7 +98,7 @@ class Drawing {
   }
 
   release(target) {
-    target.textures.forEach((texture) => this.gl.deleteTexture(texture));
+    for (const texture of target.textures) this.gl.deleteTexture(texture);
     this.gl.deleteFramebuffer(target.framebuffer);
   }
 
@@ -105,13 +110,19 @@ class Drawing {
     const count = this.sort(camera, near);
     target.drawn = lens.size;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
-    gl.drawBuffers(target.textures.map((_, place) => (place <= layers ? gl.COLOR_ATTACHMENT0 + place : gl.NONE)));
+    gl.drawBuffers(
+      target.textures.map((_, place) => (place <= layers ? gl.COLOR_ATTACHMENT0 + place : gl.NONE)),
+    );
     gl.viewport(0, 0, ...lens.size);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    const program = this.program("splat.vert", "splat.frag", { BATCH, LAYERS: layers, SH_DEGREE: this.degree });
+    const program = this.program("splat.vert", "splat.frag", {
+      BATCH,
+      LAYERS: layers,
+      SH_DEGREE: this.degree,
+    });
     gl.useProgram(program.made);
     const { order, gaussians, palette } = this;
     this.bind(program, { order, gaussians, palette, numbers: numbers ? numbers.texture : gaussians });
@@ -147,7 +158,10 @@ class Drawing {
     gl.viewport(0, 0, ...size);
     gl.bindVertexArray(this.nothing);
     gl.useProgram(program.made);
-    this.bind(program, { colours: target.textures[0], numbers: target.textures[target.textures.length > 1 ? 1 : 0] });
+    this.bind(program, {
+      colours: target.textures[0],
+      numbers: target.textures[target.textures.length > 1 ? 1 : 0],
+    });
     gl.uniform2f(program.place("part"), target.drawn[0] / target.size[0], target.drawn[1] / target.size[1]);
     gl.uniform2fv(program.place("canvas_size"), size);
     gl.uniform3fv(program.place("background"), BACKGROUND);
@@ -182,7 +196,10 @@ class Drawing {
     if (!this.programs.has(key)) {
       const { gl } = this;
       const made = gl.createProgram();
-      [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]].forEach(([kind, name]) => {
+      [
+        [gl.VERTEX_SHADER, vertex],
+        [gl.FRAGMENT_SHADER, fragment],
+      ].forEach(([kind, name]) => {
         gl.attachShader(made, this.shader(kind, name, constants));
       });
       gl.linkProgram(made);
@@ -204,7 +221,8 @@ class Drawing {
     const shader = gl.createShader(kind);
     gl.shaderSource(shader, [version, ...defines, ...rest].join("\n"));
     gl.compileShader(shader);
-    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(`${name}: ${gl.getShaderInfoLog(shader)}`);
+    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS))
+      throw new Error(`${name}: ${gl.getShaderInfoLog(shader)}`);
     return shader;
   }
 }

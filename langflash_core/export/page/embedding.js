@@ -38,9 +38,21 @@ class Embedding {
   camera() {
     if (!this.inside) return;
     const { orbit, header } = this.page;
-    const { pinhole: [fx, fy, cx, cy], size: [width, height] } = this.page.shown(1);
+    const {
+      pinhole: [fx, fy, cx, cy],
+      size: [width, height],
+    } = this.page.shown(1);
     const eye = plus(orbit.eye, header.origin);
     const viewmat = [...orbit.turn.map((axis) => [...axis, -dot(axis, eye)]), [0, 0, 0, 1]];
-    this.say("camera", { viewmat, K: [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], width, height });
+    this.say("camera", {
+      viewmat,
+      K: [
+        [fx, 0, cx],
+        [0, fy, cy],
+        [0, 0, 1],
+      ],
+      width,
+      height,
+    });
   }
 }

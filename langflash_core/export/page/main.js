@@ -1,12 +1,15 @@
 // Puts the page together: reads the scene, draws on demand, answers when the camera rests.
-// The address may say more: #view=1&ask=plant&mode=photo&bare, #stop=NAME, #plan
 
-const MOST_PIXELS = 2.1e6;         // of a picture
-const REST = 160;                  // milliseconds without a movement
-const SLOW = 40, QUICK = 22;       // milliseconds a frame, beyond which moving pictures get fewer or more pixels
+const MOST_PIXELS = 2.1e6; // of a picture
+const REST = 160; // milliseconds without a movement
+const SLOW = 40,
+  QUICK = 22; // milliseconds a frame, beyond which moving pictures get fewer or more pixels
 const LEAST_SCALE = 0.35;
 
 const find = (id) => document.getElementById(id);
+const hideAll = (which, hidden) => {
+  for (const part of document.querySelectorAll(which)) part.hidden = hidden;
+};
 
 class Page {
   // world: the first scene; `add` brings others.
@@ -14,8 +17,8 @@ class Page {
     this.canvas = find("stage");
     this.worlds = [world];
     this.world = world;
-    this.scale = 1;  // of the picture's sides while it moves
-    this.pace = QUICK;  // milliseconds a frame, on average
+    this.scale = 1; // of the picture's sides while it moves
+    this.pace = QUICK; // milliseconds a frame, on average
     this.heat = true;
     this.carried = null;
     this.orbit = new Orbit(world.start, world.start.distance);
@@ -26,10 +29,12 @@ class Page {
       aimed: (x, y) => this.aim(x, y),
       taken: () => this.touring.stop(),
     });
-    this.asking = this.answers && new Asking(this.answers.texts, [...Array(this.answers.asked).keys()], {
-      changed: () => this.asked(),
-      learn: find("tower") && ((text) => this.learn(text)),
-    });
+    this.asking =
+      this.answers &&
+      new Asking(this.answers.texts, [...Array(this.answers.asked).keys()], {
+        changed: () => this.asked(),
+        learn: find("tower") && ((text) => this.learn(text)),
+      });
     this.touring = new Touring((stop, milliseconds) => this.arrive(stop, milliseconds));
     this.notes = new Notes({ chosen: (note) => this.ask(note.phrase), reached: (note) => this.turnTo(note) });
     this.plan = new Plan((place) => this.touring.go(place));
@@ -40,34 +45,46 @@ class Page {
     this.resize();
   }
 
-  get header() { return this.world.header; }
-  get drawing() { return this.world.drawing; }
-  get answers() { return this.world.answers; }
-  get lens() { return this.world.lens; }
+  get header() {
+    return this.world.header;
+  }
+  get drawing() {
+    return this.world.drawing;
+  }
+  get answers() {
+    return this.world.answers;
+  }
+  get lens() {
+    return this.world.lens;
+  }
 
   // Buttons, keys and what the address says.
   furnish() {
-    for (const name of ["photo", "heat"]) find(name).addEventListener("click", () => this.setHeat(name === "heat"));
+    for (const name of ["photo", "heat"])
+      find(name).addEventListener("click", () => this.setHeat(name === "heat"));
     find("credit").hidden = !find("tower");
-    document.querySelectorAll(".asking").forEach((part) => (part.hidden = !this.answers));
+    hideAll(".asking", !this.answers);
     find("helper").addEventListener("click", () => this.help());
     find("help").addEventListener("click", () => find("help").close());
     find("planner").addEventListener("click", () => this.showPlan(!this.plan.open));
-    find("noter").addEventListener("click", () => this.showNotes(document.body.classList.contains("unnoted")));
+    find("noter").addEventListener("click", () =>
+      this.showNotes(document.body.classList.contains("unnoted")),
+    );
     addEventListener("keydown", (event) => this.key(event));
     this.enter(this.world);
-    const said = new URLSearchParams(location.hash.slice(1));
-    document.body.classList.toggle("bare", said.has("bare"));
-    const view = this.header.views[said.get("view")];
-    if (view) this.orbit.set(view, this.world.depth(view));
-    const stop = this.header.stops.findIndex(({ name }) => name === said.get("stop"));
-    if (stop >= 0) this.orbit.set(this.header.stops[stop], this.header.stops[stop].distance);
-    if (view || stop >= 0) this.touring.show(this.header.stops, stop);
-    const row = this.answers ? this.answers.texts.indexOf(said.get("ask")) : -1;
-    if (row >= 0) this.asking.ask(row);
-    else if (this.answers && this.answers.asked) this.asking.choose(0);
-    this.setHeat(said.get("mode") !== "photo");
-    if (said.has("plan")) this.showPlan(true);
+    const stops = this.header.stops.map(({ name }) => name);
+    const texts = this.answers ? this.answers.texts : [];
+    const said = readAddress(location.hash, this.header.views.length, stops, texts);
+    document.body.classList.toggle("bare", said.bare);
+    const place = this.header.stops[said.stop] ?? this.header.views[said.view];
+    if (place) {
+      this.orbit.set(place, place.distance ?? this.world.depth(place));
+      this.touring.show(this.header.stops, said.stop);
+    }
+    if (said.row >= 0) this.asking.ask(said.row);
+    else if (this.answers?.asked) this.asking.choose(0);
+    this.setHeat(said.heat);
+    if (said.plan) this.showPlan(true);
   }
 
   // What belongs to one scene: its title, photos, stops and notes.
@@ -75,16 +92,21 @@ class Page {
     const { header } = world;
     this.world = world;
     document.title = find("title").textContent = header.title;
-    find("views").replaceChildren(...header.views.map((_, index) => {
-      const button = element("button", String(index + 1), { title: `photo ${index + 1}`, "aria-label": `photo ${index + 1}` });
-      button.addEventListener("click", () => this.visit(index));
-      return button;
-    }));
+    find("views").replaceChildren(
+      ...header.views.map((_, index) => {
+        const button = element("button", String(index + 1), {
+          title: `photo ${index + 1}`,
+          "aria-label": `photo ${index + 1}`,
+        });
+        button.addEventListener("click", () => this.visit(index));
+        return button;
+      }),
+    );
     this.touring.show(header.stops, header.stops.length && header.start !== undefined ? header.start : -1);
     this.notes.show(world);
     find("noter").hidden = !header.notes.length;
-    document.querySelectorAll(".touring").forEach((part) => (part.hidden = !header.stops.length));
-    document.querySelectorAll(".noting").forEach((part) => (part.hidden = !header.notes.length));
+    hideAll(".touring", !header.stops.length);
+    hideAll(".noting", !header.notes.length);
     if (this.plan.open) this.plan.toggle(true, world);
   }
 
@@ -113,14 +135,17 @@ class Page {
     find("rooms").hidden = this.worlds.length < 2;
     if (this.worlds.length < 2) return;
     const row = this.asking ? this.asking.chosen : null;
-    find("rooms").replaceChildren(...this.worlds.map((world) => {
-      const button = element("button", world.header.title, { "aria-pressed": world === this.world });
-      const best = row === null ? null : world.found.get(row);
-      if (row !== null) button.dataset.state = !best ? "pending" : best.found ? "found" : "missing";
-      if (best) button.setAttribute("aria-label", `${world.header.title}: ${best.found ? "found" : "not found"}`);
-      button.addEventListener("click", () => this.change(world));
-      return button;
-    }));
+    find("rooms").replaceChildren(
+      ...this.worlds.map((world) => {
+        const button = element("button", world.header.title, { "aria-pressed": world === this.world });
+        const best = row === null ? null : world.found.get(row);
+        if (row !== null) button.dataset.state = !best ? "pending" : best.found ? "found" : "missing";
+        if (best)
+          button.setAttribute("aria-label", `${world.header.title}: ${best.found ? "found" : "not found"}`);
+        button.addEventListener("click", () => this.change(world));
+        return button;
+      }),
+    );
   }
 
   // Ask one more scene, if there is one that was not asked yet.
@@ -138,11 +163,15 @@ class Page {
     const view = Number(event.key) - 1;
     if (this.header.views[view]) this.visit(view);
     else if (event.key === "h" && this.answers) this.setHeat(!this.heat);
-    else if (event.key === "/" && this.answers) { event.preventDefault(); find("box").focus(); }
-    else if (event.key === "?") this.help();
+    else if (event.key === "/" && this.answers) {
+      event.preventDefault();
+      find("box").focus();
+    } else if (event.key === "?") this.help();
     else if (event.key === "p") this.showPlan(!this.plan.open);
-    else if (event.key === "n" && this.header.notes.length) this.showNotes(document.body.classList.contains("unnoted"));
-    else if (event.key === "t" && this.header.stops.length) this.touring.timer ? this.touring.stop() : this.touring.play();
+    else if (event.key === "n" && this.header.notes.length)
+      this.showNotes(document.body.classList.contains("unnoted"));
+    else if (event.key === "t" && this.header.stops.length)
+      this.touring.timer ? this.touring.stop() : this.touring.play();
     else if (event.key === "PageDown") this.touring.step(1);
     else if (event.key === "PageUp") this.touring.step(-1);
   }
@@ -237,8 +266,9 @@ class Page {
 
   // The row of another phrase. The text tower is unpacked when it is first needed.
   async learn(text) {
-    this.tower ??= Promise.all(["tower", "tokens"].map((name) => inflated(find(name).textContent)))
-      .then(([weights, tokens]) => new TextTower(weights, new TextDecoder().decode(tokens).split("\n")));
+    this.tower ??= Promise.all(["tower", "tokens"].map((name) => inflated(find(name).textContent))).then(
+      ([weights, tokens]) => new TextTower(weights, new TextDecoder().decode(tokens).split("\n")),
+    );
     const vector = (await this.tower).encode(text);
     return this.worlds.filter((world) => world.answers).map((world) => world.answers.learn(text, vector))[0];
   }
@@ -249,7 +279,9 @@ class Page {
     const wanted = [this.canvas.clientWidth, this.canvas.clientHeight].map((side) => Math.max(1, side));
     const most = Math.sqrt(MOST_PIXELS / (wanted[0] * wanted[1]));
     this.ratio = Math.min(devicePixelRatio || 1, most);
-    [this.canvas.width, this.canvas.height] = wanted.map((side) => Math.max(1, Math.round(side * this.ratio)));
+    [this.canvas.width, this.canvas.height] = wanted.map((side) =>
+      Math.max(1, Math.round(side * this.ratio)),
+    );
     if (this.target) this.drawing.release(this.target);
     this.target = this.drawing.target([this.canvas.width, this.canvas.height], 1);
     this.moved();
@@ -303,7 +335,11 @@ class Page {
     if (!this.asking || !this.answers) return;
     const answers = this.judge(this.asking.asked, this.shown(this.judgedScale()));
     this.asking.answer(answers);
-    const told = [...answers].map(([row, { found, score }]) => ({ phrase: this.answers.texts[row], found, score }));
+    const told = [...answers].map(([row, { found, score }]) => ({
+      phrase: this.answers.texts[row],
+      found,
+      score,
+    }));
     this.embedding.say("answers", { answers: told });
     this.askOthers();
   }
@@ -348,9 +384,12 @@ async function open() {
 // The scenes after the first, one by one.
 async function others(page) {
   const { shaders, constants } = page.header;
-  for (let number = 1; find(`header${number}`); ++number) page.add(await world(number, { shaders, constants }));
+  for (let number = 1; find(`header${number}`); ++number)
+    page.add(await world(number, { shaders, constants }));
 }
 
 // For programs that drive the page: a promise of it.
 window.langflash = open();
-window.langflash.catch((error) => (find("waiting").textContent = error.message));
+window.langflash.catch((error) => {
+  find("waiting").textContent = error.message;
+});

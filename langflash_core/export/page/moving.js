@@ -1,14 +1,24 @@
 // Mouse, touch and keys to movements of an Orbit; flights from one view to another.
 
-const TURN = 0.005;         // radians a pixel
-const WHEEL = 0.0012;       // of the logarithm of a distance, a pixel
-const FLIGHT = 450;         // milliseconds
-const RATES = { turn: 1.4, move: 0.7, zoom: 1.2 };  // a second: radians, distances, logarithms
+const TURN = 0.005; // radians a pixel
+const WHEEL = 0.0012; // of the logarithm of a distance, a pixel
+const FLIGHT = 450; // milliseconds
+const RATES = { turn: 1.4, move: 0.7, zoom: 1.2 }; // a second: radians, distances, logarithms
 const KEYS = {
-  ArrowLeft: ["orbit", 1, 0], ArrowRight: ["orbit", -1, 0], ArrowUp: ["orbit", 0, 1], ArrowDown: ["orbit", 0, -1],
-  KeyA: ["move", -1, 0, 0], KeyD: ["move", 1, 0, 0], KeyQ: ["move", 0, 1, 0], KeyE: ["move", 0, -1, 0],
-  KeyW: ["move", 0, 0, 1], KeyS: ["move", 0, 0, -1],
-  Equal: ["zoom", -1], NumpadAdd: ["zoom", -1], Minus: ["zoom", 1], NumpadSubtract: ["zoom", 1],
+  ArrowLeft: ["orbit", 1, 0],
+  ArrowRight: ["orbit", -1, 0],
+  ArrowUp: ["orbit", 0, 1],
+  ArrowDown: ["orbit", 0, -1],
+  KeyA: ["move", -1, 0, 0],
+  KeyD: ["move", 1, 0, 0],
+  KeyQ: ["move", 0, 1, 0],
+  KeyE: ["move", 0, -1, 0],
+  KeyW: ["move", 0, 0, 1],
+  KeyS: ["move", 0, 0, -1],
+  Equal: ["zoom", -1],
+  NumpadAdd: ["zoom", -1],
+  Minus: ["zoom", 1],
+  NumpadSubtract: ["zoom", 1],
 };
 
 class Moving {
@@ -77,7 +87,8 @@ class Moving {
   }
 
   key(event) {
-    if (event.target.matches("input") || event.ctrlKey || event.metaKey || event.altKey || !KEYS[event.code]) return;
+    if (event.target.matches("input") || event.ctrlKey || event.metaKey || event.altKey || !KEYS[event.code])
+      return;
     event.preventDefault();
     this.halt();
     this.pressed.add(event.code);
@@ -102,7 +113,8 @@ class Moving {
 
   held([what, ...signs], seconds) {
     if (what === "orbit") this.orbit.orbit(...signs.map((sign) => sign * RATES.turn * seconds));
-    if (what === "move") this.orbit.move(...signs.map((sign) => sign * RATES.move * seconds * this.orbit.distance));
+    if (what === "move")
+      this.orbit.move(...signs.map((sign) => sign * RATES.move * seconds * this.orbit.distance));
     if (what === "zoom") this.orbit.zoom(Math.exp(signs[0] * RATES.zoom * seconds), this.nearest);
   }
 
@@ -116,7 +128,10 @@ class Moving {
     const right = between(from.turn[0], view.turn[0]);
     const level = unit(plus(right, forward, -dot(right, forward)));
     const eye = between(from.eye, view.eye);
-    this.orbit.set({ eye, turn: [level, cross(forward, level), forward] }, between([from.distance], [distance])[0]);
+    this.orbit.set(
+      { eye, turn: [level, cross(forward, level), forward] },
+      between([from.distance], [distance])[0],
+    );
     if (share === 1) this.flight = null;
   }
 }

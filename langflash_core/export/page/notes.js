@@ -1,8 +1,8 @@
 // Notes: labels at points of the scene that hide behind what lies before them, and lines between two points with
 // their length. A hidden one is still reached by the keyboard; then it shows itself, and the camera turns to it.
 
-const SHOWS = 0.5;  // of a point's light that has to pass
-const SHORT = 34;   // letters of a note that is not chosen
+const SHOWS = 0.5; // of a point's light that has to pass
+const SHORT = 34; // letters of a note that is not chosen
 
 // A length for people: metres where the scene's scale is known.
 function measured(units, metric) {
@@ -18,7 +18,7 @@ class Notes {
     this.list = find("notes");
     this.lines = document.querySelector("#lines g");
     this.labels = [];
-    this.turn = 0;  // of the label whose sight is judged next
+    this.turn = 0; // of the label whose sight is judged next
   }
 
   show(world) {
@@ -45,7 +45,7 @@ class Notes {
 
   press(label) {
     const open = label.button.getAttribute("aria-expanded") !== "true";
-    this.labels.forEach((other) => this.open(other, other === label && open));
+    for (const other of this.labels) this.open(other, other === label && open);
     if (open) this.chosen(label.note);
   }
 
@@ -74,14 +74,13 @@ class Notes {
     const inside = depth > NEAR && x > 0 && y > 0 && x < lens.size[0] / ratio && y < lens.size[1] / ratio;
     label.away = !inside || !label.sees;
     item.classList.toggle("away", label.away);
-    item.classList.toggle("left", x > 0.66 * lens.size[0] / ratio);
+    item.classList.toggle("left", x > (0.66 * lens.size[0]) / ratio);
     item.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
     item.style.zIndex = Math.max(1, Math.round(1e4 / Math.max(depth, 0.01)));
     if (!line) return;
     line.style.display = label.away || ends.some((end) => end[2] < NEAR) ? "none" : "";
-    [["x1", "y1"], ["x2", "y2"]].forEach((names, end) => names.forEach((name, axis) => {
-      line.setAttribute(name, ends[end][axis].toFixed(1));
-    }));
+    for (const end of [0, 1])
+      for (const axis of [0, 1]) line.setAttribute(`${"xy"[axis]}${end + 1}`, ends[end][axis].toFixed(1));
   }
 }
 
@@ -94,5 +93,9 @@ function pixel(point, camera, lens, ratio) {
   const offset = plus(point, camera.eye, -1);
   const z = dot(offset, camera.turn[2]);
   const [fx, fy, cx, cy] = lens.pinhole;
-  return [(dot(offset, camera.turn[0]) / z * fx + cx) / ratio, (dot(offset, camera.turn[1]) / z * fy + cy) / ratio, z];
+  return [
+    ((dot(offset, camera.turn[0]) / z) * fx + cx) / ratio,
+    ((dot(offset, camera.turn[1]) / z) * fy + cy) / ratio,
+    z,
+  ];
 }

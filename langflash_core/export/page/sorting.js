@@ -1,8 +1,8 @@
 // Gaussians in the order in which they are drawn: farthest first, of equal depths the later row first, as the
 // renderer of the program has it. A radix sort of the depths' bits: positive floats sort like integers.
 
-const NEAR = 0.01;  // scene units; what is nearer touches the eye
-const BITS = 11;    // a pass; three passes take 32
+const NEAR = 0.01; // scene units; what is nearer touches the eye
+const BITS = 11; // a pass; three passes take 32
 
 class Sorter {
   // texels: of gaussianTexels.
@@ -22,8 +22,10 @@ class Sorter {
     let seen = 0;
     for (let i = this.count - 1; i >= 0; --i) {
       const at = 16 * i;
-      depths[i] = (texels[at] - eye[0]) * forward[0] + (texels[at + 1] - eye[1]) * forward[1]
-        + (texels[at + 2] - eye[2]) * forward[2];
+      depths[i] =
+        (texels[at] - eye[0]) * forward[0] +
+        (texels[at + 1] - eye[1]) * forward[1] +
+        (texels[at + 2] - eye[2]) * forward[2];
       if (depths[i] >= near) this.rows[seen++] = i;
     }
     for (let shift = 0; shift < 32; shift += BITS) this.pass(seen, shift);

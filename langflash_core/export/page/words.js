@@ -1,9 +1,11 @@
 // The text tower in the page: MiniLM-L6-v2, phrases to 384 unit numbers. Twin: langflash_core/language/minilm.py.
 // T tokens, C = 384 channels; activations are (T, C) float32, flat. Matrices are int8 rows with a scale each.
 
-const LAYERS = 6, HEADS = 12, NORM_EPS = 1e-12;
+const LAYERS = 6,
+  HEADS = 12,
+  NORM_EPS = 1e-12;
 const MOST_TOKENS = 256;
-const LONGEST_WORD = 100;  // letters; longer ones are unknown
+const LONGEST_WORD = 100; // letters; longer ones are unknown
 
 // float32 of the bits of a float16.
 function half(bits) {
@@ -15,7 +17,8 @@ function half(bits) {
 // Abramowitz and Stegun 7.1.26: to 1.5e-7.
 function erf(x) {
   const t = 1 / (1 + 0.3275911 * Math.abs(x));
-  const sum = t * (0.254829592 + t * (-0.284496736 + t * (1.421413741 + t * (-1.453152027 + t * 1.061405429))));
+  const sum =
+    t * (0.254829592 + t * (-0.284496736 + t * (1.421413741 + t * (-1.453152027 + t * 1.061405429))));
   return Math.sign(x) * (1 - sum * Math.exp(-x * x));
 }
 
@@ -32,9 +35,15 @@ class TextTower {
   // A tensor by name: int8 as it is, float16 as float32.
   tensor(name) {
     if (!this.kept.has(name)) {
-      const { dtype, data_offsets: [first, end] } = this.described[name];
+      const {
+        dtype,
+        data_offsets: [first, end],
+      } = this.described[name];
       const part = this.bytes.slice(this.start + first, this.start + end).buffer;
-      this.kept.set(name, dtype === "I8" ? new Int8Array(part) : Float32Array.from(new Uint16Array(part), half));
+      this.kept.set(
+        name,
+        dtype === "I8" ? new Int8Array(part) : Float32Array.from(new Uint16Array(part), half),
+      );
     }
     return this.kept.get(name);
   }
@@ -44,7 +53,8 @@ class TextTower {
     const [first, ...rest] = ` ${prompt} `.split(/\s+([+-])\s+/);
     const sum = this.phrase(first);
     for (let at = 0; at < rest.length; at += 2)
-      this.phrase(rest[at + 1]).forEach((value, c) => (sum[c] += rest[at] === "+" ? value : -value));
+      for (const [c, value] of this.phrase(rest[at + 1]).entries())
+        sum[c] += rest[at] === "+" ? value : -value;
     const size = Math.hypot(...sum);
     if (size < 1e-3) throw new Error("This cancels itself out; take another phrase away.");
     return sum.map((value) => value / size);
@@ -56,10 +66,13 @@ class TextTower {
     const plain = text
       .replace(/[\p{Cc}\p{Cf}\ufffd]/gu, (letter) => (/\s/.test(letter) ? " " : ""))
       .replace(/[\u3400-\u4dbf\u4e00-\u9fff\uf900-\ufaff]|[\u{20000}-\u{2ceaf}]/gu, " $& ")
-      .normalize("NFD").replace(/\p{Mn}/gu, "").toLowerCase();
+      .normalize("NFD")
+      .replace(/\p{Mn}/gu, "")
+      .toLowerCase();
     const words = plain.match(/[!-/:-@[-`{-~\p{P}]|[^\s!-/:-@[-`{-~\p{P}]+/gu) || [];
     const ids = words.flatMap((word) => this.pieces(word) || [unknown]);
-    if (ids.every((id) => id === unknown)) throw new Error("The text model knows no word of this; use plain words.");
+    if (ids.every((id) => id === unknown))
+      throw new Error("The text model knows no word of this; use plain words.");
     return [opening, ...ids.slice(0, MOST_TOKENS - 2), closing];
   }
 
@@ -67,7 +80,7 @@ class TextTower {
   pieces(word) {
     const letters = [...word];
     const ids = [];
-    for (let start = 0; start < letters.length;) {
+    for (let start = 0; start < letters.length; ) {
       let end = letters.length;
       const piece = () => (start ? "##" : "") + letters.slice(start, end).join("");
       while (end > start && !this.ids.has(piece())) --end;
@@ -84,16 +97,19 @@ class TextTower {
     for (let layer = 0; layer < LAYERS; ++layer) hidden = this.layer(`encoder.layer.${layer}.`, hidden);
     const channels = this.tensor("embeddings.LayerNorm.weight").length;
     const sum = new Float32Array(channels);
-    hidden.forEach((value, at) => (sum[at % channels] += value));
+    for (let at = 0; at < hidden.length; ++at) sum[at % channels] += hidden[at];
     const size = Math.hypot(...sum);
     return sum.map((value) => value / size);
   }
 
   // Word, place and type of each token, normalised.
   embedded(ids) {
-    const [words, places] = ["word", "position"].map((what) => this.tensor(`embeddings.${what}_embeddings.weight`));
-    const [wordScales, placeScales] = ["word", "position"]
-      .map((what) => this.tensor(`embeddings.${what}_embeddings.weight.scale`));
+    const [words, places] = ["word", "position"].map((what) =>
+      this.tensor(`embeddings.${what}_embeddings.weight`),
+    );
+    const [wordScales, placeScales] = ["word", "position"].map((what) =>
+      this.tensor(`embeddings.${what}_embeddings.weight.scale`),
+    );
     const types = this.tensor("embeddings.token_type_embeddings.weight");
     const channels = words.length / wordScales.length;
     const hidden = new Float32Array(ids.length * channels).map((_, at) => {
@@ -105,17 +121,29 @@ class TextTower {
   }
 
   layer(name, hidden) {
-    const mixed = this.linear(name + "attention.output.dense", this.attended(name + "attention.self.", hidden));
-    const between = this.normalised(name + "attention.output.LayerNorm", mixed.map((value, at) => value + hidden[at]));
-    const wide = this.linear(name + "intermediate.dense", between)
-      .map((value) => 0.5 * value * (1 + erf(value * Math.SQRT1_2)));
+    const mixed = this.linear(
+      name + "attention.output.dense",
+      this.attended(name + "attention.self.", hidden),
+    );
+    const between = this.normalised(
+      name + "attention.output.LayerNorm",
+      mixed.map((value, at) => value + hidden[at]),
+    );
+    const wide = this.linear(name + "intermediate.dense", between).map(
+      (value) => 0.5 * value * (1 + erf(value * Math.SQRT1_2)),
+    );
     const narrow = this.linear(name + "output.dense", wide);
-    return this.normalised(name + "output.LayerNorm", narrow.map((value, at) => value + between[at]));
+    return this.normalised(
+      name + "output.LayerNorm",
+      narrow.map((value, at) => value + between[at]),
+    );
   }
 
   // W x + b of every token.
   linear(name, input) {
-    const [matrix, scales, bias] = [".weight", ".weight.scale", ".bias"].map((end) => this.tensor(name + end));
+    const [matrix, scales, bias] = [".weight", ".weight.scale", ".bias"].map((end) =>
+      this.tensor(name + end),
+    );
     const [rows, columns] = [bias.length, matrix.length / bias.length];
     const count = input.length / columns;
     const output = new Float32Array(count * rows);
@@ -137,7 +165,7 @@ class TextTower {
       const mean = row.reduce((sum, value) => sum + value, 0) / channels;
       const variance = row.reduce((sum, value) => sum + (value - mean) ** 2, 0) / channels;
       const scale = 1 / Math.sqrt(variance + NORM_EPS);
-      row.forEach((value, c) => (row[c] = (value - mean) * scale * weight[c] + bias[c]));
+      for (let c = 0; c < channels; ++c) row[c] = (row[c] - mean) * scale * weight[c] + bias[c];
     }
     return hidden;
   }
@@ -152,7 +180,8 @@ class TextTower {
       for (let token = 0; token < count; ++token) {
         const scores = Float32Array.from({ length: count }, (_, other) => {
           let sum = 0;
-          for (let c = head; c < head + width; ++c) sum += queries[token * channels + c] * keys[other * channels + c];
+          for (let c = head; c < head + width; ++c)
+            sum += queries[token * channels + c] * keys[other * channels + c];
           return sum / Math.sqrt(width);
         });
         const highest = Math.max(...scores);

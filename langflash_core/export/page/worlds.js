@@ -1,10 +1,10 @@
 // One scene of the page: its Gaussians, what draws and answers them, and what can be seen of a point. A page may hold
 // several, which share the canvas and the phrases.
 
-const MOST_JUDGED = 320 * 320;   // pixels that scores are taken from
-const MOST_VIEWS = 8;            // of another scene that are looked through for a phrase
-const SURFACE = 0.03;            // of the distance to a point: what is nearer to it than that is its own surface
-const SOLID = 0.3;               // opacity
+const MOST_JUDGED = 320 * 320; // pixels that scores are taken from
+const MOST_VIEWS = 8; // of another scene that are looked through for a phrase
+const SURFACE = 0.03; // of the distance to a point: what is nearer to it than that is its own surface
+const SOLID = 0.3; // opacity
 
 class World {
   // header, columns: as decode.js has them.
@@ -15,12 +15,17 @@ class World {
     const phrases = readPhrases(header, columns);
     this.answers = phrases && new Answers(phrases, header.count);
     this.lens = { pinhole: header.views[0].pinhole, size: header.viewSize };
-    this.found = new Map();  // by row: the best answer of any photo's view
+    this.found = new Map(); // by row: the best answer of any photo's view
   }
 
   // Where it opens: {eye, turn, distance}.
   get start() {
-    return this.header.stops[this.header.start] || { ...this.header.views[0], distance: this.depth(this.header.views[0]) };
+    return (
+      this.header.stops[this.header.start] || {
+        ...this.header.views[0],
+        distance: this.depth(this.header.views[0]),
+      }
+    );
   }
 
   // The middle depth of what lies near the middle of a view; 1 where nothing does.
@@ -39,7 +44,10 @@ class World {
       const offset = [texels[at] - view.eye[0], texels[at + 1] - view.eye[1], texels[at + 2] - view.eye[2]];
       const z = dot(offset, view.turn[2]);
       if (z < NEAR || texels[at + 3] < SOLID) continue;
-      const off = [dot(offset, view.turn[0]) / z * fx + cx - x, dot(offset, view.turn[1]) / z * fy + cy - y];
+      const off = [
+        (dot(offset, view.turn[0]) / z) * fx + cx - x,
+        (dot(offset, view.turn[1]) / z) * fy + cy - y,
+      ];
       if (Math.hypot(...off) < radius) depths.push(z);
     }
     return depths.sort((a, b) => a - b);
@@ -50,11 +58,14 @@ class World {
   light(eye, point) {
     const { texels } = this;
     const way = plus(point, eye, -1);
-    const far = length(way), [wx, wy, wz] = way.map((value) => value / far);
+    const far = length(way),
+      [wx, wy, wz] = way.map((value) => value / far);
     const end = (1 - SURFACE) * far;
     let passes = 1;
     for (let at = 0; at < texels.length && passes > 0.01; at += 16) {
-      const x = texels[at] - eye[0], y = texels[at + 1] - eye[1], z = texels[at + 2] - eye[2];
+      const x = texels[at] - eye[0],
+        y = texels[at + 1] - eye[1],
+        z = texels[at + 2] - eye[2];
       const along = x * wx + y * wy + z * wz;
       if (along < NEAR || along > end) continue;
       const reach = 3 * Math.max(texels[at + 8], texels[at + 9], texels[at + 10]);
@@ -68,9 +79,11 @@ class World {
   deviations(at, offset, way) {
     const inside = (vector) => {
       const [w, ...axis] = this.texels.subarray(at + 4, at + 8);
-      const minus = axis.map((value) => -value);  // the inverse rotation: q^-1 v q
+      const minus = axis.map((value) => -value); // the inverse rotation: q^-1 v q
       const twice = cross(minus, vector).map((value) => 2 * value);
-      return plus(plus(vector, twice, w), cross(minus, twice)).map((value, i) => value / this.texels[at + 8 + i]);
+      return plus(plus(vector, twice, w), cross(minus, twice)).map(
+        (value, i) => value / this.texels[at + 8 + i],
+      );
     };
     const [o, w] = [inside(offset), inside(way)];
     const t = dot(o, w) / dot(w, w);
@@ -105,12 +118,18 @@ class World {
     if (!this.found.has(row)) {
       const [width, height] = this.lens.size;
       const scale = Math.min(1, Math.sqrt(MOST_JUDGED / 4 / (width * height)));
-      const lens = fitted(this.lens, [width, height].map((side) => Math.max(1, Math.round(scale * side))));
+      const lens = fitted(
+        this.lens,
+        [width, height].map((side) => Math.max(1, Math.round(scale * side))),
+      );
       const answers = this.header.views.slice(0, MOST_VIEWS).map((view, index) => {
         const { found, score } = this.judge([row], lens, view).get(row);
         return { found, score, view: index };
       });
-      this.found.set(row, answers.reduce((a, b) => (b.found - a.found || b.score - a.score) > 0 ? b : a));
+      this.found.set(
+        row,
+        answers.reduce((a, b) => ((b.found - a.found || b.score - a.score) > 0 ? b : a)),
+      );
     }
     return this.found.get(row);
   }

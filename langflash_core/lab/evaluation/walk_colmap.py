@@ -92,6 +92,8 @@ def _models(
     options = colmap.IncrementalPipelineOptions()
     options.num_threads, options.random_seed = threads, SEED
     options.min_model_size = min(3, len(paths))
+    if len(paths) == 2:  # every track is one of two views
+        options.triangulation.ignore_two_view_tracks = False
     if intrinsics is not None:
         options.ba_refine_focal_length = options.ba_refine_extra_params = False
     return list(colmap.incremental_mapping(database, paths[0].parent, work, options).values())

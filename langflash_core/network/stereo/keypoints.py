@@ -8,17 +8,14 @@ from typing import overload
 import cv2
 import numpy as np
 
-from langflash_core.keeping import not_kept
 from langflash_core.network.stereo.matching import detect, match_descriptors
 from langflash_core.network.stereo.retrieval import likely_pairs
-from langflash_core.running import Kept
 
 Told = Callable[[str, int, int], None]
 
 WORKING_SIDE = 768  # pixels of the longer side at which photos are matched
 _MANY_VIEWS = 4  # beyond this, fewer features keep the pairs affordable
 _FEATURES = {True: 1500, False: 4000}  # of many views, of few
-_last: dict[tuple[bytes, ...], "KeyPoints"] = {}
 
 
 @dataclass(frozen=True)
@@ -53,20 +50,9 @@ def match_sources(
     sources: tuple[bytes, ...],
     check: Callable[[], None] = lambda: None,
     told: Told = lambda what, done, count: None,
-    kept: Kept = not_kept,
 ) -> KeyPoints:
-    """`match_photos` of pictures as JPEG bytes; the last answer is remembered.
-
-    Args:
-        kept: gives what was kept of an earlier run.
-    """
-    points = _last.get(sources)
-    if points is None:
-        found = kept("matches", lambda: match_photos(_Decoded(sources), check, told).arrays())
-        points = KeyPoints.of(found)
-        _last.clear()
-        _last[sources] = points
-    return points
+    """`match_photos` of pictures as JPEG bytes."""
+    return match_photos(_Decoded(sources), check, told)
 
 
 class _Decoded(Sequence[np.ndarray]):

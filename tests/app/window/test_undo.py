@@ -102,44 +102,45 @@ def value(name: str, hint, chance: np.random.Generator, state: State):
         return SAYS_WHICH[name][chance.integers(len(SAYS_WHICH[name]))]
     if origin in (typing.Union, UnionType):
         return value(name, parts[chance.integers(len(parts))], chance, state)
-    if hint is NoneType:
-        return None
     if origin is tuple:
         if parts[-1] is Ellipsis:
             return tuple(value("", parts[0], chance, state) for _ in range(chance.integers(4)))
         return tuple(value("", part, chance, state) for part in parts)
-    if hint is Mask:
-        return Mask.of(chance.random(12_300) < 0.3)
-    if hint is Marks:
-        return state.editing.marks
-    if hint is CompiledQuery:
-        assert state.scene.info is not None
-        return compile_query(state.scene.info.scene, language_space("minilm"), ["wall"])
-    if hint is Scene:
-        assert state.scene.info is not None
-        return state.scene.info.scene
-    if hint is do.Command:
-        return show.ClearPhotos()
-    if hint is SceneInfo:
-        return state.scene.info
-    if hint is Pose:
-        return state.scene.pose
-    if hint is Vector:
-        return Vector(*chance.normal(size=3).tolist())
+    if hint in MADE:
+        return MADE[hint](chance, state)
     if isinstance(hint, type) and (hint in TABLES or issubclass(hint, Enum)):
         choices = list(TABLES.get(hint, hint))
         return choices[chance.integers(len(choices))]
     if is_dataclass(hint) and isinstance(hint, type):
         return hint(**arguments(hint, chance, state))
-    simple = {
-        bool: bool(chance.integers(2)), int: int(chance.integers(-1, 5)), float: float(chance.normal()),
-        str: ("", "wall", "an armchair")[chance.integers(3)], np.ndarray: np.eye(3),
-        bytes: chance.random(12_300, np.float32).tobytes(), datetime: datetime(2026, 1, 1),
-        Path: Path(f"/nowhere/{chance.integers(5)}.langflash"),
-    }  # fmt: skip
-    if hint in simple:
-        return simple[hint]
     raise TypeError(f"a command takes {hint}: say here how to make one")
+
+
+def scene_of(state: State) -> Scene:
+    """The scene on show."""
+    assert state.scene.info is not None
+    return state.scene.info.scene
+
+
+MADE: dict = {
+    NoneType: lambda chance, state: None,
+    Mask: lambda chance, state: Mask.of(chance.random(12_300) < 0.3),
+    Marks: lambda chance, state: state.editing.marks,
+    CompiledQuery: lambda chance, state: compile_query(scene_of(state), language_space("minilm"), ["wall"]),
+    Scene: lambda chance, state: scene_of(state),
+    do.Command: lambda chance, state: show.ClearPhotos(),
+    SceneInfo: lambda chance, state: state.scene.info,
+    Pose: lambda chance, state: state.scene.pose,
+    Vector: lambda chance, state: Vector(*chance.normal(size=3).tolist()),
+    bool: lambda chance, state: bool(chance.integers(2)),
+    int: lambda chance, state: int(chance.integers(-1, 5)),
+    float: lambda chance, state: float(chance.normal()),
+    str: lambda chance, state: ("", "wall", "an armchair")[chance.integers(3)],
+    bytes: lambda chance, state: chance.random(12_300, np.float32).tobytes(),
+    np.ndarray: lambda chance, state: np.eye(3),
+    datetime: lambda chance, state: datetime(2026, 1, 1),
+    Path: lambda chance, state: Path(f"/nowhere/{chance.integers(5)}.langflash"),
+}
 
 
 def bits(state: State) -> tuple:

@@ -4,9 +4,11 @@ import math
 import sys
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from langflash_core.errors import MissingPackageError
@@ -159,3 +161,38 @@ def test_without_colmap_its_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pycolmap", None)
     with pytest.raises(MissingPackageError, match=r"langflash\[colmap\]"):
         walk_colmap.check_installed()
+
+
+def corner_photo(viewmat: np.ndarray, K: np.ndarray, size: tuple[int, int], noise: np.ndarray) -> np.ndarray:
+    """(h, w) uint8 of two walls at a right angle, z = 4 + x and z = 4 - x, with noise painted on them."""
+    turn, centre = viewmat[:3, :3], -viewmat[:3, :3].T @ viewmat[:3, 3]
+    x, y = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5)
+    rays = np.stack([x, y, np.ones_like(x)], -1) @ np.linalg.inv(K).T @ turn
+    ways = [(4 - centre[2] + side * centre[0]) / (rays[..., 2] - side * rays[..., 0]) for side in (1, -1)]
+    points = centre + np.minimum(*ways)[..., None] * rays
+    u, v = (100 * (points[..., axis] + 3.5) for axis in (0, 1))
+    return cv2.remap(noise, u.astype(np.float32), v.astype(np.float32), cv2.INTER_AREA)
+
+
+@pytest.mark.filterwarnings("default")  # of other people's packages
+def test_colmap_itself_finds_cameras(tmp_path):
+    """Two that look at a painted corner from 12 degrees aside, either way."""
+    pytest.importorskip("pycolmap")
+    size, K = (320, 240), np.array([[300.0, 0, 160], [0, 300.0, 120], [0, 0, 1]])
+    generator = np.random.default_rng(0)
+    coarse, fine = (generator.integers(0, 255, (side, side)).astype(np.uint8) for side in (70, 350))
+    large = [cv2.resize(each, (700, 700), interpolation=cv2.INTER_CUBIC) for each in (coarse, fine)]
+    noise = (0.5 * large[0] + 0.5 * large[1]).astype(np.uint8)
+    turns = Rotation.from_euler("y", [[-12], [12]], degrees=True)
+    given = cameras(np.array([0.0, 0, 4]) - turns.apply([0.0, 0, 3]), turns.inv())
+    paths = [tmp_path / name for name in ("left.png", "right.png")]
+    for path, viewmat in zip(paths, given, strict=True):
+        Image.fromarray(corner_photo(viewmat, K, size, noise)).save(path)
+    found = walk_colmap.mapped(paths, (300.0, 300.0, 160.0, 120.0))
+    step = found.viewmats["right"] @ np.linalg.inv(found.viewmats["left"])
+    true = given[1] @ np.linalg.inv(given[0])
+    turned = Rotation.from_matrix(step[:3, :3] @ true[:3, :3].T).magnitude()
+    ways = step[:3, 3] / np.linalg.norm(step[:3, 3]), true[:3, 3] / np.linalg.norm(true[:3, 3])
+    apart = np.arccos(ways[0] @ ways[1])
+    assert np.degrees(turned) < 1.0 and np.degrees(apart) < 2.0, "a pixel is .2 degrees"
+    assert found.focal == 300.0

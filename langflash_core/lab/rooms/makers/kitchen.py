@@ -1,4 +1,4 @@
-"""Makers of what stands and lies in kitchens and what burns (see `makers.common`). Metres, y up, front +z."""
+"""Makers of what stands and lies in kitchens (see `makers.common`). Metres, y up, front +z."""
 
 from collections.abc import Sequence
 
@@ -26,18 +26,18 @@ from langflash_core.lab.rooms.makers.kit import (
 )
 from langflash_core.lab.rooms.makers.small import plain_cup
 
-_GLASS, _GOLD = plain((0.8, 0.87, 0.87), 0.8, 0.4), plain((0.75, 0.6, 0.25), 0.8)
-_IRON, _RED, _GREEN = (
+GLASS, GOLD = plain((0.8, 0.87, 0.87), 0.8, 0.4), plain((0.75, 0.6, 0.25), 0.8)
+IRON, _RED, _GREEN = (
     plain((0.09, 0.09, 0.095), 0.2),
     plain((0.75, 0.13, 0.08), 0.4),
     plain((0.25, 0.5, 0.15)),
 )
-_CRUST, _CREAM, _ORANGE = plain((0.72, 0.46, 0.2), 0.1), plain((0.95, 0.9, 0.75)), plain((0.95, 0.6, 0.15))
-_FIRES = (plain((0.98, 0.4, 0.06)), plain((1.0, 0.65, 0.15)), plain((1.0, 0.85, 0.4)))
+CRUST, _CREAM, _ORANGE = plain((0.72, 0.46, 0.2), 0.1), plain((0.95, 0.9, 0.75)), plain((0.95, 0.6, 0.15))
 _CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 
 
-def _any(draw: Draw, group: str, *names: str) -> tuple[int, Design]:
+def any_made(draw: Draw, group: str, *names: str) -> tuple[int, Design]:
+    """One of several things of a group: which, and its design to begin with."""
     style = draw.style(len(names))
     return style, Design(names[style], group, (group,))
 
@@ -50,18 +50,21 @@ def _blob(d: Design, size: Vector, centre: Vector, look: Look, squareness: float
     d.add(solids.rounded(size, centre, squareness, 6), look)
 
 
-def _turn(d: Design, r: float, h: float, look: Look, shape: str, at: Vector = (0, 0, 0), n: int = 14) -> None:
+def round_body(
+    d: Design, r: float, h: float, look: Look, shape: str, at: Vector = (0, 0, 0), n: int = 14
+) -> None:
     """Turned about an upright axis: "radius height" in hundredths of r and h, from the foot to the top."""
     profile = np.array(shape.split(), float).reshape(-1, 2) * [r / 100, h / 100]
     d.add(lathe([(x, y) for x, y in profile.tolist()], at, n), look)
 
 
-def _arc(x: float, y: float, wide: float, high: float, start: float, end: float) -> list[Vector]:
+def arc_line(x: float, y: float, wide: float, high: float, start: float, end: float) -> list[Vector]:
     """Points on an ellipse that faces the front; angles run from the top clockwise."""
     return [(x + wide * np.sin(t), y + high * np.cos(t), 0.0) for t in common.spread(start, end, 8)]
 
 
-def _along(d: Design, r: float, long: float, centre: Vector, look: Look) -> None:
+def rod_along(d: Design, r: float, long: float, centre: Vector, look: Look) -> None:
+    """A rod along x around a centre."""
     d.add(shifted(turned(cylinder(r, long, (0, -long / 2, 0), segments=10), 2, -QUARTER), centre), look)
 
 
@@ -154,7 +157,7 @@ def kitchen_island(draw: Draw) -> Design:
 def coffee_machine(draw: Draw) -> Design:
     """Espresso machine, filter machine with its pot, capsule machine, moka pot."""
     names = ("espresso machine", "coffee maker", "capsule coffee machine", "moka pot")
-    style, d = _any(draw, "coffee machine", *names)
+    style, d = any_made(draw, "coffee machine", *names)
     look, w, h = (
         _shell(draw),
         (0.28, 0.22, 0.14, 0.05)[style] * draw.between(0.85, 1.15),
@@ -162,7 +165,7 @@ def coffee_machine(draw: Draw) -> Design:
     )
     dark = STEEL if look is BLACK else BLACK
     if style == 3:
-        _turn(d, w, h * 0.6, STEEL, "0 0 100 0 95 38 72 45 78 50 105 92 50 98 8 100 15 108 0 110", n=8)
+        round_body(d, w, h * 0.6, STEEL, "0 0 100 0 95 38 72 45 78 50 105 92 50 98 8 100 15 108 0 110", n=8)
         d.tube(((w * 0.8, h * 0.52, 0), (w * 2, h * 0.53, 0), (w * 1.9, h * 0.27, 0)), 0.009, BLACK, 6)
         d.add(_tapered((w, 0.03, w * 0.5), (-w * 0.8, h * 0.52, 0), 1.3, 1.0), STEEL)
         return d
@@ -174,9 +177,9 @@ def coffee_machine(draw: Draw) -> Design:
         d.roll(0.016, 0.02, (0.05 * k - w * 0.33, h * 0.87, 0.134), dark, 10)
     if style == 1:
         coffee, place = plain((0.13, 0.07, 0.04), 0.9), (0, 0.056, 0.056)
-        _turn(d, 0.065, 0.13, coffee, "0 0 100 5 110 50 0 50", place)
-        _turn(d, 0.065, 0.13, _GLASS, "110 50 75 90 80 100 0 100", place)
-        d.tube([(0, y, x) for x, y, _ in _arc(0.12, 0.12, 0.045, 0.05, 0, np.pi)], 0.009, BLACK, 6)
+        round_body(d, 0.065, 0.13, coffee, "0 0 100 5 110 50 0 50", place)
+        round_body(d, 0.065, 0.13, GLASS, "110 50 75 90 80 100 0 100", place)
+        d.tube([(0, y, x) for x, y, _ in arc_line(0.12, 0.12, 0.045, 0.05, 0, np.pi)], 0.009, BLACK, 6)
     else:
         d.tube(((0, h * 0.6, 0.056), (0, h * 0.57, 0.056 + 0.14 * (style == 0))), 0.014, BLACK)
         _put(d, plain_cup(draw).parts if draw.chance(0.6) else (), (0, 0.056, 0.056), draw.between(0, 6))
@@ -185,18 +188,20 @@ def coffee_machine(draw: Draw) -> Design:
 
 def kettle(draw: Draw) -> Design:
     """Electric on a base with a handle at its side; for the stove, squat with a bail."""
-    style, d = _any(draw, "kettle", "electric kettle", "kettle")
+    style, d = any_made(draw, "kettle", "electric kettle", "kettle")
     look, dark = STEEL if draw.chance(0.4) else _shell(draw), BLACK if draw.chance(0.7) else draw.wooden()
     if style == 0:
         r, h, top = draw.between(0.065, 0.085), draw.between(0.18, 0.25), draw.between(0.6, 0.85)
-        _turn(d, r, h, look, f"0 10 100 10 {draw.count(80, 110)} 50 {100 * top} 95 10 100 15 108 0 110", n=18)
+        round_body(
+            d, r, h, look, f"0 10 100 10 {draw.count(80, 110)} 50 {100 * top} 95 10 100 15 108 0 110", n=18
+        )
         d.cylinder(r * 1.15, 0.02, (0, 0, 0), BLACK)
-        d.tube(_arc(r * top * 0.9, h * 0.56, 0.07, h * 0.37, 0, 3), 0.011, dark, 6)
+        d.tube(arc_line(r * top * 0.9, h * 0.56, 0.07, h * 0.37, 0, 3), 0.011, dark, 6)
         d.add(_tapered((0.05, 0.05, 0.03), (-r * top - 0.005, h * 0.87, 0), 1.6, 1.2), look)
     else:
         r, h = draw.between(0.085, 0.12), draw.between(0.11, 0.16)
-        _turn(d, r, h, look, "0 0 100 0 105 25 80 75 40 97 10 100 15 110 0 112", n=18)
-        d.tube(_arc(0, h * 0.75, r * 0.85, h * draw.between(0.8, 1.1), -QUARTER, QUARTER), 0.009, dark, 6)
+        round_body(d, r, h, look, "0 0 100 0 105 25 80 75 40 97 10 100 15 110 0 112", n=18)
+        d.tube(arc_line(0, h * 0.75, r * 0.85, h * draw.between(0.8, 1.1), -QUARTER, QUARTER), 0.009, dark, 6)
         d.tube(((-r * 0.8, h * 0.45, 0), (-r * 1.25, h * 0.75, 0), (-r * 1.45, h * 0.95, 0)), r * 0.14, look)
     return d
 
@@ -204,14 +209,14 @@ def kettle(draw: Draw) -> Design:
 def teapot(draw: Draw) -> Design:
     """Round to tall, of china, iron or glass: spout, lid with a knob, a handle at the back or above."""
     d = Design("teapot", "teapot", ("tea pot", "pot"))
-    r, look = draw.between(0.065, 0.095), draw.one_of((draw.ceramic(), draw.ceramic(), _IRON, STEEL, _GLASS))
+    r, look = draw.between(0.065, 0.095), draw.one_of((draw.ceramic(), draw.ceramic(), IRON, STEEL, GLASS))
     h, neck = r * draw.between(1.2, 2.0), draw.count(40, 65)
     above = f"85 80 {neck} 95 {neck} 100 {neck * 0.8} 107 8 112 16 120 10 127 0 129"
-    _turn(d, r, h, look, f"0 0 60 0 95 {draw.count(15, 30)} 100 {draw.count(35, 60)} {above}", n=18)
-    if look is _IRON or draw.chance(0.2):
-        d.tube(_arc(0, h * 0.85, r * 0.85, h * 0.95, -QUARTER, QUARTER), 0.006, _IRON, 6)
+    round_body(d, r, h, look, f"0 0 60 0 95 {draw.count(15, 30)} 100 {draw.count(35, 60)} {above}", n=18)
+    if look is IRON or draw.chance(0.2):
+        d.tube(arc_line(0, h * 0.85, r * 0.85, h * 0.95, -QUARTER, QUARTER), 0.006, IRON, 6)
     else:
-        d.tube(_arc(r * 0.85, h * 0.55, r * 0.7, h * 0.33, 0, np.pi), r * 0.09, look, 6)
+        d.tube(arc_line(r * 0.85, h * 0.55, r * 0.7, h * 0.33, 0, np.pi), r * 0.09, look, 6)
     spout = [(-r * x, h * y, 0.0) for x, y in ((0.85, 0.3), (1.2, 0.5), (1.4, 0.8), (1.65, 0.98))]
     for k in range(3):
         d.tube(spout[k : k + 2], r * (0.24 - 0.06 * k), look)
@@ -220,7 +225,7 @@ def teapot(draw: Draw) -> Design:
 
 def toaster(draw: Draw) -> Design:
     """With one or two rows of slots, some with toast in them; or a small oven with a glass door."""
-    style, d = _any(draw, "toaster", "toaster", "toaster", "toaster oven")
+    style, d = any_made(draw, "toaster", "toaster", "toaster", "toaster oven")
     look, oven = _shell(draw), style == 2
     w, h, rows = (
         draw.between(0.24, 0.33) + 0.15 * oven,
@@ -240,7 +245,7 @@ def toaster(draw: Draw) -> Design:
     for at in (0.0,) if rows == 1 else (-0.033, 0.033):
         boxes(d, BLACK, (w * 0.7, 0.006, 0.032, 0, h + 0.009, at))
         boxes(
-            d, _CRUST if toast else dark, (w * 0.42, 0.06 if toast else 0.01, 0.018, 0, h + 0.03 * toast, at)
+            d, CRUST if toast else dark, (w * 0.42, 0.06 if toast else 0.01, 0.018, 0, h + 0.03 * toast, at)
         )
     boxes(
         d, dark, (0.03, 0.018, 0.05, w / 2 + 0.012, h * 0.7, 0), (0.02, 0.03, 0.03, w / 2, h * 0.25, z * 0.2)
@@ -251,31 +256,31 @@ def toaster(draw: Draw) -> Design:
 def kitchen_appliance(draw: Draw) -> Design:
     """Blender, food processor, citrus press, stand mixer or rice cooker."""
     names = ("blender", "food processor", "juicer", "stand mixer", "rice cooker")
-    style, d = _any(draw, "kitchen appliance", *names)
+    style, d = any_made(draw, "kitchen appliance", *names)
     look, r, h = _shell(draw), draw.between(0.075, 0.1), draw.between(0.28, 0.36)
     dark, foot = STEEL if look is BLACK else BLACK, (0.13, 0.12, 0.15, 0, 0)[style]
     if style == 3:
         _blob(d, (0.36, 0.05, 0.2), (0, 0.025, 0), look, 4)
         d.add(_tapered((0.1, h * 0.75, 0.13), (0.12, h * 0.4, 0), 0.9, 0.8), look)
         _blob(d, (0.36, 0.13, 0.13), (0.01, h * 0.88, 0), look, 3)
-        _turn(d, 0.105, 0.14, STEEL, "0 0 55 0 100 100 94 100 20 80 20 170", (-0.07, 0.05, 0))
+        round_body(d, 0.105, 0.14, STEEL, "0 0 55 0 100 100 94 100 20 80 20 170", (-0.07, 0.05, 0))
         return d
     if style == 4:
-        _turn(d, r * 1.4, h * 0.65, look, "0 0 85 0 100 25 100 65 94 80 60 97 0 100", n=18)
-        _turn(d, r * 1.4, h * 0.65, dark, "102 63 102 69", n=18)
+        round_body(d, r * 1.4, h * 0.65, look, "0 0 85 0 100 25 100 65 94 80 60 97 0 100", n=18)
+        round_body(d, r * 1.4, h * 0.65, dark, "102 63 102 69", n=18)
         boxes(d, dark, (r, h * 0.2, 0.02, 0, h * 0.22, r * 1.4))
-        d.tube(_arc(0, h * 0.48, r * 1.33, h * 0.3, -QUARTER, QUARTER), 0.01, dark, 6)
+        d.tube(arc_line(0, h * 0.48, r * 1.33, h * 0.3, -QUARTER, QUARTER), 0.01, dark, 6)
         return d
     d.add(_tapered((2 * r, foot, 2 * r), (0, foot / 2, 0), 0.85, 0.85), look)
     for k in (-1, 0, 1):
         d.roll(0.014 if k else 0.022, 0.02, (0.045 * k, foot * 0.4, r * 0.92), dark, 10)
     tall, wide = ((0.22, 75), (0.13, 95), (0.05, 70))[style]
-    _turn(d, r, tall, _GLASS, f"0 0 {wide} 0 100 100 94 100", (0, foot, 0))
+    round_body(d, r, tall, GLASS, f"0 0 {wide} 0 100 100 94 100", (0, foot, 0))
     if style == 2:
-        _turn(d, r, 0.09, WHITE, "70 0 50 50 0 100", (0, foot + 0.01, 0), 8)
+        round_body(d, r, 0.09, WHITE, "70 0 50 50 0 100", (0, foot + 0.01, 0), 8)
         return d
-    _turn(d, r, tall, plain(draw.colour(0.8, 0.5)), "0 3 65 3 70 55 0 55", (0, foot, 0))
-    _turn(
+    round_body(d, r, tall, plain(draw.colour(0.8, 0.5)), "0 3 65 3 70 55 0 55", (0, foot, 0))
+    round_body(
         d,
         r,
         0.03,
@@ -283,24 +288,26 @@ def kitchen_appliance(draw: Draw) -> Design:
         f"0 0 100 0 100 80 35 80 35 {180 + 150 * style} 0 {180 + 150 * style}",
         (0, foot + tall, 0),
     )
-    d.tube(_arc(r * wide / 100, foot + tall * 0.5, 0.055, tall * 0.4, 0, np.pi), 0.011, dark, 6)
+    d.tube(arc_line(r * wide / 100, foot + tall * 0.5, 0.055, tall * 0.4, 0, np.pi), 0.011, dark, 6)
     return d
 
 
 def pan(draw: Draw) -> Design:
     """Frying pan, sauce pan with a long handle, cooking pot with two handles and a lid."""
-    style, d = _any(draw, "pan", "frying pan", "sauce pan", "cooking pot")
-    r, look = (0.125, 0.085, 0.125)[style] * draw.between(0.8, 1.2), draw.one_of((STEEL, _IRON, _shell(draw)))
+    style, d = any_made(draw, "pan", "frying pan", "sauce pan", "cooking pot")
+    r, look = (0.125, 0.085, 0.125)[style] * draw.between(0.8, 1.2), draw.one_of((STEEL, IRON, _shell(draw)))
     h, grip = r * (0.32, 1.1, 1.1)[style] * draw.between(0.8, 1.3), draw.one_of((BLACK, draw.wooden(), look))
-    _turn(d, r, h, look, f"0 0 {80 if style == 0 else 96} 0 100 100 93 100 76 10 0 10", n=18)
+    round_body(d, r, h, look, f"0 0 {80 if style == 0 else 96} 0 100 100 93 100 76 10 0 10", n=18)
     if style < 2:
         long = r + draw.between(0.15, 0.21)
         d.tube(((r * 0.95, h * 0.85, 0), (r + 0.06, h + 0.01, 0), (long, h + 0.02, 0)), 0.011, grip, 6)
     for sx in SIDES if style == 2 else ():
-        ear = [(sx * (r - 0.005 + y), h * 0.8, x) for x, y, _ in _arc(0, 0, r * 0.4, 0.04, -QUARTER, QUARTER)]
+        ear = [
+            (sx * (r - 0.005 + y), h * 0.8, x) for x, y, _ in arc_line(0, 0, r * 0.4, 0.04, -QUARTER, QUARTER)
+        ]
         d.tube(ear, 0.008, grip, 6)
     if style == 2 or draw.chance(0.3 * style):
-        _turn(d, r, r * 0.2, look, "102 0 100 10 60 80 8 100 20 140 0 150", (0, h, 0), 18)
+        round_body(d, r, r * 0.2, look, "102 0 100 10 60 80 8 100 20 140 0 150", (0, h, 0), 18)
     return d
 
 
@@ -311,7 +318,7 @@ def _tool(draw: Draw, kind: int) -> list[tuple[Triangles, Look]]:
         STEEL if kind < 2 or draw.chance(0.6) else draw.wooden(),
         draw.between(0.1, 0.17),
     )
-    _along(
+    rod_along(
         d, 0.007 + 0.004 * (kind == 0), long, (long / 2, 0.009, 0), draw.one_of((BLACK, head, draw.wooden()))
     )
     if kind == 0:
@@ -333,7 +340,7 @@ def _tool(draw: Draw, kind: int) -> list[tuple[Triangles, Look]]:
 def kitchen_utensil(draw: Draw) -> Design:
     """A knife, fork, spoon or spatula; a block or pot of them; a chopping board, a rolling pin."""
     names = ("kitchen knife", "fork", "spoon", "spatula", "knife block", "utensil holder")
-    style, d = _any(draw, "kitchen utensil", *names, "chopping board", "rolling pin")
+    style, d = any_made(draw, "kitchen utensil", *names, "chopping board", "rolling pin")
     wood, r, w = draw.wooden(), draw.between(0.045, 0.065), draw.between(0.28, 0.45)
     if style < 4:
         _put(d, _tool(draw, style), (-0.13, 0, 0))
@@ -343,7 +350,7 @@ def kitchen_utensil(draw: Draw) -> Design:
             boxes(d, BLACK, (0.016, 0.1, 0.024, 0.035 * (k % 3 - 1), 0.26, 0.032 * (k // 3 - 1)))
         d.parts = [(turned(part, 0, -0.35), look) for part, look in d.parts]
     elif style == 5:
-        _turn(
+        round_body(
             d,
             r,
             0.15,
@@ -360,8 +367,8 @@ def kitchen_utensil(draw: Draw) -> Design:
         boxes(d, wood, (w, 0.022, w * 0.65, 0, 0.011, 0), (0.08, 0.022, 0.05, w / 2 + 0.03, 0.011, 0))
         _put(d, _tool(draw, 0) if draw.chance(0.5) else (), (-0.15, 0.02, w * 0.12))
     else:
-        _along(d, 0.03, 0.24, (0, 0.03, 0), wood)
-        _along(d, 0.012, 0.42, (0, 0.03, 0), draw.one_of((wood, _RED)))
+        rod_along(d, 0.03, 0.24, (0, 0.03, 0), wood)
+        rod_along(d, 0.012, 0.42, (0, 0.03, 0), draw.one_of((wood, _RED)))
     return d
 
 
@@ -373,12 +380,12 @@ def jar(draw: Draw) -> Design:
         draw.chance(0.6),
         draw.count,
     )
-    h, neck, look = r * draw.between(1.5, 3.6), n(70, 98), _GLASS if glass else draw.ceramic()
-    _turn(d, r, h, look, f"0 0 90 0 100 6 {n(85, 115)} 50 100 82 {neck} 92 {neck} 100 0 100")
+    h, neck, look = r * draw.between(1.5, 3.6), n(70, 98), GLASS if glass else draw.ceramic()
+    round_body(d, r, h, look, f"0 0 90 0 100 6 {n(85, 115)} 50 100 82 {neck} 92 {neck} 100 0 100")
     if glass:
         d.cylinder(r * 0.83, h * draw.between(0.4, 0.8), (0, 0.005, 0), plain(draw.colour(0.8, 0.3), 0.1))
-    lid, knob = draw.one_of((STEEL, _GOLD, draw.wooden(), draw.painted(), look)), "10 20 22 30 15 38 0 40"
-    _turn(
+    lid, knob = draw.one_of((STEEL, GOLD, draw.wooden(), draw.painted(), look)), "10 20 22 30 15 38 0 40"
+    round_body(
         d,
         r,
         h,
@@ -392,14 +399,16 @@ def jar(draw: Draw) -> Design:
 def tray(draw: Draw) -> Design:
     """Rectangular with a raised edge and handles, or round; bare, or with cups and a pot."""
     d, disc, w = Design("tray", "tray", ("serving tray",)), draw.chance(0.35), draw.between(0.32, 0.52)
-    look, rim = draw.one_of((draw.body(), draw.wooden(), STEEL, _GOLD)), draw.between(0.015, 0.05)
+    look, rim = draw.one_of((draw.body(), draw.wooden(), STEEL, GOLD)), draw.between(0.015, 0.05)
     z = w * (1.0 if disc else draw.between(0.55, 0.75))
     if disc:
-        _turn(d, w / 2, rim, look, "0 0 95 0 100 100 96 100 90 15 0 15", n=24)
+        round_body(d, w / 2, rim, look, "0 0 95 0 100 100 96 100 90 15 0 15", n=24)
     for s in () if disc else SIDES:
         boxes(d, look, (w, rim, 0.012, 0, rim / 2, s * z / 2), (0.012, rim, z, s * w / 2, rim / 2, 0))
         boxes(d, look, (w / 2, 0.01, z, s * w / 4, 0.005, 0))
-        grip = [(s * (w / 2 + y * 0.3), rim + y, x) for x, y, _ in _arc(0, 0, 0.06, 0.04, -QUARTER, QUARTER)]
+        grip = [
+            (s * (w / 2 + y * 0.3), rim + y, x) for x, y, _ in arc_line(0, 0, 0.06, 0.04, -QUARTER, QUARTER)
+        ]
         d.tube(grip, 0.006, look, 5)
     for k in range(draw.count(-2, 3)):
         _put(d, plain_cup(draw).parts, ((k - 1) * w * 0.26, 0.01, z * 0.17), draw.between(0, 6))
@@ -409,13 +418,13 @@ def tray(draw: Draw) -> Design:
 
 def salt_shaker(draw: Draw) -> Design:
     """Salt and pepper, as shakers or as turned mills, side by side or one alone."""
-    mill, d = _any(draw, "salt shaker", "salt shaker", "pepper mill")
+    mill, d = any_made(draw, "salt shaker", "salt shaker", "pepper mill")
     r, h, belly = draw.between(0.022, 0.03), draw.between(0.07, 0.11) * (1 + mill), draw.count(60, 110)
-    looks = (draw.wooden(), draw.wooden()) if mill else (WHITE, draw.one_of((BLACK, _GLASS)))
+    looks = (draw.wooden(), draw.wooden()) if mill else (WHITE, draw.one_of((BLACK, GLASS)))
     head = "60 72 95 80 95 86 40 94 0 94" if mill else "95 76 95 78 50 95 0 100"
     for k in range(2 if draw.chance(0.75) else 1):
-        _turn(d, r, h, looks[k], f"0 0 100 0 100 10 {belly} 40 80 76", (0.07 * k, 0, 0), 12)
-        _turn(d, r, h, looks[k] if mill else STEEL, head, (0.07 * k, 0, 0), 12)
+        round_body(d, r, h, looks[k], f"0 0 100 0 100 10 {belly} 40 80 76", (0.07 * k, 0, 0), 12)
+        round_body(d, r, h, looks[k] if mill else STEEL, head, (0.07 * k, 0, 0), 12)
         d.cylinder(0.009, 0.015, (0.07 * k, h * (0.92 if mill else 0.99), 0), STEEL if mill else BLACK)
     return d
 
@@ -424,7 +433,7 @@ def paper_towel_holder(draw: Draw) -> Design:
     """A roll upright on a pole, or across between two posts."""
     d = Design("paper towel holder", "paper towel holder", ("kitchen roll", "paper towels"))
     look, r, long, y = draw.legs(), draw.between(0.045, 0.07), draw.between(0.22, 0.27), 0.1
-    for wide, high, part in ((r, long, WHITE), (0.022, long + 0.006, _CRUST), (0.007, long + 0.07, look)):
+    for wide, high, part in ((r, long, WHITE), (0.022, long + 0.006, CRUST), (0.007, long + 0.07, look)):
         d.cylinder(wide, high, (0, 0.016, 0), part)
     boxes(d, WHITE, (r, long, 0.003, r / 2, 0.016 + long / 2, r))
     if draw.chance(0.3):
@@ -433,65 +442,20 @@ def paper_towel_holder(draw: Draw) -> Design:
         for sx in SIDES:
             boxes(d, look, (0.015, y + 0.03, 0.05, sx * (long / 2 + 0.015) - 0.016, y / 2 + 0.015, 0))
         return d
-    _turn(d, draw.between(0.07, 0.09), 0.016, look, "0 0 100 0 100 100 0 100")
-    return d
-
-
-def _taper(d: Design, r: float, h: float, foot: Vector, wax: Look, lit: bool) -> None:
-    """A candle on `foot`, with a wick and perhaps a flame."""
-    d.add(cylinder(r, h, foot, r * 0.95, 10), wax)
-    d.add(cylinder(0.002, h + 0.012, foot, segments=4), BLACK)
-    if lit:
-        _turn(d, 0.008, 0.04, _FIRES[1], "0 0 100 30 60 60 0 100", (foot[0], foot[1] + h + 0.005, foot[2]), 6)
-
-
-def candle(draw: Draw) -> Design:
-    """Pillars alone or three together, in a glass, on a stick, or on a candelabrum of three or five arms."""
-    style, d = _any(draw, "candle", "candle", "candle in a glass", "candlestick", "candelabrum")
-    wax = plain((0.94, 0.91, 0.82) if draw.chance(0.6) else draw.colour(0.9), 0.2)
-    metal, lit = draw.one_of((_GOLD, STEEL, _IRON, draw.wooden(), draw.ceramic())), draw.chance(0.6)
-    r, h, long = draw.between(0.03, 0.05), draw.between(0.14, 0.32), draw.between(0.12, 0.26)
-    many, glass = draw.one_of((1, 3)), draw.one_of((_GLASS, plain(draw.colour(0.7), 0.7, 0.7)))
-    if style == 0:
-        d.cylinder(r * (1.3 if many == 1 else 3.5), 0.008, (0, 0, 0), metal)
-        for k in range(many):
-            place = common.polar(2.1 * r * (many > 1), 2.1 * k, 0.006)
-            _taper(d, r, r * draw.between(1.5, 5), place, wax, lit)
-    elif style == 1:
-        _turn(d, r, r * 2.2, glass, f"0 0 {draw.count(75, 100)} 0 100 100 93 100")
-        _taper(d, r * 0.7, r * 1.7, (0, 0.008, 0), wax, lit)
-    else:
-        _turn(d, 0.05, h, metal, "0 0 100 0 100 4 30 10 20 35 45 50 20 60 25 93 50 96 50 100 0 100")
-        _taper(d, 0.011, long, (0, h, 0), wax, lit)
-    for reach in (0.1, -0.1, 0.19, -0.19)[: many + 1] if style == 3 else ():
-        d.tube(_arc(0, h * 0.85, reach, h * 0.35, np.pi, QUARTER), 0.007, metal, 6)
-        d.add(cylinder(0.012, 0.02, (reach, h * 0.85, 0), 0.024, 10), metal)
-        _taper(d, 0.011, long, (reach, h * 0.85 + 0.02, 0), wax, lit)
-    return d
-
-
-def ashtray(draw: Draw) -> Design:
-    """A round or square dish, some with ash and cigarettes."""
-    d, r, h = Design("ashtray", "ashtray", ("ash tray",)), draw.between(0.05, 0.09), draw.between(0.022, 0.04)
-    look = draw.one_of((plain((0.75, 0.82, 0.82), 0.9), draw.ceramic(), STEEL, BLACK))
-    _turn(d, r, h, look, "0 0 90 0 100 100 75 100 65 35 0 30", n=draw.one_of((4, 8, 18)))
-    d.cylinder(r * 0.45, 0.004, (0, h * 0.32, 0), plain((0.35, 0.34, 0.33)))
-    for k in range(draw.count(0, 4)):
-        turn, out = k * 1.57 + draw.between(-0.3, 0.3), draw.between(0.6, 1.1) * r
-        ends = [common.polar(x, turn, y) for x, y in ((0.01, h / 2), (out, h), (out + 0.02, h + 0.004))]
-        d.tube(ends[:2], 0.004, WHITE, 6)
-        d.tube(ends[1:], 0.0042, _CRUST, 6)
+    round_body(d, draw.between(0.07, 0.09), 0.016, look, "0 0 100 0 100 100 0 100")
     return d
 
 
 def bread(draw: Draw) -> Design:
     """Loaf, baguettes, cake, cheese, pizza, hamburger, vegetables."""
-    style, d = _any(draw, "food", "bread", "baguette", "cake", "cheese", "pizza", "hamburger", "vegetables")
+    style, d = any_made(
+        draw, "food", "bread", "baguette", "cake", "cheese", "pizza", "hamburger", "vegetables"
+    )
     r, w, sweet = draw.between(0.09, 0.16), draw.between(0.22, 0.34), plain(draw.colour(0.8, 0.4), 0.2)
     brown, yellow = plain((0.25, 0.13, 0.07)), plain((0.93, 0.75, 0.3), 0.1)
     for k in range((1, draw.count(1, 3))[style] if style < 2 else 0):
         long, high, deep = ((w, 0.11, w * 0.45), (w * 1.7, 0.06, 0.065))[style]
-        _blob(d, (long, high, deep), (0, high / 2, 0.068 * k), _CRUST, 2.5)
+        _blob(d, (long, high, deep), (0, high / 2, 0.068 * k), CRUST, 2.5)
         for x in common.spread(-long * 0.3, long * 0.3, 5):
             boxes(d, _CREAM, (0.012, 0.01, deep * 0.5, x, high * 0.94, 0.068 * k))
     if style == 2:
@@ -506,15 +470,15 @@ def bread(draw: Draw) -> Design:
         for x, y in ((-0.2, 0.2), (0.1, 0.42), (0.35, 0.25), (0.6, 0.4)):
             _blob(d, (0.02, 0.02, 0.02), (r * x, 0.01 + r * y, r * 0.404 * (1 - x)), brown)
     elif style == 4:
-        _turn(d, r, 0.025, _CRUST, "0 0 100 0 105 50 97 100 88 60", n=20)
-        _turn(d, r, 0.018, _ORANGE, "90 85 0 100", n=16)
+        round_body(d, r, 0.025, CRUST, "0 0 100 0 105 50 97 100 88 60", n=20)
+        round_body(d, r, 0.018, _ORANGE, "90 85 0 100", n=16)
         for k in range(10):
             place = common.polar(r * (0.35, 0.68)[k % 2], 0.63 * k, 0.018)
             d.add(cylinder(r * 0.13, 0.005, place, segments=8), (_RED, _RED, _GREEN)[k % 3])
     elif style == 5:
-        for k, look in enumerate((_CRUST, brown, _ORANGE, _GREEN)):
+        for k, look in enumerate((CRUST, brown, _ORANGE, _GREEN)):
             d.cylinder(r * (0.45 + 0.02 * k), 0.018, (0, 0.016 * k, 0), look)
-        _turn(d, r * 0.47, 0.045, _CRUST, "100 0 95 40 60 85 0 100", (0, 0.065, 0))
+        round_body(d, r * 0.47, 0.045, CRUST, "100 0 95 40 60 85 0 100", (0, 0.065, 0))
     for k in range(draw.count(4, 8) if style == 6 else 0):
         kind, wide, long = draw.one_of(((_ORANGE, 0.04, 0.16), (_RED, 0.07, 0.07), (_GREEN, 0.05, 0.17)))
         _blob(d, (wide, wide, long), (0.075 * (k % 4) - 0.11, wide / 2, 0.13 * (k // 4)), kind)
@@ -523,17 +487,17 @@ def bread(draw: Draw) -> Design:
 
 def barrel(draw: Draw) -> Design:
     """A wooden cask with hoops, upright or lying on a cradle, or a metal drum."""
-    drum, d = _any(draw, "barrel", "barrel", "metal drum")
+    drum, d = any_made(draw, "barrel", "barrel", "metal drum")
     r, look = draw.between(0.2, 0.32), plain(draw.colour(0.9, 0.3), 0.3) if drum else draw.wooden()
     h, belly = r * draw.between(2.3, 3.0), 0 if drum else draw.count(12, 30)
     hoop, metal = (0.03, 0.33, 0.66, 0.93) if drum else (0.03, 0.2, 0.34, 0.63, 0.76, 0.93), draw.metal()
     wide = [100 + belly * np.sin(np.pi * y) for y in (0, 0.25, 0.5, 0.75, 1)]
     waist = " ".join(f"{x} {25 * k}" for k, x in enumerate(wide))
-    _turn(d, r, h, look, f"0 3 92 3 92 0 {waist} 92 100 92 97 0 97", n=18)
+    round_body(d, r, h, look, f"0 3 92 3 92 0 {waist} 92 100 92 97 0 97", n=18)
     for y in hoop:
         low, high = (102 + belly * np.sin(np.pi * t) for t in (y, y + 0.04))
         edge = f"{low - 4} {100 * y} {low} {100 * y} {high} {100 * y + 4} {high - 4} {100 * y + 4}"
-        _turn(d, r, h, look if drum else metal, edge, n=18)
+        round_body(d, r, h, look if drum else metal, edge, n=18)
     if not drum and draw.chance(0.35):
         d.parts = [(common.laid(part, (0, r * 1.35, -h / 2)), p) for part, p in d.parts]
         boxes(d, look, *((r * 1.9, r * 0.45, 0.06, 0, r * 0.225, z) for z in (-h * 0.3, h * 0.3)))
@@ -559,87 +523,6 @@ def high_chair(draw: Draw) -> Design:
     return d
 
 
-def firewood(draw: Draw) -> Design:
-    """Logs in a heap, or piled in a frame of metal or wood, some under a board."""
-    d, heap, many, metal = (
-        Design("firewood", "firewood", ("logs",)),
-        draw.chance(0.4),
-        draw.count(4, 8),
-        draw.legs(),
-    )
-    long, r, rows = draw.between(0.25, 0.4), draw.between(0.035, 0.06), many if heap else draw.count(4, 6)
-    bark, cut = plain((0.33, 0.23, 0.15)), plain((0.83, 0.66, 0.44))
-    for row in range(rows):
-        for k in range(many - row if heap else many - row % 2):
-            x, n = (2 * k + (row if heap else row % 2) + 1 - many) * r, draw.one_of((3, 4, 8, 8))
-            size, end, spin = (
-                r * draw.between(0.85, 1.05),
-                draw.between(-0.02, 0.02) - long / 2,
-                draw.between(0, 6),
-            )
-            for wide, deep, look in ((size, long, bark), (size * 0.86, long + 0.006, cut)):
-                log = turned(cylinder(wide, deep, (0, (long - deep) / 2, 0), segments=n), 1, spin)
-                d.add(common.laid(log, (x, 0.04 + r + row * 1.75 * r, end)), look)
-    wide, high = many * r + 0.03, 0.06 + rows * 1.75 * r + 0.05
-    for z in () if heap else (-long * 0.35, long * 0.35):
-        d.tube(((-wide, high, z), (-wide, 0.02, z), (wide, 0.02, z), (wide, high, z)), 0.011, metal, 6)
-    if not heap and draw.chance(0.5):
-        boxes(d, metal, (2 * wide + 0.04, 0.025, long * 0.9, 0, high + 0.01, 0))
-    return d
-
-
-def _fire(d: Design, draw: Draw, w: float, y: float, z: float, deep: float) -> None:
-    """Logs with flames over a width and a depth."""
-    for k in (-1, 0, 1):
-        _along(d, 0.035, w * 0.7, (0, y + 0.035 + 0.05 * (k == 0), z + deep * k), plain((0.16, 0.1, 0.07)))
-    for x in common.spread(-w * 0.35, w * 0.35, max(4, int(w / 0.07))) if draw.chance(0.8) else ():
-        high, place = draw.between(0.12, 0.3), (x, y + 0.05, z + deep * draw.between(-0.5, 1))
-        _turn(d, high * 0.2, high, draw.one_of(_FIRES), "0 0 100 25 55 60 0 100", place, 6)
-
-
-def fireplace(draw: Draw) -> Design:
-    """A mantel of stone, brick or wood about a fire; an iron stove with its pipe; modern and flat."""
-    style, d = _any(draw, "fireplace", "fireplace", "wood stove", "modern fireplace")
-    w, h, z, flat = draw.between(1.1, 1.6), draw.between(1.0, 1.3), draw.between(0.15, 0.22), style == 2
-    if style == 1:
-        w, look = w * 0.37, _IRON if draw.chance(0.7) else plain(draw.colour(0.3, 0.3), 0.3)
-        boxes(d, look, (w, h * 0.6, 0.4, 0, h * 0.3 + 0.15, 0), (w * 1.1, 0.04, 0.46, 0, h * 0.6 + 0.16, 0))
-        boxes(d, look, *((0.05, 0.16, 0.36, sx * w * 0.4, 0.08, 0) for sx in SIDES))
-        boxes(d, plain((0.15, 0.06, 0.03), 0.8), (w * 0.8, h * 0.4, 0.02, 0, h * 0.35 + 0.15, 0.2))
-        d.cylinder(0.075, draw.between(1.0, 1.5), (0, h * 0.6 + 0.15, -0.05), look)
-        _fire(d, draw, w * 0.7, h * 0.2 + 0.15, 0.2, 0.01)
-        return d
-    low, top = (0.45, draw.between(0.75, 0.9)) if flat else (0.08, h - 0.3)
-    wide, head, brick = (
-        w * (0.8 if flat else 0.56),
-        draw.between(1.2, 2.3) if flat else h,
-        draw.chance(0.4) and not flat,
-    )
-    look = draw.body() if draw.chance(0.3) and not flat else plain(draw.colour(0.2, 0.5, 0.95), 0.2)
-    rows, side, out = 10 if brick else 1, (w - wide) / 2, 0.0 if flat else 0.15
-    boxes(d, plain((0.07, 0.06, 0.06)), (wide, top - low, 0.02, 0, (top + low) / 2, -z + 0.01))
-    boxes(
-        d,
-        look,
-        (w, head - top, 2 * z, 0, (head + top) / 2, 0),
-        (w + out, low, 2 * (z + out), 0, low / 2, out),
-    )
-    for k in range(2 * rows):
-        tone, each, x = (
-            plain((draw.between(0.45, 0.65), 0.26, 0.19)),
-            (top - low) / rows,
-            (w - side) / 2 * (k % 2 * 2 - 1),
-        )
-        boxes(
-            d, tone if brick else look, (side, each - 0.01 * brick, 2 * z, x, low + each * (k // 2 + 0.5), 0)
-        )
-    if not flat:
-        boxes(d, draw.wooden() if brick else look, (w + 0.16, 0.06, 2 * z + 0.12, 0, h, 0.05))
-        boxes(d, look, (w * 0.8, tall := draw.one_of((0.02, 0.9)), z * 1.6, 0, h + tall / 2, -z * 0.2))
-    _fire(d, draw, wide * 0.8, low, 0, 0.06)
-    return d
-
-
 def _keys(d: Design, w: float, y: float, z: float) -> None:
     """White keys with black ones in twos and threes."""
     boxes(d, WHITE, (w, 0.02, 0.15, 0, y, z))
@@ -657,7 +540,7 @@ def _slab(outline: Sequence[tuple[float, float]], foot: float, thick: float) -> 
 
 def piano(draw: Draw) -> Design:
     """An upright with keys and pedals, a grand with its lid up, a digital piano on a stand."""
-    style, d = _any(draw, "piano", "upright piano", "grand piano", "digital piano")
+    style, d = any_made(draw, "piano", "upright piano", "grand piano", "digital piano")
     look = draw.one_of((plain((0.03, 0.03, 0.035), 0.9), BLACK, WHITE, draw.wooden()))
     w, h, y, z = draw.between(1.35, 1.5), draw.between(1.05, 1.3), draw.between(0.68, 0.74), 0.13
     if style == 0:
@@ -676,7 +559,7 @@ def piano(draw: Draw) -> Design:
             for x, out in (np.array(curve.split(), float).reshape(-1, 2) * [w / 100, z / 50]).tolist()
         ]
         d.add(_slab(rim, y - 0.04, 0.28), look)
-        d.add(_slab([(x * 0.93, out * 0.93) for x, out in rim], y + 0.2, 0.045), _GOLD)
+        d.add(_slab([(x * 0.93, out * 0.93) for x, out in rim], y + 0.2, 0.045), GOLD)
         d.add(turned(_slab(rim, y + 0.25, 0.02), 2, draw.between(0.5, 0.7), (-w / 2, y + 0.25, 0)), look)
         d.tube(((w * 0.42, y + 0.2, z * 0.4), (w * 0.22, y + 0.68, z * 0.4)), 0.01, look, 6)
         for x, out in ((-0.42, 0.85), (0.42, 0.85), (-0.2, -0.8)):
@@ -688,5 +571,5 @@ def piano(draw: Draw) -> Design:
             d.tube(((sx * 0.6, 0.02, 0.1 + sz * 0.12), (sx * 0.5, y - 0.05, 0.1 + sz * 0.06)), 0.02, look, 6)
     boxes(d, look, (w, 0.08, 0.26, 0, y - 0.05, z + 0.05))
     _keys(d, w * 0.88, y, z + 0.09)
-    boxes(d, _GOLD, *((0.03, 0.015, 0.12, x, 0.06, z * 0.9 + 0.08) for x in (-0.07, 0, 0.07) if style < 2))
+    boxes(d, GOLD, *((0.03, 0.015, 0.12, x, 0.06, z * 0.9 + 0.08) for x in (-0.07, 0, 0.07) if style < 2))
     return d
