@@ -71,7 +71,7 @@ class Surface:
 
     def called(self, *words: str) -> Bool[np.ndarray, " n"]:
         """What answers one of these words; nothing where too little does."""
-        found = self.answers[:, [_WORDS.index(word) for word in words]].any(1)
+        found = np.asarray(self.answers[:, [_WORDS.index(word) for word in words]].any(1))
         return found if len(found) and found.mean() >= _SHARE else np.zeros_like(found)
 
 
