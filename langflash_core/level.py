@@ -43,6 +43,7 @@ _SHARE = 0.02  # of the surface, from which what answers a word is believed in
 _LEVEL = math.cos(math.radians(30))  # of a surface that may be a floor or a ceiling
 _WINDOW = 0.04  # of the scene's height: surfaces so near in height are one
 _CONTRADICTED = 2.5
+_BOTH = 0.3  # of what answers "floor", from which what lies lower is the floor
 _EDGE = 0.02  # of a picture's side: what reaches so near to its border may go on
 
 # What things measure: metres, and the standard deviation of its logarithm.
@@ -70,7 +71,7 @@ class Surface:
 
     def called(self, *words: str) -> Bool[np.ndarray, " n"]:
         """What answers one of these words; nothing where too little does."""
-        found = self.answers[:, [_WORDS.index(word) for word in words]].any(1)
+        found = np.asarray(self.answers[:, [_WORDS.index(word) for word in words]].any(1))
         return found if len(found) and found.mean() >= _SHARE else np.zeros_like(found)
 
 
@@ -247,7 +248,10 @@ def _floor(surface: Surface, up: np.ndarray, most: float) -> tuple[float, str]:
     window = _WINDOW * float(np.subtract(*np.quantile(heights, (0.99, 0.01))))
     named = surface.called("floor") & level & (heights < most)
     if named.any():
-        return densest(heights[named], window), "floor"
+        low = heights[named]
+        below = low <= densest(low, window) - 4 * window
+        # A ceiling is flat and large, too, and a word may find both.
+        return densest(low[below] if below.mean() > _BOTH else low, window), "floor"
     low = heights[level] if level.any() else heights
     return densest(low[low <= np.quantile(heights, 0.01) + 3 * window], window), "lowest"
 

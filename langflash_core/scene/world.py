@@ -90,7 +90,8 @@ def _placed_key(
     """A key frame that sees the same; as it is where it is none."""
     try:
         centre = unit * turn @ (np.array(key["centre"], float) - origin)
-        rotation = rotations.quaternion(turn @ rotations.matrix(tuple(map(float, key["rotation"]))))
+        w, x, y, z = map(float, key["rotation"])
+        rotation = rotations.quaternion(turn @ rotations.matrix((w, x, y, z)))
         lengths = {name: unit * float(key[name]) for name in ("reach", "span") if key.get(name) is not None}
     except (TypeError, ValueError, LookupError):
         return key

@@ -114,7 +114,8 @@ def kept_scene(staged: StagedRoom, seed: int, keep: Path | None) -> Scene:
         for file, image in zip(files, staged.views.images, strict=True):
             Image.fromarray(image).save(file, "PNG", compress_level=1)
         K = staged.views.Ks[0]
-        scene = reconstruct(files, intrinsics=tuple(map(float, (K[0, 0], K[1, 1], K[0, 2], K[1, 2]))))
+        lens = (float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]))
+        scene = reconstruct(files, intrinsics=lens)
     if path is not None:
         make_folder(path.parent)
         save(scene, path)
