@@ -2,9 +2,9 @@
 # make test   set up what is missing, then every check and every test
 # make lint   the checks alone, without a test
 # make setup  the set-up alone
-# make test-all        every test with every optional package: Ray, SAM 2, TensorBoard, COLMAP, others' measures
 # make portable        a folder that runs without Python, in dist/ (Linux; torch for processors)
-# make torture         100,000 hostile files for every reader of ours (SEED=1, COUNT=100000)
+# make test-all        every test with every optional package: Ray, SAM 2, TensorBoard, COLMAP, others' measures
+# make torture         what it is to survive (PARTS="calls kills", SEED=1; tests/torture/README.md)
 # make test-machines   every test three times, as three other processors and orders would run it
 #
 # Set-up is a virtual environment in .venv, this package in it, and (Debian, Ubuntu) the system's
@@ -35,7 +35,7 @@ APT := install() { \
 
 .PHONY: help setup run lint test test-all test-machines torture portable
 help:
-	@sed -n '1,8s/^# //p' Makefile
+	@sed -n '1,9s/^# //p' Makefile
 
 setup: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window $(STAMP)-browser
 
@@ -78,9 +78,10 @@ test-machines: setup
 	ATEN_CPU_CAPABILITY=avx2 OMP_NUM_THREADS=1 $(BIN)/python -m pytest $(SHUFFLED)=$(SEED)
 	ATEN_CPU_CAPABILITY=default OMP_NUM_THREADS=2 $(BIN)/python -m pytest $(SHUFFLED)=$$(($(SEED) + 1))
 
-COUNT ?= 100000
+# Hostile files, failing calls, kills, hard photos, load: some 25 minutes on two cores.
+PARTS ?=
 torture: setup
-	PYTHONHASHSEED=0 OMP_NUM_THREADS=1 $(BIN)/python -m tests.torture.fuzz --seed $(SEED) --count $(COUNT)
+	PYTHONHASHSEED=0 OMP_NUM_THREADS=1 $(BIN)/python -m tests.torture $(PARTS) --seed $(SEED)
 
 # In an environment of its own, so that nothing else is packed; `make test` does not build it.
 PACKING := .venv-portable

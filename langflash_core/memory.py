@@ -1,7 +1,7 @@
 """What a long session no longer needs goes back to the system; and which errors say that there is no more.
 
-Giving back works with the GNU C library alone: elsewhere memory is kept and given back in
-the system's own way.
+Giving back works with the GNU C library alone: elsewhere memory is kept and given back in the system's own
+way.
 """
 
 import ctypes

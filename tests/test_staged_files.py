@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from langflash_core import files
 from langflash_core.errors import OutputError
 from langflash_core.files import check_folder, check_output_file, move_all, staged_folder
 
@@ -104,3 +105,14 @@ def test_output_file(tmp_path):
     with pytest.raises(OutputError, match="also an input"):
         check_output_file(tmp_path / "." / "a.jpg", inputs=[Path("elsewhere"), photo])
     assert os.listdir(tmp_path) == ["a.jpg"]
+
+
+def test_what_a_killed_process_left_beside_a_new_folder_is_swept_up(tmp_path):
+    """It lay beside the folder, which was not there yet; the next export writes into the folder."""
+    gone = f".export.{files._HOST}-{2**22 + 7}-0123456789ab.part"  # no process has such a number
+    (tmp_path / gone).mkdir()
+    (tmp_path / gone / "half").write_bytes(b"x")
+    (tmp_path / "out").mkdir()
+    with staged_folder(tmp_path / "out") as staging:
+        (staging / "a").write_bytes(b"whole")
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]

@@ -79,9 +79,9 @@ def build_parser() -> Parser:
         add_train,
         add_eval,
         add_weights,
+        add_words,
         add_desktop,
         add_completion,
-        add_words,
     ):
         add(commands)
     return parser

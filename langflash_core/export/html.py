@@ -43,8 +43,8 @@ from langflash_core.types import Scene
 
 MOST_WEIGHTS = 4  # of a Gaussian; `langflash bench` says what the others are worth
 SCRIPTS = (
-    "decode", "cameras", "sorting", "answers", "drawing", "worlds", "moving", "asking", "touring", "notes",
-    "plan", "embedding", "main",
+    "decode", "cameras", "sorting", "answers", "drawing", "worlds", "moving", "asking", "address", "touring",
+    "notes", "plan", "embedding", "main",
 )  # fmt: skip
 READING = "words"  # beside a text model
 _SHADERS = ("splat.vert", "splat.frag", "screen.vert", "show.frag")

@@ -49,6 +49,12 @@ _THROUGH = 1.05  # times as deep: there another view sees through
 _CELL = 1.4  # pixels of a view
 _MOST_CELLS = 150_000
 _GRAZING = 0.04
+_PARALLEL, _CLOSE = 0.9, 0.8  # planes alike, and so near: the one that more lies on goes on
+_NOISE, _NARROWEST = (
+    3.0,
+    0.25,
+)  # deviations of a plane's own points that still lie on it; tolerances, at the least
+_RARE = 0.2  # of the commonest group's share of a plane: rarer groups are things before it
 
 
 @dataclass(frozen=True)
@@ -183,6 +189,8 @@ def _chosen(
         steep = abs(down) > _GRAZING * np.linalg.norm(view.rays, axis=-1)
         behind = (hit > _BEFORE * np.where(view.before > 0, view.before, 0)) & (hit > 1e-6)
         there = view.hole & steep & behind & (reach <= _REACHED * any_surface + 3) & (hit < depth)
+        alike = np.array([abs(plane.normal @ other.normal) > _PARALLEL for other in found])
+        there &= (which < 0) | ~alike[which] | (hit < _CLOSE * depth)  # a curtain's, just before its wall's
         which[there], depth[there] = number, hit[there]
     return which, depth
 
@@ -197,9 +205,11 @@ def _patch(plane: Plane, spots: Float[np.ndarray, "n 3"], views: Sequence[_View]
     rows, columns = np.indices(shape)
     along = low + pitch * (np.stack((columns, rows), -1) + 0.5)
     points = along @ basis + plane.normal * plane.offset  # (h, w, 3)
-    colours, weights, known, through = _seen(points.reshape(-1, 3), views)
+    on_it = _FAR * min(max(_NOISE * plane.noise, _NARROWEST), 2.0)
+    colours, weights, known, through = _seen(points.reshape(-1, 3), views, on_it)
+    known = known if weights is None else known & _common(weights, known)
     known, through = (each.reshape(shape) for each in (known, through))
-    hole &= ~known & ~through
+    hole &= ~through & ~_covered(points.reshape(-1, 3), views).reshape(shape)
     if not hole.any():
         return none
     coloured = healed(colours.reshape(*shape, 3), known, hole)
@@ -231,13 +241,32 @@ def _raster(
     return basis, pitch, low, (height, width)
 
 
+def _common(weights: Float[np.ndarray, "n K"], known: Bool[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+    """Points that mean what most of a plane's known ones do: a curtain before a wall does not."""
+    if not weights.shape[1] or not known.any():
+        return np.ones_like(known)
+    groups = weights.argmax(1)
+    counts = np.bincount(groups[known], minlength=weights.shape[1])
+    return (counts >= _RARE * counts.max())[groups]
+
+
+def _covered(points: Float[np.ndarray, "n 3"], views: Sequence[_View]) -> Bool[np.ndarray, " n"]:
+    """Points where some view shows a surface just there."""
+    found = np.zeros(len(points), bool)
+    for view in views:
+        inside, rows, columns, z = view.pixels(points)
+        depth = np.where(view.hole[rows, columns], 0.0, view.depths[rows, columns])
+        found |= inside & (depth > 0) & (abs(depth - z) <= 2 * _FAR * z)
+    return found
+
+
 def _seen(
-    points: Float[np.ndarray, "n 3"], views: Sequence[_View]
+    points: Float[np.ndarray, "n 3"], views: Sequence[_View], on_it: float
 ) -> tuple[
     Float[np.ndarray, "n 3"], Float[np.ndarray, "n K"] | None, Bool[np.ndarray, " n"], Bool[np.ndarray, " n"]
 ]:
     """Colours and weights of points where a view shows a surface just there, whether one does, and whether
-    one sees through them."""
+    one sees through them. on_it: share of the depth to which a surface counts."""
     colours, known, through = (
         np.zeros((len(points), 3)),
         np.zeros(len(points), bool),
@@ -251,7 +280,7 @@ def _seen(
         depth = view.depths[rows, columns]
         open_there = inside & ~view.hole[rows, columns] & (depth > 0)
         through |= open_there & (depth > _THROUGH * z)
-        new = open_there & (abs(depth - z) <= 2 * _FAR * z) & ~known
+        new = open_there & (abs(depth - z) <= on_it * z) & ~known
         colours[new] = view.colours[rows[new], columns[new]]
         if weights is not None and view.weights is not None:
             weights[new] = view.weights[rows[new], columns[new]]
@@ -299,7 +328,7 @@ def _elements(
     thin = _THIN * sizes.min(1, keepdims=True)
     gaussians = Gaussians(
         means=torch.from_numpy(means).float(),
-        quats=matrices_to_quats(torch.from_numpy(np.ascontiguousarray(axes))).float(),
+        quats=matrices_to_quats(torch.from_numpy(np.array(axes))).float(),
         scales=torch.from_numpy(np.concatenate((sizes, thin), 1)).float(),
         opacities=torch.full((count,), OPACITY),
         sh=colour_to_sh(torch.from_numpy(colours))[:, None].float(),

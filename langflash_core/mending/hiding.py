@@ -4,7 +4,8 @@
    than what the view shows, belong to the rim and are hidden with the part: colours of a thing run over its
    edge. So do all that this photo made there, also behind the part, where nobody saw anything.
 2. They become blocks (`coarse.py`), or go, and what was behind them is filled in (`filling.py`).
-3. Photos get what the scene shows now, in all of their masks (`photos.py`).
+3. Photos get what the scene shows now, in all of their masks (`photos.py`), and where they show what was left
+   out of the scene, since other photos do not show it.
 4. What nobody needs any more goes: atoms that nothing carries, names that people gave to what was hidden, and
    what a newer version put beside the scene.
 
@@ -29,7 +30,7 @@ from langflash_core.types import Camera, Scene
 from .coarse import coarsened
 from .filling import fill
 from .looks import Progress, Render, mattes
-from .photos import grown, painted_over, with_photos, without_photos
+from .photos import grown, not_in_scene, painted_over, with_photos, without_photos
 
 How = Literal["blur", "pixels", "remove"]
 BLOCKS, MOST_BLOCKS = 6.0, 16.0
@@ -115,6 +116,8 @@ def hide(
         made = kept.rows(torch.zeros(0, dtype=torch.int64))
     done = appended(kept, made).with_record(others={})
     told("photos", 0.6)
+    if hiding.photos:
+        masks = [mask | _strangers(scene, view, hiding, render) for view, mask in enumerate(masks)]
     done, shares = _with_photos(done, masks, hiding, render)
     report = Hidden(
         hiding.how, int(members.sum()), int(rows.sum() - members.sum()), len(made.gaussians), side, shares,
@@ -166,21 +169,52 @@ def _block_side(scene: Scene, members: Tensor, blocks: float) -> float:
 
 
 def _unnamed(scene: Scene, rows: Tensor) -> tuple[Scene, tuple[str, ...]]:
-    """The scene without names and denials that people gave to atoms that mostly lie in what is hidden."""
+    """The scene without what people called what is hidden: names and denials of atoms that mostly lie in it,
+    notes pinned to it, names of the inventory's things."""
     record, semantics = scene.record, scene.semantics
+    notes = list(record.tour.get("notes", ()))
+    pinned = _pinned(notes, scene, rows)
     told = {*record.atom_names, *record.atom_denials}
     shares = semantics.weight_values * scene.gaussians.opacities[:, None]
     sums = torch.zeros(2, semantics.num_atoms + 1)
     for place, some in enumerate((rows, torch.ones_like(rows))):
         sums[place].index_add_(0, semantics.weight_ids[some].flatten(), shares[some].flatten().float())
     gone = {k for k in told if float(sums[0, k]) >= _OWN * float(sums[1, k])}
-    names = tuple(record.atom_names[k] for k in sorted(gone) if k in record.atom_names)
+    names = (
+        *(record.atom_names[k] for k in sorted(gone) if k in record.atom_names),
+        *record.thing_names.values(),
+        *(str(note.get("text", "")) for note, of_it in zip(notes, pinned, strict=True) if of_it),
+    )
+    tour = dict(record.tour)
+    if any(pinned):
+        tour["notes"] = [note for note, of_it in zip(notes, pinned, strict=True) if not of_it]
     cleared = replace(
         record,
+        tour=tour,
+        thing_names={},  # with other things in the scene, the inventory counts them anew
         atom_names={k: name for k, name in record.atom_names.items() if k not in gone},
         atom_denials={k: said for k, said in record.atom_denials.items() if k not in gone},
     )
     return replace(scene, record=cleared), names
+
+
+def _pinned(notes: list[dict], scene: Scene, rows: Tensor) -> list[bool]:
+    """Of notes, whether what is hidden is nearer to one of their ends than all that stays."""
+    means, found = scene.gaussians.means.double(), []
+    for note in notes:
+        ends = torch.tensor([end for end in (note.get("at"), note.get("to")) if end], dtype=torch.float64)
+        far = torch.cdist(ends.reshape(-1, 3), means)  # (e, N)
+        hidden, kept = far.masked_fill(~rows, torch.inf), far.masked_fill(rows, torch.inf)
+        found.append(bool((hidden.amin(1) < kept.amin(1)).any()))
+    return found
+
+
+def _strangers(scene: Scene, view: int, hiding: Hiding, render: Render) -> np.ndarray:
+    """(H, W) bool: what a photo shows that was left out of the scene, where anything of that photo was."""
+    shares = scene.record.left_out.get("shares", ())
+    if not scene.photos or view >= len(shares) or not shares[view]:
+        return np.zeros(scene.view_size[::-1], bool)
+    return grown(not_in_scene(scene, view, render), hiding.margin)
 
 
 def _with_photos(

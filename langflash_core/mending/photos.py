@@ -24,6 +24,7 @@ from langflash_core.types import Frame, Scene
 from .looks import Render
 
 QUALITY = 90  # of JPEG
+_PATCH, _STRANGE = 5, 0.12  # pixels; mean difference of a photo from the scene over so many
 _ROUNDED = 0.2  # of a blurred mask: it grows a little, and loses the corners of its pixels
 
 
@@ -54,6 +55,19 @@ def painted_over(scene: Scene, view: int, mask: Bool[np.ndarray, "H W"], render:
     stream = io.BytesIO()
     Image.fromarray(painted).save(stream, "JPEG", quality=QUALITY)
     return stream.getvalue()
+
+
+def not_in_scene(scene: Scene, view: int, render: Render) -> Bool[np.ndarray, "H W"]:
+    """Pixels of a view whose photo shows what the scene does not: who walked by, and no phrase finds.
+
+    Raises:
+        SceneFileError: the photo cannot be read.
+    """
+    width, height = scene.view_size
+    photo = cv2.resize(_decoded(scene.photos[view], view), (width, height), interpolation=cv2.INTER_AREA)
+    shown = _in_its_light(_shown(render(scene, scene.camera(view), weight_maps=False)), scene, view)
+    apart = abs(photo.astype(np.float32) - shown.astype(np.float32)).mean(-1) / 255
+    return cv2.blur(apart, (_PATCH, _PATCH)) > _STRANGE
 
 
 def with_photos(scene: Scene, photos: dict[int, bytes]) -> Scene:

@@ -4,7 +4,7 @@ out.
 A plane is n . x = d, n of unit length. Source: Fischler and Bolles 1981.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -15,10 +15,11 @@ _REFITS = 3
 
 @dataclass(frozen=True)
 class Plane:
-    """normal (3,), unit; offset: n . x of its points."""
+    """normal (3,), unit; offset: n . x of its points. noise: robust deviation of those, in tolerances."""
 
     normal: Float[np.ndarray, " 3"]
     offset: float
+    noise: float = 1.0
 
     def apart(self, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n"]:
         """Distances of points, below 0 behind the normal."""
@@ -48,7 +49,8 @@ def planes(
         on_it = left & (abs(plane.apart(points)) <= tolerances)
         if on_it.sum() < max(3, share * len(points)):
             break
-        found.append(plane)
+        noise = 1.4826 * float(np.median(abs(plane.apart(points[on_it])) / tolerances[on_it]))
+        found.append(replace(plane, noise=noise))
         left &= ~on_it
     return found
 

@@ -55,12 +55,14 @@ def seen_through(
     return blocked.flatten()
 
 
-def witnesses(view: int, points: Tensor, viewmats: Tensor, Ks: Tensor, size: tuple[int, int]) -> list[int]:
-    """The other photos that are asked about a photo's points (n, 3): all of `_ASKED` and fewer; of more so
+def witnesses(
+    view: int, points: Tensor, viewmats: Tensor, Ks: Tensor, size: tuple[int, int], most: int = _ASKED
+) -> list[int]:
+    """The other photos that are asked about a photo's points (n, 3): all of `most` and fewer; of more so
     many, spread evenly over those that have some of the points before them, so that the work grows with the
     photos."""
     others = [other for other in range(len(viewmats)) if other != view]
-    if len(others) <= _ASKED:
+    if len(others) <= most:
         return others
     some = points[_TRIED // 2 :: _TRIED].T  # (3, m)
     pos_c = viewmats[:, :3, :3] @ some + viewmats[:, :3, 3:]  # (V, 3, m)
@@ -68,9 +70,9 @@ def witnesses(view: int, points: Tensor, viewmats: Tensor, Ks: Tensor, size: tup
     x, y = (pos_c[:, axis] / ahead * Ks[:, axis, axis, None] + Ks[:, axis, 2, None] for axis in (0, 1))
     inside = (pos_c[:, 2] > 0) & (x >= 0) & (y >= 0) & (x < size[1]) & (y < size[0])
     seeing = [other for other, sees in enumerate(inside.any(1).tolist()) if sees and other != view]
-    if len(seeing) <= _ASKED:
+    if len(seeing) <= most:
         return seeing
-    return [seeing[(2 * k + 1) * len(seeing) // (2 * _ASKED)] for k in range(_ASKED)]
+    return [seeing[(2 * k + 1) * len(seeing) // (2 * most)] for k in range(most)]
 
 
 def outvoted(points: Tensor, viewmats: Tensor, Ks: Tensor, depths: Tensor) -> Tensor:

@@ -9,8 +9,9 @@ cannot deny. Colours are compared with all that lies within `_AROUND` cells, bot
 depths which are a pixel or two off say nothing. Small and loose parts are no regions; a region then goes on
 through what the others see through, and a little further, over blurred borders and what a thing shades.
 
-A thing whose depth is wrong is foreseen at the wrong place, too. So a region is left out only if most of
-those others show it nowhere along its rays. What is left out was foreseen by others: nothing stays uncovered.
+A thing whose depth is wrong is foreseen at the wrong place, too. So a region is left out only if hardly any
+of those others shows it somewhere along its rays. What is left out was foreseen by others: nothing stays
+uncovered.
 
 Sizes: V views, U others, H W pixels of the grid, h w cells of `_CELL` x `_CELL` pixels.
 
@@ -40,6 +41,8 @@ _OTHER = 0.1  # sRGB, beyond all colours around, from which it is another colour
 _ALIKE = 0.1  # sRGB and log depth, within which others foresee one thing
 _THROUGH = 0.12  # log depth by which a surface lies behind another
 _VOTES = 2
+_ASKED = 8  # photos that are asked about one
+_FEW = 3  # of them, of which one is enough to show what another denies
 _WINDOW, _FULL = 5, 0.6  # cells a side, and the share of them that is contradicted inside a region
 _SMALLEST = 0.004  # of a photo
 _FARTHEST = 24  # cells, by which a region may go on
@@ -75,7 +78,7 @@ def strangers(
     looks = [_Look.of(*own) for own in zip(images, depths, viewmats, Ks, strict=True)]
     for view, own in enumerate(looks):
         size = (depths.shape[1], depths.shape[2])
-        others = [looks[other] for other in witnesses(view, own.points(), viewmats, Ks, size)]
+        others = [looks[other] for other in witnesses(view, own.points().T, viewmats, Ks, size, _ASKED)]
         if len(others) < _VOTES:
             continue
         said = _Foreseen.together([other.foreseen(own) for other in others])
@@ -233,14 +236,16 @@ def _seeds(contradicted: Tensor) -> list[Tensor]:
 
 
 def _elsewhere(seed: Tensor, own: _Look, others: list[_Look], faced: Tensor) -> bool:
-    """Whether half of the others that could deny a region (h, w) show it somewhere along its rays."""
+    """Whether two of the others that could deny a region (h, w), of few one, show it somewhere along its
+    rays."""
     pixels = own.pixels(seed)
-    shares = [
-        other.shows(own, pixels)
+    asked = [
+        other
         for other, cells in zip(others, faced, strict=True)
         if float(cells[seed].float().mean()) > _DENIES
     ]
-    return bool(np.isfinite(shares).any() and np.nanmedian(shares) >= _FOUND)
+    showing = sum(other.shows(own, pixels) >= _FOUND for other in asked)
+    return showing >= (_VOTES if len(asked) > _FEW else 1)
 
 
 def _grown(seeds: Tensor, may: Tensor) -> Tensor:

@@ -30,6 +30,7 @@ from tests.export.browser import Browser, browser, needs_browser
 from tests.export.splats import random_gaussians
 from tests.export.test_html import ODD, PAGE, phrases_of
 from tests.splat.scenes import cloud
+from tests.torture import address
 
 pytestmark = needs_browser
 
@@ -355,3 +356,16 @@ def test_a_phrase_that_the_vocabulary_lacks_is_answered(page, reading, scene):
     page.key("Enter")
     until(page, "document.getElementById('note').textContent.includes('cancels itself out')")
     assert page.errors == []
+
+
+@pytest.mark.parametrize("fragment", ["#view=length", "#view=map&ask=plant", "#view=-1&mode=photo", "#%"])
+def test_an_address_that_names_no_view_shows_the_first(page, file, fragment):
+    """`views["length"]` is there, and no view: the page stayed empty."""
+    page.open(file, (200, 150), fragment)
+    assert page.value("langflash.then((page) => page.orbit.turn.length)") == 3
+    assert page.errors == []
+
+
+def test_addresses_at_random(tmp_path):
+    """`python -m tests.torture address` reads a million."""
+    assert address.torture(tmp_path, 2000, seed=4) == []

@@ -126,3 +126,13 @@ def test_a_damaged_side_car_costs_the_language_alone(tmp_path, scene):
     ):
         beside.write_bytes(content)
         assert "damaged" in refused(tmp_path / "plain.ply")
+
+
+@pytest.mark.parametrize("name", ["a.glb", "a.ply"])
+def test_a_scene_gives_the_same_bytes_each_time(tmp_path, scene, name):
+    """safetensors writes its strings in an order of chance."""
+    contents = set()
+    for _ in range(6):
+        export(scene, tmp_path / name)
+        contents.add(tuple(path.read_bytes() for path in sorted(tmp_path.iterdir())))
+    assert len(contents) == 1

@@ -147,6 +147,31 @@ def test_names_and_what_nobody_knows_go_with_it(known, draw):
     assert hidden.semantics.num_atoms < scene.semantics.num_atoms
 
 
+def test_who_was_left_out_of_the_scene_is_painted_over_too(known, draw):
+    """A passer-by in one photo, of whom the scene has nothing, so that no phrase finds him."""
+    photo = np.asarray(Image.open(io.BytesIO(known.scene.photos[0])).convert("RGB")).copy()
+    height, width = photo.shape[:2]
+    part = np.s_[height // 2 :, : width // 5]
+    photo[part] = (20, 250, 20)
+    stream = io.BytesIO()
+    Image.fromarray(photo).save(stream, "PNG")
+    scene = replace(known.scene, photos=(stream.getvalue(), known.scene.photos[1]))
+    scene = scene.with_record(left_out={"shares": [0.1, 0.0]})
+    hidden, report = hide(scene, known.members, draw, Hiding("blur"))
+    green = pixels(hidden.photos[0])
+    assert not ((green[..., 1] - green[..., 0]) > 0.4).any()
+    assert report.photos[0] > report.photos[1] + 0.05
+
+
+def test_notes_pinned_to_it_go_and_others_stay(known, draw):
+    inside = known.scene.gaussians.means[known.members].mean(0).tolist()
+    notes = [{"text": "Anna", "at": inside}, {"text": "wall", "at": [-0.5, 0.0, 1.0]}]
+    scene = known.scene.with_record(tour={"notes": notes}, thing_names={"picture 1": "Bob"})
+    hidden, report = hide(scene, known.members, draw, Hiding("blur"))
+    assert [note["text"] for note in hidden.record.tour["notes"]] == ["wall"]
+    assert report.names == ("Bob", "Anna") and not hidden.record.thing_names
+
+
 def test_photos_can_be_left_out(known, draw):
     hidden, report = hide(known.scene, known.members, draw, Hiding("blur", photos=False))
     assert hidden.photos == () and hidden.record.photos == () and report.photos_left_out

@@ -64,7 +64,7 @@ def only(view: int, count: int = 5) -> tuple[bool, ...]:
     return tuple(v == view for v in range(count))
 
 
-@pytest.mark.parametrize("count", [3, 5])
+@pytest.mark.parametrize("count", [3, 5, 12])
 @pytest.mark.parametrize("thing", [SOMEBODY, SCREEN])
 def test_what_one_photo_shows_is_left_out_of_it_alone(thing, count):
     seen = room(thing, only(1, count))

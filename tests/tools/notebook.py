@@ -87,11 +87,12 @@ def _walk(place: Path, port: int, picture: str | None) -> dict:
         screen = {"width": SIZE[0], "height": SIZE[1], "deviceScaleFactor": 1, "mobile": False}
         page.call("Emulation.setDeviceMetricsOverride", **screen)
         page.call("Page.navigate", url=f"http://127.0.0.1:{port}/lab/tree/show.ipynb")
-        _until(page, "document.querySelectorAll('.jp-Notebook .jp-CodeCell').length === 4")
-        _until(page, "document.body.textContent.includes('| Idle')")
+        _until(page, "document.querySelectorAll('.jp-Notebook .jp-CodeCell').length === 4", 240)
+        idle = "(each) => each.dataset.status === 'idle'"
+        _until(page, f"[...document.querySelectorAll('.jp-Notebook-ExecutionIndicator')].some({idle})", 240)
         _run_cell(page, 0)
-        _until(page, f"{_FRAME} !== null")
-        time.sleep(12)  # the page draws, answers, tells
+        _until(page, f"{_FRAME} !== null", 240)
+        time.sleep(25)  # the page draws, answers, tells
         _run_cell(page, 1)
         told = _written(place / "told.json")
         time.sleep(6)
@@ -118,7 +119,7 @@ def _run_cell(page: Browser, number: int) -> None:
         for kind in ("keyDown", "keyUp"):
             held = {"key": "Enter", "code": "Enter", "modifiers": 8, "windowsVirtualKeyCode": 13}
             page.call("Input.dispatchKeyEvent", type=kind, **held)
-        time.sleep(2)
+        time.sleep(4)
 
 
 def _written(path: Path, seconds: float = 60) -> list:

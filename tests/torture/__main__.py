@@ -10,6 +10,14 @@ import warnings
 from pathlib import Path
 
 
+def files(args: argparse.Namespace, folder: Path) -> int:
+    """Hostile files: `fuzz.py`."""
+    from tests.torture import fuzz
+
+    words = ["--seed", str(args.seed), "--count", str(args.files)]
+    return fuzz.main([*words, *(word for name in args.only or () for word in ("--reader", name))])
+
+
 def calls(args: argparse.Namespace, folder: Path) -> int:
     """The n-th call fails: `nth.py`."""
     from tests.torture.jobs import prepared
@@ -47,7 +55,23 @@ def window(args: argparse.Namespace, folder: Path) -> int:
         return report(torture(session, folder, 60 * args.minutes, args.seed), sys.stdout.write)
 
 
-PARTS = {"calls": calls, "window": window, "kills": kills, "photos": photos}
+def load(args: argparse.Namespace, folder: Path) -> int:
+    """Much at once, and often: `load.py`."""
+    from tests.torture.load import everything, report
+
+    return report(everything(folder, args.questions), sys.stdout.write)
+
+
+def address(args: argparse.Namespace, folder: Path) -> int:
+    """Addresses of pages: `address.py`."""
+    from tests.torture.address import report
+
+    return report(folder, args.addresses, args.seed, sys.stdout.write)
+
+
+PARTS = {
+    each.__name__: each for each in (files, address, calls, window, kills, photos, load)
+}  # fmt: skip
 
 
 def main() -> int:
@@ -55,7 +79,10 @@ def main() -> int:
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(PARTS)} (default: all)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--minutes", type=float, default=5.0, help="of each part, about (default: 5)")
+    parser.add_argument("--files", type=int, default=100_000, help="hostile ones (default: 100,000)")
     parser.add_argument("--count", type=int, default=200, help="of kills while it writes (default: 200)")
+    parser.add_argument("--questions", type=int, default=10_000, help="in a row (default: 10,000)")
+    parser.add_argument("--addresses", type=int, default=1_000_000, help="of pages (default: a million)")
     parser.add_argument("--only", nargs="+", help="of a part's rows those whose names begin so")
     args = parser.parse_args()
     unknown = [name for name in args.parts if name not in PARTS]

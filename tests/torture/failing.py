@@ -177,7 +177,7 @@ def _streams(fault: Fault) -> Iterator[None]:
 
 @contextmanager
 def small_disk(size: int) -> Iterator[None]:
-    """No file may grow beyond `size` bytes, whoever writes it, of this process or of one that it starts."""
+    """No file may grow beyond `size` bytes, whoever writes it: this process, or one that it starts."""
     import resource
 
     before = resource.getrlimit(resource.RLIMIT_FSIZE)

@@ -18,7 +18,7 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -167,13 +167,13 @@ def bounded(call: Callable[[], int]) -> int:
         resource.setrlimit(kind, before)
 
 
-def main() -> int:
+def main(words: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
     parser.add_argument("--count", type=int, default=10_000, help="files in all")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--reader", action="append", help="this reader alone; may be given again")
     parser.add_argument("--keep", type=Path, default=FINDS, help="folder of finds")
-    args = parser.parse_args()
+    args = parser.parse_args(words)
     warnings.simplefilter("ignore")
     with tempfile.TemporaryDirectory() as folder:
         files, readers = prepare(Path(folder))

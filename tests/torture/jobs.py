@@ -34,13 +34,14 @@ from tests.lab.training.conftest import toy_record
 from tests.torture.nth import FILES, Job
 
 SIZE = "56x42"
+FOLDERS = ("LANGFLASH_CONFIG", "LANGFLASH_STATE", "LANGFLASH_HOME")
 
 
 def prepared(folder: Path) -> list[Job]:
     """All jobs, with what they read in `folder`/in."""
     source = folder / "in"
     source.mkdir(parents=True, exist_ok=True)
-    for name in ("LANGFLASH_CONFIG", "LANGFLASH_STATE", "LANGFLASH_HOME"):
+    for name in FOLDERS:
         os.environ[name] = str(folder / "out" / name.lower())
     photos = small_pair(source / "photos")
     content = tuple(photo.read_bytes() for photo in photos)

@@ -7,7 +7,7 @@ however it dies. A file whose lock is free belongs to nobody: it is offered agai
 import json
 import os
 import sys
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import asdict, replace
 from math import isfinite
 from pathlib import Path
@@ -114,13 +114,14 @@ def fields(kept: Kept) -> dict:
 
 def locked(path: Path) -> BinaryIO:
     """A lock file, held until it is closed or the process ends."""
-    try:
-        stream = path.open("wb")
-        stream.write(b"\0")
-        stream.flush()
-        _lock(stream)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+    with ExitStack() as opened:
+        try:
+            stream = opened.enter_context(path.open("wb", buffering=0))
+            stream.write(b"\0")
+            _lock(stream)
+        except OSError as error:
+            raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+        opened.pop_all()
     return stream
 
 

@@ -177,7 +177,8 @@ class Reconstruct:
         if not state.scene.photos:
             return Notify("There is no photo to reconstruct; drop two photos on the window.").apply(state)
         pausable = len(state.scene.photos) >= FEWEST
-        return state.with_scene(job=Job(RECONSTRUCTING, "starting", started=state.now, pausable=pausable))
+        job = Job(RECONSTRUCTING, "starting", started=state.now, pausable=pausable)
+        return state.with_scene(job=job, unfinished=())
 
 
 @dataclass(frozen=True)

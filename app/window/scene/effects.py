@@ -87,13 +87,7 @@ class SceneEffects(Effects):
             case SaveScene(path) if state.scene.info is not None:
                 submit(WriteScene(state.scene.info.scene, path, state.editing.marks))
             case CancelJob() | PauseJob():
-                self._hands.cancel()
-                if (
-                    isinstance(command, CancelJob)
-                    and before.scene.job is not None
-                    and before.scene.job.pausable
-                ):
-                    submit(DropWork(_paths(before)))
+                self._end_job(command, before)
             case ChoosePair() if state.scene.choosing and not before.scene.choosing:
                 submit(FindPair(tuple(photo.path for photo in state.scene.photos)))
             case SceneArrived(info):
@@ -106,9 +100,20 @@ class SceneEffects(Effects):
                 self._hands.dispatch(Loaded())
             case _:
                 self._go_on(command, before, state)
-        if _paths(before) != _paths(state) and len(state.scene.photos) >= FEWEST and state.scene.job is None:
-            submit(LookForWork(_paths(state)))
+        self._look_for_work(before, state)
         self._show_whole(before, state)
+
+    def _end_job(self, command: CancelJob | PauseJob, before: State) -> None:
+        """A job that is paused keeps its work, one that is cancelled does not."""
+        self._hands.cancel()
+        job = before.scene.job
+        if isinstance(command, CancelJob) and job is not None and job.pausable:
+            self._hands.submit(DropWork(_paths(before)))
+
+    def _look_for_work(self, before: State, state: State) -> None:
+        """Other photos in the tray may be ones on which work was begun."""
+        if _paths(before) != _paths(state) and len(state.scene.photos) >= FEWEST and state.scene.job is None:
+            self._hands.submit(LookForWork(_paths(state)))
 
     def _go_on(self, command: Command, before: State, state: State) -> None:
         """Commands that stand for others."""

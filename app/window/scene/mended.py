@@ -8,8 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from langflash_core.errors import Cancelled
 from langflash_core.scene.edits import Marks
+from langflash_core.scene.mask import Mask
 
 from ..editing.mending import HiddenForGood
 from ..requests import Asked, Job
@@ -20,10 +23,12 @@ from .work import describe_scene
 if TYPE_CHECKING:
     from langflash_core.types import Frame
 
+_EDGE = 0.01  # of a photo's longer side: so far colours of a thing run over its edge
+
 
 @dataclass(frozen=True)
 class FillHole(Job):
-    """The selection taken away, and its hole filled from what is left around it."""
+    """The selection taken away with what runs over its edge, and the hole filled from what is around."""
 
     info: SceneInfo
     marks: Marks = field(repr=False)
@@ -32,6 +37,7 @@ class FillHole(Job):
         import torch
 
         from langflash_core.mending.filling import fill
+        from langflash_core.mending.hiding import preview
         from langflash_core.mending.looks import drawn
         from langflash_core.scene.edited import there
         from langflash_core.scene.joining import appended
@@ -40,10 +46,12 @@ class FillHole(Job):
         own, marks = self.info, self.marks
         kept = marks.left.rows()[: marks.there[0]]
         shown = there(own.memory.changed(marks), marks).rows(torch.from_numpy(kept))
-        gone = torch.from_numpy(marks.selected.rows()[: len(kept)][kept])
-        patch = fill(shown, gone, _watched(drawn, progress, cancelled))
+        render = _watched(drawn, progress, cancelled)
+        gone = preview(shown, torch.from_numpy(marks.selected.rows()[: len(kept)][kept]), render, _EDGE)
+        patch, rows = fill(shown, gone, render), np.zeros(marks.selected.count, bool)
+        rows[np.flatnonzero(kept)] = gone.numpy()
         info = describe_scene(appended(there(own.scene, marks), patch), serial, own.name, own.path)
-        return Merged(own.serial, marks.there, info, own.name, marks.selected)
+        return Merged(own.serial, marks.there, info, own.name, Mask.of(rows))
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,4 @@
 // Puts the page together: reads the scene, draws on demand, answers when the camera rests.
-// The address may say more: #view=1&ask=plant&mode=photo&bare, #stop=NAME, #plan
 
 const MOST_PIXELS = 2.1e6; // of a picture
 const REST = 160; // milliseconds without a movement
@@ -73,18 +72,19 @@ class Page {
     );
     addEventListener("keydown", (event) => this.key(event));
     this.enter(this.world);
-    const said = new URLSearchParams(location.hash.slice(1));
-    document.body.classList.toggle("bare", said.has("bare"));
-    const view = this.header.views[said.get("view")];
-    if (view) this.orbit.set(view, this.world.depth(view));
-    const stop = this.header.stops.findIndex(({ name }) => name === said.get("stop"));
-    if (stop >= 0) this.orbit.set(this.header.stops[stop], this.header.stops[stop].distance);
-    if (view || stop >= 0) this.touring.show(this.header.stops, stop);
-    const row = this.answers ? this.answers.texts.indexOf(said.get("ask")) : -1;
-    if (row >= 0) this.asking.ask(row);
+    const stops = this.header.stops.map(({ name }) => name);
+    const texts = this.answers ? this.answers.texts : [];
+    const said = readAddress(location.hash, this.header.views.length, stops, texts);
+    document.body.classList.toggle("bare", said.bare);
+    const place = this.header.stops[said.stop] ?? this.header.views[said.view];
+    if (place) {
+      this.orbit.set(place, place.distance ?? this.world.depth(place));
+      this.touring.show(this.header.stops, said.stop);
+    }
+    if (said.row >= 0) this.asking.ask(said.row);
     else if (this.answers?.asked) this.asking.choose(0);
-    this.setHeat(said.get("mode") !== "photo");
-    if (said.has("plan")) this.showPlan(true);
+    this.setHeat(said.heat);
+    if (said.plan) this.showPlan(true);
   }
 
   // What belongs to one scene: its title, photos, stops and notes.

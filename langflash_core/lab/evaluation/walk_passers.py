@@ -7,11 +7,12 @@ picture, and another in those photos.
 Worlds: the room's (y up), metres; H W pixels.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from langflash_core.lab.rooms import RoomRenderer, StagedRoom
 from langflash_core.lab.rooms.layout import Instance, Room
@@ -23,7 +24,8 @@ SCREEN = (0.7, 0.45)
 """Width and height, m."""
 TRIES = 60
 _SHARE = (0.03, 0.25)  # of a picture, that somebody covers
-_SEEING = 0.7  # of the photos, that see a screen
+_SEEING, _MOSTLY = 0.7, 0.7  # of the photos, that see a screen; of the screen
+_HEIGHT = 96  # pixels of pictures to prove it
 _GAP = 0.02  # relative depth, by which the wall of a screen may be off
 
 
@@ -56,7 +58,7 @@ class Screen:
         places, inside = self.seen(picture, viewmat, K)
         size = 96
         rng = np.random.default_rng(number)
-        content = cv2.resize(rng.uniform(0.05, 1.0, (5, 8, 3)).astype(np.float32), (size, size)) * 2 * bright
+        content = cv2.resize(rng.uniform(0.05, 1.0, (2, 3, 3)).astype(np.float32), (size, size)) * 2 * bright
         x, y = (((places[..., k] + 1) / 2 * (size - 1)).astype(np.float32) for k in (0, 1))
         colours = cv2.remap(content, x, y, cv2.INTER_LINEAR)
         return replace(picture, radiance=np.where(inside[..., None], colours, picture.radiance))
@@ -70,9 +72,7 @@ def with_somebody(
     `renderer` has another room afterwards.
     """
     rng = np.random.default_rng([seed, 37])
-    size = (96, 96 * staged.views.depths.shape[2] // staged.views.depths.shape[1])
-    ratio = size[0] / (2 * K[1, 2])
-    small = K * np.array([[ratio], [ratio], [1.0]])
+    small, size = _small(staged, K)
     renderer.set_room(staged.room)
     depth = renderer.draw(viewmat, small, size).depth
     middle = float(np.median(depth[depth > 0])) if (depth > 0).any() else 3.0
@@ -125,43 +125,54 @@ def _upright(size: tuple[float, float, float]) -> bool:
 def screen_in(
     staged: StagedRoom, renderer: RoomRenderer, viewmats: list[np.ndarray], K: np.ndarray, seed: int
 ) -> Screen | None:
-    """A place for a screen that most of these cameras see mostly; None where there is none.
-
-    `renderer` has this room.
+    """The place for a screen, of some by chance, that most of these cameras see and see largest; None where
+    there is none. `renderer` has this room.
     """
+    small, size = _small(staged, K)
+    pictures = [renderer.draw(view, small, size) for view in viewmats]
+    best, most = None, 0.0
+    for screen in _screens(staged, pictures[len(pictures) // 2], viewmats[len(viewmats) // 2], small, seed):
+        shares = [_share(screen, p, v, small) for p, v in zip(pictures, viewmats, strict=True)]
+        if np.count_nonzero(shares) >= _SEEING * len(shares) and np.mean(shares) > most:
+            best, most = screen, float(np.mean(shares))
+    return best
+
+
+def _screens(
+    staged: StagedRoom, picture: Picture, viewmat: np.ndarray, K: np.ndarray, seed: int
+) -> Iterator[Screen]:
+    """Screens on what a picture shows of walls."""
     rng = np.random.default_rng([seed, 38])
-    height, width = 96, 96 * staged.views.depths.shape[2] // staged.views.depths.shape[1]
-    ratio = height / (2 * K[1, 2])
-    small = K * np.array([[ratio], [ratio], [1.0]])
-    pictures = [renderer.draw(view, small, (height, width)) for view in viewmats]
-    middle, view = pictures[len(pictures) // 2], viewmats[len(viewmats) // 2]
-    rows, columns = np.nonzero(middle.ids == 1)  # walls
-    for _ in range(TRIES if len(rows) else 0):
-        pick = int(rng.integers(len(rows)))
-        ray = np.linalg.inv(small) @ [columns[pick] + 0.5, rows[pick] + 0.5, 1.0]
-        place = view[:3, :3].T @ (ray * middle.depth[rows[pick], columns[pick]] - view[:3, 3])
+    rows, columns = np.nonzero(picture.ids == 1)  # walls
+    for pick in rng.integers(len(rows), size=TRIES) if len(rows) else ():
+        ray = np.linalg.inv(K) @ [columns[pick] + 0.5, rows[pick] + 0.5, 1.0]
+        place = viewmat[:3, :3].T @ (ray * picture.depth[rows[pick], columns[pick]] - viewmat[:3, 3])
         for wall in staged.room.shell.walls:
-            inward = np.array([wall.inward[0], 0.0, wall.inward[1]])
-            start = np.array([wall.start[0], 0.0, wall.start[1]])
-            if abs((place - start) @ inward) > 0.03:
-                continue
-            along = np.array([wall.direction[0], 0.0, wall.direction[1]])
-            screen = Screen(place + 0.01 * inward, along * SCREEN[0] / 2, np.array([0, -SCREEN[1] / 2, 0]))
-            seen = [_mostly(screen, p, v, small) for p, v in zip(pictures, viewmats, strict=True)]
-            if sum(seen) >= _SEEING * len(seen):
-                return screen
-    return None
+            inward, start, along = (
+                np.array([flat[0], 0.0, flat[1]]) for flat in (wall.inward, wall.start, wall.direction)
+            )
+            if abs((place - start) @ inward) < 0.03:
+                up = np.array([0, -SCREEN[1] / 2, 0])
+                yield Screen(place + 0.01 * inward, along * SCREEN[0] / 2, up)
 
 
-def _mostly(screen: Screen, picture: Picture, viewmat: np.ndarray, K: np.ndarray) -> Bool:
-    """Whether a picture shows .7 of a screen, as a hundredth of it and more."""
-    corners = np.stack(
-        [screen.centre + a * screen.right + b * screen.up for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    )
-    pos = corners @ viewmat[:3, :3].T + viewmat[:3, 3]
+def _share(screen: Screen, picture: Picture, viewmat: np.ndarray, K: np.ndarray) -> float:
+    """Of a picture that a screen takes; 0 where it shows less than .7 of the screen."""
+    corners = [
+        screen.centre + a * screen.right + b * screen.up for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    ]
+    pos = np.stack(corners) @ viewmat[:3, :3].T + viewmat[:3, 3]
     if (pos[:, 2] < 0.3).any():
-        return False
+        return 0.0
     x, y = (pos @ K.T)[:, :2].T / pos[:, 2]
     area = abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1))) / 2
     _, inside = screen.seen(picture, viewmat, K)
-    return bool(inside.sum() >= 0.7 * area and inside.mean() > 0.01)
+    return float(inside.mean()) if inside.sum() >= _MOSTLY * area else 0.0
+
+
+def _small(staged: StagedRoom, K: np.ndarray) -> tuple[np.ndarray, tuple[int, int]]:
+    """A lens, and (height, width), of pictures to prove what cameras see."""
+    height, width = staged.views.depths.shape[1:]
+    size = (_HEIGHT, _HEIGHT * width // height)
+    ratio = _HEIGHT / (2 * K[1, 2])
+    return K * np.array([[ratio], [ratio], [1.0]]), size

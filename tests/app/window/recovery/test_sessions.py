@@ -7,13 +7,17 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from app.window.places import state_folder
 from app.window.recovery import sessions
 from app.window.recovery.commands import restored_phrases
 from app.window.recovery.keeper import Keeper
 from app.window.recovery.state import Kept
 from app.window.state import State
+from langflash_core.errors import OutputError
 from langflash_core.geometry.poses import Pose, Vector
+from tests.torture.failing import failing
 
 ROOT = Path(__file__).parents[4]
 DYING = """
@@ -112,3 +116,40 @@ def test_a_colour_that_is_no_number_is_damage(folders: Path) -> None:
     read = sessions.read(next(state_folder().glob("*.json")))
     keeper.close()
     assert read is None
+
+
+def test_a_session_that_cannot_be_read_today_stays(folders: Path) -> None:
+    """Too many open files, or a disk that hiccups: it went with the scene that nobody had saved."""
+    photo = folders / "a photo.png"
+    photo.write_bytes(b"pixels")
+    die(photo)
+    there = set(state_folder().iterdir())
+    with failing("read", 3, folders):  # the folder, the lock, the session
+        assert sessions.left_behind() is None
+    assert set(state_folder().iterdir()) >= there
+    assert sessions.left_behind() is not None
+
+
+def test_of_two_windows_that_died_together_both_come_back(folders: Path) -> None:
+    state_folder().mkdir(parents=True)
+    for number in (1, 2):
+        stem = state_folder() / f"session-{number}-0000000{number}"
+        stem.with_suffix(".langflash").write_bytes(b"a scene")
+        kept = Kept(scene=str(stem.with_suffix(".langflash")), saved=False, name=f"room {number}")
+        stem.with_suffix(".json").write_text(json.dumps(sessions.fields(kept)))
+        os.utime(stem.with_suffix(".json"), (number, number))
+    for name in ("room 2", "room 1"):
+        kept = sessions.left_behind()
+        assert kept is not None and kept.name == name and Path(kept.scene).is_file()
+        assert kept.file is not None
+        sessions.forget(kept.file)
+    assert sessions.left_behind() is None
+
+
+def test_a_lock_on_a_full_disk_leaves_no_open_file(folders: Path) -> None:
+    state_folder().mkdir(parents=True)
+    before = set(os.listdir("/proc/self/fd")) if Path("/proc/self/fd").is_dir() else set()
+    with failing("write", 1, folders), pytest.raises(OutputError, match="cannot write"):
+        sessions.locked(state_folder() / "session-1-a.lock")
+    if before:
+        assert len(os.listdir("/proc/self/fd")) == len(before)

@@ -138,6 +138,7 @@ def test_a_pause_leaves_the_tray_and_says_how_it_goes_on(photos):
     assert not fewer.scene.goes_on
     resumed = show.Reconstruct().apply(state)
     assert resumed.scene.job is not None and not resumed.scene.job.pausing
+    assert not resumed.scene.goes_on  # when it is done there is nothing to go on from
 
 
 def test_few_photos_are_not_paused_and_what_is_cancelled_is_not_resumed(photos):

@@ -1,6 +1,7 @@
 """The tour in the window: every change is an edit, stops are flown to and asked, walks end, films follow."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -95,7 +96,7 @@ def test_notes_of_a_point_and_of_a_length(shown):
 
 def test_films_go_along_the_tour(shown):
     form = replace(shown.exporting.form, what=outputs.VIDEO, path="/out/film")
-    state = toured(shown).with_exporting(form=form)
+    state = toured(shown).with_exporting(form=form, edited=Path("/cache/edited.langflash"))
     wanted = order(state)
     assert isinstance(wanted, Order) and wanted.words[wanted.words.index("--path") + 1] == "tour"
     none = order(shown.with_exporting(form=replace(form, way="tour")))
