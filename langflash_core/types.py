@@ -26,6 +26,7 @@ from importlib import import_module
 from typing import Any
 
 import torch
+from jaxtyping import Bool, Float, Int, Integer, Shaped
 from torch import Tensor
 
 from langflash_core.records import Cost as Cost
@@ -46,8 +47,8 @@ class Camera:
     are pixels per scene unit, at any depth.
     """
 
-    viewmat: Tensor
-    K: Tensor
+    viewmat: Float[Tensor, "4 4"]
+    K: Float[Tensor, "3 3"]
     width: int
     height: int
     orthographic: bool = False
@@ -109,12 +110,12 @@ class Views:
     poses are given instead of sought. lenses: what `Ks` rest on; None: they are given.
     """
 
-    images: Tensor
-    Ks: Tensor
+    images: Float[Tensor, "V 3 H W"]
+    Ks: Float[Tensor, "V 3 3"]
     names: tuple[str, ...]
     sources: tuple[bytes, ...] = ()
     warnings: tuple[str, ...] = ()
-    viewmats: Tensor | None = None
+    viewmats: Float[Tensor, "V 4 4"] | None = None
     lenses: Lenses | None = None
 
     @property
@@ -138,11 +139,11 @@ class Gaussians:
         ValueError: a field's shape is another.
     """
 
-    means: Tensor
-    quats: Tensor
-    scales: Tensor
-    opacities: Tensor
-    sh: Tensor
+    means: Float[Tensor, "N 3"]
+    quats: Float[Tensor, "N 4"]
+    scales: Float[Tensor, "N 3"]
+    opacities: Float[Tensor, " N"]
+    sh: Float[Tensor, "N S 3"]
 
     def __post_init__(self) -> None:
         count, bases = len(self.means), self.sh.shape[1] if self.sh.ndim == 3 else 1
@@ -162,7 +163,7 @@ class Gaussians:
         """Apply `change` to every field (casting, moving)."""
         return Gaussians(*(change(v) for v in (self.means, self.quats, self.scales, self.opacities, self.sh)))
 
-    def rows(self, keep: Tensor) -> "Gaussians":
+    def rows(self, keep: Shaped[Tensor, " n"]) -> "Gaussians":
         """Some of the Gaussians, as `Scene.rows`."""
         return self.map(lambda values: values[keep.to(values.device)])
 
@@ -182,9 +183,9 @@ class Semantics:
         ValueError: a field's shape or type is another, or an id names no atom.
     """
 
-    weight_ids: Tensor
-    weight_values: Tensor
-    dictionary: Tensor
+    weight_ids: Int[Tensor, "N m"]
+    weight_values: Float[Tensor, "N m"]
+    dictionary: Float[Tensor, "K C"]
     space: str
 
     def __post_init__(self) -> None:
@@ -198,14 +199,14 @@ class Semantics:
     def num_atoms(self) -> int:
         return self.dictionary.shape[0]
 
-    def dense_weights(self) -> Tensor:
+    def dense_weights(self) -> Float[Tensor, "N K"]:
         """w_ik as a dense (N, K) matrix; repeated ids add up."""
         dense = self.weight_values.new_zeros(self.weight_ids.shape[0], self.num_atoms)
         if self.num_atoms == 0:
             return dense
         return dense.scatter_add(1, self.weight_ids, self.weight_values)
 
-    def rows(self, keep: Tensor) -> "Semantics":
+    def rows(self, keep: Shaped[Tensor, " n"]) -> "Semantics":
         """What some of the Gaussians carry, as `Scene.rows`; the dictionary stays whole."""
         keep = keep.to(self.weight_ids.device)
         return replace(self, weight_ids=self.weight_ids[keep], weight_values=self.weight_values[keep])
@@ -225,16 +226,16 @@ class Prediction:
     """
 
     gaussians: Gaussians
-    weights: Tensor
-    dictionary: Tensor
+    weights: Float[Tensor, "V K H W"]
+    dictionary: Float[Tensor, "K C"]
     space: str
-    viewmats: Tensor
-    depths: Tensor
-    confidences: Tensor
+    viewmats: Float[Tensor, "V 4 4"]
+    depths: Float[Tensor, "V H W"]
+    confidences: Float[Tensor, "V H W"]
     unplaced: tuple[int, ...] = ()
     warnings: tuple[str, ...] = ()
     timings: dict[str, float] = field(default_factory=dict)
-    Ks: Tensor | None = None
+    Ks: Float[Tensor, "V 3 3"] | None = None
     lenses: tuple[FoundLens, ...] = ()
 
 
@@ -257,14 +258,14 @@ class Scene:
 
     gaussians: Gaussians
     semantics: Semantics
-    viewmats: Tensor
-    Ks: Tensor
+    viewmats: Float[Tensor, "V 4 4"]
+    Ks: Float[Tensor, "V 3 3"]
     view_size: tuple[int, int]
     photos: tuple[bytes, ...] = ()
-    view_ids: Tensor | None = None
+    view_ids: Int[Tensor, " N"] | None = None
     record: Record = field(default_factory=Record)
-    levels: Tensor | None = None
-    confidences: Tensor | None = None
+    levels: Integer[Tensor, " N"] | None = None
+    confidences: Float[Tensor, " N"] | None = None
 
     def __post_init__(self) -> None:
         count, num_views = len(self.gaussians), len(self.viewmats)
@@ -305,7 +306,7 @@ class Scene:
         """The scene in a cell of a notebook, as `showing.notebook.show` has it."""
         return import_module("langflash_core.showing.notebook").show(self, prompts, **options)
 
-    def rows(self, keep: Tensor) -> "Scene":
+    def rows(self, keep: Shaped[Tensor, " n"]) -> "Scene":
         """The scene with some of its Gaussians; dictionary, views, photos and record stay.
 
         Args:
@@ -344,10 +345,10 @@ class Frame:
     weight_maps (H, W, K) = sum_i T_i a_i w_ik, or None when not asked for.
     """
 
-    rgb: Tensor
-    alphas: Tensor
-    depths: Tensor
-    weight_maps: Tensor | None = None
+    rgb: Float[Tensor, "H W 3"]
+    alphas: Float[Tensor, "H W"]
+    depths: Float[Tensor, "H W"]
+    weight_maps: Float[Tensor, "H W K"] | None = None
 
 
 @dataclass(frozen=True)
@@ -377,8 +378,8 @@ class QueryResult:
 
     answers: tuple[PromptAnswer, ...]
     mode: str
-    relevance: Tensor
-    masks: Tensor
+    relevance: Float[Tensor, "P H W"]
+    masks: Bool[Tensor, "P H W"]
     frame: Frame
     camera: Camera
 
@@ -399,8 +400,8 @@ class Segments:
     prompts: tuple[str, ...]
     scores: tuple[float, ...]
     threshold: float
-    members: Tensor
-    instances: Tensor
+    members: Bool[Tensor, "P N"]
+    instances: Int[Tensor, "P N"]
 
     def __post_init__(self) -> None:
         for name in ("members", "instances"):
@@ -428,17 +429,17 @@ class SegmentedView:
 
     camera: Camera
     frame: Frame
-    mattes: Tensor
-    union: Tensor
-    things: Tensor
+    mattes: Float[Tensor, "P H W"]
+    union: Float[Tensor, "H W"]
+    things: Int[Tensor, "H W"]
 
     @property
-    def masks(self) -> Tensor:
+    def masks(self) -> Bool[Tensor, "P H W"]:
         """(P, H, W) bool: at least half of the pixel is the phrase."""
         return self.mattes >= 0.5
 
     @property
-    def labels(self) -> Tensor:
+    def labels(self) -> Int[Tensor, "H W"]:
         """(H, W) int64: 1 + the phrase that most of the pixel is, where it is in a mask; else 0."""
         best, which = torch.where(self.masks, self.mattes, 0.0).max(0)
         return torch.where(best > 0, which + 1, 0)

@@ -9,6 +9,7 @@ from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
+import jaxtyping
 from jaxtyping import install_import_hook
 
 # One thread a process, also in the processes that tests start: the tests' arrays are small, and
@@ -80,6 +81,12 @@ def _keep_near(event: str, arguments: tuple) -> None:
 
 
 sys.addaudithook(_keep_near)
+
+
+@pytest.fixture
+def unchecked(monkeypatch):
+    """What the product itself says of shapes that it cannot take, which the checker would refuse before."""
+    monkeypatch.setattr(jaxtyping.config, "jaxtyping_disable", True)
 
 
 @pytest.fixture(scope="session")

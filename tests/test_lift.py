@@ -53,7 +53,7 @@ def test_shares_stay_shares():
     assert torch.allclose(shares.sum(-1), torch.ones(len(shares)), atol=1e-4)
 
 
-def test_values_of_another_size_are_refused():
+def test_values_of_another_size_are_refused(unchecked):
     with pytest.raises(ValueError, match="values: expected"):
         gathered(random_gaussians(3), small_camera(), torch.zeros(24, 31, 2))
     with pytest.raises(ValueError, match="trust: expected"):

@@ -88,7 +88,7 @@ def test_rows_take_every_field_along(keep):
         (torch.tensor([4]), "received 4 to 4"),
     ],
 )
-def test_rows_that_are_not_there_are_refused(keep, words):
+def test_rows_that_are_not_there_are_refused(keep, words, unchecked):
     with pytest.raises(ValueError, match=words):
         made().rows(keep)
 
@@ -133,7 +133,7 @@ def _semantics(**changes) -> Semantics:
         (lambda: made(record=Record(atom_names={-1: "a"})), "atom_names: expected values"),
     ],
 )
-def test_what_does_not_fit_is_refused(wrong, words):
+def test_what_does_not_fit_is_refused(wrong, words, unchecked):
     with pytest.raises(ValueError, match=words):
         wrong()
 

@@ -15,7 +15,7 @@ from langflash_core.language.channels import Decoder
 from langflash_core.language.relevance import CompiledQuery, feature_relevance
 from langflash_core.types import Camera, Scene
 
-from ..gl.still import Still, StillMaps, draw_still
+from ..gl.processor.still import Still, StillMaps, draw_still
 
 _EXAMPLES = 20_000
 """Gaussians that a decoder is fitted on."""

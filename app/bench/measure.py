@@ -21,8 +21,9 @@ from langflash_core.types import Camera, Scene
 
 from ..gl import SplatRenderer
 from ..gl.canvas import Canvas
+from ..gl.processor.still import draw_still
+from ..gl.shapes import MakeShapes
 from ..gl.splats import SplatBuffers
-from ..gl.still import draw_still
 from .cases import Case
 from .channels import Channels, channels_of, draw_channels
 from .errors import Errors, View, errors_of, true_view
@@ -155,8 +156,10 @@ class _Bench:
         return self.case.uncompiled if mode.whole else self.case.compiled
 
     def _made(self, mode: Mode, key: tuple) -> SplatRenderer:
-        def splats(ctx: moderngl.Context, programs: Programs, scene: Scene) -> SplatBuffers:
-            made = mode.splats(ctx, programs, scene)
+        def splats(
+            ctx: moderngl.Context, programs: Programs, scene: Scene, shapes: MakeShapes
+        ) -> SplatBuffers:
+            made = mode.splats(ctx, programs, scene, shapes)
             if isinstance(made, StaleOrder):
                 self._late[key] = made
             return made

@@ -24,7 +24,7 @@ class Mode:
     that the scene has. share: of the Gaussians, the others widened. fast: relevance from numbers
     splatted beside the colour. shrink: of the picture's sides. splats: what the scene is uploaded to.
     answers: who answers, None: the renderer's own choice. whole: asked in all C channels of D.
-    still: drawn on the processor, as the window does where OpenGL runs there too (app/gl/still.py).
+    still: drawn on the processor, as the window does where OpenGL runs there too (app/gl/processor/still.py).
     splatted: language as channels instead of weights (channels.py), so many `channels`, None: all.
     colours: whether the picture's colours may differ from the default's, not its answers alone.
     """

@@ -12,6 +12,7 @@ from ..gl.answers import Answers, ShaderAnswers, in_numbers, temperature_of
 from ..gl.layout import DEFINES, LAYERS_A_PASS, PHRASES_A_LAYER
 from ..gl.packed import PackedMaps, blocks
 from ..gl.painter import Painter
+from ..gl.shapes import MakeShapes
 from ..gl.splats import SplatBuffers
 from ..gl.targets import ADDED, Layers, LayerTarget
 from ..gl.weights import Maps
@@ -20,9 +21,9 @@ from ..gl.weights import Maps
 class ThreeSigma(SplatBuffers):
     """Quads end at three deviations: too early for the opaque, too late for the faint."""
 
-    def __init__(self, ctx: moderngl.Context, programs: Programs, scene: Scene):
+    def __init__(self, ctx: moderngl.Context, programs: Programs, scene: Scene, shapes: MakeShapes):
         self._cut = Programs(ctx, "splat", {**DEFINES, "CUT": 3.0})
-        super().__init__(ctx, self._cut, scene)
+        super().__init__(ctx, self._cut, scene, shapes)
 
     def release(self) -> None:
         super().release()

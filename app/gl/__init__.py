@@ -2,7 +2,7 @@
 
 from langflash_core.graphics import offscreen_context
 
-from .moving import moving_renderer
+from .processor.moving import moving_renderer
 from .renderer import SplatRenderer
 
 __all__ = ["SplatRenderer", "moving_renderer", "offscreen_context"]

@@ -8,6 +8,7 @@ import moderngl
 from langflash_core.errors import GraphicsError
 from langflash_core.graphics import OPENGL
 
+from .hardware import Hardware, hardware_of
 from .painter import Painter
 from .view import ViewTargets
 
@@ -20,12 +21,17 @@ class Canvas:
     """Owns both. A renderer has one of its own, or shares one whose maker releases it after the renderers."""
 
     def __init__(
-        self, ctx: moderngl.Context, precision: Precision = "float16", maps: Precision | None = None
+        self,
+        ctx: moderngl.Context,
+        precision: Precision = "float16",
+        maps: Precision | None = None,
+        hardware: Hardware | None = None,
     ):
         """
         Args:
             precision: of colour and weight maps; alphas, depth and relevance are always float32.
             maps: of weight maps, if another.
+            hardware: whose ways of drawing to take; None: where the context draws.
 
         Raises:
             GraphicsError: the context is older than OpenGL 3.3.
@@ -39,7 +45,8 @@ class Canvas:
                 f"OpenGL {ctx.version_code / 100:.1f} is too old for splatting, 3.3 is needed; "
                 "update the graphics driver"
             )
-        self.painter = Painter(ctx)
+        self.hardware = hardware_of(ctx) if hardware is None else hardware
+        self.painter = Painter(ctx, self.hardware.shapes, self.hardware.defines)
         self.precision = precision
         self._dtypes = _DTYPES[precision], _DTYPES[maps or precision]
         self._views: list[ViewTargets] = []  # the newest last
@@ -59,7 +66,7 @@ class Canvas:
             _check(size, self.painter.ctx.info["GL_MAX_TEXTURE_SIZE"])
             while len(self._views) >= _KEPT:
                 self._views.pop(0).release()
-            found = ViewTargets(self.painter, size, *self._dtypes)
+            found = ViewTargets(self.painter, size, *self._dtypes, self.hardware.maps)
         else:
             self._views.remove(found)
         for other in self._views:

@@ -23,7 +23,7 @@ def draw_colour(
         numbers: (N, 3 L) that the Gaussians carry into L layers behind colour and depth.
         depth: whether the framebuffer has it beside the colour; without, there are no numbers.
     """
-    defines = {"COLOUR": 1, **splats.defines}
+    defines = {"COLOUR": 1, **splats.shapes.defines}
     num_layers = 0 if numbers is None else numbers.shape[1] // ATOMS_A_LAYER
     if not depth:
         defines["ALONE"] = 1

@@ -33,7 +33,7 @@ def splat_numbers(splats: SplatBuffers, compiled: CompiledQuery, norms: np.ndarr
     factor = compiled.factor.detach().cpu().double().numpy()
     prompts = compiled.prompts.detach().cpu().double().numpy()
     negatives = compiled.negatives.detach().cpu().double().numpy()
-    dots = splats.mixed(factor @ np.concatenate((prompts, negatives)).T)  # (N, P + M)
+    dots = splats.carried.mixed(factor @ np.concatenate((prompts, negatives)).T)  # (N, P + M)
     answers = dots[:, : len(prompts)]
     if compiled.mode == "relevancy":
         answers = answers - dots[:, len(prompts) :].max(1, keepdims=True)

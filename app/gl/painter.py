@@ -6,9 +6,10 @@ from collections.abc import Mapping
 import moderngl
 import numpy as np
 
-from langflash_core.graphics import Programs, draws_in_software, set_uniforms
+from langflash_core.graphics import Programs, set_uniforms
 
 from .layout import DEFINES
+from .shapes import MakeShapes, Quads
 from .targets import SUM, drawing
 
 Uniforms = Mapping[str, float | tuple | np.ndarray]
@@ -18,10 +19,13 @@ Textures = Mapping[str, moderngl.Texture | moderngl.TextureArray]
 class Painter:
     """Owns the programs of `shaders/splat/` on one context; `passes` counts what was drawn with them."""
 
-    def __init__(self, ctx: moderngl.Context):
+    def __init__(
+        self, ctx: moderngl.Context, shapes: MakeShapes = Quads, defines: Mapping[str, float] | None = None
+    ):
+        """shapes: what Gaussians are drawn as. defines: of all programs, beside those of layout.py."""
         self.ctx = ctx
-        place = {"SOFTWARE": 1} if draws_in_software(ctx) else {}
-        self.programs = Programs(ctx, "splat", {**DEFINES, **place})
+        self.shapes = shapes
+        self.programs = Programs(ctx, "splat", {**DEFINES, **(defines or {})})
         self.passes: Counter[str] = Counter()
         self._screens: dict[int, moderngl.VertexArray] = {}
 

@@ -33,10 +33,10 @@ class PhotoDepths:
         views = spread(scene.num_views)
         self.cameras = tuple(_small(scene.camera(view)) for view in views)
         ctx, programs = painter.ctx, painter.programs
-        whole = None if own else SplatBuffers(ctx, programs, scene)
+        whole = None if own else SplatBuffers(ctx, programs, scene, painter.shapes)
         maps = []
         for view, camera in zip(views, self.cameras, strict=True):
-            splats = whole or SplatBuffers(ctx, programs, _own_scene(scene, view))
+            splats = whole or SplatBuffers(ctx, programs, _own_scene(scene, view), painter.shapes)
             maps.append(_depths(painter, splats, camera))
             if splats is not whole:
                 splats.release()

@@ -9,9 +9,7 @@ Composed of three lifetimes: the scene (scene.py), the picture's size (view.py),
 programs live as long as the context (canvas.py).
 """
 
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import Literal
+from dataclasses import replace
 
 import moderngl
 import numpy as np
@@ -19,125 +17,27 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import GraphicsError
-from langflash_core.export.colours import heat
 from langflash_core.formats import COLOUR_MAPS
-from langflash_core.graphics import draws_in_software
 from langflash_core.language.relevance import CompiledQuery
 from langflash_core.scene.changes import Change
-from langflash_core.splat.projection import ALPHA_MIN, NEAR
+from langflash_core.splat.projection import NEAR
 from langflash_core.types import Camera, Frame, Scene
 
-from .answers import MakeAnswers, ShaderAnswers
+from .answers import MakeAnswers
 from .canvas import Canvas, Precision
 from .colours import hues
 from .display import MASK_STYLES, Answer, Background, Drawn
-from .host import HostAnswers
+from .hardware import Hardware
 from .layout import PHRASES_A_LAYER
 from .painter import Uniforms
+from .picture import DrawnPicture, Picture
+from .processor.still import Still
+from .processor.still_picture import StillPicture
 from .question import Question
 from .scene import Level, LiveScene, MakeSplats
 from .splats import SplatBuffers
-from .still import Still, StillMaps, mixture
 from .targets import context_lives, read
 from .view import ViewTargets
-from .weights import Maps
-
-_ANSWERS: dict[str, MakeAnswers] = {"shader": ShaderAnswers, "host": HostAnswers}
-
-
-@dataclass(frozen=True)
-class _Picture:
-    """What the last `draw` asked for."""
-
-    scene: LiveScene
-    level: Level
-    view: ViewTargets
-    drawn: Drawn
-    fast: bool
-    depth_range: tuple[float, float]
-
-    def lay(self) -> None:
-        """Draw colour and depth again where another renderer of this canvas drew since."""
-        self.view.draw_colour(self.level)
-
-    @property
-    def maps(self) -> Maps:
-        """Its weight maps, drawn unless they are there."""
-        return self.view.maps.of(self.level)
-
-    def weights(self, x: int, y: int) -> np.ndarray | None:
-        """(K,) of a pixel, once its weight maps are drawn."""
-        there = self.view.maps.shows(self.level)
-        return self.maps.pixel(x, y, self.scene.num_atoms) if there else None
-
-    def read_maps(self) -> np.ndarray:
-        """(H, W, K) float32."""
-        return self.maps.read(self.scene.num_atoms)
-
-    def answer(self, question: Question) -> Answer:
-        """Relevance, from the fast mode or else from weight maps: those that are there are better."""
-        fast = self.fast and question.fits_fast and not self.view.maps.shows(self.level)
-        layers = (self.view.fast if fast else self.view.exact)(question, self.level)
-        return Answer(layers, question.num_phrases, (self.drawn.key, question.key, fast))
-
-    def atoms(self) -> moderngl.Texture:
-        return self.view.display.atoms(self.maps, self.scene.atom_colours)
-
-    def features(self) -> moderngl.Texture:
-        return self.view.display.features(self.maps, self.scene.feature_columns)
-
-    def weight(self, atom: int, colormap: str) -> moderngl.Texture:
-        return self.view.display.weight(self.maps, atom, colormap)
-
-
-@dataclass(frozen=True)
-class _StillPicture:
-    """What the last `bring` gave, with the same face as `_Picture`."""
-
-    scene: LiveScene
-    still: Still
-    view: ViewTargets
-    drawn: Drawn
-
-    @property
-    def depth_range(self) -> tuple[float, float]:
-        return self.still.depth_range
-
-    @property
-    def maps(self) -> StillMaps:
-        if self.still.maps is None:
-            raise ValueError("bring: expected a picture with weight maps, received one without")
-        return self.still.maps
-
-    def lay(self) -> None:
-        self.view.take(self.still)
-
-    def weights(self, x: int, y: int) -> np.ndarray | None:
-        return None if self.still.maps is None else self.maps.pixel(x, y)
-
-    def read_maps(self) -> np.ndarray:
-        return self.maps.weights.float().numpy()
-
-    def answer(self, question: Question) -> Answer:
-        layers = self.view.told(question, self.still)
-        return Answer(layers, question.num_phrases, (self.drawn.key, question.key, False))
-
-    def atoms(self) -> moderngl.Texture:
-        return self._mixed("atoms", self.scene.atom_colours)
-
-    def features(self) -> moderngl.Texture:
-        return self._mixed("features", self.scene.feature_columns)
-
-    def _mixed(self, kind: str, columns: np.ndarray) -> moderngl.Texture:
-        make = partial(mixture, self.still, columns)
-        return self.view.display.brought(kind, (self.still.key,), make)
-
-    def weight(self, atom: int, colormap: str) -> moderngl.Texture:
-        return self.view.display.brought(
-            "weight",
-            (self.still.key, atom, colormap),
-            lambda: heat(self.maps.weights[..., atom], colormap).numpy(),
-        )
 
 
 class SplatRenderer:
@@ -154,39 +54,34 @@ class SplatRenderer:
         self,
         ctx: moderngl.Context,
         precision: Precision = "float16",
-        queries: Literal["shader", "host"] | None = None,
         splats: MakeSplats = SplatBuffers,
         canvas: Canvas | None = None,
         maps: Precision | None = None,
+        hardware: Hardware | None = None,
     ):
         """
         Args:
             precision: of colour and weight maps; alphas, depth and relevance are always float32.
-            queries: where phrases are multiplied with weight maps; None: on the processor where
-                OpenGL runs there too (app/gl/host.py), else in shaders.
             splats: makes the buffers of a scene.
             canvas: of this context and precision, to share with other renderers; None: one of its own.
-            maps: precision of weight maps, if another, of a canvas of its own.
+            maps: precision of weight maps, if another, of a canvas of its own. hardware: whose ways of
+                drawing such a canvas takes; None: where the context draws.
 
         Raises:
             GraphicsError: the context is older than OpenGL 3.3.
-            ValueError: another precision, another place, a canvas of another precision.
+            ValueError: another precision, a canvas of another precision.
         """
-        if queries not in (*_ANSWERS, None):
-            raise ValueError(f"queries: expected shader, host or None, received {queries!r}")
         if canvas is not None and canvas.precision != precision:
             raise ValueError(f"canvas: expected {precision}, received {canvas.precision}")
         self._ctx = ctx
         self._own_canvas = canvas is None
-        self._canvas = Canvas(ctx, precision, maps) if canvas is None else canvas
+        self._canvas = Canvas(ctx, precision, maps, hardware) if canvas is None else canvas
         self.passes = self._canvas.painter.passes
-        place = ("host" if draws_in_software(ctx) else "shader") if queries is None else queries
-        self._answers = _ANSWERS[place]
         self._fill = False
         self._splats = splats
         self._scene: LiveScene | None = None
         self._question: Question | None = None
-        self._picture: _Picture | _StillPicture | None = None
+        self._picture: Picture | None = None
 
     # --- what to draw -----------------------------------------------------------------------
 
@@ -245,11 +140,6 @@ class SplatRenderer:
         """What makes the buffers of a scene."""
         return self._splats
 
-    @property
-    def in_software(self) -> bool:
-        """Whether OpenGL runs on the processor, so that still pictures are drawn better beside it."""
-        return draws_in_software(self._ctx)
-
     def columns(self, features: bool) -> np.ndarray:
         """Of the atoms: colours (K, 3), or those of the features picture (K, 4)."""
         if self._scene is None:
@@ -280,7 +170,7 @@ class SplatRenderer:
         """
         scene, level, view = self._prepared(camera, share)
         drawn = Drawn(view.colour, camera, background, level.places_key, self._fill)
-        picture = _Picture(scene, level, view, drawn, fast, level.splats.depth_range)
+        picture = DrawnPicture(scene, view, drawn, level, fast, level.splats.depth_range)
         if self._question is not None and fast and self._question.fits_fast:
             picture.answer(self._question)
         view.draw_colour(level)
@@ -322,10 +212,10 @@ class SplatRenderer:
         if self._scene is None:
             raise ValueError("bring: expected set_scene before, received no scene")
         view = self._canvas.view((still.camera.width, still.camera.height))
-        view.take(still)
+        view.take(still.key, still.colour, still.depth)
         view.forget_maps()  # it has its own
         drawn = Drawn(view.colour, still.camera, background, still.key, self._fill)
-        self._picture = _StillPicture(self._scene, still, view, drawn)
+        self._picture = StillPicture(self._scene, view, drawn, still)
 
     def fill(self, gaps: bool) -> None:
         """Whether pictures of colours show what is around their gaps (scene/gaps.py), from now on and in the
@@ -349,9 +239,13 @@ class SplatRenderer:
         received = compiled.factor.shape[0]
         if self._scene is not None and received != self._scene.num_atoms:
             raise ValueError(f"compiled: expected {self._scene.num_atoms} atoms, received {received}")
-        self._question = Question(compiled, self._answers if answers is None else answers)
+        self._question = Question(compiled, self._canvas.hardware.answers if answers is None else answers)
 
     # --- for who measures -------------------------------------------------------------------
+
+    def finish(self) -> None:
+        """Wait until all that was asked of OpenGL is drawn."""
+        self._ctx.finish()
 
     def forget(self, answers_only: bool = False) -> None:
         """Nothing counts as drawn or answered: the next picture and question go through every pass.
@@ -375,27 +269,14 @@ class SplatRenderer:
 
     def frame(self, weight_maps: bool = False) -> Frame:
         """The view as tensors on the CPU, float32; weight maps (H, W, K) on request."""
-        picture = self._drawn()
-        width, height = picture.view.size
-        colour = read(picture.drawn.target.colour).reshape(height, width, 4)
-        sums, alphas = np.moveaxis(read(picture.drawn.target.depth).reshape(height, width, 2), -1, 0)
-        covered = alphas >= ALPHA_MIN
-        depths = np.where(covered, sums / np.where(covered, alphas, 1.0), 0.0).astype(np.float32)
-        maps = torch.from_numpy(picture.read_maps()) if weight_maps else None
-        under = np.asarray(picture.drawn.background, np.float32)
-        rgb = torch.from_numpy(colour[..., :3] + (1 - alphas[..., None]) * under)
-        return Frame(rgb, torch.from_numpy(alphas.copy()), torch.from_numpy(depths), maps)
+        return self._drawn().frame(weight_maps)
 
     def pixel(self, x: int, y: int) -> tuple[float, float, np.ndarray | None]:
         """Alpha, depth (scene units, 0 where empty) and weights (K,) of one pixel of the view.
 
         The weights are None until the weight maps of this view are drawn. Reads a few texels.
         """
-        picture = self._drawn()
-        content = picture.drawn.target.framebuffer.read((x, y, 1, 1), 2, attachment=1, dtype="f4")
-        total, alpha = np.frombuffer(content, np.float32).tolist()
-        depth = total / alpha if alpha >= ALPHA_MIN else 0.0
-        return alpha, depth, picture.weights(x, y)
+        return self._drawn().pixel(x, y)
 
     def relevance(self) -> Tensor:
         """Relevance (P, H, W) float32 of the phrases asked, 0 where the view is empty.
@@ -577,7 +458,7 @@ class SplatRenderer:
         level.prepare(camera)
         return self._scene, level, view
 
-    def _drawn(self) -> "_Picture | _StillPicture":
+    def _drawn(self) -> Picture:
         """The picture asked for last; drawn again where another renderer of this canvas drew since."""
         picture = self._picture
         if picture is None or not self._canvas.holds(picture.view):
@@ -585,7 +466,7 @@ class SplatRenderer:
         picture.lay()
         return picture
 
-    def _answered(self) -> "tuple[_Picture | _StillPicture, Answer, float]":
+    def _answered(self) -> tuple[Picture, Answer, float]:
         """The picture, the answer over it, and the threshold that the question brings along."""
         picture, question = self._drawn(), self._question
         if question is None:

@@ -19,9 +19,10 @@ from langflash_core.types import Camera, Gaussians, Scene
 from .colours import feature_axes
 from .painter import Painter
 from .photos import PhotoDepths
+from .shapes import MakeShapes
 from .splats import SplatBuffers
 
-MakeSplats = Callable[[moderngl.Context, Programs, Scene], SplatBuffers]
+MakeSplats = Callable[[moderngl.Context, Programs, Scene, MakeShapes], SplatBuffers]
 _names = count(1)  # each given once, so that no two contents are ever taken for each other
 
 
@@ -76,7 +77,7 @@ class Level:
         """|f_i| (N,) of the level's Gaussians over a dictionary with factor R (K, r); kept for the last R."""
         named = factor.tobytes()
         if self._norms is None or self._norms[0] != named:
-            self._norms = named, np.linalg.norm(self.splats.mixed(factor), axis=1)
+            self._norms = named, np.linalg.norm(self.splats.carried.mixed(factor), axis=1)
         return self._norms[1]
 
     def forget(self) -> None:
@@ -170,7 +171,8 @@ class LiveScene:
             level.forget()
 
     def _made(self, share: float, scene: Scene, rows: np.ndarray) -> Level:
-        splats = self._make_splats(self._painter.ctx, self._painter.programs, scene)
+        painter = self._painter
+        splats = self._make_splats(painter.ctx, painter.programs, scene, painter.shapes)
         level = self._levels[share] = Level(splats, rows, scene.gaussians)
         if self._changes:
             level.change(self._changes)

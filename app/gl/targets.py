@@ -61,23 +61,6 @@ def drawing(
         previous.use()
 
 
-@contextmanager
-def as_sprites(ctx: moderngl.Context, margin: int) -> Iterator[None]:
-    """Draw points as large as their shader says into the framebuffer in use, within `drawing`.
-
-    The viewport is `margin` pixels wider on every side: points are left out with their centres.
-    """
-    framebuffer = ctx.fbo
-    x, y, width, height = before = framebuffer.viewport
-    framebuffer.viewport = (x - margin, y - margin, width + 2 * margin, height + 2 * margin)
-    ctx.enable(moderngl.PROGRAM_POINT_SIZE)
-    try:
-        yield
-    finally:
-        ctx.disable(moderngl.PROGRAM_POINT_SIZE)
-        framebuffer.viewport = before
-
-
 def read(texture: moderngl.Texture | moderngl.TextureArray) -> np.ndarray:
     """Every value of a float texture, flat, as float32."""
     return np.frombuffer(texture.read(), NUMPY_TYPES[texture.dtype]).astype(np.float32)

@@ -1,5 +1,7 @@
 """What lives as long as the picture's size: colour, depth, weight maps, relevance, pictures to show."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from .answers import Answers, MakeAnswers
@@ -11,9 +13,8 @@ from .packed import PackedMaps
 from .painter import Painter
 from .question import Question
 from .scene import Level
-from .still import Still
 from .targets import NUMPY_TYPES, ColourTarget, Layers, LayerTarget
-from .weights import WeightMaps
+from .weights import MakeMaps, WeightMaps
 
 
 class ViewTargets:
@@ -22,10 +23,17 @@ class ViewTargets:
     Several renderers may draw into the same: keys are given once, so none takes another's for its own.
     """
 
-    def __init__(self, painter: Painter, size: tuple[int, int], dtype: str, map_dtype: str):
+    def __init__(
+        self,
+        painter: Painter,
+        size: tuple[int, int],
+        dtype: str,
+        map_dtype: str,
+        make_maps: MakeMaps = WeightMaps,
+    ):
         self.size = size
         self.colour = ColourTarget(painter.ctx, size, dtype)
-        self.maps = WeightMaps(painter, size, map_dtype)
+        self.maps = make_maps(painter, size, map_dtype)
         self.packed = PackedMaps(painter, size)
         self.display = Display(painter, size, self.packed)
         self._painter = painter
@@ -53,25 +61,24 @@ class ViewTargets:
         texels = self.colour.alone.read(components=3, alignment=1, dtype="f1")
         return np.frombuffer(texels, np.uint8).reshape(height, width, 3)
 
-    def take(self, still: Still) -> None:
-        """Colour and depth of a picture drawn elsewhere, unless they are there."""
-        if self._shown == still.key:
+    def take(self, key: int, colour: np.ndarray, depth: np.ndarray) -> None:
+        """Colour (H, W, 4) and depth (H, W, 2) of a picture drawn elsewhere, unless they are there."""
+        if self._shown == key:
             return
-        for texture, values in ((self.colour.colour, still.colour), (self.colour.depth, still.depth)):
+        for texture, values in ((self.colour.colour, colour), (self.colour.depth, depth)):
             texture.write(np.ascontiguousarray(values, NUMPY_TYPES[texture.dtype]))
-        self._shown = still.key
+        self._shown = key
 
-    def told(self, question: Question, still: Still) -> LayerTarget:
-        """Relevance of a picture drawn elsewhere, unless it is there."""
-        assert still.maps is not None
+    def told(self, key: int, question: Question, make: Callable[[], np.ndarray]) -> LayerTarget:
+        """Relevance (P, H, W) that is made elsewhere, of the picture so named, unless it is there."""
         told = self._told.exactly(num_groups(question.num_phrases))
-        if (still.key, question.key) != self._tells:
-            height, width = still.depth.shape[:2]
+        if (key, question.key) != self._tells:
+            width, height = self.size
             texels = np.zeros((told.num_layers, height, width, PHRASES_A_LAYER), np.float32)
-            for phrase, values in enumerate(still.maps.relevance(question.compiled)):
+            for phrase, values in enumerate(make()):
                 texels[phrase // PHRASES_A_LAYER, :, :, phrase % PHRASES_A_LAYER] = values
             told.array.write(texels)
-            self._tells = still.key, question.key
+            self._tells = key, question.key
         return told
 
     def exact(self, question: Question, level: Level) -> LayerTarget:

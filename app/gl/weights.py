@@ -1,6 +1,7 @@
 """Weight maps W_k(p) of the atoms in view: drawn in passes of `layout.ATOMS_A_PASS`,
-on a processor cell by cell (cells.py), read back on request."""
+on a processor cell by cell (processor/cell_maps.py), read back on request."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import moderngl
@@ -8,7 +9,6 @@ import numpy as np
 
 from langflash_core.graphics import set_uniforms
 
-from .cells import Batch, Cells, batches, cells_of, together
 from .layout import ATOMS_A_LAYER, ATOMS_A_PASS, LAYERS_A_PASS, num_layers
 from .painter import Painter
 from .scene import Level
@@ -55,13 +55,12 @@ class Maps:
 
 
 class WeightMaps:
-    """Owns the layers; draws them once for each order of a level."""
+    """Owns the layers; draws the maps once for each order of a level. Subclasses may `draw` otherwise."""
 
     def __init__(self, painter: Painter, size: tuple[int, int], dtype: str):
-        self._painter = painter
-        self._size = size
-        self._layers = Layers(painter.ctx, size, dtype)
-        self._cells = Layers(painter.ctx, size, dtype)
+        self.painter = painter
+        self.size = size
+        self.layers = Layers(painter.ctx, size, dtype)
         self._maps: Maps | None = None
 
     def shows(self, level: Level) -> bool:
@@ -71,16 +70,14 @@ class WeightMaps:
     def of(self, level: Level) -> Maps:
         """The maps of the level as it stands, drawn unless they are there."""
         if self._maps is None or self._maps.version != level.order_key:
-            self._maps = self._drawn(level)
+            self._maps = self.draw(level)
         return self._maps
 
-    def _drawn(self, level: Level) -> Maps:
-        measured = level.splats.footprints is not None
-        if measured and (cells := cells_of(level.splats, self._size)) is not None:
-            return self._drawn_in_cells(level, cells)
+    def draw(self, level: Level) -> Maps:
+        """Of the atoms in view, in passes of `layout.ATOMS_A_PASS`."""
         atoms = level.splats.active_atoms()
         whole_passes = -(-len(atoms) // ATOMS_A_PASS) * LAYERS_A_PASS
-        layers = self._layers.at_least(max(1, whole_passes))
+        layers = self.layers.at_least(max(1, whole_passes))
         for first in range(0, len(atoms), ATOMS_A_PASS):
             self._draw(level.splats, layers, atoms, first)
         return Maps(layers, atoms, level.order_key)
@@ -89,46 +86,20 @@ class WeightMaps:
         """One pass, of the atoms from place `first` on."""
         count = num_layers(min(ATOMS_A_PASS, len(atoms) - first))
         expanded = splats.expand(atoms, first, count)
-        program = self._painter.programs.get("quad.vert", "weights.frag", {"LAYERS": count, **splats.defines})
-        set_uniforms(program, image_size=tuple(float(n) for n in self._size))
+        defines = {"LAYERS": count, **splats.shapes.defines}
+        program = self.painter.programs.get("quad.vert", "weights.frag", defines)
+        set_uniforms(program, image_size=tuple(float(n) for n in self.size))
         target = layers.layers(first // ATOMS_A_LAYER, count)
         target.clear()
         with drawing(target, PREMULTIPLIED):
             splats.draw(program, expanded, count, colour=False)
-        self._painter.passes["weights"] += 1
-
-    def _drawn_in_cells(self, level: Level, cells: Cells) -> Maps:
-        """The same, each cell of the picture with its own atoms alone (cells.py).
-
-        Cells that need as many layers are drawn beside each other, into the first ones of an array for that,
-        and go from there to their atoms' layers: a framebuffer for each cell leaves all processors but one
-        without work.
-        """
-        atoms = together(cells.atoms)
-        passes = -(-len(atoms) // ATOMS_A_PASS)
-        layers = self._layers.at_least(max(1, passes * LAYERS_A_PASS))
-        for first in range(0, num_layers(len(atoms)), LAYERS_A_PASS):
-            layers.layers(first, LAYERS_A_PASS).clear()
-        for batch in batches(cells.atoms, atoms, layers.num_layers):
-            self._draw_batch(level.splats, cells, batch, batch.slots(atoms, cells.atoms.shape[1]))
-            boxes = cells.boxes[batch.cells].tolist()
-            for place, chosen in enumerate(batch.layers.T.tolist()):
-                self._cells.at_least(1).copy(place, layers, zip(boxes, chosen, strict=True))
-        self._painter.passes["weights"] += passes
-        return Maps(layers, atoms, level.order_key)
-
-    def _draw_batch(self, splats: SplatBuffers, cells: Cells, batch: Batch, slots: np.ndarray) -> None:
-        count = batch.layers.shape[1]
-        program = self._painter.programs.get("quad.vert", "weights.frag", {"LAYERS": count, **splats.defines})
-        set_uniforms(program, image_size=tuple(float(n) for n in self._size))
-        target = self._cells.at_least(count).layers(0, count)
-        target.clear()
-        with drawing(target, PREMULTIPLIED):
-            places = [cells.places[cell] for cell in batch.cells]
-            splats.draw_cells(program, cells.boxes[batch.cells], places, slots, count)
-        target.scissor = (0, 0, *self._size)
+        self.painter.passes["weights"] += 1
 
     def release(self) -> None:
-        self._cells.release()
-        self._layers.release()
+        """Give the layers back; whoever asks for maps draws them anew."""
+        self.layers.release()
         self._maps = None
+
+
+MakeMaps = Callable[[Painter, tuple[int, int], str], WeightMaps]
+"""For pictures of (width, height) pixels, of a type of textures."""

@@ -4,7 +4,7 @@ A folder a feature (scene, asking, editing, exporting, recovery), a file a role 
 what is shown, `commands` what can happen, `work` what takes long, on the worker's thread; `effects` alone
 touch the disk, the worker and the picture; panels turn the state into pictures and hands into commands.
 What they share is here: `session` joins it in one loop, `frame` puts the panels in their places, `kit`
-is what panels are made of, `viewport` draws as much as the quality `governor` allows.
+is what panels are made of, `viewport` shows what `drawing` draws, as much as the quality `governor` allows.
 """
 
 from collections.abc import Sequence

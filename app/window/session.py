@@ -23,6 +23,7 @@ from langflash_core.memory import keep_large_apart
 from . import desktop
 from .asking.effects import AskingEffects
 from .commands import Command, CopyText, Measured, Notify, OfScene, PictureDrawn, ShowPicture, Tick, apply
+from .drawing.values import BACKGROUND
 from .editing.effects import EditingEffects
 from .effects import Effects, Hands
 from .events import Events
@@ -44,7 +45,7 @@ from .scene.commands import OpenPaths
 from .scene.effects import SceneEffects
 from .state import State, Stats
 from .typed import TypedEffects
-from .viewport import BACKGROUND, Viewport
+from .viewport import Viewport
 from .worker import Worker
 
 log = logging.getLogger(__name__)

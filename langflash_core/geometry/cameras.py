@@ -3,10 +3,11 @@
 import math
 
 import torch
+from jaxtyping import Float, Shaped
 from torch import Tensor
 
 
-def intrinsics_from_fov(fov_degrees: float, width: int, height: int) -> Tensor:
+def intrinsics_from_fov(fov_degrees: float, width: int, height: int) -> Float[Tensor, "3 3"]:
     """K (3, 3) of a centred camera whose *longer* image side spans `fov_degrees`.
 
     Raises:
@@ -18,7 +19,7 @@ def intrinsics_from_fov(fov_degrees: float, width: int, height: int) -> Tensor:
     return torch.tensor([[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]])
 
 
-def fov_degrees(K: Tensor, width: int, height: int) -> tuple[float, float]:
+def fov_degrees(K: Float[Tensor, "3 3"], width: int, height: int) -> tuple[float, float]:
     """Horizontal and vertical field of view in degrees; the principal point may be off centre."""
     (fx, _, cx), (_, fy, cy) = K[0].tolist(), K[1].tolist()
     horizontal = math.atan(cx / fx) + math.atan((width - cx) / fx)
@@ -26,7 +27,7 @@ def fov_degrees(K: Tensor, width: int, height: int) -> tuple[float, float]:
     return math.degrees(horizontal), math.degrees(vertical)
 
 
-def pixel_grid(width: int, height: int, *, like: Tensor) -> Tensor:
+def pixel_grid(width: int, height: int, *, like: Shaped[Tensor, "..."]) -> Float[Tensor, "H W 2"]:
     """Pixel centres (H, W, 2) as (x, y), of `like`'s dtype and device."""
     ys = torch.arange(height, dtype=like.dtype, device=like.device) + 0.5
     xs = torch.arange(width, dtype=like.dtype, device=like.device) + 0.5
@@ -34,7 +35,7 @@ def pixel_grid(width: int, height: int, *, like: Tensor) -> Tensor:
     return torch.stack((grid_x, grid_y), -1)
 
 
-def rays(Ks: Tensor, width: int, height: int) -> Tensor:
+def rays(Ks: Float[Tensor, "*n 3 3"], width: int, height: int) -> Float[Tensor, "*n H W 3"]:
     """Viewing directions (..., H, W, 3) with z = 1 in the camera frame, for K (..., 3, 3)."""
     grid = pixel_grid(width, height, like=Ks)
     focal = torch.stack((Ks[..., 0, 0], Ks[..., 1, 1]), -1)[..., None, None, :]
@@ -43,7 +44,9 @@ def rays(Ks: Tensor, width: int, height: int) -> Tensor:
     return torch.cat((xy, torch.ones_like(xy[..., :1])), -1)
 
 
-def unproject(depths: Tensor, Ks: Tensor, orthographic: bool = False) -> Tensor:
+def unproject(
+    depths: Float[Tensor, "*n H W"], Ks: Float[Tensor, "... 3 3"], orthographic: bool = False
+) -> Float[Tensor, "*n H W 3"]:
     """Points (..., H, W, 3) in the camera frame from z-depths (..., H, W)."""
     height, width = depths.shape[-2:]
     ahead = rays(Ks, width, height)
@@ -52,19 +55,25 @@ def unproject(depths: Tensor, Ks: Tensor, orthographic: bool = False) -> Tensor:
     return ahead * depths[..., None]
 
 
-def project(pos_c: Tensor, K: Tensor, eps: float = 1e-8) -> Tensor:
+def project(
+    pos_c: Float[Tensor, "*n 3"], K: Float[Tensor, "... 3 3"], eps: float = 1e-8
+) -> Float[Tensor, "... 2"]:
     """Pixels (..., 2) of camera-frame points (..., 3); K (3, 3) or broadcastable to (..., 3, 3)."""
     xy = pos_c[..., :2] / pos_c[..., 2:].clamp_min(eps)
     focal = torch.stack((K[..., 0, 0], K[..., 1, 1]), -1)
     return xy * focal + K[..., :2, 2]
 
 
-def transform(matrices: Tensor, points: Tensor) -> Tensor:
+def transform(
+    matrices: Float[Tensor, "... 4 4"], points: Float[Tensor, "... n 3"]
+) -> Float[Tensor, "... n 3"]:
     """Rigid matrices (..., 4, 4) applied to points (..., n, 3)."""
     return points @ matrices[..., :3, :3].transpose(-1, -2) + matrices[..., None, :3, 3]
 
 
-def pictured(viewmat: Tensor, K: Tensor, points: Tensor, eps: float = 1e-8) -> tuple[Tensor, Tensor, Tensor]:
+def pictured(
+    viewmat: Float[Tensor, "4 4"], K: Float[Tensor, "3 3"], points: Float[Tensor, "3 n"], eps: float = 1e-8
+) -> tuple[Float[Tensor, " n"], Float[Tensor, " n"], Float[Tensor, " n"]]:
     """Pixel x, y and depth z (n,) in one view, of points (3, n), a row an axis.
 
     `transform` and `project` of many points in the layout that a processor goes through fastest.
@@ -74,7 +83,7 @@ def pictured(viewmat: Tensor, K: Tensor, points: Tensor, eps: float = 1e-8) -> t
     return x / ahead * K[0, 0] + K[0, 2], y / ahead * K[1, 1] + K[1, 2], z
 
 
-def invert_rigid(matrices: Tensor) -> Tensor:
+def invert_rigid(matrices: Float[Tensor, "*n 4 4"]) -> Float[Tensor, "*n 4 4"]:
     """Inverse of rigid (..., 4, 4) without a linear solve: [R^T, -R^T t]."""
     rotations = matrices[..., :3, :3].transpose(-1, -2)
     inverse = torch.zeros_like(matrices)
@@ -84,7 +93,9 @@ def invert_rigid(matrices: Tensor) -> Tensor:
     return inverse
 
 
-def rotation_angle_degrees(left: Tensor, right: Tensor) -> Tensor:
+def rotation_angle_degrees(
+    left: Float[Tensor, "... 3 3"], right: Float[Tensor, "... 3 3"]
+) -> Float[Tensor, "..."]:
     """Angle (...) in degrees between rotations (..., 3, 3).
 
     atan2 of the skew and symmetric parts keeps small angles exact where arccos would not.

@@ -1,6 +1,7 @@
 """Real spherical harmonics as used by 3D Gaussian splatting: colour = 0.5 + sum_b Y_b(d) c_b."""
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 SH_C0 = 0.28209479177387814
@@ -13,12 +14,12 @@ _C3 = (
 MAX_SHOWN_DEGREE = 3
 
 
-def colour_to_sh(colours: Tensor) -> Tensor:
+def colour_to_sh(colours: Float[Tensor, "*n 3"]) -> Float[Tensor, "*n 3"]:
     """Degree-0 coefficient (..., 3) of a colour in [0, 1]."""
     return (colours - 0.5) / SH_C0
 
 
-def sh_basis(directions: Tensor, degree: int) -> Tensor:
+def sh_basis(directions: Float[Tensor, "*n 3"], degree: int) -> Float[Tensor, "*n S"]:
     """Y_b(d), (..., (degree + 1)^2), for unit directions (..., 3), degree 0 to 3.
 
     Source: Kerbl et al. 2023, the constants and signs of the reference implementation.
@@ -41,7 +42,7 @@ def sh_basis(directions: Tensor, degree: int) -> Tensor:
     return torch.stack(bases, -1)
 
 
-def sh_to_colour(sh: Tensor, directions: Tensor) -> Tensor:
+def sh_to_colour(sh: Float[Tensor, "N S 3"], directions: Float[Tensor, "N 3"]) -> Float[Tensor, "N 3"]:
     """Colours (N, 3), clamped at 0, of sh (N, S, 3) seen along unit directions (N, 3).
 
     Directions point from the camera to the Gaussian. Degrees above 3 are kept in files but

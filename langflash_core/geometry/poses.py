@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Float, Num
 
 from langflash_core.geometry import rotations
 from langflash_core.geometry.reach import MIN_REACH
@@ -73,12 +74,12 @@ class Pose:
     span: float | None = None
 
     @property
-    def axes(self) -> np.ndarray:
+    def axes(self) -> Float[np.ndarray, "3 3"]:
         """Camera to world rotation (3, 3); its columns are right, down, forward."""
         return rotations.matrix(self.rotation)
 
     @property
-    def pivot(self) -> np.ndarray:
+    def pivot(self) -> Float[np.ndarray, "3"]:
         """The point (3,) that orbits turn around."""
         return np.array(self.centre) + self.reach * self.axes[:, 2]
 
@@ -92,7 +93,11 @@ START = Pose()  # of an empty window
 
 
 def from_view(
-    viewmat: np.ndarray, K: np.ndarray, size: tuple[int, int], reach: float, orthographic: bool = False
+    viewmat: Float[np.ndarray, "4 4"],
+    K: Float[np.ndarray, "3 3"],
+    size: tuple[int, int],
+    reach: float,
+    orthographic: bool = False,
 ) -> Pose:
     """The pose of an input view: viewmat (4, 4) world to camera, K (3, 3), size (width, height)."""
     width, height = size
@@ -109,7 +114,7 @@ def from_view(
     )
 
 
-def intrinsics(pose: Pose, width: int, height: int) -> np.ndarray:
+def intrinsics(pose: Pose, width: int, height: int) -> Float[np.ndarray, "3 3"]:
     """K (3, 3) in pixels of a width x height picture that holds the pose's whole box; with a span, focal
     lengths in pixels per scene unit."""
     box_width = min(width, height * pose.aspect)
@@ -121,7 +126,7 @@ def intrinsics(pose: Pose, width: int, height: int) -> np.ndarray:
     return np.array([[focal, 0.0, centre_x], [0.0, focal, centre_y], [0.0, 0.0, 1.0]])
 
 
-def viewmat(pose: Pose) -> np.ndarray:
+def viewmat(pose: Pose) -> Float[np.ndarray, "4 4"]:
     """World to camera (4, 4)."""
     matrix = np.eye(4)
     matrix[:3, :3] = pose.axes.T
@@ -145,8 +150,8 @@ def to_camera(pose: Pose, width: int, height: int) -> "Camera":
 
 
 def project(
-    points: np.ndarray, pose: Pose, size: tuple[float, float]
-) -> tuple[np.ndarray, np.ndarray] | None:
+    points: Num[np.ndarray, "n 3"], pose: Pose, size: tuple[float, float]
+) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 2"]] | None:
     """Camera coordinates (n, 3) and pixels (n, 2) of world points in a picture of `size`; None where one is
     not in front."""
     matrix = viewmat(pose)

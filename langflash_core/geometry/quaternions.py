@@ -1,11 +1,12 @@
 """Unit quaternions, wxyz. q and -q are the same rotation."""
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 from torch.nn.functional import normalize
 
 
-def unit_quats(quats: Tensor, eps: float = 1e-12) -> Tensor:
+def unit_quats(quats: Float[Tensor, "*n 4"], eps: float = 1e-12) -> Float[Tensor, "*n 4"]:
     """Unit quaternions (..., 4) of any finite ones; where no entry exceeds `eps`, the identity.
 
     Divided by the largest entry first: squares of float32 overflow above 1e19.
@@ -16,7 +17,7 @@ def unit_quats(quats: Tensor, eps: float = 1e-12) -> Tensor:
     return torch.where(largest > eps, normalize(quats / largest.clamp_min(eps), dim=-1), identity)
 
 
-def quats_to_matrices(quats: Tensor, eps: float = 1e-12) -> Tensor:
+def quats_to_matrices(quats: Float[Tensor, "*n 4"], eps: float = 1e-12) -> Float[Tensor, "*n 3 3"]:
     """Rotation matrices of quaternions that need not be unit.
 
     Args:
@@ -36,7 +37,7 @@ def quats_to_matrices(quats: Tensor, eps: float = 1e-12) -> Tensor:
     return torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
 
 
-def matrices_to_quats(matrices: Tensor) -> Tensor:
+def matrices_to_quats(matrices: Float[Tensor, "*n 3 3"]) -> Float[Tensor, "*n 4"]:
     """Quaternions wxyz with w >= 0 of rotation matrices (..., 3, 3).
 
     The four candidate forms differ in their divisor; the largest divisor is the stable one.
@@ -62,7 +63,7 @@ def matrices_to_quats(matrices: Tensor) -> Tensor:
     return torch.where(quats[..., :1] < 0, -quats, quats)
 
 
-def multiply_quats(left: Tensor, right: Tensor) -> Tensor:
+def multiply_quats(left: Float[Tensor, "... 4"], right: Float[Tensor, "... 4"]) -> Float[Tensor, "... 4"]:
     """Hamilton product (..., 4): the rotation `right` first, then `left`."""
     a, b, c, d = left.unbind(-1)
     e, f, g, h = right.unbind(-1)

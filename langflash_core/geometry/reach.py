@@ -1,12 +1,18 @@
 """How far away is what a camera looks at."""
 
 import numpy as np
+from jaxtyping import Float
 
 MIN_REACH = 0.02
 """Scene units; what is nearer is inside the lens."""
 
 
-def median_reach(means: np.ndarray, viewmat: np.ndarray, K: np.ndarray, size: tuple[int, int]) -> float:
+def median_reach(
+    means: Float[np.ndarray, "N 3"],
+    viewmat: Float[np.ndarray, "4 4"],
+    K: Float[np.ndarray, "3 3"],
+    size: tuple[int, int],
+) -> float:
     """Median depth of what lies in the middle half of a view: the distance to orbit at.
 
     Args:

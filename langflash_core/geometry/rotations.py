@@ -7,12 +7,12 @@ vectors.
 
 import numpy as np
 import pyrr
-from jaxtyping import Float
+from jaxtyping import Float, Num
 
 Quaternion = tuple[float, float, float, float]  # wxyz
 
 
-def about(axis: np.ndarray, angle: float) -> Float[np.ndarray, "3 3"]:
+def about(axis: Num[np.ndarray, "3"], angle: float) -> Float[np.ndarray, "3 3"]:
     """By `angle` radians about an axis (3,) of any length but 0."""
     return pyrr.matrix33.create_from_axis_rotation(axis / np.linalg.norm(axis), angle).T
 

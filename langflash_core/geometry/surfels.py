@@ -4,13 +4,16 @@ Sizes: ... any leading sizes, H W pixels.
 """
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
 STRETCH = 5.0  # a surface seen edge-on is not stretched further than this many footprints
 
 
-def spans(pos_c: Tensor, footprint: Tensor) -> tuple[Tensor, Tensor]:
+def spans(
+    pos_c: Float[Tensor, "*n H W 3"], footprint: Float[Tensor, "*n H W"]
+) -> tuple[Float[Tensor, "*n H W 3"], Float[Tensor, "*n H W 3"]]:
     """Tangents (..., H, W, 3) of points (..., H, W, 3) from a pixel to the next, along columns and rows.
 
     The shorter of the forward and backward differences: the nearer side of a jump of depth.
@@ -30,7 +33,9 @@ def _difference(pos_c: Tensor, dim: int, footprint: Tensor) -> Tensor:
     return shorter * (STRETCH * footprint[..., None] / longest).clamp_max(1)
 
 
-def ellipses(span_u: Tensor, span_v: Tensor) -> tuple[Tensor, Tensor]:
+def ellipses(
+    span_u: Float[Tensor, "*n 3"], span_v: Float[Tensor, "*n 3"]
+) -> tuple[Float[Tensor, "*n 3 3"], Float[Tensor, "*n 2"]]:
     """The ellipse whose covariance is t_u t_u^T + t_v t_v^T; its 2 x 2 eigenproblem is closed-form.
 
     Args:

@@ -9,6 +9,7 @@ Right or Left, Down or Up, Forward or Back.
 from functools import lru_cache
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE, sh_basis
@@ -18,7 +19,7 @@ _SIGNS = {"R": 1, "L": -1, "D": 1, "U": -1, "F": 1, "B": -1}  # along right, dow
 _AXIS = {**dict.fromkeys("RL", 0), **dict.fromkeys("DU", 1), **dict.fromkeys("FB", 2)}
 
 
-def axes_matrix(letters: str) -> Tensor:
+def axes_matrix(letters: str) -> Float[Tensor, "3 3"]:
     """M (3, 3) float64 from right-down-forward, the axes of a `Scene`, to those named."""
     matrix = torch.zeros(3, 3, dtype=torch.float64)
     for row, letter in enumerate(letters):
@@ -26,7 +27,7 @@ def axes_matrix(letters: str) -> Tensor:
     return matrix
 
 
-def turned_quats(quats: Tensor, matrix: Tensor) -> Tensor:
+def turned_quats(quats: Float[Tensor, "N 4"], matrix: Float[Tensor, "3 3"]) -> Float[Tensor, "N 4"]:
     """Quaternions wxyz (N, 4) of R' for those of R.
 
     Where M only turns axes round, R' = M R M: the same Gaussian, and the numbers keep their places.
@@ -39,7 +40,7 @@ def turned_quats(quats: Tensor, matrix: Tensor) -> Tensor:
     return multiply_quats(turn.to(quats), quats)
 
 
-def turned_sh(sh: Tensor, matrix: Tensor) -> Tensor:
+def turned_sh(sh: Float[Tensor, "N S 3"], matrix: Float[Tensor, "3 3"]) -> Float[Tensor, "N _ 3"]:
     """Coefficients (N, S, 3) of c'(d) = c(M^T d); degrees above 3, which nobody shows, are left out."""
     sh = sh[:, : (MAX_SHOWN_DEGREE + 1) ** 2]
     if sh.shape[1] == 1:

@@ -8,6 +8,7 @@ import re
 from collections.abc import Sequence
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.errors import PromptError
@@ -34,7 +35,7 @@ def terms(prompt: str) -> list[tuple[int, str]]:
     return pairs
 
 
-def encode_prompts(space: LanguageSpace, prompts: Sequence[str]) -> Tensor:
+def encode_prompts(space: LanguageSpace, prompts: Sequence[str]) -> Float[Tensor, "P C"]:
     """Unit embeddings (P, C) of prompts that may be sums and differences of phrases.
 
     t = normalise(sum_j sign_j e_j), all phrases encoded in one pass.

@@ -6,6 +6,7 @@ A phrase is present where its best pixels pass the threshold, not where it is le
 import math
 
 import torch
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from langflash_core.errors import PromptError
@@ -23,7 +24,7 @@ _FEW_POINTS = 3  # fewer have no principal axes
 
 
 def answer(
-    relevance: Tensor,
+    relevance: Float[Tensor, "P H W"],
     frame: Frame,
     camera: Camera,
     compiled: CompiledQuery,
@@ -61,7 +62,7 @@ def answer(
     return QueryResult(answers, compiled.mode, relevance, masks, frame, camera)
 
 
-def presence_scores(relevance: Tensor, covered: Tensor) -> Tensor:
+def presence_scores(relevance: Float[Tensor, "P H W"], covered: Bool[Tensor, "H W"]) -> Float[Tensor, " P"]:
     """Scores (P,) of maps (P, H, W): mean of the highest 0.1 % where `covered` (H, W); 0 if nowhere."""
     inside = relevance[:, covered]  # (P, n)
     count = inside.shape[1]
@@ -71,7 +72,7 @@ def presence_scores(relevance: Tensor, covered: Tensor) -> Tensor:
 
 
 def best_places(
-    relevance: Tensor, frame: Frame, camera: Camera
+    relevance: Float[Tensor, "P H W"], frame: Frame, camera: Camera
 ) -> tuple[tuple[float, float, float] | None, ...]:
     """Where each of P maps (P, H, W) is highest among the covered pixels, scene units; None without any.
 
@@ -90,20 +91,20 @@ def best_places(
     return tuple(places)
 
 
-def world_points(depths: Tensor, camera: Camera) -> Tensor:
+def world_points(depths: Float[Tensor, "H W"], camera: Camera) -> Float[Tensor, "H W 3"]:
     """World points (H, W, 3) of z-depths (H, W) seen by `camera`."""
     points = unproject(depths, camera.K.to(depths), camera.orthographic).flatten(0, 1)
     return transform(invert_rigid(camera.viewmat.to(depths)), points).unflatten(0, depths.shape)
 
 
-def weighted_centroid(points: Tensor, weights: Tensor) -> Tensor:
+def weighted_centroid(points: Float[Tensor, "n 3"], weights: Float[Tensor, " n"]) -> Float[Tensor, "3"]:
     """Mean (3,) of points (n, 3) with weights (n,) >= 0; plain mean where all weights are 0."""
     total = weights.sum()
     shares = weights / total if total > 0 else torch.full_like(weights, 1 / len(weights))
     return shares @ points
 
 
-def oriented_box(points: Tensor) -> dict:
+def oriented_box(points: Float[Tensor, "n 3"]) -> dict:
     """Oriented box of points (n, 3), n >= 1, extents from the 2nd to 98th percentile.
 
     Gravity is not known. Two sets of axes are tried, the world's (those of view 0, upright
@@ -134,7 +135,7 @@ def _extents(points: Tensor, axes: Tensor) -> tuple[Tensor, Tensor]:
     return low, high
 
 
-def principal_axes(points: Tensor) -> Tensor:
+def principal_axes(points: Float[Tensor, "n 3"]) -> Float[Tensor, "3 3"]:
     """Rows (3, 3): orthonormal principal axes of points (n, 3), longest first, determinant 1.
 
     The 4 % farthest from the median point are left out: squares let a few outliers turn axes.

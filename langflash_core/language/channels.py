@@ -32,10 +32,10 @@ class Decoder:
     basis: (d, C). hidden: A (d, h); shift: b (h); out: (h, C).
     """
 
-    basis: Tensor
-    hidden: Tensor
-    shift: Tensor
-    out: Tensor
+    basis: Float[Tensor, "d C"]
+    hidden: Float[Tensor, "d h"]
+    shift: Float[Tensor, " h"]
+    out: Float[Tensor, "h C"]
 
     @staticmethod
     def fitted(features: Float[Tensor, "n C"], channels: int) -> "Decoder":

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from jaxtyping import Float
 from safetensors import SafetensorError
 from torch import Tensor
 from torch.nn.functional import normalize
@@ -49,7 +50,7 @@ class ClipImages:
     def __init__(self, model: Any) -> None:
         self.model = model.requires_grad_(False).eval()
 
-    def encode(self, pictures: Tensor) -> Tensor:
+    def encode(self, pictures: Float[Tensor, "n 3 224 224"]) -> Float[Tensor, "n 512"]:
         """Unit embeddings (n, 512) float32 of pictures (n, 3, 224, 224) in [0, 1]."""
         if len(pictures) == 0:
             return torch.zeros(0, DIMENSION)
@@ -65,7 +66,7 @@ class ClipText:
         self.model = model.requires_grad_(False).eval()
         self.tokenizer = tokenizer
 
-    def encode(self, texts: Sequence[str]) -> Tensor:
+    def encode(self, texts: Sequence[str]) -> Float[Tensor, "P 512"]:
         """Unit embeddings (P, 512) float32; phrases are cut at 77 tokens.
 
         Raises:

@@ -1,6 +1,7 @@
 """Which Gaussians answer a phrase: relevance of f_i = sum_k w_ik d_k itself, without a view."""
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.language.relevance import CompiledQuery, relevance_maps
@@ -9,7 +10,7 @@ from langflash_core.types import Semantics
 _AT_ONCE = 1 << 16  # rows of dense weights: 33 MB for K = 128
 
 
-def gaussian_relevance(semantics: Semantics, compiled: CompiledQuery) -> Tensor:
+def gaussian_relevance(semantics: Semantics, compiled: CompiledQuery) -> Float[Tensor, "P N"]:
     """Relevance (P, N) of prompts at Gaussians, as `compiled.mode` says; 0 where one carries nothing.
 
     `compiled.factor` may come from an edited dictionary of the same K atoms.

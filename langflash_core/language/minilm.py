@@ -15,6 +15,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import torch
+from jaxtyping import Float, Int, Shaped
 from safetensors import SafetensorError
 from safetensors.torch import load_file
 from tokenizers import Tokenizer
@@ -36,15 +37,15 @@ _SPECIAL_TOKENS = 2  # [CLS] and [SEP]
 class RowInt8Table(nn.Module):
     """An embedding table kept as int8 rows and one scale per row."""
 
-    rows: Tensor
-    scales: Tensor
+    rows: Int[Tensor, "T C"]
+    scales: Float[Tensor, " T"]
 
-    def __init__(self, rows: Tensor, scales: Tensor) -> None:
+    def __init__(self, rows: Int[Tensor, "T C"], scales: Float[Tensor, " T"]) -> None:
         super().__init__()
         self.register_buffer("rows", rows)  # (T, C) int8
         self.register_buffer("scales", scales.float())  # (T,)
 
-    def forward(self, ids: Tensor) -> Tensor:
+    def forward(self, ids: Int[Tensor, "*n"]) -> Float[Tensor, "*n C"]:
         """Float rows (..., C) of int64 ids (...)."""
         return self.rows[ids] * self.scales[ids][..., None]
 
@@ -52,9 +53,9 @@ class RowInt8Table(nn.Module):
 class MiniLM(nn.Module):
     """The tower: token embeddings, six BERT layers, mean over tokens, unit length."""
 
-    positions: Tensor
+    positions: Float[Tensor, "T C"]
 
-    def __init__(self, tensors: dict[str, Tensor], tokenizer: Tokenizer) -> None:
+    def __init__(self, tensors: dict[str, Shaped[Tensor, "..."]], tokenizer: Tokenizer) -> None:
         super().__init__()
         prefix = "embeddings."
         self.words = RowInt8Table(
@@ -71,7 +72,7 @@ class MiniLM(nn.Module):
         self.requires_grad_(False).eval()
         self.tokenizer = _prepared(tokenizer)
 
-    def encode(self, texts: Sequence[str]) -> Tensor:
+    def encode(self, texts: Sequence[str]) -> Float[Tensor, "P 384"]:
         """Unit embeddings (P, 384) float32 of P phrases; P may be 0.
 
         Deterministic. A phrase gives the same vector alone or in a list, to 1e-5: padding is
@@ -104,7 +105,7 @@ class MiniLM(nn.Module):
             raise PromptError(f"the prompt {text!r} holds no word the text model knows; use plain words")
         return ids
 
-    def forward(self, ids: Tensor, mask: Tensor) -> Tensor:
+    def forward(self, ids: Int[Tensor, "B T"], mask: Shaped[Tensor, "B T"]) -> Float[Tensor, "B C"]:
         """Unit embeddings (B, C) of padded ids (B, T) int64 with mask (B, T), true at real tokens."""
         hidden = self.norm(self.words(ids) + self.positions[: ids.shape[1]])  # (B, T, C)
         padding = None if mask.all() else ~mask

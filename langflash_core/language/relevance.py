@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import torch
+from jaxtyping import Bool, Float
 from torch import Tensor
 
 from langflash_core.errors import PromptError, SceneFileError
@@ -38,9 +39,9 @@ class CompiledQuery:
     negative_texts: the phrases.
     """
 
-    factor: Tensor
-    prompts: Tensor
-    negatives: Tensor
+    factor: Float[Tensor, "K r"]
+    prompts: Float[Tensor, "P r"]
+    negatives: Float[Tensor, "M r"]
     temperature: float
     threshold: float
     mode: Mode
@@ -58,12 +59,12 @@ class Calibration:
     negatives: tuple[str, ...]
 
 
-def finite_atoms(dictionary: Tensor) -> Tensor:
+def finite_atoms(dictionary: Float[Tensor, "K C"]) -> Bool[Tensor, " K"]:
     """(K,) bool: every number of the atom is finite; the others count as atoms of length 0."""
     return torch.isfinite(dictionary).all(-1)
 
 
-def reduce_dictionary(dictionary: Tensor) -> tuple[Tensor, Tensor]:
+def reduce_dictionary(dictionary: Float[Tensor, "K C"]) -> tuple[Float[Tensor, "K r"], Float[Tensor, "r C"]]:
     """Thin factorisation D = R Q of a dictionary (K, C).
 
     Householder QR of D^T in float64: exact also where rows repeat, vanish, or outnumber the
@@ -83,7 +84,7 @@ def reduce_dictionary(dictionary: Tensor) -> tuple[Tensor, Tensor]:
     return r.T.contiguous().to(dictionary), q.T.contiguous().to(dictionary)
 
 
-def finite_dictionary(scene: Scene | Semantics, space: LanguageSpace) -> Tensor:
+def finite_dictionary(scene: Scene | Semantics, space: LanguageSpace) -> Float[Tensor, "K C"]:
     """The dictionary (K, C) as queries see it: as `spoken_dictionary`, atoms that are not finite are 0."""
     dictionary = spoken_dictionary(scene, space)
     return torch.where(finite_atoms(dictionary)[:, None], dictionary, 0.0)
@@ -151,7 +152,9 @@ def compile_query(
     )
 
 
-def relevancy(positives: Tensor, negatives: Tensor, temperature: float) -> Tensor:
+def relevancy(
+    positives: Float[Tensor, " P *at"], negatives: Float[Tensor, " M *at"], temperature: float
+) -> Float[Tensor, " P *at"]:
     """Smallest, over the negatives, of softmax(temperature * [pos, neg])_pos.
 
     Each pair's softmax is sigmoid(temperature * (pos - neg)), which falls as neg rises: the
@@ -173,15 +176,17 @@ def relevancy(positives: Tensor, negatives: Tensor, temperature: float) -> Tenso
     return torch.sigmoid(temperature * (positives - negatives.amax(0)))
 
 
-def relevance_maps(weight_maps: Tensor, compiled: CompiledQuery, eps: float = EMPTY_NORM) -> Tensor:
+def relevance_maps(
+    weight_maps: Float[Tensor, "*at K"], compiled: CompiledQuery, eps: float = EMPTY_NORM
+) -> Float[Tensor, " P *at"]:
     """Relevance of every prompt at every pixel.
 
     Args:
-        weight_maps: (H, W, K), composited w_ik.
+        weight_maps: (..., K), as (H, W, K), composited w_ik.
         eps: floor on |F(p)|.
 
     Returns:
-        (P, H, W), cosine or relevancy as `compiled.mode` says; exactly 0 at empty pixels.
+        (P, ...), cosine or relevancy as `compiled.mode` says; exactly 0 at empty pixels.
 
     Raises:
         ValueError: K disagrees.
@@ -190,8 +195,11 @@ def relevance_maps(weight_maps: Tensor, compiled: CompiledQuery, eps: float = EM
 
 
 def feature_relevance(
-    maps: Tensor, compiled: CompiledQuery, decode: Callable[[Tensor], Tensor], eps: float = EMPTY_NORM
-) -> Tensor:
+    maps: Float[Tensor, "*at d"],
+    compiled: CompiledQuery,
+    decode: Callable[[Tensor], Tensor],
+    eps: float = EMPTY_NORM,
+) -> Float[Tensor, " P *at"]:
     """`relevance_maps` of whatever a decoder makes vectors F of, in the phrases' own numbers.
 
     Args:
@@ -233,7 +241,7 @@ def _cosines(features: Tensor, phrases: Tensor, eps: float) -> tuple[Tensor, Ten
     return torch.where(empty, 0.0, cosines).clamp(-1, 1), empty
 
 
-def spoken_dictionary(scene: Scene | Semantics, space: LanguageSpace) -> Tensor:
+def spoken_dictionary(scene: Scene | Semantics, space: LanguageSpace) -> Float[Tensor, "K C"]:
     """The dictionary (K, C) as people taught the scene (`taught`); silent atoms are 0."""
     if isinstance(scene, Semantics):
         return scene.dictionary

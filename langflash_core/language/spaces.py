@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Protocol
 
+from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.errors import PromptError
@@ -18,7 +19,7 @@ NEGATIVES = ("object", "things", "stuff", "texture")
 class TextTower(Protocol):
     """Anything that turns phrases into unit rows (P, C) float32."""
 
-    def encode(self, texts: Sequence[str]) -> Tensor: ...
+    def encode(self, texts: Sequence[str]) -> Float[Tensor, "P C"]: ...
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class LanguageSpace:
     load: Callable[[], TextTower] = field(repr=False)
     negatives: tuple[str, ...] = NEGATIVES
 
-    def encode(self, texts: Sequence[str]) -> Tensor:
+    def encode(self, texts: Sequence[str]) -> Float[Tensor, "P C"]:
         """Unit embeddings (P, C) float32; the tower is read at the first call.
 
         Raises:
@@ -49,7 +50,7 @@ class LanguageSpace:
 
 
 @lru_cache(maxsize=64)
-def encode_cached(space: LanguageSpace, texts: tuple[str, ...]) -> Tensor:
+def encode_cached(space: LanguageSpace, texts: tuple[str, ...]) -> Float[Tensor, "P C"]:
     """`space.encode(texts)`, remembered: the negatives are the same at every key stroke.
 
     Do not change the result in place.

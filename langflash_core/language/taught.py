@@ -13,6 +13,7 @@ Source: own.
 from collections.abc import Mapping, Sequence
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 from torch.nn.functional import normalize
 
@@ -25,7 +26,9 @@ ALIKE = 0.9
 thing lie above .95, a chair and a sofa below .8."""
 
 
-def taught_dictionary(dictionary: Tensor, record: Record, space: LanguageSpace) -> Tensor:
+def taught_dictionary(
+    dictionary: Float[Tensor, "K C"], record: Record, space: LanguageSpace
+) -> Float[Tensor, "K C"]:
     """The dictionary (K, C) as a scene's names and denials have made it; the same without any.
 
     Raises:

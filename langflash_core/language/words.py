@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery, reduce_dictionary
@@ -18,7 +19,7 @@ class NearWord:
 
 
 def nearest_words(
-    vector: Tensor, words: Sequence[str], embeddings: Tensor, count: int = 5
+    vector: Float[Tensor, " C"], words: Sequence[str], embeddings: Float[Tensor, "A C"], count: int = 5
 ) -> tuple[NearWord, ...]:
     """The words of a vocabulary nearest to a language vector, best first.
 
@@ -47,12 +48,14 @@ def nearest_words(
     return tuple(best.values())
 
 
-def feature_at(weights: Tensor, dictionary: Tensor) -> Tensor:
+def feature_at(weights: Float[Tensor, " K"], dictionary: Float[Tensor, "K C"]) -> Float[Tensor, " C"]:
     """F = W D (C,) of one pixel's weights (K,); atoms that are not finite count as 0."""
     return weights.to(dictionary) @ torch.where(torch.isfinite(dictionary), dictionary, 0.0)
 
 
-def with_vectors(compiled: CompiledQuery, dictionary: Tensor, vectors: Mapping[int, Tensor]) -> CompiledQuery:
+def with_vectors(
+    compiled: CompiledQuery, dictionary: Float[Tensor, "K C"], vectors: Mapping[int, Float[Tensor, " C"]]
+) -> CompiledQuery:
     """The query with language vectors (C,) instead of some of its phrases, by their place.
 
     Args:

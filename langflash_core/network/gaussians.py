@@ -5,6 +5,7 @@ The head only corrects that footprint and decides opacity and colour.
 """
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -25,7 +26,11 @@ _COLOUR_RANGE = 0.1  # and a colour by at most this
 CHANNELS = 1 + 3 + 3  # opacity, three scales, colour
 
 
-def footprints(depths: Tensor, Ks: Tensor, edges: Tensor | None = None) -> tuple[Tensor, Tensor, Tensor]:
+def footprints(
+    depths: Float[Tensor, "*n H W"],
+    Ks: Float[Tensor, "... 3 3"],
+    edges: Float[Tensor, "*n H W 2"] | None = None,
+) -> tuple[Float[Tensor, "... H W 3"], Float[Tensor, "... H W 3 3"], Float[Tensor, "... H W 3"]]:
     """Surface elements that cover one pixel each.
 
     With tangents t_u, t_v (differences of neighbouring points, the nearer side of a depth jump)
@@ -66,7 +71,16 @@ class GaussianHead(nn.Module):
             nn.init.zeros_(parameter)  # starts as the plain footprint of each pixel
         self.head = nn.Sequential(nn.Conv2d(f, f, 3, padding=1), nn.ReLU(), last)
 
-    def forward(self, maps: tuple[Tensor, Tensor, Tensor, Tensor], images: Tensor) -> Tensor:
+    def forward(
+        self,
+        maps: tuple[
+            Float[Tensor, "n _ _ _"],
+            Float[Tensor, "n _ _ _"],
+            Float[Tensor, "n _ _ _"],
+            Float[Tensor, "n _ _ _"],
+        ],
+        images: Float[Tensor, "B V 3 H W"],
+    ) -> Tensor:
         """Raw parameters from level maps (B*V, C_i, h, w) and images (B, V, 3, H, W) in [0, 1]."""
         height, width = images.shape[-2:]
         half = (height // 2, width // 2)
@@ -76,7 +90,11 @@ class GaussianHead(nn.Module):
 
 
 def assemble_gaussians(
-    raw: Tensor, images: Tensor, depth_maps: DepthMaps, viewmats: Tensor, Ks: Tensor
+    raw: Float[Tensor, "V 7 H W"],
+    images: Float[Tensor, "V 3 H W"],
+    depth_maps: DepthMaps,
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
 ) -> Gaussians:
     """Gaussians of one scene, N = V*H*W in the order (v h w), world = view 0.
 

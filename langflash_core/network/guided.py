@@ -11,6 +11,7 @@ from typing import cast
 import cv2
 import numpy as np
 import torch
+from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -103,7 +104,7 @@ class GuidedDepthNet(LangFlashNet):
         with torch.autocast(images.device.type, torch.bfloat16) if self.mixed else nullcontext():
             yield
 
-    def encode(self, images: Tensor, Ks: Tensor) -> Tokens:
+    def encode(self, images: Float[Tensor, "B V 3 H W"], Ks: Float[Tensor, "B V 3 3"]) -> Tokens:
         """Four hooks of the frozen encoder and two of the half that real photos taught; the intrinsics
         join later."""
         return Tokens.beside([self._encoded(images[:, some]) for some in groups_of(images.shape[1])])
@@ -114,7 +115,11 @@ class GuidedDepthNet(LangFlashNet):
             named = tuple(unflattened(t, images) for t in self.late(early, self.encoder.vit))
         return replace(tokens, named=named).each(self._exact)
 
-    def levels(self, tokens: Tokens, Ks: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    def levels(
+        self, tokens: Tokens, Ks: Float[Tensor, "B V 3 3"]
+    ) -> tuple[
+        Float[Tensor, "n _ _ _"], Float[Tensor, "n _ _ _"], Float[Tensor, "n _ _ _"], Float[Tensor, "n _ _ _"]
+    ]:
         """Level maps (B*V, C_i, h, w) of the geometry heads: two encoder hooks, two decoder depths.
 
         Of many photos each reads those most like it.
@@ -142,11 +147,11 @@ class GuidedDepthNet(LangFlashNet):
         logs, errors = (part.log_depths for part in parts), (part.log_errors for part in parts)
         return DepthMaps(together(logs, count, 1), together(errors, count, 1))
 
-    def monocular_depth(self, tokens: Tokens, Ks: Tensor) -> DepthMaps:
+    def monocular_depth(self, tokens: Tokens, Ks: Float[Tensor, "B V 3 3"]) -> DepthMaps:
         """Prior depth in metres, (B, V, H, W)."""
         return self.depth_head(self.levels(tokens, Ks), tokens)
 
-    def language(self, tokens: Tokens, images: Tensor) -> Tensor:
+    def language(self, tokens: Tokens, images: Float[Tensor, "B V 3 H W"]) -> Float[Tensor, "B V C h w"]:
         """L(x) from the shared tokens, at four times their grid; of very many photos at twice."""
         count = tokens.shape[1]
 
@@ -159,7 +164,9 @@ class GuidedDepthNet(LangFlashNet):
 
         return together(map(features, groups_of(count)), count, 1)
 
-    def semantic_maps(self, tokens: Tokens, images: Tensor) -> tuple[tuple[Tensor, ...], Tensor]:
+    def semantic_maps(
+        self, tokens: Tokens, images: Float[Tensor, "B V 3 H W"]
+    ) -> tuple[tuple[Float[Tensor, "n C _ _"], ...], Float[Tensor, "n C h w"]]:
         """Memories at 1, 2 and 4 times the grid, and the mask map at 8 times."""
         with self._fast(images):
             memories, finest = self.scratch(tokens, self.siamese(tokens), images)
@@ -170,8 +177,12 @@ class GuidedDepthNet(LangFlashNet):
         return values.float() if self.mixed else values
 
     def parts(
-        self, tokens: Tokens, images: Tensor, size: tuple[int, int], features: Tensor | None = None
-    ) -> Tensor:
+        self,
+        tokens: Tokens,
+        images: Float[Tensor, "B V 3 H W"],
+        size: tuple[int, int],
+        features: Float[Tensor, "B V C h w"] | None = None,
+    ) -> Float[Tensor, "V J H W"]:
         """The surviving groups, cut into parts, also by what their pixels are called."""
         if features is None:
             features = self.language(tokens, images)
@@ -217,7 +228,9 @@ class GuidedDepthNet(LangFlashNet):
 
         return split_maps([partial(joint, number) for number in range(len(some))], len(features), rule, size)
 
-    def named(self, atoms: Tensor, weights: Tensor, seen: Seen) -> Tensor:
+    def named(
+        self, atoms: Float[Tensor, "K C"], weights: Float[Tensor, "V K H W"], seen: Seen
+    ) -> Float[Tensor, "K C"]:
         """Atoms corrected by deep tokens, places and each other."""
         if len(atoms) == 0:
             return atoms
@@ -225,7 +238,13 @@ class GuidedDepthNet(LangFlashNet):
         return self.namer(atoms, describe(weights, seen.tokens), where)
 
     def reconstruct(
-        self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: Run, elements: bool = True
+        self,
+        views: Views,
+        images: Float[Tensor, "B V 3 H W"],
+        Ks: Float[Tensor, "B V 3 3"],
+        tokens: Tokens,
+        run: Run,
+        elements: bool = True,
     ) -> Geometry:
         """Depth, poses, refined depth with edges and flat surfaces that agrees between photos, Gaussians."""
         with run.stage("depth"):

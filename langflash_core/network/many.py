@@ -7,6 +7,7 @@ photo (language features, the map that masks are read from, weights) is held in 
 from collections.abc import Callable, Iterable
 from itertools import pairwise
 
+from jaxtyping import Shaped
 from torch import Tensor
 
 from langflash_core.memory import give_back
@@ -22,7 +23,7 @@ def groups_of(count: int) -> list[slice]:
     return [slice(first, last) for first, last in pairwise(bounds)]
 
 
-def in_groups(work: Callable[..., Tensor], *of_views: Tensor, dim: int = 0) -> Tensor:
+def in_groups(work: Callable[..., Tensor], *of_views: Tensor, dim: int = 0) -> Shaped[Tensor, "..."]:
     """What `work` makes of all views, which are dimension `dim` of what it reads and gives, group by
     group."""
     count = of_views[0].shape[dim]
@@ -36,7 +37,7 @@ def in_groups(work: Callable[..., Tensor], *of_views: Tensor, dim: int = 0) -> T
     return together(parts, count, dim)
 
 
-def together(parts: Iterable[Tensor], count: int, dim: int = 0) -> Tensor:
+def together(parts: Iterable[Shaped[Tensor, "..."]], count: int, dim: int = 0) -> Shaped[Tensor, "..."]:
     """Parts of `count` views in one, each put there as it comes; a single one as it is.
 
     What made them goes back to the system.
@@ -56,6 +57,6 @@ def together(parts: Iterable[Tensor], count: int, dim: int = 0) -> Tensor:
     return whole
 
 
-def held(values: Tensor, count: int) -> Tensor:
+def held(values: Shaped[Tensor, "*any"], count: int) -> Shaped[Tensor, "*any"]:
     """What stays of `count` photos: of many in half precision."""
     return values if count <= FEW else values.half()

@@ -7,6 +7,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 
 from langflash_core.errors import WeightsError
@@ -30,11 +31,11 @@ class Geometry:
     """What the geometry stages hand over; fields as in `Prediction`."""
 
     gaussians: Gaussians
-    viewmats: Tensor
-    depths: Tensor
-    confidences: Tensor
+    viewmats: Float[Tensor, "V 4 4"]
+    depths: Float[Tensor, "V H W"]
+    confidences: Float[Tensor, "V H W"]
     unplaced: tuple[int, ...]
-    Ks: Tensor | None = None
+    Ks: Float[Tensor, "V 3 3"] | None = None
     lenses: tuple[FoundLens, ...] = ()
 
 
@@ -44,9 +45,9 @@ class Seen:
     viewmats (V, 4, 4) and Ks (V, 3, 3) of all its views."""
 
     tokens: Tokens
-    depths: Tensor
-    viewmats: Tensor
-    Ks: Tensor
+    depths: Float[Tensor, "V H W"]
+    viewmats: Float[Tensor, "V 4 4"]
+    Ks: Float[Tensor, "V 3 3"]
 
 
 class LangFlashNet(nn.Module):
@@ -105,30 +106,42 @@ class LangFlashNet(nn.Module):
             raise WeightsError(f"there are no weights for {', '.join(missing)}; {remedy}")
 
     @abstractmethod
-    def encode(self, images: Tensor, Ks: Tensor) -> Tokens:
+    def encode(self, images: Float[Tensor, "B V 3 H W"], Ks: Float[Tensor, "B V 3 3"]) -> Tokens:
         """Shared tokens of images (B, V, 3, H, W) in [0, 1]; Ks (B, V, 3, 3) in their pixels."""
 
     @abstractmethod
     def reconstruct(
-        self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: Run, elements: bool = True
+        self,
+        views: Views,
+        images: Float[Tensor, "B V 3 H W"],
+        Ks: Float[Tensor, "B V 3 3"],
+        tokens: Tokens,
+        run: Run,
+        elements: bool = True,
     ) -> Geometry:
         """The geometry stages of one scene (B = 1); elements: as `predict`."""
 
     @abstractmethod
-    def language(self, tokens: Tokens, images: Tensor) -> Tensor:
+    def language(self, tokens: Tokens, images: Float[Tensor, "B V 3 H W"]) -> Float[Tensor, "B V C h w"]:
         """L(x), (B, V, C, h, w), unit channel norm."""
 
     @abstractmethod
-    def semantic_maps(self, tokens: Tokens, images: Tensor) -> tuple[tuple[Tensor, ...], Tensor]:
+    def semantic_maps(
+        self, tokens: Tokens, images: Float[Tensor, "B V 3 H W"]
+    ) -> tuple[tuple[Float[Tensor, "n C _ _"], ...], Float[Tensor, "n C h w"]]:
         """What queries read, coarse to fine (B*V, f, h, w) each, and the map that masks are read from."""
 
     @abstractmethod
     def parts(
-        self, tokens: Tokens, images: Tensor, size: tuple[int, int], features: Tensor | None = None
-    ) -> Tensor:
+        self,
+        tokens: Tokens,
+        images: Float[Tensor, "B V 3 H W"],
+        size: tuple[int, int],
+        features: Float[Tensor, "B V C h w"] | None = None,
+    ) -> Float[Tensor, "V J H W"]:
         """w_k(x) of one scene (B = 1), (V, K, *size), sums to 1 over K; features: of `language`."""
 
-    def group(self, tokens: Tokens, images: Tensor) -> tuple[Groups, ...]:
+    def group(self, tokens: Tokens, images: Float[Tensor, "B V 3 H W"]) -> tuple[Groups, ...]:
         """Groups after each scale or layer; the last is the answer."""
         memories, finest = self.semantic_maps(tokens, images)
         return self.grouping(memories, finest, tokens.shape[1])
@@ -138,7 +151,12 @@ class LangFlashNet(nn.Module):
     aggregated = True
     """The aggregation has weights; else atoms are plain averages."""
 
-    def dictionary(self, weights: Tensor, features: Tensor, seen: Seen | None = None) -> Tensor:
+    def dictionary(
+        self,
+        weights: Float[Tensor, "V K H W"],
+        features: Float[Tensor, "B V C h w"],
+        seen: Seen | None = None,
+    ) -> Float[Tensor, "K C"]:
         """Atoms (K, C) of unit norm of one scene: weights (V, K, H, W), features (1, V, C, h, w).
 
         seen: for networks that name parts by more than their language features.
@@ -150,7 +168,9 @@ class LangFlashNet(nn.Module):
             atoms = averaged_atoms(small, features, self.preset.eps)[0]
         return atoms if seen is None else self.named(atoms, small[0], seen)
 
-    def named(self, atoms: Tensor, weights: Tensor, seen: Seen) -> Tensor:
+    def named(
+        self, atoms: Float[Tensor, "K C"], weights: Float[Tensor, "V K h w"], seen: Seen
+    ) -> Float[Tensor, "K C"]:
         """Atoms (K, C) of one scene, corrected by what is seen of their parts; weights (V, K, h, w)."""
         return atoms
 
@@ -307,7 +327,9 @@ def _beside(work: Callable[[], Tensor], device: torch.device) -> Callable[[], Te
     return joined
 
 
-def pooled_weights(weights: Tensor, features: Tensor) -> Tensor:
+def pooled_weights(
+    weights: Float[Tensor, "V K H W"], features: Float[Tensor, "B V C h w"]
+) -> Float[Tensor, "n V K h w"]:
     """Weights (V, K, H, W) at the size of features (1, V, C, h, w), as a batch of one scene.
 
     The means of `adaptive_avg_pool2d`, the twin, which goes through them number by number: a window's mean is

@@ -10,6 +10,7 @@ Sizes: V views, H W pixels.
 """
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.geometry.jumps import steps_along, towards_nearer
@@ -21,12 +22,12 @@ _BACK = 0.3  # pixels by which the last element is drawn back
 _SHORT = 0.5  # and how long it is, of its length
 
 
-def under_edges(log_depths: Tensor) -> Tensor:
+def under_edges(log_depths: Float[Tensor, "V H W"]) -> Float[Tensor, "V H W 2"]:
     """(V, H, W, 2), as `towards_nearer` has them, of the jumps that a background goes on under."""
     return towards_nearer(log_depths, _JUMP)
 
 
-def over_edges(log_depths: Tensor) -> Tensor:
+def over_edges(log_depths: Float[Tensor, "V H W"]) -> Float[Tensor, "V H W 2"]:
     """(V, H, W, 2) of -1, 0, 1 along columns and rows: where the farther side of a jump is from the last
     pixel of the nearer one."""
     signs = []
@@ -39,8 +40,11 @@ def over_edges(log_depths: Tensor) -> Tensor:
 
 
 def drawn_back(
-    pos_c: Tensor, tangent_u: Tensor, tangent_v: Tensor, edges: Tensor
-) -> tuple[Tensor, Tensor, Tensor]:
+    pos_c: Float[Tensor, "V H W 3"],
+    tangent_u: Float[Tensor, "V H W 3"],
+    tangent_v: Float[Tensor, "V H W 3"],
+    edges: Float[Tensor, "V H W 2"],
+) -> tuple[Float[Tensor, "V H W 3"], Float[Tensor, "V H W 3"], Float[Tensor, "V H W 3"]]:
     """Points and the tangents that span their elements (V, H, W, 3); those at `edges` (V, H, W, 2), as
     `over_edges` has them, are away from the jump and shorter across it."""
     across, down = edges[..., :1], edges[..., 1:]
@@ -49,7 +53,12 @@ def drawn_back(
     return pos_c, tangent_u * shorter[..., :1], tangent_v * shorter[..., 1:]
 
 
-def extended(pos_c: Tensor, scales: Tensor, log_depths: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor]:
+def extended(
+    pos_c: Float[Tensor, "V H W 3"],
+    scales: Float[Tensor, "V H W 3"],
+    log_depths: Float[Tensor, "V H W"],
+    Ks: Float[Tensor, "V 3 3"],
+) -> tuple[Float[Tensor, "V H W 3"], Float[Tensor, "V H W 3"]]:
     """Points and scales (V, H, W, 3) in the camera's frame; those on the farther side of a jump are moved by
     half of `_UNDER` pixels and, within the surface, as wide.
 

@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 
 from langflash_core.network.encoders.lseg import LSeg
@@ -92,7 +93,7 @@ class PointMapNet(LangFlashNet):
         with torch.autocast(images.device.type, torch.bfloat16, enabled=self.mixed):
             yield
 
-    def encode(self, images: Tensor, Ks: Tensor) -> Tokens:
+    def encode(self, images: Float[Tensor, "B V 3 H W"], Ks: Float[Tensor, "B V 3 3"]) -> Tokens:
         """Encoder output and three decoder depths; a single photo is paired with itself."""
         grid = (images.shape[-2] // self.preset.patch, images.shape[-1] // self.preset.patch)
         hooks = self._hooks(self.encoder, self.decoder, images, Ks, grid)
@@ -117,30 +118,36 @@ class PointMapNet(LangFlashNet):
         hooks = (encoded, *(layers[depth - 1][:, :num_views] for depth in self.sizes.decoder_hooks))
         return tuple(hook[:, :, :-1].float() for hook in hooks)
 
-    def point_maps(self, tokens: Tokens, images: Tensor) -> Tensor:
+    def point_maps(self, tokens: Tokens, images: Float[Tensor, "B V 3 H W"]) -> Float[Tensor, "B V 3 H W"]:
         """Points (B, V, 3, H, W) in view 0's frame."""
         with torch.autocast(images.device.type, enabled=False):
             return self.point_heads(_levels(tokens), images)
 
-    def raw_gaussians(self, tokens: Tokens, images: Tensor) -> Tensor:
+    def raw_gaussians(self, tokens: Tokens, images: Float[Tensor, "B V 3 H W"]) -> Tensor:
         """Raw parameters (B, V, 8 + 3 S, H, W)."""
         with self._fast(images):
             return self.gaussian_heads(_levels(tokens), images, with_images=True)
 
-    def language(self, tokens: Tokens, images: Tensor) -> Tensor:
+    def language(self, tokens: Tokens, images: Float[Tensor, "B V 3 H W"]) -> Float[Tensor, "B V C h w"]:
         """L(x) of LSeg, at half the picture's size."""
         with self._fast(images):
             return self.language_head(images)
 
-    def semantic_maps(self, tokens: Tokens, images: Tensor) -> tuple[tuple[Tensor, ...], Tensor]:
+    def semantic_maps(
+        self, tokens: Tokens, images: Float[Tensor, "B V 3 H W"]
+    ) -> tuple[tuple[Float[Tensor, "n C _ _"], ...], Float[Tensor, "n C h w"]]:
         """Memories at 1, 2 and 4 times the grid, and the mask map at the picture's size."""
         with self._fast(images):
             memories, finest = self.scratch(tokens.for_grouping(), images)
         return tuple(memory.float() for memory in memories), finest.float()
 
     def parts(
-        self, tokens: Tokens, images: Tensor, size: tuple[int, int], features: Tensor | None = None
-    ) -> Tensor:
+        self,
+        tokens: Tokens,
+        images: Float[Tensor, "B V 3 H W"],
+        size: tuple[int, int],
+        features: Float[Tensor, "B V C h w"] | None = None,
+    ) -> Float[Tensor, "V J H W"]:
         """Softmax over the masks that pass the preset's filter."""
         if not self.grouped:
             features = self.language(tokens, images) if features is None else features
@@ -156,7 +163,13 @@ class PointMapNet(LangFlashNet):
         return split_groups(whole, features, replace(self.preset.splitting, agreement=0.0), size)
 
     def reconstruct(
-        self, views: Views, images: Tensor, Ks: Tensor, tokens: Tokens, run: Run, elements: bool = True
+        self,
+        views: Views,
+        images: Float[Tensor, "B V 3 H W"],
+        Ks: Float[Tensor, "B V 3 3"],
+        tokens: Tokens,
+        run: Run,
+        elements: bool = True,
     ) -> Geometry:
         """Points, the cameras that see them, Gaussians."""
         with run.stage("point maps"):

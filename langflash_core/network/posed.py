@@ -1,6 +1,7 @@
 """Groups and dictionary of views whose geometry is known: no poses are sought, no depth is predicted."""
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.network.model import LangFlashNet, Seen
@@ -9,8 +10,8 @@ from langflash_core.types import Views
 
 @torch.inference_mode()
 def posed_semantics(
-    network: LangFlashNet, views: Views, viewmats: Tensor, depths: Tensor
-) -> tuple[Tensor, Tensor]:
+    network: LangFlashNet, views: Views, viewmats: Float[Tensor, "V 4 4"], depths: Float[Tensor, "V H W"]
+) -> tuple[Float[Tensor, "V K H W"], Float[Tensor, "K C"]]:
     """What a network sees in V views, beside their own geometry.
 
     Args:

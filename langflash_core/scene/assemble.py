@@ -4,6 +4,7 @@ import time
 from dataclasses import replace
 
 import torch
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 from torch.nn.functional import normalize
 
@@ -95,6 +96,7 @@ def placed_views(prediction: Prediction, views: Views) -> tuple[Prediction, View
             viewmats=prediction.viewmats[keep],
             depths=prediction.depths[keep],
             confidences=prediction.confidences[keep],
+            Ks=None if prediction.Ks is None else prediction.Ks[keep],
             unplaced=(),
         ),
         replace(
@@ -108,7 +110,7 @@ def placed_views(prediction: Prediction, views: Views) -> tuple[Prediction, View
     )
 
 
-def mean_distance(means: Tensor, viewmat: Tensor) -> float:
+def mean_distance(means: Float[Tensor, "N 3"], viewmat: Float[Tensor, "4 4"]) -> float:
     """Mean distance of points (n, 3) from the camera, over those that are finite.
 
     Raises:
@@ -125,7 +127,9 @@ def mean_distance(means: Tensor, viewmat: Tensor) -> float:
     return mean
 
 
-def sparse_weights(dense: Tensor, top_m: int) -> tuple[Tensor, Tensor]:
+def sparse_weights(
+    dense: Float[Tensor, "N K"], top_m: int
+) -> tuple[Int[Tensor, "N m"], Float[Tensor, "N m"]]:
     """The `top_m` largest of w_ik (n, K), renormalised: ids (n, m) int64 and values (n, m).
 
     m = min(top_m, K). Rows without weight, or with values that are not finite, become 0.
@@ -136,7 +140,7 @@ def sparse_weights(dense: Tensor, top_m: int) -> tuple[Tensor, Tensor]:
     return ids, renormalised(values)
 
 
-def renormalised(values: Tensor) -> Tensor:
+def renormalised(values: Float[Tensor, "n m"]) -> Float[Tensor, "n m"]:
     """Rows (n, m) >= 0 scaled to sum 1; rows of zeros stay."""
     sums = values.sum(-1, keepdim=True)
     return torch.where(sums > 0, values / sums.clamp_min(1e-12), 0.0)
@@ -178,19 +182,21 @@ def _semantics(prediction: Prediction, keep: Tensor, top_m: int) -> Semantics:
     return semantics_of(prediction, of_views)
 
 
-def directed(dictionary: Tensor) -> Tensor:
+def directed(dictionary: Float[Tensor, "K C"]) -> Bool[Tensor, " K"]:
     """(K,) bool: atoms (K, C) that have a direction."""
     return torch.isfinite(dictionary).all(-1) & (dictionary.norm(dim=-1) > 1e-6)
 
 
-def semantics_of(prediction: Prediction, of_views: list[tuple[Tensor, Tensor]]) -> Semantics:
+def semantics_of(
+    prediction: Prediction, of_views: list[tuple[Int[Tensor, "_ m"], Float[Tensor, "_ m"]]]
+) -> Semantics:
     """Over the atoms that have a direction, of ids and values (n, m) of each view's Gaussians over those."""
     ids, values = (torch.cat(parts) for parts in zip(*of_views, strict=True))
     dictionary = prediction.dictionary[directed(prediction.dictionary)]
     return Semantics(ids, values, normalize(dictionary.float(), dim=-1), prediction.space)
 
 
-def scaled_poses(viewmats: Tensor, unit: float) -> Tensor:
+def scaled_poses(viewmats: Float[Tensor, "V 4 4"], unit: float) -> Float[Tensor, "V 4 4"]:
     """Poses (V, 4, 4) in units of `unit`."""
     scaled = viewmats.float().clone()
     scaled[:, :3, 3] = viewmats[:, :3, 3].float() / unit

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import torch
+from jaxtyping import Float, UInt8
 from PIL import Image
 from torch.nn.functional import normalize
 
@@ -23,9 +24,9 @@ class AtomsReport:
     """shares: (K,) of the scene's surface, sum 1. order: (K,) rows, alike atoms side by side.
     similarity: (K, K) cosines."""
 
-    shares: np.ndarray = field(repr=False)
+    shares: Float[np.ndarray, " K"] = field(repr=False)
     order: tuple[int, ...]
-    similarity: np.ndarray = field(repr=False)
+    similarity: Float[np.ndarray, "K K"] = field(repr=False)
 
 
 def describe_atoms(scene: Scene) -> AtomsReport:
@@ -37,7 +38,7 @@ def describe_atoms(scene: Scene) -> AtomsReport:
     return AtomsReport(atom_shares(scene), alike_order(similarity), similarity)
 
 
-def atom_shares(scene: Scene) -> np.ndarray:
+def atom_shares(scene: Scene) -> Float[np.ndarray, " K"]:
     """(K,) of the scene's surface, opacity times area, sum 1; zeros where there is none."""
     masses = _carried(scene)
     return masses / max(masses.sum(), 1e-12)
@@ -61,7 +62,7 @@ def atom_places(scene: Scene) -> tuple[tuple[float, float, float] | None, ...]:
     return tuple(found)
 
 
-def alike_order(similarity: np.ndarray) -> tuple[int, ...]:
+def alike_order(similarity: Float[np.ndarray, "K K"]) -> tuple[int, ...]:
     """An order (K,) of rows in which alike ones are near: each next to its likest among the rest.
 
     Starts at the row least like all others.
@@ -84,7 +85,7 @@ def _carried(scene: Scene) -> np.ndarray:
     return np.bincount(ids.ravel(), finite.ravel(), minlength=scene.semantics.num_atoms)
 
 
-def atom_pictures(scene: Scene) -> tuple[np.ndarray | None, ...]:
+def atom_pictures(scene: Scene) -> tuple[UInt8[np.ndarray, "_ _ 3"] | None, ...]:
     """For each atom the part of a photo that carries it most, (side, side, 3) uint8; None where none does."""
     maps = [atom_cells(scene, view) for view in range(len(scene.photos))]
     photos = [decoded_photo(photo) for photo in scene.photos]
@@ -97,7 +98,7 @@ def atom_pictures(scene: Scene) -> tuple[np.ndarray | None, ...]:
     return tuple(made)
 
 
-def atom_cells(scene: Scene, view: int) -> np.ndarray:
+def atom_cells(scene: Scene, view: int) -> Float[np.ndarray, "K h w"]:
     """(K, h, w): how much of each atom the cells of a photo show, of what is not hidden there."""
     camera = scene.camera(view)
     viewmat, K = camera.viewmat.double().numpy(), camera.K.double().numpy()
@@ -138,7 +139,7 @@ def _crop(photo: np.ndarray, cells: np.ndarray) -> np.ndarray:
     return np.asarray(Image.fromarray(photo).resize(size, Image.Resampling.BILINEAR, box))
 
 
-def decoded_photo(photo: bytes) -> np.ndarray | None:
+def decoded_photo(photo: bytes) -> UInt8[np.ndarray, "H W 3"] | None:
     """A scene's small photo as (H, W, 3) uint8; None where it is damaged."""
     try:
         with opened_picture(photo, STORED) as opened:

@@ -13,6 +13,7 @@ Source: own; pruned trees by marginal gain as in Chou, Lookabaugh, Gray 1989 (BF
 from dataclasses import dataclass
 
 import torch
+from jaxtyping import Bool, Float, Int, Shaped
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -31,8 +32,8 @@ class Tree:
     where that is larger; endless where it must be parted, 0 where nobody needs it. wanted: (rows, columns)
     bool of level l at place l: somebody needs the square."""
 
-    gains: tuple[Tensor, ...]
-    wanted: tuple[Tensor, ...]
+    gains: tuple[Float[Tensor, "_ _"], ...]
+    wanted: tuple[Bool[Tensor, "_ _"], ...]
     size: tuple[int, int]
 
 
@@ -40,15 +41,21 @@ class Tree:
 class Squares:
     """n squares of one size: their left and top edges, pixels; how long their sides are."""
 
-    left: Tensor
-    top: Tensor
+    left: Int[Tensor, " n"]
+    top: Int[Tensor, " n"]
     side: int
 
     def __len__(self) -> int:
         return len(self.left)
 
 
-def grown(photo: Tensor, log_depths: Tensor, clear: Tensor, wanted: Tensor, finest: int = 1) -> Tree:
+def grown(
+    photo: Float[Tensor, "3 h w"],
+    log_depths: Float[Tensor, "h w"],
+    clear: Float[Tensor, "h w"],
+    wanted: Bool[Tensor, "h w"],
+    finest: int = 1,
+) -> Tree:
     """The whole tree of one photo.
 
     Args:
@@ -118,7 +125,7 @@ def leaves(tree: Tree, limit: float) -> tuple[list[Squares], Squares]:
     return found[::-1], beneath
 
 
-def padded(values: Tensor) -> Tensor:
+def padded(values: Shaped[Tensor, "C H W"]) -> Shaped[Tensor, "C h w"]:
     """(C, h, w) with its last row and column repeated up to multiples of `LARGEST`."""
     height, width = values.shape[-2:]
     return F.pad(values[None], (0, -width % LARGEST, 0, -height % LARGEST), mode="replicate")[0]

@@ -64,9 +64,9 @@ class RefinedWeights:
     grid: (H, W, K), >= 0, sums to 1. image (3, H, W), photo (3, h, w): in [0, 1], the same crop.
     """
 
-    grid: Tensor
-    image: Tensor
-    photo: Tensor
+    grid: Float[Tensor, "H W K"]
+    image: Float[Tensor, "3 H W"]
+    photo: Float[Tensor, "3 h w"]
     rule: BorderRule
 
     def at(self, rows: Integer[Tensor, " n"], columns: Integer[Tensor, " n"]) -> Float[Tensor, "n K"]:

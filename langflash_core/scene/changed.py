@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import torch
+from jaxtyping import Int, Shaped
 from torch import Tensor
 
 from langflash_core.geometry.harmonics import SH_C0, sh_to_colour
@@ -14,7 +15,9 @@ from langflash_core.scene.edits import Marks
 from langflash_core.types import LUMA, Gaussians, Scene
 
 
-def changed(gaussians: Gaussians, changes: Iterable[Change], rows: Tensor | None = None) -> Gaussians:
+def changed(
+    gaussians: Gaussians, changes: Iterable[Change], rows: Int[Tensor, " n"] | None = None
+) -> Gaussians:
     """The Gaussians after all changes, in order; fields that none of them touches are the same tensors.
 
     Numbers are computed in float64 and kept in the fields' own type. Coefficients of degree 1 to 3 turn
@@ -44,7 +47,7 @@ def changed_scene(scene: Scene, marks: Marks, more: Change | None = None) -> Sce
     return scene if gaussians is scene.gaussians else replace(scene, gaussians=gaussians)
 
 
-def mean_luma(gaussians: Gaussians, rows: Tensor) -> float:
+def mean_luma(gaussians: Gaussians, rows: Shaped[Tensor, " n"]) -> float:
     """Mean brightness of Gaussians (n,) bool, by their opacity, seen along +z; 0 of none."""
     some = gaussians.rows(rows)
     ahead = torch.tensor([0.0, 0.0, 1.0]).expand(len(some), 3)

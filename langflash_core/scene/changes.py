@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from jaxtyping import Float
 
 from langflash_core.scene.mask import Mask
 
@@ -132,7 +133,7 @@ def turn_about(axis: Spot, degrees: float) -> Turn:
     return _turn(_rotations().from_rotvec(vector))
 
 
-def turn_matrix(turn: Turn) -> np.ndarray:
+def turn_matrix(turn: Turn) -> Float[np.ndarray, "3 3"]:
     """R (3, 3) float64 of a unit quaternion."""
     return _rotation(turn).as_matrix()
 

@@ -7,13 +7,14 @@ Sizes: h w pixels of the photo.
 import cv2
 import numpy as np
 import torch
+from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.scene.upsampling import JUMP
 
 
-def clearances(log_depths: Tensor) -> Tensor:
+def clearances(log_depths: Float[Tensor, "h w"]) -> Float[Tensor, "h w"]:
     """(h, w) pixels from the middle of each to the nearest end of a surface, at least a half; endless where
     that is the end of a nearer one, behind which its own goes on.
 

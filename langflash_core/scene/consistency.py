@@ -1,6 +1,7 @@
 """What one photo sees through cannot be there. N Gaussians of V views, order (v h w)."""
 
 import torch
+from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -19,13 +20,13 @@ _AROUND, _JUMP = 5, 0.1  # pixels of a window, and log depth within it from whic
 
 
 def seen_through(
-    means: Tensor,
-    viewmats: Tensor,
-    Ks: Tensor,
-    depths: Tensor,
-    confidences: Tensor,
+    means: Float[Tensor, "N 3"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+    depths: Float[Tensor, "V H W"],
+    confidences: Float[Tensor, "V H W"],
     tolerance: float = TOLERANCE,
-) -> Tensor:
+) -> Bool[Tensor, " N"]:
     """Gaussians that stand in free space of a photo which knows its depth better.
 
     Gaussian i of view v is projected into every other view u. If it lies in front of u's surface
@@ -56,7 +57,12 @@ def seen_through(
 
 
 def witnesses(
-    view: int, points: Tensor, viewmats: Tensor, Ks: Tensor, size: tuple[int, int], most: int = _ASKED
+    view: int,
+    points: Float[Tensor, "n 3"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+    size: tuple[int, int],
+    most: int = _ASKED,
 ) -> list[int]:
     """The other photos that are asked about a photo's points (n, 3): all of `most` and fewer; of more so
     many, spread evenly over those that have some of the points before them, so that the work grows with the
@@ -75,7 +81,12 @@ def witnesses(
     return [seeing[(2 * k + 1) * len(seeing) // (2 * most)] for k in range(most)]
 
 
-def outvoted(points: Tensor, viewmats: Tensor, Ks: Tensor, depths: Tensor) -> Tensor:
+def outvoted(
+    points: Float[Tensor, "V n 3"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+    depths: Float[Tensor, "V H W"],
+) -> Bool[Tensor, "V H W"]:
     """(V, H, W) bool: what lies beside a jump of depth, where two other photos and more see through it, and
     more than see it as their surface.
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import safetensors.numpy
+from jaxtyping import Shaped
 from safetensors import SafetensorError
 
 from langflash_core.errors import SceneFileError
@@ -37,7 +38,7 @@ class Container:
     space: str
     view_size: tuple[int, int]
     metadata: dict
-    arrays: dict[str, np.ndarray]
+    arrays: dict[str, Shaped[np.ndarray, "..."]]
 
 
 def read_container(path: Path) -> Container:
@@ -99,7 +100,7 @@ def damaged(path: Path, reason: object) -> SceneFileError:
     return SceneFileError(f"{path.name} is damaged ({said}); {_REMEDY}")
 
 
-def digest(text: str, arrays: Mapping[str, np.ndarray]) -> str:
+def digest(text: str, arrays: Mapping[str, Shaped[np.ndarray, "..."]]) -> str:
     """SHA-256 of the header's JSON and of every array with its name, type (as torch spells it) and shape."""
     total = hashlib.sha256(text.encode())
     for name in sorted(arrays):

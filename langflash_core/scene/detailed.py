@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TypeVar, overload
 
 import torch
+from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -61,7 +62,7 @@ def working_size(photo: tuple[int, int], grid: tuple[int, int]) -> tuple[int, in
     return high[0], high[1]
 
 
-def working_photo(photo: Tensor, grid: tuple[int, int]) -> Tensor:
+def working_photo(photo: Float[Tensor, "3 h w"], grid: tuple[int, int]) -> Float[Tensor, "3 H W"]:
     """A photo (3, h, w) in [0, 1] at its working size."""
     size = working_size((photo.shape[-2], photo.shape[-1]), grid)
     if size == (photo.shape[-2], photo.shape[-1]):
@@ -72,11 +73,11 @@ def working_photo(photo: Tensor, grid: tuple[int, int]) -> Tensor:
 def assemble_detailed(
     prediction: Prediction,
     views: Views,
-    photos: Sequence[Tensor],
+    photos: Sequence[Float[Tensor, "3 _ _"]],
     detail: Detail,
     *,
     gaussians: int | None = None,
-    strangers: Tensor | None = None,
+    strangers: Bool[Tensor, "V H W"] | None = None,
     top_m: int = 8,
     preset: str = "mini",
     progress: Callable[[float], None] = lambda done: None,

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 from torch.nn.functional import normalize
 
@@ -12,7 +13,7 @@ from langflash_core.scene.edits import Atom, Marks
 from langflash_core.types import NO_LANGUAGE, Scene, Semantics
 
 
-def edited_dictionary(scene: Scene, atoms: Sequence[Atom]) -> Tensor:
+def edited_dictionary(scene: Scene, atoms: Sequence[Atom]) -> Float[Tensor, "K C"]:
     """The dictionary (K, C) after merging: merged atoms share one row, silent ones are 0.
 
     Two rows d are one atom with the sum of the weights: W_a d + W_b d = (W_a + W_b) d. So a query

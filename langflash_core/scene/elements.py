@@ -16,6 +16,7 @@ import math
 from dataclasses import dataclass, fields, replace
 
 import torch
+from jaxtyping import Bool, Float, Int, Shaped, UInt8
 from torch import Tensor
 
 from langflash_core.geometry.cameras import invert_rigid, unproject
@@ -49,21 +50,21 @@ class Elements:
     surface they lie on. pixels (n,) of the photo, row by row, whose meaning they have. colours (n, 3) in
     [0, 1]. levels (n,) uint8. sides (n,) pixels. hidden (n,) bool: behind others, in their own photo."""
 
-    x: Tensor
-    y: Tensor
-    roots: Tensor
-    log_depths: Tensor
-    cells: Tensor
-    pixels: Tensor
-    colours: Tensor
-    levels: Tensor
-    sides: Tensor
-    hidden: Tensor
+    x: Float[Tensor, " n"]
+    y: Float[Tensor, " n"]
+    roots: Float[Tensor, "n 3"]
+    log_depths: Float[Tensor, " n"]
+    cells: Int[Tensor, " n"]
+    pixels: Int[Tensor, " n"]
+    colours: Float[Tensor, "n 3"]
+    levels: UInt8[Tensor, " n"]
+    sides: Float[Tensor, " n"]
+    hidden: Bool[Tensor, " n"]
 
     def __len__(self) -> int:
         return len(self.x)
 
-    def rows(self, keep: Tensor) -> "Elements":
+    def rows(self, keep: Shaped[Tensor, " n"]) -> "Elements":
         return Elements(*(getattr(self, f.name)[keep] for f in fields(self)))
 
 
@@ -72,7 +73,7 @@ def joined(parts: list[Elements]) -> Elements:
     return Elements(*(torch.cat([getattr(p, f.name) for p in parts]) for f in fields(Elements)))
 
 
-def of_squares(squares: Squares, photo: Tensor, depth: Upsampled) -> Elements:
+def of_squares(squares: Squares, photo: Float[Tensor, "3 h w"], depth: Upsampled) -> Elements:
     """An element a square (all of one surface), in its middle."""
     side, (height, width) = squares.side, depth.log_depths.shape
     left, top = squares.left, squares.top
@@ -104,7 +105,7 @@ def _means(photo: Tensor, left: Tensor, top: Tensor, side: int) -> Tensor:
     return pooled[:, top // side, left // side].T
 
 
-def ground(squares: Squares, photo: Tensor, depth: Upsampled) -> Elements:
+def ground(squares: Squares, photo: Float[Tensor, "3 h w"], depth: Upsampled) -> Elements:
     """Under squares that were parted: an element of the nearer surface, and one of what is behind a jump."""
     rows, columns = (_of_squares(along, squares.side) for along in (squares.top, squares.left))
     height, width = depth.log_depths.shape
@@ -148,7 +149,7 @@ def _ground_of(
     )  # fmt: skip
 
 
-def drawn_in(elements: Elements, clear: Tensor) -> Elements:
+def drawn_in(elements: Elements, clear: Float[Tensor, "h w"]) -> Elements:
     """Those that reach over the end of their surface, `clear` (h, w) pixels away, drawn in: two deviations
     along rows and columns stay on it, of what is wider than a pixel."""
     l11, l21, l22 = elements.roots.unbind(-1)
@@ -157,7 +158,7 @@ def drawn_in(elements: Elements, clear: Tensor) -> Elements:
     return replace(elements, roots=elements.roots * (room / widest).clamp(max=1)[:, None])
 
 
-def under(log_depths: Tensor, image: Tensor, size: tuple[int, int]) -> Elements:
+def under(log_depths: Float[Tensor, "h w"], image: Float[Tensor, "3 H W"], size: tuple[int, int]) -> Elements:
     """What goes on behind the edges of nearer things, an element a cell of the grid (H, W) before a jump.
 
     Args:
@@ -179,7 +180,11 @@ def under(log_depths: Tensor, image: Tensor, size: tuple[int, int]) -> Elements:
 
 
 def placed(
-    elements: Elements, log_depths: Tensor, slopes: Tensor, camera: Camera, size: tuple[int, int]
+    elements: Elements,
+    log_depths: Float[Tensor, "H W"],
+    slopes: Float[Tensor, "H W"],
+    camera: Camera,
+    size: tuple[int, int],
 ) -> Gaussians:
     """Gaussians in the world of the camera, in the unit of its depths.
 

@@ -8,6 +8,7 @@ Levels are bytes, and so are confidences, in steps of 1/255.
 """
 
 import torch
+from jaxtyping import Shaped
 from torch import Tensor
 from torch.nn.functional import normalize
 
@@ -31,7 +32,7 @@ _DTYPES = {
 _ID_TYPES = ((2**8, torch.uint8), (2**15, torch.int16), (2**31, torch.int32))
 
 
-def to_fields(scene: Scene) -> dict[str, Tensor]:
+def to_fields(scene: Scene) -> dict[str, Shaped[Tensor, "..."]]:
     """CPU tensors by stable name; see the module's note on precision."""
     gaussians, semantics = scene.gaussians, scene.semantics
     fields = {
@@ -64,7 +65,9 @@ def _narrow(ids: Tensor, count: int) -> Tensor:
     return ids.to(next(dtype for limit, dtype in _ID_TYPES if count <= limit))
 
 
-def from_fields(fields: dict[str, Tensor], space: str, view_size: tuple[int, int], record: Record) -> Scene:
+def from_fields(
+    fields: dict[str, Shaped[Tensor, "..."]], space: str, view_size: tuple[int, int], record: Record
+) -> Scene:
     """The scene of stored tensors; rows that rounding moved off unit norm or sum are put back.
 
     Raises:

@@ -66,8 +66,8 @@ class Light:
         ValueError: they are not of one shape (V, 3).
     """
 
-    gains: Tensor
-    offsets: Tensor
+    gains: Float[Tensor, "V 3"]
+    offsets: Float[Tensor, "V 3"]
 
     def __post_init__(self) -> None:
         for name, values in (("gains", self.gains), ("offsets", self.offsets)):
@@ -83,7 +83,9 @@ class Light:
         plain = all(x == 1 for row in gains for x in row) and not any(x for row in offsets for x in row)
         return {} if plain else {"gains": gains, "offsets": offsets}
 
-    def corrected(self, images: Float[Tensor, "*V 3 H W"], view: int | None = None) -> Tensor:
+    def corrected(
+        self, images: Float[Tensor, "*V 3 H W"], view: int | None = None
+    ) -> Float[Tensor, "*V 3 H W"]:
         """Photos (V, 3, H, W), or the one of `view` (3, H, W), in the light of all; not clipped."""
         chosen = slice(None) if view is None else view
         gains, offsets = self.gains[chosen].to(images), self.offsets[chosen].to(images)
@@ -142,7 +144,13 @@ def photo_light(
         return light_of(compared(*inputs), len(images))
 
 
-def compared(images: Tensor, depths: Tensor, confidences: Tensor, viewmats: Tensor, Ks: Tensor) -> Pairs:
+def compared(
+    images: Float[Tensor, "V 3 H W"],
+    depths: Float[Tensor, "V H W"],
+    confidences: Float[Tensor, "V H W"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+) -> Pairs:
     """The pairs that `photo_light` compares, float32 in."""
     num_views, height, width = depths.shape
     if num_views < 2 or min(height, width) < BLOCK:

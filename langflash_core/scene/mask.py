@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
+from jaxtyping import Bool
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,7 @@ class Mask:
         return Mask(count, bytes(-(-count // 8)))
 
     @staticmethod
-    def of(rows: np.ndarray) -> "Mask":
+    def of(rows: Bool[np.ndarray, " N"]) -> "Mask":
         """The rows that are true in a boolean (count,)."""
         return Mask(len(rows), np.packbits(np.asarray(rows, bool), bitorder="little").tobytes())
 
@@ -41,7 +42,7 @@ class Mask:
         rows[: len(kept)] = kept
         return Mask.of(rows)
 
-    def rows(self) -> np.ndarray:
+    def rows(self) -> Bool[np.ndarray, " N"]:
         """Boolean (count,)."""
         packed = np.frombuffer(self.bits, np.uint8)
         return np.unpackbits(packed, count=self.count, bitorder="little").astype(bool)

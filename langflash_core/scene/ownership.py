@@ -16,6 +16,7 @@ Sizes: V views, H W cells of the grid, n cells that are tried, B blocks of cells
 from dataclasses import dataclass
 
 import torch
+from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -30,7 +31,12 @@ _TRIED = 8  # cells of a row and of a column, of which one is tried; and the sid
 _FINER = 2.0  # area that a pixel of the earlier photo covers over that of a later one which takes it over
 
 
-def owned(depths: Tensor, viewmats: Tensor, Ks: Tensor, known: Tensor | None = None) -> Tensor:
+def owned(
+    depths: Float[Tensor, "V H W"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+    known: Bool[Tensor, "V H W"] | None = None,
+) -> Bool[Tensor, "V H W"]:
     """(V, H, W) bool: the cells of each photo that it covers itself.
 
     Args:
@@ -62,8 +68,12 @@ def owned(depths: Tensor, viewmats: Tensor, Ks: Tensor, known: Tensor | None = N
 
 
 def covered(
-    depths: Tensor, viewmats: Tensor, Ks: Tensor, keep: Tensor, anything: Tensor | None = None
-) -> Tensor:
+    depths: Float[Tensor, "V H W"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+    keep: Bool[Tensor, "V H W"],
+    anything: Bool[Tensor, "V H W"] | None = None,
+) -> Bool[Tensor, "V H W"]:
     """(V, H, W) bool: cells of each photo in which, or beside which, what is kept lies at about their depth
     or before it.
 

@@ -1,6 +1,7 @@
 """Selections of Gaussians by where they are: growing, floaters, the atom they belong to."""
 
 import numpy as np
+from jaxtyping import Bool, Float, Int
 from scipy.spatial import KDTree
 
 from langflash_core.types import Gaussians, Semantics
@@ -11,12 +12,12 @@ _LEAST_DEVIATION = 0.1  # of a logarithm: a perfect grid has spread 0, and tenth
 
 
 def grow(
-    means: np.ndarray,
-    selected: np.ndarray,
-    allowed: np.ndarray,
+    means: Float[np.ndarray, "N 3"],
+    selected: Bool[np.ndarray, " N"],
+    allowed: Bool[np.ndarray, " N"],
     distance: float,
-    radii: np.ndarray | None = None,
-) -> np.ndarray:
+    radii: Float[np.ndarray, " N"] | None = None,
+) -> Bool[np.ndarray, " N"]:
     """The selection with everything allowed that lies within `distance` of it.
 
     Args:
@@ -40,7 +41,7 @@ def grow(
     return grown
 
 
-def spacing(means: np.ndarray, most: int = 4000) -> float:
+def spacing(means: Float[np.ndarray, "n 3"], most: int = 4000) -> float:
     """Median distance of a Gaussian to its nearest neighbour, scene units; 0 for fewer than two.
 
     Measured on every n-th of them, at most about `most`, against all.
@@ -52,7 +53,7 @@ def spacing(means: np.ndarray, most: int = 4000) -> float:
     return float(np.median(distances[:, 1]))
 
 
-def isolation(gaussians: Gaussians, visible: np.ndarray) -> np.ndarray:
+def isolation(gaussians: Gaussians, visible: Bool[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
     """How far each Gaussian stands out as a floater, in robust deviations.
 
     A Gaussian of a surface has opaque neighbours about as near as it is large. With d_i the mean
@@ -87,7 +88,7 @@ def isolation(gaussians: Gaussians, visible: np.ndarray) -> np.ndarray:
     return scores
 
 
-def strongest_atoms(semantics: Semantics) -> np.ndarray:
+def strongest_atoms(semantics: Semantics) -> Int[np.ndarray, " N"]:
     """(N,) the atom that each Gaussian carries most of; -1 where it carries none."""
     values = semantics.weight_values.detach().cpu()
     if values.shape[1] == 0:

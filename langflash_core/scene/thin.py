@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import torch
+from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 from torch import Tensor
 
@@ -41,7 +42,7 @@ def thin(scene: Scene, share: float) -> Scene:
     return thin_with_rows(scene, share)[0]
 
 
-def thin_with_rows(scene: Scene, share: float) -> tuple[Scene, np.ndarray]:
+def thin_with_rows(scene: Scene, share: float) -> tuple[Scene, Int[np.ndarray, " n"]]:
     """`thin`, and the rows of the scene that were kept, ascending."""
     if not 0 < share <= 1:
         raise ValueError(f"share: expected a number in (0, 1], received {share}")
@@ -110,7 +111,7 @@ def coarse_share(scene: Scene) -> float:
     return count / len(scene.gaussians) if count else 1.0
 
 
-def covered_areas(gaussians: Gaussians) -> np.ndarray:
+def covered_areas(gaussians: Gaussians) -> Float[np.ndarray, " N"]:
     """Opacity times the product of the two longest axes (N,) float64; 0 where a value is not finite."""
     axes = gaussians.scales.detach().cpu().double().abs().sort(-1).values
     areas = gaussians.opacities.detach().cpu().double() * axes[:, 1] * axes[:, 2]
@@ -122,7 +123,7 @@ def _finite(values: Tensor) -> Tensor:
     return torch.isfinite(values.detach().cpu()).all(-1)
 
 
-def inclusion(sizes: np.ndarray, expected: float) -> np.ndarray:
+def inclusion(sizes: Float[np.ndarray, " N"], expected: float) -> Float[np.ndarray, " N"]:
     """Probabilities (N,) min(1, c s_i) with the c >= 0 that makes their sum `expected`.
 
     With fewer positive sizes than that, every one of those is 1.
@@ -139,7 +140,7 @@ def inclusion(sizes: np.ndarray, expected: float) -> np.ndarray:
     return np.minimum(1.0, scale[certain] * sizes)
 
 
-def z_order(means: np.ndarray) -> np.ndarray:
+def z_order(means: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
     """Rows of means (N, 3) along the Z-curve of a grid of 1024 cells a side; far outliers share the rim."""
     finite = np.where(np.isfinite(means), means, 0.0).astype(np.float64)
     low, high = np.percentile(finite, (1, 99), axis=0)

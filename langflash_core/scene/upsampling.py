@@ -13,6 +13,7 @@ cell instead of the mean.
 from dataclasses import dataclass
 
 import torch
+from jaxtyping import Float, Int
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -32,12 +33,14 @@ class Upsampled:
     """log_depths (h, w); cells (h, w) int64, row by row, the cell of the grid that each pixel belongs to;
     slopes (H, W), log depth from a cell to the next along its steepest way, of the nearer side of a jump."""
 
-    log_depths: Tensor
-    cells: Tensor
-    slopes: Tensor
+    log_depths: Float[Tensor, "h w"]
+    cells: Int[Tensor, "h w"]
+    slopes: Float[Tensor, "H W"]
 
 
-def upsampled(log_depths: Tensor, image: Tensor, photo: Tensor) -> Upsampled:
+def upsampled(
+    log_depths: Float[Tensor, "H W"], image: Float[Tensor, "3 H W"], photo: Float[Tensor, "3 h w"]
+) -> Upsampled:
     """Log depths (H, W) at the size of the photo.
 
     Args:

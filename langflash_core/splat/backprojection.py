@@ -11,6 +11,7 @@ stay so.
 """
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.types import Camera, Gaussians
@@ -23,8 +24,12 @@ _PAIRS_AT_ONCE = 1 << 17  # times K floats of memory: 33 MB for K = 64
 
 @torch.no_grad()
 def gathered(
-    gaussians: Gaussians, camera: Camera, values: Tensor, trust: Tensor | None = None, near: float = NEAR
-) -> tuple[Tensor, Tensor]:
+    gaussians: Gaussians,
+    camera: Camera,
+    values: Float[Tensor, "H W K"],
+    trust: Float[Tensor, "H W"] | None = None,
+    near: float = NEAR,
+) -> tuple[Float[Tensor, "N K"], Float[Tensor, " N"]]:
     """Sums of one view; add up those of several views, then divide.
 
     Args:

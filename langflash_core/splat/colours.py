@@ -29,6 +29,7 @@ import cv2
 import numpy as np
 import scipy.sparse
 import torch
+from jaxtyping import Float, Int
 from torch import Tensor
 
 from langflash_core.memory import give_back
@@ -64,18 +65,18 @@ _PROBE = 8  # of rows of pixels, by one of which a group is judged after others 
 class Solved:
     """colours: (N, 3) in [0, 1]. psnr: dB of each view before the rounds and after them."""
 
-    colours: Tensor
+    colours: Float[Tensor, "N 3"]
     psnr: tuple[tuple[float, float], ...]
 
 
 @torch.no_grad()
 def solved_colours(
     gaussians: Gaussians,
-    start: Tensor,
+    start: Float[Tensor, "N 3"],
     cameras: Sequence[Camera],
-    photos: Sequence[Tensor],
-    trusts: Sequence[Tensor] | None = None,
-    owners: Tensor | None = None,
+    photos: Sequence[Float[Tensor, "3 _ _"]],
+    trusts: Sequence[Float[Tensor, " N"]] | None = None,
+    owners: Int[Tensor, " N"] | None = None,
     rounds: int = ROUNDS,
     ringing: float | None = None,
     progress: Callable[[float], None] = lambda done: None,

@@ -8,6 +8,7 @@ out: then everything that covers a pixel counts, hidden or not.
 """
 
 import torch
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from langflash_core.types import Camera, Gaussians
@@ -17,8 +18,13 @@ from .reference import _MAX_PAIRS, _alphas, _Box, _clip, _halves, _pairs, _trans
 
 
 def contributions(
-    gaussians: Gaussians, camera: Camera, pixels: Tensor, *, through: bool = False, near: float = NEAR
-) -> Tensor:
+    gaussians: Gaussians,
+    camera: Camera,
+    pixels: Bool[Tensor, "H W"],
+    *,
+    through: bool = False,
+    near: float = NEAR,
+) -> Float[Tensor, " N"]:
     """Largest contribution of every Gaussian to a set of pixels.
 
     Exact in the dtype given, transmittances always in float64; only the pixels' own rectangle is
@@ -60,7 +66,7 @@ def contributions(
     return result
 
 
-def composition(footprints: Footprints, x: int, y: int) -> tuple[Tensor, Tensor]:
+def composition(footprints: Footprints, x: int, y: int) -> tuple[Int[Tensor, " n"], Float[Tensor, " n"]]:
     """What one pixel is made of: rows (n,) of the Gaussians projected, nearest first, and T alpha (n,).
 
     A weight map at the pixel is W_k = sum_i T_i alpha_i w_ik. `project` takes most of the time and

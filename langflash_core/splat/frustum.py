@@ -15,6 +15,7 @@ import math
 from dataclasses import dataclass
 
 import torch
+from jaxtyping import Float, Int
 from torch import Tensor
 
 from langflash_core.splat.projection import ALPHA_MIN, DILATION, NEAR, TAN_MARGIN, finite_rows
@@ -31,12 +32,12 @@ class Packs:
     of these; centres (P, 3), radii (P,) and largest scales (P,) of packs. radius: deviations to where the
     most opaque one ends."""
 
-    rows: Tensor
-    means: Tensor
-    scales: Tensor
-    centres: Tensor
-    radii: Tensor
-    largest: Tensor
+    rows: Int[Tensor, " n"]
+    means: Float[Tensor, "n 3"]
+    scales: Float[Tensor, " n"]
+    centres: Float[Tensor, "P 3"]
+    radii: Float[Tensor, " P"]
+    largest: Float[Tensor, " P"]
     radius: float
 
     @staticmethod
@@ -54,7 +55,7 @@ class Packs:
         radius = math.sqrt(2 * math.log(max(opaque / ALPHA_MIN, 1.0)))
         return Packs(rows, means, scales, centres, radii, scales[last].amax(1), radius)
 
-    def before(self, camera: Camera) -> Tensor:
+    def before(self, camera: Camera) -> Int[Tensor, " n"]:
         """Rows of the Gaussians that may touch the picture, in ascending order."""
         if camera.orthographic:
             return self.rows.sort().values

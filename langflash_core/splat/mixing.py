@@ -17,6 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 import scipy.sparse
+from jaxtyping import Bool
 
 from langflash_core.splat.projection import ALPHA_MAX, Footprints
 from langflash_core.types import Camera
@@ -42,7 +43,7 @@ def mixing(
     count: int,
     faint: float = FAINT,
     small: float = SMALL,
-    wanted: np.ndarray | None = None,
+    wanted: Bool[np.ndarray, "H W"] | None = None,
 ) -> scipy.sparse.csr_matrix:
     """Contributions (H*W, N) float32 of N Gaussians to the pixels of a view, row by row.
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import torch
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from langflash_core.types import Camera, Gaussians, Semantics
@@ -13,8 +14,13 @@ SEEN = 0.05  # of a pixel's colour: a Gaussian that adds less anywhere in a regi
 
 
 def seen_in(
-    gaussians: Gaussians, visible: np.ndarray, camera: Camera, pixels: np.ndarray, *, through: bool = False
-) -> np.ndarray:
+    gaussians: Gaussians,
+    visible: Bool[np.ndarray, " N"],
+    camera: Camera,
+    pixels: Bool[np.ndarray, "H W"],
+    *,
+    through: bool = False,
+) -> Bool[np.ndarray, " N"]:
     """Gaussians that add at least `SEEN` to some of the pixels.
 
     Args:
@@ -35,13 +41,17 @@ def seen_in(
     return found
 
 
-def projected(gaussians: Gaussians, visible: np.ndarray, camera: Camera) -> tuple[Tensor, Footprints]:
+def projected(
+    gaussians: Gaussians, visible: Bool[np.ndarray, " N"], camera: Camera
+) -> tuple[Int[Tensor, " n"], Footprints]:
     """Rows (n,) of what is visible, and their footprints in a view; for any number of `weights_at`."""
     rows, shown = _shown(gaussians, visible)
     return rows, project(shown, camera)
 
 
-def weights_at(semantics: Semantics, rows: Tensor, footprints: Footprints, x: int, y: int) -> Tensor:
+def weights_at(
+    semantics: Semantics, rows: Int[Tensor, " n"], footprints: Footprints, x: int, y: int
+) -> Float[Tensor, " K"]:
     """Weights (K,) float32 of a pixel, W_k = sum_i T_i alpha_i w_ik, composed exactly.
 
     Args:

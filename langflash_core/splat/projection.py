@@ -17,6 +17,7 @@ Source: Zwicker et al. 2001 (EWA), Kerbl et al. 2023 (constants), gsplat (off-ce
 from dataclasses import dataclass
 
 import torch
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 from torch.nn.functional import normalize
 
@@ -43,14 +44,14 @@ class Footprints:
     scene units; num_dropped: Gaussians refused because a value was NaN or infinite.
     """
 
-    ids: Tensor
-    centres: Tensor
-    roots: Tensor
-    opacities: Tensor
-    depths: Tensor
+    ids: Int[Tensor, " n"]
+    centres: Float[Tensor, "n 2"]
+    roots: Float[Tensor, "n 3"]
+    opacities: Float[Tensor, " n"]
+    depths: Float[Tensor, " n"]
     num_dropped: int
 
-    def boxes(self) -> Tensor:
+    def boxes(self) -> Int[Tensor, "n 4"]:
         """Pixels that may pass the alpha cut: (n, 4) as x0, y0, x1, y1, half open, not clipped.
 
         alpha >= 1/255 means |L^-1 d| <= sqrt(2 ln(255 o)), an ellipse whose half extents are
@@ -65,14 +66,14 @@ class Footprints:
             return torch.cat((low, high), -1).long()  # half a pixel of slack swallows rounding
 
 
-def finite_rows(gaussians: Gaussians) -> Tensor:
+def finite_rows(gaussians: Gaussians) -> Bool[Tensor, " N"]:
     """(N,) bool: every value of the Gaussian is finite."""
     fields = (gaussians.means, gaussians.quats, gaussians.scales, gaussians.opacities[:, None])
     rows = [f.isfinite().all(-1) for f in fields] + [gaussians.sh.isfinite().flatten(1).all(-1)]
     return torch.stack(rows).all(0)
 
 
-def drawable_rows(scene: Scene) -> Tensor:
+def drawable_rows(scene: Scene) -> Bool[Tensor, " N"]:
     """(N,) bool: every value of the Gaussian and each of its weights is finite.
 
     Raises:
@@ -84,7 +85,7 @@ def drawable_rows(scene: Scene) -> Tensor:
     return finite_rows(scene.gaussians) & values.isfinite().all(-1)
 
 
-def view_depths(gaussians: Gaussians, camera: Camera) -> Tensor:
+def view_depths(gaussians: Gaussians, camera: Camera) -> Float[Tensor, " N"]:
     """z (N,) of every mean in the camera's frame, scene units.
 
     Term by term: matrix products of two libraries round a third of the rows differently, and
@@ -96,7 +97,7 @@ def view_depths(gaussians: Gaussians, camera: Camera) -> Tensor:
     return x * row[0] + y * row[1] + z * row[2] + row[3]
 
 
-def view_colours(gaussians: Gaussians, camera: Camera) -> Tensor:
+def view_colours(gaussians: Gaussians, camera: Camera) -> Float[Tensor, "N 3"]:
     """Colours (N, 3) as this camera sees them, clamped at 0, not above; parallel rays have its axis."""
     viewmat = camera.viewmat.to(gaussians.means)
     if camera.orthographic:

@@ -15,6 +15,7 @@ atoms at 224 x 224 take 1.3 s on one core where they are 1.2 px wide, 15 s at 4.
 """
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.types import Camera, Frame, Gaussians, Scene
@@ -71,8 +72,8 @@ def render(
 
 
 def rasterize(
-    gaussians: Gaussians, features: Tensor, camera: Camera, near: float = NEAR
-) -> tuple[Tensor, Tensor]:
+    gaussians: Gaussians, features: Float[Tensor, "N F"], camera: Camera, near: float = NEAR
+) -> tuple[Float[Tensor, "H W F"], Float[Tensor, "H W"]]:
     """Composite any features front to back; works in the dtype and on the device given.
 
     Args:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from importlib.util import find_spec
 
 import torch
+from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn.functional import normalize
 
@@ -61,7 +62,9 @@ class Budget:
     steps: int = 2000
 
 
-def refine(scene: Scene, photos: Tensor, budget: Budget, report: Progress | None = None) -> Refinement:
+def refine(
+    scene: Scene, photos: Float[Tensor, "V 3 H W"], budget: Budget, report: Progress | None = None
+) -> Refinement:
     """The scene fitted to its photos, if that brings a held-out view closer to its photo.
 
     Args:
@@ -94,7 +97,7 @@ def refine(scene: Scene, photos: Tensor, budget: Budget, report: Progress | None
     return Refinement(fitted, True, view, held_out, (before, _mean_psnr(fitted, photos)), (first, second))
 
 
-def psnr(rgb: Tensor, photo: Tensor, shown: Tensor) -> float:
+def psnr(rgb: Float[Tensor, "H W 3"], photo: Float[Tensor, "3 H W"], shown: Bool[Tensor, "H W"]) -> float:
     """dB over the pixels `shown` (H, W); rgb (H, W, 3), photo (3, H, W). Equal pictures give 100."""
     error = (rgb.detach().clamp(0, 1) - photo.movedim(0, -1))[shown].square().mean()
     return -10 * math.log10(max(float(error), 1e-10))

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from jaxtyping import Float, Int, Num
 from torch import Tensor
 
 from langflash_core.errors import Cancelled
@@ -34,11 +35,11 @@ _WORTH_PACKING = 0.75  # share of tiles that go on, from which down those that a
 
 def rasterize_tiles(
     footprints: Footprints,
-    features: Sequence[Tensor],
+    features: Sequence[Float[Tensor, "N _"]],
     camera: Camera,
     threads: int = 1,
     stopping: Callable[[], bool] = lambda: False,
-) -> tuple[list[Tensor], Tensor]:
+) -> tuple[list[Float[Tensor, "H W _"]], Float[Tensor, "H W"]]:
     """Composite features front to back, as `reference.rasterize` does, without gradients.
 
     Args:
@@ -105,8 +106,8 @@ class _Lists:
 
 
 def tiles_touched(
-    boxes: np.ndarray, width: int, height: int, side: int = TILE
-) -> tuple[np.ndarray, np.ndarray, tuple[int, int]]:
+    boxes: Num[np.ndarray, "n 4"], width: int, height: int, side: int = TILE
+) -> tuple[Int[np.ndarray, " pairs"], Int[np.ndarray, " pairs"], tuple[int, int]]:
     """Every pair of a box and a tile of side x side pixels of an image that it touches.
 
     Args:
@@ -129,7 +130,7 @@ def tiles_touched(
     )
 
 
-def num_touched(boxes: np.ndarray, width: int, height: int, side: int) -> int:
+def num_touched(boxes: Num[np.ndarray, "n 4"], width: int, height: int, side: int) -> int:
     """How many pairs `tiles_touched` returns."""
     _, _, wide, tall = _spans(boxes, width, height, side)
     return int((wide * tall).sum())

@@ -8,6 +8,7 @@ in every photo, counts nothing. Sizes: V photos, N Gaussians, H W pixels.
 
 import numpy as np
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.types import Scene
@@ -17,7 +18,7 @@ from .projection import project
 
 
 @torch.no_grad()
-def seen_shares(scene: Scene) -> Tensor:
+def seen_shares(scene: Scene) -> Float[Tensor, "V N"]:
     """Shares (V, N) float32 of the photos' pixels, as the network saw them; rows sum to 1 at most."""
     shapes, count = scene.gaussians.map(lambda values: values.detach().cpu().float()), len(scene.gaussians)
     rows = []

@@ -79,7 +79,7 @@ def test_reduced_dictionary_of_lower_rank(kind):
     assert torch.isfinite(relevance_maps(maps(24), compiled(dictionary, atoms(3), atoms(2)))).all()
 
 
-def test_reduced_dictionary_keeps_float32():
+def test_reduced_dictionary_keeps_float32(unchecked):
     factor, basis = reduce_dictionary(atoms(24).float())
     assert factor.dtype == basis.dtype == torch.float32
     # Computed in float64, rounded once: half an ulp of numbers below 1.
@@ -125,14 +125,14 @@ def test_relevancy_equals_the_softmax(num):
 
 
 def test_relevancy_is_stable_and_ordered():
-    positives = torch.tensor([-1.0, -0.5, 0.0, 0.5, 1.0])
+    positives = torch.tensor([[-1.0, -0.5, 0.0, 0.5, 1.0]])
     negatives = torch.tensor([[0.0], [-1.0]]).expand(2, 5)
     scores = relevancy(positives, negatives, 1e4)  # logits of +-1e4
-    assert scores.tolist() == [0.0, 0.0, 0.5, 1.0, 1.0]
+    assert scores.tolist() == [[0.0, 0.0, 0.5, 1.0, 1.0]]
     gentle = relevancy(positives, negatives, 10.0)
     assert (gentle.diff() > 0).all()
     assert ((gentle > 0) & (gentle < 1)).all()
-    assert (relevancy(positives, negatives + 1, 10.0)[:-1] < 0.5).all()  # a negative wins
+    assert (relevancy(positives, negatives + 1, 10.0)[:, :-1] < 0.5).all()  # a negative wins
     with pytest.raises(ValueError, match="at least one"):
         relevancy(positives, negatives[:0], 10.0)
 
@@ -192,7 +192,7 @@ def test_gradients_reach_the_weights_and_stay_finite():
     assert torch.autograd.gradcheck(lambda w: relevance_maps(w, query), maps(3, 3, 2)[1:].requires_grad_())
 
 
-def test_sizes_must_agree():
+def test_sizes_must_agree(unchecked):
     query = compiled(atoms(4), atoms(2, seed=2), atoms(2, seed=3))
     with pytest.raises(ValueError, match="weight_maps: expected K = 4, received 5"):
         relevance_maps(maps(5), query)

@@ -94,7 +94,9 @@ def test_unknown_depths_say_nothing(bad):
         weights, torch.full((2, SIDE, SIDE), bad), torch.eye(4).repeat(2, 1, 1), KS.repeat(2, 1, 1)
     )
     assert torch.equal(found, torch.zeros(3, PLACE))
-    assert places(weights[:, :0], torch.ones(2, SIDE, SIDE), torch.eye(4).repeat(2, 1, 1), KS).shape == (
+    assert places(
+        weights[:, :0], torch.ones(2, SIDE, SIDE), torch.eye(4).repeat(2, 1, 1), KS.repeat(2, 1, 1)
+    ).shape == (
         0,
         PLACE,
     )

@@ -310,7 +310,7 @@ def test_levels_and_confidences_come_back_in_a_file_of_version_3(path, tmp_path,
         ("confidences", lambda values: values[None].clone(), "confidences: expected shape"),
     ],
 )
-def test_levels_and_confidences_that_make_no_sense_are_refused(path, scene, name, wrong, words):
+def test_levels_and_confidences_that_make_no_sense_are_refused(path, scene, name, wrong, words, unchecked):
     from langflash_core.scene.file import _digest
 
     save(detailed(scene), path)

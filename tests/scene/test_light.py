@@ -362,7 +362,7 @@ def test_partners_are_those_that_share_most_and_connect_all():
     assert len(none[0]) == 0
 
 
-def test_light_is_refused_where_its_shape_is_wrong_and_corrects_one_or_all():
+def test_light_is_refused_where_its_shape_is_wrong_and_corrects_one_or_all(unchecked):
     with pytest.raises(ValueError, match="offsets: expected shape"):
         Light(torch.ones(2, 3), torch.zeros(3, 3))
     with pytest.raises(ValueError, match="gains: expected shape"):

@@ -10,6 +10,7 @@ from typing import overload
 
 import numpy as np
 import torch
+from jaxtyping import Shaped
 from safetensors.torch import save
 from torch import Tensor
 
@@ -147,7 +148,7 @@ def save_network(network: LangFlashNet, path: Path, metadata: Mapping | None = N
     write_atomically(path, save(quantise(network.state_dict()), {"langflash": json.dumps(header)}))
 
 
-def read_weights(path: Path) -> tuple[dict[str, Tensor], dict]:
+def read_weights(path: Path) -> tuple[dict[str, Shaped[Tensor, "..."]], dict]:
     """Float32 tensors and metadata of a safetensors file ({} for a foreign one).
 
     Raises:
@@ -157,7 +158,7 @@ def read_weights(path: Path) -> tuple[dict[str, Tensor], dict]:
     return _tensors(stored.arrays), stored.header
 
 
-def quantise(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
+def quantise(tensors: Mapping[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Tensor, "..."]]:
     """Int8 rows for matrices, float16 for the rest. Rows of zeros keep a scale of 0."""
     stored = {}
     for key, value in tensors.items():
@@ -176,7 +177,7 @@ def quantise(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
     return stored
 
 
-def dequantise(stored: Mapping[str, Tensor]) -> dict[str, Tensor]:
+def dequantise(stored: Mapping[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Tensor, "..."]]:
     """Float32 tensors of `quantise`."""
     return _tensors(dequantised({key: value.numpy() for key, value in stored.items()}))
 
@@ -187,7 +188,7 @@ def _tensors(arrays: Mapping[str, np.ndarray]) -> dict[str, Tensor]:
 
 
 def load_strictly(
-    module: torch.nn.Module, tensors: dict[str, Tensor], path: Path, *, assign: bool = False
+    module: torch.nn.Module, tensors: dict[str, Shaped[Tensor, "..."]], path: Path, *, assign: bool = False
 ) -> None:
     """Fill a module with exactly its tensors: copies of them, or `assign` them as they are.
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from jaxtyping import Shaped
 from safetensors import SafetensorError
 from safetensors.torch import load_file
 from torch import Tensor
@@ -40,12 +41,12 @@ class Imported:
     `notes`: what its user should know, a sentence each."""
 
     origin: Origin
-    tensors: dict[str, Tensor]
-    clip: dict[str, Tensor]
+    tensors: dict[str, Shaped[Tensor, "..."]]
+    clip: dict[str, Shaped[Tensor, "..."]]
     notes: tuple[str, ...] = ()
 
 
-def read_checkpoint(path: Path) -> dict[str, Tensor]:
+def read_checkpoint(path: Path) -> dict[str, Shaped[Tensor, "..."]]:
     """The state dict of a .safetensors file, or of a pickle of plain tensors.
 
     Nothing in a pickle is executed, whatever it names.
@@ -97,7 +98,7 @@ def _state_dict(held: Any, path: Path) -> dict[str, Tensor]:
     return {str(name): value for name, value in held.items()}
 
 
-def recognise(state: Mapping[str, Tensor], path: Path) -> Origin:
+def recognise(state: Mapping[str, Shaped[Tensor, "..."]], path: Path) -> Origin:
     """Which published checkpoint this is.
 
     Raises:
@@ -112,7 +113,7 @@ def recognise(state: Mapping[str, Tensor], path: Path) -> Origin:
     )
 
 
-def convert(state: Mapping[str, Tensor], preset: Preset, path: Path) -> Imported:
+def convert(state: Mapping[str, Shaped[Tensor, "..."]], preset: Preset, path: Path) -> Imported:
     """Our tensors of a published state dict.
 
     Args:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import torch
+from jaxtyping import Shaped
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
@@ -70,7 +71,7 @@ def installed(preset: Preset) -> list[Part]:
 
 def write_part(
     path: Path,
-    tensors: Mapping[str, Tensor],
+    tensors: Mapping[str, Shaped[Tensor, "..."]],
     preset: Preset,
     origin: str = "",
     source: str = "",
@@ -123,7 +124,7 @@ def read_part(path: Path) -> Part:
     )  # fmt: skip
 
 
-def fingerprint(tensors: Mapping[str, Tensor], prefix: str = "") -> str:
+def fingerprint(tensors: Mapping[str, Shaped[Tensor, "..."]], prefix: str = "") -> str:
     """Of the trunk among tensors by our names, `prefix` before them; alike where their float32 values are.
 
     Returns:
@@ -135,7 +136,7 @@ def fingerprint(tensors: Mapping[str, Tensor], prefix: str = "") -> str:
     return digest({name: tensors[key] for name, key in own.items()})
 
 
-def digest(tensors: Mapping[str, Tensor]) -> str:
+def digest(tensors: Mapping[str, Shaped[Tensor, "..."]]) -> str:
     """Of names and float32 values, 32 hexadecimal digits."""
     whole = hashlib.sha256()
     for name in sorted(tensors):
@@ -145,7 +146,7 @@ def digest(tensors: Mapping[str, Tensor]) -> str:
     return whole.hexdigest()[:32]
 
 
-def read_tensors(part: Part, modules: Iterable[str]) -> dict[str, Tensor]:
+def read_tensors(part: Part, modules: Iterable[str]) -> dict[str, Shaped[Tensor, "..."]]:
     """Some modules of a part, mapped from the disk, by their whole names."""
     wanted = set(modules)
     with safe_open(str(part.path), framework="pt") as file:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
+from jaxtyping import Shaped
 from safetensors import safe_open
 from safetensors.torch import save_file
 from torch import Tensor
@@ -223,7 +224,7 @@ def _fill(network: LangFlashNet, name: str, path: Path, device: str | torch.devi
     module.load_state_dict(tensors, assign=True)
 
 
-def on_own_address(value: Tensor) -> Tensor:
+def on_own_address(value: Shaped[Tensor, "*any"]) -> Shaped[Tensor, "*any"]:
     """The same numbers where torch would have put them, on a multiple of 64 bytes.
 
     A tensor of a safetensors file starts at any address, and matrix products may choose their way by it
@@ -233,7 +234,7 @@ def on_own_address(value: Tensor) -> Tensor:
     return value if value.data_ptr() % ALIGNMENT == 0 else value.clone()
 
 
-def finite(value: Tensor) -> bool:
+def finite(value: Shaped[Tensor, "..."]) -> bool:
     """One sum tells nearly always, and is several times faster than asking every number."""
     return bool(torch.isfinite(value.sum())) or bool(torch.isfinite(value).all())
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from safetensors import SafetensorError, safe_open
 
 from langflash_core.errors import WeightsError
@@ -30,7 +31,7 @@ multiple of this, where torch itself would have put it, so that the last bits do
 class Stored:
     """arrays: float32, each on a multiple of `ALIGNMENT` bytes. header: our metadata; {}: a foreign file."""
 
-    arrays: dict[str, np.ndarray]
+    arrays: dict[str, Shaped[np.ndarray, "..."]]
     header: dict
 
 
@@ -69,7 +70,7 @@ def read_stored(path: Path) -> Stored:
     return Stored(dequantised(raw), header)
 
 
-def dequantised(raw: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def dequantised(raw: Mapping[str, Shaped[np.ndarray, "..."]]) -> dict[str, Shaped[np.ndarray, "..."]]:
     """Aligned float32 arrays of what is stored: int8 rows times their scales, the rest as it is."""
     kept = {key: value for key, value in raw.items() if not _is_scale(key, raw)}
     arrays = aligned({key: value.shape for key, value in kept.items()})
@@ -82,7 +83,7 @@ def dequantised(raw: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return arrays
 
 
-def aligned(shapes: Mapping[str, tuple[int, ...]]) -> dict[str, np.ndarray]:
+def aligned(shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Shaped[np.ndarray, "..."]]:
     """Float32 arrays of these shapes, not yet filled, one after the other in one piece of memory."""
     step = ALIGNMENT // np.dtype(np.float32).itemsize
     sizes = {key: math.prod(shape) for key, shape in shapes.items()}

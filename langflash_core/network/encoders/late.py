@@ -7,6 +7,7 @@ own, read these. Both halves share the early blocks, so a photo costs half an en
 from typing import cast
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -60,7 +61,7 @@ class LateHalf(nn.Module):
         pairs = zip(self.blocks, vit.blocks[self.first :], strict=True)
         return [(cast(CorrectedBlock, own), cast(Block, base)) for own, base in pairs]
 
-    def forward(self, early: Tensor, vit: PlainViT) -> tuple[Tensor, ...]:
+    def forward(self, early: Float[Tensor, "n T C"], vit: PlainViT) -> tuple[Float[Tensor, "n _ C"], ...]:
         """Normed tokens (n, h*w, C) of the last two hooks; early (n, 1 + h*w, C): of `vit.states`."""
         given, x = [], early
         for depth, (own, block) in enumerate(self.pairs(vit)):
@@ -90,7 +91,7 @@ class CorrectedBlock(nn.Module):
             (self.fc2, base.mlp.fc2),
         ]
 
-    def forward(self, x: Tensor, base: Block) -> Tensor:
+    def forward(self, x: Float[Tensor, "N T C"], base: Block) -> Float[Tensor, "N T C"]:
         values = attended(self.qkv(self.norm1(x), base.attn.qkv), self.heads)
         x = x + self.ls1(self.proj(values, base.attn.proj))
         hidden = F.gelu(self.fc1(self.norm2(x), base.mlp.fc1))
@@ -106,9 +107,9 @@ class Correction(nn.Module):
         self.up = nn.Parameter(torch.zeros(outputs, rank))
         self.bias = nn.Parameter(torch.zeros(outputs))
 
-    def forward(self, x: Tensor, base: nn.Linear) -> Tensor:
+    def forward(self, x: Float[Tensor, "N T C"], base: nn.Linear) -> Float[Tensor, "N T D"]:
         return F.linear(x, self.matrix(base), self.bias)
 
-    def matrix(self, base: nn.Linear) -> Tensor:
+    def matrix(self, base: nn.Linear) -> Float[Tensor, "outputs inputs"]:
         """W + U D, (outputs, inputs)."""
         return base.weight + self.up @ self.down

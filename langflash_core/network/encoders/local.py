@@ -8,6 +8,7 @@ Sizes: n pictures, H W pixels.
 
 from collections.abc import Mapping
 
+from jaxtyping import Float, Shaped
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -39,7 +40,7 @@ class LocalFeatures(nn.Module):
         self.fusion = nn.Sequential(_conv(64, 64), _conv(64, 64), nn.Conv2d(64, DIM, 1))
         self.requires_grad_(False)
 
-    def forward(self, images: Tensor) -> Tensor:
+    def forward(self, images: Float[Tensor, "n 3 H W"]) -> Float[Tensor, "n C h w"]:
         """(n, 3, H, W) in [0, 1] -> unit descriptors (n, 64, about 3 H / 8, 3 W / 8)."""
         size = tuple(round(side * _ENLARGE / _STRIDE) * _STRIDE for side in images.shape[-2:])
         grey = resize(images.mean(1, keepdim=True), (size[0], size[1]))
@@ -52,7 +53,7 @@ class LocalFeatures(nn.Module):
         return F.normalize(self.fusion(joined).float(), dim=1)
 
 
-def convert(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
+def convert(tensors: Mapping[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Tensor, "..."]]:
     """State dict of `LocalFeatures` from the published tensors of XFeat; other heads are dropped."""
     found = {f"skip.{part}": tensors[f"skip1.1.{part}"] for part in ("weight", "bias")}
     names = {f"block{i}": f"block{i}" for i in range(1, 6)} | {"block_fusion": "fusion"}

@@ -4,6 +4,7 @@ Source: Li et al. 2022 (LSeg), its demo network: ViT-L/16, readout "project", ba
 """
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -20,7 +21,7 @@ class NormedUnit(nn.Module):
         self.conv1, self.conv2 = (nn.Conv2d(feature, feature, 3, padding=1, bias=False) for _ in range(2))
         self.norm1, self.norm2 = nn.BatchNorm2d(feature), nn.BatchNorm2d(feature)
 
-    def forward(self, x: Tensor) -> Tensor:
+    def forward(self, x: Float[Tensor, "n C h w"]) -> Float[Tensor, "n C h w"]:
         return x + self.norm2(self.conv2(F.relu(self.norm1(self.conv1(F.relu(x))))))
 
 
@@ -33,7 +34,9 @@ class NormedFusion(nn.Module):
         self.mix = NormedUnit(feature)
         self.out = nn.Conv2d(feature, feature, 1)
 
-    def forward(self, coarse: Tensor, lateral: Tensor | None = None) -> Tensor:
+    def forward(
+        self, coarse: Float[Tensor, "n C h w"], lateral: Float[Tensor, "n C _ _"] | None = None
+    ) -> Float[Tensor, "n C H W"]:
         if self.lateral is not None and lateral is not None:
             # An odd grid makes the coarsest path a row too large; LSeg itself takes only even ones.
             coarse = coarse[..., : lateral.shape[-2], : lateral.shape[-1]] + self.lateral(lateral)
@@ -66,7 +69,7 @@ class LSeg(nn.Module):
         """Stays in evaluation mode."""
         return super().train(False)
 
-    def features(self, images: Tensor) -> Tensor:
+    def features(self, images: Float[Tensor, "n 3 H W"]) -> Float[Tensor, "n C h w"]:
         """Features of any norm (n, C, H/2, W/2) of images (n, 3, H, W) in [0, 1], sides multiples of 16."""
         patch = self.vit.patch.kernel_size[0]
         grid = (images.shape[-2] // patch, images.shape[-1] // patch)
@@ -81,7 +84,7 @@ class LSeg(nn.Module):
             path = self.fuse[index](path, levels[index])
         return self.out(path).float()
 
-    def forward(self, images: Tensor) -> Tensor:
+    def forward(self, images: Float[Tensor, "B V 3 H W"]) -> Float[Tensor, "B V C h w"]:
         """L(x), (B, V, C, H/2, W/2), unit channel norm."""
         return F.normalize(self.features(images.flatten(0, 1)), dim=1).unflatten(0, images.shape[:2])
 

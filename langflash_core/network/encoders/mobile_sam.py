@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import torch
+from jaxtyping import Float, Shaped
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -81,12 +82,12 @@ class MobileSamEncoder(nn.Module):
         """Where its numbers lie."""
         return next(self.parameters()).device
 
-    def forward(self, squares: Tensor) -> Tensor:
+    def forward(self, squares: Float[Tensor, "n 3 H W"]) -> Float[Tensor, "n 256 h w"]:
         """Embedding (n, 256, h, w) of normalised pictures (n, 3, H, W), sides multiples of 16."""
         return self.neck(self.body.forward_features(squares))
 
     @torch.inference_mode()
-    def dense(self, images: Tensor) -> Tensor:
+    def dense(self, images: Float[Tensor, "n 3 H W"]) -> Float[Tensor, "n 256 h w"]:
         """Embedding (n, 256, h, w) of photos (n, 3, H, W) in [0, 1], max(h, w) = side / 16.
 
         Cells that show nothing of the photo are left out.
@@ -101,7 +102,7 @@ class MobileSamEncoder(nn.Module):
         scale = self.side / max(height, width)
         return max(1, round(height * scale)), max(1, round(width * scale))
 
-    def squared(self, small: Tensor) -> Tensor:
+    def squared(self, small: Float[Tensor, "n 3 h w"]) -> Float[Tensor, "n 3 H W"]:
         """Squares (n, 3, side, side) of photos (n, 3, h, w) of `fitting` size, in [0, 1].
 
         Normalised, and zero where nothing is, as SAM has them.
@@ -116,7 +117,7 @@ class ChannelNorm(nn.LayerNorm):
     def __init__(self, width: int) -> None:
         super().__init__(width, eps=1e-6)
 
-    def forward(self, input: Tensor) -> Tensor:
+    def forward(self, input: Float[Tensor, "n C h w"]) -> Float[Tensor, "n C h w"]:
         return super().forward(input.movedim(1, -1)).movedim(-1, 1)
 
 
@@ -131,7 +132,7 @@ def load_mobile_sam_encoder(path: Path, side: int = SIDE, device: str = "cpu") -
     return filled(MobileSamEncoder(side), state, path, "MobileSAM's encoder").to(device)
 
 
-def own_names(published: Mapping[str, Tensor]) -> dict[str, Tensor]:
+def own_names(published: Mapping[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Tensor, "..."]]:
     """The tensors of a file of MobileSAM, those of the encoder by the names they have here, in single
     precision; without the classifier's, which nobody asks."""
     return {
@@ -141,7 +142,7 @@ def own_names(published: Mapping[str, Tensor]) -> dict[str, Tensor]:
     }
 
 
-def filled(network: Module, state: Mapping[str, Tensor], path: Path, what: str) -> Module:
+def filled(network: Module, state: Mapping[str, Shaped[Tensor, "..."]], path: Path, what: str) -> Module:
     """The network, frozen, with exactly these tensors, which are of a file.
 
     Raises:

@@ -6,6 +6,7 @@ n pictures of H x W pixels, a grid of h x w patches, C channels.
 from collections.abc import Iterable, Sequence
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -36,11 +37,11 @@ class PlainViT(nn.Module):
         self.blocks = nn.ModuleList(Block(dim, heads) for _ in range(preset.encoder_depth))
         self.norm = nn.LayerNorm(dim, NORM_EPS)
 
-    def forward(self, images: Tensor, hooks: Sequence[int]) -> list[Tensor]:
+    def forward(self, images: Float[Tensor, "n 3 H W"], hooks: Sequence[int]) -> list[Float[Tensor, "n T C"]]:
         """Normed tokens (n, h*w, C) after every hooked block, class token left out; images (n, 3, H, W)."""
         return [self.norm(x)[:, 1:] for x in self.states(images, hooks)]
 
-    def states(self, images: Tensor, hooks: Sequence[int]) -> list[Tensor]:
+    def states(self, images: Float[Tensor, "n 3 H W"], hooks: Sequence[int]) -> list[Float[Tensor, "n T C"]]:
         """What every hooked block hands on, (n, 1 + h*w, C), class token first."""
         maps = self.patch_embed(images)
         tokens = maps.flatten(2).transpose(1, 2)
@@ -56,13 +57,15 @@ class PlainViT(nn.Module):
         return torch.cat((self.pos_embed[:, :1], resized.permute(0, 2, 3, 1).flatten(1, 2)), 1)
 
 
-def attended(qkv: Tensor, heads: int) -> Tensor:
+def attended(qkv: Float[Tensor, "n T D"], heads: int) -> Float[Tensor, "n T C"]:
     """Values (n, T, C) that every head gathers; qkv (n, T, 3 C): queries, keys and values."""
     q, k, v = qkv.unflatten(-1, (3, heads, -1)).permute(2, 0, 3, 1, 4)
     return F.scaled_dot_product_attention(q, k, v).transpose(1, 2).flatten(2)
 
 
-def through(blocks: Iterable[nn.Module], x: Tensor, hooks: Sequence[int]) -> list[Tensor]:
+def through(
+    blocks: Iterable[nn.Module], x: Float[Tensor, "N T C"], hooks: Sequence[int]
+) -> list[Float[Tensor, "N T C"]]:
     """What the hooked ones of `blocks` hand on; x (n, 1 + h*w, C)."""
     given = []
     for depth, block in enumerate(blocks):
@@ -110,7 +113,7 @@ class LayerScale(nn.Module):
         super().__init__()
         self.gamma = nn.Parameter(torch.full((dim,), _FIRST_SCALE))
 
-    def forward(self, x: Tensor) -> Tensor:
+    def forward(self, x: Float[Tensor, "N T C"]) -> Float[Tensor, "N T C"]:
         return x * self.gamma
 
 
@@ -123,6 +126,6 @@ class Block(nn.Module):
         self.attn, self.mlp = _Attention(dim, heads), _MLP(dim)
         self.ls1, self.ls2 = LayerScale(dim), LayerScale(dim)
 
-    def forward(self, x: Tensor) -> Tensor:
+    def forward(self, x: Float[Tensor, "N T C"]) -> Float[Tensor, "N T C"]:
         x = x + self.ls1(self.attn(self.norm1(x)))
         return x + self.ls2(self.mlp(self.norm2(x)))

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 
 from langflash_core.network.encoders.plain import PlainViT
@@ -22,21 +23,21 @@ class Tokens:
     grouped: the hooks once more, from the encoder that the grouping was trained on; () where it is this one.
     """
 
-    hooks: tuple[Tensor, ...]
+    hooks: tuple[Float[Tensor, "B V _ _"], ...]
     grid: tuple[int, int]
-    named: tuple[Tensor, ...] = ()
-    grouped: tuple[Tensor, ...] = ()
+    named: tuple[Float[Tensor, "B V _ _"], ...] = ()
+    grouped: tuple[Float[Tensor, "B V _ _"], ...] = ()
 
     @property
     def shape(self) -> tuple[int, int]:
         """(B, V)."""
         return self.hooks[0].shape[0], self.hooks[0].shape[1]
 
-    def maps(self, index: int) -> Tensor:
+    def maps(self, index: int) -> Float[Tensor, "n C h w"]:
         """Hook `index` as feature maps (B*V, C, h, w)."""
         return tokens_to_maps(self.hooks[index].flatten(0, 1), self.grid)
 
-    def taught_maps(self) -> Tensor:
+    def taught_maps(self) -> Float[Tensor, "n C h w"]:
         """What the classifier of real photos reads, (B*V, 3C, h, w): the last early hook and those of the
         half that photos taught."""
         deep = (tokens_to_maps(t.flatten(0, 1), self.grid) for t in self.named)
@@ -76,7 +77,7 @@ class Tokens:
         return self.each(lambda hook: hook[:, list(keep)])
 
 
-def tokens_to_maps(tokens: Tensor, grid: tuple[int, int]) -> Tensor:
+def tokens_to_maps(tokens: Float[Tensor, "n _ C"], grid: tuple[int, int]) -> Float[Tensor, "n C h w"]:
     """(n, h*w, C) -> (n, C, h, w)."""
     return tokens.transpose(1, 2).unflatten(2, grid)
 
@@ -96,7 +97,7 @@ class Encoder(nn.Module):
         return super().train(False)
 
     @torch.no_grad()
-    def forward(self, images: Tensor) -> tuple[Tokens, Tensor]:
+    def forward(self, images: Float[Tensor, "B V 3 H W"]) -> tuple[Tokens, Float[Tensor, "n _ C"]]:
         """Tokens of images (B, V, 3, H, W) in [0, 1], and what `LateHalf` reads, (B*V, 1 + h*w, C)."""
         mean, std = (images.new_tensor(values)[:, None, None] for values in (_MEAN, _STD))
         flat = (images.flatten(0, 1) - mean) / std
@@ -106,6 +107,8 @@ class Encoder(nn.Module):
         return Tokens(hooks, grid), states[1]
 
 
-def unflattened(tokens: Tensor, images: Tensor) -> Tensor:
+def unflattened(
+    tokens: Float[Tensor, "n ..."], images: Float[Tensor, "B V _ H W"]
+) -> Float[Tensor, "B V ..."]:
     """Tokens (B*V, ...) of images (B, V, 3, H, W), as (B, V, ...)."""
     return tokens.unflatten(0, images.shape[:2])

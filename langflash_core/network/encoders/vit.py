@@ -4,6 +4,7 @@ B batch, V views, n tokens, C channels; a picture of H x W pixels has a grid of 
 """
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -12,7 +13,7 @@ from langflash_core.network.layers.decoder import normalised_intrinsics
 from langflash_core.network.presets import LSegSizes, PointMaps
 
 
-def centred(images: Tensor) -> Tensor:
+def centred(images: Float[Tensor, "*n 3 H W"]) -> Float[Tensor, "*n 3 H W"]:
     """Images in [0, 1] -> [-1, 1], as all published networks of this preset read them."""
     return images * 2 - 1
 
@@ -37,7 +38,7 @@ class RotaryEncoder(nn.Module):
         )
         self.norm = nn.LayerNorm(dim, preset.norm_eps)
 
-    def forward(self, images: Tensor, Ks: Tensor) -> Tensor:
+    def forward(self, images: Float[Tensor, "B V 3 H W"], Ks: Float[Tensor, "B V 3 3"]) -> Tensor:
         """(B, V, h*w + 1, C) from images (B, V, 3, H, W) in [0, 1] and Ks (B, V, 3, 3), pixels."""
         height, width = images.shape[-2:]
         patches = self.patch(centred(images.flatten(0, 1))).flatten(2).transpose(1, 2)
@@ -64,7 +65,7 @@ class ClassTokenEncoder(nn.Module):
         self.places = nn.Parameter(torch.zeros(1, sizes.trained_grid**2 + 1, sizes.dim))
         self.blocks = nn.ModuleList(SelfBlock(sizes.dim, sizes.heads, 1e-6) for _ in range(sizes.depth))
 
-    def forward(self, images: Tensor) -> tuple[Tensor, ...]:
+    def forward(self, images: Float[Tensor, "n 3 H W"]) -> tuple[Float[Tensor, "n T C"], ...]:
         """Tokens (n, 1 + h*w, C) after every hook, class token first; images (n, 3, H, W) in [-1, 1]."""
         maps = self.patch(images)
         x = torch.cat((self.class_token.expand(len(maps), -1, -1), maps.flatten(2).transpose(1, 2)), 1)

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -10,7 +11,7 @@ Memory = tuple[Tensor, Tensor]
 """Keys and values of tokens that are read, (B, heads, m, head_dim) each."""
 
 
-def rope_2d(grid: tuple[int, int], head_dim: int, base: float, *, extra: int = 0) -> Tensor:
+def rope_2d(grid: tuple[int, int], head_dim: int, base: float, *, extra: int = 0) -> Float[Tensor, "2 n d"]:
     """Cosines and sines (2, h*w + extra, head_dim) of rotary codes for patch rows and columns.
 
     The first half of a head turns with y, the second with x. `extra` tokens after the grid sit
@@ -29,7 +30,9 @@ def rope_2d(grid: tuple[int, int], head_dim: int, base: float, *, extra: int = 0
     return torch.stack((angles.cos(), angles.sin()))
 
 
-def rotate(tokens: Tensor, code: Tensor) -> Tensor:
+def rotate(
+    tokens: Float[Tensor, "B heads n d"], code: Float[Tensor, "2 n d"]
+) -> Float[Tensor, "B heads n d"]:
     """Apply a `rope_2d` code to tokens (B, heads, n, head_dim)."""
     first, second = tokens.unflatten(-1, (2, 2, -1)).unbind(-2)  # (B, heads, n, 2 axes, quarter)
     turned = torch.stack((-second, first), -2).flatten(-3)
@@ -46,24 +49,37 @@ class Attention(nn.Module):
         self.out = nn.Linear(dim, dim, bias=bias)
 
     def forward(
-        self, query: Tensor, key: Tensor, value: Tensor, codes: tuple[Tensor, Tensor] | None = None
-    ) -> Tensor:
+        self,
+        query: Float[Tensor, "B n C"],
+        key: Float[Tensor, "B m C"],
+        value: Float[Tensor, "B m C"],
+        codes: tuple[Float[Tensor, "2 n d"], Float[Tensor, "2 m d"]] | None = None,
+    ) -> Float[Tensor, "B n C"]:
         """(B, n, C) from queries (B, n, C), keys and values (B, m, C)."""
         own, of_memory = codes if codes is not None else (None, None)
         return self.gathered(query, self.memory(key, value, of_memory), own)
 
-    def memory(self, key: Tensor, value: Tensor, code: Tensor | None = None) -> Memory:
+    def memory(
+        self,
+        key: Float[Tensor, "B m C"],
+        value: Float[Tensor, "B m C"],
+        code: Float[Tensor, "2 m d"] | None = None,
+    ) -> Memory:
         """What queries read of (B, m, C): one memory serves many."""
         k, v = self._of_heads(self.key(key)), self._of_heads(self.value(value))
         return k if code is None else rotate(k, code), v
 
-    def gathered(self, query: Tensor, memory: Memory, code: Tensor | None = None) -> Tensor:
+    def gathered(
+        self, query: Float[Tensor, "B n C"], memory: Memory, code: Float[Tensor, "2 n d"] | None = None
+    ) -> Float[Tensor, "B n C"]:
         """(B, n, C) from queries (B, n, C) and a memory."""
         q = self._of_heads(self.query(query))
         q = q if code is None else rotate(q, code)
         return self.out(F.scaled_dot_product_attention(q, *memory).transpose(1, 2).flatten(2))
 
-    def gathered_in_turn(self, query: Tensor, memories: Iterable[Memory]) -> Tensor:
+    def gathered_in_turn(
+        self, query: Float[Tensor, "B n C"], memories: Iterable[Memory]
+    ) -> Float[Tensor, "B n C"]:
         """(B, n, C) from queries (B, n, C) and a memory that comes in parts: one of them is held at a time.
 
         Of every part the largest logit is taken out before exponentials are summed, and sums so far are
@@ -99,7 +115,9 @@ class SelfBlock(nn.Module):
         self.norm1, self.norm2 = nn.LayerNorm(dim, eps), nn.LayerNorm(dim, eps)
         self.attn, self.mlp = Attention(dim, heads), MLP(dim, 4 * dim)
 
-    def forward(self, tokens: Tensor, code: Tensor | None = None) -> Tensor:
+    def forward(
+        self, tokens: Float[Tensor, "B n C"], code: Float[Tensor, "2 n d"] | None = None
+    ) -> Float[Tensor, "B n C"]:
         x = self.norm1(tokens)
         tokens = tokens + self.attn(x, x, x, None if code is None else (code, code))
         return tokens + self.mlp(self.norm2(tokens))
@@ -113,13 +131,15 @@ class CrossBlock(nn.Module):
         self.norm1, self.norm2, self.norm3, self.norm_memory = (nn.LayerNorm(dim, eps) for _ in range(4))
         self.attn, self.cross, self.mlp = Attention(dim, heads), Attention(dim, heads), MLP(dim, 4 * dim)
 
-    def forward(self, tokens: Tensor, memory: Memory, code: Tensor) -> Tensor:
+    def forward(
+        self, tokens: Float[Tensor, "B n C"], memory: Memory, code: Float[Tensor, "2 n d"]
+    ) -> Float[Tensor, "B n C"]:
         x = self.norm1(tokens)
         tokens = tokens + self.attn(x, x, x, (code, code))
         tokens = tokens + self.cross.gathered(self.norm2(tokens), memory, code)
         return tokens + self.mlp(self.norm3(tokens))
 
-    def memory(self, tokens: Tensor, code: Tensor) -> Memory:
+    def memory(self, tokens: Float[Tensor, "B m C"], code: Float[Tensor, "2 m d"]) -> Memory:
         """What this block reads of other tokens (B, m, C)."""
         m = self.norm_memory(tokens)
         return self.cross.memory(m, m, code)
@@ -139,19 +159,22 @@ class QueryBlock(nn.Module):
 
     def forward(
         self,
-        queries: Tensor,
-        memory: Tensor,
-        query_pos: Tensor | float = 0.0,
-        memory_pos: Tensor | float = 0.0,
-    ) -> Tensor:
+        queries: Float[Tensor, "B N d"],
+        memory: Float[Tensor, "B M d"],
+        query_pos: Float[Tensor, "N d"] | float = 0.0,
+        memory_pos: Float[Tensor, "M d"] | float = 0.0,
+    ) -> Float[Tensor, "B N d"]:
         queries = self._among_themselves(queries, query_pos)
         m = self.norm_memory(memory)
         queries = queries + self.cross(self.norm2(queries) + query_pos, m + memory_pos, m)
         return queries + self.mlp(self.norm3(queries))
 
     def in_turn(
-        self, queries: Tensor, memories: Iterable[tuple[Tensor, Tensor]], query_pos: Tensor | float = 0.0
-    ) -> Tensor:
+        self,
+        queries: Float[Tensor, "B N d"],
+        memories: Iterable[tuple[Float[Tensor, "B _ d"], Float[Tensor, "_ d"]]],
+        query_pos: Float[Tensor, "N d"] | float = 0.0,
+    ) -> Float[Tensor, "B N d"]:
         """The same of a memory in parts, each with its positions; one of them is held at a time."""
         queries = self._among_themselves(queries, query_pos)
         normed = ((self.norm_memory(memory), pos) for memory, pos in memories)

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import cast
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 
 from langflash_core.network.encoders.shared import Tokens
@@ -14,7 +15,7 @@ Readings = Sequence[Sequence[int]]
 """Of each view the others that it reads, at least one."""
 
 
-def normalised_intrinsics(Ks: Tensor, width: int, height: int) -> Tensor:
+def normalised_intrinsics(Ks: Float[Tensor, "... 3 3"], width: int, height: int) -> Float[Tensor, "... 9"]:
     """K (..., 3, 3) in pixels -> (..., 9): row 0 over width, row 1 over height, row-major."""
     size = torch.tensor([width, height, 1.0]).to(Ks)
     return (Ks / size[:, None]).flatten(-2)
@@ -38,7 +39,9 @@ class TwoStacks(nn.Module):
         self.other = nn.ModuleList(CrossBlock(dim, heads, eps) for _ in range(depth))
         self.norm = nn.LayerNorm(dim, eps)
 
-    def layers(self, x: Tensor, grid: tuple[int, int], read: Readings | None = None) -> list[Tensor]:
+    def layers(
+        self, x: Float[Tensor, "..."], grid: tuple[int, int], read: Readings | None = None
+    ) -> list[Float[Tensor, "..."]]:
         """What every layer gives, the last one normalised, from embedded tokens (B, V, h*w + 1, C);
         the last token of a view is the one of its intrinsics. read: which others each view reads; None:
         all."""
@@ -100,7 +103,9 @@ class TwoStackDecoder(TwoStacks):
         self.embed_named = nn.Linear(preset.encoder_dim, preset.decoder_dim, bias=False)
         nn.init.zeros_(self.embed_named.weight)
 
-    def forward(self, tokens: Tokens, Ks: Tensor, read: Readings | None = None) -> tuple[Tensor, Tensor]:
+    def forward(
+        self, tokens: Tokens, Ks: Float[Tensor, "B V 3 3"], read: Readings | None = None
+    ) -> tuple[Float[Tensor, "B V n C"], Float[Tensor, "B V n C"]]:
         """Tokens (B, V, h*w, C) after half of the layers and after the last.
 
         Args:
@@ -127,7 +132,7 @@ class SiameseDecoder(nn.Module):
         self.blocks = nn.ModuleList(SelfBlock(dim, heads) for _ in range(preset.semantic_depth))
         self.norm = nn.LayerNorm(dim)
 
-    def forward(self, tokens: Tokens) -> tuple[Tensor, Tensor]:
+    def forward(self, tokens: Tokens) -> tuple[Float[Tensor, "B V n C"], Float[Tensor, "B V n C"]]:
         """Tokens (B, V, h*w, C) after half of the layers and after the last."""
         x = self.embed(tokens.hooks[-1]).flatten(0, 1)
         code = rope_2d(tokens.grid, self.head_dim, self.base).to(x.device)

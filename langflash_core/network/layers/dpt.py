@@ -6,6 +6,7 @@ path_4 at 1x, path_3 at 2x, path_2 at 4x and path_1 at 8x the grid.
 
 from dataclasses import dataclass
 
+from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -14,10 +15,10 @@ from torch.nn import functional as F
 class Paths:
     """Fused maps (n, feature, s*h, s*w), coarse to fine: s = 1, 2, 4, 8."""
 
-    path_4: Tensor
-    path_3: Tensor
-    path_2: Tensor
-    path_1: Tensor
+    path_4: Float[Tensor, "n C _ _"]
+    path_3: Float[Tensor, "n C _ _"]
+    path_2: Float[Tensor, "n C _ _"]
+    path_1: Float[Tensor, "n C _ _"]
 
 
 class ResidualUnit(nn.Module):
@@ -28,7 +29,7 @@ class ResidualUnit(nn.Module):
         self.conv1 = nn.Conv2d(feature, feature, 3, padding=1)
         self.conv2 = nn.Conv2d(feature, feature, 3, padding=1)
 
-    def forward(self, x: Tensor) -> Tensor:
+    def forward(self, x: Float[Tensor, "B C H W"]) -> Float[Tensor, "B C H W"]:
         return x + self.conv2(F.relu(self.conv1(F.relu(x))))
 
 
@@ -42,14 +43,16 @@ class Fusion(nn.Module):
         self.mix = ResidualUnit(feature)
         self.out = nn.Conv2d(feature, feature, 1)
 
-    def forward(self, coarse: Tensor, lateral: Tensor | None = None) -> Tensor:
+    def forward(
+        self, coarse: Float[Tensor, "n C h w"], lateral: Float[Tensor, "n C _ _"] | None = None
+    ) -> Float[Tensor, "n C H W"]:
         if self.lateral is not None and lateral is not None:
             coarse = coarse[..., : lateral.shape[-2], : lateral.shape[-1]] + self.lateral(lateral)
         # The 1x1 convolution commutes with the bilinear resize and is four times cheaper before it.
         return double(self.out(self.mix(coarse)), align_corners=self.align_corners)
 
 
-def double(maps: Tensor, *, align_corners: bool) -> Tensor:
+def double(maps: Float[Tensor, "n C h w"], *, align_corners: bool) -> Float[Tensor, "n C H W"]:
     """Maps (n, C, h, w) -> (n, C, 2h, 2w), bilinear."""
     return F.interpolate(maps, scale_factor=2.0, mode="bilinear", align_corners=align_corners)
 
@@ -81,7 +84,15 @@ class DPT(nn.Module):
             Fusion(feature, coarsest=i == 3, align_corners=align_corners) for i in range(4)
         )
 
-    def forward(self, maps: tuple[Tensor, Tensor, Tensor, Tensor]) -> Paths:
+    def forward(
+        self,
+        maps: tuple[
+            Float[Tensor, "n _ _ _"],
+            Float[Tensor, "n _ _ _"],
+            Float[Tensor, "n _ _ _"],
+            Float[Tensor, "n _ _ _"],
+        ],
+    ) -> Paths:
         """Fuse token maps (n, C_i, h, w), shallow first."""
         levels = [
             level(resize(project(m)))

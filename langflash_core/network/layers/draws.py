@@ -1,10 +1,11 @@
 """Fresh numbers for learned parameters."""
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 
-def drawn(*shape: int, std: float = 1.0) -> Tensor:
+def drawn(*shape: int, std: float = 1.0) -> Float[Tensor, "..."]:
     """Normally distributed numbers around 0; on the meta device their shape alone.
 
     There `normal_` would import torch's compiler and sympy, one and a half seconds, to draw nothing.

@@ -5,6 +5,7 @@ Ye et al. 2025 (NoPoSplat); the exponential point map: Wang et al. 2024 (DUSt3R)
 """
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -37,12 +38,12 @@ class PointHead(nn.Module):
         self.mix = nn.Conv2d(f // 2, f // 2, 3, padding=1)
         self.out = nn.Conv2d(f // 2, 3, 1)
 
-    def forward(self, levels: Levels) -> Tensor:
+    def forward(self, levels: Levels) -> Float[Tensor, "n 3 H W"]:
         wide = double(self.narrow(self.dpt(levels).path_1), align_corners=True)
         return exponential_points(self.out(F.relu(self.mix(wide))))
 
 
-def exponential_points(raw: Tensor) -> Tensor:
+def exponential_points(raw: Float[Tensor, "n 3 *pixels"]) -> Float[Tensor, "n 3 *pixels"]:
     """v / |v| (e^|v| - 1) along dim 1: far points need no large numbers, 0 stays 0."""
     length = raw.norm(dim=1, keepdim=True)
     return raw / length.clamp_min(1e-8) * torch.expm1(length)
@@ -62,7 +63,7 @@ class ParameterHead(nn.Module):
         self.mix = nn.Conv2d(f, f, 3, padding=1, bias=False)
         self.out = nn.Conv2d(f, 8 + 3 * (preset.sh_degree + 1) ** 2, 1)
 
-    def forward(self, levels: Levels, images: Tensor) -> Tensor:
+    def forward(self, levels: Levels, images: Float[Tensor, "n 3 H W"]) -> Float[Tensor, "n R H W"]:
         wide = double(self.dpt(levels).path_1, align_corners=True)
         return self.out(F.relu(self.mix(wide + F.relu(self.shortcut(centred(images))))))
 
@@ -70,7 +71,9 @@ class ParameterHead(nn.Module):
 class PerView(nn.ModuleList):
     """Two heads of one kind: one for view 0, one for every other view."""
 
-    def forward(self, levels: Levels, images: Tensor, *, with_images: bool = False) -> Tensor:
+    def forward(
+        self, levels: Levels, images: Float[Tensor, "B V 3 H W"], *, with_images: bool = False
+    ) -> Float[Tensor, "B V ..."]:
         """Levels (B*V, C_i, h, w), images (B, V, 3, H, W) -> (B, V, ...) of the heads' answers."""
         batch, num_views = images.shape[:2]
         answers = []
@@ -81,7 +84,7 @@ class PerView(nn.ModuleList):
         return torch.stack(answers, 1)
 
 
-def activated(raw: Tensor, points: Tensor) -> Gaussians:
+def activated(raw: Float[Tensor, "V R H W"], points: Float[Tensor, "V 3 H W"]) -> Gaussians:
     """Gaussians of one scene, N = V*H*W in the order (v h w).
 
     Channels: opacity, three scales, quaternion xyzw, harmonics colour by colour.

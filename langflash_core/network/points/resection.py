@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.geometry.cameras import pixel_grid, project, transform
@@ -25,7 +26,7 @@ _NEAREST = 1e-4  # share of the median depth; points behind the camera are put t
 class Resection:
     """viewmat (4, 4); share of the sampled points that agree with it, in [0, 1]."""
 
-    viewmat: np.ndarray
+    viewmat: Float[np.ndarray, "4 4"]
     share: float
 
     @property
@@ -33,7 +34,7 @@ class Resection:
         return self.share >= _MIN_SHARE
 
 
-def resect(points: Tensor, K: Tensor) -> Resection:
+def resect(points: Float[Tensor, "3 H W"], K: Float[Tensor, "3 3"]) -> Resection:
     """The pose from which points (3, H, W) are seen at their own pixels; deterministic.
 
     Args:
@@ -68,7 +69,9 @@ def resect(points: Tensor, K: Tensor) -> Resection:
     return Resection(viewmat, len(keep) / len(pos_w))
 
 
-def depths_and_confidences(points: Tensor, viewmats: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor]:
+def depths_and_confidences(
+    points: Float[Tensor, "V 3 H W"], viewmats: Float[Tensor, "V 4 4"], Ks: Float[Tensor, "V 3 3"]
+) -> tuple[Float[Tensor, "V H W"], Float[Tensor, "V H W"]]:
     """z > 0 of every point in its own view, and how well it falls on its own pixel, in [0, 1].
 
     Args:

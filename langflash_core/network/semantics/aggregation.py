@@ -3,6 +3,7 @@
 import math
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -13,7 +14,9 @@ from langflash_core.network.presets import Preset
 _CLOSELY = 32  # views that groups read at half of the features' size; more at less: as many tokens in all
 
 
-def average_atoms(weights: Tensor, features: Tensor, eps: float = 1e-6) -> Tensor:
+def average_atoms(
+    weights: Float[Tensor, "B V K h w"], features: Float[Tensor, "B V C h w"], eps: float = 1e-6
+) -> Float[Tensor, "B K C"]:
     """d_k = sum_x w_k(x) L(x) / (sum_x w_k(x) + eps), not normalised.
 
     Args:
@@ -32,7 +35,9 @@ def average_atoms(weights: Tensor, features: Tensor, eps: float = 1e-6) -> Tenso
     return total / (weights.sum((1, 3, 4))[..., None] + eps)
 
 
-def averaged_atoms(weights: Tensor, features: Tensor, eps: float = 1e-6) -> Tensor:
+def averaged_atoms(
+    weights: Float[Tensor, "B V K h w"], features: Float[Tensor, "B V C h w"], eps: float = 1e-6
+) -> Float[Tensor, "B K C"]:
     """`average_atoms` of unit norm; a group without agreement points nowhere."""
     return F.normalize(average_atoms(weights, features, eps), dim=-1)
 
@@ -58,7 +63,9 @@ class Aggregation(nn.Module):
         nn.init.zeros_(self.out.weight)
         nn.init.zeros_(self.out.bias)
 
-    def forward(self, weights: Tensor, features: Tensor) -> Tensor:
+    def forward(
+        self, weights: Float[Tensor, "B V K h w"], features: Float[Tensor, "B V C h w"]
+    ) -> Float[Tensor, "B K C"]:
         """Atoms (B, K, C) of unit norm.
 
         Args:

@@ -7,6 +7,7 @@ distilled from it. V views, K groups, H W pixels, C channels.
 from collections.abc import Callable
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -17,7 +18,9 @@ _SMALLEST = 1 / 16  # of the picture's side
 Embed = Callable[[Tensor], Tensor]
 
 
-def crop_atoms(weights: Tensor, photos: list[Tensor], embed: Embed) -> Tensor:
+def crop_atoms(
+    weights: Float[Tensor, "V K H W"], photos: list[Float[Tensor, "3 _ _"]], embed: Embed
+) -> Float[Tensor, "K C"]:
     """Atoms (K, C) of unit norm.
 
     Args:
@@ -38,7 +41,7 @@ def _best_views(weights: Tensor) -> list[int]:
     return weights.sum((2, 3)).argmax(0).tolist()
 
 
-def group_box(weights: Tensor) -> tuple[float, float, float, float]:
+def group_box(weights: Float[Tensor, "H W"]) -> tuple[float, float, float, float]:
     """(left, top, right, bottom) in shares of the picture, square in pixels where it fits; weights (H, W)."""
     height, width = weights.shape
     left, right = _extent(weights.sum(0))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import cast
 
 import torch
+from jaxtyping import Float, Int
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -24,11 +25,11 @@ from langflash_core.network.stereo.prior import resize
 class Groups:
     """mask_logits (B, V, N, h, w) at the scratch head's size; existence_logits (B, N)."""
 
-    mask_logits: Tensor
-    existence_logits: Tensor
+    mask_logits: Float[Tensor, "B V N h w"]
+    existence_logits: Float[Tensor, "B N"]
 
 
-def sinusoid(length: int, dim: int, *, like: Tensor, start: int = 0) -> Tensor:
+def sinusoid(length: int, dim: int, *, like: Float[Tensor, "..."], start: int = 0) -> Float[Tensor, "n C"]:
     """1-D code (length, dim) of the running position from `start` on. Source: Vaswani et al. 2017."""
     rates = 10_000.0 ** (-torch.arange(0, dim, 2, device=like.device, dtype=torch.float32) / dim)
     places = torch.arange(start, start + length, device=like.device, dtype=torch.float32)
@@ -51,8 +52,11 @@ class ScratchHead(nn.Module):
         self.mix = nn.Conv2d(f, f, 3, padding=1)
 
     def forward(
-        self, tokens: Tokens, siamese: tuple[Tensor, Tensor], images: Tensor
-    ) -> tuple[tuple[Tensor, ...], Tensor]:
+        self,
+        tokens: Tokens,
+        siamese: tuple[Float[Tensor, "B V n C"], Float[Tensor, "B V n C"]],
+        images: Float[Tensor, "B V 3 H W"],
+    ) -> tuple[tuple[Float[Tensor, "_ _ _ _"], ...], Float[Tensor, "_ _ h w"]]:
         """Memories (B*V, f, s*h, s*w) for s = 1, 2, 4, and the finest map (B*V, f, 8h, 8w)."""
         deep = tuple(tokens_to_maps(t.flatten(0, 1), tokens.grid) for t in siamese)
         paths = self.dpt((tokens.maps(0), tokens.maps(1), *deep))
@@ -77,7 +81,9 @@ class SemanticGrouping(nn.Module):
         self.mask_mlp = MLP(dim, dim, f)
         self.existence = nn.Linear(dim, 1)
 
-    def forward(self, memories: tuple[Tensor, ...], finest: Tensor, num_views: int) -> tuple[Groups, ...]:
+    def forward(
+        self, memories: tuple[Float[Tensor, "n _ _ _"], ...], finest: Float[Tensor, "n C h w"], num_views: int
+    ) -> tuple[Groups, ...]:
         """Groups after every second layer (one per scale); the last entry is the answer.
 
         Layers read the scales coarse to fine in order; the first half of the layers at the
@@ -95,7 +101,7 @@ class SemanticGrouping(nn.Module):
             answers.append(self._read(queries, finest.unflatten(0, (batch, num_views))))
         return tuple(answers)
 
-    def of_many(self, memories: Sequence[tuple[Tensor, ...]]) -> Tensor:
+    def of_many(self, memories: Sequence[tuple[Float[Tensor, "_ _ _ _"], ...]]) -> Float[Tensor, "1 N d"]:
         """What the queries (1, N, d) come to by the memories of one scene's views, group after group of them.
 
         But for rounding what `forward` reads its last masks from (`masks`); one group's keys are held at a
@@ -118,7 +124,7 @@ class SemanticGrouping(nn.Module):
             yield memory, sinusoid(memory.shape[1], memory.shape[2], like=memory, start=start)
             start += memory.shape[1]
 
-    def masks(self, queries: Tensor, finest: Tensor) -> Groups:
+    def masks(self, queries: Float[Tensor, "1 N d"], finest: Float[Tensor, "n C h w"]) -> Groups:
         """What the queries (1, N, d) answer in some views, whose finest maps are (v, f, h, w)."""
         return self._read(queries, finest[None])
 
@@ -128,7 +134,7 @@ class SemanticGrouping(nn.Module):
         return Groups(logits.float(), self.existence(x)[..., 0].float())
 
 
-def surviving(groups: Groups, tau_exist: float) -> Tensor:
+def surviving(groups: Groups, tau_exist: float) -> Int[Tensor, " K"]:
     """Indices (K,) of the queries of one scene (B = 1) that exist and claim some pixel.
 
     Query n survives where e_n > tau_exist and max_x p_n(x) > tau_exist. Source: the paper, 3.2.
@@ -136,13 +142,17 @@ def surviving(groups: Groups, tau_exist: float) -> Tensor:
     return surviving_of([groups.mask_logits[0].amax((0, 2, 3))], groups.existence_logits[0], tau_exist)
 
 
-def surviving_of(strongest: Sequence[Tensor], existence: Tensor, tau_exist: float) -> Tensor:
+def surviving_of(
+    strongest: Sequence[Float[Tensor, " n"]], existence: Float[Tensor, " n"], tau_exist: float
+) -> Int[Tensor, " K"]:
     """`surviving` by the largest mask logits (N,) of each group of views and the existence logits (N,)."""
     highest = torch.sigmoid(torch.stack(list(strongest)).amax(0))
     return ((torch.sigmoid(existence) > tau_exist) & (highest > tau_exist)).nonzero()[:, 0]
 
 
-def group_weights(groups: Groups, survivors: Tensor, size: tuple[int, int]) -> Tensor:
+def group_weights(
+    groups: Groups, survivors: Int[Tensor, " K"], size: tuple[int, int]
+) -> Float[Tensor, "V K H W"]:
     """w_k(x), (V, K, H, W): softmax over the survivors' logits of one scene, at pixel size."""
     logits = groups.mask_logits[0, :, survivors]
     if len(survivors) == 0:

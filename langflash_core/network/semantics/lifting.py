@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -28,7 +29,9 @@ _SAME_MASK = 0.5  # of the pixels that two masks cover together where both photo
 _SOFT = 5  # pixels over which a group's border fades: borders of masks are that sure
 
 
-def lifted_weights(segments: Sequence[Groups], geometry: Geometry, Ks: Tensor, most: int = 256) -> Tensor:
+def lifted_weights(
+    segments: Sequence[Groups], geometry: Geometry, Ks: Float[Tensor, "V 3 3"], most: int = 256
+) -> Float[Tensor, "V K H W"]:
     """w_k(x), (V, K, H, W), sums to 1 over K; the largest groups first, the rest last.
 
     Args:

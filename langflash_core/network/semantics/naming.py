@@ -8,6 +8,7 @@ Sizes: V views, K parts, H W pixels, h w a map's own size, C channels of the lan
 """
 
 import torch
+from jaxtyping import Bool, Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -27,7 +28,7 @@ _LEVEL = 0.6  # a normal within 53 degrees of the camera's own up may be the roo
 _SAME, _NEAR = 0.995, 0.985  # cosines: of normals that vote for each other, and that are averaged
 
 
-def describe(weights: Tensor, tokens: Tokens) -> Tensor:
+def describe(weights: Float[Tensor, "V K H W"], tokens: Tokens) -> Float[Tensor, "K C"]:
     """Mean deep tokens of every part, (K, 2 * encoder channels).
 
     Args:
@@ -41,7 +42,7 @@ def describe(weights: Tensor, tokens: Tokens) -> Tensor:
     return torch.cat(means, 1)
 
 
-def upright(pos_c: Tensor, valid: Tensor) -> Tensor:
+def upright(pos_c: Float[Tensor, "H W 3"], valid: Bool[Tensor, "H W"]) -> Float[Tensor, "3"]:
     """The direction up in a camera's frame: where most surfaces that could be level face.
 
     Rooms have floors, table tops and ceilings, and people hold cameras roughly level.
@@ -66,7 +67,12 @@ def upright(pos_c: Tensor, valid: Tensor) -> Tensor:
     return F.normalize(normals[agreement[winner] > _NEAR].mean(0), dim=0)
 
 
-def places(weights: Tensor, depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
+def places(
+    weights: Float[Tensor, "V K H W"],
+    depths: Float[Tensor, "V _ _"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+) -> Float[Tensor, "K C"]:
     """Where each part is and how large, (K, `PLACE`): log width, height and depth (m), heights of its
     foot and top over the floor (m), place to the side and ahead (m), log share of all pixels, share of
     it on a picture's border, and 1; zeros where too little of it is known.
@@ -122,8 +128,8 @@ class PartNamer(nn.Module):
     brought to mean 0 and variance 1 by statistics of the training parts.
     """
 
-    mean: Tensor
-    std: Tensor
+    mean: Float[Tensor, " n"]
+    std: Float[Tensor, " n"]
 
     def __init__(self, preset: GuidedDepth):
         super().__init__()
@@ -136,18 +142,22 @@ class PartNamer(nn.Module):
         nn.init.zeros_(self.out.weight)
         nn.init.zeros_(self.out.bias)
 
-    def standardised(self, atoms: Tensor, looks: Tensor, places: Tensor) -> Tensor:
+    def standardised(
+        self, atoms: Float[Tensor, "K C"], looks: Float[Tensor, "K D"], places: Float[Tensor, "K p"]
+    ) -> Float[Tensor, "K E"]:
         """What the layers read, (K, inputs)."""
         return (torch.cat((looks, places, atoms), -1) - self.mean) / self.std
 
-    def context(self, inputs: Tensor) -> Tensor:
+    def context(self, inputs: Float[Tensor, "n C"]) -> Float[Tensor, "n D"]:
         """What each part's correction is read from, (K, naming_dim); inputs: `standardised`."""
         parts = self.embed(inputs)[None]
         for block in self.blocks:
             parts = block(parts)
         return self.norm(parts)[0]
 
-    def forward(self, atoms: Tensor, looks: Tensor, places: Tensor) -> Tensor:
+    def forward(
+        self, atoms: Float[Tensor, "K C"], looks: Float[Tensor, "K D"], places: Float[Tensor, "K p"]
+    ) -> Float[Tensor, "K C"]:
         """Atoms (K, C) of unit norm of one scene.
 
         Args:

@@ -63,7 +63,9 @@ class Outlines:
         return Outlines(load_mobile_sam(path, side, device))
 
     @torch.inference_mode()
-    def __call__(self, weights: Float[Tensor, "V K H W"], photos: Sequence[Tensor]) -> Tensor:
+    def __call__(
+        self, weights: Float[Tensor, "V K H W"], photos: Sequence[Float[Tensor, "3 _ _"]]
+    ) -> Float[Tensor, "V K H W"]:
         """The weights redrawn, (V, K, H, W), sums to 1 over K; photos (3, h, w) in [0, 1], of any size."""
         if weights.shape[1] == 0:
             return weights

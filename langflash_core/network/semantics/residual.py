@@ -8,6 +8,7 @@ B batch, V views, N queries, f channels of the mask map. Source: the paper, and 
 """
 
 import torch
+from jaxtyping import Float, Shaped
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -29,7 +30,16 @@ class FullSizeScratch(nn.Module):
         self.dpt = DPT((e, d, d, d), preset.dpt_dims, f, align_corners=True)
         self.shortcut = nn.Conv2d(3, f, 7, padding=3)
 
-    def forward(self, levels: tuple[Tensor, Tensor, Tensor, Tensor], images: Tensor) -> tuple[Tensor, ...]:
+    def forward(
+        self,
+        levels: tuple[
+            Float[Tensor, "n _ _ _"],
+            Float[Tensor, "n _ _ _"],
+            Float[Tensor, "n _ _ _"],
+            Float[Tensor, "n _ _ _"],
+        ],
+        images: Float[Tensor, "n 3 H W"],
+    ) -> tuple[Float[Tensor, "n _ _ _"], ...]:
         """path_4, path_3, path_2 (n, f, s*h, s*w) for s = 1, 2, 4, and the mask map (n, f, H, W)."""
         paths = self.dpt(levels)
         finest = double(paths.path_1, align_corners=True) + F.relu(self.shortcut(centred(images)))
@@ -42,7 +52,9 @@ class ScratchPair(nn.ModuleList):
     def __init__(self, preset: PointMaps):
         super().__init__([FullSizeScratch(preset), FullSizeScratch(preset)])
 
-    def forward(self, tokens: Tokens, images: Tensor) -> tuple[tuple[Tensor, ...], Tensor]:
+    def forward(
+        self, tokens: Tokens, images: Float[Tensor, "B V 3 H W"]
+    ) -> tuple[tuple[Float[Tensor, "n _ _ _"], ...], Float[Tensor, "n _ _ _"]]:
         """Memories (B*V, f, s*h, s*w), and the mask map (B*V, f, H, W)."""
         views = []
         for view in range(tokens.shape[1]):
@@ -73,7 +85,9 @@ class ResidualGrouping(nn.Module):
         self.scores = nn.ModuleList(MLP(dim, dim, 1) for _ in range(depth))
         self.mask_mlp = MLP(dim, dim, preset.dpt_feature)
 
-    def forward(self, memories: tuple[Tensor, ...], finest: Tensor, num_views: int) -> tuple[Groups, ...]:
+    def forward(
+        self, memories: tuple[Float[Tensor, "n _ _ _"], ...], finest: Float[Tensor, "n _ _ _"], num_views: int
+    ) -> tuple[Groups, ...]:
         """Groups after every layer while training, else after the last alone.
 
         Layers read the scales coarse to fine in order, two layers each for six.
@@ -95,7 +109,7 @@ class ResidualGrouping(nn.Module):
         return tuple(answers)
 
 
-def filtered(groups: Groups, rule: MaskFilter) -> Tensor:
+def filtered(groups: Groups, rule: MaskFilter) -> Shaped[Tensor, " K"]:
     """Indices (K,) of the queries of one scene (B = 1) whose masks are groups, best first.
 
     A mask is where the logit is above 0, over all views. It needs a predicted IoU, a stability

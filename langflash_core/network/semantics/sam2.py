@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.errors import WeightsError
@@ -34,8 +35,8 @@ _BROKEN = (UnpicklingError, RuntimeError, OSError, EOFError, ValueError, KeyErro
 class Segments:
     """Masks of one photo: logits (N, H, W), above 0 inside; scores (N,), predicted IoU in [0, 1]."""
 
-    logits: Tensor
-    scores: Tensor
+    logits: Float[Tensor, "N H W"]
+    scores: Float[Tensor, " N"]
 
 
 def sam2_checkpoint() -> Path | None:
@@ -64,7 +65,7 @@ class Sam2:
         self.predictor = _predictor(checkpoint, device)
 
     @torch.inference_mode()
-    def __call__(self, photo: Tensor) -> Segments:
+    def __call__(self, photo: Float[Tensor, "3 H W"]) -> Segments:
         """All masks that a grid of points gives in a photo (3, H, W) in [0, 1], three a point."""
         height, width = photo.shape[-2:]
         picture = (photo.clamp(0, 1) * 255).round().byte().movedim(0, -1).cpu().numpy()

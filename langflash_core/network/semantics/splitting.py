@@ -15,6 +15,7 @@ S = f + K channels of the joint space.
 from collections.abc import Callable, Sequence
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -29,12 +30,12 @@ _SEEDS_FROM = 1500  # pixels; enough to seed from, and seeding is the only seria
 
 
 def split_groups(
-    weights: Tensor,
-    embeddings: Tensor,
+    weights: Float[Tensor, "V K H W"],
+    embeddings: Float[Tensor, "v f h w"],
     rule: Splitting,
     size: tuple[int, int],
-    features: Tensor | None = None,
-) -> Tensor:
+    features: Float[Tensor, "V C _ _"] | None = None,
+) -> Float[Tensor, "V J _ _"]:
     """w_j(x) = softmax_j(sharpness u(x) . c_j), u = (e, agreement sqrt(w), meaning L) / norm.
 
     sqrt(w) is a unit vector, so u . u' adds the Bhattacharyya affinity of the queries' answers at
@@ -59,7 +60,12 @@ def split_groups(
     return split_maps([lambda: joint], len(weights), rule, size)
 
 
-def joint_maps(weights: Tensor, embeddings: Tensor, meant: Tensor | None, rule: Splitting) -> Tensor:
+def joint_maps(
+    weights: Float[Tensor, "v K h w"],
+    embeddings: Float[Tensor, "v f h w"],
+    meant: Float[Tensor, "v C H W"] | None,
+    rule: Splitting,
+) -> Float[Tensor, "v S h w"]:
     """u of some views (v, S, h, w): weights (v, K, h, w) and embeddings (v, f, h, w) as `split_groups` has
     them; meant: (v, D, h', w'), condensed features."""
     units = F.normalize(embeddings.float(), dim=1)
@@ -71,7 +77,7 @@ def joint_maps(weights: Tensor, embeddings: Tensor, meant: Tensor | None, rule: 
 
 def split_maps(
     groups: Sequence[Callable[[], Tensor]], num_views: int, rule: Splitting, size: tuple[int, int]
-) -> Tensor:
+) -> Float[Tensor, "v S h w"]:
     """`split_groups` of V views whose joint maps (v, S, h, w) come group by group, each as often as it is
     asked for. Of many views the parts are found in some of their pixels, and the answer is held in half
     precision."""
@@ -90,7 +96,7 @@ def split_maps(
     return together(map(weights, groups), num_views)
 
 
-def condensed(features: Tensor) -> Tensor:
+def condensed(features: Float[Tensor, "V C h w"]) -> Float[Tensor, "V D h w"]:
     """Maps (V, C, h, w) in the few directions that a scene needs, (V, `_DIRECTIONS`, h, w) float32:
     clustering then takes a fifth of the time, and cosines stay.
 
@@ -116,7 +122,7 @@ def _powered(features: Tensor, basis: Tensor) -> Tensor:
     return found
 
 
-def cluster(vectors: Tensor, rule: Splitting) -> Tensor:
+def cluster(vectors: Float[Tensor, "X S"], rule: Splitting) -> Float[Tensor, "J S"]:
     """Centres (J, S), unit norm, of unit vectors (X, S), the largest first; 1 <= J <= max_parts.
 
     Centres closer than `max_cosine` to a larger one are left out: simple rooms keep few parts.

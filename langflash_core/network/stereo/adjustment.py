@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from langflash_core.network.stereo.bundle import Bundle, Rig, adjusted_bundle
 from langflash_core.network.stereo.graph import Placed
@@ -70,15 +71,15 @@ class Adjusted:
     were said. depths (M,): z. depth_errors (M,): of its logarithm. agreed: matches by pairs.
     lenses: of each lens what was found, None: it stays."""
 
-    viewmats: np.ndarray
+    viewmats: Float[np.ndarray, "V 4 4"]
     tracks: Tracks
-    depths: np.ndarray
-    depth_errors: np.ndarray
+    depths: Float[np.ndarray, " M"]
+    depth_errors: Float[np.ndarray, " M"]
     agreed: Agreed
-    growths: np.ndarray
+    growths: Float[np.ndarray, " V"]
     lenses: tuple[FoundFocal | None, ...]
 
-    def after(self, growths: np.ndarray, lenses: Sequence[int]) -> "Adjusted":
+    def after(self, growths: Float[np.ndarray, " V"], lenses: Sequence[int]) -> "Adjusted":
         """The same where focal lengths had grown by `growths` (V,) before; lenses: as `Sought` has them."""
         by_lens = dict(zip(lenses, growths.tolist(), strict=True))
         found = tuple(
@@ -200,7 +201,7 @@ def _adjusted(
     return bundle, matches
 
 
-def log_depths(views: Sequence[PoseInput], tracks: Tracks) -> np.ndarray:
+def log_depths(views: Sequence[PoseInput], tracks: Tracks) -> Float[np.ndarray, " M"]:
     """Of the monocular maps where each observation lies, (M,)."""
     found = np.zeros(len(tracks))
     for v, view in enumerate(views):

@@ -12,6 +12,7 @@ Sizes: V views, H W pixels, S knots a side, P pixels that are compared.
 from dataclasses import dataclass
 
 import torch
+from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -36,12 +37,17 @@ class Carried:
     log_depths: (P,) their log z there. places: (P, 2), -1 to 1 over that picture. inside: (P,) in view.
     """
 
-    log_depths: Tensor
-    places: Tensor
-    inside: Tensor
+    log_depths: Float[Tensor, " P"]
+    places: Float[Tensor, "P 2"]
+    inside: Bool[Tensor, " P"]
 
 
-def agreed(maps: DepthMaps, viewmats: Tensor, Ks: Tensor, neighbours: Neighbours | None = None) -> DepthMaps:
+def agreed(
+    maps: DepthMaps,
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+    neighbours: Neighbours | None = None,
+) -> DepthMaps:
     """Maps (V, H, W) that agree where they show one surface; the expected errors stay.
 
     One view, or views that share nothing, come back as they are.
@@ -61,7 +67,12 @@ def agreed(maps: DepthMaps, viewmats: Tensor, Ks: Tensor, neighbours: Neighbours
 
 
 def carried(
-    points: Tensor, viewmats: Tensor, Ks: Tensor, view: int, other: int, size: tuple[int, int]
+    points: Float[Tensor, "n 3"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+    view: int,
+    other: int,
+    size: tuple[int, int],
 ) -> Carried:
     """Points (P, 3) in the frame of `view`'s camera, seen from `other`, whose picture is `size` = (H, W)."""
     x, y, depths = pictured(viewmats[other] @ invert_rigid(viewmats[view]), Ks[other], points.T)
@@ -71,14 +82,19 @@ def carried(
     return Carried(depths.clamp_min(1e-4).log(), torch.stack((x, y), -1), inside)
 
 
-def sampled(maps: Tensor, places: Tensor) -> Tensor:
+def sampled(maps: Float[Tensor, "H W"], places: Float[Tensor, "P 2"]) -> Float[Tensor, " P"]:
     """Bilinear values of a map (H, W) at places (P, 2) of -1 to 1."""
     return F.grid_sample(maps[None, None], places[None, None], padding_mode="border", align_corners=False)[
         0, 0, 0
     ]
 
 
-def straightened(log_depths: Tensor, viewmats: Tensor, Ks: Tensor, neighbours: Neighbours) -> Tensor:
+def straightened(
+    log_depths: Float[Tensor, "V H W"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+    neighbours: Neighbours,
+) -> Float[Tensor, "V H W"]:
     """Log depths (V, H, W) plus the smooth corrections under which they differ least.
 
     With r the log depth that the other map has less the one that is carried there, and hat functions
@@ -134,7 +150,7 @@ def _comparisons(
     return normal.flatten(2).flatten(0, 1) * share, right.flatten() * share
 
 
-def knot_weights(places: Tensor) -> Tensor:
+def knot_weights(places: Float[Tensor, "P 2"]) -> Float[Tensor, "P _"]:
     """Hat functions (P, S^2) of the knots at places (P, 2) of -1 to 1; rows sum to 1."""
     knots = torch.linspace(-1, 1, _KNOTS, dtype=places.dtype, device=places.device)
     hats = (1 - (places[..., None] - knots).abs() * ((_KNOTS - 1) / 2)).clamp_min(0)  # (P, 2, S)
@@ -150,8 +166,12 @@ def _expectation(device: torch.device) -> Tensor:
 
 
 def blended(
-    log_depths: Tensor, log_errors: Tensor, viewmats: Tensor, Ks: Tensor, neighbours: Neighbours
-) -> Tensor:
+    log_depths: Float[Tensor, "V H W"],
+    log_errors: Float[Tensor, "V H W"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+    neighbours: Neighbours,
+) -> Float[Tensor, "V H W"]:
     """Log depths (V, H, W): where others show the same surface, the mean of all, weighted by 1 / b^2."""
     height, width = log_depths.shape[1:]
     blended_logs = []

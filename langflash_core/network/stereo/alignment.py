@@ -12,6 +12,7 @@ correction (medians .091, .084, .092); slopes expected at 0.1 or 0.2 gave .110 a
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 _PRIOR_SIGMAS = np.array([0.5, 0.05, 0.05, 0.05])  # what is expected of b without any match
 _PRIOR_ERROR = 0.08  # log-depth error that no smooth correction removes
@@ -25,10 +26,12 @@ _LIMIT = 1.0  # a correction never exceeds a factor of e
 class Correction:
     """Coefficients b (4,) and the mean log depth they refer to."""
 
-    coefficients: np.ndarray
+    coefficients: Float[np.ndarray, " n"]
     mean_log_depth: float
 
-    def at(self, x: np.ndarray, log_depths: np.ndarray) -> np.ndarray:
+    def at(
+        self, x: Float[np.ndarray, "*n 2"], log_depths: Float[np.ndarray, "*n"]
+    ) -> Float[np.ndarray, "*n"]:
         """Correction of log depth (...) at normalised coordinates x (..., 2)."""
         columns = (np.ones_like(log_depths), x[..., 0], x[..., 1], log_depths - self.mean_log_depth)
         return np.clip(np.stack(columns, -1) @ self.coefficients, -_LIMIT, _LIMIT)
@@ -38,7 +41,10 @@ NO_CORRECTION = Correction(np.zeros(4), 0.0)
 
 
 def fit_correction(
-    x: np.ndarray, log_priors: np.ndarray, log_targets: np.ndarray, sigmas: np.ndarray
+    x: Float[np.ndarray, "n 2"],
+    log_priors: Float[np.ndarray, " n"],
+    log_targets: Float[np.ndarray, " n"],
+    sigmas: Float[np.ndarray, " n"],
 ) -> Correction:
     """The maximum a posteriori correction; none where there are no points.
 

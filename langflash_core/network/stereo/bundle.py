@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 import scipy.sparse
+from jaxtyping import Float, Int
 
 from langflash_core.network.stereo.tracks import Tracks
 
@@ -36,13 +37,13 @@ class Rig:
     expected of g; 0: the lens stays as it is said to be. bend_doubts (G,): of k; 0, or None: lines are
     straight."""
 
-    focals: np.ndarray
-    lenses: np.ndarray
-    doubts: np.ndarray
-    bend_doubts: np.ndarray | None = None
+    focals: Float[np.ndarray, " V"]
+    lenses: Int[np.ndarray, " V"]
+    doubts: Float[np.ndarray, " G"]
+    bend_doubts: Float[np.ndarray, " G"] | None = None
 
     @property
-    def lens_doubts(self) -> np.ndarray:
+    def lens_doubts(self) -> Float[np.ndarray, " G"]:
         """Of all g, then of all k, (2 G,)."""
         bends = np.zeros_like(self.doubts) if self.bend_doubts is None else self.bend_doubts
         return np.concatenate((self.doubts, bends))
@@ -55,15 +56,15 @@ class Bundle:
     tracks: observations that agree. depths (M,): of those, z; depth_errors (M,): of its logarithm, by the
     other views and by what is known of where they stand."""
 
-    viewmats: np.ndarray
-    points: np.ndarray
-    growths: np.ndarray
-    errors: np.ndarray
-    bends: np.ndarray
-    bend_errors: np.ndarray
+    viewmats: Float[np.ndarray, "V 4 4"]
+    points: Float[np.ndarray, "P 3"]
+    growths: Float[np.ndarray, " G"]
+    errors: Float[np.ndarray, " G"]
+    bends: Float[np.ndarray, " G"]
+    bend_errors: Float[np.ndarray, " G"]
     tracks: Tracks
-    depths: np.ndarray
-    depth_errors: np.ndarray
+    depths: Float[np.ndarray, " M"]
+    depth_errors: Float[np.ndarray, " M"]
 
 
 @dataclass(frozen=True)
@@ -119,12 +120,12 @@ class _Problem:
 
 
 def adjusted_bundle(
-    viewmats: np.ndarray,
-    logs: np.ndarray,
-    growths: np.ndarray,
+    viewmats: Float[np.ndarray, "V 4 4"],
+    logs: Float[np.ndarray, " V"],
+    growths: Float[np.ndarray, " G"],
     rig: Rig,
     tracks: Tracks,
-    log_depths: np.ndarray,
+    log_depths: Float[np.ndarray, " M"],
 ) -> Bundle:
     """The poses, points and lenses that all observations say; view 0 stays where it is.
 

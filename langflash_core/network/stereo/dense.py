@@ -5,13 +5,16 @@ exactly (a cell is about 3 pixels). n matches; h x w cells.
 """
 
 import numpy as np
+from jaxtyping import Float
 
 from langflash_core.network.stereo.matching import mutual
 
 MIN_COSINE = 0.8
 
 
-def match_cells(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def match_cells(
+    left: Float[np.ndarray, "C h w"], right: Float[np.ndarray, "C h w"]
+) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"]]:
     """Cells that choose each other, in cell units with centres at +0.5: (n, 2) left, (n, 2) right.
 
     The right ones are moved to the peak of a parabola through the neighbouring cosines, at most

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from jaxtyping import Float, Int
 
 from langflash_core.network.stereo.matching import RelativePose
 
@@ -36,13 +37,15 @@ class Placed:
     """viewmats (V, 4, 4), world = view 0; scales (V,) of the views' own units; missing: views that no
     edge reaches, which stand where view 0 does. kept: edges that agree with them."""
 
-    viewmats: np.ndarray
-    scales: np.ndarray
+    viewmats: Float[np.ndarray, "V 4 4"]
+    scales: Float[np.ndarray, " V"]
     missing: tuple[int, ...]
     kept: tuple[tuple[int, int], ...]
 
 
-def chosen_pairs(num_views: int, matches: Mapping[tuple[int, int], np.ndarray]) -> list[tuple[int, int]]:
+def chosen_pairs(
+    num_views: int, matches: Mapping[tuple[int, int], Int[np.ndarray, "_ 2"]]
+) -> list[tuple[int, int]]:
     """The pairs to look at: those of each photo with the most matches, and a tree that connects all."""
     counts = {edge: len(rows) for edge, rows in matches.items()}
     best = closest(num_views, counts, _PARTNERS)
@@ -159,7 +162,12 @@ def adjusted(start: Placed, pairs: Pairs) -> Placed:
     return Placed(viewmats, np.exp(logs), start.missing, kept)
 
 
-def gap(viewmats: np.ndarray, logs: np.ndarray, edge: tuple[int, int], pose: RelativePose) -> np.ndarray:
+def gap(
+    viewmats: Float[np.ndarray, "V 4 4"],
+    logs: Float[np.ndarray, " V"],
+    edge: tuple[int, int],
+    pose: RelativePose,
+) -> Float[np.ndarray, "7"]:
     """What the poses say of an edge less what its pair says: turn (radians), shift, log scale: (7,)."""
     i, j = edge
     relative = viewmats[j] @ np.linalg.inv(viewmats[i])

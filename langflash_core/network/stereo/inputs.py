@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from langflash_core.network.stereo.dense import match_cells
 from langflash_core.network.stereo.keypoints import WORKING_SIDE, KeyPoints
@@ -20,17 +21,19 @@ class PoseInput:
     monocular map. local: unit descriptors (C, h', w') of `LocalFeatures`.
     """
 
-    K: np.ndarray
+    K: Float[np.ndarray, "3 3"]
     size: tuple[int, int]
-    depth: np.ndarray
-    local: np.ndarray
+    depth: Float[np.ndarray, "H W"]
+    local: Float[np.ndarray, "C h w"]
 
     def through(self, growth: float) -> "PoseInput":
         """The same view through a lens of so many times the focal length."""
         return replace(self, K=grown(self.K, growth))
 
 
-def grown(K: np.ndarray, growth: float | np.ndarray) -> np.ndarray:
+def grown(
+    K: Float[np.ndarray, "... 3 3"], growth: float | Float[np.ndarray, "..."]
+) -> Float[np.ndarray, "... 3 3"]:
     """Intrinsics (..., 3, 3) of so many times (...) the focal length."""
     ratio = np.ones_like(K)
     ratio[..., :2, :2] = np.asarray(growth)[..., None, None]
@@ -66,13 +69,13 @@ def normalised_sigma(view: PoseInput, pixels: float) -> float:
     return pixels * max(view.size) / WORKING_SIDE / view.K[0, 0]
 
 
-def without_camera(pixels: np.ndarray, view: PoseInput) -> np.ndarray:
+def without_camera(pixels: Float[np.ndarray, "n 2"], view: PoseInput) -> Float[np.ndarray, "n 2"]:
     """Pixels of a picture whose longer side is `WORKING_SIDE` -> normalised coordinates (n, 2)."""
     own = pixels * (max(view.size) / WORKING_SIDE)
     return (own - view.K[:2, 2]) / view.K.diagonal()[:2]
 
 
-def depths_at(view: PoseInput, x: np.ndarray) -> np.ndarray:
+def depths_at(view: PoseInput, x: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
     """z (n,) of the monocular map at normalised coordinates (n, 2)."""
     pixels = x * view.K.diagonal()[:2] + view.K[:2, 2]
     columns, rows = np.clip(pixels.astype(int), 0, np.array(view.size) - 1).T

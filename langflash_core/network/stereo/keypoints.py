@@ -7,6 +7,7 @@ from typing import overload
 
 import cv2
 import numpy as np
+from jaxtyping import Float, Int, Shaped, UInt8
 
 from langflash_core.network.stereo.matching import detect, match_descriptors
 from langflash_core.network.stereo.retrieval import likely_pairs
@@ -23,10 +24,10 @@ class KeyPoints:
     """positions: per view (n, 2), pixels of the photo scaled to `WORKING_SIDE`. pairs: per pair of
     views i < j that may show the same, rows of both (m, 2) that correspond."""
 
-    positions: tuple[np.ndarray, ...]
-    pairs: dict[tuple[int, int], np.ndarray]
+    positions: tuple[Float[np.ndarray, "_ 2"], ...]
+    pairs: dict[tuple[int, int], Int[np.ndarray, "_ 2"]]
 
-    def arrays(self) -> dict[str, np.ndarray]:
+    def arrays(self) -> dict[str, Shaped[np.ndarray, "..."]]:
         """Both, end to end, to be kept."""
         rows = list(self.pairs.values())
         return {
@@ -38,7 +39,7 @@ class KeyPoints:
         }
 
     @staticmethod
-    def of(arrays: Mapping[str, np.ndarray]) -> "KeyPoints":
+    def of(arrays: Mapping[str, Shaped[np.ndarray, "..."]]) -> "KeyPoints":
         """What `arrays` had."""
         positions = np.split(arrays["positions"], np.cumsum(arrays["of_views"])[:-1])
         rows = np.split(arrays["rows"], np.cumsum(arrays["of_edges"])[:-1])
@@ -73,7 +74,7 @@ class _Decoded(Sequence[np.ndarray]):
 
 
 def match_photos(
-    greys: Sequence[np.ndarray],
+    greys: Sequence[UInt8[np.ndarray, "_ _"]],
     check: Callable[[], None] = lambda: None,
     told: Told = lambda what, done, count: None,
 ) -> KeyPoints:
@@ -98,7 +99,7 @@ def match_photos(
     return KeyPoints(tuple(positions), pairs)
 
 
-def decoded(source: bytes) -> np.ndarray:
+def decoded(source: bytes) -> UInt8[np.ndarray, "h w"]:
     """A picture (h, w) uint8, grey, of JPEG bytes."""
     grey = cv2.imdecode(np.frombuffer(source, np.uint8), cv2.IMREAD_GRAYSCALE)
     assert grey is not None, "sources are JPEG bytes that images/ wrote"

@@ -1,6 +1,7 @@
 """Photos whose poses are given: matches say how large each depth map is in the poses' own unit."""
 
 import numpy as np
+from jaxtyping import Float
 
 from langflash_core.errors import InputError
 from langflash_core.network.stereo.matching import Matches, triangulate
@@ -10,7 +11,7 @@ _LEAST_PARALLAX = 2.0  # standard deviations of a match that its depth must move
 _FEWEST = 12  # matches that say a map's scale
 
 
-def agreeing(matches: Matches, relative: np.ndarray) -> Matches:
+def agreeing(matches: Matches, relative: Float[np.ndarray, "4 4"]) -> Matches:
     """Those matches that a pose allows: on each other's epipolar lines, and in front of both cameras.
 
     Args:
@@ -29,8 +30,11 @@ def agreeing(matches: Matches, relative: np.ndarray) -> Matches:
 
 
 def log_scales(
-    matches: Matches, relative: np.ndarray, depths_i: np.ndarray, depths_j: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+    matches: Matches,
+    relative: Float[np.ndarray, "4 4"],
+    depths_i: Float[np.ndarray, " n"],
+    depths_j: Float[np.ndarray, " n"],
+) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
     """What the matches of a pair say each map has to be multiplied by, as logarithms.
 
     Args:
@@ -45,7 +49,7 @@ def log_scales(
     return np.log(true_i[sure] / depths_i[sure]), np.log(true_j[sure] / depths_j[sure])
 
 
-def depth_scales(said: list[np.ndarray]) -> np.ndarray:
+def depth_scales(said: list[Float[np.ndarray, " _"]]) -> Float[np.ndarray, " V"]:
     """Factors (V,) from the logarithms that the matches of each view say; of all, where few do.
 
     Raises:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from jaxtyping import Bool, Float, Int, Shaped, UInt8
 
 _MAX_FEATURES = 4000
 _CONTRAST = 0.01  # walls have little: the default of 0.04 finds nothing on them
@@ -36,20 +37,20 @@ class Matches:
     """x_i, x_j (n, 2) normalised coordinates; sigma: their standard deviation, same unit. rows (n, 2): which
     key points of both views they are, -1 of what is none; None: nobody asks."""
 
-    x_i: np.ndarray
-    x_j: np.ndarray
+    x_i: Float[np.ndarray, "n 2"]
+    x_j: Float[np.ndarray, "n 2"]
     sigma: float
-    rows: np.ndarray | None = None
+    rows: Int[np.ndarray, "n 2"] | None = None
 
     @property
-    def key_points(self) -> np.ndarray:
+    def key_points(self) -> Int[np.ndarray, "n 2"]:
         """`rows`, -1 where nobody asked."""
         return np.full((len(self), 2), -1) if self.rows is None else self.rows
 
     def __len__(self) -> int:
         return len(self.x_i)
 
-    def subset(self, keep: np.ndarray) -> "Matches":
+    def subset(self, keep: Shaped[np.ndarray, " n"]) -> "Matches":
         rows = None if self.rows is None else self.rows[keep]
         return Matches(self.x_i[keep], self.x_j[keep], self.sigma, rows)
 
@@ -63,25 +64,27 @@ class RelativePose:
     information: (7, 7) inverse covariance of a turn before R (radians), of t and of log_scale.
     """
 
-    rotation: np.ndarray
-    translation: np.ndarray
+    rotation: Float[np.ndarray, "3 3"]
+    translation: Float[np.ndarray, "3"]
     log_scale: float
-    inliers: np.ndarray
+    inliers: Bool[np.ndarray, " n"]
     cost: float
-    information: np.ndarray
+    information: Float[np.ndarray, "7 7"]
 
     @property
     def num_inliers(self) -> int:
         """How many matches agree."""
         return int(self.inliers.sum())
 
-    def matrix(self) -> np.ndarray:
+    def matrix(self) -> Float[np.ndarray, "4 4"]:
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = self.rotation, self.translation
         return pose
 
 
-def detect(grey: np.ndarray, num_features: int = _MAX_FEATURES) -> tuple[np.ndarray, np.ndarray]:
+def detect(
+    grey: UInt8[np.ndarray, "H W"], num_features: int = _MAX_FEATURES
+) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 128"]]:
     """RootSIFT: pixel positions (n, 2) with centres at +0.5, and descriptors (n, 128).
 
     Args:
@@ -97,7 +100,7 @@ def detect(grey: np.ndarray, num_features: int = _MAX_FEATURES) -> tuple[np.ndar
     return positions, np.sqrt(descriptors / np.maximum(descriptors.sum(1, keepdims=True), 1e-7))
 
 
-def mutual(similarity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def mutual(similarity: Float[np.ndarray, "n m"]) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
     """Rows (n,) and columns (n,) of (A, B) that choose each other; of several equal ones the first."""
     best = similarity.argmax(1)
     rows = np.flatnonzero(similarity[np.arange(len(best)), best] >= similarity.max(0)[best])
@@ -105,7 +108,9 @@ def mutual(similarity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return rows[firsts], best[rows[firsts]]
 
 
-def match_descriptors(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+def match_descriptors(
+    left: Float[np.ndarray, "n C"], right: Float[np.ndarray, "m C"]
+) -> Int[np.ndarray, "k 2"]:
     """Index pairs (n, 2) that pass the ratio test and choose each other."""
     if len(left) < 2 or len(right) < 2:
         return np.zeros((0, 2), int)
@@ -119,7 +124,9 @@ def match_descriptors(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     return np.stack((rows[keep], best[keep]), 1)
 
 
-def relative_pose(matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray) -> RelativePose | None:
+def relative_pose(
+    matches: Matches, depth_i: Float[np.ndarray, " n"], depth_j: Float[np.ndarray, " n"]
+) -> RelativePose | None:
     """The relative pose that the matches support best, or None where too few agree.
 
     Candidates from the five-point method (good with parallax), from PnP on the depth map (good
@@ -173,8 +180,11 @@ def _five_point(matches: Matches, depth_i: np.ndarray) -> list[tuple[np.ndarray,
 
 
 def triangulate(
-    x_i: np.ndarray, x_j: np.ndarray, rotation: np.ndarray, translation: np.ndarray
-) -> np.ndarray:
+    x_i: Float[np.ndarray, "n 2"],
+    x_j: Float[np.ndarray, "n 2"],
+    rotation: Float[np.ndarray, "3 3"],
+    translation: Float[np.ndarray, "3"],
+) -> Float[np.ndarray, " n"]:
     """z in view i (n,) from x_j ~ R z (x_i, 1) + t; least squares over both equations."""
     turned = _homogeneous(x_i) @ rotation.T
     slope = turned[:, :2] - x_j * turned[:, 2:]
@@ -206,22 +216,26 @@ class DepthPriors:
     independent turned cameras by up to a degree to please a tilted map.
     """
 
-    log_i: np.ndarray
-    log_j: np.ndarray
+    log_i: Float[np.ndarray, " n"]
+    log_j: Float[np.ndarray, " n"]
     share: float
 
     @staticmethod
-    def of(depth_i: np.ndarray, depth_j: np.ndarray) -> "DepthPriors":
+    def of(depth_i: Float[np.ndarray, " n"], depth_j: Float[np.ndarray, " n"]) -> "DepthPriors":
         """From depths (n,) > 0."""
         return DepthPriors(np.log(depth_i), np.log(depth_j), min(1.0, _INDEPENDENT / len(depth_i)))
 
-    def weigh(self, terms: np.ndarray) -> np.ndarray:
+    def weigh(self, terms: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 4"]:
         """Terms (n, 4) of the residuals, those of depth times `share`."""
         return terms * np.array([1.0, 1.0, self.share, self.share])
 
 
 def refine_pose(
-    matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray, rotation: np.ndarray, translation: np.ndarray
+    matches: Matches,
+    depth_i: Float[np.ndarray, " n"],
+    depth_j: Float[np.ndarray, " n"],
+    rotation: Float[np.ndarray, "m C"],
+    translation: Float[np.ndarray, " k"],
 ) -> RelativePose:
     """Two-view bundle adjustment with depth priors, Levenberg-Marquardt, Cauchy weights.
 

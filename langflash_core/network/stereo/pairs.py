@@ -9,6 +9,7 @@ from itertools import combinations
 
 import cv2
 import numpy as np
+from jaxtyping import UInt8
 
 from langflash_core.network.stereo.matching import detect, match_descriptors
 
@@ -21,7 +22,7 @@ _LEAST = 0.05  # what a pair without parallax is worth
 
 
 def choose_pair(
-    greys: Sequence[np.ndarray], check: Callable[[], None] = lambda: None
+    greys: Sequence[UInt8[np.ndarray, "_ _"]], check: Callable[[], None] = lambda: None
 ) -> tuple[int, int] | None:
     """Places of the best two of `greys`, each (H, W) uint8; None where no two match.
 

@@ -13,6 +13,7 @@ Source: own derivation; the score of angles is that of view selection in multi-v
 """
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -28,7 +29,12 @@ _ENOUGH = 0.15  # worth that a point has from the start: what more of the same a
 _LEAST = 0.01  # of gain a point, for a partner
 
 
-def partners(log_depths: Tensor, viewmats: Tensor, Ks: Tensor, count: int = PARTNERS) -> Neighbours:
+def partners(
+    log_depths: Float[Tensor, "V H W"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+    count: int = PARTNERS,
+) -> Neighbours:
     """Of each view at most `count` others, the best first; two views have each other.
 
     Args:

@@ -13,6 +13,7 @@ polynomial regression (Katkovnik et al. 2006).
 """
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -23,7 +24,9 @@ _RANGE = (0.004, 0.015)  # of what is a ripple, relative depth: more is a thing,
 _FARTHEST = 2.5  # ripples by which a pixel's own depth may differ from the plane
 
 
-def flattened(log_depths: Tensor, log_errors: Tensor) -> Tensor:
+def flattened(
+    log_depths: Float[Tensor, "V H W"], log_errors: Float[Tensor, "V H W"]
+) -> Float[Tensor, "V H W"]:
     """Log depths (V, H, W) without ripples; `log_errors` (V, H, W), what is expected of them, stays."""
     size = (log_depths.shape[-2], log_depths.shape[-1])
     inverse, errors = _halved((-log_depths).exp()), _halved(log_errors.exp())
@@ -39,7 +42,9 @@ def flattened(log_depths: Tensor, log_errors: Tensor) -> Tensor:
     return log_depths + F.interpolate(change, size, mode="bilinear", align_corners=False)[:, 0]
 
 
-def fitted_planes(inverse: Tensor, radius: int) -> tuple[Tensor, Tensor]:
+def fitted_planes(
+    inverse: Float[Tensor, "V C h w"], radius: int
+) -> tuple[Float[Tensor, "V 1 h w"], Float[Tensor, "V 1 h w"]]:
     """The plane of least squares in a window around every pixel, (V, 1, h, w): its value there, and the mean
     square of what it leaves, relative to the window's mean.
 

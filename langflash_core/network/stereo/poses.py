@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from langflash_core.network.stereo.adjustment import (
     FEWEST,
@@ -52,14 +53,14 @@ class Poses:
     before scaling; guessed: views that no match supports. adjusted: where three and more were placed, what
     they say together, with the lens."""
 
-    viewmats: np.ndarray
-    depth_scales: np.ndarray
+    viewmats: Float[np.ndarray, "V 4 4"]
+    depth_scales: Float[np.ndarray, " V"]
     corrections: tuple[Correction, ...]
     guessed: tuple[int, ...]
     adjusted: Adjusted | None = None
 
     @property
-    def growths(self) -> np.ndarray:
+    def growths(self) -> Float[np.ndarray, " V"]:
         """By what each view's focal length (V,) is longer than was said."""
         return np.ones(len(self.viewmats)) if self.adjusted is None else self.adjusted.growths
 
@@ -73,7 +74,7 @@ def estimate_poses(
     views: list[PoseInput],
     points: KeyPoints,
     check: Callable[[], None] = lambda: None,
-    known: np.ndarray | None = None,
+    known: Float[np.ndarray, "V 4 4"] | None = None,
     sought: Sought | None = None,
 ) -> Poses:
     """Poses of all views, deterministic.

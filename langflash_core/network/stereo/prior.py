@@ -7,6 +7,7 @@ error of log depth (the scale of a Laplace distribution).
 from dataclasses import dataclass
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -24,20 +25,20 @@ _CONFIDENT_ERROR = 0.1  # relative depth error that counts as confidence 1/2
 class DepthMaps:
     """log_depths and log_errors (B, V, H, W): log z, and log b of its expected error."""
 
-    log_depths: Tensor
-    log_errors: Tensor
+    log_depths: Float[Tensor, "... H W"]
+    log_errors: Float[Tensor, "... H W"]
 
     @property
-    def depths(self) -> Tensor:
+    def depths(self) -> Float[Tensor, "... H W"]:
         return self.log_depths.exp()
 
     @property
-    def confidences(self) -> Tensor:
+    def confidences(self) -> Float[Tensor, "... H W"]:
         """1 / (1 + b / 0.1), in (0, 1)."""
         return torch.sigmoid(torch.log(torch.tensor(_CONFIDENT_ERROR)) - self.log_errors)
 
 
-def resize(maps: Tensor, size: tuple[int, int]) -> Tensor:
+def resize(maps: Float[Tensor, "n C _ _"], size: tuple[int, int]) -> Float[Tensor, "n C H W"]:
     """Bilinear (n, C, h, w) -> (n, C, *size), pixel centres aligned; averages when shrinking."""
     shrinking = maps.shape[-1] > size[1]
     if shrinking:
@@ -57,7 +58,16 @@ class DepthHead(nn.Module):
             nn.Conv2d(preset.dpt_feature, 32, 3, padding=1), nn.ReLU(), nn.Conv2d(32, 2, 1)
         )
 
-    def forward(self, maps: tuple[Tensor, Tensor, Tensor, Tensor], tokens: Tokens) -> DepthMaps:
+    def forward(
+        self,
+        maps: tuple[
+            Float[Tensor, "n _ _ _"],
+            Float[Tensor, "n _ _ _"],
+            Float[Tensor, "n _ _ _"],
+            Float[Tensor, "n _ _ _"],
+        ],
+        tokens: Tokens,
+    ) -> DepthMaps:
         """Maps of the four levels (B*V, C_i, h, w) -> (B, V, H, W)."""
         raw = self.head(self.dpt(maps).path_1).float()
         size = (tokens.grid[0] * self.patch, tokens.grid[1] * self.patch)

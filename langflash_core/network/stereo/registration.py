@@ -23,6 +23,7 @@ import cv2
 import numpy as np
 import scipy.sparse
 import torch
+from jaxtyping import Float, UInt8
 from scipy.sparse.linalg import cg
 from torch import Tensor
 from torch.nn import functional as F
@@ -66,9 +67,9 @@ class _Matches:
 
 def registered(
     maps: DepthMaps,
-    photos: Sequence[np.ndarray],
-    viewmats: Tensor,
-    Ks: Tensor,
+    photos: Sequence[UInt8[np.ndarray, "_ _"]],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
     neighbours: Neighbours | None = None,
     check: Callable[[], None] = lambda: None,
     each: Callable[[int, Callable[[], Tensor]], Tensor] = lambda view, make: make(),

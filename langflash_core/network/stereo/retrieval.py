@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
+from jaxtyping import Float
 
 ALL = 12
 """Photos up to which every pair is matched."""
@@ -16,7 +17,7 @@ _SIMILAR, _NEAR = 8, 3  # of each photo: the most similar others, the next in th
 _WORDS, _SAMPLES, _ROUNDS = 64, 8000, 8
 
 
-def likely_pairs(descriptors: Sequence[np.ndarray]) -> list[tuple[int, int]]:
+def likely_pairs(descriptors: Sequence[Float[np.ndarray, "_ C"]]) -> list[tuple[int, int]]:
     """Pairs i < j of photos, in order: all of a few; of many as many for each, those most alike and those
     that were given one after another.
 
@@ -35,7 +36,7 @@ def likely_pairs(descriptors: Sequence[np.ndarray]) -> list[tuple[int, int]]:
     return sorted(pairs)
 
 
-def most_alike(descriptors: Sequence[np.ndarray], count: int) -> list[list[int]]:
+def most_alike(descriptors: Sequence[Float[np.ndarray, "_ C"]], count: int) -> list[list[int]]:
     """Of each photo the `count` others most like it, in order; all where there are not so many.
 
     Args:

@@ -16,6 +16,7 @@ import math
 from dataclasses import dataclass
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -47,7 +48,7 @@ class _Parts:
         return (self.squares - self.means**2).clamp_min(0).sqrt()
 
 
-def sharpened(log_depths: Tensor, images: Tensor) -> Tensor:
+def sharpened(log_depths: Float[Tensor, "V H W"], images: Float[Tensor, "V 3 H W"]) -> Float[Tensor, "V H W"]:
     """Log depths (V, H, W) whose edges are where those of the images (V, 3, H, W) in [0, 1] are.
 
     Where no two depths can be told apart nothing changes.

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -41,12 +42,14 @@ class Compared:
     for each of G equal groups of channels and 0 outside of it: products with it are sums by group.
     """
 
-    table: Tensor
+    table: Float[Tensor, "V _ C"]
     size: tuple[int, int]
-    own: Tensor
+    own: Float[Tensor, "v n C G"]
 
     @staticmethod
-    def of(maps: Tensor, size: tuple[int, int], groups: int = 1, first: int | None = None) -> "Compared":
+    def of(
+        maps: Float[Tensor, "V C h w"], size: tuple[int, int], groups: int = 1, first: int | None = None
+    ) -> "Compared":
         """Vectors (V, C, h', w') of any size, for depth maps of `size`; groups must divide C. first: so many
         views' depth is looked for; None: that of all."""
         mine = maps[:first]
@@ -62,12 +65,12 @@ class Compared:
 
 def sweep_correlation(
     compared: Sequence[Compared],
-    log_depths: Tensor,
-    offsets: Tensor,
-    viewmats: Tensor,
-    Ks: Tensor,
+    log_depths: Float[Tensor, "V h w"],
+    offsets: Float[Tensor, " P"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
     neighbours: Neighbours | None = None,
-) -> tuple[list[Tensor], Tensor]:
+) -> tuple[list[Float[Tensor, "V _ P h w"]], Float[Tensor, "V P h w"]]:
     """Correlation of every view with its neighbours (None: all others) over depth hypotheses.
 
     Args:
@@ -128,7 +131,9 @@ def _products(compared: Compared, view: int, other: int, ndc: Tensor) -> Tensor:
     return torch.cat([torch.bmm(gathered(table, compared.size, there), here) for there, here in parts])
 
 
-def gathered(table: Tensor, size: tuple[int, int], ndc: Tensor) -> Tensor:
+def gathered(
+    table: Float[Tensor, "_ C"], size: tuple[int, int], ndc: Float[Tensor, "2 X P"]
+) -> Float[Tensor, "X P C"]:
     """Bilinear vectors (X, P, C) of a map of `size` = (h, w) at places (2, X, P) of -1 to 1.
 
     Each is a weighted sum of four rows of the table ((h + 2) (w + 2), C), whose border is 0: as embeddings
@@ -153,7 +158,7 @@ def _rows(maps: Tensor) -> Tensor:
     return maps.flatten(2).transpose(1, 2)
 
 
-def patches(images: Tensor, reach: int = 2) -> Tensor:
+def patches(images: Float[Tensor, "n 3 H W"], reach: int = 2) -> Float[Tensor, "n C h w"]:
     """Grey patches (n, (2 reach + 1)^2, H/2, W/2) of mean 0 and unit norm: their products are
     normalised cross-correlations, which exposure cannot change. images (n, 3, H, W)."""
     half = resize(images.mean(1, keepdim=True), (images.shape[-2] // 2, images.shape[-1] // 2))
@@ -176,7 +181,9 @@ class Regulariser(nn.Module):
         self.up_b, self.second_up = nn.Conv2d(c, b, 1), ResidualUnit(b)
         self.up_a, self.aside, self.first_up = nn.Conv2d(b, a, 1), nn.Conv2d(inputs, a, 1), ResidualUnit(a)
 
-    def forward(self, x: Tensor, shallow: Tensor, deep: Tensor) -> Tensor:
+    def forward(
+        self, x: Float[Tensor, "B C H W"], shallow: Float[Tensor, "B D h w"], deep: Float[Tensor, "B D h w"]
+    ) -> Float[Tensor, "B E H W"]:
         """(n, inputs, 4h, 4w) and tokens (n, E, h, w) of two depths -> (n, a, 4h, 4w)."""
         second = self.second(self.enter(x))
         bottom = self.bottom(self.down(F.relu(second)) + self.tokens(torch.cat((shallow, deep), 1)))
@@ -213,12 +220,12 @@ class DepthRefiner(nn.Module):
 
     def forward(
         self,
-        images: Tensor,
+        images: Float[Tensor, "B V 3 H W"],
         tokens: Tokens,
-        local: Tensor,
+        local: Float[Tensor, "V C h w"],
         prior: DepthMaps,
-        viewmats: Tensor,
-        Ks: Tensor,
+        viewmats: Float[Tensor, "B V 4 4"],
+        Ks: Float[Tensor, "B V 3 3"],
         neighbours: Neighbours | None = None,
         first: int | None = None,
     ) -> tuple[DepthMaps, ...]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse
+from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 
 _LONGEST = 32  # observations of a point that are adjusted
@@ -21,10 +22,10 @@ class Tracks:
     pixels (M, 2): there. sigmas (M,): their standard deviations, pixels.
     """
 
-    points: np.ndarray
-    views: np.ndarray
-    pixels: np.ndarray
-    sigmas: np.ndarray
+    points: Int[np.ndarray, " M"]
+    views: Int[np.ndarray, " M"]
+    pixels: Float[np.ndarray, "M 2"]
+    sigmas: Float[np.ndarray, " M"]
 
     def __len__(self) -> int:
         return len(self.points)
@@ -33,7 +34,9 @@ class Tracks:
     def num_points(self) -> int:
         return int(self.points[-1]) + 1 if len(self.points) else 0
 
-    def subset(self, keep: np.ndarray) -> tuple["Tracks", np.ndarray, np.ndarray]:
+    def subset(
+        self, keep: Bool[np.ndarray, " M"]
+    ) -> tuple["Tracks", Int[np.ndarray, " m"], Int[np.ndarray, " p"]]:
         """Some of the observations (M,) bool, without points that are seen once then; and which observations
         and points those are."""
         stays = np.bincount(self.points[keep], minlength=self.num_points) >= 2
@@ -76,8 +79,8 @@ def no_tracks() -> Tracks:
 
 
 def joined(
-    positions: Sequence[np.ndarray],
-    pairs: Mapping[tuple[int, int], np.ndarray],
+    positions: Sequence[Float[np.ndarray, "_ 2"]],
+    pairs: Mapping[tuple[int, int], Int[np.ndarray, "_ 2"]],
     sigmas: Sequence[float],
 ) -> Tracks:
     """Matches of pairs brought together; a track with two places in one view contradicts itself and goes.
@@ -104,7 +107,10 @@ def joined(
     return Tracks(points, views[nodes], np.concatenate(positions)[nodes], np.asarray(sigmas)[views[nodes]])
 
 
-def with_pairs(tracks: Tracks, pairs: Sequence[tuple[int, int, np.ndarray, np.ndarray, float]]) -> Tracks:
+def with_pairs(
+    tracks: Tracks,
+    pairs: Sequence[tuple[int, int, Float[np.ndarray, "_ 2"], Float[np.ndarray, "_ 2"], float]],
+) -> Tracks:
     """Tracks, and after them points that two views alone saw.
 
     Args:

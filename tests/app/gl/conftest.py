@@ -1,6 +1,11 @@
+from dataclasses import replace
+
 import pytest
 
 from app.gl import SplatRenderer
+from app.gl.answers import ShaderAnswers
+from app.gl.hardware import hardware_of
+from app.gl.processor.host import HostAnswers
 
 
 @pytest.fixture(params=["float16", "float32"])
@@ -13,5 +18,6 @@ def renderer(gl, request):
 @pytest.fixture(params=["shader", "host"])
 def queries(request, monkeypatch):
     """Both places where phrases meet weight maps, whatever this machine would choose."""
-    monkeypatch.setattr("app.gl.renderer.draws_in_software", lambda ctx: request.param == "host")
+    answers = {"shader": ShaderAnswers, "host": HostAnswers}[request.param]
+    monkeypatch.setattr("app.gl.canvas.hardware_of", lambda ctx: replace(hardware_of(ctx), answers=answers))
     return request.param

@@ -118,8 +118,9 @@ def test_the_atoms_a_pass_are_one_number(gl, monkeypatch):
     scene, seen = cloud(600, 50, 8, dtype=torch.float32), camera()
     drawn = []
     for layers, passes in ((8, 3), (3, 6)):
-        monkeypatch.setattr("app.gl.weights.LAYERS_A_PASS", layers)
-        monkeypatch.setattr("app.gl.weights.ATOMS_A_PASS", ATOMS_A_LAYER * layers)
+        for module in ("app.gl.weights", "app.gl.processor.cell_maps"):
+            monkeypatch.setattr(f"{module}.LAYERS_A_PASS", layers)
+            monkeypatch.setattr(f"{module}.ATOMS_A_PASS", ATOMS_A_LAYER * layers)
         renderer = SplatRenderer(gl)
         renderer.set_scene(scene)
         renderer.draw(seen)

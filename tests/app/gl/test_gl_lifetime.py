@@ -11,7 +11,8 @@ import pytest
 from app.cli.renderers import open_renderer
 from app.gl import SplatRenderer, offscreen_context
 from app.gl.canvas import Canvas
-from app.gl.splats import atom_bits, stable_order
+from app.gl.carried import atom_bits
+from app.gl.ordering import stable_order
 from app.gl.targets import gl_function
 from langflash_core.errors import GraphicsError
 from langflash_core.types import Scene

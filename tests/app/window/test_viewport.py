@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 import torch
 
-from app.gl import still
+from app.gl.processor import still
+from app.window.drawing.processor import ProcessorPicture
+from app.window.drawing.stills import RETRY_SECONDS
 from app.window.governor import Governor, Kind, Plan
 from app.window.scene.memory import SceneMemory
-from app.window.viewport import RETRY_SECONDS, Viewport
+from app.window.viewport import Viewport
 from langflash_core import pictures
 from langflash_core.geometry.poses import orbit
 from langflash_core.language.relevance import compile_query
@@ -48,12 +50,13 @@ def test_a_picture_comes_to_rest_in_full(context) -> None:
     with context:
         viewport = Viewport(context)
         viewport.set_scene(1, scene)
-        if viewport._artist is None:
+        picture = viewport.picture
+        if not isinstance(picture, ProcessorPicture):
             pytest.skip("OpenGL here has a graphics card, which draws all pictures itself")
         viewport.ask((0,), compile_query(scene, space, list(PHRASES[:1])))
         plans: list[Plan] = []
         for _ in range(300):
-            viewport.governor = Stubborn(slow=True)
+            picture.governor = Stubborn(slow=True)
             state = replace(state, now=state.now + 0.05)
             viewport.update(state, SIZE, touched=0.0)
             plan = getattr(viewport.drawn, "plan", None)
@@ -76,18 +79,19 @@ def test_what_moves_in_full_size_is_followed_by_the_exact_picture(context) -> No
     with context:
         viewport = Viewport(context)
         viewport.set_scene(1, scene)
-        if viewport._artist is None:
+        picture = viewport.picture
+        if not isinstance(picture, ProcessorPicture):
             pytest.skip("OpenGL here has a graphics card, which draws all pictures itself")
         plans = []
         for _ in range(300):
-            viewport.governor = Quick(slow=True)
+            picture.governor = Quick(slow=True)
             state = replace(state, now=state.now + 0.05)
             viewport.update(state, SIZE, touched=0.0)
             plans.append(getattr(viewport.drawn, "plan", None))
-            if viewport._still is not None:
+            if picture.stills.shown is not None:
                 break
             time.sleep(0.01)
-        still = viewport._still
+        still = picture.stills.shown
         viewport.release()
     assert Plan(Kind.COLOUR) in plans[:-1], "the moving one came first"
     assert still is not None and (still.camera.width, still.camera.height) == SIZE
@@ -130,7 +134,7 @@ def test_a_picture_that_could_not_be_drawn_is_told_and_tried_again(context, monk
             raise MemoryError("a picture too many")
         return real(*args, **named)
 
-    monkeypatch.setattr(still, "draw_still", draw_still)
+    monkeypatch.setattr("app.window.drawing.stills.draw_still", draw_still)
     scene = room(language_space("minilm").encode(list(PHRASES)))
     shown = shown_scene()
     assert shown.scene.info is not None
@@ -138,7 +142,8 @@ def test_a_picture_that_could_not_be_drawn_is_told_and_tried_again(context, monk
     with context:
         viewport = Viewport(context)
         viewport.set_scene(1, scene)
-        if viewport._artist is None:
+        picture = viewport.picture
+        if not isinstance(picture, ProcessorPicture):
             pytest.skip("OpenGL here has a graphics card, which draws all pictures itself")
 
         def live(seconds: float, until) -> None:
@@ -146,7 +151,7 @@ def test_a_picture_that_could_not_be_drawn_is_told_and_tried_again(context, monk
             for _ in range(300):
                 if until():
                     return
-                viewport.governor = Stubborn(slow=True)
+                picture.governor = Stubborn(slow=True)
                 state = replace(state, now=state.now + seconds)
                 viewport.update(state, SIZE, touched=0.0)
                 time.sleep(0.01)
@@ -230,8 +235,10 @@ def test_a_scene_with_levels_moves_coarse_and_rests_whole(context, monkeypatch) 
     with context:
         viewport = Viewport(context)
         viewport.set_scene(1, scene)
-        if viewport._artist is None:
-            assert viewport.governor.share == 1
+        picture = viewport.picture
+        assert picture is not None
+        if not isinstance(picture, ProcessorPicture):
+            assert picture.governor.share == 1
             pytest.skip("OpenGL here has a graphics card, which draws all pictures itself")
         plans = []
         for turn in range(40):
@@ -247,7 +254,7 @@ def test_a_scene_with_levels_moves_coarse_and_rests_whole(context, monkeypatch) 
         assert live is not None and {*live._levels} == {0.25}
         for share in viewport.shares:
             viewport.thin(scene, share, *thin_with_rows(scene, share))
-        assert viewport.governor.ladder[2:4] == ((0.75, 0.625), (0.5, 0.625))
+        assert picture.governor.ladder[2:4] == ((0.75, 0.625), (0.5, 0.625))
         for _ in range(300):
             state = replace(state, now=state.now + 0.05)
             viewport.update(state, SIZE, touched=0.0)

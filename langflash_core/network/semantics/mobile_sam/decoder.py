@@ -4,6 +4,7 @@ Sizes: N prompts, T tokens each (1 of quality, 4 of masks, then the prompt's), L
 """
 
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
@@ -22,7 +23,9 @@ class Attention(nn.Module):
         self.q_proj, self.k_proj, self.v_proj = (nn.Linear(CHANNELS, inner) for _ in range(3))
         self.out_proj = nn.Linear(inner, CHANNELS)
 
-    def forward(self, q: Tensor, k: Tensor, v: Tensor) -> Tensor:
+    def forward(
+        self, q: Float[Tensor, "N T 256"], k: Float[Tensor, "... L 256"], v: Float[Tensor, "... L 256"]
+    ) -> Float[Tensor, "... T 256"]:
         asked, keys, values = (
             project(x).unflatten(-1, (_HEADS, -1)).transpose(1, 2)
             for project, x in ((self.q_proj, q), (self.k_proj, k), (self.v_proj, v))
@@ -37,7 +40,7 @@ class Hidden(nn.Module):
         super().__init__()
         self.lin1, self.lin2 = nn.Linear(CHANNELS, _HIDDEN), nn.Linear(_HIDDEN, CHANNELS)
 
-    def forward(self, x: Tensor) -> Tensor:
+    def forward(self, x: Float[Tensor, "*n C"]) -> Float[Tensor, "*n C"]:
         return self.lin2(self.lin1(x).relu())
 
 
@@ -52,7 +55,13 @@ class TwoWayBlock(nn.Module):
         self.mlp = Hidden()
         self.norm1, self.norm2, self.norm3, self.norm4 = (nn.LayerNorm(CHANNELS) for _ in range(4))
 
-    def forward(self, x: Tensor, cells: Tensor, asked: Tensor, where: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(
+        self,
+        x: Float[Tensor, "N T 256"],
+        cells: Float[Tensor, "... L 256"],
+        asked: Float[Tensor, "N T 256"],
+        where: Float[Tensor, "... L 256"],
+    ) -> tuple[Tensor, Float[Tensor, "... L 256"]]:
         """Tokens x (N, T, 256) and cells (N, L, 256), with what they were at first and where they are."""
         if self.first:
             x = self.norm1(self.self_attn(x, x, x))
@@ -73,7 +82,12 @@ class TwoWayTransformer(nn.Module):
         self.final_attn_token_to_image = Attention()
         self.norm_final_attn = nn.LayerNorm(CHANNELS)
 
-    def forward(self, cells: Tensor, where: Tensor, asked: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(
+        self,
+        cells: Float[Tensor, "... L 256"],
+        where: Float[Tensor, "... L 256"],
+        asked: Float[Tensor, "N T 256"],
+    ) -> tuple[Float[Tensor, "N T 256"], Float[Tensor, "N L 256"]]:
         x = asked
         for layer in self.layers:
             x, cells = layer(x, cells, asked, where)
@@ -90,7 +104,7 @@ class Layers(nn.Module):
             (nn.Linear(CHANNELS, CHANNELS), nn.Linear(CHANNELS, CHANNELS), nn.Linear(CHANNELS, after))
         )
 
-    def forward(self, x: Tensor) -> Tensor:
+    def forward(self, x: Float[Tensor, "*n C"]) -> Float[Tensor, "*n D"]:
         first, second, last = self.layers
         return last(second(first(x).relu()).relu())
 
@@ -113,7 +127,13 @@ class MaskDecoder(nn.Module):
         self.output_hypernetworks_mlps = nn.ModuleList(Layers(CHANNELS // 8) for _ in range(_MASKS))
         self.iou_prediction_head = Layers(_MASKS)
 
-    def forward(self, picture: Tensor, where: Tensor, tokens: Tensor, rough: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(
+        self,
+        picture: Float[Tensor, "1 256 h w"],
+        where: Float[Tensor, "1 256 h w"],
+        tokens: Float[Tensor, "N P 256"],
+        rough: Float[Tensor, "... 256 _ _"],
+    ) -> tuple[Float[Tensor, "N 4 _ _"], Float[Tensor, "N 4"]]:
         """Logits (N, 4, 4h, 4w) and predicted IoU (N, 4).
 
         Args:

@@ -33,7 +33,7 @@ class Looked:
     """A photo after the encoder: its map (1, 256, S/16, S/16), its size (H, W), and pixels of the square a
     pixel of the photo."""
 
-    features: Tensor
+    features: Float[Tensor, "1 256 _ _"]
     size: tuple[int, int]
     scale: float
 
@@ -62,7 +62,9 @@ class MobileSam(nn.Module):
         features = self.image_encoder(self.image_encoder.squared(pixels))
         return Looked(features, image.shape[:2], self.side / max(image.shape[:2]))
 
-    def by_points(self, looked: Looked, points: Float[Tensor, "N 2"]) -> tuple[Tensor, Tensor]:
+    def by_points(
+        self, looked: Looked, points: Float[Tensor, "N 2"]
+    ) -> tuple[Float[Tensor, "N 3 _ _"], Float[Tensor, "N 3"]]:
         """Three masks a point: logits (N, 3, S/4, S/4), above 0 inside, and predicted IoU (N, 3).
 
         Args:
@@ -79,7 +81,7 @@ class MobileSam(nn.Module):
         masks: Float[Tensor, "N H W"],
         points: Float[Tensor, "N P 2"],
         boxes: Float[Tensor, "N 4"],
-    ) -> tuple[Tensor, Tensor]:
+    ) -> tuple[Float[Tensor, "N 4 _ _"], Float[Tensor, "N 4"]]:
         """Rough masks made good: logits (N, 4, S/4, S/4) and predicted IoU (N, 4), the first of each the one
         for prompts that leave nothing open.
 

@@ -6,6 +6,7 @@ Sizes: N prompts of one picture, P points each; positions (x, y) in pixels of th
 import math
 
 import torch
+from jaxtyping import Float, Int
 from torch import Tensor, nn
 
 from langflash_core.network.encoders.mobile_sam import CHANNELS, ChannelNorm
@@ -21,7 +22,7 @@ class Frequencies(nn.Module):
         super().__init__()
         self.register_buffer("positional_encoding_gaussian_matrix", torch.zeros(2, CHANNELS // 2))
 
-    def forward(self, positions: Tensor) -> Tensor:
+    def forward(self, positions: Float[Tensor, "*n 2"]) -> Float[Tensor, "*n 256"]:
         """(..., 2) in [0, 1] to (..., 256)."""
         phases = 2 * math.pi * (2 * positions - 1) @ self.get_buffer("positional_encoding_gaussian_matrix")
         return torch.cat((phases.sin(), phases.cos()), -1)
@@ -46,7 +47,9 @@ class PromptEncoder(nn.Module):
             nn.Conv2d(16, CHANNELS, 1),
         )
 
-    def points(self, positions: Tensor, says: Tensor, side: int) -> Tensor:
+    def points(
+        self, positions: Float[Tensor, "N P 2"], says: Int[Tensor, "N P"], side: int
+    ) -> Float[Tensor, "N _ 256"]:
         """Tokens of points (N, P, 2) and what each says (N, P)."""
         tokens = self.pe_layer((positions + 0.5) / side)
         tokens = tokens * (says != NO_POINT)[..., None]
@@ -55,13 +58,13 @@ class PromptEncoder(nn.Module):
         )
         return tokens + table[says]  # -1 is the last row
 
-    def rough(self, logits: Tensor | None) -> Tensor:
+    def rough(self, logits: Float[Tensor, "N _ _"] | None) -> Float[Tensor, "_ 256 _ _"]:
         """The map of rough masks (N, S/4, S/4), or of none."""
         if logits is None:
             return self.no_mask_embed.weight[..., None, None]
         return self.mask_downscaling(logits[:, None])
 
-    def grid(self, cells: int) -> Tensor:
+    def grid(self, cells: int) -> Float[Tensor, "1 256 _ _"]:
         """Where the cells of a picture are, (1, 256, cells, cells)."""
         steps = (torch.arange(cells) + 0.5) / cells
         rows, columns = torch.meshgrid(steps, steps, indexing="ij")

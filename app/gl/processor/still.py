@@ -22,9 +22,9 @@ from langflash_core.splat.projection import ALPHA_MIN, NEAR, drawable_rows, proj
 from langflash_core.splat.tiles import rasterize_tiles
 from langflash_core.types import LUMA, Camera, Frame, Scene, Semantics
 
-from .answers import in_numbers, temperature_of
+from ..answers import in_numbers, temperature_of
+from ..splats import TINTED, TINTS
 from .host import relevancy
-from .splats import TINTED, TINTS
 
 _PIXELS_AT_ONCE = 1 << 13  # 1.3 MB of 40 weights: within a core's cache
 _KEPT = 4  # answers of a picture, the newest

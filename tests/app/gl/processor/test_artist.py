@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from app.window.artist import Artist
+from app.gl.processor.artist import Artist
 from langflash_core.errors import Cancelled
 
 PATIENCE = 20.0

@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 import torch
 
-from app.gl import cells as cells_module
-from app.gl import splats as splats_module
-from app.gl.cells import batches, cells_of, together
+from app.gl.hardware import CARD
 from app.gl.layout import ATOMS_A_LAYER, LAYERS_A_PASS, num_layers
+from app.gl.processor import cell_maps as cell_maps_module
+from app.gl.processor import cells as cells_module
+from app.gl.processor.cells import AtomsOf, batches, cells_of, together
 from app.gl.targets import LayerTarget, read
 from langflash_core.graphics import draws_in_software
 from langflash_core.types import Scene
-from tests.app.gl.test_gl_sprites import Quads, drawn
+from tests.app.gl.processor.test_sprites import drawn
 from tests.splat.scenes import camera, cloud
 
 
@@ -38,7 +39,7 @@ def local(num_atoms: int, twice: bool = False) -> Scene:
 @pytest.mark.parametrize(("num_atoms", "twice"), [(1, True), (7, False), (25, True), (70, False)])
 def test_cells_hold_what_whole_maps_hold(gl, software, num_atoms, twice):
     scene, view = local(num_atoms, twice), camera(200, 150, 170.0)
-    mine, true = drawn(gl, scene, view)[0][3], drawn(gl, scene, view, Quads)[0][3]
+    mine, true = drawn(gl, scene, view)[0][3], drawn(gl, scene, view, CARD)[0][3]
     assert float(true.max()) > 0.5
     assert torch.equal(mine, true)
 
@@ -49,35 +50,27 @@ def test_cells_are_drawn_as_quads_where_a_splat_is_too_large(gl, software):
     scales[0] = 1e3
     scene = replace(scene, gaussians=replace(scene.gaussians, scales=scales))
     view = camera(200, 150, 170.0)
-    mine, true = drawn(gl, scene, view), drawn(gl, scene, view, Quads)
+    mine, true = drawn(gl, scene, view), drawn(gl, scene, view, CARD)
     assert not mine[2] and torch.equal(mine[0][3], true[0][3])
 
 
 def test_maps_are_drawn_whole_where_too_many_splats_reach_too_many_cells(gl, software, monkeypatch):
     scene, view = local(30), camera(200, 150, 170.0)
     boxes = np.tile(np.array([[0.0], [0.0], [130.0], [100.0]], np.float32), 200)
-    everywhere = Placed(boxes, np.ones((200, 9), bool))
+    everywhere = boxes, carrying(np.ones((200, 9), bool))
     monkeypatch.setattr(cells_module, "MOST_PAIRS", 5 * 4 * 200)
-    reached = cells_of(everywhere, (130, 100), side=32)  # pyright: ignore[reportArgumentType]
+    reached = cells_of(*everywhere, (130, 100), side=32)
     assert reached is not None and len(reached.places) == 5 * 4
     monkeypatch.setattr(cells_module, "MOST_PAIRS", 5 * 4 * 200 - 1)
-    assert cells_of(everywhere, (130, 100), side=32) is None  # pyright: ignore[reportArgumentType]
+    assert cells_of(*everywhere, (130, 100), side=32) is None  # pyright: ignore[reportArgumentType]
     monkeypatch.setattr(cells_module, "MOST_PAIRS", 0)
-    mine, true = drawn(gl, scene, view)[0][3], drawn(gl, scene, view, Quads)[0][3]
+    mine, true = drawn(gl, scene, view)[0][3], drawn(gl, scene, view, CARD)[0][3]
     assert torch.equal(mine, true)
 
 
-class Placed:
-    """Splats that know their boxes (4, n) and their atoms (n, K)."""
-
-    def __init__(self, boxes: np.ndarray, carried: np.ndarray):
-        self._boxes, self._carried = boxes, carried
-
-    def boxes(self):
-        return self._boxes
-
-    def atoms_of(self, places, starts):
-        return np.logical_or.reduceat(self._carried[places], starts, axis=0)
+def carrying(carried: np.ndarray) -> AtomsOf:
+    """Of splats that carry atoms (n, K)."""
+    return lambda places, starts: np.logical_or.reduceat(carried[places], starts, axis=0)
 
 
 def test_cells_find_every_splat_that_reaches_them():
@@ -86,7 +79,7 @@ def test_cells_find_every_splat_that_reaches_them():
     boxes = np.concatenate((low, low + draw.uniform(0, 50, (2, 200)))).astype(np.float32)
     boxes[:, 0], boxes[:, 1] = np.nan, np.inf  # broken, and beside every image
     carried = draw.random((200, 9)) < 0.05
-    reached = cells_of(Placed(boxes, carried), (130, 100), side=32)  # pyright: ignore[reportArgumentType]
+    reached = cells_of(boxes, carrying(carried), (130, 100), side=32)
     assert reached is not None
     boxes_found = [tuple(box) for box in reached.boxes.tolist()]
     found = dict(zip(boxes_found, zip(reached.places, reached.atoms, strict=True), strict=True))
@@ -138,7 +131,7 @@ def test_cells_are_drawn_out_of_many_uploads(gl, software, monkeypatch):
     """As where a large scene's would take gigabytes."""
     scene, view = local(40), camera(200, 150, 170.0)
     at_once = drawn(gl, scene, view)[0][3]
-    monkeypatch.setattr(splats_module, "_SPLATS_AT_ONCE", 50)
+    monkeypatch.setattr(cell_maps_module, "_SPLATS_AT_ONCE", 50)
     assert torch.equal(drawn(gl, scene, view)[0][3], at_once)
 
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
 
-from .answers import Answers, in_numbers, temperature_of
-from .layout import ATOMS_A_LAYER, PHRASES_A_LAYER
-from .targets import NUMPY_TYPES, LayerTarget
-from .weights import Maps
+from ..answers import Answers, in_numbers, temperature_of
+from ..layout import ATOMS_A_LAYER, PHRASES_A_LAYER
+from ..targets import NUMPY_TYPES, LayerTarget
+from ..weights import Maps
 
 _LARGEST_EXPONENT = np.float32(80)  # exp of it is finite in float32, and 1 / (1 + exp) is 0 to all digits
 

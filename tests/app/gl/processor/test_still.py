@@ -10,7 +10,7 @@ import torch
 
 from app.gl import SplatRenderer
 from app.gl.canvas import Canvas
-from app.gl.still import StillMaps, draw_still
+from app.gl.processor.still import StillMaps, draw_still
 from app.gl.warming import SIDE, warm_up
 from langflash_core.language.relevance import relevance_maps
 from langflash_core.splat import render
@@ -176,7 +176,7 @@ def test_weight_maps_of_one_size_are_kept(gl, scene) -> None:
     first, second = (scene.camera(0, *size) for size in ((64, 48), (48, 36)))
     before = renderer_maps(renderer, first)
     renderer.draw(second)
-    assert [view.maps._layers._made is None for view in renderer._canvas._views] == [True, False]
+    assert [view.maps.layers._made is None for view in renderer._canvas._views] == [True, False]
     assert np.array_equal(renderer_maps(renderer, first), before)
     renderer.release()
 

@@ -16,8 +16,8 @@ from langflash_core.errors import Cancelled
 
 log = logging.getLogger(__name__)
 
-Asked = Callable[[], bool]
-Work = Callable[[Asked], Any]
+Stopping = Callable[[], bool]
+Work = Callable[[Stopping], Any]
 _NICE = 10  # below the window's own threads, which share the processor
 
 

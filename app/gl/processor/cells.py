@@ -6,15 +6,14 @@ holds goes to the layers of its atoms; atoms that are seen together share a laye
 cell every weight is 0, so the maps are the same to the bit.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from langflash_core.splat.tiles import num_touched, tiles_touched
 
-from .layout import ATOMS_A_LAYER, LAYERS_A_PASS
-from .splats import SplatBuffers
+from ..layout import ATOMS_A_LAYER, LAYERS_A_PASS
 
 SIDE = 32  # pixels; half a tile of llvmpipe
 MOST_PAIRS = 1 << 24  # of splats and cells; sorting so many takes half a GB
@@ -55,10 +54,18 @@ class Batch:
         return slots[:, :num_atoms]
 
 
-def cells_of(splats: SplatBuffers, size: tuple[int, int], side: int = SIDE) -> Cells | None:
-    """Cells of a picture (width, height) that measured splats reach; None where so many reach so many that
-    each is better drawn once."""
-    boxes = np.nan_to_num(splats.boxes()).clip(-_FARTHEST, _FARTHEST)
+AtomsOf = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""(runs, K) bool of splats at places (m,) of the draw order and where each run of them starts."""
+
+
+def cells_of(boxes: np.ndarray, atoms_of: AtomsOf, size: tuple[int, int], side: int = SIDE) -> Cells | None:
+    """Cells of a picture (width, height) that splats reach; None where so many reach so many that each is
+    better drawn once.
+
+    Args:
+        boxes: (4, n) x0, y0, x1, y1 of splats in draw order, pixels. atoms_of: which atoms they carry.
+    """
+    boxes = np.nan_to_num(boxes).clip(-_FARTHEST, _FARTHEST)
     boxes = np.concatenate((np.floor(boxes[:2]), np.ceil(boxes[2:]))).astype(np.int64)
     if num_touched(boxes.T, *size, side) > MOST_PAIRS:
         return None
@@ -71,7 +78,7 @@ def cells_of(splats: SplatBuffers, size: tuple[int, int], side: int = SIDE) -> C
     starts = np.flatnonzero(np.diff(cells, prepend=-1))
     low = side * np.stack((cells[starts] % columns, cells[starts] // columns), 1)
     found = np.concatenate((low, np.minimum(side, np.array(size) - low)), 1)
-    return Cells(found, np.split(places, starts[1:]), splats.atoms_of(places, starts))
+    return Cells(found, np.split(places, starts[1:]), atoms_of(places, starts))
 
 
 def together(carried: np.ndarray) -> np.ndarray:

@@ -4,8 +4,8 @@ from functools import partial
 
 import moderngl
 
-from .renderer import SplatRenderer
-from .splats import SplatBuffers
+from ..renderer import SplatRenderer
+from ..splats import SplatBuffers
 
 REACH = 2.5
 """Deviations at which footprints end. Where alpha falls below 1/255 an opaque one ends at 3.3."""

@@ -1,0 +1,35 @@
+"""The two places where OpenGL runs, and what each does in its own way; the pictures are the same."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import moderngl
+
+from langflash_core.graphics import draws_in_software
+
+from .answers import MakeAnswers, ShaderAnswers
+from .processor.cell_maps import CellMaps
+from .processor.host import HostAnswers
+from .processor.sprites import Sprites
+from .shapes import MakeShapes, Quads
+from .weights import MakeMaps, WeightMaps
+
+
+@dataclass(frozen=True)
+class Hardware:
+    """shapes: what Gaussians are drawn as. maps: how weight maps come about. answers: who multiplies them
+    with phrases. defines: of all shaders."""
+
+    shapes: MakeShapes
+    maps: MakeMaps
+    answers: MakeAnswers
+    defines: Mapping[str, float] = field(default_factory=dict)
+
+
+CARD = Hardware(Quads, WeightMaps, ShaderAnswers)
+PROCESSOR = Hardware(Sprites, CellMaps, HostAnswers, {"SOFTWARE": 1})
+
+
+def hardware_of(ctx: moderngl.Context) -> Hardware:
+    """Where a context draws."""
+    return PROCESSOR if draws_in_software(ctx) else CARD

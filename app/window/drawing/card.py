@@ -1,0 +1,58 @@
+"""A scene in the viewport, drawn by a graphics card: everything, on the thread of its context."""
+
+from typing import TYPE_CHECKING
+
+from langflash_core.scene.thin import coarse_share
+
+from ...gl import SplatRenderer
+from ..governor import Governor
+from ..state import State
+from .easel import Easel
+from .marked import Marked
+from .values import Stand, View, kind_of
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from langflash_core.language.relevance import CompiledQuery
+    from langflash_core.types import Frame, Scene
+
+
+class CardPicture:
+    """As `ScenePicture`: smaller pictures while something moves, and finer ones step by step at rest."""
+
+    settling = failing = False
+
+    def __init__(self, renderer: SplatRenderer, serial: int, scene: "Scene") -> None:
+        """
+        Raises:
+            GraphicsError: the OpenGL here cannot do it.
+        """
+        self.governor = Governor(len(scene.gaussians), slow=False, coarse=coarse_share(scene))
+        self.easel = Easel(renderer, serial, scene, self.governor.share)
+
+    def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", lapses: int) -> None:
+        self.easel.ask(keys, query, lapses)
+
+    def mark(self, marked: Marked) -> None:
+        self.easel.mark(marked)
+
+    def update(self, state: State, stand: Stand, touched: float) -> float:
+        kind = kind_of(state)
+        still = state.now - max(stand.moved, touched)
+        resting = self.governor.resting(kind, still)
+        wanted = self.easel.wanted(state, stand, resting or self.governor.moving(kind))
+        if not self.easel.covers(wanted):
+            self.easel.draw(wanted)
+            self.governor = self.governor.learn(wanted.plan, self.easel.seconds, moving=resting is None)
+        self.easel.paint(state)
+        return self.governor.next_rest(still)
+
+    def view(self, state: State, stand: Stand) -> View | None:
+        return self.easel.view(state, stand, self._numbers)
+
+    def _numbers(self) -> "tuple[Frame, Tensor]":
+        return self.easel.renderer.frame(), self.easel.renderer.relevance()
+
+    def release(self, patience: float) -> None:
+        pass
