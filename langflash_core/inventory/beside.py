@@ -143,7 +143,7 @@ def _described(found: Inventory, render: Render) -> tuple[np.ndarray, np.ndarray
         pixels *= np.array([camera.width / grey.shape[1], camera.height / grey.shape[0]])
         own, whole = _world_places(found, camera, frame, pixels)
         places.append(own[whole])
-        descriptors.append(described[whole])
+        descriptors.append(described[whole].astype(np.float32))
     return np.concatenate(places), np.concatenate(descriptors)
 
 
