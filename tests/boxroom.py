@@ -39,7 +39,7 @@ def box_room(
         _sheet("wall", (WIDE, 0, 0), (0, 0, DEEP), (0, HIGH, 0)),
         _sheet("door", (WIDE - 0.03, 0, 3.5), (0, 0, 0.9), (0, 2.0, 0)),
         *(_cube("chair", east, north, 0.45, 0.45, 0.8) for east, north in chairs),
-        *(_cube("table", *table, 1.4, 0.8, 0.74) for _ in range(table is not None)),
+        *(_cube("table", east, north, 1.4, 0.8, 0.74) for east, north in (() if table is None else (table,))),
     ]
     points, normals, words = (np.concatenate([part[k] for part in parts]) for k in range(3))
     # Of a world of east, height, north to the first camera: right, down, ahead.
@@ -85,13 +85,14 @@ def without_language(scene: Scene) -> Scene:
 
 
 def _sheet(word: str, corner: tuple, along: tuple, up: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    corner, along, up = (np.array(v, float) for v in (corner, along, up))
+    start, first, second = (np.array(v, float) for v in (corner, along, up))
     steps = [
-        np.arange(SPACING / 2, np.linalg.norm(side), SPACING) / np.linalg.norm(side) for side in (along, up)
+        np.arange(SPACING / 2, np.linalg.norm(side), SPACING) / np.linalg.norm(side)
+        for side in (first, second)
     ]
     s, t = (grid.ravel()[:, None] for grid in np.meshgrid(*steps))
-    points = corner + s * along + t * up
-    normal = np.cross(along, up) / np.linalg.norm(np.cross(along, up))
+    points = start + s * first + t * second
+    normal = np.cross(first, second) / np.linalg.norm(np.cross(first, second))
     return points, np.tile(normal, (len(points), 1)), np.full(len(points), WORDS.index(word))
 
 

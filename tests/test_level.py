@@ -101,6 +101,7 @@ def test_a_told_height_makes_metres(room, world):
 def test_a_known_length_makes_metres(room):
     a, b = seen_at(room, 0, 30, 40), seen_at(room, 0, 70, 40)
     told = measured(room, a, b, 3.0)
+    assert told.record.metric_scale is not None
     assert told.record.metric_scale * math.dist(a, b) == pytest.approx(3.0)
     with pytest.raises(InputError, match="one point"):
         measured(room, a, a, 3.0)

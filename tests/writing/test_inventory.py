@@ -71,7 +71,8 @@ def test_the_plan_is_to_scale_on_paper(folder):
     drawing = ET.parse(folder / "room.svg").getroot()
     box = [float(value) for value in drawing.get("viewBox", "").split()]
     assert drawing.get("width") == f"{box[2]:.1f}mm"  # a unit of the drawing is a millimetre
-    ratio = int(re.search(r"1 : (\d+)", "".join(drawing.itertext())).group(1))
+    (said,) = re.findall(r"1 : (\d+)", "".join(drawing.itertext()))
+    ratio = int(said)
     walls = [line for line in drawing.iter(f"{SVG}line") if line.get("class") == "wall"]
     ends = [[float(line.get(name, "nan")) for name in ("x1", "y1", "x2", "y2")] for line in walls]
     metres = sorted(math.dist(end[:2], end[2:]) / 1000 * ratio for end in ends)

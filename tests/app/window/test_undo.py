@@ -195,7 +195,7 @@ def random_command(chance: np.random.Generator, state: State) -> do.Command:
         edit.SelectRegion(Region(points[:1], 4.0), combine), edit.SelectByPhrase(key, combine),
         edit.SelectAtom(atom, combine), edit.Grow(), edit.Grow(phrase=True), edit.Invert(), edit.SelectAll(),
         edit.Deselect(), edit.Delete(), edit.Hide(), edit.Isolate(), edit.ShowAll(), edit.FindFloaters(),
-        edit.SetStrictness(float(chance.uniform(1, 6))), edit.EndFloaters("select"),
+        edit.SetStrength(float(chance.uniform(0, 1))), edit.EndFloaters("select"),
         edit.EndFloaters("delete"), point.SetThrough(bool(chance.integers(2))),
         edit.RenameAtom(atom, f"thing {key}"), edit.ToggleAtom(atom), edit.MergeAtoms((atom, key)),
         film.AddKey(), film.RemoveKey(key), film.ClearKeys(), point.SetLength(float(chance.uniform(0.1, 2))),

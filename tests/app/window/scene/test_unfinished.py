@@ -43,6 +43,7 @@ def began(photos: tuple[Path, ...]) -> Path:
         assert folder is not None
         Keep(folder, "key")("step", lambda: {"values": np.ones(3)})
         raise Cancelled("stopped")
+    assert folder is not None
     return folder
 
 
