@@ -35,7 +35,7 @@ APT := install() { \
 
 .PHONY: help setup run lint test test-all test-machines torture portable
 help:
-	@sed -n '1,9s/^# //p' Makefile
+	@sed -n '1,8s/^# //p' Makefile
 
 setup: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window $(STAMP)-browser
 

@@ -44,7 +44,7 @@ def box_room(
     points, normals, words = (np.concatenate([part[k] for part in parts]) for k in range(3))
     # Of a world of east, height, north to the first camera: right, down, ahead.
     flip = np.diag([1.0, -1.0, 1.0])
-    turn = Rotation.from_euler("zxy", [roll, -pitch, -yaw], degrees=True).as_matrix()
+    turn = Rotation.from_euler("zxy", [roll, pitch, -yaw], degrees=True).as_matrix()
     home = turn @ flip
     means = (points - np.array(EYE)) @ home.T / METRES
     across = normals @ home.T
@@ -74,7 +74,7 @@ def box_room(
 
 def true_up(scene: Scene, pitch: float = 20.0, roll: float = 4.0, yaw: float = 10.0) -> np.ndarray:
     """Up in the scene's axes."""
-    turn = Rotation.from_euler("zxy", [roll, -pitch, -yaw], degrees=True).as_matrix()
+    turn = Rotation.from_euler("zxy", [roll, pitch, -yaw], degrees=True).as_matrix()
     return turn @ np.array([0.0, -1.0, 0.0])
 
 

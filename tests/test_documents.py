@@ -30,7 +30,8 @@ TOPS = ("app", "langflash_core", "shaders", "assets", "tests", ".github", ".ci")
 TO_BE_MADE = re.compile(r"NAME")  # of recipes
 SOURCES = ("*.py", "*.frag", "*.vert", "*.glsl")
 DOTTED = re.compile(r"(?<![\w./-])(?:langflash_core|app)(?:\.[A-Za-z_]\w*)+(?![\w/(]*/)")
-ELSEWHERE = {"--help", "--nproc-per-node"}  # options of everything, and of torchrun
+# Options of everything, of pytest here, of torchrun, of Biome.
+ELSEWHERE = {"--help", "--nothing-missing", "--nproc-per-node", "--write"}
 
 
 def read(document: str) -> str:

@@ -39,6 +39,7 @@ from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.poses import from_view
 from langflash_core.graphics import shader_source
 from langflash_core.scene.tour import Stop, read_tour
+from langflash_core.scene.world import turn_of
 from langflash_core.types import Scene
 
 MOST_WEIGHTS = 4  # of a Gaussian; `langflash bench` says what the others are worth
@@ -218,6 +219,7 @@ def _encoded(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
         "origin": origin.tolist(),
         "views": _views(scene, origin),
         "viewSize": list(scene.view_size),
+        "down": _down(scene),
         **_tour(scene, origin.numpy()),
         **books,
     }
@@ -250,6 +252,12 @@ def _views(scene: Scene, origin: Tensor) -> list[dict]:
             }
         )
     return views
+
+
+def _down(scene: Scene) -> list[float]:
+    """Where down is: as the world has it that the scene stands in, else as the first photo was held."""
+    world = scene.record.world
+    return (scene.viewmats[0, 1, :3] if world is None else turn_of(world)[1]).tolist()
 
 
 def _tour(scene: Scene, origin: np.ndarray) -> dict:

@@ -127,7 +127,7 @@ def aligned(first: Inventory, second: Inventory, render: Render) -> Fit:
 def _described(found: Inventory, render: Render) -> tuple[np.ndarray, np.ndarray]:
     """Places (n, 3) in the world of all photos' key points, and their descriptors (n, 128)."""
     places, descriptors = [np.zeros((0, 3))], [np.zeros((0, 128), np.float32)]
-    sift = cv2.SIFT_create(_POINTS, contrastThreshold=0.01)
+    sift = cv2.SIFT.create(_POINTS, contrastThreshold=0.01)
     for view, photo in enumerate(found.scene.photos):
         try:
             with opened_picture(photo, STORED) as opened:

@@ -78,7 +78,7 @@ class Plan:
         """Corners (west, south) and (east, north) of all that is drawn."""
         ends = [place for wall in self.walls for place in (wall.start, wall.end)]
         ends += [tuple(corner) for thing in self.things for corner in thing.corners]
-        points = np.array([*ends, *self.eyes])
+        points = np.array([*ends, *self.eyes] or [(-1.0, -1.0), (1.0, 1.0)])
         (west, south), (east, north) = points.min(0).tolist(), points.max(0).tolist()
         return (west, south), (east, north)
 
@@ -256,7 +256,8 @@ def _in_wall(thing: Thing, walls: list[PlanWall], metre: float) -> tuple[Place, 
         start, end = np.array(wall.start), np.array(wall.end)
         along = (end - start) / wall.length
         place = float((middle - start) @ along)
-        across = abs(float(np.cross(along, middle - start)))
+        aside = middle - start
+        across = abs(float(along[0] * aside[1] - along[1] * aside[0]))
         reach = np.abs((thing.corners - middle) @ along).max()
         if (
             across <= _HANGS * metre

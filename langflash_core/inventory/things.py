@@ -135,7 +135,7 @@ def inventory(scene: Scene, *, threshold: float | None = None, least: float = LE
     shares = photo_shares(scene)
     things = [
         thing
-        for kind in sorted(set(kinds) - {""})
+        for kind in sorted({str(kind) for kind in kinds} - {""})
         if kind not in STRUCTURE
         for thing in _of_kind(whole, kind, kinds == kind, relevance, shares, least)
     ]

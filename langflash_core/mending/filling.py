@@ -1,10 +1,10 @@
 """What was behind a part that was taken out: walls and floors go on as planes, under what is left around.
 
 Where the part covered a pixel and nothing is left there, is a hole. Planes are found among what the views
-show around their holes. A ray through a hole meets the planes that lie around it there; it ends at the
-nearest one that is not before what was taken away: so two walls meet in their corner. Where no plane lies
-around, depth is interpolated from the edge as 1 / z, which a plane's is linear in. What another view sees
-through is not filled.
+show around their holes, but for those that much of it lies behind. A ray through a hole meets the planes that
+lie around it there; it ends at the nearest one that is not before what was taken away: so two walls meet in
+their corner. Where no plane lies around, depth is interpolated from the edge as 1 / z, which a plane's is
+linear in. What another view sees through is not filled.
 
 Every plane becomes a flat picture, in which holes are filled by what is around them (`texture.py`), and one
 flat Gaussian per pixel of its hole, with the weights of the nearest known pixel. Nobody saw any of it:
@@ -48,6 +48,7 @@ _BEFORE = 0.97  # of the depth of what was taken away: nearer is no background
 _THROUGH = 1.05  # times as deep: there another view sees through
 _CELL = 1.4  # pixels of a view
 _MOST_CELLS = 150_000
+_BEHIND = 0.3  # of what is around
 _GRAZING = 0.04
 _PARALLEL, _CLOSE = 0.9, 0.8  # planes alike, and so near: the one that more lies on goes on
 _NOISE, _NARROWEST = (
@@ -150,8 +151,22 @@ def _view(left: Scene, camera: Camera, matte: Tensor, before: Tensor, number: in
 def _planes_around(views: Sequence[_View]) -> list[Plane]:
     points = np.concatenate([view.points(view.depths)[view.ring] for view in views])
     depths = np.concatenate([view.depths[view.ring] for view in views])
+    eyes = np.concatenate([np.broadcast_to(view.eye, (int(view.ring.sum()), 3)) for view in views])
     step = max(1, len(points) // 5000)
-    return planes(points[::step], _FAR * depths[::step], share=_SHARE, most=_MOST_PLANES)
+    points, eyes, far = points[::step], eyes[::step], _FAR * depths[::step]
+    found = planes(points, far, share=_SHARE, most=_MOST_PLANES)
+    return [plane for plane in found if _bounds(plane, points, eyes, far)]
+
+
+def _bounds(
+    plane: Plane,
+    points: Float[np.ndarray, "n 3"],
+    eyes: Float[np.ndarray, "n 3"],
+    far: Float[np.ndarray, " n"],
+) -> bool:
+    """Whether little of what is around lies behind a plane, as it does behind a chair's back: it goes on."""
+    behind = plane.apart(points) * np.sign(plane.apart(eyes)) < -2 * far
+    return float(behind.mean()) <= _BEHIND
 
 
 def _on_planes(

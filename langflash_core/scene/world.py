@@ -11,8 +11,10 @@ from torch import Tensor
 
 from langflash_core.geometry import rotations
 from langflash_core.geometry.cameras import invert_rigid, transform
+from langflash_core.geometry.poses import Vector, read_pose, told_pose
 from langflash_core.geometry.turning import turned_quats, turned_sh
 from langflash_core.records import World
+from langflash_core.scene.tour import read_tour, told_tour
 from langflash_core.types import Gaussians, Scene
 
 
@@ -35,7 +37,7 @@ def placed(
 ) -> Scene:
     """The scene with every point p at unit turn (p - origin); its views look at the same things.
 
-    Key frames go along: the window's cameras are places of the scene, too.
+    Key frames, stops and notes go along: they are places of the scene, too.
     """
     matrix, start = torch.from_numpy(turn).double(), torch.from_numpy(origin).double()
     means = (unit * (scene.gaussians.means.double() - start) @ matrix.T).float()
@@ -45,8 +47,9 @@ def placed(
     viewmats[:, :3, :3] = rotation
     moved = _turned(scene.gaussians, means, matrix, unit)
     path = tuple(_placed_key(key, turn, origin, unit) for key in scene.record.camera_path)
+    tour = _placed_tour(scene.record.tour, turn, origin, unit)
     whole = replace(scene, gaussians=moved, viewmats=viewmats.float())
-    return whole.with_record(camera_path=path) if path else whole
+    return whole.with_record(camera_path=path, tour=tour) if path or tour else whole
 
 
 def turn_of(world: World) -> Float[np.ndarray, "3 3"]:
@@ -61,13 +64,34 @@ def _turned(gaussians: Gaussians, means: Tensor, matrix: Tensor, unit: float) ->
     return replace(gaussians, means=means, quats=quats, scales=gaussians.scales * unit, sh=sh)
 
 
+def _placed_tour(
+    told: Mapping[str, Any], turn: Float[np.ndarray, "3 3"], origin: Float[np.ndarray, " 3"], unit: float
+) -> dict[str, Any]:
+    """A tour at the same things."""
+
+    def point(at: Vector) -> Vector:
+        return Vector(*(unit * turn @ (np.array(at) - origin)).tolist())
+
+    tour = read_tour(told)
+    stops = tuple(
+        replace(stop, pose=read_pose(_placed_key(told_pose(stop.pose), turn, origin, unit)))
+        for stop in tour.stops
+    )
+    notes = tuple(
+        replace(note, at=point(note.at), to=None if note.to is None else point(note.to))
+        for note in tour.notes
+    )
+    return told_tour(replace(tour, stops=stops, notes=notes))
+
+
 def _placed_key(
     key: Mapping[str, Any], turn: Float[np.ndarray, "3 3"], origin: Float[np.ndarray, " 3"], unit: float
 ) -> Mapping[str, Any]:
     """A key frame that sees the same; as it is where it is none."""
     try:
         centre = unit * turn @ (np.array(key["centre"], float) - origin)
-        rotation = rotations.quaternion(turn @ rotations.matrix(tuple(map(float, key["rotation"]))))
+        w, x, y, z = map(float, key["rotation"])
+        rotation = rotations.quaternion(turn @ rotations.matrix((w, x, y, z)))
         lengths = {name: unit * float(key[name]) for name in ("reach", "span") if key.get(name) is not None}
     except (TypeError, ValueError, LookupError):
         return key

@@ -78,8 +78,8 @@ def page_of(scene: Scene, prompts: Sequence[str], *, detail: str, title: str) ->
 def _widget() -> type | None:
     """The widget's class; None where anywidget is not installed."""
     try:
-        import anywidget
-        import traitlets
+        import anywidget  # pyright: ignore[reportMissingImports]
+        import traitlets  # pyright: ignore[reportMissingImports]
     except ModuleNotFoundError:
         return None
 

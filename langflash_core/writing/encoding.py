@@ -22,7 +22,7 @@ _WEBP = (
 
 
 @contextmanager
-def encoded(path: Path, size: tuple[int, int]) -> Iterator[Callable[[bytes], None]]:
+def encoded(path: Path, size: tuple[int, int]) -> Iterator[Callable[[bytes], object]]:
     """A function that takes pictures, (H, W, 3) bytes each, one after the other; the film is whole where the
     block ends well. H.264, or for a .webp an animation that begins again at its end.
 
@@ -38,7 +38,7 @@ def encoded(path: Path, size: tuple[int, int]) -> Iterator[Callable[[bytes], Non
         assert encoder.stdin is not None
         try:
             with suppress(BrokenPipeError):  # it is gone, and has said why
-                yield encoder.stdin.write
+                yield encoder.stdin.write  # pyright: ignore[reportReturnType] - it takes more than bytes
                 encoder.stdin.close()
             code = encoder.wait()
         finally:
@@ -57,25 +57,14 @@ def _started(path: Path, size: tuple[int, int], complaints) -> subprocess.Popen:
     import imageio_ffmpeg
 
     codec = _WEBP if path.suffix.lower() == ".webp" else _H264
-    picture = (
-        "-f",
-        "rawvideo",
-        "-s",
-        f"{size[0]}x{size[1]}",
-        "-pix_fmt",
-        "rgb24",
-        "-r",
-        str(RATE),
-        "-i",
-        "-",
-    )
-    words = ("-y", "-v", "error", *picture, "-an", "-vcodec", *codec, str(path))
-    own = {"process_group": 0} if os.name == "posix" else {}  # Ctrl-C ends us, and we end it
+    picture = ("-f", "rawvideo", "-s", f"{size[0]}x{size[1]}", "-pix_fmt", "rgb24", "-r", str(RATE))
+    words = ("-y", "-v", "error", *picture, "-i", "-", "-an", "-vcodec", *codec, str(path))
     try:
         return subprocess.Popen(
             [imageio_ffmpeg.get_ffmpeg_exe(), *words],
             stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=complaints,
-            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0), **own,
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+            process_group=0 if os.name == "posix" else None,  # Ctrl-C ends us, and we end it
         )  # fmt: skip
     except (OSError, RuntimeError) as error:  # RuntimeError: there is no ffmpeg
         raise LangFlashError(

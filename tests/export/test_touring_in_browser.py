@@ -103,7 +103,7 @@ def test_notes_hide_behind_what_is_before_them_and_the_keyboard_reaches_them(ope
     opened.value("document.querySelectorAll('.note')[1].focus()")
     until(opened, "langflash.then((page) => page.moving.flight === null)")
     turned = np.array(opened.value("langflash.then((page) => page.orbit.turn[2])"))
-    assert turned @ (BEHIND / np.linalg.norm(BEHIND)) == pytest.approx(1, abs=1e-3)
+    assert turned @ np.array(BEHIND) / np.linalg.norm(BEHIND) == pytest.approx(1, abs=1e-3)
     opened.key("n", "KeyN", "n")
     assert opened.value("getComputedStyle(document.getElementById('notes')).display") == "none"
 

@@ -26,6 +26,7 @@ from tests.export.browser import Browser
 SIZE = (1280, 900)
 HERE = "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1"
 _FRAME = "document.querySelector('iframe[title=\"a scene\"]')"
+_LISTEN = "heard = [], addEventListener('message', ({ data }) => heard.push(data?.langflash)), 0"
 CELLS = (
     "import json\nimport langflash_core as lf\nscene = lf.load('room.langflash')\n"
     "shown = scene.show(['armchair', 'piano'], height=420)\nshown",
@@ -90,19 +91,23 @@ def _walk(place: Path, port: int, picture: str | None) -> dict:
         _until(page, "document.querySelectorAll('.jp-Notebook .jp-CodeCell').length === 4", 240)
         idle = "(each) => each.dataset.status === 'idle'"
         _until(page, f"[...document.querySelectorAll('.jp-Notebook-ExecutionIndicator')].some({idle})", 240)
+        page.value(_LISTEN)
         _run_cell(page, 0)
         _until(page, f"{_FRAME} !== null", 240)
-        time.sleep(25)  # the page draws, answers, tells
+        _until(page, "heard.includes('answers') && heard.includes('camera')", 240)
+        time.sleep(2)  # the kernel is told, too
         _run_cell(page, 1)
         told = _written(place / "told.json")
-        time.sleep(6)
+        _until(page, "heard.filter((word) => word === 'answers').length > 1", 120)
+        time.sleep(2)
         if picture:
             page.value(f"{_FRAME}.scrollIntoView()")
             time.sleep(1)
             Path(picture).write_bytes(page.screenshot())
         _run_cell(page, 2)
         asked = _written(place / "asked.json")
-        time.sleep(6)
+        _until(page, "heard.filter((word) => word === 'answers').length > 2", 120)
+        time.sleep(2)
         _run_cell(page, 3)
         went = _written(place / "went.json")
         return {"camera": told[0], "answers": told[1], "found": told[2], "after asking": asked, "went": went}

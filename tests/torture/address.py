@@ -24,8 +24,8 @@ _FUZZ = """
   };
   const texts = ["plant", "length", "a b", "", "%", "\\u0000", "constructor"];
   const stops = ["The window", "length", ""];
-  const words = ["view", "stop", "plan", "The window", "ask", "mode", "bare", "=", "&", "#", "%", "%zz", "%00",
-    "+", "plant", "length",
+  const words = ["view", "stop", "plan", "The window", "ask", "mode", "bare", "=", "&", "#", "%", "%zz",
+    "%00", "+", "plant", "length",
     "map", "constructor", "__proto__", "toString", "0", "1", "-1", "1e9", "99999999999999999999", "0x1", " 1",
     "1.5", "NaN", "Infinity", "photo", "heat", "\\ud800", "\\u202e", "\\u0000", "<script>", "[]",
     "view=length", "view=1", "?", ";"];

@@ -17,10 +17,9 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 PLACES = ("open", "os.rename", "os.mkdir", "os.remove", "os.rmdir", "os.truncate", "os.link", "os.symlink")
 LOOKS = ("os.listdir", "os.scandir")
@@ -265,7 +264,7 @@ def _set_handler(capsule: object) -> object:
 
 
 def _numpy_function(place: int) -> int:
-    table = _pointer(np._core._multiarray_umath._ARRAY_API, None)
+    table = _pointer(import_module("numpy._core._multiarray_umath")._ARRAY_API, None)
     return ctypes.cast(table, ctypes.POINTER(ctypes.c_void_p))[place]
 
 

@@ -21,7 +21,7 @@ from torch.nn import functional as F
 from langflash_core import pipeline
 from langflash_core.errors import LangFlashError
 from langflash_core.images.views import load_views
-from langflash_core.network import LangFlashNet, load_network
+from langflash_core.network import GuidedDepthNet, load_network
 from langflash_core.resources import asset_path
 from langflash_core.types import Scene
 
@@ -222,10 +222,11 @@ def stages(paths: list[Path], precision: str) -> Stages:
 
 
 @cache
-def _network(precision: str) -> LangFlashNet:
+def _network(precision: str) -> GuidedDepthNet:
     network = load_network("mini", bfloat16=precision == "bfloat16")
+    assert isinstance(network, GuidedDepthNet)
     if precision == "float64":
-        network.double()
+        network.to(torch.float64)
         for part in network.modules():  # some stages go back to float32 by themselves
             part.register_forward_pre_hook(lambda _, given: tuple(map(_double, given)))
     return network

@@ -240,8 +240,8 @@ def _keeping(scene: Scene) -> Iterator[Job]:
     yield Job("autosave of edits", kept(1), kept(0), FILES)
     yield Job("autosave of a session", session("new"), session("old"), FILES)
     yield Job("preferences", preferred(1.5), preferred(1.0), FILES)
-    found = (_recover(scene, histories[1], write) for write in (False, True))
-    yield Job("recovery of edits", *found, ("read", "place"), fresh=False)
+    again, killed = (_recover(scene, histories[1], write) for write in (False, True))
+    yield Job("recovery of edits", again, killed, ("read", "place"), fresh=False)
     yield Job("recovery of a session", _restored_session, _killed_session, ("read", "place"), fresh=False)
 
 

@@ -41,7 +41,7 @@ from tests.app.window.recovery.desk import Desk
 
 ENDINGS = (".langflash", ".ply", ".spz", ".sog", ".glb", ".splat", ".compressed.ply", ".html")
 DONE = -(1 << 62)
-Say = Callable[[int], None]
+Say = Callable[[int], object]
 
 
 @dataclass
@@ -268,9 +268,9 @@ def recovering(count: int, rng: random.Random, again: bool) -> Row:
 
     def second(say: Say) -> None:
         desk = _recovered(say)
-        if again and desk.state.info is not None:
+        if again and desk.state.scene.info is not None:
             for number in range(10, 40):
-                _edit(desk, desk.state.info.scene, number)
+                _edit(desk, desk.state.scene.info.scene, number)
                 say(_count(desk))
 
     for _ in range(count):
@@ -287,7 +287,7 @@ def _lost(kept: int) -> list[str]:
     desk = _recovered()
     finds = []
     have = _count(desk)
-    if desk.state.info is None:
+    if desk.state.scene.info is None:
         finds.append(f"nothing is offered, {kept} edits were kept")
     elif not kept <= have <= kept + 1:
         finds.append(f"{have} edits came back of {kept}")
@@ -354,8 +354,8 @@ def _two_windows(scenes: tuple[Scene, Scene]) -> list[str]:
     counts = set()
     for _ in range(2):
         desk = _recovered()
-        if desk.state.info is not None:
-            counts.add(desk.state.info.num_gaussians)
+        if desk.state.scene.info is not None:
+            counts.add(desk.state.scene.info.num_gaussians)
         desk.effects.close(desk.state, crashed=False)
     wanted = {len(scene.gaussians) for scene in scenes}
     return [] if counts == wanted else [f"of scenes of {wanted} came back {counts}"]

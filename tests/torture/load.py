@@ -72,7 +72,7 @@ def many_atoms(atoms: int, phrases: int) -> Row:
     finally:
         renderer.release()
     assert truth.weight_maps is not None and drawn.weight_maps is not None
-    maps = [relevance_maps(frame.weight_maps, compiled) for frame in (truth, drawn)]
+    maps = [relevance_maps(weights, compiled) for weights in (truth.weight_maps, drawn.weight_maps)]
     off = float((maps[0] - maps[1]).abs().max())
     row.told = f"{tuple(maps[1].shape)} relevance, at most {off:.1e} from the reference"
     if not (maps[1].isfinite().all() and off < CLOSE):

@@ -104,6 +104,7 @@ def _numbers(job: Job, folder: Path, kind: str, row: Row, share: float, seed: in
     began = time.process_time()
     with _fault(kind, 10**9, folder) as fault:
         _spoken(job.run, folder)
+    assert fault is not None
     each = (time.process_time() - began) * 0.6 + 0.002  # the later a call, the longer until it fails
     row.calls = fault.calls
     wanted = row.calls * (len(ERRORS.get(kind, ())) or 1)
@@ -113,7 +114,7 @@ def _numbers(job: Job, folder: Path, kind: str, row: Row, share: float, seed: in
     return sorted({1 + (place * wanted // most + seed) % wanted for place in range(most)})
 
 
-def _fault(kind: str, nth: int, folder: Path) -> contextlib.AbstractContextManager[Fault]:
+def _fault(kind: str, nth: int, folder: Path) -> contextlib.AbstractContextManager[Fault | None]:
     """nth: with more errors than one of a kind, each call fails in each way."""
     errors = ERRORS.get(kind, (errno.ENOMEM,))
     places = (folder,) if kind != "read" else (folder, asset_path(""), shader_path(""))
@@ -123,14 +124,12 @@ def _fault(kind: str, nth: int, folder: Path) -> contextlib.AbstractContextManag
 def _try(job: Job, folder: Path, kind: str, nth: int, row: Row, before: dict, new: dict) -> None:
     row.tried += 1
     if kind == "disk":
-        largest = max(
-            (path.stat().st_size for path in (folder / "new").rglob("*") if path.is_file()), default=1
-        )
-        fault, scope = Fault(kind, nth, (), 0), small_disk(largest * nth // STEPS)
+        sizes = [path.stat().st_size for path in (folder / "new").rglob("*") if path.is_file()]
+        scope = small_disk(max(sizes, default=1) * nth // STEPS)
     else:
-        fault = scope = _fault(kind, nth, folder)
+        scope = _fault(kind, nth, folder)
     with scope as given:
-        fault = given if isinstance(given, Fault) else fault
+        fault = given or Fault(kind, nth, (), 0)
         try:
             code, said = _spoken(job.run, folder)
         except BaseException as error:

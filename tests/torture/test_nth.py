@@ -3,6 +3,7 @@
 import errno
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import moderngl
@@ -28,7 +29,7 @@ def folder(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def known(folder) -> dict[str, nth.Job]:
+def known(folder) -> Iterator[dict[str, nth.Job]]:
     before = {name: os.environ.get(name) for name in jobs.FOLDERS}
     yield {job.name: job for job in jobs.prepared(folder)}
     for name, value in before.items():

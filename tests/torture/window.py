@@ -46,8 +46,9 @@ def opened(scene: Path, folder: Path) -> Iterator[Session]:
         os.environ.pop("WAYLAND_DISPLAY", None)
         session = Session((scene,), SIZES[0])
         try:
-            _steps(session, until=lambda: session.state.info is not None)
-            count = len(session.state.info.scene.gaussians)
+            _steps(session, until=lambda: session.state.scene.info is not None)
+            assert session.state.scene.info is not None
+            count = len(session.state.scene.info.scene.gaussians)
             session.dispatch(edit.Found(Mask.of(np.arange(count) % 9 == 0), "replace", "here"))
             session.dispatch(edit.Delete())
             _steps(session, 10)
@@ -72,7 +73,7 @@ def torture(session: Session, folder: Path, seconds: float, seed: int = 1) -> It
 
 def _one(session: Session, folder: Path, kind: str, nth: int, seed: int, row: Row) -> bool:
     """Use the window while something fails; whether it did."""
-    before = session.state.editing.history.done
+    before = _edits(session)
     with failing(kind, nth, folder, 28) as fault:
         try:
             _use(session, folder, nth + seed)
@@ -87,16 +88,21 @@ def _one(session: Session, folder: Path, kind: str, nth: int, seed: int, row: Ro
     wrong = [text for text in texts if "unexpected" in text or "\n" in text]
     if wrong:
         row.finds.setdefault(f"said: {wrong[0][:150]} [{fault.failed}]", "")
-    if session.state.editing.history.done != before or session.should_close:
+    if _edits(session) != before or session.should_close:
         row.finds.setdefault(f"edits are gone [{fault.failed}]", "")
     return bool(fault.failed)
+
+
+def _edits(session: Session) -> tuple:
+    history = session.state.editing.history
+    return () if history is None else history.done
 
 
 def _use(session: Session, folder: Path, turn: int) -> None:
     """Another size, another mode, another phrase; copy, paste, open and save."""
     glfw.set_window_size(session._window, *SIZES[turn % 2])
     session.dispatch(camera.SetMode(PICTURES[turn % len(PICTURES)]))
-    session.dispatch(ask.EditPrompt(session.state.prompts[0].key, ("armchair", "wall")[turn % 2]))
+    session.dispatch(ask.EditPrompt(session.state.asking.prompts[0].key, ("armchair", "wall")[turn % 2]))
     session.dispatch(CopyText("some text"))
     session.dispatch(Paste())
     if turn % 4 == 0:

@@ -27,7 +27,8 @@ def run(args: Namespace, out: TextIO) -> None:
     if args.output is not None:
         same = args.scene.suffix.lower() == ".langflash"  # which nothing is lost of
         check_output_file(args.output, (".langflash", ".ply", ".glb"), inputs=[] if same else [args.scene])
-    metres = None if args.length is None else _metres(args.length[2])
+    first, last, told = args.length or ("", "", "")
+    metres = _metres(told) if told else None
     from langflash_core import level
     from langflash_core.records import world_to_json
     from langflash_core.scene.report import world_line
@@ -38,7 +39,7 @@ def run(args: Namespace, out: TextIO) -> None:
     world = level.found_world(scene, up=args.up, north=args.north, origin=args.origin)
     scene = scene.with_record(world=world)
     if metres is not None:
-        scene = level.measured(scene, *(_place(scene, text) for text in args.length[:2]), metres)
+        scene = level.measured(scene, _place(scene, first), _place(scene, last), metres)
     for name in ("ceiling", "door"):
         if getattr(args, name) is not None:
             scene = level.measured_by(scene, name, getattr(args, name))

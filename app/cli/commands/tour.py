@@ -41,7 +41,7 @@ def run(args: Namespace, out: TextIO) -> None:
     readable_file(args.scene, "scene", SceneFileError)
     if args.scene.suffix.lower() != SUFFIX:
         raise InputError(f"{args.scene.name} cannot hold a tour; export it to a {SUFFIX} scene first")
-    output = getattr(args, "output", None)
+    output: Path | None = getattr(args, "output", None)
     if output is not None:
         suffix = ".json" if args.action == "export" else SUFFIX
         check_output_file(output, (suffix,), inputs=[args.scene])
@@ -54,7 +54,7 @@ def run(args: Namespace, out: TextIO) -> None:
         make_folder(output.parent)
     if args.action == "export":
         content = {"format": FORMAT, "version": VERSION, **told_tour(tour)}
-        write_atomically(output, json.dumps(content, indent=1, ensure_ascii=False).encode())
+        write_atomically(args.output, json.dumps(content, indent=1, ensure_ascii=False).encode())
         return print(f"{output}: {_counted(tour)}", file=out)
     changed = _CHANGES[args.action](args, tour, found)
     write_tour(changed, found, output or args.scene)

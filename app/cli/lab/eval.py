@@ -19,6 +19,7 @@ from ..renderers import open_renderer
 from ..report import ProgressBar, say_warnings, write_json, write_tables
 from .evals.ablations import ablations
 from .evals.labels import labels
+from .evals.level import level
 from .evals.protocol import protocol
 from .evals.report import report
 from .evals.sharp import sharp
@@ -46,6 +47,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "photos-labelled": _photos_labelled,
         "posed": _posed,
         "labels": labels,
+        "level": level,
         "protocol": protocol,
         "report": report,
         "sharp": sharp,

@@ -111,6 +111,7 @@ def add_eval(commands) -> None:
     _add_sides(actions)
     _add_sharp(actions)
     _add_walk(actions)
+    _add_level(actions)
     _add_labels(actions)
     _add_protocol(actions)
     _add_report(actions)
@@ -233,6 +234,24 @@ def _add_sharp(actions) -> None:
         "--sheet", type=Path, metavar="IMG", help="also photos and scenes at 100 and 300 %%, as .png"
     )
     _add_judging(command)
+
+
+def _add_level(actions) -> None:
+    command = new_command(
+        actions, "level", "how level scenes of rooms stand, their size, and what inventory and plan get right"
+    )
+    command.add_argument("pack", type=Path, metavar="PACK", help="furniture, made by rooms pack")
+    command.add_argument("--limit", type=whole_count, metavar="N", help="so many rooms (default: 100)")
+    command.add_argument("--first-seed", type=seed, metavar="N", help="(default: of the held-out rooms)")
+    command.add_argument(
+        "--photos", type=whole_count, default=2, metavar="N", help="of each room (default: 2)"
+    )
+    command.add_argument(
+        "--keep", type=Path, metavar="FOLDER", help="scenes that are made stay there and are read again"
+    )
+    command.add_argument("--no-things", action="store_true", help="leave inventory and plan out")
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
+    add_json(command)
 
 
 def _add_walk(actions) -> None:

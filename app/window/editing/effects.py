@@ -8,13 +8,14 @@ import numpy as np
 from ..commands import Command, Notify
 from ..effects import Effects, Hands
 from ..places import config_folder
+from ..requests import Job
 from ..scene.commands import SceneArrived
-from ..scene.mended import FillHole, HidePart
+from ..scene.mended import CopyPart, FillHole, HidePart
 from ..scene.state import Room, SceneInfo
 from ..state import State
 from ..viewport import Viewport
 from .commands import FindFloaters, StopWaiting
-from .mending import BringBack, FillSelection, HiddenForGood, HideForGood, RememberUnhidden
+from .mending import BringBack, CopySelection, FillSelection, HiddenForGood, HideForGood, RememberUnhidden
 from .pointing import CardOpened, Named, ReadingTaken, RulerPlaced
 from .state import Reading, Tool
 from .teaching import WORDS, KeepWords, TakeWords
@@ -94,16 +95,6 @@ class EditingEffects(Effects):
                 self._hands.submit(KeepLessons(info.serial, info.memory, marks, config_folder() / WORDS))
             case TakeWords() if info is not None and marks is not None:
                 self._hands.submit(FindLessons(info.serial, info.memory, marks, config_folder() / WORDS))
-            case FillSelection() if info is not None and marks is not None and marks.selected:
-                self._hands.submit(FillHole(info, marks))
-            case HideForGood(how) if info is not None and marks is not None and marks.selected:
-                self._hands.submit(HidePart(info, marks, how))
-            case HiddenForGood() if command.fits(before):
-                self._take_hidden(command, before)
-            case BringBack() if before.scene.unhidden is not None:
-                room = before.scene.unhidden
-                arrival = SceneArrived(replace(room.info, history=room.history), room=room, replaces=True)
-                self._hands.perform(arrival)
             case FindFloaters() if info is not None and marks is not None:
                 self._hands.submit(ScoreFloaters(info.serial, info.memory, marks))
             case _ if info is not None and marks is not None:
@@ -112,8 +103,26 @@ class EditingEffects(Effects):
                     self._hands.submit(request)
                 elif state.editing.waiting and not before.editing.waiting:
                     self._hands.perform(StopWaiting())
+        self._mend(command, before, state)
         if marks != before.editing.marks and state.scene.info is before.scene.info:
             self._atoms_changed(before, state)
+
+    def _mend(self, command: Command, before: State, state: State) -> None:
+        """What makes another scene of the one on show, and what goes back to that."""
+        info, marks, unhidden = state.scene.info, state.editing.marks, before.scene.unhidden
+        jobs: dict[type, Job] = {}
+        if info is not None and marks is not None and marks.selected:
+            jobs = {FillSelection: FillHole(info, marks), CopySelection: CopyPart(info, marks)}
+            if isinstance(command, HideForGood):
+                jobs[HideForGood] = HidePart(info, marks, command.how)
+        match command:
+            case FillSelection() | CopySelection() | HideForGood() if type(command) in jobs:
+                self._hands.submit(jobs[type(command)])
+            case HiddenForGood() if command.fits(before):
+                self._take_hidden(command, before)
+            case BringBack() if unhidden is not None:
+                arrival = replace(unhidden.info, history=unhidden.history)
+                self._hands.perform(SceneArrived(arrival, room=unhidden, replaces=True))
 
     def _take_hidden(self, command: HiddenForGood, before: State) -> None:
         """Show it, and remember what was on show until it is saved."""

@@ -14,7 +14,7 @@ from ..scene.commands import SceneArrived
 from ..scene.state import Job, Room, SceneInfo
 from ..state import State
 
-HIDING, FILLING = "Hiding", "Filling"
+HIDING, FILLING, COPYING = "Hiding", "Filling", "Copying"
 """Titles of the jobs."""
 
 
@@ -84,6 +84,16 @@ class BringBack:
 
     def apply(self, state: State) -> State:
         return state
+
+
+@dataclass(frozen=True)
+class CopySelection:
+    """Copy the selection; the copy is selected, with the gizmo in hand."""
+
+    def apply(self, state: State) -> State:
+        if not state.editing.num_selected:
+            return state
+        return state.with_scene(job=Job(COPYING, "copying", started=state.now))
 
 
 @dataclass(frozen=True)

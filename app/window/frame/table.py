@@ -318,6 +318,7 @@ def _editing() -> Iterable[Entry]:
     deleting = (*_plain("delete"), *_plain("backspace"))
     yield Entry("Delete the selection", group, _selected(edit.Delete()), deleting)
     yield Entry("Delete the selection and fill its hole", group, _selected(mending.FillSelection()))
+    yield Entry("Copy the selection", group, _selected(mending.CopySelection()), _ctrl("j"))
     yield Entry("Hide the selection for good", group, _selected(mending.AskToHide()))
     yield Entry("Recolour the selection", group, _recolour, _ctrl("t"))
     for name, key, nudge in (

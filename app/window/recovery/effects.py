@@ -134,7 +134,7 @@ class RecoveryEffects(Effects):
             case CopyKept(path) if path == self._keeper.scene_file:
                 self._copied = True
                 self._snapshot = ()  # the session now has a scene to name
-                self._drop_outlived()
+                self._drop_outlived(state)
             case EditsKept(file) if file is not None:
                 for errand in self._replaced:
                     self._hands.submit(errand)
@@ -158,7 +158,7 @@ class RecoveryEffects(Effects):
 
     def _arrived(self, info: SceneInfo, before: State, state: State, replaces: bool) -> None:
         self._take_edits(info, before, state, replaces)
-        self._take_session(info)
+        self._take_session(info, state)
 
     # Edits
 
@@ -220,7 +220,7 @@ class RecoveryEffects(Effects):
 
     # The session
 
-    def _take_session(self, info: SceneInfo) -> None:
+    def _take_session(self, info: SceneInfo, state: State) -> None:
         """Stand where a restored session stood; a scene that has no file of its own gets a copy."""
         kept, self._restoring = self._restoring, None
         if kept is not None and (kept.edits or str(info.path) == kept.scene):
@@ -238,12 +238,12 @@ class RecoveryEffects(Effects):
         if kept is not None and kept.file is not None:
             self._outlived = kept.file
         if not unsaved:
-            self._drop_outlived()
+            self._drop_outlived(state)
 
-    def _drop_outlived(self) -> None:
-        """The restored session's files go once this session has its own."""
+    def _drop_outlived(self, state: State) -> None:
+        """The restored session's files go once this session has its own, which is written first."""
         if self._outlived is not None:
-            self._writer.submit(sessions.forget, self._outlived)
+            self._writer.submit(self._keep, self._kept(state), self._outlived)
             self._outlived = None
 
     def _end_session_offer(self, kept: Kept, restore: bool) -> None:
@@ -268,11 +268,14 @@ class RecoveryEffects(Effects):
         if problem:
             self._hands.dispatch(Notify(problem))
 
-    def _keep(self, kept: Kept) -> None:
+    def _keep(self, kept: Kept, outlived: Path | None = None) -> None:
         try:
             self._keeper.keep(kept)
         except LangFlashError as error:
             self._hands.dispatch(Log("error", f"The session is not kept: {error}."))
+            return
+        if outlived is not None:
+            sessions.forget(outlived)
 
     def _kept(self, state: State) -> Kept:
         info = state.scene.info

@@ -382,13 +382,14 @@ class MergeScene:
 @dataclass(frozen=True)
 class Merged:
     """The scene with number `serial`, of which there was so much, and another as one scene; or, where `gone`
-    says what was taken away, what fills its hole."""
+    says what was taken away, what fills its hole; or `copied`, copies of what was selected."""
 
     serial: int
     there: tuple[int, int]
     info: SceneInfo
     name: str
     gone: Mask | None = None
+    copied: bool = False
 
     def fits(self, state: State) -> bool:
         """Whether it still holds the scene on show."""
@@ -405,6 +406,8 @@ class Merged:
         text = f"{self.name} was not merged, since another scene is on show by now; merge it again."
         if self.gone is not None:
             text = "Nothing was filled, since the scene is another by now; fill it again."
+        elif self.copied:
+            text = "Nothing was copied, since the scene is another by now; copy it again."
         return Notify(text).apply(state.with_scene(job=None))
 
     def arrival(self, state: State) -> "SceneArrived":
@@ -420,6 +423,8 @@ class Merged:
         if self.gone is not None:
             none = replace(after, selected=Mask.none(count))
             after, label = delete(none, self.gone.of_count(count)), f"Delete and fill {len(self.gone):,}"
+        elif self.copied:
+            label = f"Copy {len(brought):,}"
         history = before.edited(label, after)
         if saved is not None:
             saved = saved.of_size(self.there[0], saved.atoms[: self.there[1]]).of_size(count, whole.atoms)

@@ -129,6 +129,8 @@ class SceneEffects(Effects):
                 waited = commands
             case Merged(gone=gone) if gone is not None and command.fits(before):
                 waited = [command.arrival(before)]
+            case Merged(copied=True) if command.fits(before):
+                waited = [command.arrival(before), SetHandle(Handle.MOVE)]
             case Merged() if command.fits(before):
                 waited = [command.arrival(before), SetHandle(Handle.MOVE), FrameAll()]
             case GoToRoom(serial):

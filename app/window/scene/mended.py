@@ -55,6 +55,26 @@ class FillHole(Job):
 
 
 @dataclass(frozen=True)
+class CopyPart(Job):
+    """The selection as it is shown, once more, in its own place: to be moved over what it is to cover."""
+
+    info: SceneInfo
+    marks: Marks = field(repr=False)
+
+    def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> Merged:
+        import torch
+
+        from langflash_core.scene.edited import there
+        from langflash_core.scene.joining import appended
+
+        own, marks = self.info, self.marks
+        chosen = torch.from_numpy(np.flatnonzero(marks.selected.rows()))
+        copies = own.memory.changed(marks).rows(chosen)
+        info = describe_scene(appended(there(own.scene, marks), copies), serial, own.name, own.path)
+        return Merged(own.serial, marks.there, info, own.name, copied=True)
+
+
+@dataclass(frozen=True)
 class HidePart(Job):
     """The scene as edited, with the selection hidden for good in Gaussians and photos."""
 

@@ -22,7 +22,7 @@ class Page {
     this.heat = true;
     this.carried = null;
     this.orbit = new Orbit(world.start, world.start.distance);
-    this.orbit.down = unit(world.header.views[0].turn[1]);
+    this.orbit.down = unit(world.header.down);
     this.moving = new Moving(this.canvas, this.orbit, 0.05 * this.orbit.distance, {
       focal: () => this.shown(1).pinhole[0] / this.ratio,
       changed: () => this.moved(),
@@ -114,7 +114,7 @@ class Page {
   change(world) {
     if (world === this.world) return;
     this.enter(world);
-    this.orbit.down = unit(world.header.views[0].turn[1]);
+    this.orbit.down = unit(world.header.down);
     this.orbit.set(world.start, world.start.distance);
     this.moving.nearest = 0.05 * this.orbit.distance;
     this.moving.flight = null;

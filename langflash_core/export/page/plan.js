@@ -50,7 +50,7 @@ class Plan {
       texels,
       header: { views },
     } = world;
-    const down = unit(views[0].turn[1]);
+    const down = unit(world.header.down);
     const right = unit(plus(views[0].turn[0], down, -dot(views[0].turn[0], down)));
     const turn = [right, cross(down, right), down];
     const places = [[], [], []];

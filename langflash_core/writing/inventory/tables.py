@@ -40,11 +40,12 @@ def entry(thing: Thing) -> dict[str, Any]:
 def table_csv(found: Inventory) -> str:
     """A row a thing."""
     stream = io.StringIO(newline="")
-    table = csv.DictWriter(stream, COLUMNS)
-    table.writeheader()
+    table = csv.writer(stream)
+    table.writerow(COLUMNS)
     for thing in found.things:
         row = entry(thing) | {"unit": found.unit, "guessed": found.guess is not None}
-        table.writerow({**row, "photos": " ".join(map(str, thing.photos))})
+        row["photos"] = " ".join(map(str, thing.photos))
+        table.writerow(row[name] for name in COLUMNS)
     return stream.getvalue()
 
 

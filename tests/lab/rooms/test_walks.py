@@ -77,3 +77,36 @@ def test_a_frame_knows_where_it_was_taken(pack: Pack, renderer: RoomRenderer):
     assert np.allclose(np.linalg.inv(photo.pose.numpy()), walk.camera(0), atol=1e-9)
     assert photo.image.shape[:2] == photo.depths.shape and photo.metric
     assert float(photo.K[0, 2]) == pytest.approx(photo.image.shape[1] / 2)
+
+
+def test_somebody_passes_before_some_photos_and_is_gone_from_what_is_kept(pack: Pack, renderer: RoomRenderer):
+    plain = walk_of(pack, renderer, Camcorder(times=1))
+    kept, photos = plain.kept(1), [plain.photo(n) for n in (0, 2, 4)]
+    crowded = walk_of(pack, renderer, Camcorder(passers=1, times=1))
+    changed = []
+    for photo, number in zip(photos, (0, 2, 4), strict=True):
+        there = crowded.photo(number)
+        assert photo.depths is not None and there.depths is not None
+        assert (there.depths <= photo.depths + 1e-4).all()  # nobody makes a room larger
+        changed.append(float((there.depths < 0.95 * photo.depths).mean()))
+    assert sum(share > 0.02 for share in changed) == 1 and sum(share == 0 for share in changed) == 2
+    assert np.array_equal(crowded.kept(1).image, kept.image)
+
+
+def test_a_screen_shows_another_picture_in_some_photos(pack: Pack, renderer: RoomRenderer):
+    frames = (6, 8, 12)  # of which it is another in the last one
+    pictures, kept = [], []
+    for screens in (0, 2):
+        plan, camcorder = planned((8,)), Camcorder(screens=screens, times=1)
+        (walk,) = room_walks(pack, renderer, plan, count=1, camcorder=camcorder)
+        pictures.append([walk.photo(frame) for frame in frames])
+        kept.append(walk.kept(12).image.astype(int))
+    shown = []
+    for bare, photo in zip(*pictures, strict=True):
+        assert bare.depths is not None and photo.depths is not None
+        assert np.array_equal(bare.depths, photo.depths)
+        shown.append(np.abs(bare.image.astype(int) - photo.image).max(-1) > 30)
+    assert min(where.mean() for where in shown) > 0.005
+    where = np.abs(kept[0] - kept[1]).max(-1) > 30
+    both = where & shown[2]
+    assert np.abs(kept[1] - pictures[1][2].image)[both].mean() > 20  # not what the others show

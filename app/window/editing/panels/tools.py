@@ -220,6 +220,7 @@ def _actions(right: float) -> list[do.Command]:
         (fa.ICON_FA_EXPAND, "Fly to it  (F)", point.FrameSelection()),
         (fa.ICON_FA_PALETTE, "Recolour  (Ctrl+T)", placing.BeginTint()),
         (fa.ICON_FA_TRASH, "Delete  (Del)", edit.Delete()),
+        (fa.ICON_FA_CLONE, "Copy it, to be moved over something else  (Ctrl+J)", mending.CopySelection()),
         (fa.ICON_FA_FILL_DRIP, "Delete, and fill the hole from what is around", mending.FillSelection()),
         (fa.ICON_FA_USER_SECRET, "Hide for good: blur, pixelate or remove", mending.AskToHide()),
         (fa.ICON_FA_XMARK, "Select nothing  (Ctrl+D)", edit.Deselect()),

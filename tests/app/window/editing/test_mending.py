@@ -10,8 +10,9 @@ import torch
 
 from app.window.commands import Command, OfScene, Tick, apply
 from app.window.editing import commands as edit
-from app.window.editing import mending
+from app.window.editing import mending, placing
 from app.window.editing.effects import EditingEffects
+from app.window.editing.state import Tool
 from app.window.effects import Hands
 from app.window.places import state_folder
 from app.window.recovery.effects import KEEP_AFTER, RecoveryEffects
@@ -21,6 +22,7 @@ from app.window.scene import commands as show
 from app.window.scene.effects import SceneEffects
 from app.window.scene.work import describe_scene
 from app.window.state import State
+from langflash_core.scene.changes import Moved
 from langflash_core.scene.file import load, save
 from langflash_core.scene.mask import Mask
 from tests.app.window.scene.test_rooms import Nothing
@@ -105,6 +107,20 @@ def test_a_hole_is_filled_as_one_edit(desk: Desk) -> None:
     assert (
         marks is not None and not marks.deleted and marks.there == (COUNT, 3) and len(marks.selected) == BLOCK
     )
+
+
+def test_a_copy_lies_where_it_was_shown_with_the_gizmo_in_hand(desk: Desk) -> None:
+    moved = Moved(Mask.first(COUNT, BLOCK), offset=(0.1, 0.0, 0.0))
+    desk.perform(placing.Adjust(moved), placing.EndGesture(), mending.CopySelection())
+    desk.work()
+    info, editing = desk.state.scene.info, desk.state.editing
+    assert info is not None and editing.marks is not None and editing.history is not None
+    assert editing.history.done[-1].label == f"Copy {BLOCK:,}" and editing.tool is Tool.PLACE
+    assert editing.marks.selected.rows()[COUNT:].all() and editing.num_selected == BLOCK
+    means = info.memory.changed(editing.marks).gaussians.means
+    assert torch.allclose(means[COUNT:], means[:BLOCK])
+    desk.perform(edit.Undo())
+    assert desk.state.editing.marks is not None and desk.state.editing.marks.there == (COUNT, 3)
 
 
 @pytest.mark.parametrize("how", ["blur", "remove"])

@@ -262,3 +262,21 @@ def test_a_phrase_that_asks_for_a_place_comes_back_as_what_it_was(desk: Desk, in
     assert (again.text, again.like, again.threshold) == (similar.text, vector, LIKE_THRESHOLD)
     file.write_text(json.dumps({**json.loads(file.read_bytes()), "likes": ["", "0f"]}))
     assert sessions.read(file) is None  # half a number is damage
+
+
+def test_a_restored_session_goes_only_once_this_one_is_on_the_disk(desk: Desk, info) -> None:
+    """Killed again within a second of coming back, a scene that nobody had saved was lost."""
+    scene = state_folder() / "session-1-00000000.langflash"
+    scene.parent.mkdir(parents=True)
+    save(info.scene, scene)
+    session = scene.with_suffix(".json")
+    session.write_text(json.dumps({**BEFORE, "scene": str(scene)}))
+    desk.effects.begin(DEFAULTS, "", empty=True)
+    desk.perform(keep.EndSessionOffer(restore=True))
+    desk.perform(scene_work.LoadScene(scene).run(3, print, lambda: False))
+    desk.work()
+    desk.effects._writer.submit(lambda: None).result()  # and no time has passed
+    (own,) = state_folder().glob("session-*.json")
+    kept = sessions.read(own)
+    assert own != session and not scene.exists() and kept is not None
+    assert kept.scene == str(desk.keeper.scene_file) and desk.keeper.scene_file.is_file()

@@ -14,7 +14,6 @@ __all__ = ["display", "pytestmark"]  # a fixture and the mark of the window's te
 
 PLACES = """
 import json, sys
-from dataclasses import replace
 from pathlib import Path
 from app.window.scene.commands import Progressed
 from app.window.scene.state import Job, Photo
@@ -31,13 +30,13 @@ def places(session):
 
 items = Items()
 session = Session((), (900, 600))
-session.state = replace(session.state, photos=tuple(Photo(Path(each)) for each in sys.argv[1:]))
+session.state = session.state.with_scene(photos=tuple(Photo(Path(each)) for each in sys.argv[1:]))
 seen = [places(session)]
-session.state = replace(session.state, job=Job("Reconstructing", "starting"))
+session.state = session.state.with_scene(job=Job("Reconstructing", "starting"))
 for stage in ("photos", "encoder", "language features", "depth", "poses", "refinement", "done"):
     seen.append(places(session))
     session.dispatch(Progressed(stage, 0.0))
-session.state = replace(session.state, job=None)
+session.state = session.state.with_scene(job=None)
 seen.append(places(session))
 print(json.dumps(seen))
 session.close()

@@ -57,6 +57,7 @@ def test_what_cannot_be_is_told_and_changes_nothing(shown):
 def test_one_flies_to_a_stop_and_is_asked_its_phrase(shown):
     asking = shown.with_scene(mode=pictures.HEAT)
     state = toured(asking, 1)
+    assert asking.asking.active_prompt is not None
     phrase = asking.asking.active_prompt.text
     assert state.tour.stops[0].phrase == phrase
     assert not toured(shown.with_scene(mode=pictures.RGB)).tour.stops[0].phrase
@@ -67,7 +68,8 @@ def test_one_flies_to_a_stop_and_is_asked_its_phrase(shown):
     assert landed.scene.pose == state.tour.stops[0].pose
     assert len(landed.asking.prompts) == len(asking.asking.prompts), "it was asked already"
     pinned = after(shown, tour.AddNote("seat", Vector(0, 0, 1), phrase="a comfy seat"), tour.AskNote(0))
-    assert pinned.asking.active_prompt.text == "a comfy seat"
+    shown_phrase = pinned.asking.active_prompt
+    assert shown_phrase is not None and shown_phrase.text == "a comfy seat"
 
 
 def test_steps_go_around_and_a_walk_ends_at_the_last_stop(shown):

@@ -1,0 +1,77 @@
+"""Two scenes of one room: what moved, came and went, and how one comes onto the other."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from langflash_core.errors import InputError
+from langflash_core.inventory import beside, inventory
+from langflash_core.inventory.beside import Fit, difference
+from langflash_core.splat import render
+from tests.boxroom import CHAIRS, METRES, TABLE, box_room
+
+SAME = Fit(np.eye(3), 1.0, np.zeros(3), 40, 50)
+
+
+@pytest.fixture(scope="module")
+def room():
+    return inventory(box_room().with_record(metric_scale=METRES))
+
+
+def test_the_turn_scale_and_shift_of_matches_are_found_among_wrong_ones():
+    rng = np.random.default_rng(0)
+    theirs = rng.uniform(-2, 2, (60, 3))
+    turn = Rotation.from_euler("y", 90.7, degrees=True).as_matrix()
+    ours = 1.3 * theirs @ turn.T + [0.5, 0.1, -1.0]
+    ours[::3] = rng.uniform(-3, 3, (20, 3))
+    fit = beside._fitted(ours, theirs, 1.0)
+    assert fit is not None and fit.matches >= 40 and fit.tried == 60
+    assert fit.scale == pytest.approx(1.3, abs=0.01) and np.allclose(fit.turn, turn, atol=0.01)
+    good = np.arange(60) % 3 > 0
+    assert np.allclose(fit.placed(theirs[good]), ours[good], atol=0.02)
+
+
+def test_matches_that_agree_on_nothing_are_no_fit():
+    rng = np.random.default_rng(1)
+    fit = beside._fitted(rng.uniform(-2, 2, (30, 3)), rng.uniform(-2, 2, (30, 3)), 1.0)
+    assert fit is None or fit.matches < beside._LEAST
+    assert beside._fitted(np.zeros((1, 3)), np.zeros((1, 3)), 1.0) is None
+
+
+def test_three_changes_are_told_by_numbers(room, monkeypatch):
+    """A chair goes 80 cm, the table goes away, and nothing else changes."""
+    monkeypatch.setattr(beside, "aligned", lambda first, second, render: SAME)
+    moved = ((CHAIRS[0][0] + 0.8, CHAIRS[0][1]), CHAIRS[1])
+    after = inventory(box_room(chairs=moved, table=None).with_record(metric_scale=METRES))
+    found = difference(room, after, render)
+    assert len(found.moved) == 1 and found.moved[0].by == pytest.approx(0.8, abs=0.08)
+    assert found.moved[0].before.kind == "chair"
+    assert [thing.kind for thing in found.went] == ["table"] and not found.came
+    assert sorted(pair.before.kind for pair in found.stayed) == ["chair", "door"]
+    back = difference(after, room, render)
+    assert [thing.kind for thing in back.came] == ["table"] and not back.went
+    assert len(back.moved) == 1
+
+
+def test_a_room_beside_itself_is_the_same(room, monkeypatch):
+    monkeypatch.setattr(beside, "aligned", lambda first, second, render: SAME)
+    found = difference(room, room, render)
+    assert not (found.moved or found.came or found.went or found.unseen)
+    assert len(found.stayed) == len(room.things) and max(pair.by for pair in found.stayed) == 0
+
+
+def test_what_no_photo_of_the_other_scene_looks_at_is_not_said_to_have_gone(room, monkeypatch):
+    monkeypatch.setattr(beside, "aligned", lambda first, second, render: SAME)
+    aside = box_room(table=None).with_record(metric_scale=METRES, world=room.world)
+    turned = aside.viewmats.clone()
+    turned[:, :3, :3] = turned.new_tensor([[-1.0, 0, 0], [0, 1, 0], [0, 0, -1]]) @ turned[:, :3, :3]
+    looking_back = inventory(replace(aside, viewmats=turned), least=0.0)
+    found = difference(room, looking_back, render)
+    assert not found.went and TABLE and "table" in [thing.kind for thing in found.unseen]
+
+
+def test_scenes_without_photos_are_refused(room):
+    with pytest.raises(InputError, match="photos"):
+        difference(room, room, render)

@@ -1,0 +1,57 @@
+"""The plan of a room whose walls are known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from langflash_core.inventory import inventory
+from langflash_core.inventory.plan import floor_plan, weighted_quantile
+from tests.boxroom import DEEP, EYE, METRES, WIDE, box_room
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return floor_plan(inventory(box_room().with_record(metric_scale=METRES)))
+
+
+def test_the_three_walls_are_where_they_are(plan):
+    assert len(plan.walls) == 3
+    ends = np.array([[wall.start, wall.end] for wall in plan.walls]) + np.array([EYE[0], EYE[2]])
+    level = [pair for pair in ends if abs(pair[0, 1] - pair[1, 1]) < abs(pair[0, 0] - pair[1, 0])]
+    upright = [pair for pair in ends if abs(pair[0, 1] - pair[1, 1]) > abs(pair[0, 0] - pair[1, 0])]
+    assert len(level) == 1 and len(upright) == 2
+    assert level[0][:, 1] == pytest.approx([DEEP, DEEP], abs=0.06)
+    offsets = sorted(float(pair[:, 0].mean()) for pair in upright)
+    assert offsets == pytest.approx([0.0, WIDE], abs=0.06)
+    lengths = sorted(wall.length for wall in plan.walls)
+    assert lengths == pytest.approx([WIDE, DEEP, DEEP], abs=0.2)
+    assert abs(plan.turn) < 1
+
+
+def test_the_door_is_in_its_wall_and_no_thing(plan):
+    (door,) = plan.openings
+    assert door.thing.kind == "door"
+    middle = (np.array(door.start) + door.end) / 2 + [EYE[0], EYE[2]]
+    assert middle == pytest.approx([WIDE, 3.95], abs=0.12)
+    assert math.dist(door.start, door.end) == pytest.approx(0.9, abs=0.12)
+    assert sorted(thing.kind for thing in plan.things) == ["chair", "chair", "table"]
+
+
+def test_bounds_hold_all_that_is_drawn(plan):
+    (west, south), (east, north) = plan.bounds
+    assert east - west == pytest.approx(WIDE, abs=0.2) and north - south == pytest.approx(DEEP, abs=0.4)
+
+
+def test_a_scene_in_its_own_unit_has_the_same_plan():
+    room = box_room()
+    scaled = floor_plan(inventory(room))
+    assert len(scaled.walls) == 3 and len(scaled.openings) == 1
+
+
+def test_quantiles_by_weight_are_those_of_repeated_values():
+    values, weights = np.array([3.0, 1.0, 2.0]), np.array([2.0, 5.0, 3.0])
+    repeated = np.repeat(values, weights.astype(int))
+    for share in (0.1, 0.5, 0.7, 0.9, 1.0):
+        exact = np.sort(repeated)[max(0, math.ceil(share * len(repeated)) - 1)]
+        assert weighted_quantile(values, weights, share) == exact

@@ -1,0 +1,110 @@
+"""The things of a room whose things are known."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from langflash_core.errors import InputError, PromptError
+from langflash_core.inventory import inventory
+from langflash_core.inventory.things import upright_box
+from tests.boxroom import CHAIRS, EYE, METRES, TABLE, box_room, without_language
+
+
+@pytest.fixture(scope="module")
+def room():
+    return box_room().with_record(metric_scale=METRES)
+
+
+@pytest.fixture(scope="module")
+def found(room):
+    return inventory(room)
+
+
+def seen_from_above(thing) -> tuple[float, float]:
+    """Where a thing is in the room: the inventory's origin lies under the first camera."""
+    return thing.place[0] + EYE[0], thing.place[2] + EYE[2]
+
+
+def test_two_chairs_a_table_and_a_door_are_found_where_they_stand(found):
+    assert found.counts == {"chair": 2, "door": 1, "table": 1}
+    assert (found.unit, found.guess) == ("m", None)
+    places = sorted(seen_from_above(thing) for thing in found.things if thing.kind == "chair")
+    for place, true in zip(places, sorted(CHAIRS), strict=True):
+        assert math.dist(place, true) < 0.1
+    (table,) = (thing for thing in found.things if thing.kind == "table")
+    assert math.dist(seen_from_above(table), TABLE) < 0.1
+    # Quantiles leave out 2 % on either side, and samples lie half a spacing inside.
+    assert table.size == pytest.approx((1.4, 0.8, 0.74), abs=0.12)
+    assert abs(table.bottom) < 0.08 and 0.85 < table.sure <= 1
+    assert set(table.photos) == {0, 1} and table.id == "table 1" == table.title
+
+
+def test_the_corners_of_a_thing_are_those_of_its_box(found):
+    (table,) = (thing for thing in found.things if thing.kind == "table")
+    sides = np.linalg.norm(np.diff(table.corners, axis=0), axis=1)
+    assert sides == pytest.approx([table.size[0], table.size[1], table.size[0]])
+    assert table.corners.mean(0) == pytest.approx([table.place[0], table.place[2]])
+
+
+def test_names_that_a_person_gave_are_told(room):
+    named = inventory(room.with_record(thing_names={"chair 1": "reading chair", "ghost 3": "none"}))
+    titles = {thing.title for thing in named.things}
+    assert "reading chair" in titles and "chair 1" not in titles and "chair 2" in titles
+
+
+def test_without_a_length_the_guess_is_told(room):
+    found = inventory(room.with_record(metric_scale=None))
+    assert found.unit == "m" and found.guess is not None
+    (table,) = (thing for thing in found.things if thing.kind == "table")
+    assert table.size[0] == pytest.approx(1.4, rel=0.15)
+
+
+def test_things_are_all_of_their_gaussians_once(found):
+    rows = np.stack([thing.rows for thing in found.things])
+    assert rows.sum(0).max() == 1
+    segments = found.segments()
+    assert segments.counts == (1,) * len(found.things)
+    assert segments.members.numpy().sum(1).tolist() == rows.sum(1).tolist()
+
+
+def test_scenes_of_nothing_or_without_language_are_refused(room):
+    with pytest.raises(InputError, match="empty"):
+        inventory(room.rows(torch.zeros(len(room.gaussians), dtype=torch.bool)))
+    with pytest.raises(PromptError, match="no language"):
+        inventory(without_language(room))
+
+
+def test_gaussians_that_are_not_finite_stop_nothing(room):
+    means = room.gaussians.means.clone()
+    means[::50] = math.nan
+    found = inventory(replace(room, gaussians=replace(room.gaussians, means=means)))
+    assert found.counts["chair"] == 2
+
+
+def test_a_box_turns_where_that_saves_room():
+    rng = np.random.default_rng(0)
+    flat = rng.uniform(-0.5, 0.5, (4000, 2)) * [2.0, 0.4]
+    turn = math.radians(36)
+    matrix = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    east, north = (flat @ matrix.T).T
+    points = np.stack((east + 1, rng.uniform(-1.0, 0.0, 4000), north + 2), 1)
+    place, size, degrees, bottom = upright_box(points)
+    assert degrees == pytest.approx(36, abs=1.6)  # steps of three degrees
+    assert size == pytest.approx((0.96 * 2.0, 0.96 * 0.4, 0.96), abs=0.06)
+    assert place == pytest.approx((1, -0.5, 2), abs=0.05) and bottom == pytest.approx(0.02, abs=0.01)
+    # The slow way: every direction's own extents.
+    areas = []
+    for k in range(0, 90, 3):
+        t = math.radians(k)
+        axes = np.array([[math.cos(t), math.sin(t)], [-math.sin(t), math.cos(t)]])
+        low, high = np.quantile(points[:, [0, 2]] @ axes.T, (0.02, 0.98), axis=0)
+        areas.append(np.prod(high - low))
+    assert size[0] * size[1] == pytest.approx(min(areas), rel=0.02)
+
+
+def test_one_point_has_a_box_of_no_size():
+    place, size, _, bottom = upright_box(np.array([[1.0, -2.0, 3.0]]))
+    assert place == (1.0, -2.0, 3.0) and size == (0.0, 0.0, 0.0) and bottom == 2.0
