@@ -65,12 +65,12 @@ class Compared:
 
 def sweep_correlation(
     compared: Sequence[Compared],
-    log_depths: Float[Tensor, "V h w"],
+    log_depths: Float[Tensor, "v h w"],
     offsets: Float[Tensor, " P"],
     viewmats: Float[Tensor, "V 4 4"],
     Ks: Float[Tensor, "V 3 3"],
     neighbours: Neighbours | None = None,
-) -> tuple[list[Float[Tensor, "V _ P h w"]], Float[Tensor, "V P h w"]]:
+) -> tuple[list[Float[Tensor, "v _ P h w"]], Float[Tensor, "v P h w"]]:
     """Correlation of every view with its neighbours (None: all others) over depth hypotheses.
 
     Args:
