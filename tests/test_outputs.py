@@ -132,6 +132,7 @@ def test_the_guide_s_table_of_export_and_the_help_name_what_is_written() -> None
     told = " ".join(row[2] for row in rows)
     assert {word for word in WORDS if f"`{word}`" not in told and f"`--what {word}`" not in told} <= {
         "rgb",
+        "plan",
         "cutout",
     }
     assert all(re.search(rf"(^|[ ;]){re.escape(ending)}[,:]", help_of_files()) for ending in ALL_OUT)

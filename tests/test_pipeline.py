@@ -124,7 +124,7 @@ def test_the_lens_is_taken(weights, photos):
     assert wide.Ks[0, 0, 0].item() == pytest.approx(longer / 2, rel=0.15)
 
 
-def test_a_warning_of_an_assumed_lens_goes_when_photos_tell_it():
+def test_a_warning_of_an_assumed_lens_goes_when_photos_tell_it(unchecked):
     lenses = Lenses((0, 0, 0), (65.0,), (0.35,), (False,), "assumed")
     Ks, images = torch.eye(3).repeat(3, 1, 1), torch.zeros(3, 3, 14, 14)
     views = Views(images, Ks, ("a", "b", "c"), warnings=("dark", "assumed"), lenses=lenses)
@@ -138,7 +138,7 @@ def test_a_warning_of_an_assumed_lens_goes_when_photos_tell_it():
 
 
 @pytest.mark.parametrize("rounds", [0, 1, 9])
-def test_photos_are_straightened_until_nothing_bends(rounds):
+def test_photos_are_straightened_until_nothing_bends(rounds, unchecked):
     """Always from the photos as they were taken, and the last round seeks no bends."""
     lenses = Lenses((0, 0), (65.0,), (0.35,), (False,), "assumed")
     K = torch.tensor([[50.0, 0, 32], [0, 50, 24], [0, 0, 1]])
@@ -167,7 +167,7 @@ def test_photos_are_straightened_until_nothing_bends(rounds):
     assert told.bend == bend.bend and "straightened by k1 = -0.0" in str(told)
 
 
-def test_a_lens_that_is_not_told_again_stays_straightened():
+def test_a_lens_that_is_not_told_again_stays_straightened(unchecked):
     """The second round tells the other lens alone."""
     lenses = Lenses((0, 1), (65.0, 65.0), (0.35, 0.35), (False, False))
     K = torch.tensor([[50.0, 0, 32], [0, 50, 24], [0, 0, 1]])

@@ -182,7 +182,7 @@ class GuidedDepthNet(LangFlashNet):
         images: Float[Tensor, "B V 3 H W"],
         size: tuple[int, int],
         features: Float[Tensor, "B V C h w"] | None = None,
-    ) -> Float[Tensor, "V J H W"]:
+    ) -> Float[Tensor, "V J mh mw"]:
         """The surviving groups, cut into parts, also by what their pixels are called."""
         if features is None:
             features = self.language(tokens, images)

@@ -138,7 +138,7 @@ class LangFlashNet(nn.Module):
         images: Float[Tensor, "B V 3 H W"],
         size: tuple[int, int],
         features: Float[Tensor, "B V C h w"] | None = None,
-    ) -> Float[Tensor, "V J H W"]:
+    ) -> Float[Tensor, "V J mh mw"]:
         """w_k(x) of one scene (B = 1), (V, K, *size), sums to 1 over K; features: of `language`."""
 
     def group(self, tokens: Tokens, images: Float[Tensor, "B V 3 H W"]) -> tuple[Groups, ...]:

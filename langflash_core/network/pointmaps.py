@@ -147,7 +147,7 @@ class PointMapNet(LangFlashNet):
         images: Float[Tensor, "B V 3 H W"],
         size: tuple[int, int],
         features: Float[Tensor, "B V C h w"] | None = None,
-    ) -> Float[Tensor, "V J H W"]:
+    ) -> Float[Tensor, "V J mh mw"]:
         """Softmax over the masks that pass the preset's filter."""
         if not self.grouped:
             features = self.language(tokens, images) if features is None else features

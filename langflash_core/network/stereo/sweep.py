@@ -222,7 +222,7 @@ class DepthRefiner(nn.Module):
         self,
         images: Float[Tensor, "B V 3 H W"],
         tokens: Tokens,
-        local: Float[Tensor, "V C h w"],
+        local: Float[Tensor, "n C h w"],
         prior: DepthMaps,
         viewmats: Float[Tensor, "B V 4 4"],
         Ks: Float[Tensor, "B V 3 3"],

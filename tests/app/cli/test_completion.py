@@ -10,7 +10,7 @@ from app.cli.parser import build_parser
 
 LINES = (
     (("tour", "st"), {"stop", "start"}),
-    (("export", "a.langflash", "--what", "in"), {"instances"}),
+    (("export", "a.langflash", "--what", "in"), {"instances", "inventory"}),
     (("weights", "get", "--k"), {"--keep"}),
     (("completion", ""), {"bash", "zsh", "fish"}),
     (("rec",), {"reconstruct"}),

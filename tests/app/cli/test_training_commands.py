@@ -18,6 +18,9 @@ from tests.lab.evaluation.real_photos import write_folder
 from tests.lab.rooms.conftest import TINY_PACK
 from tests.lab.training.conftest import toy_record
 
+PLAIN = np.tile(np.linspace(120, 136, 56).astype(np.uint8)[None, :, None], (42, 1, 3))
+"""A photo of a shade: something is to be seen, and there is no corner to match."""
+
 
 @pytest.fixture(scope="module")
 def checkpoint(tmp_path_factory):
@@ -171,7 +174,7 @@ def photos(tmp_path):
     """Two labelled photos of a wall with a chair on it."""
     writer = FolderWriter(tmp_path / "photos")
     for id in ("1", "2"):
-        writer.photo(id, np.full((42, 56, 3), 128, np.uint8))
+        writer.photo(id, PLAIN)
         labels = np.ones((42, 56), np.int64)
         labels[10:30, 10:40] = 2
         writer.labels(id, labels)
@@ -244,11 +247,11 @@ def test_labelled_photos_are_judged(run, checkpoint, photos, tmp_path):
 
 
 def test_posed_photos_are_judged(run, checkpoint, tmp_path):
-    """Three equal photos of nothing: no motion is true, none matches and one is left out, whose direction is
-    then the worst; and there is no depth to judge."""
+    """Three equal photos of a shade without a corner: no motion is true, none matches and one is left out,
+    whose direction is then the worst; and there is no depth to judge."""
     writer = FolderWriter(tmp_path / "posed")
     for id in ("0", "3", "6"):
-        writer.photo(id, np.full((42, 56, 3), 128, np.uint8))
+        writer.photo(id, PLAIN)
         writer.pose(id, torch.eye(4, dtype=torch.float64))
     writer.finish({}, "drawn by a test")
     words = ("--weights", checkpoint, "--size", "56", "--backend", "torch", "--apart", "6")

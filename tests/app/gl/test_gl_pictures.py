@@ -265,7 +265,7 @@ def test_what_adds_nothing_is_discarded_or_drawn_to_the_same_bits(gl, monkeypatc
     scene = cloud(1500, 12, dtype=torch.float32)
     frames = []
     for software in (False, True):
-        monkeypatch.setattr("app.gl.painter.draws_in_software", lambda ctx, said=software: said)
+        monkeypatch.setattr("app.gl.hardware.draws_in_software", lambda ctx, said=software: said)
         drawn = SplatRenderer(gl)
         drawn.set_scene(scene)
         drawn.draw(camera())

@@ -163,7 +163,7 @@ def _card(state: State, card: Card, look: Look, place: ImVec2, size: ImVec2) -> 
             if at.x + look.px(_CARD + 30) < place.x + size.x
             else at.x - look.px(_CARD + 18)
         )
-        y = min(max(at.y - look.px(40), place.y + look.px(12)), place.y + size.y - look.px(372))
+        y = min(max(at.y - look.px(40), place.y + look.px(12)), place.y + size.y - look.px(330))
         corner = ImVec2(x, max(y, place.y + look.px(12)))
     imgui.set_next_window_pos(corner)
     imgui.set_next_window_size(ImVec2(look.px(_CARD), 0))
@@ -201,17 +201,28 @@ def _answer(state: State, card: Card, look: Look) -> list[do.Command]:
         imgui.text_colored(theme.MUTED, _coordinates(card.reading))
     if group is not None:
         issued += _group(state, card, group, look)
-    if card.reading.point is not None:
-        word = card.words[0][0] if card.words else ""
-        if imgui.button(f"{fa.ICON_FA_THUMBTACK}  Pin a note here", ImVec2(look.px(_CARD - 32), 0)):
-            issued.append(tour.AddNote(word or "note", Vector(*card.reading.point), phrase=word))
-        widgets.tooltip("A note of the scene's tour: here, in web pages and in the file")
+    return issued + _going_on(card, look)
+
+
+def _going_on(card: Card, look: Look) -> list[do.Command]:
+    """In one row: ask for what is alike, and pin a note where there is a place for it."""
+    issued: list[do.Command] = []
+    pin = look.px(44) if card.reading.point is not None else 0.0
     if card.vector:
-        if widgets.primary_button(
-            f"{fa.ICON_FA_MAGNIFYING_GLASS}  Find similar", ImVec2(look.px(_CARD - 32), 0)
-        ):
+        width = look.px(_CARD - 32) - pin
+        if widgets.primary_button(f"{fa.ICON_FA_MAGNIFYING_GLASS}  Find similar", ImVec2(width, 0)):
             issued.append(point.FindSimilar())
         widgets.tooltip("Ask for everything that says the same as this place")
+        if pin:
+            imgui.same_line(0, look.px(8))
+    if card.reading.point is not None:
+        word = card.words[0][0] if card.words else ""
+        label = (
+            f"{fa.ICON_FA_THUMBTACK}##pin" if card.vector else f"{fa.ICON_FA_THUMBTACK}  Pin a note here##pin"
+        )
+        if imgui.button(label, ImVec2(pin - look.px(8) if card.vector else look.px(_CARD - 32), 0)):
+            issued.append(tour.AddNote(word or "note", Vector(*card.reading.point), phrase=word))
+        widgets.tooltip("Pin a note of the scene's tour: here, in web pages and in the file")
     return issued
 
 
