@@ -18,7 +18,8 @@ import numpy as np
 from jaxtyping import Float
 
 from langflash_core.errors import PromptError
-from langflash_core.files import write_atomically
+from langflash_core.files import readable_file, write_atomically
+from langflash_core.limits import TEXT
 from langflash_core.records import Record
 
 SAME = 0.85
@@ -26,7 +27,6 @@ SAME = 0.85
 SUFFIX = ".words.json"
 FORMAT, VERSION = "langflash words", 1
 MOST_LESSONS, MOST_DENIED, LONGEST = 2_000, 64, 500  # LONGEST: characters of a word
-MOST_BYTES = 64 << 20
 
 
 @dataclass(frozen=True)
@@ -131,16 +131,10 @@ def read_lessons(path: Path) -> Lessons:
     Raises:
         PromptError: there is no such file, or it holds no usable vocabulary; says what is wrong.
     """
+    readable_file(path, "vocabulary", PromptError)
+    TEXT.check(path.stat().st_size, path.name, PromptError)
     try:
-        with path.open("rb") as stream:
-            content = stream.read(MOST_BYTES + 1)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise PromptError(f"the vocabulary {path} cannot be read ({reason}); choose another file") from error
-    if len(content) > MOST_BYTES:
-        raise PromptError(f"{path} is larger than a vocabulary can be; choose another file")
-    try:
-        return _parsed(json.loads(content.decode("utf-8")))
+        return _parsed(json.loads(path.read_bytes()))
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         why = " ".join(str(error).split())[:120]
         raise PromptError(
