@@ -90,7 +90,7 @@ portable: | $(BIN)/python
 	@$(PACKING)/bin/python -m pip install --quiet --disable-pip-version-check --extra-index-url https://download.pytorch.org/whl/cpu torch==2.13.0+cpu
 	@$(PACKING)/bin/python -m pip install --quiet --disable-pip-version-check 'pyinstaller>=6.10' '.[window]'
 	@$(PACKING)/bin/python -m pip uninstall --quiet --yes langflash
-	@PYTHONPATH=$(CURDIR) $(PACKING)/bin/python -m PyInstaller --noconfirm --log-level WARN --workpath build/portable --distpath dist portable/langflash.spec
+	@PYTHONPATH=$(CURDIR) $(PACKING)/bin/python -m PyInstaller --noconfirm --log-level WARN --workpath build/portable --distpath dist .ci/portable/langflash.spec
 	@du -sh dist/langflash
 
 # The newest Python from 3.11 that can make a virtual environment.
