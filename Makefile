@@ -2,7 +2,7 @@
 # make test   set up what is missing, then every check and every test
 # make lint   the checks alone, without a test
 # make setup  the set-up alone
-# make portable        a folder that runs without Python, in dist/ (Linux; torch for processors)
+# make portable        a folder that runs without Python, in dist/ (Linux)
 # make test-all        every test with every optional package: Ray, SAM 2, TensorBoard, COLMAP, others' measures
 # make torture         what it is to survive (PARTS="calls kills", SEED=1; tests/torture/README.md)
 # make test-machines   every test three times, as three other processors and orders would run it
@@ -87,7 +87,7 @@ torture: setup
 PACKING := .venv-portable
 portable: | $(BIN)/python
 	@test -x $(PACKING)/bin/python || $(BIN)/python -m venv $(PACKING)
-	@$(PACKING)/bin/python -m pip install --quiet --disable-pip-version-check --extra-index-url https://download.pytorch.org/whl/cpu torch==2.13.0+cpu
+	@$(PACKING)/bin/python -m pip install --quiet --disable-pip-version-check torch==2.13.0
 	@$(PACKING)/bin/python -m pip install --quiet --disable-pip-version-check 'pyinstaller>=6.10' '.[window]'
 	@$(PACKING)/bin/python -m pip uninstall --quiet --yes langflash
 	@PYTHONPATH=$(CURDIR) $(PACKING)/bin/python -m PyInstaller --noconfirm --log-level WARN --workpath build/portable --distpath dist .ci/portable/langflash.spec
