@@ -53,8 +53,7 @@ def appearances(scene: Scene, network: LangFlashNet | None = None) -> Appearance
     """
     if scene.semantics.space == NO_LANGUAGE:
         raise PromptError("the scene has no language; give it one with `langflash lift`")
-    count = len(scene.photos)
-    chosen = sorted({place * count // min(count, MOST_PHOTOS) for place in range(min(count, MOST_PHOTOS))})
+    chosen = scene.some_views(MOST_PHOTOS) if scene.photos else []
     photos = {view: photo for view in chosen if (photo := decoded_photo(scene.photos[view])) is not None}
     if not photos:
         raise InputError("the scene holds no photos to recognise its groups by; use one made of photos")

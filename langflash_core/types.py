@@ -297,6 +297,11 @@ class Scene:
     def num_views(self) -> int:
         return self.viewmats.shape[0]
 
+    def some_views(self, most: int) -> list[int]:
+        """At most so many of the input views, evenly spaced, the first among them."""
+        asked = min(self.num_views, most)
+        return [place * self.num_views // asked for place in range(asked)]
+
     def camera(self, view: int, width: int | None = None, height: int | None = None) -> Camera:
         """Camera of input view `view` (from 0), optionally drawn at another size."""
         own = Camera(self.viewmats[view], self.Ks[view], *self.view_size)

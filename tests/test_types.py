@@ -50,6 +50,15 @@ def made(count: int = 4, **changes) -> Scene:
     return Scene(gaussians, semantics, **{**whole, **changes})
 
 
+@pytest.mark.parametrize(
+    ("views", "most", "chosen"), [(1, 4, [0]), (4, 4, [0, 1, 2, 3]), (9, 4, [0, 2, 4, 6])]
+)
+def test_some_views_are_spread_over_all(views, most, chosen):
+    viewmats, Ks = torch.eye(4).repeat(views, 1, 1), torch.eye(3).repeat(views, 1, 1)
+    scene = made(viewmats=viewmats, Ks=Ks, photos=(), view_ids=None)
+    assert scene.some_views(most) == chosen
+
+
 def test_a_record_is_replaced_not_changed():
     scene = made(record=Record(preset="mini"))
     assert scene.with_record(metric_scale=2.0).record == Record(preset="mini", metric_scale=2.0)

@@ -28,7 +28,7 @@ from langflash_core.pipeline import query
 from langflash_core.types import Camera, Frame, PromptAnswer, QueryResult, Scene
 
 MOST_VIEWS = 4
-"""Of a scene, evenly among its photos: a fifth seldom shows what four do not."""
+"""Of a scene, evenly among its photos: each takes as long as a query."""
 PICTURES, TABLE, DOCUMENT, PAGE = "pictures", "answers.csv", "answers.json", "index.html"
 COLUMNS = (
     "phrase", "scene", "found", "score", "threshold", "view", "photo", "area", "x", "y", "z",
@@ -80,7 +80,7 @@ def ask_scene(
     if scene.semantics.num_atoms == 0:
         raise InputError("it has no language; give it one with `langflash lift`")
     best: dict[int, tuple[int, QueryResult]] = {}
-    for view in views_of(scene):
+    for view in scene.some_views(MOST_VIEWS):
         result = query(scene, prompts, view=view, mode=mode, negatives=negatives, render=render)
         for place, answer in enumerate(result.answers):
             if place not in best or _rank(answer) > _rank(best[place][1].answers[place]):
@@ -96,13 +96,6 @@ def ask_scene(
         photo = photos[view] if view < len(photos) else ""
         replies.append(Reply(name, answer, view, photo, scene.record.metric_scale, picture))
     return replies
-
-
-def views_of(scene: Scene) -> list[int]:
-    """Up to `MOST_VIEWS` of the photos, evenly spaced, the first among them."""
-    count = len(scene.viewmats)
-    asked = min(count, MOST_VIEWS)
-    return sorted({place * count // asked for place in range(asked)}) if asked else [0]
 
 
 def write_survey(
