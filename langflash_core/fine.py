@@ -26,6 +26,7 @@ from langflash_core.splat.colours import ROUNDS, solved_colours
 from langflash_core.types import Cost, Prediction, Scene, Views
 
 _HELD = 8  # photos that stay decoded
+_JUDGES = 3  # photos, from which Gaussians that hinder are left out: of two neither knows better
 _LEFT_OUT = "{} something that the others do not ({}); it is left out"
 _RINGING = 0.3
 """Of what a photo varies by around a Gaussian, how far its colour may go beyond: blur needs some of it."""
@@ -168,9 +169,12 @@ def _coloured(scene: Scene, photos: _Silent, progress: Callable[[float], None]) 
         photos,
         owners=scene.view_ids,
         ringing=_RINGING,
+        leave_out=len(photos) >= _JUDGES,
         progress=progress,
     )
     sh = colour_to_sh(solved.colours)[:, None]
     near = [round(after, 2) for _, after in solved.psnr]
     bought = {**scene.record.detail, "rounds": ROUNDS, "photos_psnr_db": near}
-    return replace(scene, gaussians=replace(scene.gaussians, sh=sh)).with_record(detail=bought)
+    counts = {**scene.record.counts, "hindering": int(solved.hinders.sum())}
+    coloured = replace(scene, gaussians=replace(scene.gaussians, sh=sh)).with_record(detail=bought)
+    return coloured.rows(~solved.hinders).with_record(counts=counts)

@@ -17,6 +17,9 @@ solved for in groups of neighbours in their order, each from where those before 
 mean of what its groups found, weighed by how much of it each saw. So memory stays that of one group, and
 time grows with the photos.
 
+What brings the pictures nearer to the photos by going is left out (`hindering`), and the rounds go on without
+it.
+
 Sizes: V views, N Gaussians, n of them in one view, h w pixels of a photo.
 """
 
@@ -29,12 +32,13 @@ import cv2
 import numpy as np
 import scipy.sparse
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from langflash_core.memory import give_back
 from langflash_core.splat.frustum import Packs
-from langflash_core.splat.mixing import mixing
+from langflash_core.splat.hindering import Pairs, Tally
+from langflash_core.splat.mixing import mixed
 from langflash_core.splat.projection import Footprints, project
 from langflash_core.types import Camera, Gaussians
 
@@ -59,14 +63,18 @@ _STEP = 0.5 / 255  # to which the photo is rounded there
 _OF_VIEWS = 0.75  # of the time, for which contributions are listed
 _SEEN = 0.05  # contributions of a Gaussian over all pixels, below which its colour stays
 _PROBE = 8  # of rows of pixels, by one of which a group is judged after others came
+_LEAVING, _AFTERWARDS = 2, 4
+"""How often what hinders is left out, and rounds after each time."""
 
 
 @dataclass(frozen=True)
 class Solved:
-    """colours: (N, 3) in [0, 1]. psnr: dB of each view before the rounds and after them."""
+    """colours: (N, 3) in [0, 1]. psnr: dB of each view before the rounds and after them. hinders: (N,) bool,
+    without which the pictures are nearer to the photos, and which `psnr` leaves out."""
 
     colours: Float[Tensor, "N 3"]
     psnr: tuple[tuple[float, float], ...]
+    hinders: Bool[Tensor, " N"]
 
 
 @torch.no_grad()
@@ -79,6 +87,7 @@ def solved_colours(
     owners: Int[Tensor, " N"] | None = None,
     rounds: int = ROUNDS,
     ringing: float | None = None,
+    leave_out: bool = False,
     progress: Callable[[float], None] = lambda done: None,
 ) -> Solved:
     """Colours of Gaussians from all their photos.
@@ -91,6 +100,7 @@ def solved_colours(
         owners: (N,) int64, the view that made each Gaussian; None: every photo speaks in all its pixels.
         ringing: how far colours may leave what the photos show around a Gaussian, in parts of how much that
             differs; None: within [0, 1], as far as they like.
+        leave_out: Gaussians that hinder may be found and left out.
         progress: called with the share that is done, before every view and every round; what it raises ends
             the work there.
 
@@ -109,9 +119,11 @@ def solved_colours(
     before, probes = [], []
     share = 1 if owners is None or len(photos) <= _MANY else min(-(-len(photos) // _EVERY), _MOST_EVERY)
     bounds, cuts = _groups(len(photos), share), _CUTS if len(photos) > _MANY else {}
+    hinders, tally = np.zeros(len(first), bool), Tally.of(len(first))
     for begin, end in pairwise(bounds):
         told = _within(progress, begin / len(photos), (end - begin) / len(photos))
-        group = _Group(len(first), told)
+        leaving = _LEAVING if leave_out and len(bounds) == 2 else 0
+        group = _Group(len(first), told, rounds + leaving * _AFTERWARDS)
         for view in range(begin, end):
             told(_OF_VIEWS * (view - begin) / (end - begin))
             rows = packs.before(cameras[view])
@@ -123,10 +135,18 @@ def solved_colours(
             if cuts:
                 give_back()  # each view leaves holes of other sizes
         before += [view.error(first) for view in group.views]
-        answer.take(group.solved(answer.colours, rounds, ringing), group.total)
+        found = group.solved(answer.colours, rounds, ringing)
+        for _ in range(leaving):
+            hinders |= group.leave(found)
+            found = group.solved(found, _AFTERWARDS, ringing)
+        if leave_out and len(bounds) > 2:
+            group.tell(tally, found)
+        answer.take(found, group.total)
         probes += group.views if len(bounds) == 2 else [view.every(_PROBE) for view in group.views]
     after = [view.error(answer.colours) for view in probes]
-    return Solved(torch.from_numpy(answer.colours), tuple(zip(before, after, strict=True)))
+    hinders |= tally.hindering
+    nearness = tuple(zip(before, after, strict=True))
+    return Solved(torch.from_numpy(answer.colours), nearness, torch.from_numpy(hinders))
 
 
 def _groups(count: int, share: int = 1) -> list[int]:
@@ -165,12 +185,13 @@ class _Answer:
 
 
 class _Group:
-    """Views that are solved for together."""
+    """Views that are solved for together, in so many rounds in all."""
 
-    def __init__(self, count: int, progress: Callable[[float], None]):
+    def __init__(self, count: int, progress: Callable[[float], None], rounds: int):
         self.views: list[_View] = []
         self._count = count
         self._progress = progress
+        self._done, self._rounds = 0, rounds
 
     @property
     def total(self) -> np.ndarray:
@@ -187,8 +208,9 @@ class _Group:
         low, high = self._bounds(start, ringing)
         colours = ahead = start
         pace = 1.0
-        for number in range(rounds):
-            self._progress(_OF_VIEWS + (1 - _OF_VIEWS) * number / rounds)
+        for _ in range(rounds):
+            self._progress(_OF_VIEWS + (1 - _OF_VIEWS) * self._done / self._rounds)
+            self._done += 1
             step = np.zeros_like(start)
             for view in self.views:
                 step[view.ids] += view.carried_back(ahead)
@@ -197,6 +219,19 @@ class _Group:
             ahead = found + ((pace - 1) / following) * (found - colours)
             colours, pace = found, following
         return colours
+
+    def tell(self, tally: Tally, colours: np.ndarray) -> None:
+        """What all views say of each Gaussian in these colours (N, 3)."""
+        for view in self.views:
+            view.tell(tally, colours)
+
+    def leave(self, colours: np.ndarray) -> np.ndarray:
+        """(N,) bool: what hinders in these colours (N, 3), and is now left out."""
+        tally = Tally.of(self._count)
+        self.tell(tally, colours)
+        gone = tally.hindering
+        self.views = [view.without(gone[view.ids]) for view in self.views]
+        return gone
 
     def _bounds(
         self, start: np.ndarray, ringing: float | None
@@ -239,14 +274,15 @@ class _Spoken:
 @dataclass(frozen=True)
 class _View:
     """ids: (n,) rows of the Gaussians that are shown. contributions: (h w, n), of 1 a pixel where anything is
-    drawn. photo: (h w, 3). trust: (n, 1), None: 1. sums: (n,) of contributions, times the trust. shown:
-    (h w, 1), 1 where something is drawn and the photo is a number, else 0. around: rows of some Gaussians,
-    and least and most of the photo around each, uint8. size: (h, w), or 1 and how many pixels where a photo
-    speaks in some, which are those of the rows here. counts: (h w, 1), what each pixel's word
-    counts, None: 1."""
+    drawn, each pixel's front to back. light: (h w,) that stays there. photo: (h w, 3). trust: (n, 1), None:
+    1. sums: (n,) of contributions, times the trust. shown: (h w, 1), 1 where something is drawn and the photo
+    is a number, else 0. around: rows of some Gaussians, and least and most of the photo around each, uint8.
+    size: (h, w), or 1 and how many pixels where a photo speaks in some, which are those of the rows here.
+    counts: (h w, 1), what each pixel's word counts, None: 1."""
 
     ids: np.ndarray
     contributions: scipy.sparse.csr_matrix
+    light: np.ndarray
     photo: np.ndarray
     trust: np.ndarray | None
     sums: np.ndarray
@@ -270,7 +306,8 @@ class _View:
         footprints = project(gaussians.rows(seen), camera)
         loudness = None if spoken is None else spoken.loudness(footprints, (camera.height, camera.width))
         wanted = None if loudness is None else loudness > 0
-        matrix, some = _narrowed(mixing(footprints, camera, len(seen), **cuts, wanted=wanted), len(seen))
+        matrix, stays = mixed(footprints, camera, len(seen), **cuts, wanted=wanted)
+        matrix, some = _narrowed(matrix, len(seen))
         light = np.asarray(matrix.sum(1)).ravel()
         flat = photo.movedim(0, -1).flatten(0, 1).cpu().numpy().astype(np.float32)
         shown = (light >= _LEAST) & np.isfinite(flat).all(1)
@@ -286,7 +323,7 @@ class _View:
         placed[some] = np.arange(len(some))
         around = _around(footprints, placed, sums, flat.reshape(*size, 3))
         view = _View(
-            ids, matrix, flat, None if told is None else told[:, None], sums,
+            ids, matrix, stays.astype(np.float32), flat, None if told is None else told[:, None], sums,
             shown[:, None].astype(np.float32), (ids[around[0]], *around[1:]), size,
         )  # fmt: skip
         if loudness is None:
@@ -299,6 +336,7 @@ class _View:
         return replace(
             self,
             contributions=self.contributions[kept],
+            light=self.light[kept],
             photo=self.photo[kept],
             shown=self.shown[kept],
             size=(1, len(kept)),
@@ -316,6 +354,23 @@ class _View:
         return replace(
             part, ids=self.ids[some], contributions=matrix, trust=None, sums=self.sums[some], around=nothing
         )
+
+    def tell(self, tally: Tally, colours: np.ndarray) -> None:
+        """What is nearer to the photo without each Gaussian."""
+        pairs = Pairs.of(self.contributions, self.light)
+        tally.take(pairs, self.ids, colours[self.ids], self.photo, self.shown[:, 0] > 0)
+
+    def without(self, gone: np.ndarray) -> "_View":
+        """The same without some of its Gaussians, (n,) bool."""
+        if not gone.any():
+            return self
+        matrix, light = Pairs.of(self.contributions, self.light).without(gone)
+        shown = self.shown * (light >= _LEAST)[:, None]
+        scale = shown[:, 0] / np.maximum(light, _LEAST)
+        matrix.data *= np.repeat(scale, np.diff(matrix.indptr)).astype(np.float32)
+        sums = matrix.T @ (np.ones(len(light), np.float32) if self.counts is None else self.counts[:, 0])
+        sums = sums if self.trust is None else sums * self.trust[:, 0]
+        return replace(self, contributions=matrix, light=light, shown=shown, sums=sums)
 
     def wrong(self, colours: np.ndarray) -> np.ndarray:
         """(h w, 3) the photo less the picture, 0 where nothing is drawn."""

@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 import scipy.sparse
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 
 from langflash_core.splat.projection import ALPHA_MAX, Footprints
 from langflash_core.types import Camera
@@ -45,13 +45,26 @@ def mixing(
     small: float = SMALL,
     wanted: Bool[np.ndarray, "H W"] | None = None,
 ) -> scipy.sparse.csr_matrix:
-    """Contributions (H*W, N) float32 of N Gaussians to the pixels of a view, row by row.
+    """Contributions (H*W, N) float32 of N Gaussians to the pixels of a view, row by row, front to back.
 
     Args:
         footprints: of the Gaussians as the camera sees them. count: N.
         faint, small: alpha and contribution below which a pair is left out; 1/255 and 0 as in pictures.
         wanted: (H, W) bool, pixels whose rows are asked for, the others' are empty; None: all.
     """
+    return mixed(footprints, camera, count, faint, small, wanted)[0]
+
+
+def mixed(
+    footprints: Footprints,
+    camera: Camera,
+    count: int,
+    faint: float = FAINT,
+    small: float = SMALL,
+    wanted: Bool[np.ndarray, "H W"] | None = None,
+) -> tuple[scipy.sparse.csr_matrix, Float[np.ndarray, " HW"]]:
+    """As `mixing`, and the light (H*W,) that stays at each pixel, those of `small` contributions included;
+    1 where a pixel is not wanted."""
     table = _Table.of(footprints, camera, faint)
     light = np.zeros(camera.width * camera.height)  # logarithm of what passes all slabs so far
     if wanted is not None:
@@ -68,7 +81,7 @@ def mixing(
         layers.append((shares, rows[columns], counts))
     shares, columns, ends = _joined(layers)
     ids = footprints.ids.cpu().numpy().astype(np.int32)
-    return scipy.sparse.csr_matrix((shares, ids[columns], ends), shape=(len(light), count))
+    return scipy.sparse.csr_matrix((shares, ids[columns], ends), shape=(len(light), count)), -np.expm1(light)
 
 
 def _slabs(count: int) -> int:

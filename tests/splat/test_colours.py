@@ -348,8 +348,8 @@ def test_of_many_photos_each_speaks_in_turn_and_colours_come_back(monkeypatch):
     owners = torch.full((400,), -1)
     owners[:100] = 0
     listed = []
-    whole = module.mixing
-    monkeypatch.setattr(module, "mixing", lambda *a, **k: listed.append(k["wanted"]) or whole(*a, **k))
+    whole = module.mixed
+    monkeypatch.setattr(module, "mixed", lambda *a, **k: listed.append(k["wanted"]) or whole(*a, **k))
     solved = solved_colours(gaussians, grey(colours), cameras, photos, owners=owners)
     assert all(wanted.mean() < 0.4 for wanted in listed[1:])
     assert listed[0].sum() > listed[1].sum()  # the first also speaks for its own
