@@ -45,11 +45,11 @@ from langflash_core.types import Camera, Gaussians
 ROUNDS = 8
 TOGETHER = 16
 """Photos that are solved for at once: a group of them holds half a gigabyte at 672 x 672 pixels."""
-_MANY, _CUTS = 8, {"faint": 1 / 32, "small": 0.02}
-"""Of more photos than that, alpha and contribution below which pairs are left out: a fifth of the time for
-.005 dB of 28.9."""
-_EVERY, _MOST_EVERY = 16, 8
-"""Photos of which one speaks in a block, and in one block of how many a photo speaks at least."""
+_MANY, _EVERY, _MOST_EVERY = 8, 8, 8
+"""Photos up to which all speak everywhere; of more, those of which one speaks in a block, and in one block of
+how many each speaks at least."""
+_JUDGED = {"small": 0.004}
+"""Contribution below which pairs are left out where what hinders is sought: with .01 half is found."""
 _BLOCK, _OWN = (
     96,
     0.25,
@@ -118,7 +118,7 @@ def solved_colours(
     packs, answer = Packs.of(gaussians), _Answer.of(first)
     before, probes = [], []
     share = 1 if owners is None or len(photos) <= _MANY else min(-(-len(photos) // _EVERY), _MOST_EVERY)
-    bounds, cuts = _groups(len(photos), share), _CUTS if len(photos) > _MANY else {}
+    bounds, cuts = _groups(len(photos), share), _JUDGED if leave_out else {}
     hinders, tally = np.zeros(len(first), bool), Tally.of(len(first))
     for begin, end in pairwise(bounds):
         told = _within(progress, begin / len(photos), (end - begin) / len(photos))
@@ -132,7 +132,7 @@ def solved_colours(
             trust = None if trusts is None else trusts[view]
             seen = _View.of(gaussians, rows, cameras[view], photos[view], trust, cuts, spoken)
             group.views.append(seen)
-            if cuts:
+            if len(photos) > _MANY:
                 give_back()  # each view leaves holes of other sizes
         before += [view.error(first) for view in group.views]
         found = group.solved(answer.colours, rounds, ringing)
