@@ -29,7 +29,7 @@ def reads(monkeypatch) -> list[Path]:
 
 
 def test_a_held_network_is_read_once_and_again_when_its_file_changes(reads, tmp_path):
-    path = shutil.copy(asset_path("weights/mini.safetensors"), tmp_path / "own.safetensors")
+    path = Path(shutil.copy(asset_path("weights/mini.safetensors"), tmp_path / "own.safetensors"))
     networks = lf.Networks()
 
     def made():
