@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from langflash_core.images.frames import frames as frames
     from langflash_core.pipeline import query as query
     from langflash_core.pipeline import reconstruct as reconstruct
+    from langflash_core.reconstruction.networks import Networks as Networks
     from langflash_core.request import ExportRequest as ExportRequest
     from langflash_core.writing import write as write
 
@@ -34,6 +35,7 @@ wait_asleep()
 _HOMES = {
     "reconstruct": ("pipeline", "reconstruct"),
     "frames": ("images.frames", "frames"),
+    "Networks": ("reconstruction.networks", "Networks"),
     "query": ("pipeline", "query"),
     "save": ("export", "export"),
     "load": ("export", "read"),

@@ -1,4 +1,5 @@
-"""What a long session no longer needs goes back to the system; and which errors say that there is no more.
+"""What a long session no longer needs goes back to the system; how much was held, and which errors say that
+there is no more.
 
 Giving back works with the GNU C library alone: elsewhere memory is kept and given back in the system's own
 way.
@@ -33,6 +34,16 @@ def give_back() -> None:
     Tensors that nobody holds are gone without Python's collector, which would stop the window for a while.
     """
     _call("malloc_trim", 0)
+
+
+def peak_memory_mb() -> int | None:
+    """The most memory that this process has held so far, in MB; None where it cannot be asked."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    unit = 1 if sys.platform == "darwin" else 1024  # bytes there, KiB on Linux
+    return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6)
 
 
 def out_of_memory(error: BaseException) -> bool:

@@ -1,73 +1,36 @@
-"""The only composer: photos -> scene, and scene + phrases -> answer.
-
-images.load_views -> network.predict -> scene.assemble -> scene.prune
-render -> query.relevance_maps -> query.answer
+"""The only composer: photos -> scene (`reconstruction.stages` has the steps), scene + phrases -> answer, or
+part of the scene, and scene -> web page.
 """
 
-import sys
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
-from contextlib import suppress
-from dataclasses import asdict, replace
 from pathlib import Path
 
 import torch
 from torch import Tensor
 
-from langflash_core.ahead import Ahead, begin
-from langflash_core.detail import DEFAULT_DETAIL, check_gaussians, chosen_detail
-from langflash_core.errors import InputError, PromptError, ViewError, WeightsError
+from langflash_core.ahead import Ahead
+from langflash_core.detail import DEFAULT_DETAIL
+from langflash_core.errors import InputError, PromptError, ViewError
 from langflash_core.export.html import Beside, Phrases, TextModel, write_html
-from langflash_core.fine import fine_scene
-from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.images.decode import grey_photo
-from langflash_core.images.straight import after, straightened
-from langflash_core.images.triage import check_shown
-from langflash_core.images.views import load_views, source_pictures
-from langflash_core.keeping import Keep, not_kept
-from langflash_core.kept_prediction import arrays_of, prediction_of
 from langflash_core.language.answers import answer
-from langflash_core.language.clip import load_clip_images
 from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.minilm import load_minilm, shipped_files
 from langflash_core.language.relevance import Mode, compile_query, finite_dictionary, relevance_maps
 from langflash_core.language.spaces import language_space
 from langflash_core.language.vocabulary import all_phrases
-from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_network
-from langflash_core.network.build import network_class
-from langflash_core.network.checkpoints.parts import part_folder
-from langflash_core.network.checkpoints.stored import Stored, weights_file
-from langflash_core.network.model import Atoms, Geometry, Lifted, Redrawn, pooled_weights
-from langflash_core.network.precision import bfloat16_fails, has_bfloat16
-from langflash_core.network.semantics.aggregation import averaged_atoms
-from langflash_core.network.semantics.crops import crop_atoms
-from langflash_core.network.semantics.grouping import Groups
-from langflash_core.network.semantics.lifting import lifted_weights
-from langflash_core.network.semantics.outlines import Outlines
-from langflash_core.network.semantics.sam2 import Sam2, sam2_checkpoint
-from langflash_core.records import BentLens
+from langflash_core.network import choose_pair
+from langflash_core.reconstruction.networks import Networks as Networks
+from langflash_core.reconstruction.stages import STAGES as STAGES
+from langflash_core.reconstruction.stages import scene_of
+from langflash_core.reconstruction.wishes import Wishes
 from langflash_core.resources import asset_path
-from langflash_core.running import Kept, Progress, Run
-from langflash_core.scene.assemble import assemble
-from langflash_core.scene.prune import prune
+from langflash_core.running import Progress, Run
 from langflash_core.scene.tour import Note, Stop, read_tour
-from langflash_core.scene.world import in_world
 from langflash_core.splat import render as render_reference
-from langflash_core.splat.refine import Budget, refine
-from langflash_core.types import Camera, Cost, Frame, Prediction, QueryResult, Scene, Views
+from langflash_core.types import Camera, Frame, QueryResult, Scene
 
-# Where each stage begins in the whole, from its measured share of the time on two CPU cores.
-STAGES = {"photos": 0.0, "weights": 0.08, "network": 0.16, "assemble": 0.66, "refine": 0.97}
-PRECISIONS = ("auto", "float32", "bfloat16")
-AGGREGATIONS = ("lfa", "average", "crops")
-GROUPINGS = ("queries", "mobile-sam", "sam2")
 LARGEST_PICTURE = 8192
-LONGEST_REFINEMENT = 3600  # seconds
-_STRAIGHTENED = 3  # times, at most
-_PATIENCE = 0.2  # seconds, until it is told again how far something is
-_AS_IT_IS = "the preset '{}' makes one Gaussian a pixel; the detail that was asked for is left out"
-_NOT_TOLD = "; these photos do not determine it by themselves"
-_networks: dict[tuple, LangFlashNet] = {}
 
 
 def reconstruct(
@@ -90,6 +53,7 @@ def reconstruct(
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
     ahead: Ahead | None = None,
+    networks: Networks | None = None,
 ) -> Scene:
     """Photos of one room to a 3D scene that can be queried, in one forward pass.
 
@@ -123,6 +87,7 @@ def reconstruct(
         cancelled: asked between stages, photos and pairs of photos, and before every layer.
         ahead: of `ahead.begin` with the same arguments, which may have been called before torch was
             imported; None: begun here.
+        networks: keeps the network for the next scene; None: the weights are read for this one alone.
 
     Returns:
         A scene on the CPU; its record holds seconds per stage, peak memory and warnings.
@@ -132,107 +97,25 @@ def reconstruct(
         WeightsError: the checkpoint is missing or does not fit. OutputError: `keep` cannot be written.
         Cancelled: `cancelled()` became true.
     """
-    run, keep = Run(STAGES, progress, cancelled), None if keep is None else Path(keep)
-    device = _device(device)
-    _check_detail(detail, gaussians)
-    if refine_seconds is not None:
-        _check_refinement(refine_seconds, photos)
-    with run.stage("photos"):
-        ahead = ahead or begin(
-            photos,
-            preset=preset,
-            weights=weights,
-            size=size,
-            read_weights=False,
-            check=run.check,
-            keep=keep,
-        )
-        views = load_views(
-            photos, fov=fov, intrinsics=intrinsics, check=run.check, pictures=ahead.pictures.result
-        )
-        check_shown(views.names, list(views.images))
-    views = _posed(views, viewmats, preset)
-    with run.stage("weights"):
-        network = _network(preset, weights, device, precision, ahead.stored)
-        atoms = _atoms(network, aggregation, views)
-        groups, redrawn = _groups(network, grouping, device), _redrawn(grouping, device)
-        _wait_for_matches(ahead, run)  # key points are found beside the weights
-    finer = None if detail is None or not network.surfaces else chosen_detail(detail)
-    with run.stage("network"):
-        settings = (preset, device, precision, aggregation, grouping, finer is None)
-
-        def predicted(seen: Views) -> Prediction:
-            told = run.within("network")
-
-            def made(kept: Kept) -> Prediction:
-                handed = ahead.handed(kept, seen.sources)
-                return _on_cpu(
-                    network.predict(seen, told, cancelled, atoms, groups, redrawn, finer is None, handed)
-                )
-
-            if keep is None:
-                return made(not_kept)
-            kept = _keep(keep, seen, (*settings, _identity(preset, weights)))
-            return prediction_of(kept("prediction", lambda: arrays_of(made(kept))))
-
-        prediction, views = _straight(predicted, views)
-        views = _through(views, prediction)
-    images = views.images[[v for v in range(views.num_views) if v not in prediction.unplaced]]
-    with run.stage("assemble"), torch.no_grad():
-        if finer is not None:
-            told = run.within("assemble")
-            scene, light = fine_scene(
-                prediction, views, finer, gaussians=gaussians, preset=preset, progress=told
-            )
-            images = light.corrected(images).clamp(0, 1)
-        else:
-            if gaussians is not None or detail not in (None, DEFAULT_DETAIL):
-                prediction = _noted(prediction, _AS_IT_IS.format(preset))
-            scene = prune(assemble(prediction, views, preset=preset))
-    if refine_seconds is not None:
-        with run.stage("refine"):
-            scene = _refined(scene, images, refine_seconds, device, run.within("refine"))
-        fitting = {**scene.record.cost.timings, "fitting": run.timings["refine"]}
-        scene = scene.with_record(cost=Cost(fitting))
-    if prediction.lenses:
-        scene = scene.with_record(lens={"found": [asdict(lens) for lens in prediction.lenses]})
-    run.check()
-    if viewmats is not None:
-        unit = scene.record.network_unit
-        assert unit is not None, "`assemble` records it"
-        scene = in_world(scene, viewmats[0], unit)
-    run.report("done", 1.0)
-    return _with_record(scene, network, run.timings)
-
-
-def _wait_for_matches(ahead: Ahead, run: Run) -> None:
-    """Until photos are matched; how far that is is told, and it may be cancelled at any time."""
-    told = run.within("weights")
-    while True:
-        try:
-            ahead.matched.result(timeout=_PATIENCE)
-            return
-        except TimeoutError:
-            if ahead.matched.done():
-                raise
-            told(f"weights: {ahead.matching}", ahead.matching.share)
-
-
-def _identity(preset: str, weights: Path | str | None) -> list[tuple[str, int, int]]:
-    """Which weights: the checkpoint and its installed parts, with size and time of change."""
-    files = sorted(part_folder(PRESETS[preset]).glob("*.safetensors"))
-    with suppress(WeightsError):  # there may be no file but the parts
-        files.append(weights_file(preset, None if weights is None else Path(weights)))
-    return [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in files if path.is_file()]
-
-
-def _keep(folder: Path, views: Views, settings: tuple) -> Keep:
-    """Where what these views become is kept; hangs on all that changes a bit of it."""
-    machine = (torch.__version__, torch.get_num_threads(), torch.backends.cpu.get_cpu_capability())
-    said = {"settings": settings, "machine": machine, "names": views.names, "lenses": views.lenses}
-    numbers = [views.images, views.Ks] + ([] if views.viewmats is None else [views.viewmats])
-    parts = (values.contiguous().numpy().tobytes() for values in numbers)
-    return Keep.of(folder, said, (*views.sources, *parts))
+    wishes = Wishes(
+        photos,
+        preset=preset,
+        weights=weights,
+        fov=fov,
+        intrinsics=intrinsics,
+        size=size,
+        device=device,
+        precision=precision,
+        aggregation=aggregation,
+        grouping=grouping,
+        detail=detail,
+        gaussians=gaussians,
+        refine_seconds=refine_seconds,
+        viewmats=viewmats,
+        keep=None if keep is None else Path(keep),
+    )
+    run = Run(STAGES, progress, cancelled)
+    return scene_of(wishes, run, Networks() if networks is None else networks, ahead)
 
 
 def query(
@@ -402,55 +285,6 @@ def _check_threshold(threshold: float) -> None:
         raise PromptError(f"the threshold {threshold} is out of range; relevancy needs 0 to 1")
 
 
-def _posed(views: Views, viewmats: Tensor | None, preset: str) -> Views:
-    """The views with the poses that were given, brought to the first camera.
-
-    Raises:
-        InputError: another preset, or not a pose for each photo.
-    """
-    if viewmats is None:
-        return views
-    if preset != "mini":
-        raise InputError(f"the preset '{preset}' seeks poses itself; choose --preset mini for given ones")
-    if tuple(viewmats.shape) != (views.num_views, 4, 4):
-        raise InputError(f"{len(viewmats)} poses were given for {views.num_views} photos; give one each")
-    relative = viewmats.double() @ invert_rigid(viewmats[0].double())
-    return replace(views, viewmats=relative)
-
-
-def _straight(predict: Callable[[Views], Prediction], views: Views) -> tuple[Prediction, Views]:
-    """A prediction, and the views it is of: straightened where their lenses bend lines.
-
-    The first round sees a strong bend only where the photos hardly show it, so the photos are straightened by
-    what all rounds say together, until nothing is left of it.
-    """
-    taken = views
-    for left in reversed(range(_STRAIGHTENED + 1)):
-        if views.lenses is not None and not left:
-            views = replace(views, lenses=replace(views.lenses, straight=True))
-        try:
-            return predict(views), views
-        except BentLens as bent:
-            assert views.lenses is not None, "bends are sought of lenses that are known"
-            before = views.lenses.straightened or (None,) * len(bent.found)
-            found = [
-                old if new is None else after(old, new) for old, new in zip(before, bent.found, strict=True)
-            ]
-            views = straightened(taken, found)
-    raise AssertionError("the last round seeks no bends")
-
-
-def _through(views: Views, prediction: Prediction) -> Views:
-    """The views with the lens that was found; the warning that it was assumed goes, or says what is left."""
-    if prediction.Ks is not None:
-        views = replace(views, Ks=prediction.Ks)
-    if views.lenses is None or not views.lenses.note:
-        return views
-    note, settled = views.lenses.note, views.lenses.settled(prediction.lenses)
-    kept = () if settled else ((f"{note}{_NOT_TOLD}",) if views.num_views > 2 else (note,))
-    return replace(views, warnings=(*(w for w in views.warnings if w != note), *kept))
-
-
 def best_pair(
     photos: Sequence[Path | str], *, cancelled: Callable[[], bool] | None = None
 ) -> tuple[int, int] | None:
@@ -468,186 +302,6 @@ def best_pair(
         run.check()
         greys.append(grey_photo(Path(photo)))
     return choose_pair(greys, run.check)
-
-
-def _with_record(scene: Scene, network: LangFlashNet, timings: dict[str, float]) -> Scene:
-    """The scene with the cost of its making, and the network's calibration, in its record.
-
-    `timings` stay disjoint seconds in order (the network's and the scene's own steps are in the
-    scene already); `seconds` sums them up for the network and for all.
-    """
-    before = {name: timings[name] for name in ("photos", "weights")}
-    cost = Cost(
-        timings={**before, **scene.record.cost.timings},
-        seconds={"network": timings["network"], "total": sum(timings.values())},
-        peak_memory_mb=peak_memory_mb(),
-    )
-    return scene.with_record(cost=cost, calibration=dict(network.calibration))
-
-
-def _check_detail(detail: str | None, gaussians: int | None) -> None:
-    if detail is not None:
-        chosen_detail(detail)
-    check_gaussians(gaussians)
-
-
-def _noted(prediction: Prediction, note: str) -> Prediction:
-    return replace(prediction, warnings=(*prediction.warnings, note))
-
-
-def _check_refinement(seconds: float, photos: Sequence) -> None:
-    if not 0 < seconds <= LONGEST_REFINEMENT:
-        raise InputError(
-            f"a refinement of {seconds:g} seconds is out of range; choose up to {LONGEST_REFINEMENT}"
-        )
-    if len(photos) < 2:
-        raise InputError("a refinement compares photos with each other; give at least two that overlap")
-
-
-def _refined(scene: Scene, images: Tensor, seconds: float, device: str, progress: Progress) -> Scene:
-    """The scene fitted to its photos, or as it was with a warning that says why; on the CPU again."""
-    try:
-        result = refine(_moved(scene, device), images.to(device), Budget(seconds), progress)
-    except InputError as reason:
-        return scene.with_record(warnings=(*scene.record.warnings, f"not refined: {reason}"))
-    record = {
-        "kept": result.kept,
-        "held_out": scene.record.photos[result.view],
-        "held_out_psnr_db": [round(value, 2) for value in result.held_out],
-        "photos_psnr_db": [round(value, 2) for value in result.photos],
-        "steps": list(result.steps),
-    }
-    warnings = scene.record.warnings
-    if not result.kept:
-        before, after = record["held_out_psnr_db"]
-        note = f"not refined: {record['held_out']}, held out, came no closer ({before} dB, then {after} dB)"
-        warnings = (*warnings, note)
-    return _moved(result.scene, "cpu").with_record(refinement=record, warnings=warnings)
-
-
-def _moved(scene: Scene, device: str) -> Scene:
-    """Gaussians and cameras on a device."""
-    return replace(
-        scene,
-        gaussians=scene.gaussians.map(lambda values: values.to(device)),
-        viewmats=scene.viewmats.to(device),
-        Ks=scene.Ks.to(device),
-    )
-
-
-def peak_memory_mb() -> int | None:
-    """The most memory that this process has held so far, in MB; None where it cannot be asked."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return None
-    unit = 1 if sys.platform == "darwin" else 1024  # bytes there, KiB on Linux
-    return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6)
-
-
-def _atoms(network: LangFlashNet, way: str | None, views: Views) -> Atoms | None:
-    """How groups get their vectors; None: as the network does it.
-
-    Raises:
-        InputError: an unknown way, or one that this preset does not have. WeightsError: no weights for it.
-    """
-    if way is None:
-        return None
-    if way == "average":
-        return lambda weights, features: averaged_atoms(pooled_weights(weights, features), features)[0]
-    if way == "lfa":
-        if not network.aggregated:
-            raise WeightsError("the aggregation has no weights here; choose --aggregation average or crops")
-        return None
-    if way != "crops":
-        raise InputError(f"the aggregation '{way}' is unknown; choose {', '.join(AGGREGATIONS)}")
-    if network.preset.space != "clip":
-        raise InputError(
-            f"crops are embedded by CLIP, but the preset '{network.preset.name}' speaks "
-            f"'{network.preset.space}'; choose --aggregation lfa or average"
-        )
-    tower, photos = load_clip_images(), source_pictures(views)
-    return lambda weights, _: crop_atoms(weights, photos, lambda p: tower.encode(p.cpu()).to(weights))
-
-
-def _groups(network: LangFlashNet, way: str | None, device: str) -> Lifted | None:
-    """Where groups come from; None: the network's own parts.
-
-    Raises:
-        InputError: an unknown way. WeightsError: no weights for it.
-    """
-    if way not in (None, *GROUPINGS):
-        raise InputError(f"the grouping '{way}' is unknown; choose {', '.join(GROUPINGS)}")
-    trained = way in ("queries", "mobile-sam")
-    if trained and not network.grouped:
-        raise WeightsError("the grouping has no weights here; `langflash weights get langflash` fetches them")
-    if trained or (way is None and (network.grouped or sam2_checkpoint() is None)):
-        return None
-    oracle = Sam2(device)
-
-    def lifted(geometry: Geometry, views: Views) -> Tensor:
-        found = [oracle(photo) for photo in views.images]
-        groups = [Groups(s.logits[None, None], s.scores.clamp(1e-6, 1 - 1e-6).logit()[None]) for s in found]
-        return lifted_weights(groups, geometry, views.Ks)
-
-    return lifted
-
-
-def _redrawn(way: str | None, device: str) -> Redrawn | None:
-    """What gives groups finer outlines; None: they stay as they are.
-
-    Raises:
-        WeightsError: no weights for it.
-    """
-    if way != "mobile-sam":
-        return None
-    outlines = Outlines.installed(device)
-    return lambda weights, views: outlines(weights, source_pictures(views))
-
-
-def _bfloat16(preset: str, precision: str, device: str) -> bool:
-    if precision not in PRECISIONS:
-        raise InputError(f"the precision '{precision}' is unknown; choose {', '.join(PRECISIONS)}")
-    if precision == "bfloat16" and device == "cpu" and bfloat16_fails():
-        raise InputError(
-            "ATEN_CPU_CAPABILITY hides what this processor needs for bfloat16; "
-            "take it out of the environment, or choose --precision float32"
-        )
-    if precision != "auto":
-        return precision == "bfloat16"
-    return device != "cpu" or (network_class(PRESETS[preset]).bfloat16_on_cpu and has_bfloat16())
-
-
-def _network(
-    preset: str, weights: Path | str | None, device: str, precision: str, stored: Future[Stored] | None
-) -> LangFlashNet:
-    """The network, read once; a checkpoint that changed on disk is read again."""
-    path = None if weights is None else Path(weights).resolve()
-    changed = path.stat().st_mtime_ns if path is not None and path.is_file() else 0
-    folder = part_folder(PRESETS[preset])
-    installed = tuple((p.name, p.stat().st_mtime_ns) for p in sorted(folder.glob("*.safetensors")))
-    mixed = _bfloat16(preset, precision, device)
-    key = (preset, path, device, mixed, changed, installed)
-    network = _networks.get(key)
-    if network is None:
-        read = None if stored is None else stored.result()
-        network = load_network(preset, path, device, bfloat16=mixed, stored=read)
-        _networks.clear()  # two are too much memory
-        _networks[key] = network
-    return network
-
-
-def _on_cpu(prediction: Prediction) -> Prediction:
-    tensors = {name: value.cpu() for name, value in vars(prediction).items() if isinstance(value, Tensor)}
-    return replace(prediction, gaussians=prediction.gaussians.map(Tensor.cpu), **tensors)
-
-
-def _device(name: str) -> str:
-    if name not in ("auto", "cpu", "cuda"):
-        raise InputError(f"the device '{name}' is unknown; choose auto, cpu or cuda")
-    if name == "cuda" and not torch.cuda.is_available():
-        raise InputError("there is no CUDA device that torch can use; choose --device cpu or auto")
-    return ("cuda" if torch.cuda.is_available() else "cpu") if name == "auto" else name
 
 
 def _camera(scene: Scene, view: int, camera: Camera | None, size: tuple[int, int] | None) -> Camera:

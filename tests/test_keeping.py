@@ -8,13 +8,14 @@ import pytest
 import torch
 
 import langflash_core as lf
-from langflash_core import pipeline
 from langflash_core.errors import Cancelled, OutputError
 from langflash_core.images.pictures import read_pictures
+from langflash_core.images.views import load_views
 from langflash_core.keeping import Keep, forget
 from langflash_core.kept_prediction import arrays_of, prediction_of
 from langflash_core.network import GuidedDepthNet
 from langflash_core.network.stereo.keypoints import KeyPoints
+from langflash_core.reconstruction.finding import keep_of
 from langflash_core.records import FoundLens
 from langflash_core.resources import asset_path
 from langflash_core.types import Gaussians, Prediction
@@ -135,9 +136,9 @@ def test_a_reconstruction_that_was_ended_goes_on_to_the_same_bits(tmp_path: Path
 
 
 def test_what_is_kept_hangs_on_photos_and_settings(tmp_path: Path):
-    views = pipeline.load_views(PHOTOS, pictures=lambda: read_pictures(PHOTOS, area=84 * 84))
-    keys = {pipeline._keep(tmp_path, views, settings).key for settings in (("mini", 1), ("mini", 2))}
+    views = load_views(PHOTOS, pictures=lambda: read_pictures(PHOTOS, area=84 * 84))
+    keys = {keep_of(tmp_path, views, settings).key for settings in (("mini", 1), ("mini", 2))}
 
-    keys.add(pipeline._keep(tmp_path, replace(views, images=views.images + 1 / 255), ("mini", 1)).key)
-    keys.add(pipeline._keep(tmp_path, replace(views, Ks=views.Ks * 1.01), ("mini", 1)).key)
+    keys.add(keep_of(tmp_path, replace(views, images=views.images + 1 / 255), ("mini", 1)).key)
+    keys.add(keep_of(tmp_path, replace(views, Ks=views.Ks * 1.01), ("mini", 1)).key)
     assert len(keys) == 4

@@ -10,11 +10,11 @@ import pytest
 import torch
 
 import langflash_core as lf
-from langflash_core import pipeline
 from langflash_core.errors import Cancelled, ImageError, InputError, PromptError, ViewError, WeightsError
 from langflash_core.images.straight import straightened
 from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS, GuidedDepthNet, build_network, save_network
+from langflash_core.reconstruction.views import found_views, straight_prediction
 from langflash_core.records import BentLens, FoundFocal
 from langflash_core.resources import asset_path
 from langflash_core.splat import render
@@ -131,10 +131,10 @@ def test_a_warning_of_an_assumed_lens_goes_when_photos_tell_it(unchecked):
     nothing = torch.zeros(0)
     plain = Prediction(Gaussians.none(), nothing, nothing, "minilm", nothing, nothing, nothing)
     found = replace(plain, Ks=2 * Ks, lenses=(FoundLens(61.0, 0.5, 3, 65.0, False),))
-    told = pipeline._through(views, found)
+    told = found_views(views, found)
     assert told.warnings == ("dark",) and (told.Ks == 2 * Ks).all()
-    [dark, left] = pipeline._through(views, plain).warnings
-    assert dark == "dark" and left.startswith("assumed;") and (pipeline._through(views, plain).Ks == Ks).all()
+    [dark, left] = found_views(views, plain).warnings
+    assert dark == "dark" and left.startswith("assumed;") and (found_views(views, plain).Ks == Ks).all()
 
 
 @pytest.mark.parametrize("rounds", [0, 1, 9])
@@ -153,7 +153,7 @@ def test_photos_are_straightened_until_nothing_bends(rounds, unchecked):
             raise BentLens((FoundFocal(1.0, 0.01, 2, -0.05 / 4 ** len(seen), 0.001),))
         return replace(plain, viewmats=torch.eye(4).expand(len(seen), 4, 4))
 
-    predicted, views = pipeline._straight(predict, taken)
+    predicted, views = straight_prediction(predict, taken)
     assert len(predicted.viewmats) == len(seen) and views is seen[-1] and len(seen) == min(rounds, 3) + 1
     assert views.lenses is not None and views.lenses.straight == (rounds > 3)
     if not rounds:
@@ -180,7 +180,7 @@ def test_a_lens_that_is_not_told_again_stays_straightened(unchecked):
             raise BentLens(found)
         return Prediction(Gaussians.none(), nothing, nothing, "minilm", nothing, nothing, nothing)
 
-    _, views = pipeline._straight(predict, taken)
+    _, views = straight_prediction(predict, taken)
     assert views.lenses is not None and views.lenses.straightened == (first, second)
 
 

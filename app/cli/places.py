@@ -22,7 +22,9 @@ from langflash_core.export.answers import answers_document, write_answers
 from langflash_core.export.png import heat_over, to_8bit
 from langflash_core.extras import optional_packages
 from langflash_core.files import filled_atomically, readable_file, write_atomically
+from langflash_core.memory import peak_memory_mb
 from langflash_core.picture_files import STORED, opened_picture
+from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.file import load, save
 from langflash_core.types import QueryResult, Scene
 from langflash_core.writing import Renderer, request_of_whole, write
@@ -55,6 +57,7 @@ class _Maker:
         self._order = order
         self._stack = stack
         self._opened: Renderer | None = None
+        self._networks = Networks()
 
     def make(self, job: Job) -> Made:
         """Fill the job's folder, or say why not; no error leaves this, and nothing is printed."""
@@ -69,7 +72,7 @@ class _Maker:
             gaussians=len(scene.gaussians),
             groups=scene.semantics.num_atoms,
             found="" if result is None else f"{sum(a.found for a in result.answers)}/{len(result.answers)}",
-            memory_mb=pipeline.peak_memory_mb() or 0,
+            memory_mb=peak_memory_mb() or 0,
             warnings=(*scene.record.warnings, *notes),
         )
 
@@ -89,6 +92,7 @@ class _Maker:
             gaussians=order.gaussians,
             fov=order.fov,
             device=order.device,
+            networks=self._networks,
         )
         with filled_atomically(job.folder) as staging:
             save(scene, staging / SCENE)

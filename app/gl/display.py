@@ -107,7 +107,7 @@ class Display:
                 "fade.frag",
                 {**drawn.colour, **drawn.depth, "eyes": eyes},
                 {"background": drawn.background, "num_photos": len(places), **lens(drawn.camera)},
-                {"COS_NONE": low, "COS_FULL": high},
+                {**_COVERED, "COS_NONE": low, "COS_FULL": high},
             )
             eyes.release()
 
@@ -144,9 +144,10 @@ class Display:
     def shown(
         self, drawn: Drawn, kind: str, fragment: str, uniforms: Uniforms, key: tuple
     ) -> moderngl.Texture:
-        """What a fragment shader makes of depth and transmittance; painted again where these, or `key`, are
-        others."""
-        return self._filled((kind,), (drawn.key, *key), fragment, drawn.depth, uniforms)
+        """What a fragment shader makes of depth, transmittance and the camera (unproject.glsl); painted again
+        where these, or `key`, are others."""
+        uniforms = {**lens(drawn.camera), **uniforms}
+        return self._filled((kind,), (drawn.key, *key), fragment, drawn.depth, uniforms, _COVERED)
 
     def trust(self, drawn: Drawn, photos: PhotoDepths, own: bool, colormap: str) -> moderngl.Texture:
         """Agreement of the photos' own depths, or else how many photos see each pixel."""

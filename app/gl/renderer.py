@@ -409,7 +409,7 @@ class SplatRenderer:
         return picture.view.display.depth(picture.drawn, span, colormap)
 
     def shown(self, kind: str, fragment: str, uniforms: Uniforms, key: tuple = ()) -> moderngl.Texture:
-        """What a fragment shader of shaders/splat/ makes of the view's depth and transmittance.
+        """What a fragment shader of shaders/splat/ makes of the view's depth, transmittance and camera.
 
         Args:
             kind: names the picture. key: of all that `uniforms` hold; another one, and it is painted again.

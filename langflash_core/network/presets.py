@@ -6,6 +6,12 @@ Two frozen dataclasses, one per kind of geometry: `GuidedDepth` (matches and dep
 
 from dataclasses import dataclass
 
+PRECISIONS = ("auto", "float32", "bfloat16")
+AGGREGATIONS = ("lfa", "average", "crops")
+"""Ways in which a group gets its vector."""
+GROUPINGS = ("queries", "mobile-sam", "sam2")
+"""Where groups come from."""
+
 
 @dataclass(frozen=True)
 class Splitting:

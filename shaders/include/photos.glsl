@@ -1,23 +1,12 @@
-// Purpose: where the surface of a pixel lies in every photo, and what depth that photo has there.
-// Frames: camera axes are OpenCV's; `pinhole` of the picture's pixels, `pinholes` of the photos' depth maps.
-//         MAX_PHOTOS and COVERED_ALPHA are set by the program; luma.glsl is included before.
+// Purpose: where the surface of a pixel (unproject.glsl) lies in every photo, and what depth that photo has there.
+// Frames: camera axes are OpenCV's; `pinholes` of the photos' depth maps. MAX_PHOTOS is set by the program;
+//         luma.glsl is included before.
 
 uniform sampler2D colour;
-uniform sampler2D depth;                 // of the picture: sum of T alpha z, sum of T alpha
 uniform sampler2DArray photo_depths;     // z, 0 where a photo shows nothing
 uniform int num_photos;
-uniform vec4 pinhole;                    // fx, fy, cx, cy
-uniform bool orthographic;               // of the picture
 uniform vec4 pinholes[MAX_PHOTOS];
 uniform mat4 to_photos[MAX_PHOTOS];      // the picture's camera to a photo's
-
-// The pixel's surface in camera axes; z = 0 where the picture shows none.
-vec3 surface(ivec2 pixel) {
-    vec2 sums = texelFetch(depth, pixel, 0).rg;
-    if (sums.y < COVERED_ALPHA) return vec3(0.0);
-    float z = sums.x / sums.y;
-    return vec3((vec2(pixel) + 0.5 - pinhole.zw) / pinhole.xy * (orthographic ? 1.0 : z), z);
-}
 
 // (z of the point in this photo) / (depth of the photo there); 0 where the photo does not frame it.
 float depth_ratio(vec3 pos_c, int photo) {

@@ -4,11 +4,10 @@
 // Frames: camera axes are OpenCV's; `eyes` are the photos' places in those of the picture, a texel each.
 //         COS_NONE and COS_FULL are set by the program.
 
+#include "unproject.glsl"
+
 uniform sampler2D colour;  // premultiplied
-uniform sampler2D depth;   // sum of T alpha z, sum of T alpha
 uniform vec3 background;
-uniform vec4 pinhole;      // fx, fy, cx, cy
-uniform bool orthographic;
 uniform int num_photos;
 uniform sampler2D eyes;
 
@@ -29,9 +28,7 @@ void main() {
     vec2 sums = texelFetch(depth, pixel, 0).rg;
     vec3 rgb = texelFetch(colour, pixel, 0).rgb;
     if (sums.g > 1.0 / 255.0) {
-        float z = sums.r / sums.g;
-        float known = trust(vec3((vec2(pixel) + 0.5 - pinhole.zw) / pinhole.xy * (orthographic ? 1.0 : z), z));
-        rgb = mix(sums.g * background, rgb, known);
+        rgb = mix(sums.g * background, rgb, trust(behind(pixel, sums.r / sums.g)));
     }
     out_colour = vec4(rgb, sums.g);
 }

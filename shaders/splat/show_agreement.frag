@@ -6,6 +6,7 @@
 
 #include "colormaps.glsl"
 #include "luma.glsl"
+#include "unproject.glsl"
 #include "photos.glsl"
 
 uniform float opacity;

@@ -3,6 +3,7 @@
 // Frames: see photos.glsl.
 
 #include "luma.glsl"
+#include "unproject.glsl"
 #include "photos.glsl"
 
 uniform vec3 count_colours[3];

@@ -126,7 +126,12 @@ def modes(guide: Guide, folder: Path) -> None:
         guide.tell(ask.ShowAtom(atom_of(guide, "plant")) if mode is pictures.WEIGHT else camera.SetMode(mode))
         guide.rest()
         shots.append(Shot(caption, guide.canvas()))
-    write_sheet(shots, folder / "tour_modes.png", columns=5, width=260, numbered=False)
+    write_sheet(shots, folder / "tour_modes.png", columns=_columns(len(shots)), width=260, numbered=False)
+
+
+def _columns(count: int) -> int:
+    """Four or five a row, whichever leaves fewer places empty."""
+    return min((5, 4), key=lambda columns: -count % columns)
 
 
 def atom_of(guide: Guide, word: str) -> int:

@@ -26,8 +26,8 @@ def run(args: Namespace, out: TextIO) -> None:
     import torch
 
     from langflash_core.lab.evaluation.speed import Plan, measure_network, speed_table
+    from langflash_core.memory import peak_memory_mb
     from langflash_core.network import PRESETS
-    from langflash_core.pipeline import peak_memory_mb
 
     device = args.device if args.device != "auto" else ("cuda" if torch.cuda.is_available() else "cpu")
     if device == "cuda" and not torch.cuda.is_available():

@@ -9,12 +9,12 @@ from pathlib import Path
 import cv2
 import torch
 
-from langflash_core import pipeline
 from langflash_core.batch.dispatch import Job, Made
 from langflash_core.extras import optional_packages
 from langflash_core.lab.labels.clips import ClipPlace
 from langflash_core.lab.labels.making import LabelMaker
 from langflash_core.lab.labels.order import LabelOrder
+from langflash_core.memory import peak_memory_mb
 from langflash_core.running import Progress
 
 from ..report import explained
@@ -55,7 +55,7 @@ def open_labeller(
             seconds=time.perf_counter() - start,
             groups=len(labels.objects),
             found=f"{measured.coverage.mean():.0%} covered, {measured.steady.mean():.1%} steady",
-            memory_mb=pipeline.peak_memory_mb() or 0,
+            memory_mb=peak_memory_mb() or 0,
         )
 
     yield make

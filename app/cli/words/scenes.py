@@ -5,6 +5,7 @@ from pathlib import Path
 from langflash_core import pictures
 from langflash_core.detail import EXPORT_DETAILS
 from langflash_core.mending.recipes import HOWS, KINDS
+from langflash_core.network.presets import AGGREGATIONS, GROUPINGS, PRECISIONS
 from langflash_core.outputs import WORDS, help_of_files, help_of_words
 
 from ..values import (
@@ -65,20 +66,20 @@ def add_reconstruct(commands) -> None:
     add_detail(command)
     command.add_argument(
         "--aggregation",
-        choices=("lfa", "average", "crops"),
+        choices=AGGREGATIONS,
         help="how a group gets its vector: trained, the average of dense features, or CLIP on a cut-out "
         "(default: lfa where it has weights, else average)",
     )
     command.add_argument(
         "--grouping",
-        choices=("queries", "mobile-sam", "sam2"),
+        choices=GROUPINGS,
         help="where groups come from: trained queries, the same with MobileSAM's outlines where its weights "
         "are installed, or masks of SAM 2 lifted to the scene (default: queries where they have weights, "
         "else sam2 where it is installed, else the language features)",
     )
     command.add_argument(
         "--precision",
-        choices=("auto", "float32", "bfloat16"),
+        choices=PRECISIONS,
         default="auto",
         help="auto: bfloat16 on graphics cards and, for full, on processors with instructions for it "
         "(default: auto)",

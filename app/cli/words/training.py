@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from langflash_core.network.presets import PRECISIONS
+
 from ..values import minutes, part, seed, size, whole_count
 from .shared import add_description, add_json, add_output, new_actions, new_command
 
@@ -254,7 +256,7 @@ def _add_loop(command: argparse.ArgumentParser) -> None:
         metavar="N",
         help="that a step is made of, shared by the processes (default: one each)",
     )
-    command.add_argument("--precision", choices=("auto", "float32", "bfloat16"), default="auto")
+    command.add_argument("--precision", choices=PRECISIONS, default="auto")
     command.add_argument("--board", action="store_true", help="also write TensorBoard's logs, in RUN/board")
 
 

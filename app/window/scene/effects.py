@@ -8,6 +8,7 @@ from pathlib import Path
 from langflash_core.colormaps import colour_bar
 from langflash_core.errors import LangFlashError
 from langflash_core.formats import COLOUR_MAPS
+from langflash_core.reconstruction.networks import Networks
 
 from ..commands import Command, Notify
 from ..editing.placing import SetHandle
@@ -68,6 +69,7 @@ class SceneEffects(Effects):
         self._viewport = viewport
         self._thumbnails = thumbnails
         self._entitle = entitle
+        self._networks = Networks()
 
     def follow(self, command: Command, before: State, state: State) -> None:
         """Jobs and errands of the worker; a scene that has come goes to the renderer."""
@@ -81,7 +83,8 @@ class SceneEffects(Effects):
                 submit(MakeThumbnails(paths))
             case Reconstruct() if state.scene.photos:
                 photos, detail = state.scene.photos, state.preferences.detail
-                submit(ReconstructPhotos(tuple(p.path for p in photos), tuple(p.fov for p in photos), detail))
+                paths, fovs = tuple(p.path for p in photos), tuple(p.fov for p in photos)
+                submit(ReconstructPhotos(paths, fovs, detail, self._networks))
             case OpenScene(path, edits, alone):
                 submit(LoadScene(path, edits, alone))
             case SaveScene(path) if state.scene.info is not None:

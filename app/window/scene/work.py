@@ -18,6 +18,7 @@ from langflash_core.geometry.poses import Vector, from_view
 from langflash_core.geometry.reach import median_reach
 from langflash_core.images.still_names import film_of, shown_name
 from langflash_core.picture_files import STORED, opened_picture
+from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command, ShowPicture
@@ -49,11 +50,13 @@ THUMBNAIL_SIDE = 320  # pixels of the longer side
 @dataclass(frozen=True)
 class ReconstructPhotos(Job):
     """Make a scene of photos; of many it goes on from what was kept (`unfinished`). fovs: degrees of the
-    longer side, one per photo; None: its record. detail: its name, of `langflash_core.detail`."""
+    longer side, one per photo; None: its record. detail: its name, of `langflash_core.detail`. networks:
+    the session's, so that weights are read once."""
 
     paths: tuple[Path, ...]
     fovs: tuple[float | None, ...] = ()
     detail: str = DEFAULT_DETAIL
+    networks: Networks = field(default_factory=Networks, repr=False, compare=False)
 
     def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> SceneArrived:
         from langflash_core.pipeline import reconstruct
@@ -61,7 +64,13 @@ class ReconstructPhotos(Job):
         lenses = self.fovs or None
         with unfinished.kept(self.paths) as keep:
             scene = reconstruct(
-                self.paths, fov=lenses, detail=self.detail, keep=keep, progress=progress, cancelled=cancelled
+                self.paths,
+                fov=lenses,
+                detail=self.detail,
+                keep=keep,
+                progress=progress,
+                cancelled=cancelled,
+                networks=self.networks,
             )
         return SceneArrived(describe_scene(scene, serial, called(self.paths)))
 

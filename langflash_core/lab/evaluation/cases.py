@@ -58,6 +58,7 @@ from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import LanguageSpace, language_space
 from langflash_core.network import PRESETS, LangFlashNet, load_network
 from langflash_core.pipeline import query
+from langflash_core.reconstruction.networks import Networks
 from langflash_core.types import Frame, Scene, Views
 
 
@@ -74,6 +75,7 @@ class Judge:
     preset: str = "mini"
     size: int | None = None
     align: bool = False
+    networks: Networks = field(default_factory=Networks, repr=False, compare=False)
 
     @staticmethod
     def of(
@@ -142,7 +144,12 @@ def judge_case(judge: Judge, case: Case, look: Look | None = None) -> Tally:
     tally = Tally()
     photos = [case.folder.photo(id) for id in case.photos]
     scene, seconds = scene_of(
-        photos, photos[0].intrinsics, weights=judge.weights, preset=judge.preset, size=judge.size
+        photos,
+        photos[0].intrinsics,
+        weights=judge.weights,
+        preset=judge.preset,
+        size=judge.size,
+        networks=judge.networks,
     )
     tally.note(seconds=seconds, placed=float(scene.num_views == len(photos)))
     tally.note(**{f"stage_{name}_seconds": value for name, value in scene.record.cost.timings.items()})

@@ -61,6 +61,7 @@ from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import LanguageSpace, language_space
 from langflash_core.network import PRESETS, LangFlashNet, load_network
 from langflash_core.pipeline import query, reconstruct
+from langflash_core.reconstruction.networks import Networks
 from langflash_core.types import Camera, Frame, Scene, Views
 
 DRAWN = 1
@@ -87,6 +88,7 @@ class Judged:
     preset: str
     size: int | None
     render: Render
+    networks: Networks = field(default_factory=Networks, repr=False, compare=False)
 
 
 @dataclass
@@ -218,6 +220,7 @@ def draw_photo(judged: Judged, photo: LabelledPhoto) -> tuple[Drawn, float]:
             weights=judged.weights,
             intrinsics=photo.intrinsics,
             size=judged.size,
+            networks=judged.networks,
         )
         seconds = time.perf_counter() - start
         area = preset.native_area if judged.size is None else judged.size**2

@@ -30,6 +30,7 @@ from langflash_core.lab.training.cache import SIZES
 from langflash_core.lab.training.measures import nan_mean
 from langflash_core.level import found_world
 from langflash_core.pipeline import reconstruct
+from langflash_core.reconstruction.networks import Networks
 from langflash_core.records import World
 from langflash_core.running import Progress
 from langflash_core.scene.file import load, save
@@ -77,7 +78,7 @@ def run_level(
     Returns:
         Plain JSON: `rooms` (a row each) and `summary`.
     """
-    chosen, judged = list(seeds), []
+    chosen, judged, networks = list(seeds), [], Networks()
     with RoomRenderer(pack) as drawer:
         for number, seed in enumerate(chosen):
             progress(f"room {seed}", number / max(1, len(chosen)))
@@ -85,7 +86,8 @@ def run_level(
                 staged = drawn_room(pack, drawer, seed, photos)
             except ValueError:  # no usable photos in any room of this seed
                 continue
-            judged.append(judge(seed, kept_scene(staged, seed, keep), staged, things=things))
+            scene = kept_scene(staged, seed, keep, networks)
+            judged.append(judge(seed, scene, staged, things=things))
     return {
         "rooms": [{"seed": each.seed, **rounded(each.numbers)} for each in judged],
         "summary": summary(judged),
@@ -104,7 +106,7 @@ def drawn_room(pack: Pack, drawer: RoomRenderer, seed: int, photos: int) -> Stag
     )
 
 
-def kept_scene(staged: StagedRoom, seed: int, keep: Path | None) -> Scene:
+def kept_scene(staged: StagedRoom, seed: int, keep: Path | None, networks: Networks | None = None) -> Scene:
     """The scene of a room's photos, made now or by an earlier run."""
     path = None if keep is None else keep / f"{seed}.langflash"
     if path is not None and path.is_file():
@@ -115,7 +117,7 @@ def kept_scene(staged: StagedRoom, seed: int, keep: Path | None) -> Scene:
             Image.fromarray(image).save(file, "PNG", compress_level=1)
         K = staged.views.Ks[0]
         lens = (float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]))
-        scene = reconstruct(files, intrinsics=lens)
+        scene = reconstruct(files, intrinsics=lens, networks=networks)
     if path is not None:
         make_folder(path.parent)
         save(scene, path)

@@ -34,6 +34,7 @@ from langflash_core.lab.training.losses import ssim_map
 from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, nan_mean, psnr
 from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.pipeline import reconstruct
+from langflash_core.reconstruction.networks import Networks
 from langflash_core.running import Progress
 from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Camera, Frame, Scene
@@ -144,11 +145,12 @@ def pair_tallies(
     look: Look | None = None,
 ) -> Iterator[tuple[str, Tally]]:
     """Name and tally of every pair, in order; those on the shelf are not judged again."""
+    networks = Networks()
 
     def judge(triple: Triple) -> Tally:
         tally = Tally()
         options = {"weights": weights, "preset": preset, "size": size, "lpips": lpips, "align": align}
-        judge_triple(folder, triple, render, tally, **options, look=look)
+        judge_triple(folder, triple, render, tally, **options, look=look, networks=networks)
         return tally
 
     return collected(((key_of(t), t) for t in triples), judge, shelf)
@@ -167,11 +169,14 @@ def judge_triple(
     lpips: Lpips | None = None,
     align: bool = False,
     look: Look | None = None,
+    networks: Networks | None = None,
 ) -> None:
     """Pose, depth and the photo from between of one pair; adds to `tally`."""
     first, between, second = (folder.photo(id) for id in (triple.first, triple.between, triple.second))
     to_second, to_between = relative(first, second), relative(first, between)
-    scene, seconds = scene_of((first, second), first.intrinsics, weights=weights, preset=preset, size=size)
+    scene, seconds = scene_of(
+        (first, second), first.intrinsics, weights=weights, preset=preset, size=size, networks=networks
+    )
     placed = scene.num_views == 2
     predicted = scene.viewmats[1].cpu() if placed else torch.eye(4)
     error = pose_error(predicted, to_second.float())
@@ -243,14 +248,18 @@ def scene_of(
     weights: Path | None = None,
     preset: str = "mini",
     size: int | None = None,
+    networks: Networks | None = None,
 ) -> tuple[Scene, float]:
-    """Photos through the whole program, and the seconds that took. intrinsics: as `reconstruct` has them."""
+    """Photos through the whole program, and the seconds that took. intrinsics and what follows: as
+    `reconstruct` has them."""
     with tempfile.TemporaryDirectory() as folder:
         paths = [Path(folder) / f"{photo.id}.png" for photo in photos]
         for path, photo in zip(paths, photos, strict=True):
             Image.fromarray(photo.image).save(path, "PNG", compress_level=1)
         start = time.perf_counter()
-        scene = reconstruct(paths, preset=preset, weights=weights, intrinsics=intrinsics, size=size)
+        scene = reconstruct(
+            paths, preset=preset, weights=weights, intrinsics=intrinsics, size=size, networks=networks
+        )
         return scene, time.perf_counter() - start
 
 

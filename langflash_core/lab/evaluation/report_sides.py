@@ -13,6 +13,7 @@ from langflash_core.lab.evaluation.side_tables import LOOKS, ONCE, place_name, t
 from langflash_core.lab.evaluation.sides import judge, summary
 from langflash_core.lab.evaluation.tallies import Shelf, collected
 from langflash_core.lab.rooms import RoomRenderer, load_pack
+from langflash_core.reconstruction.networks import Networks
 
 
 @dataclass
@@ -37,9 +38,12 @@ def side_tallies(
     Raises:
         InputError: the pack cannot be used. WeightsError: the checkpoint does not fit.
     """
+    networks = Networks()
 
     def judged(case: Case) -> Tally:
-        scene, seconds = scene_of(case.photos, case.intrinsics, weights=weights, preset=preset)
+        scene, seconds = scene_of(
+            case.photos, case.intrinsics, weights=weights, preset=preset, networks=networks
+        )
         row = judge(scene, case.truth(scene.view_size), render, lpips)
         return Tally([{"name": case.name, "seconds": round(seconds, 3), **row}])
 

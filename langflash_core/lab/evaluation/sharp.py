@@ -14,7 +14,7 @@ Sizes: H W pixels.
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -48,6 +48,7 @@ from langflash_core.lab.evaluation.side_subjects import Look, photo_look
 from langflash_core.lab.evaluation.sides import aligned, camera_of, covered_depths, number
 from langflash_core.lab.training.measures import nan_mean, psnr
 from langflash_core.pipeline import reconstruct
+from langflash_core.reconstruction.networks import Networks
 from langflash_core.running import Progress
 from langflash_core.scene.file import load, save
 from langflash_core.types import NO_LANGUAGE, Camera, Record, Scene, Semantics
@@ -90,6 +91,7 @@ class Bench:
     lpips: Lpips | None = None
     beside: Path | None = None
     keep: Path | None = None
+    networks: Networks = field(default_factory=Networks, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -181,6 +183,7 @@ def _columns(subject: Subject, bench: Bench) -> Iterator[Column]:
                 weights=bench.weights,
                 preset=bench.preset,
                 size=bench.size,
+                networks=bench.networks,
             )
             seconds = time.perf_counter() - start
             path = (bench.keep or Path(folder)) / way / f"{subject.name}.langflash"

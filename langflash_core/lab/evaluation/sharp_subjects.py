@@ -25,9 +25,8 @@ from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
 from langflash_core.lab.rooms import Pack, RoomRenderer, RoomViews, staged_room
 from langflash_core.lab.training.commands import cache_plan
 from langflash_core.resources import asset_path
+from langflash_core.scene.detailed import MOST_ENLARGED
 
-MOST = 3
-"""So many times the network's grid a picture is compared at, at most."""
 _LEFT = re.compile(r"(.+)_left")
 
 
@@ -71,11 +70,11 @@ class Subject:
 
 def sharp_size(photo: tuple[int, int], grid: tuple[int, int]) -> tuple[int, int]:
     """(width, height) at which a photo is compared: of exactly the grid's shape, as large as the photo's crop
-    but at most `MOST` times the grid; sizes are (width, height)."""
+    but at most `MOST_ENLARGED` times the grid; sizes are (width, height)."""
     left, _, right, _ = centre_box(*photo, grid)
     divisor = math.gcd(*grid)
     columns, rows = grid[0] // divisor, grid[1] // divisor
-    steps = min(MOST * divisor, max(1, int((right - left) / columns + 1e-6)))
+    steps = min(MOST_ENLARGED * divisor, max(1, int((right - left) / columns + 1e-6)))
     return columns * steps, rows * steps
 
 
@@ -146,7 +145,7 @@ def room_subjects(
     kind: str = "held_out",
     count: int = 20,
     first: int | None = None,
-    times: int = MOST,
+    times: int = MOST_ENLARGED,
 ) -> Iterator[Subject]:
     """Rooms of a set of `langflash train cache`, made again from their seeds, `times` as large, with their
     third view as the photo from between.

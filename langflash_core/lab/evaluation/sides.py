@@ -40,6 +40,7 @@ from langflash_core.lab.evaluation.side_subjects import Case, Look, Subject
 from langflash_core.lab.training.losses import ssim_map
 from langflash_core.lab.training.measures import nan_mean, psnr
 from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.reconstruction.networks import Networks
 from langflash_core.running import Progress
 from langflash_core.scene.gaps import filled
 from langflash_core.types import Camera, Frame, Scene
@@ -72,10 +73,12 @@ def run_sides(
     Raises:
         InputError: there is no case. WeightsError: the checkpoint does not fit.
     """
-    judged = []
+    judged, networks = [], Networks()
     for done, case in enumerate(cases):
         progress(case.name, done / max(count, 1))
-        scene, seconds = scene_of(case.photos, case.intrinsics, weights=weights, preset=preset, size=size)
+        scene, seconds = scene_of(
+            case.photos, case.intrinsics, weights=weights, preset=preset, size=size, networks=networks
+        )
         made(case, scene)
         row = judge(scene, case.truth(scene.view_size), render, lpips)
         judged.append({"name": case.name, "seconds": round(seconds, 3), **row})

@@ -28,6 +28,7 @@ from langflash_core.lab.evaluation.posed import (
 from langflash_core.lab.evaluation.tallies import merged
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.training.measures import nan_mean
+from langflash_core.reconstruction.networks import Networks
 from langflash_core.running import Progress
 from langflash_core.types import Scene
 
@@ -106,11 +107,12 @@ def run_stretches(
     """
     work = list(_scenes(stretches))
     warm = [folder.photo(id) for id in work[0][1]]
-    scene_of(warm, warm[0].intrinsics, weights=weights, preset=preset, size=size)
+    options = {"weights": weights, "preset": preset, "size": size, "networks": Networks()}
+    scene_of(warm, warm[0].intrinsics, **options)
     tallies: dict[int, list[Tally]] = {}
     for done, (between, ids) in enumerate(work, start=1):
         tally = Tally()
-        judge_stretch(folder, ids, between, render, tally, weights=weights, preset=preset, size=size)
+        judge_stretch(folder, ids, between, render, tally, **options)
         tallies.setdefault(len(ids), []).append(tally)
         progress(f"{len(ids)} photos from {ids[0]}", done / len(work))
     return {
@@ -138,10 +140,13 @@ def judge_stretch(
     weights: Path | None = None,
     preset: str = "mini",
     size: int | None = None,
+    networks: Networks | None = None,
 ) -> None:
     """One scene of the photos `ids` and the photo between them; adds to `tally`."""
     photos, target = [folder.photo(id) for id in ids], folder.photo(between)
-    scene, seconds = scene_of(photos, photos[0].intrinsics, weights=weights, preset=preset, size=size)
+    scene, seconds = scene_of(
+        photos, photos[0].intrinsics, weights=weights, preset=preset, size=size, networks=networks
+    )
     truths = {photo.id: relative(photos[0], photo).float() for photo in photos[1:]}
     placed = placed_views(scene)
     for id, truth in truths.items():

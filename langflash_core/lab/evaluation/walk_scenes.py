@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -28,6 +28,7 @@ from langflash_core.lab.evaluation.walk_measures import centres_of, fitted_camer
 from langflash_core.lab.evaluation.walk_subjects import Walk
 from langflash_core.lab.photos import LabelledPhoto
 from langflash_core.pipeline import reconstruct
+from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.file import load, save
 from langflash_core.types import NO_LANGUAGE, Record, Scene, Semantics
 
@@ -53,6 +54,7 @@ class Bench:
     lpips: Lpips | None = None
     memory: bool = False
     colmap: bool = False
+    networks: Networks = field(default_factory=Networks, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,10 @@ def made_of(walk: Walk, frames: Sequence[int], bench: Bench, *, memory: bool = F
         "viewmats": torch.from_numpy(truth).float() if bench.given_poses else None,
     }
     with files_of(photos) as paths:
-        scene, cost = (_made_apart if memory else _made)(paths, options)
+        if memory:
+            scene, cost = _made_apart(paths, options)
+        else:
+            scene, cost = _made(paths, {**options, "networks": bench.networks})
     placed = placed_views(scene)
     views = tuple(view for view, photo in enumerate(photos) if photo.id in placed)
     fit = fitted_cameras(np.stack([as_array(placed[photos[v].id]) for v in views]), truth[list(views)])

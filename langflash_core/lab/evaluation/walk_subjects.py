@@ -25,7 +25,6 @@ from jaxtyping import Float
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
-from langflash_core.lab.evaluation.sharp_subjects import MOST
 from langflash_core.lab.evaluation.walk_passers import Screen, screen_in, with_somebody
 from langflash_core.lab.evaluation.walk_rooms import Way, found_way, shaken
 from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
@@ -34,6 +33,7 @@ from langflash_core.lab.rooms.layout import Room
 from langflash_core.lab.rooms.render import Picture
 from langflash_core.lab.rooms.sensor import expose
 from langflash_core.lab.training.commands import cache_plan
+from langflash_core.scene.detailed import MOST_ENLARGED
 
 PHOTOS = (2, 4, 8, 16, 32)
 KEPT = 8
@@ -162,7 +162,7 @@ class Camcorder:
     exposure: float = 0.0
     blur: float = 0.0
     bend: float = 0.0
-    times: int = MOST
+    times: int = MOST_ENLARGED
     passers: int = 0
     screens: int = 0
 

@@ -15,6 +15,7 @@ import torch
 from PIL import Image
 
 import langflash_core
+from langflash_core.pictures import PICTURES
 from langflash_core.splat import render
 from langflash_core.types import Camera
 from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS
@@ -125,7 +126,12 @@ def test_size_and_camera_file(run, scene_file, tmp_path):
 @pytest.mark.parametrize("backend", ["torch", "gl"])
 @pytest.mark.parametrize(
     "what",
-    ["rgb", "depth", "atoms", "weights:1", "relevance --prompt armchair", "labels --prompt armchair lamp"],
+    [
+        picture.word.replace(":K", ":1")
+        + (" --prompt armchair" + " lamp" * (not picture.one)) * (picture.needs == "phrases")
+        for picture in PICTURES
+        if picture.word
+    ],
 )
 def test_render(run, scene_file, tmp_path, what, backend):
     path = tmp_path / "new" / "a.png"

@@ -13,6 +13,7 @@ from app.window.scene import commands as show
 from app.window.scene import work
 from app.window.worker import Worker
 from langflash_core.memory import give_back
+from langflash_core.reconstruction.networks import Networks
 from langflash_core.resources import asset_path
 from tests.app.window.test_worker import PATIENCE, wait_for
 
@@ -21,6 +22,7 @@ STOPPED_SECONDS = 1.0  # from the cancel until the worker is free for the next j
 KEPT_MB = 40  # that may stay: what allocators hold back, not the some hundred MB of a reconstruction
 TRIES = 3  # what other programs take from this machine comes and goes; the best of these counts
 PHOTOS = tuple(asset_path(f"photos/living_room_{side}.png") for side in ("left", "right"))
+NETWORKS = Networks()  # as a session holds one
 
 
 def resident_mb() -> float:
@@ -31,7 +33,7 @@ def resident_mb() -> float:
 def stages_of(worker: Worker) -> dict[str, float]:
     """When each stage of a whole reconstruction began, seconds from the first one."""
     began: dict[str, float] = {}
-    worker.submit(work.ReconstructPhotos(PHOTOS))
+    worker.submit(work.ReconstructPhotos(PHOTOS, networks=NETWORKS))
     end = time.monotonic() + PATIENCE
     while "done" not in began:
         assert time.monotonic() < end, began
@@ -64,7 +66,7 @@ def cancelled_in(worker: Worker, stage: str, wait: float) -> tuple[float, float,
     gc.collect()
     give_back()
     before = resident_mb()
-    worker.submit(work.ReconstructPhotos(PHOTOS))
+    worker.submit(work.ReconstructPhotos(PHOTOS, networks=NETWORKS))
     while not any(r.stage == stage for r in worker.poll() if isinstance(r, show.Progressed)):
         time.sleep(0.002)
     time.sleep(wait)

@@ -1,6 +1,5 @@
 """`langflash eval sharp`: how near pictures of scenes are to their photos, at the photos' size."""
 
-import io
 import json
 from argparse import Namespace
 from collections.abc import Iterator
@@ -8,7 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, TextIO
 
 from langflash_core.errors import ImageError, InputError, SceneFileError
-from langflash_core.files import check_folder, check_output_file, make_folder, readable_file, write_atomically
+from langflash_core.files import check_folder, make_folder, readable_file, write_atomically
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.rooms import RoomRenderer, load_pack
 
@@ -16,6 +15,7 @@ from ...renderers import open_renderer
 from ...report import ProgressBar, write_tables
 from ..photos import opened_folder
 from ..shared import colour_only, opened_lpips
+from .results import check_files, write_sheet
 
 if TYPE_CHECKING:
     from langflash_core.lab.evaluation.sharp import Bench
@@ -50,10 +50,7 @@ def sharp(args: Namespace, out: TextIO) -> None:
         make_folder(args.results)
         write_atomically(args.results / NUMBERS, json.dumps(result, indent=1).encode())
     if args.sheet is not None:
-        stream = io.BytesIO()
-        sheet.image().save(stream, "PNG", optimize=True)
-        make_folder(args.sheet.parent)
-        write_atomically(args.sheet, stream.getvalue())
+        write_sheet(args.sheet, sheet.image())
     write_tables(args, result, sharp_markdown(result), out)
 
 
@@ -61,10 +58,7 @@ def _check(args: Namespace) -> None:
     """What can be known before any work."""
     if sum((bool(args.photos), args.folder is not None, args.pack is not None)) > 1:
         raise InputError("give photos, a folder with --posed, or furniture with --pack; not two of them")
-    if args.output is not None:
-        check_output_file(args.output, (".md",))
-    if args.sheet is not None:
-        check_output_file(args.sheet, (".png",))
+    check_files(args)
     for folder in (args.results, args.keep):
         if folder is not None:
             check_folder(folder)

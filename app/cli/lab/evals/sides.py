@@ -1,15 +1,14 @@
 """`langflash eval sides` and `sides-beside`: scenes seen from aside, by one version of the code or by two."""
 
-import io
-import json
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TextIO
 
+from PIL import Image
+
 from langflash_core.errors import InputError, WeightsError
-from langflash_core.files import check_folder, check_output_file, make_folder, readable_file, write_atomically
+from langflash_core.files import check_folder, readable_file
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.evaluation.side_subjects import Case
 from langflash_core.lab.rooms import RoomRenderer, load_pack
@@ -19,10 +18,24 @@ from ...renderers import open_renderer
 from ...report import ProgressBar, write_tables
 from ..photos import opened_folder
 from ..shared import colour_only
+from .results import PICTURES, Results, Versions, check_files
 
 ROOMS, PAIRS = 100, 40
-NUMBERS, PICTURES = "sides.json", "pictures"
-"""What --results holds."""
+
+
+def _sheet(versions: Versions) -> Image.Image:
+    from ..sheets.sides import side_sheet
+
+    return side_sheet(versions)
+
+
+RESULTS = Results(
+    "sides",
+    "sides.json",
+    frozenset({"cases", "by_look"}),
+    "scene in common; make both with the same rooms or pairs",
+    _sheet,
+)
 
 
 def sides(args: Namespace, out: TextIO) -> None:
@@ -35,12 +48,11 @@ def sides(args: Namespace, out: TextIO) -> None:
         raise InputError("give either a furniture pack or a folder with --posed; not both, not none")
     if args.pack is not None and args.size is not None:
         raise InputError("rooms are drawn at the network's own size; leave --size out, or judge --posed")
-    if args.output is not None:
-        check_output_file(args.output, (".md",))
+    check_files(args)
     if args.results is not None:
         check_folder(args.results)
-    if args.sheet is not None:
-        _check_sheet(args)
+    if args.sheet is not None and (args.results is None or args.pack is None):
+        raise InputError("--sheet shows what --results keeps of rooms; give a furniture pack and --results")
     from langflash_core.lab.evaluation.lpips import Lpips
     from langflash_core.lab.evaluation.side_tables import sides_markdown
     from langflash_core.lab.evaluation.sides import run_sides
@@ -64,17 +76,10 @@ def sides(args: Namespace, out: TextIO) -> None:
 
             draw_pairs(args.results / PICTURES, render, args.weights)
     if args.results is not None:
-        make_folder(args.results)
-        write_atomically(args.results / NUMBERS, json.dumps(result, indent=1).encode())
+        RESULTS.write(args.results, result)
     if args.sheet is not None and args.results is not None:
-        _write_sheet(args.sheet, [("drawn", args.results)])
+        RESULTS.draw(args.sheet, [("drawn", args.results)])
     write_tables(args, result, sides_markdown(result), out)
-
-
-def _check_sheet(args: Namespace) -> None:
-    check_output_file(args.sheet, (".png",))
-    if args.results is None or args.pack is None:
-        raise InputError("--sheet shows what --results keeps of rooms; give a furniture pack and --results")
 
 
 def _pictures(args: Namespace, render: Render) -> Callable[[Case, Scene], None]:
@@ -93,34 +98,16 @@ def _pictures(args: Namespace, render: Render) -> Callable[[Case, Scene], None]:
     return made
 
 
-def _write_sheet(path: Path, versions: Sequence[tuple[str, Path]]) -> None:
-    from ..sheets.sides import side_sheet
-
-    sheet = side_sheet([(title, folder / PICTURES) for title, folder in versions])
-    stream = io.BytesIO()
-    sheet.save(stream, "PNG", optimize=True)
-    make_folder(path.parent)
-    write_atomically(path, stream.getvalue())
-
-
 def beside(args: Namespace, out: TextIO) -> None:
     """Two results of the same scenes in one table.
 
     Raises:
         InputError: a folder holds no results, or they have no scene in common.
     """
-    if args.output is not None:
-        check_output_file(args.output, (".md",))
-    if args.sheet is not None:
-        check_output_file(args.sheet, (".png",))
+    check_files(args)
     from langflash_core.lab.evaluation.side_tables import beside_markdown
 
-    before, after = (_numbers(folder) for folder in (args.before, args.after))
-    if not {row["name"] for row in before["cases"]} & {row["name"] for row in after["cases"]}:
-        raise InputError("these results have no scene in common; make both with the same rooms or pairs")
-    if args.sheet is not None:
-        _write_sheet(args.sheet, [("before", args.before), ("after", args.after)])
-    write_tables(args, {}, beside_markdown(before, after), out)
+    RESULTS.beside(args, beside_markdown, out)
 
 
 @contextmanager
@@ -141,14 +128,3 @@ def _cases(args: Namespace) -> Iterator[tuple[Iterator, int]]:
     pack, count = load_pack(args.pack), args.limit or ROOMS
     with RoomRenderer(pack) as renderer:
         yield room_cases(pack, renderer, kind=args.set, count=count, first=args.first_seed), count
-
-
-def _numbers(folder: Path) -> dict:
-    path = readable_file(folder / NUMBERS, "result of eval sides", InputError)
-    try:
-        found = json.loads(path.read_bytes())
-    except ValueError:
-        found = None
-    if not isinstance(found, dict) or not {"cases", "by_look"} <= found.keys():
-        raise InputError(f"{path} is no result of eval sides; make it with --results")
-    return found

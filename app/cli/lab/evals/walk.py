@@ -1,13 +1,13 @@
 """`langflash eval walk` and `walk-beside`: the same place in 2, 4, 8 ... photos, by one version or by two."""
 
-import io
-import json
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
+
+from PIL import Image
 
 from langflash_core.errors import InputError
 from langflash_core.files import check_folder, check_output_file, make_folder, readable_file, write_atomically
@@ -17,6 +17,7 @@ from ...renderers import Renderer, open_renderer
 from ...report import ProgressBar, write_tables
 from ..photos import opened_folder
 from ..shared import colour_only, opened_lpips
+from .results import PICTURES, Results, Versions, check_files
 
 if TYPE_CHECKING:
     from langflash_core.lab.evaluation.tallies import Shelf
@@ -24,13 +25,28 @@ if TYPE_CHECKING:
     from langflash_core.lab.evaluation.walk_subjects import Plan, Walk
 
 ROOMS, STRETCHES = 20, 4
-NUMBERS, WALKS, PICTURES = "walk.json", "walks", "pictures"
-"""What --results holds."""
+WALKS = "walks"
+"""The folder of results that keeps single walks."""
 OPTIONS = (
     "size", "set", "way", "exposure", "blur", "step", "assume_lens", "given_poses", "no_own", "align",
     "memory", "colmap", "depth_unit", "crop", "intrinsics", "passers", "screens",
 )  # fmt: skip
 """By which numbers of a walk change."""
+
+
+def _sheet(versions: Versions) -> Image.Image:
+    from ..sheets.walk import walk_sheet
+
+    return walk_sheet(versions)
+
+
+RESULTS = Results(
+    "walk",
+    "walk.json",
+    frozenset({"cases", "by_photos"}),
+    "walk in common; make both along the same walks",
+    _sheet,
+)
 
 
 def walk(args: Namespace, out: TextIO) -> None:
@@ -54,10 +70,9 @@ def walk(args: Namespace, out: TextIO) -> None:
         with ProgressBar() as progress:
             result = run_walks(walks, count, bench, progress=progress, **kept)
     if args.results is not None:
-        make_folder(args.results)
-        write_atomically(args.results / NUMBERS, json.dumps(result, indent=1).encode())
+        RESULTS.write(args.results, result)
     if args.sheet is not None and args.results is not None:
-        _write_sheet(args.sheet, [("drawn", args.results)])
+        RESULTS.draw(args.sheet, [("drawn", args.results)])
     if args.plot is not None:
         _write_plot(args.plot, result)
     write_tables(args, result, walk_markdown(result), out)
@@ -71,18 +86,15 @@ def _check(args: Namespace) -> None:
         raise InputError(
             "--exposure, --blur, --passers and --screens change drawn rooms; leave them out with --posed"
         )
-    if args.output is not None:
-        check_output_file(args.output, (".md",))
+    check_files(args)
     if args.results is not None:
         check_folder(args.results)
     if args.plot is not None:
         check_output_file(args.plot, (".png",))
         if find_spec("matplotlib") is None:
             raise InputError("--plot needs matplotlib; pip install 'langflash[bench]' brings it")
-    if args.sheet is not None:
-        check_output_file(args.sheet, (".png",))
-        if args.results is None:
-            raise InputError("--sheet shows what --results keeps; give --results, too")
+    if args.sheet is not None and args.results is None:
+        raise InputError("--sheet shows what --results keeps; give --results, too")
     if args.colmap:
         from langflash_core.lab.evaluation.walk_colmap import check_installed
 
@@ -135,29 +147,10 @@ def beside(args: Namespace, out: TextIO) -> None:
     Raises:
         InputError: a folder holds no results, or they have no walk in common.
     """
-    if args.output is not None:
-        check_output_file(args.output, (".md",))
-    if args.sheet is not None:
-        check_output_file(args.sheet, (".png",))
+    check_files(args)
     from langflash_core.lab.evaluation.walk_tables import beside_markdown
 
-    before, after = (_numbers(folder) for folder in (args.before, args.after))
-    if not {row["name"] for row in before["cases"]} & {row["name"] for row in after["cases"]}:
-        raise InputError("these results have no walk in common; make both along the same walks")
-    if args.sheet is not None:
-        _write_sheet(args.sheet, [("before", args.before), ("after", args.after)])
-    write_tables(args, {}, beside_markdown(before, after), out)
-
-
-def _numbers(folder: Path) -> dict:
-    path = readable_file(folder / NUMBERS, "result of eval walk", InputError)
-    try:
-        found = json.loads(path.read_bytes())
-    except ValueError:
-        found = None
-    if not isinstance(found, dict) or not {"cases", "by_photos"} <= found.keys():
-        raise InputError(f"{path} is no result of eval walk; make it with --results")
-    return found
+    RESULTS.beside(args, beside_markdown, out)
 
 
 def _write_plot(path: Path, result: dict) -> None:
@@ -165,16 +158,6 @@ def _write_plot(path: Path, result: dict) -> None:
 
     make_folder(path.parent)
     write_atomically(path, walk_png(result))
-
-
-def _write_sheet(path: Path, versions: Sequence[tuple[str, Path]]) -> None:
-    from ..sheets.walk import walk_sheet
-
-    sheet = walk_sheet([(title, folder / PICTURES) for title, folder in versions])
-    stream = io.BytesIO()
-    sheet.save(stream, "PNG", optimize=True)
-    make_folder(path.parent)
-    write_atomically(path, stream.getvalue())
 
 
 @contextmanager

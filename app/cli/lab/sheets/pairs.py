@@ -15,6 +15,7 @@ from langflash_core.export.sheet import captioned
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.quaternions import matrices_to_quats, quats_to_matrices
 from langflash_core.picture_files import opened_picture
+from langflash_core.reconstruction.networks import Networks
 from langflash_core.types import Camera, Scene
 
 from ...renderers import Renderer
@@ -41,9 +42,9 @@ def pair_sheet(
     Raises:
         LangFlashError: a photo or the checkpoint cannot be used.
     """
-    bands = []
+    bands, networks = [], Networks()
     for pair in pairs:
-        scene = pipeline.reconstruct(pair, weights=weights)
+        scene = pipeline.reconstruct(pair, weights=weights, networks=networks)
         cells = [*_views(scene, pair, renderer), *_answers(scene, renderer, prompts)]
         rows = [cells[i : i + columns] for i in range(0, len(cells), columns)]
         bands += [np.concatenate(row, axis=1) for row in rows]

@@ -22,6 +22,7 @@ from langflash_core.lab.evaluation.side_pictures import SHOWN, room_pictures, sc
 from langflash_core.lab.evaluation.side_subjects import Case
 from langflash_core.picture_files import opened_picture
 from langflash_core.pipeline import reconstruct
+from langflash_core.reconstruction.networks import Networks
 from langflash_core.resources import asset_path
 from langflash_core.types import Scene
 
@@ -42,9 +43,11 @@ def draw_room(folder: Path, number: int, case: Case, scene: Scene, render: Rende
 
 def draw_pairs(folder: Path, render: Render, weights: Path | None = None) -> None:
     """Keep what the scenes of three demo pairs show."""
+    networks = Networks()
     for number, name in enumerate(PAIRS, ROOMS):
         photos = [next(asset_path("photos").glob(f"{name}_{side}.*")) for side in ("left", "right")]
-        _keep(folder, f"{number}_{name}", scene_pictures(reconstruct(photos, weights=weights), render))
+        scene = reconstruct(photos, weights=weights, networks=networks)
+        _keep(folder, f"{number}_{name}", scene_pictures(scene, render))
 
 
 def _keep(folder: Path, name: str, pictures: Sequence[Tensor]) -> None:

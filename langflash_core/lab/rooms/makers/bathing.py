@@ -26,8 +26,9 @@ from langflash_core.lab.rooms.makers.kit import (
     Vector,
     across,
     ball,
+    brim,
+    corner_floor,
     cylinder,
-    facing,
     grid_triangles,
     hull,
     lathe,
@@ -129,19 +130,9 @@ def _corner_tub(draw: Draw) -> Design:
     side, tall, hand = draw.between(1.2, 1.5), draw.between(0.5, 0.62), draw.one_of(SIDES)
     apron = WHITE if draw.chance(0.7) else draw.body()
     half, x, z = side / 2, -hand * 0.06 * side, -0.06 * side
-    arc = [polar(0.55 * side, a, 0) for a in spread(0, QUARTER, 7)]
-    front = [(hand * (u - 0.05 * side), v - 0.05 * side) for u, _, v in arc]
-    outline = [
-        (-hand * half, -half),
-        (hand * half, -half),
-        *front,
-        (-hand * half, half),
-        (-hand * half, -half),
-    ]
+    outline = corner_floor(side, hand, 0.05)
     d.add(grid_triangles(np.array([[(u, y, v) for u, v in outline] for y in (0.0, tall)])), apron)
-    rim = [(u, tall, v) for u, v in facing(outline, (x, z), 24)]
-    brim = [(x + u, tall, z + v) for u, _, v in (polar(0.37 * side, a, 0) for a in spread(0, TURN, 25))]
-    d.add(grid_triangles(np.array([rim, brim])), WHITE)
+    d.add(brim(outline, (x, z), tall, 0.37 * side, 24), WHITE)
     hollow = ((0.37 * side, tall), (0.33 * side, tall * 0.45), (0.29 * side, 0.14), (0, 0.12))
     d.add(lathe(hollow, (x, 0, z), 24), WHITE)
     for k in range(5):

@@ -17,6 +17,8 @@ from langflash_core.lab.rooms.makers.common import (
     Face,
     Look,
     plain,
+    polar,
+    spread,
 )
 from langflash_core.lab.rooms.objfile import Material
 from langflash_core.lab.rooms.solids import (
@@ -132,6 +134,26 @@ def facing(
     off /= np.linalg.norm(off, axis=1, keepdims=True)
     turn = np.linspace(0, TURN, many + 1)
     return [outline[k] for k in (off @ np.stack([np.cos(turn), np.sin(turn)])).argmax(0)]
+
+
+def corner_floor(side: float, hand: int, inset: float) -> list[tuple[float, float]]:
+    """The floor outline (x, z) of what stands in a corner: a square of that side with the front corner round,
+    which begins `inset`, of the side, behind the middle; closed."""
+    half = side / 2
+    arc = [polar((0.5 + inset) * side, a, 0) for a in spread(0, QUARTER, 7)]
+    front = [(hand * (u - inset * side), v - inset * side) for u, _, v in arc]
+    back = [(-hand * half, -half), (hand * half, -half)]
+    return [*back, *front, (-hand * half, half), back[0]]
+
+
+def brim(
+    outline: Sequence[tuple[float, float]], centre: tuple[float, float], y: float, radius: float, many: int
+) -> Triangles:
+    """The flat edge between a floor outline (x, z) and a round hollow in it."""
+    x, z = centre
+    outer = [(u, y, v) for u, v in facing(outline, centre, many)]
+    inner = [(x + u, y, z + v) for u, _, v in (polar(radius, a, 0) for a in spread(0, TURN, many + 1))]
+    return grid_triangles(np.array([outer, inner]))
 
 
 def mixed(look: Look, other: Vector, share: float) -> Look:

@@ -12,7 +12,6 @@ from langflash_core.lab.rooms.makers.kit import (
     QUARTER,
     SIDES,
     STEEL,
-    TURN,
     WATER,
     WHITE,
     Design,
@@ -22,8 +21,9 @@ from langflash_core.lab.rooms.makers.kit import (
     Vector,
     across,
     ball,
+    brim,
+    corner_floor,
     cylinder,
-    facing,
     four_legs,
     grid_triangles,
     hull,
@@ -33,7 +33,6 @@ from langflash_core.lab.rooms.makers.kit import (
     pad,
     panels,
     plain,
-    polar,
     scaled,
     shifted,
     slab,
@@ -172,23 +171,13 @@ def _corner_sink(draw: Draw) -> Design:
     d = Design("corner sink", "sink", ("corner basin", "washbasin"))
     side, top, hand = draw.between(0.42, 0.55), draw.between(0.8, 0.87), draw.one_of(SIDES)
     half, x, z = side / 2, -hand * 0.08 * side, -0.08 * side
-    arc = [polar(0.6 * side, a, 0) for a in spread(0, QUARTER, 7)]
-    front = [(hand * (u - 0.1 * side), v - 0.1 * side) for u, _, v in arc]
-    outline = [
-        (-hand * half, -half),
-        (hand * half, -half),
-        *front,
-        (-hand * half, half),
-        (-hand * half, -half),
-    ]
+    outline = corner_floor(side, hand, 0.1)
     rows = [
         [(scale * u, y, scale * v) for u, v in outline]
         for scale, y in ((0.0, top - 0.17), (0.75, top - 0.16), (1.0, top))
     ]
     d.add(grid_triangles(np.array(rows)), WHITE)
-    rim = [(u, top, v) for u, v in facing(outline, (x, z), 20)]
-    brim = [(x + u, top, z + v) for u, _, v in (polar(0.31 * side, a, 0) for a in spread(0, TURN, 21))]
-    d.add(grid_triangles(np.array([rim, brim])), WHITE)
+    d.add(brim(outline, (x, z), top, 0.31 * side, 20), WHITE)
     d.add(lathe(((0.31 * side, top), (0.25 * side, top - 0.09), (0, top - 0.12)), (x, 0, z), 20), WHITE)
     if draw.chance(0.5):
         d.add(cylinder(0.09, top - 0.14, (2 * x, 0, 2 * z), 0.07), WHITE)

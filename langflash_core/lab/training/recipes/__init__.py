@@ -19,7 +19,7 @@ from langflash_core.lab.training.stages.aggregation import aggregation_stage
 from langflash_core.lab.training.stages.grouping import grouping_stage
 from langflash_core.lab.training.stages.stage import Stage
 from langflash_core.lab.training.stages.table import POINT_STAGES, STAGES
-from langflash_core.network.presets import PRESETS, PointMaps
+from langflash_core.network.presets import PRECISIONS, PRESETS, PointMaps
 
 _FOLDER = Path(__file__).parent
 _TOP = {"preset": str, "seed": int, "precision": str, "ema_decay": float, "optimising": dict, "stages": list}
@@ -113,8 +113,8 @@ def read_recipe(name: str, options: LoopOptions) -> Recipe:
     _check(table, _TOP, str(path))
     if table["preset"] not in PRESETS or not table["stages"]:
         raise InputError(f"{path}: preset must be one of {', '.join(PRESETS)}, with one stage or more")
-    if table["precision"] not in ("auto", "float32", "bfloat16"):
-        raise InputError(f"{path}: precision must be auto, float32 or bfloat16")
+    if table["precision"] not in PRECISIONS:
+        raise InputError(f"{path}: precision must be one of {', '.join(PRECISIONS)}")
     common = replace(
         options, minutes=_ENDLESS, seed=table["seed"], precision=table["precision"],
         ema_decay=float(table["ema_decay"]), optimising=_optimising(table["optimising"], path),

@@ -1,0 +1,77 @@
+"""What the network finds in the views, kept where a folder for that was named."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+from langflash_core.ahead import Ahead
+from langflash_core.errors import WeightsError
+from langflash_core.keeping import Keep, not_kept
+from langflash_core.kept_prediction import arrays_of, prediction_of
+from langflash_core.network import PRESETS
+from langflash_core.network.checkpoints.parts import part_folder
+from langflash_core.network.checkpoints.stored import weights_file
+from langflash_core.reconstruction.tools import Tools
+from langflash_core.reconstruction.wishes import Wishes
+from langflash_core.running import Kept, Run
+from langflash_core.types import Prediction, Views
+
+
+def predictor(wishes: Wishes, tools: Tools, ahead: Ahead, run: Run) -> Callable[[Views], Prediction]:
+    """Views to what the network finds in them, on the CPU; what `wishes.keep` holds is not done again."""
+
+    def predicted(views: Views) -> Prediction:
+        if wishes.keep is None:
+            return _made(views, not_kept, tools, ahead, run)
+        kept = keep_of(wishes.keep, views, _settings(wishes, tools))
+        return prediction_of(kept("prediction", lambda: arrays_of(_made(views, kept, tools, ahead, run))))
+
+    return predicted
+
+
+def keep_of(folder: Path, views: Views, settings: tuple) -> Keep:
+    """Where what these views become is kept; hangs on all that changes a bit of it."""
+    machine = (torch.__version__, torch.get_num_threads(), torch.backends.cpu.get_cpu_capability())
+    said = {"settings": settings, "machine": machine, "names": views.names, "lenses": views.lenses}
+    numbers = [views.images, views.Ks] + ([] if views.viewmats is None else [views.viewmats])
+    parts = (values.contiguous().numpy().tobytes() for values in numbers)
+    return Keep.of(folder, said, (*views.sources, *parts))
+
+
+def _made(views: Views, kept: Kept, tools: Tools, ahead: Ahead, run: Run) -> Prediction:
+    prediction = tools.network.predict(
+        views,
+        run.within("network"),
+        run.cancelled,
+        tools.atoms,
+        tools.groups,
+        tools.redrawn,
+        tools.finer is None,
+        ahead.handed(kept, views.sources),
+    )
+    tensors = {name: value.cpu() for name, value in vars(prediction).items() if isinstance(value, Tensor)}
+    return replace(prediction, gaussians=prediction.gaussians.map(Tensor.cpu), **tensors)
+
+
+def _settings(wishes: Wishes, tools: Tools) -> tuple:
+    return (
+        wishes.preset,
+        wishes.device,
+        wishes.precision,
+        wishes.aggregation,
+        wishes.grouping,
+        tools.finer is None,
+        _identity(wishes.preset, wishes.weights),
+    )
+
+
+def _identity(preset: str, weights: Path | str | None) -> list[tuple[str, int, int]]:
+    """Which weights: the checkpoint and its installed parts, with size and time of change."""
+    files = sorted(part_folder(PRESETS[preset]).glob("*.safetensors"))
+    with suppress(WeightsError):  # there may be no file but the parts
+        files.append(weights_file(preset, None if weights is None else Path(weights)))
+    return [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in files if path.is_file()]

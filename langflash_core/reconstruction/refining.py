@@ -1,0 +1,44 @@
+"""A scene fitted to its photos for some seconds, and kept so if that brings a held-out view closer."""
+
+from dataclasses import replace
+
+from jaxtyping import Float
+from torch import Tensor
+
+from langflash_core.errors import InputError
+from langflash_core.running import Progress
+from langflash_core.splat.refine import Budget, refine
+from langflash_core.types import Scene
+
+
+def refined(
+    scene: Scene, images: Float[Tensor, "V 3 H W"], seconds: float, device: str, progress: Progress
+) -> Scene:
+    """The scene fitted to its photos, or as it was with a warning that says why; on the CPU again."""
+    try:
+        result = refine(_moved(scene, device), images.to(device), Budget(seconds), progress)
+    except InputError as reason:
+        return scene.with_record(warnings=(*scene.record.warnings, f"not refined: {reason}"))
+    record = {
+        "kept": result.kept,
+        "held_out": scene.record.photos[result.view],
+        "held_out_psnr_db": [round(value, 2) for value in result.held_out],
+        "photos_psnr_db": [round(value, 2) for value in result.photos],
+        "steps": list(result.steps),
+    }
+    warnings = scene.record.warnings
+    if not result.kept:
+        before, after = record["held_out_psnr_db"]
+        note = f"not refined: {record['held_out']}, held out, came no closer ({before} dB, then {after} dB)"
+        warnings = (*warnings, note)
+    return _moved(result.scene, "cpu").with_record(refinement=record, warnings=warnings)
+
+
+def _moved(scene: Scene, device: str) -> Scene:
+    """Gaussians and cameras on a device."""
+    return replace(
+        scene,
+        gaussians=scene.gaussians.map(lambda values: values.to(device)),
+        viewmats=scene.viewmats.to(device),
+        Ks=scene.Ks.to(device),
+    )

@@ -1,0 +1,159 @@
+"""The stages of a reconstruction, in order: photos, weights, network, assembly, refinement.
+
+photos -> Views -> Tools -> Prediction -> Scene. Each is a function of what those before it gave; `Run` times
+them and tells how far they are.
+"""
+
+from dataclasses import asdict, replace
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from langflash_core.ahead import Ahead, begin
+from langflash_core.detail import DEFAULT_DETAIL
+from langflash_core.fine import fine_scene
+from langflash_core.images.triage import check_shown
+from langflash_core.images.views import load_views
+from langflash_core.memory import peak_memory_mb
+from langflash_core.network import LangFlashNet
+from langflash_core.reconstruction.finding import predictor
+from langflash_core.reconstruction.networks import Networks
+from langflash_core.reconstruction.refining import refined
+from langflash_core.reconstruction.tools import Tools, open_tools
+from langflash_core.reconstruction.views import found_views, posed_views, straight_prediction
+from langflash_core.reconstruction.wishes import Wishes
+from langflash_core.running import Run
+from langflash_core.scene.assemble import assemble
+from langflash_core.scene.prune import prune
+from langflash_core.scene.world import in_world
+from langflash_core.types import Cost, Prediction, Scene, Views
+
+# Where each begins in the whole, from its measured share of the time on two CPU cores.
+STAGES = {"photos": 0.0, "weights": 0.08, "network": 0.16, "assemble": 0.66, "refine": 0.97}
+_PATIENCE = 0.2  # seconds, until it is told again how far something is
+_AS_IT_IS = "the preset '{}' makes one Gaussian a pixel; the detail that was asked for is left out"
+
+
+def scene_of(wishes: Wishes, run: Run, networks: Networks, ahead: Ahead | None) -> Scene:
+    """The scene that was wished for; errors and `ahead` as of `pipeline.reconstruct`."""
+    wishes = wishes.settled()
+    views, ahead = _photos(wishes, run, ahead)
+    tools = _weights(wishes, run, networks, ahead, views)
+    prediction, views = _found(wishes, run, ahead, tools, views)
+    scene, images = _assembled(wishes, run, tools, prediction, views)
+    if wishes.refine_seconds is not None:
+        scene = _refined(wishes, run, scene, images)
+    if prediction.lenses:
+        scene = scene.with_record(lens={"found": [asdict(lens) for lens in prediction.lenses]})
+    run.check()
+    scene = _in_world(wishes, scene)
+    run.report("done", 1.0)
+    return _with_record(scene, tools.network, run.timings)
+
+
+def _photos(wishes: Wishes, run: Run, ahead: Ahead | None) -> tuple[Views, Ahead]:
+    """The photos as views, with what was begun of them; the rest of what can be begins here."""
+    with run.stage("photos"):
+        ahead = ahead or begin(
+            wishes.photos,
+            preset=wishes.preset,
+            weights=wishes.weights,
+            size=wishes.size,
+            read_weights=False,
+            check=run.check,
+            keep=wishes.keep,
+        )
+        views = load_views(
+            wishes.photos,
+            fov=wishes.fov,
+            intrinsics=wishes.intrinsics,
+            check=run.check,
+            pictures=ahead.pictures.result,
+        )
+        check_shown(views.names, list(views.images))
+    return posed_views(views, wishes.viewmats, wishes.preset), ahead
+
+
+def _weights(wishes: Wishes, run: Run, networks: Networks, ahead: Ahead, views: Views) -> Tools:
+    """The network and its helpers; key points are found beside."""
+    with run.stage("weights"):
+        tools = open_tools(wishes, views, networks, ahead.stored)
+        _wait_for_matches(ahead, run)
+    return tools
+
+
+def _wait_for_matches(ahead: Ahead, run: Run) -> None:
+    """Until photos are matched; how far that is is told, and it may be cancelled at any time."""
+    told = run.within("weights")
+    while True:
+        try:
+            ahead.matched.result(timeout=_PATIENCE)
+            return
+        except TimeoutError:
+            if ahead.matched.done():
+                raise
+            told(f"weights: {ahead.matching}", ahead.matching.share)
+
+
+def _found(wishes: Wishes, run: Run, ahead: Ahead, tools: Tools, views: Views) -> tuple[Prediction, Views]:
+    """What the network finds, and the views as it has them now."""
+    with run.stage("network"):
+        prediction, views = straight_prediction(predictor(wishes, tools, ahead, run), views)
+        return prediction, found_views(views, prediction)
+
+
+def _assembled(
+    wishes: Wishes, run: Run, tools: Tools, prediction: Prediction, views: Views
+) -> tuple[Scene, Float[Tensor, "V 3 H W"]]:
+    """The scene, and the photos that have a place in it, in the light that its colours are of."""
+    images = views.images[[v for v in range(views.num_views) if v not in prediction.unplaced]]
+    with run.stage("assemble"), torch.no_grad():
+        if tools.finer is None:
+            if wishes.gaussians is not None or wishes.detail not in (None, DEFAULT_DETAIL):
+                note = _AS_IT_IS.format(wishes.preset)
+                prediction = replace(prediction, warnings=(*prediction.warnings, note))
+            return prune(assemble(prediction, views, preset=wishes.preset)), images
+        scene, light = fine_scene(
+            prediction,
+            views,
+            tools.finer,
+            gaussians=wishes.gaussians,
+            preset=wishes.preset,
+            progress=run.within("assemble"),
+        )
+        return scene, light.corrected(images).clamp(0, 1)
+
+
+def _refined(wishes: Wishes, run: Run, scene: Scene, images: Float[Tensor, "V 3 H W"]) -> Scene:
+    """The scene fitted to its photos, with the seconds of that in its record."""
+    assert wishes.refine_seconds is not None
+    with run.stage("refine"):
+        told = run.within("refine")
+        scene = refined(scene, images, wishes.refine_seconds, wishes.device, told)
+    fitting = {**scene.record.cost.timings, "fitting": run.timings["refine"]}
+    return scene.with_record(cost=Cost(fitting))
+
+
+def _in_world(wishes: Wishes, scene: Scene) -> Scene:
+    """The scene in the world of the poses that were given."""
+    if wishes.viewmats is None:
+        return scene
+    unit = scene.record.network_unit
+    assert unit is not None, "`assemble` records it"
+    return in_world(scene, wishes.viewmats[0], unit)
+
+
+def _with_record(scene: Scene, network: LangFlashNet, timings: dict[str, float]) -> Scene:
+    """The scene with the cost of its making, and the network's calibration, in its record.
+
+    `timings` stay disjoint seconds in order (the network's and the scene's own steps are in the
+    scene already); `seconds` sums them up for the network and for all.
+    """
+    before = {name: timings[name] for name in ("photos", "weights")}
+    cost = Cost(
+        timings={**before, **scene.record.cost.timings},
+        seconds={"network": timings["network"], "total": sum(timings.values())},
+        peak_memory_mb=peak_memory_mb(),
+    )
+    return scene.with_record(cost=cost, calibration=dict(network.calibration))

@@ -1,0 +1,71 @@
+"""What a scene is to be made of, and how: one frozen record of what `pipeline.reconstruct` was asked."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from langflash_core.detail import DEFAULT_DETAIL, check_gaussians, chosen_detail
+from langflash_core.errors import InputError
+
+LONGEST_REFINEMENT = 3600  # seconds
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """Fields as the arguments of `pipeline.reconstruct`."""
+
+    photos: Sequence[Path | str]
+    preset: str = "mini"
+    weights: Path | str | None = None
+    fov: float | Sequence[float | None] | None = None
+    intrinsics: tuple[float, float, float, float] | None = None
+    size: int | None = None
+    device: str = "auto"
+    precision: str = "auto"
+    aggregation: str | None = None
+    grouping: str | None = None
+    detail: str | None = DEFAULT_DETAIL
+    gaussians: int | None = None
+    refine_seconds: float | None = None
+    viewmats: Float[Tensor, "V 4 4"] | None = None
+    keep: Path | None = None
+
+    def settled(self) -> "Wishes":
+        """The same with the device that there is, once all was checked that can be before a photo is read.
+
+        Raises:
+            InputError: the device, the detail, the number of Gaussians or the refinement cannot be had.
+        """
+        device = chosen_device(self.device)
+        if self.detail is not None:
+            chosen_detail(self.detail)
+        check_gaussians(self.gaussians)
+        if self.refine_seconds is not None:
+            _check_refinement(self.refine_seconds, len(self.photos))
+        return replace(self, device=device)
+
+
+def chosen_device(name: str) -> str:
+    """ "cpu" or "cuda".
+
+    Raises:
+        InputError: there is no such device.
+    """
+    if name not in ("auto", "cpu", "cuda"):
+        raise InputError(f"the device '{name}' is unknown; choose auto, cpu or cuda")
+    if name == "cuda" and not torch.cuda.is_available():
+        raise InputError("there is no CUDA device that torch can use; choose --device cpu or auto")
+    return ("cuda" if torch.cuda.is_available() else "cpu") if name == "auto" else name
+
+
+def _check_refinement(seconds: float, num_photos: int) -> None:
+    if not 0 < seconds <= LONGEST_REFINEMENT:
+        raise InputError(
+            f"a refinement of {seconds:g} seconds is out of range; choose up to {LONGEST_REFINEMENT}"
+        )
+    if num_photos < 2:
+        raise InputError("a refinement compares photos with each other; give at least two that overlap")
