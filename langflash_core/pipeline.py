@@ -33,6 +33,7 @@ from langflash_core.language.minilm import load_minilm, shipped_files
 from langflash_core.language.relevance import Mode, compile_query, finite_dictionary, relevance_maps
 from langflash_core.language.spaces import language_space
 from langflash_core.language.vocabulary import all_phrases
+from langflash_core.level import levelled
 from langflash_core.network import PRESETS, LangFlashNet, choose_pair, load_network
 from langflash_core.network.build import network_class
 from langflash_core.network.checkpoints.parts import part_folder
@@ -57,7 +58,7 @@ from langflash_core.splat.refine import Budget, refine
 from langflash_core.types import Camera, Cost, Frame, Prediction, QueryResult, Scene, Views
 
 # Where each stage begins in the whole, from its measured share of the time on two CPU cores.
-STAGES = {"photos": 0.0, "weights": 0.08, "network": 0.16, "assemble": 0.66, "refine": 0.97}
+STAGES = {"photos": 0.0, "weights": 0.08, "network": 0.16, "assemble": 0.66, "refine": 0.97, "level": 0.98}
 PRECISIONS = ("auto", "float32", "bfloat16")
 AGGREGATIONS = ("lfa", "average", "crops")
 GROUPINGS = ("queries", "mobile-sam", "sam2")
@@ -201,8 +202,10 @@ def reconstruct(
         unit = scene.record.network_unit
         assert unit is not None, "`assemble` records it"
         scene = in_world(scene, viewmats[0], unit)
+    with run.stage("level"):
+        scene = levelled(scene.with_record(calibration=dict(network.calibration)))
     run.report("done", 1.0)
-    return _with_record(scene, network, run.timings)
+    return _with_cost(scene, run.timings)
 
 
 def _wait_for_matches(ahead: Ahead, run: Run) -> None:
@@ -470,19 +473,19 @@ def best_pair(
     return choose_pair(greys, run.check)
 
 
-def _with_record(scene: Scene, network: LangFlashNet, timings: dict[str, float]) -> Scene:
-    """The scene with the cost of its making, and the network's calibration, in its record.
+def _with_cost(scene: Scene, timings: dict[str, float]) -> Scene:
+    """The scene with the cost of its making in its record.
 
     `timings` stay disjoint seconds in order (the network's and the scene's own steps are in the
     scene already); `seconds` sums them up for the network and for all.
     """
     before = {name: timings[name] for name in ("photos", "weights")}
     cost = Cost(
-        timings={**before, **scene.record.cost.timings},
+        timings={**before, **scene.record.cost.timings, "level": timings["level"]},
         seconds={"network": timings["network"], "total": sum(timings.values())},
         peak_memory_mb=peak_memory_mb(),
     )
-    return scene.with_record(cost=cost, calibration=dict(network.calibration))
+    return scene.with_record(cost=cost)
 
 
 def _check_detail(detail: str | None, gaussians: int | None) -> None:

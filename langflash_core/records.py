@@ -93,6 +93,10 @@ _KNOWN = {
 }
 """How it is known where a scene stands."""
 
+SURE = 2.0
+"""Degrees of expected error of up, to which edges of the photos are believed without asking. Surfaces alone
+lean with their depth."""
+
 
 @dataclass(frozen=True)
 class World:
@@ -114,6 +118,11 @@ class World:
     floor_by: str = "told"
     north_by: str = "told"
     guess: Guess | None = None
+
+    @property
+    def sure(self) -> bool:
+        """Whether up is known well enough to stand a scene on it unasked."""
+        return self.up_by == "told" or (self.up_by == "edges" and self.up_error <= SURE)
 
 
 def world_to_json(world: World) -> dict[str, Any]:

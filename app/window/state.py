@@ -3,8 +3,13 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+from jaxtyping import Float
+
 from langflash_core.colormaps import HeatColours
-from langflash_core.geometry.poses import Pose
+from langflash_core.geometry import rotations
+from langflash_core.geometry.poses import UP, Pose
+from langflash_core.records import Guess, World
 from langflash_core.scene.tour import NO_TOUR, read_tour
 from langflash_core.scene.tour import Tour as ToldTour
 
@@ -141,6 +146,26 @@ class State:
     def metric(self) -> float | None:
         """Metres per scene unit, where that is known."""
         return self.editing.marks.metric_scale if self.editing.marks else None
+
+    @property
+    def guess(self) -> Guess | None:
+        """Of metres per scene unit, where nobody told."""
+        return None if self.metric is not None or self.world is None else self.world.guess
+
+    @property
+    def world(self) -> World | None:
+        """Where the scene stands, where somebody looked."""
+        return self.editing.marks.world if self.editing.marks else None
+
+    @property
+    def turn(self) -> Float[np.ndarray, "3 3"]:
+        """Rows east, down and north of where the scene stands, in its own axes; those where nobody looked."""
+        return np.eye(3) if self.world is None else rotations.matrix(self.world.turn)
+
+    @property
+    def up(self) -> Float[np.ndarray, "3"]:
+        """Up, unit, in the scene's own axes."""
+        return UP if self.world is None else -self.turn[1]
 
     @property
     def heat_colours(self) -> HeatColours:

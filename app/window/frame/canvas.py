@@ -8,7 +8,7 @@ from ..editing.state import Tool
 from ..kit.look import Look
 from ..opening.panels import welcome
 from ..scene import camera
-from ..scene.panels import in_space, moving
+from ..scene.panels import floor, in_space, moving
 from ..state import State
 from ..touring import panel as tour_panel
 
@@ -29,6 +29,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
         welcome.draw_photos(state, look, corner, size)
         imgui.invisible_button("picture", ImVec2(max(size.x, 1), max(size.y, 1)))
         return []
+    floor.draw(state, look, corner, size)
     ruler.draw_line(state, look, corner, size)
     placed, taken = gizmo.draw(state, look, corner, size)
     over = placed if taken else placed + in_space.draw(state, look, corner, size)

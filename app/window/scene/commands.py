@@ -1,12 +1,13 @@
 """What can happen to the tray and to the scene: photos, files, the jobs that make scenes."""
 
+import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from langflash_core.geometry import poses
+from langflash_core.geometry import poses, rotations
 from langflash_core.scene.edits import Marks, delete
 from langflash_core.scene.mask import Mask
 
@@ -22,6 +23,9 @@ from .unfinished import FEWEST
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
+
+ASLANT = math.radians(2.0)
+"""Of a photo's roll that one sees."""
 
 # Photos
 
@@ -252,6 +256,7 @@ class SceneArrived:
         old, info, asking = state.scene, self.info, state.asking.without_scene()
         made = old.job is not None and old.job.title == RECONSTRUCTING
         saved = None if info.history is None else info.history.first
+        start = _start(info)
         return replace(
             state,
             scene=replace(
@@ -259,9 +264,9 @@ class SceneArrived:
                 info=info,
                 photos=() if self.alone else old.photos,
                 aside=None,
-                pose=info.views[0] if info.views else poses.START,
+                pose=start,
                 flight=None,
-                view=0 if info.views else None,
+                view=0 if info.views and start == info.views[0] else None,
                 unhidden=None,
                 job=None,
             ),
@@ -270,6 +275,19 @@ class SceneArrived:
             filming=NO_FILMING,
             recovery=replace(state.recovery, edits=None, kept=None),
         )
+
+
+def _start(info: SceneInfo) -> poses.Pose:
+    """Where one stands first: as the first photo saw it, upright where that was held aslant and it is known
+    how the scene stands."""
+    world = None if info.history is None else info.history.marks.world
+    start = info.views[0] if info.views else poses.START
+    if world is None:
+        return start
+    turn = rotations.matrix(world.turn)
+    if not info.views:
+        return poses.facing(start, poses.Vector(*turn[2].tolist()), -turn[1])
+    return poses.righted(start, -turn[1]) if abs(poses.roll(start, -turn[1])) > ASLANT else start
 
 
 def _rooms(state: State, coming: SceneInfo) -> tuple[Room, ...]:
