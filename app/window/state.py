@@ -18,6 +18,7 @@ from .dialogs import Dialog
 from .editing.state import NO_EDITING, Editing
 from .exporting.state import NO_EXPORTING, Exporting
 from .filming.state import NO_FILMING, Filming, read
+from .inventory.state import NO_LISTING, Listing
 from .opening.state import NO_OPENING, Opening
 from .recovery.preferences import DEFAULTS, Preferences
 from .recovery.state import NO_RECOVERY, Recovery
@@ -103,6 +104,7 @@ class State:
     opening: Opening = NO_OPENING
     recovery: Recovery = NO_RECOVERY
     touring: Touring = NO_TOURING
+    listing: Listing = NO_LISTING
 
     # The state with another half; `changes` are that half's fields
 
@@ -129,6 +131,9 @@ class State:
 
     def with_touring(self, **changes: Any) -> "State":
         return replace(self, touring=replace(self.touring, **changes))
+
+    def with_listing(self, **changes: Any) -> "State":
+        return replace(self, listing=replace(self.listing, **changes))
 
     # What follows from several halves
 

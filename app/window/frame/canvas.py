@@ -5,6 +5,7 @@ from imgui_bundle import ImVec2, imgui
 from .. import commands as do
 from ..editing.panels import gizmo, hands, pointing, ruler
 from ..editing.state import Tool
+from ..inventory import panel as inventory_panel
 from ..kit.look import Look
 from ..opening.panels import welcome
 from ..scene import camera
@@ -34,6 +35,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     placed, taken = gizmo.draw(state, look, corner, size)
     over = placed if taken else placed + in_space.draw(state, look, corner, size)
     tour_panel.draw_notes(state, look, corner, size)
+    inventory_panel.draw_box(state, look, corner, size)
     pointing.draw_marks(state, look, corner, size)
     if any(isinstance(command, camera.JumpTo) for command in over):
         return over  # the click was on a camera

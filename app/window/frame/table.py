@@ -24,6 +24,7 @@ from ..editing import teaching as teach
 from ..editing.state import Handle, Tool
 from ..exporting import commands as export
 from ..filming import commands as film
+from ..inventory import commands as take
 from ..opening import commands as opening
 from ..recovery import commands as keep
 from ..scene import camera, samples
@@ -236,6 +237,7 @@ def _looking() -> Iterable[Entry]:
     yield Entry("Add a key frame", group, _shown(film.AddKey()), _plain("m"))
     yield Entry("Remove the last key frame", group, lambda s: film.RemoveKey() if s.keys else None)
     yield Entry("Fly along the key frames", group, _shown(film.Preview()), _plain("j"))
+    yield Entry("Inventory: what is in the room", group, _inventory, _ctrl("l"), fa.ICON_FA_LIST_CHECK)
     yield Entry("Tour: stops and notes", group, _tour, icon=fa.ICON_FA_SIGNS_POST)
     yield Entry("Tour: the present view is a stop", group, _shown(tour.AddStop()))
     yield Entry("Tour: play", group, lambda s: tour.Play() if s.tour.stops else None)
@@ -248,6 +250,10 @@ def _looking() -> Iterable[Entry]:
     for mode in PICTURES:
         keys = _plain(f"_{_DIGITS[KEYED.index(mode)]}") if mode in KEYED else ()
         yield Entry(f"Show: {mode.label}", group, _mode(mode), keys)
+
+
+def _inventory(state: State) -> do.Command | None:
+    return take.ShowInventory(not state.listing.open) if state.scene.info is not None else None
 
 
 def _tour(state: State) -> do.Command | None:

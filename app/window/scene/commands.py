@@ -273,6 +273,7 @@ class SceneArrived:
             asking=replace(asking, named=made and not asking.asked),
             editing=fresh(state.editing, info.history, saved),
             filming=NO_FILMING,
+            listing=state.listing.without_scene(),
             recovery=replace(state.recovery, edits=None, kept=None),
         )
 
