@@ -177,7 +177,8 @@ class Record:
     it stands; None: nobody looked. thing_names: a person's own, by what the inventory calls a thing.
     calibration: what the network's checkpoint says about scores, instead of its language space. atom_names:
     a person's own, by atom, which it answers to. atom_denials: what a person said that an atom is not.
-    silent_atoms: those that answer no phrase. num_deleted: Gaussians that edits took away. camera_path:
+    silent_atoms: those that answer no phrase. lone_atoms: of parts that somebody took out of an answer; what
+    they are told is told to no other. num_deleted: Gaussians that edits took away. camera_path:
     the window's key frames. tour: stops and notes, as `scene.tour` has them. others: what a file says under
     keys that this version does not know.
     """
@@ -201,6 +202,7 @@ class Record:
     atom_names: Mapping[int, str] = field(default_factory=dict)
     atom_denials: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
     silent_atoms: tuple[int, ...] = ()
+    lone_atoms: tuple[int, ...] = ()
     num_deleted: int = 0
     camera_path: tuple[Mapping[str, Any], ...] = ()
     tour: Mapping[str, Any] = field(default_factory=dict)

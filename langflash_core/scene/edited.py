@@ -94,6 +94,7 @@ def there(scene: Scene, marks: Marks) -> Scene:
         atom_names={k: name for k, name in record.atom_names.items() if k < num_atoms},
         atom_denials={k: words for k, words in record.atom_denials.items() if k < num_atoms},
         silent_atoms=tuple(k for k in record.silent_atoms if k < num_atoms),
+        lone_atoms=tuple(k for k in record.lone_atoms if k < num_atoms),
     )
     return replace(first, semantics=semantics, record=record)
 
@@ -156,5 +157,6 @@ def _joined(scene: Scene, atoms: Sequence[Atom]) -> Scene:
         atom_names={places[k]: atoms[k].name for k in heads if atoms[k].name},
         atom_denials={places[k]: atoms[k].denied for k in heads if atoms[k].denied},
         silent_atoms=tuple(places[k] for k in heads if not atoms[k].on),
+        lone_atoms=tuple(places[k] for k in heads if k in scene.record.lone_atoms),
     )
     return replace(scene, semantics=replace(semantics, weight_ids=ids, dictionary=dictionary), record=record)

@@ -332,6 +332,12 @@ def deny_atom(marks: Marks, k: int, text: str) -> Marks:
     return _with_atoms(marks, _merged_with(marks, k), name=name, denied=(*atom.denied, text))
 
 
+def allow_atom(marks: Marks, k: int, text: str) -> Marks:
+    """Take back that an atom, with those merged with it, is not what `text` means."""
+    denied = tuple(word for word in marks.atoms[k].denied if word != text.strip())
+    return _with_atoms(marks, _merged_with(marks, k), denied=denied)
+
+
 def toggle_atom(marks: Marks, k: int) -> Marks:
     """Let an atom, with those merged with it, answer phrases, or no longer."""
     return _with_atoms(marks, _merged_with(marks, k), on=not marks.atoms[k].on)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from langflash_core.geometry import poses, rotations
-from langflash_core.scene.edits import Marks, delete
+from langflash_core.scene.edits import Marks, delete, deny_atom
 from langflash_core.scene.mask import Mask
 
 from ..commands import NOTHING_TO_SAVE, Command, Notify, ShowDialog
@@ -401,7 +401,8 @@ class MergeScene:
 @dataclass(frozen=True)
 class Merged:
     """The scene with number `serial`, of which there was so much, and another as one scene; or, where `gone`
-    says what was taken away, what fills its hole; or `copied`, copies of what was selected."""
+    says what was taken away, what fills its hole, or stands for it but is not what is `denied`; or `copied`,
+    copies of what was selected."""
 
     serial: int
     there: tuple[int, int]
@@ -409,6 +410,7 @@ class Merged:
     name: str
     gone: Mask | None = None
     copied: bool = False
+    denied: str = ""
 
     def fits(self, state: State) -> bool:
         """Whether it still holds the scene on show."""
@@ -423,7 +425,9 @@ class Merged:
         if self.fits(state):
             return state
         text = f"{self.name} was not merged, since another scene is on show by now; merge it again."
-        if self.gone is not None:
+        if self.denied:
+            text = "Nothing was taken out, since the scene is another by now; click it again."
+        elif self.gone is not None:
             text = "Nothing was filled, since the scene is another by now; fill it again."
         elif self.copied:
             text = "Nothing was copied, since the scene is another by now; copy it again."
@@ -439,7 +443,11 @@ class Merged:
         before = before.of_size(count, whole.atoms)
         brought = Mask.full(count) - Mask.first(count, self.there[0])
         after, label = replace(before.marks, there=whole.there, selected=brought), f"Merge {self.name}"
-        if self.gone is not None:
+        if self.gone is not None and self.denied:
+            kept = replace(after, selected=before.marks.selected)
+            after = deny_atom(delete(kept, self.gone.of_count(count)), whole.there[1] - 1, self.denied)
+            label = f"Take a part out of {self.denied}"
+        elif self.gone is not None:
             none = replace(after, selected=Mask.none(count))
             after, label = delete(none, self.gone.of_count(count)), f"Delete and fill {len(self.gone):,}"
         elif self.copied:
