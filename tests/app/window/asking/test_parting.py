@@ -28,7 +28,7 @@ from tests.app.window.headless import context, frames, look
 from tests.app.window.scenes import after, told
 from tests.boxroom import box_room
 
-CUT = 0.6
+CUT = 0.85
 
 
 @pytest.fixture(scope="module")
@@ -165,6 +165,7 @@ def test_every_part_has_a_row_that_fits_beside_the_picture(listed: State, monkey
         theme.set_up(1.0, "dark")
 
         def draw(seen) -> None:
+            imgui.set_next_window_pos(ImVec2(0, 0))
             imgui.set_next_window_size(ImVec2(348, 468))
             imgui.begin("##panel")
             panel.draw(state, seen)
