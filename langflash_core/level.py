@@ -122,6 +122,21 @@ def found_world(
     return replace(world, guess=guessed(evidence(scene, world, surface)))
 
 
+NOT_SURE = "its photos do not tell for sure which way is up; langflash level, or the window, guesses it"
+
+
+def levelled(scene: Scene) -> Scene:
+    """The scene with where it stands in its record, where that is sure, and else with a warning; its tensors
+    are the same."""
+    try:
+        world = found_world(scene)
+    except InputError:  # nothing is there to stand on
+        return scene
+    if world.sure:
+        return scene.with_record(world=world)
+    return scene.with_record(warnings=(*scene.record.warnings, NOT_SURE))
+
+
 def metres_of(scene: Scene) -> tuple[float | None, Guess | None]:
     """Metres per scene unit where they are known, and else the guess."""
     if scene.record.metric_scale:

@@ -242,7 +242,7 @@ def _spoken(
         nearest = rows[torch.from_numpy(np.asarray(KDTree(means[seen]).query(means[~seen])[1]))]
         ids[hidden], values[hidden] = ids[nearest], values[nearest]
     # What is known of atoms and of photos that are no more.
-    plain = scene.with_record(atom_names={}, atom_denials={}, silent_atoms=(), light={})
+    plain = scene.with_record(atom_names={}, atom_denials={}, silent_atoms=(), lone_atoms=(), light={})
     lifted = replace(
         plain,
         semantics=Semantics(ids, values, dictionary, PRESETS[PRESET].space),

@@ -263,23 +263,25 @@ TRANSFORMS = Output(
 )  # fmt: skip
 
 INVENTORY_PAGE = Output(
-    "inventory", (".html",), tip="What is in the room, with cut-outs and a plan, as a page to print",
+    "inventory", (".html",), "Page", tip="What is in the room, with cut-outs and a plan, as a page to print",
     subject="room", word="inventory", writer="writing.inventory:write_inventory",
 )  # fmt: skip
 INVENTORY_CSV = Output(
-    "inventory_table", (".csv",), tip="What is in the room as a table",
+    "inventory_table", (".csv",), "Table, .csv", stem="inventory", tip="What is in the room as a table",
     subject="room", word="inventory", noun="a .csv of things", writer="writing.inventory:write_inventory",
 )  # fmt: skip
 INVENTORY_JSON = Output(
-    "inventory_data", (".json",), tip="What is in the room, and its plan, as data",
-    subject="room", word="inventory", keys=("things",), writer="writing.inventory:write_inventory",
+    "inventory_data", (".json",), "Data, .json", stem="inventory",
+    tip="What is in the room, and its plan, as data", subject="room",
+    word="inventory", keys=("things",), writer="writing.inventory:write_inventory",
 )  # fmt: skip
 PLAN_SVG = Output(
-    "plan", (".svg",), tip="The room from above, to scale, with walls, things, names and measures",
+    "plan", (".svg",), "Plan, .svg",
+    tip="The room from above, to scale, with walls, things, names and measures",
     subject="room", word="plan", unsaid=True, writer="writing.inventory:write_plan",
 )  # fmt: skip
 PLAN_DXF = Output(
-    "plan_cad", (".dxf",), tip="The same for CAD programs",
+    "plan_cad", (".dxf",), "Plan, .dxf", stem="plan", tip="The same for CAD programs",
     subject="room", word="plan", unsaid=True, writer="writing.inventory:write_plan",
 )  # fmt: skip
 
@@ -289,8 +291,10 @@ OUTPUTS = (
     OPEN_USD, PAGE, SCENE, COLMAP, TRANSFORMS, INVENTORY_PAGE, INVENTORY_CSV, INVENTORY_JSON, PLAN_SVG,
     PLAN_DXF,
 )  # fmt: skip
-OFFERED = tuple(output for output in OUTPUTS if output.label)
-"""By the window, in the order of its buttons."""
+OFFERED = tuple(output for output in OUTPUTS if output.label and output.subject != "room")
+"""By the window's export, in the order of its buttons."""
+ROOM = tuple(output for output in OUTPUTS if output.subject == "room")
+"""By the window's inventory."""
 WORDS = tuple(dict.fromkeys(output.word for output in OUTPUTS if output.word))
 """For `--what`."""
 READ_ONLY = {".ksplat": "export.ksplat:read_ksplat", ".gltf": "export.gltf:read_gltf"}

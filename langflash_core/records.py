@@ -93,6 +93,10 @@ _KNOWN = {
 }
 """How it is known where a scene stands."""
 
+SURE = 2.0
+"""Degrees of expected error of up, to which edges of the photos are believed without asking. Surfaces alone
+lean with their depth."""
+
 
 @dataclass(frozen=True)
 class World:
@@ -114,6 +118,11 @@ class World:
     floor_by: str = "told"
     north_by: str = "told"
     guess: Guess | None = None
+
+    @property
+    def sure(self) -> bool:
+        """Whether up is known well enough to stand a scene on it unasked."""
+        return self.up_by == "told" or (self.up_by == "edges" and self.up_error <= SURE)
 
 
 def world_to_json(world: World) -> dict[str, Any]:
@@ -168,7 +177,8 @@ class Record:
     it stands; None: nobody looked. thing_names: a person's own, by what the inventory calls a thing.
     calibration: what the network's checkpoint says about scores, instead of its language space. atom_names:
     a person's own, by atom, which it answers to. atom_denials: what a person said that an atom is not.
-    silent_atoms: those that answer no phrase. num_deleted: Gaussians that edits took away. camera_path:
+    silent_atoms: those that answer no phrase. lone_atoms: of parts that somebody took out of an answer; what
+    they are told is told to no other. num_deleted: Gaussians that edits took away. camera_path:
     the window's key frames. tour: stops and notes, as `scene.tour` has them. others: what a file says under
     keys that this version does not know.
     """
@@ -192,6 +202,7 @@ class Record:
     atom_names: Mapping[int, str] = field(default_factory=dict)
     atom_denials: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
     silent_atoms: tuple[int, ...] = ()
+    lone_atoms: tuple[int, ...] = ()
     num_deleted: int = 0
     camera_path: tuple[Mapping[str, Any], ...] = ()
     tour: Mapping[str, Any] = field(default_factory=dict)

@@ -288,7 +288,7 @@ class Scene:
         if self.confidences is not None:
             _shape("confidences", self.confidences, (count,))
             _shares("confidences", self.confidences)
-        for name in ("atom_names", "atom_denials", "silent_atoms"):
+        for name in ("atom_names", "atom_denials", "silent_atoms", "lone_atoms"):
             atoms = torch.tensor(list(getattr(self.record, name)), dtype=torch.int64)
             _names(name, atoms, self.semantics.num_atoms)
         check_light(self.record.light, num_views)

@@ -9,8 +9,18 @@ import torch
 
 from langflash_core import level
 from langflash_core.errors import InputError
-from langflash_core.level import Evidence, found_world, guessed, measured, measured_by, seen_at, upright
-from langflash_core.records import Guess
+from langflash_core.level import (
+    NOT_SURE,
+    Evidence,
+    found_world,
+    guessed,
+    levelled,
+    measured,
+    measured_by,
+    seen_at,
+    upright,
+)
+from langflash_core.records import SURE, Guess, World
 from langflash_core.scene.world import turn_of
 from langflash_core.types import Gaussians
 from tests.boxroom import EYE, HIGH, METRES, box_room, true_up, without_language
@@ -154,3 +164,20 @@ def test_the_densest_window_is_found():
     values = np.concatenate((np.linspace(0, 10, 20), np.full(15, 4.0)))
     assert level.densest(values, 0.1) == pytest.approx(4.0)
     assert level.densest(np.array([3.0]), 0.1) == 3.0
+
+
+def test_a_scene_is_levelled_unasked_only_where_that_is_sure(room, monkeypatch):
+    """Surfaces lean, so their word is not taken unasked; what edges say is, beside the same tensors."""
+    unsure = levelled(room)
+    assert unsure.record.world is None and unsure.record.warnings[-1] == NOT_SURE
+    stands = World((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "edges", SURE)
+    monkeypatch.setattr(level, "found_world", lambda scene: stands)
+    sure = levelled(room)
+    assert sure.record.world == stands and sure.record.warnings == room.record.warnings
+    assert sure.gaussians is room.gaussians and sure.semantics is room.semantics
+    assert not replace(stands, up_error=SURE + 0.1).sure and replace(stands, up_by="told", up_error=9.0).sure
+
+
+def test_a_scene_of_nothing_is_levelled_to_nothing(room):
+    nothing = room.rows(torch.zeros(len(room.gaussians), dtype=torch.bool))
+    assert levelled(nothing) is nothing

@@ -13,6 +13,7 @@ import langflash_core as lf
 from langflash_core.errors import Cancelled, ImageError, InputError, PromptError, ViewError, WeightsError
 from langflash_core.images.straight import straightened
 from langflash_core.language.spaces import language_space
+from langflash_core.level import levelled
 from langflash_core.network import PRESETS, GuidedDepthNet, build_network, save_network
 from langflash_core.reconstruction.views import found_views, straight_prediction
 from langflash_core.records import BentLens, FoundFocal
@@ -73,7 +74,7 @@ def test_the_scene_records_how_it_was_made(scene):
     assert record.preset == "mini"
     assert record.photos == ("books_left.jpg", "books_right.jpg")
     inside = [stage for stage in GuidedDepthNet.stages if stage != "Gaussians"]  # the scene's own are finer
-    stages = ["photos", "weights", *inside, "assembly", "colours", "pruning"]
+    stages = ["photos", "weights", *inside, "assembly", "colours", "pruning", "level"]
     assert list(cost.timings) == stages
     assert all(seconds > 0 for seconds in cost.timings.values())
     # The stages are all that is done: between them lie bookkeeping, one copy, and what a busy machine takes.
@@ -82,6 +83,15 @@ def test_the_scene_records_how_it_was_made(scene):
     assert network == pytest.approx(cost.seconds["network"], rel=0.2)
     assert sys.platform == "win32" or 100 < (cost.peak_memory_mb or 0) < 100_000
     assert len(set(record.warnings)) == len(record.warnings)
+
+
+def test_the_scene_is_levelled_beside_its_tensors(scene):
+    """By its photos' edges where they tell, else it says that they do not."""
+    world = scene.record.world
+    assert (world is None) == any("which way is up" in warning for warning in scene.record.warnings)
+    again = levelled(replace(scene, record=replace(scene.record, world=None, warnings=())))
+    assert again.record.world == world
+    assert again.gaussians is scene.gaussians and again.viewmats is scene.viewmats
 
 
 def test_the_scene_answers(scene):

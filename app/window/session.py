@@ -30,6 +30,7 @@ from .events import Events
 from .exporting.effects import ExportingEffects
 from .filming.effects import FilmingEffects
 from .frame.layout import draw_all
+from .inventory.effects import InventoryEffects
 from .kit import theme
 from .kit.look import Look
 from .kit.textures import Thumbnails
@@ -112,6 +113,7 @@ class Session:
             recovery,
             ExportingEffects(hands, keeper),
             FilmingEffects(hands),
+            InventoryEffects(hands),
             LogEffects(hands),
             TypedEffects(hands),
             RestEffects(hands),

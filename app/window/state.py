@@ -3,8 +3,13 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+from jaxtyping import Float
+
 from langflash_core.colormaps import HeatColours
-from langflash_core.geometry.poses import Pose
+from langflash_core.geometry import rotations
+from langflash_core.geometry.poses import UP, Pose
+from langflash_core.records import Guess, World
 from langflash_core.scene.tour import NO_TOUR, read_tour
 from langflash_core.scene.tour import Tour as ToldTour
 
@@ -13,6 +18,7 @@ from .dialogs import Dialog
 from .editing.state import NO_EDITING, Editing
 from .exporting.state import NO_EXPORTING, Exporting
 from .filming.state import NO_FILMING, Filming, read
+from .inventory.state import NO_LISTING, Listing
 from .opening.state import NO_OPENING, Opening
 from .recovery.preferences import DEFAULTS, Preferences
 from .recovery.state import NO_RECOVERY, Recovery
@@ -98,6 +104,7 @@ class State:
     opening: Opening = NO_OPENING
     recovery: Recovery = NO_RECOVERY
     touring: Touring = NO_TOURING
+    listing: Listing = NO_LISTING
 
     # The state with another half; `changes` are that half's fields
 
@@ -125,6 +132,9 @@ class State:
     def with_touring(self, **changes: Any) -> "State":
         return replace(self, touring=replace(self.touring, **changes))
 
+    def with_listing(self, **changes: Any) -> "State":
+        return replace(self, listing=replace(self.listing, **changes))
+
     # What follows from several halves
 
     @property
@@ -141,6 +151,26 @@ class State:
     def metric(self) -> float | None:
         """Metres per scene unit, where that is known."""
         return self.editing.marks.metric_scale if self.editing.marks else None
+
+    @property
+    def guess(self) -> Guess | None:
+        """Of metres per scene unit, where nobody told."""
+        return None if self.metric is not None or self.world is None else self.world.guess
+
+    @property
+    def world(self) -> World | None:
+        """Where the scene stands, where somebody looked."""
+        return self.editing.marks.world if self.editing.marks else None
+
+    @property
+    def turn(self) -> Float[np.ndarray, "3 3"]:
+        """Rows east, down and north of where the scene stands, in its own axes; those where nobody looked."""
+        return np.eye(3) if self.world is None else rotations.matrix(self.world.turn)
+
+    @property
+    def up(self) -> Float[np.ndarray, "3"]:
+        """Up, unit, in the scene's own axes."""
+        return UP if self.world is None else -self.turn[1]
 
     @property
     def heat_colours(self) -> HeatColours:

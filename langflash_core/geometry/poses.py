@@ -1,8 +1,9 @@
 """Where the person stands: a pose to orbit, pan, zoom and fly with, as pure functions.
 
-Conventions of the core: OpenCV axes, world = camera of view 0, quaternions wxyz. World up is
--y, because view 0 was held roughly level. A pose frames a *box* with the shape of the photos
-inside a panel of any shape: the box always fits, so an input view shows all of its photo.
+Conventions of the core: OpenCV axes, world = camera of view 0, quaternions wxyz. Up is -y, because view 0
+was held roughly level, where nobody knows better (`langflash_core.records.World`). A pose frames a *box*
+with the shape of the photos inside a panel of any shape: the box always fits, so an input view shows all of
+its photo.
 
 A pose with a `span` sees by parallel rays (orthographic). It stands clear of the scene, since what is
 behind it is not drawn: how large things are follows from the span, not from where it stands.
@@ -163,6 +164,21 @@ def project(
     return pos_c, across * K.diagonal()[:2] + K[:2, 2]
 
 
+def visible(
+    line: Num[np.ndarray, "n 3"], pose: Pose, size: tuple[float, float]
+) -> Float[np.ndarray, "m 2 2"]:
+    """The pieces between points of a line that lie in front, as pixels (m, start and end, 2) in a picture of
+    `size`."""
+    matrix = viewmat(pose)
+    pos_c = line @ matrix[:3, :3].T + matrix[:3, 3]
+    ahead = pos_c[:, 2] >= NEAREST
+    K = intrinsics(pose, max(round(size[0]), 1), max(round(size[1]), 1))
+    depths = np.maximum(pos_c[:, 2:], NEAREST)
+    across = pos_c[:, :2] if pose.span is not None else pos_c[:, :2] / depths
+    pixels = across * K.diagonal()[:2] + K[:2, 2]
+    return np.stack((pixels[:-1], pixels[1:]), 1)[ahead[:-1] & ahead[1:]]
+
+
 def orthographic(pose: Pose, low: Vector, high: Vector) -> Pose:
     """The pose by parallel rays, the pivot as large as before, clear of the box from `low` to `high`."""
     span = 2 * pose.distance * math.tan(math.radians(pose.fov) / 2)
@@ -186,33 +202,35 @@ def _at_reach(pose: Pose, reach: float) -> Pose:
     return replace(pose, centre=Vector(*centre.tolist()), reach=reach)
 
 
-def orbit(pose: Pose, yaw: float, pitch: float) -> Pose:
-    """Turn around the pivot, radians: yaw about world up, pitch about the camera's x axis."""
-    turned = look(pose, yaw, pitch)
+def orbit(pose: Pose, yaw: float, pitch: float, up: Float[np.ndarray, "3"] = UP) -> Pose:
+    """Turn around the pivot, radians: yaw about up (unit), pitch about the camera's x axis."""
+    turned = look(pose, yaw, pitch, up)
     centre = pose.pivot - pose.reach * turned.axes[:, 2]
     return replace(turned, centre=Vector(*centre.tolist()))
 
 
-def orbit_near(pose: Pose, yaw: float, pitch: float, places: Sequence[Vector]) -> Pose:
+def orbit_near(
+    pose: Pose, yaw: float, pitch: float, places: Sequence[Vector], up: Float[np.ndarray, "3"] = UP
+) -> Pose:
     """`orbit`, slower and slower to a stop between `NEAR` and `FARTHEST` degrees from the nearest of some
     places, as the pivot sees them. It is free without places, on the way back, and for who went farther
     on another way."""
     if not places:
-        return orbit(pose, yaw, pitch)
+        return orbit(pose, yaw, pitch, up)
     # In small steps, so that a quick drag ends where a slow one does.
     steps = max(1, math.ceil(math.degrees(max(abs(yaw), abs(pitch))) / SLOWING_STEP))
     for _ in range(steps):
-        pose = _slowed(pose, yaw / steps, pitch / steps, places)
+        pose = _slowed(pose, yaw / steps, pitch / steps, places, up)
     return pose
 
 
-def _slowed(pose: Pose, yaw: float, pitch: float, places: Sequence[Vector]) -> Pose:
-    turned = orbit(pose, yaw, pitch)
+def _slowed(pose: Pose, yaw: float, pitch: float, places: Sequence[Vector], up: np.ndarray) -> Pose:
+    turned = orbit(pose, yaw, pitch, up)
     before, after = (degrees_aside(at, places) for at in (pose, turned))
     if after <= max(before, NEAR) or before > FARTHEST:
         return turned
     share = (FARTHEST - max(before, NEAR)) / (FARTHEST - NEAR)
-    held = orbit(pose, yaw * share, pitch * share)
+    held = orbit(pose, yaw * share, pitch * share, up)
     return pose if degrees_aside(held, places) > FARTHEST else held
 
 
@@ -224,15 +242,28 @@ def degrees_aside(pose: Pose, places: Sequence[Vector]) -> float:
     return math.degrees(math.acos(min(max(cosine, -1.0), 1.0)))
 
 
-def look(pose: Pose, yaw: float, pitch: float) -> Pose:
-    """Turn on the spot, radians; stops short of the poles so that up stays up."""
-    axes = about(UP, yaw) @ pose.axes
-    from_pole = math.acos(float(np.clip(axes[:, 2] @ UP, -1.0, 1.0)))
+def look(pose: Pose, yaw: float, pitch: float, up: Float[np.ndarray, "3"] = UP) -> Pose:
+    """Turn on the spot, radians; stops short of the poles so that up (unit) stays up."""
+    axes = about(up, yaw) @ pose.axes
+    from_pole = math.acos(float(np.clip(axes[:, 2] @ up, -1.0, 1.0)))
     floor = math.radians(MIN_POLE_DEGREES)
     # Looking up shrinks the angle to the pole: a positive pitch turns the view upwards.
     lowest, highest = min(floor - from_pole, 0.0), max(math.pi - floor - from_pole, 0.0)
     pitch = -float(np.clip(-pitch, lowest, highest))
     return replace(pose, rotation=_rotation(about(axes[:, 0], pitch) @ axes))
+
+
+def roll(pose: Pose, up: Float[np.ndarray, "3"]) -> float:
+    """Radians by which the picture is turned about its own direction, from one that stands upright; 0 where
+    it looks straight up or down."""
+    across, along = pose.axes[:, 0] @ up, pose.axes[:, 1] @ up
+    return 0.0 if math.hypot(across, along) < 1e-6 else math.atan2(-across, -along)
+
+
+def righted(pose: Pose, up: Float[np.ndarray, "3"], share: float = 1.0) -> Pose:
+    """The pose from the same place in the same direction, upright; or so much of the way there."""
+    turn = -share * roll(pose, up)
+    return replace(pose, rotation=_rotation(about(pose.axes[:, 2], turn) @ pose.axes)) if turn else pose
 
 
 def pan(pose: Pose, right: float, down: float) -> Pose:
@@ -255,11 +286,11 @@ def zoom(pose: Pose, factor: float) -> Pose:
     return _at_reach(pose, max(pose.reach * factor, MIN_REACH))
 
 
-def facing(pose: Pose, forward: Vector) -> Pose:
-    """The pose that looks along a world direction at the same pivot, upright; straight up or down, with the
+def facing(pose: Pose, forward: Vector, up: Float[np.ndarray, "3"] = UP) -> Pose:
+    """The pose that looks along a direction at the same pivot, upright; straight up or down, with the
     picture's right side where it was."""
     ahead = np.array(forward) / np.linalg.norm(forward)
-    right = np.cross(-UP, ahead)
+    right = np.cross(-up, ahead)
     if np.linalg.norm(right) < 1e-6:
         right = pose.axes[:, 0] - (pose.axes[:, 0] @ ahead) * ahead
     right /= np.linalg.norm(right)
@@ -268,10 +299,12 @@ def facing(pose: Pose, forward: Vector) -> Pose:
     return replace(pose, centre=Vector(*centre.tolist()), rotation=_rotation(axes))
 
 
-def facing_near(pose: Pose, forward: Vector, places: Sequence[Vector]) -> Pose:
+def facing_near(
+    pose: Pose, forward: Vector, places: Sequence[Vector], up: Float[np.ndarray, "3"] = UP
+) -> Pose:
     """`facing`, no farther than `NEAR` degrees from the nearest of some places, as the pivot sees them: from
     there on the way to where it should look from."""
-    there = facing(pose, forward)
+    there = facing(pose, forward, up)
     if not places or degrees_aside(there, places) <= NEAR:
         return there
     wanted = -there.axes[:, 2]
@@ -280,9 +313,9 @@ def facing_near(pose: Pose, forward: Vector, places: Sequence[Vector]) -> Pose:
     nearest = ways[np.argmax(ways @ wanted)]
     axis = np.cross(nearest, wanted)
     if np.linalg.norm(axis) < 1e-6:  # right behind what the photo looked at: around it
-        axis = UP
+        axis = up
     direction = about(axis / np.linalg.norm(axis), math.radians(NEAR)) @ nearest
-    return facing(pose, Vector(*(-direction).tolist()))
+    return facing(pose, Vector(*(-direction).tolist()), up)
 
 
 def with_fov(pose: Pose, degrees: float) -> Pose:

@@ -68,7 +68,7 @@ def lessons_of(record: Record, rows: Float[np.ndarray, "K C"], network: str) -> 
         rows: how its atoms look; what no photo shows, a row of 0, cannot be told from anything. network: that
             looked.
     """
-    taught = sorted({*record.atom_names, *record.atom_denials})
+    taught = sorted({*record.atom_names, *record.atom_denials} - {*record.lone_atoms})
     lessons = (
         Lesson(rows[k].astype(np.float32), record.atom_names.get(k, ""), record.atom_denials.get(k, ()))
         for k in taught

@@ -7,6 +7,8 @@ are the same and not at all from a cosine of `ALIKE` down:
     d_j' = normalise(d_j + sum_k s_jk (d_k' - d_k)),
     s_jk = clamp((cos(d_j, d_k) - ALIKE) / (1 - ALIKE), 0, 1).
 
+A lone atom (`langflash_core.scene.lone`) is that of one part of a scene, and moves no other.
+
 Source: own.
 """
 
@@ -45,6 +47,8 @@ def taught_dictionary(
     after = torch.stack([_moved(dictionary[k], *lesson, known) for k, lesson in lessons.items()])
     unit = normalize(dictionary, dim=-1)
     shares = ((unit @ unit[rows].T - ALIKE) / (1 - ALIKE)).clamp(0, 1)
+    lone = torch.tensor([k in record.lone_atoms for k in lessons], device=dictionary.device)
+    shares = torch.where(lone, 0.0, shares)
     spread = normalize(dictionary + shares @ (after - before), dim=-1)
     moved = shares.amax(-1, keepdim=True) > 0
     return torch.where(moved, spread, dictionary).index_copy(0, rows, after)

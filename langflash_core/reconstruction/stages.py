@@ -1,4 +1,4 @@
-"""The stages of a reconstruction, in order: photos, weights, network, assembly, refinement.
+"""The stages of a reconstruction, in order: photos, weights, network, assembly, refinement, level.
 
 photos -> Views -> Tools -> Prediction -> Scene. Each is a function of what those before it gave; `Run` times
 them and tells how far they are.
@@ -15,8 +15,8 @@ from langflash_core.detail import DEFAULT_DETAIL
 from langflash_core.fine import fine_scene
 from langflash_core.images.triage import check_shown
 from langflash_core.images.views import load_views
+from langflash_core.level import levelled
 from langflash_core.memory import peak_memory_mb
-from langflash_core.network import LangFlashNet
 from langflash_core.reconstruction.finding import predictor
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.reconstruction.refining import refined
@@ -30,7 +30,7 @@ from langflash_core.scene.world import in_world
 from langflash_core.types import Cost, Prediction, Scene, Views
 
 # Where each begins in the whole, from its measured share of the time on two CPU cores.
-STAGES = {"photos": 0.0, "weights": 0.08, "network": 0.16, "assemble": 0.66, "refine": 0.97}
+STAGES = {"photos": 0.0, "weights": 0.08, "network": 0.16, "assemble": 0.66, "refine": 0.97, "level": 0.98}
 _PATIENCE = 0.2  # seconds, until it is told again how far something is
 _AS_IT_IS = "the preset '{}' makes one Gaussian a pixel; the detail that was asked for is left out"
 
@@ -48,8 +48,10 @@ def scene_of(wishes: Wishes, run: Run, networks: Networks, ahead: Ahead | None) 
         scene = scene.with_record(lens={"found": [asdict(lens) for lens in prediction.lenses]})
     run.check()
     scene = _in_world(wishes, scene)
+    with run.stage("level"):
+        scene = levelled(scene.with_record(calibration=dict(tools.network.calibration)))
     run.report("done", 1.0)
-    return _with_record(scene, tools.network, run.timings)
+    return _with_cost(scene, run.timings)
 
 
 def _photos(wishes: Wishes, run: Run, ahead: Ahead | None) -> tuple[Views, Ahead]:
@@ -144,16 +146,16 @@ def _in_world(wishes: Wishes, scene: Scene) -> Scene:
     return in_world(scene, wishes.viewmats[0], unit)
 
 
-def _with_record(scene: Scene, network: LangFlashNet, timings: dict[str, float]) -> Scene:
-    """The scene with the cost of its making, and the network's calibration, in its record.
+def _with_cost(scene: Scene, timings: dict[str, float]) -> Scene:
+    """The scene with the cost of its making in its record.
 
     `timings` stay disjoint seconds in order (the network's and the scene's own steps are in the
     scene already); `seconds` sums them up for the network and for all.
     """
     before = {name: timings[name] for name in ("photos", "weights")}
     cost = Cost(
-        timings={**before, **scene.record.cost.timings},
+        timings={**before, **scene.record.cost.timings, "level": timings["level"]},
         seconds={"network": timings["network"], "total": sum(timings.values())},
         peak_memory_mb=peak_memory_mb(),
     )
-    return scene.with_record(cost=cost, calibration=dict(network.calibration))
+    return scene.with_record(cost=cost)

@@ -12,6 +12,9 @@ from langflash_core.scene.changed import changed_scene
 from langflash_core.scene.edits import Atom, Marks
 from langflash_core.types import NO_LANGUAGE, Scene, Semantics
 
+RECORDED = ("camera_path", "metric_scale", "tour", "world", "thing_names")
+"""What marks and a scene's record both say."""
+
 
 def edited_dictionary(scene: Scene, atoms: Sequence[Atom]) -> Float[Tensor, "K C"]:
     """The dictionary (K, C) after merging: merged atoms share one row, silent ones are 0.
@@ -48,7 +51,7 @@ def spoken_scene(scene: Scene, marks: Marks) -> Scene:
 
 def edited_scene(scene: Scene, marks: Marks) -> Scene:
     """The scene to save: its Gaussians moved and recoloured, without deleted ones; merged atoms as one;
-    names, key frames, tour and scale in its record.
+    names, key frames, tour, scale and where it stands in its record.
 
     Hidden Gaussians are kept. Untouched marks give back the scene itself.
     """
@@ -57,7 +60,7 @@ def edited_scene(scene: Scene, marks: Marks) -> Scene:
         scene = replace(scene, view_ids=None)
     marks = marks.of_size(len(scene.gaussians), marks.atoms[: marks.there[1]])
     record = scene.record
-    told = {name: getattr(marks, name) for name in ("camera_path", "metric_scale", "tour")}
+    told = {name: getattr(marks, name) for name in RECORDED}
     if any(value != getattr(record, name) for name, value in told.items()):
         scene = scene.with_record(**told)
     if not marks.deleted and marks.atoms == atoms_of(scene):
@@ -91,6 +94,7 @@ def there(scene: Scene, marks: Marks) -> Scene:
         atom_names={k: name for k, name in record.atom_names.items() if k < num_atoms},
         atom_denials={k: words for k, words in record.atom_denials.items() if k < num_atoms},
         silent_atoms=tuple(k for k in record.silent_atoms if k < num_atoms),
+        lone_atoms=tuple(k for k in record.lone_atoms if k < num_atoms),
     )
     return replace(first, semantics=semantics, record=record)
 
@@ -123,6 +127,8 @@ def first_marks(scene: Scene) -> Marks:
         camera_path=tuple(scene.record.camera_path),
         metric_scale=scene.record.metric_scale,
         tour=scene.record.tour,
+        world=scene.record.world,
+        thing_names=scene.record.thing_names,
     )
 
 
@@ -151,5 +157,6 @@ def _joined(scene: Scene, atoms: Sequence[Atom]) -> Scene:
         atom_names={places[k]: atoms[k].name for k in heads if atoms[k].name},
         atom_denials={places[k]: atoms[k].denied for k in heads if atoms[k].denied},
         silent_atoms=tuple(places[k] for k in heads if not atoms[k].on),
+        lone_atoms=tuple(places[k] for k in heads if k in scene.record.lone_atoms),
     )
     return replace(scene, semantics=replace(semantics, weight_ids=ids, dictionary=dictionary), record=record)

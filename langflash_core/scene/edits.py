@@ -15,11 +15,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
+from langflash_core.records import World
 from langflash_core.scene.changes import Change, with_change
 from langflash_core.scene.mask import Mask
 
 MASKS = ("deleted", "hidden", "selected")
-TOLD = ("camera_path", "metric_scale", "there", "tour")
+TOLD = ("camera_path", "metric_scale", "there", "tour", "world", "thing_names")
 MOST_EDITS = 1000
 MOST_BYTES = 32 * 2**20  # of the edits of one scene
 Combine = Literal["replace", "add", "remove"]
@@ -43,7 +44,8 @@ class Atom:
 class Marks:
     """What edits made of a scene. A deleted or hidden Gaussian is never selected.
 
-    camera_path, metric_scale, tour: as in `Record`; plain values of JSON. changes: of Gaussians, in order.
+    camera_path, metric_scale, tour, thing_names: as in `Record`; plain values of JSON. world: as there.
+    changes: of Gaussians, in order.
     there: how many of the scene's first Gaussians and atoms there are; others came with a merge that was
     undone.
     """
@@ -57,6 +59,8 @@ class Marks:
     metric_scale: float | None = None
     changes: tuple[Change, ...] = ()
     tour: Mapping[str, Any] = field(default_factory=dict)
+    world: World | None = None
+    thing_names: Mapping[str, str] = field(default_factory=dict)
 
     @staticmethod
     def untouched(num_gaussians: int, num_atoms: int) -> "Marks":
@@ -78,7 +82,7 @@ class Marks:
     @property
     def written(self) -> tuple[Any, ...]:
         """What a saved scene holds of them: all but what is hidden or selected."""
-        told = self.camera_path, self.metric_scale, self.tour
+        told = self.camera_path, self.metric_scale, self.tour, self.world, self.thing_names
         return self.left, self.atoms[: self.there[1]], *told, self.changes
 
     def of_size(self, num_gaussians: int, atoms: tuple[Atom, ...]) -> "Marks":
@@ -109,7 +113,7 @@ class Edit:
         flips = sum(len(packed) for _, packed in self.flips)
         pairs = [(name, value) for name, *pair in self.told for value in pair]
         values = sum(300 * len(value) for _, value in pairs if isinstance(value, tuple))
-        values += sum(len(str(value)) for name, value in pairs if name == "tour")
+        values += sum(len(str(value)) for name, value in pairs if name in ("tour", "thing_names"))
         moved = (
             0 if self.changes is None else sum(len(c.rows.bits) for c in self.changes[1] + self.changes[2])
         )
@@ -326,6 +330,12 @@ def deny_atom(marks: Marks, k: int, text: str) -> Marks:
         return marks
     name = "" if atom.name.lower() == text.lower() else atom.name
     return _with_atoms(marks, _merged_with(marks, k), name=name, denied=(*atom.denied, text))
+
+
+def allow_atom(marks: Marks, k: int, text: str) -> Marks:
+    """Take back that an atom, with those merged with it, is not what `text` means."""
+    denied = tuple(word for word in marks.atoms[k].denied if word != text.strip())
+    return _with_atoms(marks, _merged_with(marks, k), denied=denied)
 
 
 def toggle_atom(marks: Marks, k: int) -> Marks:

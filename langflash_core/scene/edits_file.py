@@ -1,6 +1,6 @@
 """A history of edits as JSON: small, readable, whole or refused.
 
-    {"format": "langflash-edits", "version": 3, "digest": of the scene, "gaussians": N, "atoms": K,
+    {"format": "langflash-edits", "version": 4, "digest": of the scene, "gaussians": N, "atoms": K,
      "about": {...}, "done": [...], "undone": [...]}
 
 An edit is {"label", "flips": {mask: base64 of zlib}, "swaps": [[atom, [into, name, on, denied...], [...]]]},
@@ -8,8 +8,8 @@ where key frames or the scale changed with "told": [[name, before, after]], wher
 recoloured with "changes": [stayed, [went], [came]], each of those [kind, base64 of zlib, numbers].
 What came before the first edit of "done" is in "before": edits without a name, from the scene to the marks
 that its history began with and on to those that can still be undone to; "forgotten" counts the latter.
-Version 1 had neither "changes" nor "before", version 2 no tours; who reads only that must not lose them in
-silence.
+Version 1 had neither "changes" nor "before", version 2 no tours, version 3 no worlds and names of things; who
+reads only that must not lose them in silence.
 """
 
 import base64
@@ -25,6 +25,7 @@ from typing import Any
 from langflash_core.errors import SceneFileError
 from langflash_core.files import write_atomically
 from langflash_core.limits import TEXT
+from langflash_core.records import World, world_from_json, world_to_json
 from langflash_core.scene.changes import Change, checked, told
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import MASKS, TOLD, Atom, Edit, History, difference
@@ -32,7 +33,7 @@ from langflash_core.scene.mask import Mask
 from langflash_core.scene.tour import read_tour, told_tour
 from langflash_core.types import Scene
 
-FORMAT, VERSION = "langflash-edits", 3
+FORMAT, VERSION = "langflash-edits", 4
 
 
 def scene_digest(scene: Scene) -> str:
@@ -124,11 +125,16 @@ def _encoded(edit: Edit) -> dict:
         "swaps": [[k, *([a.into, a.name, a.on, *a.denied] for a in pair)] for k, *pair in edit.swaps],
     }
     if edit.told:
-        encoded["told"] = [list(entry) for entry in edit.told]
+        encoded["told"] = [[name, *map(_plain, pair)] for name, *pair in edit.told]
     if edit.changes is not None:
         stayed, *both = edit.changes
         encoded["changes"] = [stayed, *([_encoded_change(each) for each in some] for some in both)]
     return encoded
+
+
+def _plain(value: Any) -> Any:
+    """A told value as JSON has it."""
+    return world_to_json(value) if isinstance(value, World) else value
 
 
 def _encoded_change(change: Change) -> list:
@@ -168,6 +174,12 @@ def _told(name: str, value: Any) -> Any:
             return float(metres)
         case "tour", dict():
             return told_tour(read_tour(value))
+        case "world", None:
+            return None
+        case "world", dict():
+            return world_from_json(value)
+        case "thing_names", dict() if all(isinstance(word, str) for word in value.values()):
+            return dict(value)
         case "there", [int() as num_gaussians, int() as num_atoms] if min(num_gaussians, num_atoms) >= 0:
             return num_gaussians, num_atoms
     raise ValueError(f"told: expected a value of {' or '.join(TOLD)}, received {name} {value!r}")

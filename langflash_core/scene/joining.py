@@ -58,13 +58,14 @@ def joined(
         view_ids=view_ids,
         levels=_known_of_both(first, second, first.levels, second.levels, 0),
         confidences=_known_of_both(first, second, first.confidences, second.confidences, 1),
-        record=replace(first.record, atom_names={}, atom_denials={}, silent_atoms=()),
+        record=replace(first.record, atom_names={}, atom_denials={}, silent_atoms=(), lone_atoms=()),
     )
     after, ours, theirs = first.semantics.num_atoms, first.record, second.record
     return scene.with_record(
         atom_names={**ours.atom_names, **{k + after: name for k, name in theirs.atom_names.items()}},
         atom_denials={**ours.atom_denials, **{k + after: words for k, words in theirs.atom_denials.items()}},
         silent_atoms=(*ours.silent_atoms, *(k + after for k in theirs.silent_atoms)),
+        lone_atoms=(*ours.lone_atoms, *(k + after for k in theirs.lone_atoms)),
     )
 
 

@@ -252,6 +252,7 @@ def sparser(scene: Scene) -> Scene:
         atom_names={int(renumbered[k]): name for k, name in record.atom_names.items() if used[k]},
         atom_denials={int(renumbered[k]): said for k, said in record.atom_denials.items() if used[k]},
         silent_atoms=tuple(int(renumbered[k]) for k in record.silent_atoms if used[k]),
+        lone_atoms=tuple(int(renumbered[k]) for k in record.lone_atoms if used[k]),
     )
     sparse = Semantics(ids, values, semantics.dictionary[used], semantics.space)
     return replace(scene, semantics=sparse, record=record)

@@ -27,6 +27,7 @@ def to_json(record: Record) -> dict:
     known["atom_names"] = {str(k): name for k, name in record.atom_names.items()}
     known["atom_denials"] = {str(k): list(said) for k, said in record.atom_denials.items()}
     known["silent_atoms"] = record.silent_atoms
+    known["lone_atoms"] = record.lone_atoms
     known["world"] = None if record.world is None else world_to_json(record.world)
     known["thing_names"] = dict(record.thing_names)
     known["camera_path"] = record.camera_path
@@ -53,14 +54,15 @@ def from_json(values: dict) -> Record:
     edits = _of_type(values, "edits", dict) or {}
     world, things = _of_type(values, "world", dict), _of_type(values, "thing_names", dict) or {}
     ours = {
-        *known, "atom_names", "atom_denials", "silent_atoms", "edits", "camera_path", "tour", "world",
-        "thing_names", _VERSION_1, *_COST,
+        *known, "atom_names", "atom_denials", "silent_atoms", "lone_atoms", "edits", "camera_path", "tour",
+        "world", "thing_names", _VERSION_1, *_COST,
     }  # fmt: skip
     return Record(
         **{name: value for name, value in known.items() if value is not None},
         atom_names={_number(k): str(name) for k, name in names.items()},
         atom_denials={_number(k): tuple(_list(denials, k, str)) for k in denials},
         silent_atoms=tuple(_list(values, "silent_atoms", int)),
+        lone_atoms=tuple(_list(values, "lone_atoms", int)),
         world=None if world is None else world_from_json(world),
         thing_names={str(thing): str(name) for thing, name in things.items()},
         camera_path=tuple(_list(values, "camera_path", dict)),

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from jaxtyping import Float
 
 from langflash_core import pipeline
 from langflash_core.colormaps import HeatColours
@@ -17,6 +18,7 @@ from langflash_core.errors import InputError, ViewError
 from langflash_core.export.png import USUAL, heat_over, to_8bit
 from langflash_core.files import readable_file, staged_folder
 from langflash_core.geometry.poses import (
+    UP,
     Pose,
     Vector,
     alike,
@@ -35,6 +37,7 @@ from langflash_core.language.spaces import language_space
 from langflash_core.limits import TEXT
 from langflash_core.running import Progress
 from langflash_core.scene.tour import read_tour
+from langflash_core.scene.world import turn_of
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
 from langflash_core.writing.cameras import camera_of
 from langflash_core.writing.encoding import encoded
@@ -107,9 +110,11 @@ def way(
         views = _poses(scene)
         around = _turn(views[0], shown) if path == "orbit" else None
         count = max(1, round(RATE * (seconds or SECONDS)))
-        turns = _turns(scene)
+        turns, up = _turns(scene), _up(scene)
         poses = [
-            orbit(around, 2 * math.pi * index / count, 0.0) if around else _at(views, index / count, turns)
+            orbit(around, 2 * math.pi * index / count, 0.0, up)
+            if around
+            else _at(views, index / count, turns, up)
             for index in range(count)
         ]
         return [to_camera(pose, width, height) for pose in poses]
@@ -195,13 +200,18 @@ def _turn(view: Pose, shown: Scene) -> Pose:
     return framing(view, Vector(*low.tolist()), Vector(*high.tolist()))
 
 
-def _at(views: list[Pose], time: float, turns: bool) -> Pose:
+def _up(scene: Scene) -> Float[np.ndarray, "3"]:
+    """Of the world that the scene stands in; of the first camera where nobody looked."""
+    return UP if scene.record.world is None else -turn_of(scene.record.world)[1]
+
+
+def _at(views: list[Pose], time: float, turns: bool, up: Float[np.ndarray, "3"]) -> Pose:
     """The pose at `time` in [0, 1) of the round."""
     if len(views) == 1:
         angle = 2 * math.pi * time
         if turns:
-            return orbit(views[0], angle, 0.0)
-        return orbit(views[0], _SWAY[0] * math.sin(angle), _SWAY[1] * (1 - math.cos(angle)) / 2)
+            return orbit(views[0], angle, 0.0, up)
+        return orbit(views[0], _SWAY[0] * math.sin(angle), _SWAY[1] * (1 - math.cos(angle)) / 2, up)
     leg, fraction = divmod(time * len(views), 1.0)
     return blend(views[int(leg)], views[(int(leg) + 1) % len(views)], fraction)
 

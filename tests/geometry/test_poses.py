@@ -235,3 +235,30 @@ def test_the_way_between_perspective_and_parallel_rays_is_in_perspective() -> No
     middle = poses.blend(flat, wider, 0.5)
     assert flat.span is not None and middle.span == pytest.approx(1.5 * flat.span)
     assert poses.alike((start, flat))[1].span is None and poses.alike((flat, wider)) == (flat, wider)
+
+
+@pytest.mark.parametrize(("yaw", "pitch"), [(0.3, 0.0), (0.0, 0.25), (-0.9, -0.4), (3.0, 0.1)])
+@pytest.mark.parametrize("degrees", [0.0, 20.0, 75.0])
+def test_whatever_up_is_turning_keeps_it_up(degrees: float, yaw: float, pitch: float) -> None:
+    """Twin: the same turn in a world that is turned so that up is -y."""
+    turn = rotations.about(np.array([1.0, 0.3, 0.2]), math.radians(degrees))
+    up, start = -turn[1], poses.facing(Pose(reach=2.0), Vector(*turn[2].tolist()), -turn[1])
+    moved = poses.orbit(start, yaw, pitch, up)
+    level = Pose(reach=2.0, rotation=Rotation(*rotations.quaternion(turn @ start.axes)))
+    np.testing.assert_allclose(turn @ moved.axes, poses.orbit(level, yaw, pitch).axes, atol=1e-7)
+    assert abs(poses.roll(moved, up)) < 1e-7
+    tilt = rotations.about(moved.axes[:, 2], 0.3)
+    aslant = Pose(reach=2.0, rotation=Rotation(*rotations.quaternion(tilt @ moved.axes)))
+    assert poses.roll(aslant, up) == pytest.approx(0.3, abs=1e-7)
+    np.testing.assert_allclose(poses.righted(aslant, up).axes, moved.axes, atol=1e-7)
+    assert poses.roll(poses.righted(aslant, up, 0.5), up) == pytest.approx(0.15, abs=1e-7)
+
+
+def test_what_is_seen_of_a_line_is_what_lies_in_front():
+    line = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [0.5, 0.0, 1.0], [0.5, 0.5, 2.0]])
+    pose = Pose(fov=90.0, aspect=1.0)
+    pieces = poses.visible(line, pose, (100, 100))
+    expected = poses.project(line[1:], pose, (100, 100))
+    assert expected is not None and pieces.shape == (2, 2, 2)
+    np.testing.assert_allclose(pieces, np.stack((expected[1][:-1], expected[1][1:]), 1))
+    assert len(poses.visible(line[:1], pose, (100, 100))) == 0

@@ -259,7 +259,7 @@ def test_edits_of_the_version_before_open_and_newer_ones_name_their_version(scen
     path = tmp_path / "edits.json"
     save_history(history, scene, {}, path)
     content = json.loads(path.read_text())
-    assert content["version"] == 3, "what a version reads without knowing it would be lost in silence"
+    assert content["version"] == 4, "what a version reads without knowing it would be lost in silence"
     path.write_text(json.dumps({**content, "version": 2}))
     assert load_history(path, scene) == history
     del content["before"], content["forgotten"]

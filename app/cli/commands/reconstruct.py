@@ -41,7 +41,7 @@ def run(args: Namespace, out: TextIO) -> None:
         scene = _written(args)
         if args.keep is not None:
             forget(args.keep)
-    from langflash_core.scene.report import describe
+    from langflash_core.scene.report import describe, world_line
 
     say_warnings((*notes, *scene.record.warnings))
     document = {
@@ -55,6 +55,8 @@ def run(args: Namespace, out: TextIO) -> None:
         write_json(document, out)
     else:
         print(_sentence(args.output, scene, document), file=out)
+        if scene.record.world is not None:
+            print(world_line(scene.record.world), file=out)
 
 
 def _written(args: Namespace) -> "Scene":

@@ -1,15 +1,19 @@
 """What asking asks of the world: the worker for compiled phrases and scores, the renderer for the picture."""
 
-from ..commands import Command
+from ..commands import Command, Notify
+from ..editing.state import Point
 from ..effects import Effects, Hands
 from ..scene.commands import SceneArrived
+from ..scene.mended import SplitPart
 from ..state import State
 from ..viewport import Viewport
 from .commands import EditPrompt, LoadPrompts, PhrasesCompiled, SavePrompts, SetNegatives
+from .parting import TakePartAt, TakePartOut, at_point, divided, own_atom
 from .prompt_sets import PromptSet
-from .work import Answer, DescribeAtoms, Encode, ReadPrompts, WeighAtoms, WritePrompts
+from .work import Answer, DescribeAtoms, Encode, ListParts, ReadPrompts, WeighAtoms, WritePrompts
 
 DEBOUNCE_SECONDS = 0.12  # of typing
+PARTS_AFTER = 0.4  # seconds, of an answer that stays
 
 
 class AskingEffects(Effects):
@@ -18,15 +22,19 @@ class AskingEffects(Effects):
     def __init__(self, hands: Hands, viewport: Viewport) -> None:
         self._hands = hands
         self._viewport = viewport
-        self._encode_at = float("inf")
+        self._encode_at = self._list_at = float("inf")
+        self._parted: tuple | None = None  # the answer whose parts are, or will be, listed
 
     @property
     def due(self) -> float:
-        """When the phrases in force are to be compiled."""
-        return self._encode_at
+        """When the phrases in force are to be compiled, or an answer taken apart."""
+        return min(self._encode_at, self._list_at)
 
     def tick(self, state: State, now: float) -> None:
-        """Send the phrases in force to the worker."""
+        """Send the phrases in force to the worker, and the answer to be taken apart."""
+        if now >= self._list_at:
+            self._list_at = float("inf")
+            self._take_apart(state)
         if now < self._encode_at:
             return
         self._encode_at = float("inf")
@@ -38,6 +46,14 @@ class AskingEffects(Effects):
         likes, marks = tuple(p.like for p in asked), state.editing.marks
         scene, lapses = (info.serial, info.scene), state.asking.lapses
         self._hands.submit(Encode(*scene, keys, texts, state.asking.negatives, likes, marks, lapses))
+
+    def _take_apart(self, state: State) -> None:
+        info, marks, prompt = state.scene.info, state.editing.marks, divided(state)
+        if info is not None and marks is not None and prompt is not None and _answer(state) == self._parted:
+            negatives = state.asking.negatives
+            self._hands.submit(
+                ListParts(info.serial, info.memory, marks, prompt.text.strip(), negatives, prompt.cut)
+            )
 
     def follow(self, command: Command, before: State, state: State) -> None:
         """Prompt sets to the disk and from it; compiled phrases to the renderer."""
@@ -51,11 +67,38 @@ class AskingEffects(Effects):
                 submit(ReadPrompts(path))
             case PhrasesCompiled(keys, query, lapses):
                 self._viewport.ask(keys, query, lapses)
+            case TakePartOut(text, part) if state.scene.job is not None and own_atom(before, part) is None:
+                info, marks = state.scene.info, state.editing.marks
+                if info is not None and marks is not None:
+                    submit(SplitPart(info, marks, part.rows, text))
+            case TakePartAt(at):
+                self._take_at(at, state)
             case _:
                 self._weigh(before, state)
+        self._list(before, state)
         if _question(before) != _question(state):
             pause = DEBOUNCE_SECONDS if isinstance(command, EditPrompt | SetNegatives) else 0.0
             self._encode_at = self._hands.now() + pause
+
+    def _take_at(self, at: Point, state: State) -> None:
+        """The part that a click means."""
+        read = self._viewport.read(at)
+        if divided(state) is None or read is None or read[0].point is None:
+            return
+        command = at_point(state, read[0].point)
+        if command is None:
+            text = "Nothing of the answer is there; click on a part of it, with Ctrl held."
+            self._hands.perform(Notify(text, "info"))
+        else:
+            self._hands.perform(command)
+
+    def _list(self, before: State, state: State) -> None:
+        """Have the answer taken apart a moment after it has become another."""
+        same = state.asking is before.asking and state.editing.marks is before.editing.marks
+        about = None if same and state.scene.info is before.scene.info else _answer(state)
+        if about is not None and about != self._parted:
+            self._parted = about
+            self._list_at = self._hands.now() + PARTS_AFTER
 
     def _weigh(self, before: State, state: State) -> None:
         """Have the atoms weighed again once something was deleted or is back."""
@@ -71,6 +114,15 @@ class AskingEffects(Effects):
         if view is not None:
             seen = (view.relevance, view.frame, view.camera, view.query)
             self._hands.submit(Answer(view.serial, view.keys, *seen, view.lapses))
+
+
+def _answer(state: State) -> tuple | None:
+    """What the parts of the active phrase's answer depend on; None before it is answered."""
+    info, marks, prompt = state.scene.info, state.editing.marks, divided(state)
+    if info is None or marks is None or prompt is None or not prompt.found:
+        return None
+    about = info.serial, prompt.text.strip(), prompt.cut, state.asking.negatives
+    return *about, marks.left, marks.changes, marks.atoms
 
 
 def _question(state: State) -> tuple:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from langflash_core.geometry.poses import Vector
+from langflash_core.scene.mask import Mask
 
 # Told apart by people with the common colour-vision deficiencies, on dark ground.
 PALETTE = (
@@ -96,6 +97,30 @@ class Insight:
 
 
 @dataclass(frozen=True)
+class Part:
+    """A connected part of an answer that looks like one kind of thing.
+
+    kind: of the vocabulary, "" where it is like none. sure: mean relevancy of its surface to the phrase.
+    share: of the photo that shows most of it. place: in the middle of it, in the scene. rows: its Gaussians.
+    """
+
+    kind: str
+    sure: float
+    share: float
+    place: Vector
+    rows: Mask = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The parts of the answer to a phrase above a threshold, the largest first."""
+
+    text: str
+    cut: float
+    parts: tuple[Part, ...]
+
+
+@dataclass(frozen=True)
 class Histogram:
     """How many covered pixels of the view on show score how high. counts: (BINS,) over [0, 1]."""
 
@@ -113,7 +138,7 @@ class Asking:
     the last set was. usual: what the scene compares phrases with, by its own calibration, once it has said
     so. lapses: how often what scores rest on has changed. caret: the prompt whose field takes the keys next.
     span: relevance of the first and the last colour of a heat-map, the person's own; None: by the threshold.
-    named: names of things stand in the picture.
+    named: names of things stand in the picture. parts: of the answer to the active phrase.
     """
 
     prompts: tuple[Prompt, ...] = (FIRST_PROMPT,)
@@ -130,6 +155,7 @@ class Asking:
     caret: int | None = None
     span: tuple[float, float] | None = None
     named: bool = False
+    parts: Parts | None = None
 
     @property
     def asked(self) -> tuple[Prompt, ...]:
@@ -150,7 +176,15 @@ class Asking:
         """For another scene: what belongs to the old one goes."""
         prompts = tuple(replace(prompt, score=None) for prompt in self.prompts)
         return replace(
-            self, prompts=prompts, histograms=(), insight=None, atom=0, chosen=(), usual=(), named=False
+            self,
+            prompts=prompts,
+            histograms=(),
+            insight=None,
+            atom=0,
+            chosen=(),
+            usual=(),
+            named=False,
+            parts=None,
         )
 
 
@@ -161,6 +195,11 @@ def unfinished(text: str) -> bool:
     """Whether a phrase is still missing beside a + or -, as while one is being typed."""
     parts = _OPERATOR.split(f" {text} ")
     return len(parts) > 1 and not all(part.strip() for part in parts)
+
+
+def plain(text: str) -> bool:
+    """Whether a prompt is one phrase, with nothing added or taken away."""
+    return usable(text) and len(_OPERATOR.split(f" {text} ")) == 1
 
 
 def usable(text: str) -> bool:

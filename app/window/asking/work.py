@@ -11,12 +11,15 @@ import numpy as np
 
 from langflash_core.geometry.poses import Vector
 from langflash_core.scene.edits import Marks
+from langflash_core.scene.mask import Mask
 
 from ..commands import Command, Notify, ShowPicture
 from ..requests import Asked, Errand, SceneErrand
+from ..scene.memory import SceneMemory
 from .commands import Answered, AtomsDescribed, AtomsWeighed, Binned, PhrasesCompiled, PromptsRead
+from .parting import PartsListed
 from .prompt_sets import PromptSet, read_prompts, write_prompts
-from .state import BINS, Histogram, Insight
+from .state import BINS, Histogram, Insight, Part, Parts
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -100,6 +103,87 @@ class Answer(SceneErrand):
             counts, _ = np.histogram(relevance[covered].numpy(), BINS, (0.0, 1.0))
             made.append(Histogram(key, text, tuple(int(n) for n in counts)))
         return tuple(made)
+
+
+@dataclass(frozen=True)
+class ListParts(SceneErrand):
+    """Take the answer to a phrase apart: what is connected and looks like one kind of thing is a part. What
+    is too small to be one belongs to the nearest."""
+
+    newest_counts = True
+
+    memory: SceneMemory = field(repr=False)
+    marks: Marks
+    text: str
+    negatives: tuple[str, ...]
+    cut: float
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        import torch
+
+        from langflash_core.inventory.things import kinds_of
+        from langflash_core.language.gaussians import gaussian_relevance
+        from langflash_core.language.relevance import compile_query
+        from langflash_core.language.spaces import language_space
+        from langflash_core.scene.edited import left, spoken_scene
+        from langflash_core.segments import photo_shares
+
+        marks, memory = self.marks, self.memory
+        scene = left(spoken_scene(memory.changed(marks), marks), marks)
+        space = language_space(scene.semantics.space)
+        compiled = compile_query(scene, space, [self.text], negatives=list(self.negatives) or None)
+        relevance = gaussian_relevance(scene.semantics, compiled)[0].cpu()
+        members = (relevance >= self.cut).numpy()
+        where = (marks.left, marks.changes)
+        shares = memory.answered("photo shares", where, lambda: photo_shares(scene))
+        kinds = memory.answered("kinds", (*where, marks.atoms), lambda: kinds_of(scene))
+        numbers = _divided(scene, members, kinds, shares)
+        there, found = np.flatnonzero(marks.left.rows()), []
+        for number in range(1, int(numbers.max(initial=0)) + 1):
+            rows = np.zeros(marks.deleted.count, bool)
+            rows[there[numbers == number]] = True
+            own = torch.from_numpy(numbers == number)
+            found.append(_part(scene, own, kinds, relevance, shares[:, own].sum(1), Mask.of(rows)))
+        found.sort(key=lambda part: -part.share)
+        yield PartsListed(Parts(self.text, self.cut, tuple(found)))
+
+
+def _divided(scene: "Scene", members: np.ndarray, kinds: np.ndarray, shares: "Tensor") -> np.ndarray:
+    """(N,) numbers of parts, 0 of no member. shares: (V, N)."""
+    import torch
+    from scipy.spatial import cKDTree
+
+    from langflash_core.segments import connected_things
+
+    numbers = np.zeros(len(members), np.int64)
+    for kind in sorted(set(kinds[members])):
+        own = connected_things(scene, torch.from_numpy(members & (kinds == kind)), shares).numpy()
+        numbers[own > 0] = own[own > 0] + numbers.max(initial=0)
+    if not numbers.any():
+        return connected_things(scene, torch.from_numpy(members), shares).numpy()
+    rest = members & (numbers == 0)
+    if rest.any():
+        means, parted = np.nan_to_num(scene.gaussians.means.double().numpy()), np.flatnonzero(numbers)
+        numbers[rest] = numbers[parted[cKDTree(means[parted]).query(means[rest])[1]]]
+    return numbers
+
+
+def _part(
+    scene: "Scene", own: "Tensor", kinds: np.ndarray, relevance: "Tensor", shares: "Tensor", rows: Mask
+) -> Part:
+    """What there is to say of one part; own: (N,) bool, shares: (V,) of photos."""
+    from langflash_core.scene.thin import covered_areas
+
+    some = scene.rows(own)
+    areas = covered_areas(some.gaussians) + 1e-12
+    means = some.gaussians.means.double().numpy()
+    middle = np.median(means, axis=0)
+    place = means[
+        np.linalg.norm(means - middle, axis=1).argmin()
+    ]  # on the thing, not between two of its ends
+    names, counts = np.unique(kinds[own.numpy()], return_counts=True)
+    sure = float(np.average(relevance[own].numpy(), weights=areas))
+    return Part(str(names[counts.argmax()]), sure, float(shares.max()), Vector(*place.tolist()), rows)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from langflash_core.outputs import Output
+from langflash_core.outputs import RGB, ROOM, Output
 
 from ..commands import Notify
 from ..dialogs import Dialog
@@ -29,12 +29,16 @@ class EditForm:
 @dataclass(frozen=True)
 class ShowExport:
     """Open the export dialog, with a place to write to: what the person typed for this scene, or else one
-    that is named after it."""
+    that is named after it. what: the kind that is wanted; None: as it was left, of those of the dialog."""
+
+    what: Output | None = None
 
     def apply(self, state: State) -> State:
         if state.scene.info is None:
             text = "There is no scene to export; drop photos on the window first."
             return Notify(text).apply(state)
+        wanted = self.what or (RGB if state.exporting.form.what in ROOM else state.exporting.form.what)
+        state = EditForm(replace(state.exporting.form, what=wanted)).apply(state)
         form = state.exporting.form
         proposed = str(_place(state, form.what))
         own = form.path not in ("", form.proposed) and form.serial == state.scene.info.serial

@@ -5,7 +5,7 @@ from dataclasses import replace
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
-from langflash_core.outputs import OFFERED
+from langflash_core.outputs import OFFERED, ROOM
 
 from .. import commands as do
 from ..dialogs import Dialog
@@ -47,7 +47,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
 def _kinds(form: ExportForm, look: Look) -> ExportForm:
     spacing = imgui.get_style().item_spacing.x
     width = (imgui.get_content_region_avail().x - (COLUMNS - 1) * spacing) / COLUMNS
-    for index, what in enumerate(OFFERED):
+    for index, what in enumerate(ROOM if form.what in ROOM else OFFERED):
         if index % COLUMNS:
             imgui.same_line()
         size = ImVec2(width, 0)

@@ -3,12 +3,15 @@
 from imgui_bundle import ImVec2, imgui
 
 from .. import commands as do
+from ..asking.panels import parts
+from ..asking.parting import TakePartAt
 from ..editing.panels import gizmo, hands, pointing, ruler
 from ..editing.state import Tool
+from ..inventory import panel as inventory_panel
 from ..kit.look import Look
 from ..opening.panels import welcome
 from ..scene import camera
-from ..scene.panels import in_space, moving
+from ..scene.panels import floor, in_space, moving
 from ..state import State
 from ..touring import panel as tour_panel
 
@@ -29,11 +32,14 @@ def draw(state: State, look: Look) -> list[do.Command]:
         welcome.draw_photos(state, look, corner, size)
         imgui.invisible_button("picture", ImVec2(max(size.x, 1), max(size.y, 1)))
         return []
+    floor.draw(state, look, corner, size)
     ruler.draw_line(state, look, corner, size)
     placed, taken = gizmo.draw(state, look, corner, size)
     over = placed if taken else placed + in_space.draw(state, look, corner, size)
     tour_panel.draw_notes(state, look, corner, size)
+    inventory_panel.draw_box(state, look, corner, size)
     pointing.draw_marks(state, look, corner, size)
+    parts.draw_marks(state, look, corner, size)
     if any(isinstance(command, camera.JumpTo) for command in over):
         return over  # the click was on a camera
     buttons = imgui.ButtonFlags_
@@ -52,6 +58,8 @@ def draw(state: State, look: Look) -> list[do.Command]:
         issued += hands.pick(state, look, corner)
     elif state.editing.tool in (Tool.POINT, Tool.RULER):
         issued += hands.ask(look, corner)
+    elif state.editing.tool is Tool.MOVE and imgui.get_io().key_ctrl:
+        issued += [TakePartAt(each.at) for each in hands.ask(look, corner)]
     pose = moving.pointed(state, look, size)
     pose = moving.flown(pose, state.preferences.speed)
     return issued + ([camera.MoveTo(pose)] if pose != state.scene.pose else [])

@@ -17,7 +17,7 @@ from . import table
 
 AREAS = (
     "##session", "##offer", "##panel", "##export", "##toolbar", "##tools", "##bar0", "##bar1", "##bar2",
-    "##bar3", "##card", "##ruler", "##keys", "##views", "Dictionary", "Tour",
+    "##bar3", "##card", "##ruler", "##keys", "##views", "Dictionary", "Tour", "Inventory",
 )  # fmt: skip
 """Windows that F6 goes through, by name: questions first."""
 _ARROWS = (imgui.Key.left_arrow, imgui.Key.right_arrow, imgui.Key.up_arrow, imgui.Key.down_arrow)

@@ -7,6 +7,7 @@ from ..asking.panels import dictionary, prompts
 from ..editing.panels import history, pointing, ruler, tools
 from ..exporting import panel as export_panel
 from ..filming import panel as film_panel
+from ..inventory import panel as inventory_panel
 from ..kit import theme, widgets
 from ..kit.look import Look
 from ..recovery import panels as recovery_panels
@@ -53,6 +54,7 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
         issued += axes.draw(state, look, place, size)
         issued += film_panel.draw(state, look, place, size)
         issued += tour_panel.draw(state, look, place, size)
+        issued += inventory_panel.draw(state, look, place, size)
         issued += dictionary.draw(state, look, place, size)
     issued += recovery_panels.draw_offer(state, look, place, size)
     issued += recovery_panels.draw_edits_offer(state, look, place, size)

@@ -28,6 +28,7 @@ def _items(state: State) -> list[do.Command]:
     issued += _samples(state)
     imgui.separator()
     issued += _named(state, "Save ...", "Export ...", "Merge a scene into this one ...")
+    issued += _named(state, "Level the scene")
     imgui.separator()
     issued += _named(state, "All commands", "Preferences", "Log", "Mouse and keys")
     imgui.separator()

@@ -24,11 +24,13 @@ from ..editing import teaching as teach
 from ..editing.state import Handle, Tool
 from ..exporting import commands as export
 from ..filming import commands as film
+from ..inventory import commands as take
 from ..opening import commands as opening
 from ..recovery import commands as keep
 from ..scene import camera, samples
 from ..scene import commands as show
 from ..scene.panels import in_space
+from ..scene.standing import LevelScene
 from ..scene.state import possible
 from ..state import State
 from ..touring import commands as tour
@@ -222,6 +224,7 @@ def _looking() -> Iterable[Entry]:
     yield Entry("Names of things in the picture", group, _names, _plain("n"))
     yield Entry("Keep to what the photos saw", group, _near_photos)
     yield Entry("Fill gaps by what is around them", group, _fill_gaps)
+    yield Entry("Grid on the floor", group, _floor_grid)
     for side, forward in camera.SIDES:
         keys = _plain(_SIDE_KEYS[side]) if side in _SIDE_KEYS else ()
         yield Entry(f"Look from {side}", group, _shown(camera.Face(forward)), keys)
@@ -234,6 +237,7 @@ def _looking() -> Iterable[Entry]:
     yield Entry("Add a key frame", group, _shown(film.AddKey()), _plain("m"))
     yield Entry("Remove the last key frame", group, lambda s: film.RemoveKey() if s.keys else None)
     yield Entry("Fly along the key frames", group, _shown(film.Preview()), _plain("j"))
+    yield Entry("Inventory: what is in the room", group, _inventory, _ctrl("l"), fa.ICON_FA_LIST_CHECK)
     yield Entry("Tour: stops and notes", group, _tour, icon=fa.ICON_FA_SIGNS_POST)
     yield Entry("Tour: the present view is a stop", group, _shown(tour.AddStop()))
     yield Entry("Tour: play", group, lambda s: tour.Play() if s.tour.stops else None)
@@ -246,6 +250,10 @@ def _looking() -> Iterable[Entry]:
     for mode in PICTURES:
         keys = _plain(f"_{_DIGITS[KEYED.index(mode)]}") if mode in KEYED else ()
         yield Entry(f"Show: {mode.label}", group, _mode(mode), keys)
+
+
+def _inventory(state: State) -> do.Command | None:
+    return take.ShowInventory(not state.listing.open) if state.scene.info is not None else None
 
 
 def _tour(state: State) -> do.Command | None:
@@ -284,6 +292,12 @@ def _fill_gaps(state: State) -> do.Command | None:
     return prefer if state.scene.info is not None else None
 
 
+def _floor_grid(state: State) -> do.Command | None:
+    wanted = state.preferences
+    prefer = keep.Prefer(replace(wanted, floor_grid=not wanted.floor_grid))
+    return prefer if state.world is not None else None
+
+
 def _tools() -> Iterable[Entry]:
     group = "Tools"
     for name, key, tool in (
@@ -310,6 +324,7 @@ def _brush(factor: float) -> Callable[[State], do.Command | None]:
 def _editing() -> Iterable[Entry]:
     group = "Edit"
     yield Entry("Undo", group, _undo, _ctrl("z"))
+    yield Entry("Level the scene", group, _shown(LevelScene()), icon=fa.ICON_FA_SCALE_BALANCED)
     yield Entry("Redo", group, _redo, (*_ctrl("z", shift=True), *_ctrl("y")))
     yield Entry("Select everything", group, _shown(edit.SelectAll()), _ctrl("a"))
     yield Entry("Select nothing", group, _selected(edit.Deselect()), _ctrl("d"))

@@ -8,6 +8,7 @@ from langflash_core.geometry.poses import FOV_RANGE
 from .. import commands as do
 from ..asking.panels import dictionary
 from ..exporting import commands as export
+from ..inventory import panel as inventory_panel
 from ..kit import theme, widgets
 from ..kit.look import Look
 from ..scene import camera
@@ -16,9 +17,9 @@ from ..state import State
 from ..touring import panel as tour_panel
 from . import menu
 
-_FOV = 150.0  # design pixels of the slider; left out where the window is too narrow
+_FOV = 126.0  # design pixels of the slider; left out where the window is too narrow
 _LABEL = 40.0  # of its name
-_BUTTONS = 6 * 44.0
+_BUTTONS = 7 * 44.0
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
@@ -32,7 +33,8 @@ def draw(state: State, look: Look) -> list[do.Command]:
     width = width if roomy else look.px(_BUTTONS)
     imgui.same_line(imgui.get_window_width() - width - look.px(8))
     issued += _fov(state, look) if roomy else []
-    return issued + tour_panel.button(state) + dictionary.button(state) + _home(state) + _files(state, look)
+    issued += inventory_panel.button(state) + tour_panel.button(state) + dictionary.button(state)
+    return issued + _home(state) + _files(state, look)
 
 
 def _fov(state: State, look: Look) -> list[do.Command]:

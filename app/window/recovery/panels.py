@@ -50,6 +50,7 @@ def draw_settings(state: State, look: Look) -> list[do.Command]:
         ("Touch pad: two fingers turn, with Ctrl they zoom, with Shift they slide", "touch_pad"),
         ("Show the photos' cameras in the scene", "photos_in_space"),
         ("Keep to what the photos saw: orbits slow down, and the rest fades", "near_photos"),
+        ("A grid on the floor, of a scene that is level", "floor_grid"),
         ("Fill gaps by what is around them", "fill_gaps"),
         ("Reconstruct as soon as photos are dropped", "start_at_once"),
     ):

@@ -29,11 +29,11 @@ class Preferences:
     """theme: of THEMES. colormap: of heat-maps. scale: of the interface, on top of the monitor's. speed: of
     flying, a factor. touch_pad: two fingers turn, with Ctrl they zoom. photos_in_space: the cameras' frusta
     are drawn. near_photos: the picture fades, and orbits slow down, where no photo looked from about
-    there. fill_gaps: it shows what is around its gaps. start_at_once: dropped photos are reconstructed
-    without asking. detail: of DETAILS, how fine scenes of photos are. panel_width: design pixels. window:
-    x, y, width, height in screen pixels, or none. dictionary: the same of the dictionary's window inside
-    it, design pixels, and whether it is open. recent: newest first. folder: where files were last looked
-    for."""
+    there. fill_gaps: it shows what is around its gaps. floor_grid: squares of a metre on the floor.
+    start_at_once: dropped photos are reconstructed without asking. detail: of DETAILS, how fine scenes of
+    photos are. panel_width: design pixels. window: x, y, width, height in screen pixels, or none.
+    dictionary: the same of the dictionary's window inside it, design pixels, and whether it is open.
+    recent: newest first. folder: where files were last looked for."""
 
     theme: str = "dark"
     colormap: str = COLOUR_MAPS[0]
@@ -43,6 +43,7 @@ class Preferences:
     photos_in_space: bool = False
     near_photos: bool = True
     fill_gaps: bool = True
+    floor_grid: bool = False
     start_at_once: bool = True
     detail: str = DEFAULT_DETAIL
     panel_width: float = 348.0

@@ -2,13 +2,15 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Pose, Vector
 from langflash_core.pictures import Picture
 
 from ..commands import Notify
 from ..state import State
-from .near import places_to_keep_to
+from .near import orbited, places_to_keep_to
 from .state import Flight
 
 
@@ -49,16 +51,32 @@ class FlyTo:
 
 @dataclass(frozen=True)
 class Face:
-    """Fly around the pivot until the picture looks along a world axis, or as near to that as the photos
-    saw it from."""
+    """Fly around the pivot until the picture looks along an axis of the world that the scene stands in, or as
+    near to that as the photos saw it from. forward: one of `SIDES`."""
 
     forward: Vector
 
     def apply(self, state: State) -> State:
-        pose = poses.facing_near(state.scene.pose, self.forward, places_to_keep_to(state))
-        if pose != poses.facing(state.scene.pose, self.forward):
+        forward, start = aimed(state, self.forward), state.scene.pose
+        if state.world is not None and abs(self.forward.y) > 0.5:  # a plan stands along the walls
+            start = poses.facing(start, _nearest_wall(state), state.up)
+        pose = poses.facing_near(start, forward, places_to_keep_to(state), state.up)
+        if pose != poses.facing(start, forward, state.up):
             state = Notify(NOT_SEEN, "info").apply(state)
         return FlyTo(pose).apply(state)
+
+
+def aimed(state: State, direction: Vector) -> Vector:
+    """A direction of the world that the scene stands in (east, down, north), in the scene's own axes."""
+    return Vector(*(np.array(direction) @ state.turn).tolist())
+
+
+def _nearest_wall(state: State) -> Vector:
+    """The level axis of the world with which the picture turns least."""
+    right = state.turn @ state.scene.pose.axes[:, 0]
+    sides = (Vector(0, 0, 1), Vector(0, 0, -1), Vector(1, 0, 0), Vector(-1, 0, 0))
+    # Looking along (x, 0, z), the picture's right side is at (z, 0, -x).
+    return aimed(state, max(sides, key=lambda side: side.z * right[0] - side.x * right[2]))
 
 
 @dataclass(frozen=True)
@@ -92,7 +110,8 @@ SIDES = (
     ("above", Vector(0.0, 1.0, 0.0)),
     ("below", Vector(0.0, -1.0, 0.0)),
 )
-"""Where one may look from, with the direction in which; the front is the first photo's side."""
+"""Where one may look from, with the direction in which, of the world that the scene stands in; the front is
+the first photo's side."""
 
 
 @dataclass(frozen=True)
@@ -121,8 +140,7 @@ class Orbit:
     pitch: float = 0.0
 
     def apply(self, state: State) -> State:
-        pose = poses.orbit_near(state.scene.pose, self.yaw, self.pitch, places_to_keep_to(state))
-        return MoveTo(pose).apply(state)
+        return MoveTo(orbited(state, state.scene.pose, self.yaw, self.pitch)).apply(state)
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,14 @@
 """What can happen to the tray and to the scene: photos, files, the jobs that make scenes."""
 
+import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from langflash_core.geometry import poses
-from langflash_core.scene.edits import Marks, delete
+from langflash_core.geometry import poses, rotations
+from langflash_core.scene.edits import Marks, delete, deny_atom
 from langflash_core.scene.mask import Mask
 
 from ..commands import NOTHING_TO_SAVE, Command, Notify, ShowDialog
@@ -22,6 +23,9 @@ from .unfinished import FEWEST
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
+
+ASLANT = math.radians(2.0)
+"""Of a photo's roll that one sees."""
 
 # Photos
 
@@ -252,6 +256,7 @@ class SceneArrived:
         old, info, asking = state.scene, self.info, state.asking.without_scene()
         made = old.job is not None and old.job.title == RECONSTRUCTING
         saved = None if info.history is None else info.history.first
+        start = _start(info)
         return replace(
             state,
             scene=replace(
@@ -259,17 +264,31 @@ class SceneArrived:
                 info=info,
                 photos=() if self.alone else old.photos,
                 aside=None,
-                pose=info.views[0] if info.views else poses.START,
+                pose=start,
                 flight=None,
-                view=0 if info.views else None,
+                view=0 if info.views and start == info.views[0] else None,
                 unhidden=None,
                 job=None,
             ),
             asking=replace(asking, named=made and not asking.asked),
             editing=fresh(state.editing, info.history, saved),
             filming=NO_FILMING,
+            listing=state.listing.without_scene(),
             recovery=replace(state.recovery, edits=None, kept=None),
         )
+
+
+def _start(info: SceneInfo) -> poses.Pose:
+    """Where one stands first: as the first photo saw it, upright where that was held aslant and it is known
+    how the scene stands."""
+    world = None if info.history is None else info.history.marks.world
+    start = info.views[0] if info.views else poses.START
+    if world is None:
+        return start
+    turn = rotations.matrix(world.turn)
+    if not info.views:
+        return poses.facing(start, poses.Vector(*turn[2].tolist()), -turn[1])
+    return poses.righted(start, -turn[1]) if abs(poses.roll(start, -turn[1])) > ASLANT else start
 
 
 def _rooms(state: State, coming: SceneInfo) -> tuple[Room, ...]:
@@ -382,7 +401,8 @@ class MergeScene:
 @dataclass(frozen=True)
 class Merged:
     """The scene with number `serial`, of which there was so much, and another as one scene; or, where `gone`
-    says what was taken away, what fills its hole; or `copied`, copies of what was selected."""
+    says what was taken away, what fills its hole, or stands for it but is not what is `denied`; or `copied`,
+    copies of what was selected."""
 
     serial: int
     there: tuple[int, int]
@@ -390,6 +410,7 @@ class Merged:
     name: str
     gone: Mask | None = None
     copied: bool = False
+    denied: str = ""
 
     def fits(self, state: State) -> bool:
         """Whether it still holds the scene on show."""
@@ -404,7 +425,9 @@ class Merged:
         if self.fits(state):
             return state
         text = f"{self.name} was not merged, since another scene is on show by now; merge it again."
-        if self.gone is not None:
+        if self.denied:
+            text = "Nothing was taken out, since the scene is another by now; click it again."
+        elif self.gone is not None:
             text = "Nothing was filled, since the scene is another by now; fill it again."
         elif self.copied:
             text = "Nothing was copied, since the scene is another by now; copy it again."
@@ -420,7 +443,11 @@ class Merged:
         before = before.of_size(count, whole.atoms)
         brought = Mask.full(count) - Mask.first(count, self.there[0])
         after, label = replace(before.marks, there=whole.there, selected=brought), f"Merge {self.name}"
-        if self.gone is not None:
+        if self.gone is not None and self.denied:
+            kept = replace(after, selected=before.marks.selected)
+            after = deny_atom(delete(kept, self.gone.of_count(count)), whole.there[1] - 1, self.denied)
+            label = f"Take a part out of {self.denied}"
+        elif self.gone is not None:
             none = replace(after, selected=Mask.none(count))
             after, label = delete(none, self.gone.of_count(count)), f"Delete and fill {len(self.gone):,}"
         elif self.copied:

@@ -43,11 +43,13 @@ from .commands import (
     dropped,
 )
 from .drops import sort_drop
+from .standing import LevelScene
 from .state import WHOLE, WHOLE_PHOTOS, SceneInfo
 from .unfinished import FEWEST
 from .work import (
     DropWork,
     FindPair,
+    FindWorld,
     JoinScenes,
     LoadScene,
     LookForWork,
@@ -89,6 +91,9 @@ class SceneEffects(Effects):
                 submit(LoadScene(path, edits, alone))
             case SaveScene(path) if state.scene.info is not None:
                 submit(WriteScene(state.scene.info.scene, path, state.editing.marks))
+            case LevelScene() if state.scene.info is not None and state.editing.marks is not None:
+                info = state.scene.info
+                submit(FindWorld(info.serial, info.memory, state.editing.marks))
             case CancelJob() | PauseJob():
                 self._end_job(command, before)
             case ChoosePair() if state.scene.choosing and not before.scene.choosing:

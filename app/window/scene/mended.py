@@ -75,6 +75,28 @@ class CopyPart(Job):
 
 
 @dataclass(frozen=True)
+class SplitPart(Job):
+    """A part of an answer with an atom of its own, which is denied the phrase."""
+
+    info: SceneInfo
+    marks: Marks = field(repr=False)
+    rows: Mask = field(repr=False)
+    text: str
+
+    def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> Merged:
+        import torch
+
+        from langflash_core.scene.edited import there
+        from langflash_core.scene.lone import with_lone_part
+
+        own, marks = self.info, self.marks
+        scene, shown = there(own.scene, marks), there(own.memory.changed(marks), marks)
+        part = torch.from_numpy(self.rows.rows()[: len(scene.gaussians)])
+        info = describe_scene(with_lone_part(scene, part, shown), serial, own.name, own.path)
+        return Merged(own.serial, marks.there, info, own.name, self.rows, denied=self.text)
+
+
+@dataclass(frozen=True)
 class HidePart(Job):
     """The scene as edited, with the selection hidden for good in Gaussians and photos."""
 

@@ -1,10 +1,14 @@
-"""Where the photos were taken, for whoever keeps to what they saw."""
+"""Where the photos were taken, for whoever keeps to what they saw; turns that know it and which way is up."""
+
+import math
 
 from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Pose, Vector
 
 from ..state import State
 
+RIGHTING = math.radians(15.0)
+"""Of turning, within which most of a photo's roll is gone."""
 FADING = 30.0  # degrees aside from which the picture fades: `FULL` of langflash_core/scene/trust.py
 
 
@@ -45,3 +49,20 @@ def degrees_from_photos(state: State) -> float:
     """Of what is looked at, between here and the nearest place to keep to; 0 where there is none."""
     places = places_to_keep_to(state)
     return poses.degrees_aside(state.scene.pose, places) if places else 0.0
+
+
+def orbited(state: State, pose: Pose, yaw: float, pitch: float) -> Pose:
+    """The pose turned around its pivot, radians, no farther than photos know. A photo that was held aslant
+    comes upright on the way, in a scene of which it is known how it stands."""
+    return _righted(state, poses.orbit_near(pose, yaw, pitch, places_to_keep_to(state), state.up), yaw, pitch)
+
+
+def looked(state: State, pose: Pose, yaw: float, pitch: float) -> Pose:
+    """The pose turned on the spot, radians; upright on the way, as in `orbited`."""
+    return _righted(state, poses.look(pose, yaw, pitch, state.up), yaw, pitch)
+
+
+def _righted(state: State, pose: Pose, yaw: float, pitch: float) -> Pose:
+    if state.world is None:
+        return pose
+    return poses.righted(pose, state.up, 1 - math.exp(-math.hypot(yaw, pitch) / RIGHTING))

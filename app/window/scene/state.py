@@ -72,6 +72,7 @@ _SAID = {
     "colours": "finding their colours",
     "prune": "tidying up",
     "refine": "fitting it to the photos",
+    "level": "finding its floor",
 }
 
 

@@ -35,6 +35,8 @@ from .commands import (
     Thinned,
     WorkFound,
 )
+from .memory import SceneMemory
+from .standing import Levelled
 from .state import SceneInfo
 
 if TYPE_CHECKING:
@@ -192,6 +194,22 @@ class WriteScene(Errand):
         scene = self.scene if self.marks is None else edited_scene(self.scene, self.marks)
         export(scene, self.path)
         yield SceneSaved(self.path, self.marks)
+
+
+@dataclass(frozen=True)
+class FindWorld(SceneErrand):
+    """How the scene stands, as edited."""
+
+    newest_counts = True
+
+    memory: SceneMemory = field(repr=False)
+    marks: Marks
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.level import found_world
+        from langflash_core.scene.edited import left
+
+        yield Levelled(found_world(left(self.memory.changed(self.marks), self.marks)))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from ...kit.look import Look
 from ...state import State
 from .. import commands as ask
 from ..state import Prompt, usable
-from . import entry, known, scores
+from . import entry, known, parts, scores
 
 _HIGH = 760.0  # design pixels of a window in which what there is to ask leaves room for answers
 _SWATCH = imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label | imgui.ColorEditFlags_.no_tooltip
@@ -28,6 +28,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     first = not state.asking.asked or imgui.get_io().display_size.y >= look.px(_HIGH)
     if first:  # what there is to ask
         issued += known.draw(state, look)
+    issued += parts.draw(state, look)
     issued += scores.draw(state, look)
     if not first:  # in a low window answers, which it would push out
         issued += known.draw(state, look)

@@ -48,14 +48,17 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> tuple[list[do
         context.hovered_id_previous_frame,
         0,
     )  # the picture is no obstacle
-    matrix = _matrix(standing)
+    along = np.eye(4)
+    along[:3, :3] = state.turn.T  # its arms run along floor and walls
+    matrix = _matrix(standing @ along)
     view, projection = _matrix(view_of(state.scene.pose)), _matrix(projection_of(state.scene.pose, size))
     operation = _OPERATIONS[editing.handle]
-    mode = gizmo.MODE.world if editing.handle is Handle.MOVE else gizmo.MODE.local
-    moved = gizmo.manipulate(view, projection, operation, mode, matrix, snap=_snap(state))
+    moved = gizmo.manipulate(view, projection, operation, gizmo.MODE.local, matrix, snap=_snap(state))
     context.hovered_id_previous_frame = hovered
     if moved and gizmo.is_using():
         values = np.array(matrix.values, float).reshape(4, 4).T
+        if editing.handle is not Handle.SCALE:  # whose factors are those along its arms
+            values = values @ along.T
         gesture = placing.from_matrix(values, pivot, editing.handle, before)
         return ([placing.Adjust(gesture)] if gesture != editing.gesture else []), True
     ending = isinstance(editing.gesture, placing.Moved)  # in the frame in which the hand lets go

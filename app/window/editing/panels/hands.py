@@ -30,7 +30,7 @@ def hover(state: State, corner: ImVec2) -> list[do.Command]:
     return [] if at == before else [point.Hover(at)]
 
 
-def ask(look: Look, corner: ImVec2) -> list[do.Command]:
+def ask(look: Look, corner: ImVec2) -> list[point.Ask]:
     """A click without a drag asks what is there."""
     if not (imgui.is_item_deactivated() and imgui.is_mouse_released(0)):
         return []
@@ -40,9 +40,8 @@ def ask(look: Look, corner: ImVec2) -> list[do.Command]:
 
 def pick(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
     """A click without a drag selects the thing that is there."""
-    clicked = ask(look, corner)
     combine = _combined(state)
-    return [edit.SelectThing(each.at, combine) for each in clicked if isinstance(each, point.Ask)]
+    return [edit.SelectThing(each.at, combine) for each in ask(look, corner)]
 
 
 def _combined(state: State) -> edits.Combine:

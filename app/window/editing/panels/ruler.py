@@ -8,6 +8,8 @@ from imgui_bundle import icons_fontawesome_6 as fa
 
 from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Vector
+from langflash_core.records import Guess
+from langflash_core.scene.report import guess_line
 
 from ... import commands as do
 from ...kit import theme, widgets
@@ -55,7 +57,9 @@ def _field(state: State, look: Look, ends: list[ImVec2]) -> list[do.Command]:
     with widgets.colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
         imgui.begin("##ruler", None, _BAR)
         imgui.align_text_to_frame_padding()
-        imgui.text(said(length, state.metric))
+        imgui.text(said(length, state.metric, state.guess))
+        if state.guess is not None:
+            widgets.tooltip(f"{guess_line(state.guess).capitalize()}; type the true length, and it is none.")
         imgui.same_line()
         imgui.text_colored(theme.MUTED, "this is")
         imgui.same_line()
@@ -79,9 +83,12 @@ def _field(state: State, look: Look, ends: list[ImVec2]) -> list[do.Command]:
     return issued
 
 
-def said(length: float, metric: float | None) -> str:
-    """A length for people: in metres where the scene has a scale."""
+def said(length: float, metric: float | None, guess: Guess | None = None) -> str:
+    """A length for people: in metres where the scene has a scale, about so many where that is a guess."""
     if metric is None:
-        return f"{length:.3f} units"
+        if guess is None:
+            return f"{length:.3f} units"
+        metres = length * guess.metres
+        return f"about {100 * metres:.0f} cm" if metres < 1 else f"about {metres:.1f} m"
     metres = length * metric
     return f"{100 * metres:.1f} cm" if metres < 1 else f"{metres:.2f} m"

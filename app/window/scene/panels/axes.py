@@ -79,11 +79,12 @@ def _rays(state: State, side: float) -> list[do.Command]:
 
 
 def ends(state: State) -> list[tuple[str, camera.Vector, tuple[float, float], float]]:
-    """Name, direction of looking, place in the picture plane (right, down) and depth of each end, far first.
+    """Name, direction of looking in the world that the scene stands in, place in the picture plane (right,
+    down) and depth of each end, far first.
 
     The end that one looks from is opposite to the direction.
     """
-    axes = state.scene.pose.axes
+    axes = state.turn @ state.scene.pose.axes
     found = []
     for name, forward in camera.SIDES:
         x, y, z = (-np.array(forward)) @ axes

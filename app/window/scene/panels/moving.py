@@ -9,7 +9,7 @@ from langflash_core.geometry.poses import Pose
 
 from ...kit.look import Look
 from ...state import State
-from ..near import places_to_keep_to
+from ..near import looked, orbited
 
 TURN = math.radians(0.3)  # per pixel at scale 1
 ZOOM = 0.9  # of the distance, per notch of the wheel
@@ -32,14 +32,14 @@ def pointed(state: State, look: Look, size: ImVec2) -> Pose:
     if held and not imgui.is_item_activated() and (dx or dy):
         turn = TURN / look.scale
         if _held(1) and pose.span is None:
-            pose = poses.look(pose, -dx * turn, -dy * turn)
+            pose = looked(state, pose, -dx * turn, -dy * turn)
         elif selecting and not io.key_alt and not _held(2):
             pass  # the left button draws a region
         elif _held(2) or io.key_shift:
             unit = poses.units_per_pixel(pose, round(size.x), round(size.y))
             pose = poses.pan(pose, -dx * unit, -dy * unit)
         else:
-            pose = poses.orbit_near(pose, -dx * turn, -dy * turn, places_to_keep_to(state))
+            pose = orbited(state, pose, -dx * turn, -dy * turn)
     if imgui.is_item_hovered() and (io.mouse_wheel or io.mouse_wheel_h):
         pose = _scrolled(pose, state, look, size)
     return pose
@@ -55,7 +55,7 @@ def _scrolled(pose: Pose, state: State, look: Look, size: ImVec2) -> Pose:
     if io.key_shift:
         unit = poses.units_per_pixel(pose, round(size.x), round(size.y)) * look.scale
         return poses.pan(pose, -across * unit, -along * unit)
-    return poses.orbit_near(pose, across * TURN, along * TURN, places_to_keep_to(state))
+    return orbited(state, pose, across * TURN, along * TURN)
 
 
 def _held(button: int) -> bool:

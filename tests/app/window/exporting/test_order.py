@@ -24,7 +24,7 @@ from app.window.scene.state import Photo
 from app.window.state import State
 from langflash_core import outputs
 from langflash_core.geometry.poses import Pose, Vector
-from langflash_core.outputs import OFFERED, Output
+from langflash_core.outputs import OFFERED, ROOM, Output
 from langflash_core.scene.edits import Atom, History, Marks, Mask
 from tests.app.window.scenes import after, told
 from tests.app.window.scenes import shown_scene as scene
@@ -34,7 +34,7 @@ def form(state: State, **changes) -> State:
     return after(state, export.EditForm(replace(state.exporting.form, **changes)))
 
 
-@pytest.mark.parametrize("what", OFFERED, ids=lambda what: what.name)
+@pytest.mark.parametrize("what", (*OFFERED, *ROOM), ids=lambda what: what.name)
 def test_every_kind_says_the_command_that_does_it(what: Output) -> None:
     state = form(scene(), what=what, path="/out/a picture")
     order = export_form.order(state)

@@ -1,0 +1,42 @@
+"""How the scene stands: levelled as an edit, on what the worker finds of up, floor and north."""
+
+from dataclasses import dataclass, replace
+
+from langflash_core.geometry import poses
+from langflash_core.records import World
+from langflash_core.scene.report import world_line
+
+from ..commands import Notify
+from ..editing.commands import with_edit
+from ..state import State
+from .camera import FlyTo
+
+UNSURE = "Its photos do not tell for sure which way is up, so this is a guess; undo it (Ctrl+Z) if it leans."
+
+
+@dataclass(frozen=True)
+class LevelScene:
+    """Look how the scene stands; the worker does."""
+
+    def apply(self, state: State) -> State:
+        if state.scene.info is None:
+            return state
+        return Notify("Looking for the floor, and for what is upright ...", "info").apply(state)
+
+
+@dataclass(frozen=True)
+class Levelled:
+    """Where the scene stands: one more edit. The picture comes upright."""
+
+    world: World
+
+    def apply(self, state: State) -> State:
+        marks = state.editing.marks
+        if marks is None:
+            return state
+        text = f"Level: {world_line(self.world)}."
+        if marks.world == self.world:
+            text = f"The scene is level already: {world_line(self.world)}."
+        after = with_edit(state, "Level the scene", replace(marks, world=self.world))
+        after = Notify(text if self.world.sure else f"{UNSURE} {text}", "info").apply(after)
+        return FlyTo(poses.righted(after.scene.pose, after.up)).apply(after)
