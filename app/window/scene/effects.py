@@ -14,7 +14,7 @@ from ..editing.placing import SetHandle
 from ..editing.state import Handle
 from ..effects import Effects, Hands
 from ..kit.textures import Thumbnails
-from ..opening.commands import OpenFilm
+from ..opening.commands import OpenFilm, films_of
 from ..state import State
 from ..viewport import Viewport
 from .camera import FrameAll
@@ -42,9 +42,11 @@ from .commands import (
     dropped,
 )
 from .drops import sort_drop
+from .improving import Improve, Improved, ImproveScene, can_improve
 from .state import WHOLE, WHOLE_PHOTOS, SceneInfo
 from .unfinished import FEWEST
 from .work import (
+    DrawAbove,
     DropWork,
     FindPair,
     JoinScenes,
@@ -81,7 +83,8 @@ class SceneEffects(Effects):
                 submit(MakeThumbnails(paths))
             case Reconstruct() if state.scene.photos:
                 photos, detail = state.scene.photos, state.preferences.detail
-                submit(ReconstructPhotos(tuple(p.path for p in photos), tuple(p.fov for p in photos), detail))
+                paths, fovs = tuple(p.path for p in photos), tuple(p.fov for p in photos)
+                submit(ReconstructPhotos(paths, fovs, detail, films_of(state)))
             case OpenScene(path, edits, alone):
                 submit(LoadScene(path, edits, alone))
             case SaveScene(path) if state.scene.info is not None:
@@ -98,6 +101,10 @@ class SceneEffects(Effects):
                 self._viewport.thin(scene, share, thinned, rows)
             case Loaded() if state.scene.info is None and self._viewport.warm():
                 self._hands.dispatch(Loaded())
+            case Improve() if can_improve(before) and state.scene.info is not None:
+                submit(ImproveScene(state.scene.info))
+            case Improved() if command.fits(before) and (arrival := command.arrival(before)) is not None:
+                self._hands.perform(arrival)
             case _:
                 self._go_on(command, before, state)
         self._look_for_work(before, state)
@@ -183,6 +190,8 @@ class SceneEffects(Effects):
             # A scene whose small photos are damaged still shows; buttons get numbers.
             with suppress(OSError, SyntaxError, ValueError):
                 self._thumbnails.put_encoded(f"view {index}", photo)
+        if info.above is not None:
+            self._hands.submit(DrawAbove(info.serial, info.scene, info.above))
         for colormap in COLOUR_MAPS:
             self._thumbnails.put(f"bar {colormap}", colour_bar(colormap))
         self._entitle(f"{info.name} - LangFlash")
