@@ -79,8 +79,9 @@ def fine_scene(
         "assembly": solving - start,
         "colours": time.perf_counter() - solving,
     }
-    left_out = _shares(left)
-    said = (*scene.record.warnings, *([_LEFT_OUT.format(*_counted(left_out))] if left_out else []))
+    shares = _shares(left)
+    said = (*scene.record.warnings, *([_LEFT_OUT.format(*_counted(shares))] if shares else []))
+    left_out = {**scene.record.left_out, **shares}
     scene = scene.with_record(light=light.stored(), left_out=left_out, warnings=said, cost=Cost(timings))
     progress("prune", 0.9)
     return prune(scene, merge=False), light

@@ -173,7 +173,9 @@ class Record:
     it bought. light: `gains` and `offsets`, a row of
     red, green and blue for each view, by which `scene.light` brought the photos' colours to one light. lens:
     `found`, a mapping of `FoundLens` for each lens that the photos told. left_out:
-    `shares`, of each view what was left out since the others do not show it (`scene.strangers`). world: where
+    `shares`, of each view what was left out since the others do not show it (`scene.strangers`), `unplaced`,
+    names of photos that could not be placed, and `films`, each with its name (`film`), how many `frames` were
+    looked at, and what became of those that were not taken, `why` (phrases to counts). world: where
     it stands; None: nobody looked. thing_names: a person's own, by what the inventory calls a thing.
     calibration: what the network's checkpoint says about scores, instead of its language space. atom_names:
     a person's own, by atom, which it answers to. atom_denials: what a person said that an atom is not.

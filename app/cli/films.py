@@ -1,7 +1,7 @@
 """Films on the command line: which frames of them are taken, and how that is told."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -87,6 +87,12 @@ def summary(strip: Strip, choice: Choice) -> dict[str, Any]:
         "left_out": choice.left,
         "widest_gap": round(choice.gap, 3),
     }
+
+
+def recorded(film: Mapping[str, Any]) -> dict[str, Any]:
+    """The same as a scene's record has it, `Record.left_out`."""
+    why = {said: film["left_out"][key] for key, said in REASONS.items() if film["left_out"].get(key)}
+    return {"film": film["film"], "frames": film["frames_looked_at"], "why": why}
 
 
 def sentence(strip: Strip, choice: Choice) -> str:

@@ -19,19 +19,14 @@ def refined(
         result = refine(_moved(scene, device), images.to(device), Budget(seconds), progress)
     except InputError as reason:
         return scene.with_record(warnings=(*scene.record.warnings, f"not refined: {reason}"))
-    record = {
-        "kept": result.kept,
-        "held_out": scene.record.photos[result.view],
-        "held_out_psnr_db": [round(value, 2) for value in result.held_out],
-        "photos_psnr_db": [round(value, 2) for value in result.photos],
-        "steps": list(result.steps),
-    }
+    fitted = result.recorded().scene
     warnings = scene.record.warnings
     if not result.kept:
+        record = fitted.record.refinement
         before, after = record["held_out_psnr_db"]
         note = f"not refined: {record['held_out']}, held out, came no closer ({before} dB, then {after} dB)"
         warnings = (*warnings, note)
-    return _moved(result.scene, "cpu").with_record(refinement=record, warnings=warnings)
+    return _moved(fitted, "cpu").with_record(warnings=warnings)
 
 
 def _moved(scene: Scene, device: str) -> Scene:

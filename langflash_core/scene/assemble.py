@@ -43,6 +43,7 @@ def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: st
             f"gaussians: expected {num_views * height * width} of {views.num_views} views, "
             f"received {num_predicted} of {num_views}"
         )
+    left_out = unplaced_photos(prediction, views)
     prediction, views = placed_views(prediction, views)
     num_views, num_predicted = views.num_views, len(prediction.gaussians)
     if not bool(torch.isfinite(prediction.viewmats).all()):
@@ -63,6 +64,7 @@ def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: st
             "unusable": num_predicted - int(usable.sum()),
             "seen_through": int(usable.sum()) - len(view_ids),
         },
+        left_out=left_out,
         network_unit=unit,
     )
     scene = Scene(
@@ -77,6 +79,11 @@ def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: st
     )
     timings = {**prediction.timings, "assembly": time.perf_counter() - start}
     return scene.with_record(cost=Cost(timings))
+
+
+def unplaced_photos(prediction: Prediction, views: Views) -> dict[str, list[str]]:
+    """What a record's `left_out` says of views of unknown pose: nothing of none."""
+    return {"unplaced": [views.names[v] for v in prediction.unplaced]} if prediction.unplaced else {}
 
 
 def placed_views(prediction: Prediction, views: Views) -> tuple[Prediction, Views]:

@@ -26,6 +26,7 @@ from langflash_core.scene.assemble import (
     scaled_poses,
     semantics_of,
     sparse_weights,
+    unplaced_photos,
 )
 from langflash_core.scene.blocks import LEVELS, Tree, grown, leaves, threshold
 from langflash_core.scene.borders import refined_weights
@@ -100,6 +101,7 @@ def assemble_detailed(
         ValueError: the prediction's poses are not finite.
     """
     start = time.perf_counter()
+    left_out = unplaced_photos(prediction, views)
     if prediction.unplaced:
         photos = [photos[v] for v in range(len(photos)) if v not in prediction.unplaced]
     prediction, views = placed_views(prediction, views)
@@ -127,6 +129,7 @@ def assemble_detailed(
             warnings=(*views.warnings, *prediction.warnings),
             counts={"predicted": keep.numel(), "covered": int(keep.sum()), "seen_through": through},
             detail=_spent(joined(parts), detail, budget, size),
+            left_out=left_out,
             network_unit=unit,
         ),
     )

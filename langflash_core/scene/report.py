@@ -98,15 +98,56 @@ def lens_line(lens: Mapping[str, Any]) -> str:
 
 
 def left_out_line(left_out: Mapping[str, Any]) -> str:
-    """What was left out of photos since the others do not show it, for people: "6 % of photo 3"; "" of
-    nothing, and where something else is said.
+    """What was left out of photos since the others do not show it, photos that could not be placed, and what
+    became of films' frames, for people: "6 % of photo 3"; "" of nothing, and where something else is said.
 
     Args:
         left_out: as `Record` has it.
     """
+    films = (said.rstrip(".") for said in film_sentences(left_out))
+    return _joined("; ", _shares_line(left_out_shares(left_out)), _unplaced(left_out), *films)
+
+
+def left_out_shares(left_out: Mapping[str, Any]) -> tuple[float, ...]:
+    """Of each view the share that was left out since the others do not show it; () of something else."""
     shares = left_out.get("shares")
     if not isinstance(shares, list | tuple) or not all(isinstance(share, int | float) for share in shares):
-        return ""
+        return ()
+    return tuple(float(share) for share in shares)
+
+
+def unplaced_names(left_out: Mapping[str, Any]) -> tuple[str, ...]:
+    """Photos that could not be placed."""
+    names = left_out.get("unplaced")
+    return tuple(filter(_is_text, names)) if isinstance(names, list | tuple) else ()
+
+
+def film_sentences(left_out: Mapping[str, Any]) -> list[str]:
+    """What became of the frames of each film: "Of 480 frames of walk.mp4 12 were blurred."; nothing of what
+    cannot be read."""
+    stored = left_out.get("films")
+    said = []
+    for told in stored if isinstance(stored, list | tuple) else ():
+        known = told if isinstance(told, Mapping) else {}
+        film, frames, why = (known.get(name) for name in ("film", "frames", "why"))
+        counts = why.items() if isinstance(why, Mapping) else ()
+        parts = [f"{n} {phrase}" for phrase, count in counts if (n := _count(count)) and count]
+        if isinstance(film, str) and _count(frames) and parts:
+            said.append(f"Of {_count(frames)} frames of {film} {', '.join(parts)}.")
+    return said
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
+
+
+def _unplaced(left_out: Mapping[str, Any]) -> str:
+    names = unplaced_names(left_out)
+    more = f" and {len(names) - _NAMED} others" if len(names) > _NAMED else ""
+    return f"{', '.join(names[:_NAMED])}{more} could not be placed" if names else ""
+
+
+def _shares_line(shares: tuple[float, ...]) -> str:
     some = [(share, number) for number, share in enumerate(shares, 1) if share > 0]
     most = sorted(sorted(some, reverse=True)[:_NAMED], key=lambda one: one[1])
     parts = [f"{max(1, round(100 * share))} % of photo {number}" for share, number in most]

@@ -53,6 +53,17 @@ class Refinement:
     photos: tuple[float, float]
     steps: tuple[int, int]
 
+    def recorded(self) -> "Refinement":
+        """The same, with what came of it in the scene's record."""
+        told = {
+            "kept": self.kept,
+            "held_out": self.scene.record.photos[self.view] if self.scene.record.photos else str(self.view),
+            "held_out_psnr_db": [round(value, 2) for value in self.held_out],
+            "photos_psnr_db": [round(value, 2) for value in self.photos],
+            "steps": list(self.steps),
+        }
+        return replace(self, scene=self.scene.with_record(refinement=told))
+
 
 @dataclass(frozen=True)
 class Budget:

@@ -2,16 +2,17 @@
 
 import time
 from argparse import Namespace
+from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from langflash_core.errors import ImageError, InputError, WeightsError
 from langflash_core.files import check_output_file, held_alone, readable_file
 from langflash_core.formats import is_film
 from langflash_core.keeping import forget
 
-from ..films import with_frames
+from ..films import recorded, with_frames
 from ..report import ProgressBar, say_warnings, write_json
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def run(args: Namespace, out: TextIO) -> None:
             args.photos, progress, most=args.frames, start=args.start, end=args.end
         )
     with nullcontext() if args.keep is None else held_alone(args.keep):
-        scene = _written(args)
+        scene = _written(args, films)
         if args.keep is not None:
             forget(args.keep)
     from langflash_core.scene.report import describe, world_line
@@ -59,7 +60,7 @@ def run(args: Namespace, out: TextIO) -> None:
             print(world_line(scene.record.world), file=out)
 
 
-def _written(args: Namespace) -> "Scene":
+def _written(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":
     """The scene, once it is on the disk."""
     from langflash_core.ahead import begin
 
@@ -92,6 +93,9 @@ def _written(args: Namespace) -> "Scene":
             progress=progress,
             ahead=ahead,
         )
+        if films:
+            left_out = {**scene.record.left_out, "films": [recorded(film) for film in films]}
+            scene = scene.with_record(left_out=left_out)
         progress("writing", 1.0)
         args.output.parent.mkdir(parents=True, exist_ok=True)
         save(scene, args.output)

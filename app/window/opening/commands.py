@@ -11,7 +11,7 @@ from ..dialogs import Dialog
 from ..scene.drops import FILM_PHOTOS, MAX_PHOTOS, NOT_TYPED, Typed
 from ..scene.state import LOOKING_THROUGH, Job, Photo
 from ..state import State
-from .state import NO_OPENING, Film, Folder
+from .state import NO_OPENING, Film, Folder, told_film
 
 
 @dataclass(frozen=True)
@@ -206,6 +206,13 @@ def proposed(path: Path, strip: Strip, most: int, fewest: int = 2) -> Film:
 def room_for_frames(state: State) -> int:
     """How many frames of a film fit into one scene with the photos in the tray."""
     return max(MAX_PHOTOS - len(beside_frames(state)), 2)
+
+
+def films_of(state: State) -> tuple[dict, ...]:
+    """Of the film that photos in the tray are frames of, what a scene's record says."""
+    film = state.opening.film
+    of_film = film is not None and any(photo.path.parent == film.strip.folder for photo in state.scene.photos)
+    return (told_film(film),) if film is not None and of_film else ()
 
 
 def beside_frames(state: State) -> tuple[Photo, ...]:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from langflash_core.images.strip import Strip
+from langflash_core.images.strip import REASONS, Strip
 
 from ..dialogs import Dialog
 from ..protocol import Command
@@ -57,6 +57,12 @@ class Opening:
 
 
 NO_OPENING = Opening()
+
+
+def told_film(film: Film) -> dict:
+    """What a scene's record says of frames that were not taken, as `Record.left_out` has it."""
+    why = {REASONS[key]: count for key, count in film.left if count}
+    return {"film": film.strip.film, "frames": film.strip.looked, "why": why}
 
 
 def small(path: Path) -> str:

@@ -15,7 +15,7 @@ from ..editing.placing import SetHandle
 from ..editing.state import Handle
 from ..effects import Effects, Hands
 from ..kit.textures import Thumbnails
-from ..opening.commands import OpenFilm
+from ..opening.commands import OpenFilm, films_of
 from ..state import State
 from ..viewport import Viewport
 from .camera import FrameAll
@@ -43,10 +43,12 @@ from .commands import (
     dropped,
 )
 from .drops import sort_drop
+from .improving import Improve, Improved, ImproveScene, can_improve
 from .standing import LevelScene
 from .state import WHOLE, WHOLE_PHOTOS, SceneInfo
 from .unfinished import FEWEST
 from .work import (
+    DrawAbove,
     DropWork,
     FindPair,
     FindWorld,
@@ -86,7 +88,7 @@ class SceneEffects(Effects):
             case Reconstruct() if state.scene.photos:
                 photos, detail = state.scene.photos, state.preferences.detail
                 paths, fovs = tuple(p.path for p in photos), tuple(p.fov for p in photos)
-                submit(ReconstructPhotos(paths, fovs, detail, self._networks))
+                submit(ReconstructPhotos(paths, fovs, detail, films_of(state), self._networks))
             case OpenScene(path, edits, alone):
                 submit(LoadScene(path, edits, alone))
             case SaveScene(path) if state.scene.info is not None:
@@ -107,6 +109,7 @@ class SceneEffects(Effects):
             case Loaded() if state.scene.info is None and self._viewport.warm():
                 self._hands.dispatch(Loaded())
             case _:
+                self._improve(command, before, state)
                 self._go_on(command, before, state)
         self._look_for_work(before, state)
         self._show_whole(before, state)
@@ -117,6 +120,14 @@ class SceneEffects(Effects):
         job = before.scene.job
         if isinstance(command, CancelJob) and job is not None and job.pausable:
             self._hands.submit(DropWork(_paths(before)))
+
+    def _improve(self, command: Command, before: State, state: State) -> None:
+        """A scene that is to come closer to its photos, and the one that did."""
+        match command:
+            case Improve() if can_improve(before) and state.scene.info is not None:
+                self._hands.submit(ImproveScene(state.scene.info))
+            case Improved() if command.fits(before) and (arrival := command.arrival(before)) is not None:
+                self._hands.perform(arrival)
 
     def _look_for_work(self, before: State, state: State) -> None:
         """Other photos in the tray may be ones on which work was begun."""
@@ -191,6 +202,8 @@ class SceneEffects(Effects):
             # A scene whose small photos are damaged still shows; buttons get numbers.
             with suppress(OSError, SyntaxError, ValueError):
                 self._thumbnails.put_encoded(f"view {index}", photo)
+        if info.above is not None:
+            self._hands.submit(DrawAbove(info.serial, info.scene, info.above))
         for colormap in COLOUR_MAPS:
             self._thumbnails.put(f"bar {colormap}", colour_bar(colormap))
         self._entitle(f"{info.name} - LangFlash")

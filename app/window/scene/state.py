@@ -13,11 +13,14 @@ from ..protocol import Command
 from .memory import SceneMemory
 
 if TYPE_CHECKING:
+    from langflash_core.scene.above import Above
     from langflash_core.types import Scene
 
 
 FLIGHT_SECONDS = 0.7
 WHOLE_PHOTOS = 32  # of a scene, up to which all stay whole on the graphics card: 1.4 MB each
+ABOVE = "from above"
+"""The picture of the map."""
 WHOLE = "compared photo"
 """The picture of the one that is whole of more photos."""
 MOST_ROOMS = 3  # beside the one on show; a large scene takes 100 MB
@@ -48,6 +51,8 @@ class Photo:
 PAUSED = "Paused. Resume goes on from there, also when the program was closed and the same photos are opened."
 RECONSTRUCTING, RESTORING = "Reconstructing", "Restoring"
 """Titles of the jobs that make a scene out of the tray, and out of what an earlier session kept."""
+IMPROVING = "Improving"
+"""Title of the job that fits the scene on show to its photos."""
 
 LOOKING_THROUGH = "film"
 """The one stage of looking through a film, as the core calls it: what remains of it can be told."""
@@ -109,7 +114,7 @@ class SceneInfo:
     history: edits that came with it, none of them or those of an earlier session.
     memory: of what was computed about it last; goes on with the same scene.
     own_views: whether it says which photo made which Gaussian, so that photos can be compared.
-    extent: corners (low, high) of the box around nearly all of it, world axes, scene units.
+    extent: corners (low, high) of the box around nearly all of it, world axes, scene units. above: the map.
     """
 
     serial: int
@@ -124,6 +129,7 @@ class SceneInfo:
     history: "History | None" = field(default=None, compare=False, repr=False)
     own_views: bool = False
     extent: tuple[Vector, Vector] | None = None
+    above: "Above | None" = field(default=None, compare=False, repr=False)
     memory: SceneMemory = field(default=None, compare=False, repr=False)  # type: ignore[assignment]
 
     def __post_init__(self) -> None:

@@ -37,10 +37,11 @@ from .commands import (
 )
 from .memory import SceneMemory
 from .standing import Levelled
-from .state import SceneInfo
+from .state import ABOVE, SceneInfo
 
 if TYPE_CHECKING:
     from langflash_core.images.decode import Photo
+    from langflash_core.scene.above import Above
     from langflash_core.types import Scene
 
 THUMBNAIL_SIDE = 320  # pixels of the longer side
@@ -52,12 +53,14 @@ THUMBNAIL_SIDE = 320  # pixels of the longer side
 @dataclass(frozen=True)
 class ReconstructPhotos(Job):
     """Make a scene of photos; of many it goes on from what was kept (`unfinished`). fovs: degrees of the
-    longer side, one per photo; None: its record. detail: its name, of `langflash_core.detail`. networks:
-    the session's, so that weights are read once."""
+    longer side, one per photo; None: its record. detail: its name, of `langflash_core.detail`. films: what
+    became of the frames of those that photos are of, as `Record.left_out` has it. networks: the session's,
+    so that weights are read once."""
 
     paths: tuple[Path, ...]
     fovs: tuple[float | None, ...] = ()
     detail: str = DEFAULT_DETAIL
+    films: tuple[dict, ...] = ()
     networks: Networks = field(default_factory=Networks, repr=False, compare=False)
 
     def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> SceneArrived:
@@ -74,6 +77,8 @@ class ReconstructPhotos(Job):
                 cancelled=cancelled,
                 networks=self.networks,
             )
+        if self.films:
+            scene = scene.with_record(left_out={**scene.record.left_out, "films": list(self.films)})
         return SceneArrived(describe_scene(scene, serial, called(self.paths)))
 
 
@@ -141,6 +146,7 @@ def _restored(info: SceneInfo, edits: Path) -> SceneInfo:
 
 def describe_scene(scene: "Scene", serial: int, name: str, path: Path | None = None) -> SceneInfo:
     """`SceneInfo` of a `Scene`: counts, warnings, and a pose per input view."""
+    from langflash_core.scene.above import seen_from_above
     from langflash_core.scene.edited import first_marks
     from langflash_core.types import NO_LANGUAGE
 
@@ -163,6 +169,7 @@ def describe_scene(scene: "Scene", serial: int, name: str, path: Path | None = N
         history=History(first_marks(scene)),
         own_views=scene.num_views > 1 and scene.view_ids is not None,
         extent=_extent(means),
+        above=seen_from_above(scene),
     )
 
 
@@ -238,6 +245,19 @@ class ShrinkPhotos(SceneErrand):
                 photo.draft("RGB", (THUMBNAIL_SIDE, THUMBNAIL_SIDE))  # a damaged one's button has a number
                 photo.thumbnail((THUMBNAIL_SIDE, THUMBNAIL_SIDE))
                 yield ShowPicture(f"view {index}", np.asarray(photo.convert("RGB")))
+
+
+@dataclass(frozen=True)
+class DrawAbove(SceneErrand):
+    """The picture of the map."""
+
+    scene: "Scene" = field(repr=False)
+    above: "Above" = field(repr=False)
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.scene.above import drawn_from_above
+
+        yield ShowPicture(ABOVE, drawn_from_above(self.scene, self.above))
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from ...kit.look import Look
 from ...state import State
 from ..state import possible
 from . import tray
+from .places import FEWEST
 
 _WIDTH = 244.0  # design pixels
 _MARGIN = 12.0
@@ -37,7 +38,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
 
 def covers_views(width: float, count: int) -> bool:
     """Whether it would lie on the buttons of so many viewpoints, in a picture so wide, design pixels."""
-    return width < _WIDTH + 2 * _MARGIN + 16 + 84 * count + 80
+    return width < _WIDTH + 2 * _MARGIN + 16 + 84 * count + (80 if count < FEWEST else 118)
 
 
 class _Told(Facts):

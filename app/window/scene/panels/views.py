@@ -12,11 +12,11 @@ from ...kit.look import Look
 from ...recovery import commands as keep
 from ...state import State
 from .. import camera
-from . import in_space
+from . import in_space, places
 
 _VIEW = 54.0  # of a photo to jump to
 _SCROLLS = 8  # photos; more may be wider than the window
-_BESIDE, _HIGHEST = 116.0, 62.0  # the switches' room at their right, and their height
+_BESIDE, _HIGHEST = 154.0, 62.0  # the switches' room at their right, and their height
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
@@ -62,6 +62,9 @@ def draw(state: State, look: Look) -> list[do.Command]:
     if imgui.button(fa.ICON_FA_VIDEO, look.vec(34, _VIEW + 6)):
         issued.append(film.AddKey())
     widgets.tooltip("Begin a film, or go on with it: the present view as a key frame  (M)")
+    if places.offered(state.scene.info):
+        imgui.same_line(0, look.px(4))
+        issued += places.draw(state, look, look.vec(34, _VIEW + 6))
     return issued
 
 

@@ -66,12 +66,13 @@ def never() -> bool:
 def test_the_list_is_the_librarys(listed: State, room: Scene) -> None:
     found = inventory(room)
     assert listed.listing.counts == found.counts and listed.listing.unit == "m"
-    rows = listed.listing.rows
+    rows, world = listed.listing.rows, room.record.world
+    assert world is not None
     assert rows is not None and len(rows) == len(found.things)
     for row, thing in zip(rows, found.things, strict=True):
         assert (row.id, row.sure, row.size, row.photos) == (thing.id, thing.sure, thing.size, thing.photos)
         assert (row.rows.rows() == thing.rows).all()
-        stands = (row.corners - room.record.world.origin) @ turn_of(room.record.world).T * METRES
+        stands = (row.corners - world.origin) @ turn_of(world).T * METRES
         np.testing.assert_allclose(stands[:4, [0, 2]], thing.corners, atol=1e-9)
         np.testing.assert_allclose(
             -stands[[0, 4], 1], [thing.bottom, thing.bottom + thing.size[2]], atol=1e-9
