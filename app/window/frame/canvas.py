@@ -3,7 +3,7 @@
 from imgui_bundle import ImVec2, imgui
 
 from .. import commands as do
-from ..editing.panels import gizmo, hands, pointing, ruler
+from ..editing.panels import cleaning, gizmo, hands, pointing, ruler
 from ..editing.state import Tool
 from ..kit.look import Look
 from ..opening.panels import welcome
@@ -30,6 +30,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
         imgui.invisible_button("picture", ImVec2(max(size.x, 1), max(size.y, 1)))
         return []
     ruler.draw_line(state, look, corner, size)
+    cleaning.draw_box(state, corner, size, look)
     placed, taken = gizmo.draw(state, look, corner, size)
     over = placed if taken else placed + in_space.draw(state, look, corner, size)
     tour_panel.draw_notes(state, look, corner, size)
