@@ -13,7 +13,8 @@ import numpy as np
 from langflash_core.geometry import poses
 
 from .asking.state import PROMPTS_SUFFIX
-from .dialogs import Dialog
+from .dialogs import PROMPTS, RECIPES, Dialog
+from .editing.state import RECIPE_SUFFIX
 from .protocol import Command as Command
 from .scene import samples
 from .scene.drops import SCENE_SUFFIX, There, Typed
@@ -131,8 +132,10 @@ class ShowDialog:
         if self.which is Dialog.SAVE and state.scene.info is None:
             return Notify(NOTHING_TO_SAVE).apply(state)
         path = str(_place_to_save(state)) if self.which is Dialog.SAVE else ""
-        if self.which in (Dialog.SAVE_PROMPTS, Dialog.LOAD_PROMPTS):
+        if self.which in PROMPTS:
             path = str(state.asking.prompts_path or Path.home() / f"my{PROMPTS_SUFFIX}")
+        if self.which in RECIPES:
+            path = str(state.editing.recipe_path or Path.home() / f"my{RECIPE_SUFFIX}")
         return replace(state.with_scene(pending=()), dialog=self.which, typed=Typed(path), palette=NO_PALETTE)
 
 

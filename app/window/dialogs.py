@@ -18,6 +18,8 @@ class Dialog(Enum):
     UNSAVED = "Edits are not saved"
     SAVE_PROMPTS = "Save the phrases"
     LOAD_PROMPTS = "Load phrases"
+    SAVE_RECIPE = "Save the recipe"
+    LOAD_RECIPE = "Load a recipe"
     EXPORT = "Export"
     REPLACE = "Replace?"
     SETTINGS = "Preferences"
@@ -32,4 +34,8 @@ class Dialog(Enum):
     @property
     def types(self) -> bool:
         """Whether a path is typed there; the export's lies in its form."""
-        return self.looks or self in (Dialog.SAVE, Dialog.SAVE_PROMPTS, Dialog.LOAD_PROMPTS)
+        return self.looks or self is Dialog.SAVE or self in (*PROMPTS, *RECIPES)
+
+
+PROMPTS = (Dialog.SAVE_PROMPTS, Dialog.LOAD_PROMPTS)
+RECIPES = (Dialog.SAVE_RECIPE, Dialog.LOAD_RECIPE)

@@ -3,7 +3,7 @@
 Sizes: N Gaussians.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,7 +65,7 @@ def cleaned(
         found = kind_strengths(scene, visible, recipe.kinds)
         reasons = {kind: chosen(least, recipe.strength) for kind, least in found.items()}
     for rule in recipe.rules:
-        reasons[_said(rule)] = _meeting(scene, rule)
+        reasons[_said(rule)] = meeting(scene, rule)
     reasons = {name: rows & scope for name, rows in reasons.items()}
     if recipe.invert:
         found = np.logical_or.reduce([*reasons.values(), np.zeros(len(visible), bool)])
@@ -136,8 +136,17 @@ def inside(scene: Scene, box: Box) -> Bool[np.ndarray, " N"]:
     return np.all((means >= box[:3]) & (means <= box[3:]), axis=1)
 
 
-def _meeting(scene: Scene, rule: Rule) -> Bool[np.ndarray, " N"]:
-    """Gaussians of which all conditions of a rule hold."""
+def meeting(
+    scene: Scene, rule: Rule, measure: Callable[[str], Float[np.ndarray, " N"]] | None = None
+) -> Bool[np.ndarray, " N"]:
+    """Gaussians of which all conditions of a rule hold.
+
+    Args:
+        measure: `measured` of the scene by name, where somebody remembers it; None: it is measured here.
+
+    Raises:
+        InputError: the scene does not know what a condition asks for.
+    """
     rows = np.ones(len(scene.gaussians), bool)
     for name, limits in rule.items():
         if name == COLOUR:
@@ -145,12 +154,17 @@ def _meeting(scene: Scene, rule: Rule) -> Bool[np.ndarray, " N"]:
             colours = 0.5 + SH_C0 * scene.gaussians.sh[:, 0].detach().cpu().double().numpy()
             rows &= (abs(colours - shade) <= off).all(1)
             continue
-        values, (low, high) = _measured(scene, name), limits
+        values, (low, high) = measured(scene, name) if measure is None else measure(name), limits
         rows &= (values > (-np.inf if low is None else low)) & (values < (np.inf if high is None else high))
     return rows
 
 
-def _measured(scene: Scene, name: str) -> Float[np.ndarray, " N"]:
+def measured(scene: Scene, name: str) -> Float[np.ndarray, " N"]:
+    """One of `MEASURES` of each Gaussian, in its units.
+
+    Raises:
+        InputError: the scene does not know it.
+    """
     match name:
         case "opacity":
             return scene.gaussians.opacities.detach().cpu().double().numpy()

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 from langflash_core import pictures
+from langflash_core.mending.recipes import Box, Recipe
 from langflash_core.scene import edits
 from langflash_core.scene.changes import Moved
 from langflash_core.scene.edits import Combine, History, Marks
@@ -288,22 +289,35 @@ class FindFloaters:
         marks = state.editing.marks
         if marks is None:
             return state
-        strength = state.editing.floaters.strength if state.editing.floaters else Floaters().strength
+        before = state.editing.floaters or Floaters()
         within = marks.selected if marks.selected else None
-        return state.with_editing(floaters=Floaters(strength=strength, within=within))
+        return state.with_editing(floaters=Floaters(recipe=before.recipe, within=within, open=before.open))
 
 
 @dataclass(frozen=True)
 class FloatersFound:
-    """The least strengths (N,) of the preview that is open."""
+    """Of the preview that is open the least strengths (N,), and what else `recipe` finds at any strength;
+    None: that of the preview."""
 
     least: bytes
+    recipe: Recipe | None = None
+    ruled: Mask | None = None
+    answering: Mask | None = None
+    outside: Mask | None = None
+    box: Box | None = None
 
     def apply(self, state: State) -> State:
         marks, preview = state.editing.marks, state.editing.floaters
         if marks is None or preview is None or len(self.least) != 4 * marks.deleted.count:
             return state
-        return state.with_editing(floaters=replace(preview, least=self.least))
+        if self.recipe is not None and replace(self.recipe, strength=preview.strength) != preview.recipe:
+            return state  # another is on its way
+        return state.with_editing(
+            floaters=replace(
+                preview, least=self.least, ruled=self.ruled, answering=self.answering,
+                outside=self.outside, box=self.box,
+            )
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -316,7 +330,9 @@ class SetStrength:
         if state.editing.floaters is None:
             return state
         strength = min(max(self.strength, 0.0), 1.0)
-        return state.with_editing(floaters=replace(state.editing.floaters, strength=strength))
+        preview = state.editing.floaters
+        recipe = replace(preview.recipe, strength=strength)
+        return state.with_editing(floaters=replace(preview, recipe=recipe))
 
 
 @dataclass(frozen=True)
@@ -330,11 +346,14 @@ class EndFloaters:
         if marks is None or preview is None:
             return state
         found = preview.mask(marks.visible)
+        if self.then == "delete" and found and not marks.left - found:
+            return Notify("Nothing would be left of the scene; choose less.").apply(state)
         state = state.with_editing(floaters=None)
+        what = f"{len(found):,} " + ("by rules" if preview.by_rules else "floaters")
         if self.then == "delete":
-            return with_edit(state, f"Delete {len(found):,} floaters", edits.delete(marks, found))
+            return with_edit(state, f"Delete {what}", edits.delete(marks, found))
         if self.then == "select":
-            return with_edit(state, f"Select {len(found):,} floaters", edits.select(marks, found))
+            return with_edit(state, f"Select {what}", edits.select(marks, found))
         return state
 
 

@@ -14,6 +14,7 @@ from ..scene.mended import CopyPart, FillHole, HidePart
 from ..scene.state import Room, SceneInfo
 from ..state import State
 from ..viewport import Viewport
+from .cleaning import LoadRecipe, ReadRecipe, SaveRecipe, WriteRecipe
 from .commands import FindFloaters, StopWaiting
 from .mending import BringBack, CopySelection, FillSelection, HiddenForGood, HideForGood, RememberUnhidden
 from .pointing import CardOpened, Named, ReadingTaken, RulerPlaced
@@ -95,17 +96,30 @@ class EditingEffects(Effects):
                 self._hands.submit(KeepLessons(info.serial, info.memory, marks, config_folder() / WORDS))
             case TakeWords() if info is not None and marks is not None:
                 self._hands.submit(FindLessons(info.serial, info.memory, marks, config_folder() / WORDS))
-            case FindFloaters() if info is not None and marks is not None:
-                self._hands.submit(ScoreFloaters(info.serial, info.memory, marks))
+            case SaveRecipe(path) if state.editing.floaters is not None:
+                self._hands.submit(WriteRecipe(state.editing.floaters.recipe, path))
+            case LoadRecipe(path):
+                self._hands.submit(ReadRecipe(path))
             case _ if info is not None and marks is not None:
                 request = request_for(command, state, info, marks, self._viewport.size)
                 if request is not None:
                     self._hands.submit(request)
                 elif state.editing.waiting and not before.editing.waiting:
                     self._hands.perform(StopWaiting())
+        self._find_floaters(command, before, state)
         self._mend(command, before, state)
         if marks != before.editing.marks and state.scene.info is before.scene.info:
             self._atoms_changed(before, state)
+
+    def _find_floaters(self, command: Command, before: State, state: State) -> None:
+        """Look again once the preview is new, or its recipe is another in more than its strength."""
+        info, marks = state.scene.info, state.editing.marks
+        old, new = before.editing.floaters, state.editing.floaters
+        if info is None or marks is None or new is None:
+            return
+        same = old is not None and replace(old.recipe, strength=new.strength) == new.recipe
+        if not same or isinstance(command, FindFloaters):
+            self._hands.submit(ScoreFloaters(info.serial, info.memory, marks, new.recipe))
 
     def _mend(self, command: Command, before: State, state: State) -> None:
         """What makes another scene of the one on show, and what goes back to that."""

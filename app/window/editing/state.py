@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from pathlib import Path
 
 import numpy as np
 
+from langflash_core.mending.recipes import STRENGTH, Box, Recipe
 from langflash_core.scene.changes import Change
 from langflash_core.scene.edits import Combine, History, Marks
 from langflash_core.scene.mask import Mask
@@ -13,6 +15,8 @@ RADIUS_RANGE = (4.0, 160.0)  # design pixels
 PICK_RADIUS = 4.0
 REACH_RANGE = (1.0, 12.0)
 TOP_ATOMS = 3
+RECIPE_SUFFIX = ".recipe.json"
+BY_STRENGTH = Recipe(STRENGTH)
 
 
 class Tool(Enum):
@@ -117,22 +121,44 @@ class Card:
 
 @dataclass(frozen=True)
 class Floaters:
-    """The preview of floaters, sheets, flyaways and crumbs.
+    """The preview of what a recipe takes away: floaters, sheets, flyaways and crumbs, and what rules say.
 
     least: (N,) float32 bytes, the strength from which each goes; empty while computed. within: only of these;
-    None: of all.
+    None: of all. ruled, answering, outside: what meets a rule, what answers the recipe's phrases, what is
+    outside its box; None where it says nothing of that. box: the corners of its box. open: rules are shown.
     """
 
     least: bytes = field(default=b"", repr=False)
-    strength: float = 0.5
+    recipe: Recipe = BY_STRENGTH
     within: Mask | None = None
+    ruled: Mask | None = None
+    answering: Mask | None = None
+    outside: Mask | None = None
+    box: Box | None = None
+    open: bool = False
+
+    @property
+    def strength(self) -> float:
+        return self.recipe.strength
+
+    @property
+    def by_rules(self) -> bool:
+        """Whether more than the strength decides."""
+        return self.recipe != Recipe(self.strength)
 
     def mask(self, visible: Mask) -> Mask:
-        """Gaussians that go at this strength, of what is shown."""
-        if not self.least or not self.strength:
-            return Mask.none(visible.count)
-        found = Mask.of(np.frombuffer(self.least, np.float32) <= self.strength) & visible
-        return found if self.within is None else found & self.within
+        """Gaussians that go, of what is shown; as `langflash_core.mending.cleaning.cleaned` finds them."""
+        found = Mask.none(visible.count)
+        if not self.least or self.recipe.empty:
+            return found
+        scope = visible
+        for limit in (self.within, self.answering):
+            scope = scope if limit is None else scope & limit
+        if self.strength:
+            found = Mask.of(np.frombuffer(self.least, np.float32) <= self.strength)
+        found = scope & (found if self.ruled is None else found | self.ruled)
+        found = scope - found if self.recipe.invert else found
+        return found if self.outside is None else found | (visible & self.outside)
 
 
 @dataclass(frozen=True)
@@ -145,7 +171,8 @@ class Editing:
     hover: what is under the pointer. asked: where a click waits for the picture to rest.
     names: nearest words of each atom, best first. ruler: the ends of what is measured, world.
     gesture: a change of the selection that is shown and not made yet. tint: of it, while a colour is chosen.
-    hiding: the way in which the selection is to be hidden for good, while that is asked.
+    hiding: the way in which the selection is to be hidden for good, while that is asked. recipe_path: where a
+    clean-up's recipe was written or read last.
     """
 
     history: History | None = None
@@ -168,6 +195,7 @@ class Editing:
     tint: Tint | None = None
     hiding: str = ""
     last_tint: Tint = Tint()
+    recipe_path: Path | None = None
 
     @property
     def marks(self) -> Marks | None:
@@ -253,4 +281,5 @@ def fresh(editing: Editing, history: History | None, saved: Marks | None) -> Edi
     return Editing(
         history=history, saved=saved, tool=editing.tool, combine=editing.combine, radius=editing.radius,
         through=editing.through, reach=editing.reach, handle=editing.handle, last_tint=editing.last_tint,
+        recipe_path=editing.recipe_path,
     )  # fmt: skip

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from langflash_core.errors import LangFlashError
 from langflash_core.files import make_folder
 from langflash_core.geometry.poses import Pose, to_camera
+from langflash_core.mending.recipes import Box, Recipe
 from langflash_core.scene.edits import Combine, Marks
 from langflash_core.scene.mask import Mask
 
@@ -33,7 +35,7 @@ from .commands import (
     StopWaiting,
 )  # fmt: skip
 from .pointing import AtomsNamed, Named, ReadingTaken
-from .state import PICK_RADIUS, Point, Reading, Region, strongest
+from .state import BY_STRENGTH, PICK_RADIUS, Point, Reading, Region, strongest
 from .teaching import WordsFound
 
 if TYPE_CHECKING:
@@ -248,13 +250,49 @@ class GrowSelection(Selection):
 
 @dataclass(frozen=True)
 class ScoreFloaters(EditErrand):
-    """The strength of cleaning from which every Gaussian goes."""
+    """The strength of cleaning from which every Gaussian goes, and what else a recipe finds. Where it cannot
+    be followed, nothing goes."""
+
+    newest_counts = True
+
+    recipe: Recipe = BY_STRENGTH
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.mending.strength import least_strengths
 
-        least = least_strengths(self.memory.changed(self.marks), self.marks.visible.rows())
-        yield FloatersFound(least.tobytes())
+        recipe, marks = self.recipe, self.marks
+        shown, visible = self.memory.changed(marks), marks.visible
+        least = self.memory.answered(
+            "strengths",
+            (marks.changes, visible, recipe.kinds),
+            lambda: least_strengths(shown, visible.rows(), recipe.kinds).tobytes(),
+        )
+        try:
+            yield FloatersFound(least, recipe, *self._by_rules(shown))
+        except LangFlashError as problem:
+            none = Mask.none(visible.count)
+            yield FloatersFound(least, recipe, answering=none)
+            yield Notify(str(problem)[:1].upper() + str(problem)[1:] + ".")
+
+    def _by_rules(self, shown: "Scene") -> "tuple[Mask | None, Mask | None, Mask | None, Box | None]":
+        """What meets a rule, what answers its phrases, what is outside its box, and that."""
+        from langflash_core.mending.cleaning import answering, box_of, inside, measured, meeting
+
+        recipe, about = self.recipe, (self.marks.changes,)
+        ruled = spoken = outside = box = None
+        for rule in recipe.rules:
+            rows = meeting(
+                shown,
+                rule,
+                lambda name: self.memory.answered(f"measure {name}", about, lambda: measured(shown, name)),
+            )
+            ruled = Mask.of(rows) if ruled is None else ruled | Mask.of(rows)
+        if recipe.within:
+            spoken = Mask.of(answering(self.spoken(), recipe.within))
+        if recipe.crop is not None:
+            box = box_of(shown, recipe.crop, self.marks.visible.rows())
+            outside = Mask.of(~inside(shown, box))
+        return ruled, spoken, outside, box
 
 
 def request_for(

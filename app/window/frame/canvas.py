@@ -5,7 +5,7 @@ from imgui_bundle import ImVec2, imgui
 from .. import commands as do
 from ..asking.panels import parts
 from ..asking.parting import TakePartAt
-from ..editing.panels import gizmo, hands, pointing, ruler
+from ..editing.panels import cleaning, gizmo, hands, pointing, ruler
 from ..editing.state import Tool
 from ..inventory import panel as inventory_panel
 from ..kit.look import Look
@@ -34,6 +34,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
         return []
     floor.draw(state, look, corner, size)
     ruler.draw_line(state, look, corner, size)
+    cleaning.draw_box(state, corner, size, look)
     placed, taken = gizmo.draw(state, look, corner, size)
     over = placed if taken else placed + in_space.draw(state, look, corner, size)
     tour_panel.draw_notes(state, look, corner, size)

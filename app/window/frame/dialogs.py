@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from itertools import groupby
+from pathlib import Path
 
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
@@ -9,6 +10,7 @@ from imgui_bundle import icons_fontawesome_6 as fa
 from .. import commands as do
 from ..asking import commands as ask
 from ..dialogs import Dialog
+from ..editing import cleaning as clean
 from ..exporting import commands as export
 from ..exporting import panel as export_panel
 from ..kit import theme, widgets
@@ -49,7 +51,7 @@ COLUMNS = ((None, "View", "Program"), ("File", "Find", "Tools", "Edit"))  # of h
 _CLOSING = (
     do.ShowDialog | show.SaveScene | show.OpenPaths | show.Instead | show.All | show.GoOn | show.SaveFirst
     | show.MergeScene | opening.LookForPlace | opening.PlaceFound | opening.TakeFrames
-    | ask.SavePrompts | ask.LoadPrompts | export.Export
+    | ask.SavePrompts | ask.LoadPrompts | clean.SaveRecipe | clean.LoadRecipe | export.Export
 )  # fmt: skip
 
 
@@ -112,8 +114,12 @@ def _body(dialog: Dialog) -> Callable[[State, Look], list[do.Command]]:
         Dialog.PLACE: browser.draw,
         Dialog.FILM: strip.draw,
         Dialog.UNSAVED: rooms.draw_unsaved,
-        Dialog.SAVE_PROMPTS: _save_prompts,
-        Dialog.LOAD_PROMPTS: _load_prompts,
+        Dialog.SAVE_PROMPTS: _saving("Where to write them", ask.SavePrompts),
+        Dialog.LOAD_PROMPTS: _loading(
+            "A set of phrases (.prompts.json); they replace the present ones", ask.LoadPrompts
+        ),
+        Dialog.SAVE_RECIPE: _saving("Where to write what is cleaned up", clean.SaveRecipe),
+        Dialog.LOAD_RECIPE: _loading("A recipe (.json); it replaces the present rules", clean.LoadRecipe),
         Dialog.EXPORT: export_panel.draw,
         Dialog.REPLACE: export_panel.draw_replacing,
         Dialog.SETTINGS: recovery_panels.draw_settings,
@@ -135,26 +141,31 @@ def _save(state: State, look: Look) -> list[do.Command]:
     return issued
 
 
-def _save_prompts(state: State, look: Look) -> list[do.Command]:
-    issued, confirmed = _path_field(state, "Where to write them")
-    text = state.typed.text.strip()
-    exists = state.typed.there is There.FILE
-    imgui.begin_disabled(not text)
-    pressed = widgets.primary_button("Replace" if exists else "Save", look.vec(120, 0))
-    imgui.end_disabled()
-    if text and (pressed or confirmed):
-        issued.append(ask.SavePrompts(typed_path(text)))
-    return issued
+def _saving(label: str, make: Callable[[Path], do.Command]) -> Callable[[State, Look], list[do.Command]]:
+    """Asks for a file to write."""
+    return lambda state, look: _file(state, look, label, _verb(state), make)
 
 
-def _load_prompts(state: State, look: Look) -> list[do.Command]:
-    issued, confirmed = _path_field(state, "A set of phrases (.prompts.json); they replace the present ones")
+def _loading(label: str, make: Callable[[Path], do.Command]) -> Callable[[State, Look], list[do.Command]]:
+    """Asks for a file to read."""
+    return lambda state, look: _file(state, look, label, "Load", make)
+
+
+def _verb(state: State) -> str:
+    return "Replace" if state.typed.there is There.FILE else "Save"
+
+
+def _file(
+    state: State, look: Look, label: str, verb: str, make: Callable[[Path], do.Command]
+) -> list[do.Command]:
+    """A path, and the button that does something with it."""
+    issued, confirmed = _path_field(state, label)
     text = state.typed.text.strip()
     imgui.begin_disabled(not text)
-    pressed = widgets.primary_button("Load", look.vec(120, 0))
+    pressed = widgets.primary_button(verb, look.vec(120, 0))
     imgui.end_disabled()
     if text and (pressed or confirmed):
-        issued.append(ask.LoadPrompts(typed_path(text)))
+        issued.append(make(typed_path(text)))
     return issued
 
 

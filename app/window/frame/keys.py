@@ -17,15 +17,16 @@ from . import table
 
 AREAS = (
     "##session", "##offer", "##panel", "##export", "##toolbar", "##tools", "##bar0", "##bar1", "##bar2",
-    "##bar3", "##card", "##ruler", "##keys", "##views", "Dictionary", "Tour", "Inventory",
+    "##bar3", "##card", "##ruler", "##keys", "##views", "Dictionary", "Tour", "Inventory", "Rules",
 )  # fmt: skip
 """Windows that F6 goes through, by name: questions first."""
+_PAGES = (imgui.Key.page_up, imgui.Key.page_down)
 _ARROWS = (imgui.Key.left_arrow, imgui.Key.right_arrow, imgui.Key.up_arrow, imgui.Key.down_arrow)
 
 
 def draw(state: State) -> list[do.Command]:
     """Keys that work wherever the pointer is, after all that may take them in this frame."""
-    _keep_arrows()
+    _keep_keys(state)
     if imgui.is_key_pressed(imgui.Key.escape, False) and (state.dialog or not typing()):
         return _escape(state)
     if _covered(state):
@@ -35,11 +36,14 @@ def draw(state: State) -> list[do.Command]:
     return [command for command in commands if command is not None]
 
 
-def _keep_arrows() -> None:
-    """While Ctrl is held the arrows are commands: they do not lead from control to control as well."""
-    if imgui.get_io().key_ctrl and not typing():
-        for key in _ARROWS:
-            imgui.internal.set_key_owner(key, imgui.get_id("commands"))
+def _keep_keys(state: State) -> None:
+    """While Ctrl is held the arrows are commands, and the page keys are where there is a tour: they do not
+    lead from control to control as well."""
+    if typing() or _covered(state):
+        return
+    kept = _ARROWS if imgui.get_io().key_ctrl else ()
+    for key in (*kept, *(_PAGES if state.tour.stops else ())):
+        imgui.internal.set_key_owner(key, imgui.get_id("commands"))
 
 
 def typing() -> bool:

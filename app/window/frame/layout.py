@@ -4,7 +4,7 @@ from imgui_bundle import ImVec2, imgui
 
 from .. import commands as do
 from ..asking.panels import dictionary, prompts
-from ..editing.panels import history, pointing, ruler, tools
+from ..editing.panels import cleaning, history, pointing, ruler, tools
 from ..exporting import panel as export_panel
 from ..filming import panel as film_panel
 from ..inventory import panel as inventory_panel
@@ -55,6 +55,7 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
         issued += film_panel.draw(state, look, place, size)
         issued += tour_panel.draw(state, look, place, size)
         issued += inventory_panel.draw(state, look, place, size)
+        issued += cleaning.draw(state, look, place, size)
         issued += dictionary.draw(state, look, place, size)
     issued += recovery_panels.draw_offer(state, look, place, size)
     issued += recovery_panels.draw_edits_offer(state, look, place, size)

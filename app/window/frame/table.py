@@ -17,6 +17,7 @@ from .. import commands as do
 from ..asking import commands as ask
 from ..asking.prompt_sets import MOST_PROMPTS
 from ..dialogs import Dialog
+from ..editing import cleaning as clean
 from ..editing import commands as edit
 from ..editing import mending, placing
 from ..editing import pointing as point
@@ -317,6 +318,8 @@ def _tools() -> Iterable[Entry]:
     yield Entry("A smaller brush", group, _brush(1 / BRUSH_STEP), _plain("left_bracket"), repeats=True)
     yield Entry("A larger brush", group, _brush(BRUSH_STEP), _plain("right_bracket"), repeats=True)
     yield Entry("Clean up", group, _shown(edit.FindFloaters()))
+    yield Entry("Clean up: by rules, or outside a box", group, _shown(clean.ShowRules()))
+    yield Entry("Clean up: load a recipe ...", group, _shown(do.ShowDialog(Dialog.LOAD_RECIPE)))
 
 
 def _brush(factor: float) -> Callable[[State], do.Command | None]:

@@ -9,6 +9,7 @@ from ... import commands as do
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State
+from .. import cleaning as clean
 from .. import commands as edit
 from .. import mending, placing
 from .. import pointing as point
@@ -273,7 +274,7 @@ def _floaters(state: State, found: Floaters, look: Look, right: float) -> list[d
     changed, strength = widgets.slider("##strength", found.strength, (0.0, 1.0), text, tip, width)
     if changed:
         issued.append(edit.SetStrength(strength))
-    return issued + _end_floaters(count, look, right)
+    return issued + _end_floaters(count, found.open, look, right)
 
 
 def _hiding(chosen: str, look: Look, right: float) -> list[do.Command]:
@@ -300,9 +301,14 @@ def _hiding(chosen: str, look: Look, right: float) -> list[do.Command]:
     return issued
 
 
-def _end_floaters(count: int, look: Look, right: float) -> list[do.Command]:
-    """The ways out of the preview of so many."""
+def _end_floaters(count: int, opened: bool, look: Look, right: float) -> list[do.Command]:
+    """Its rules, and the ways out of the preview of so many."""
     issued: list[do.Command] = []
+    label = f"{fa.ICON_FA_SLIDERS}  Rules"
+    widgets.go_on(widgets.button_width(label), right, look.px(14))
+    if widgets.primary_button(label) if opened else imgui.button(label):
+        issued.append(clean.ShowRules(not opened))
+    widgets.tooltip("By sureness, size, opacity, colour, distance, photos; a box; recipes")
     widgets.go_on(widgets.button_width("Delete"), right, look.px(14))
     imgui.begin_disabled(count == 0)
     if widgets.primary_button("Delete##floaters"):

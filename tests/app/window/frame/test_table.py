@@ -9,11 +9,12 @@ from imgui_bundle import imgui
 from app.window.commands import Command
 from app.window.dialogs import Dialog
 from app.window.editing import commands as edit
-from app.window.frame import dialogs, table
+from app.window.frame import dialogs, keys, table
 from app.window.kit import theme
 from app.window.recovery import commands as keep
 from app.window.scene import commands as show
 from app.window.state import State
+from app.window.touring import commands as tour
 from langflash_core import pictures
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History, Mask
@@ -97,3 +98,19 @@ def test_help_fits_a_window_of_800_lines() -> None:
         assert window is not None and window.scroll_max.y == 0
     assert ("1 to 0", "Show: RGB to Features") in dialogs.help_rows("View")
     assert ("Ctrl+Z", "Undo") in dialogs.help_rows("Edit")
+
+
+def test_the_page_keys_of_a_tour_do_not_move_the_focus() -> None:
+    """Page down went to the next stop and to another control at once."""
+    for state, owned in ((with_marks(), False), (after(with_marks(), tour.AddStop()), True)):
+        owners = []
+
+        def draw(_look, state=state, owners=owners) -> None:
+            keys.draw(state)
+            own = imgui.get_id("commands")
+            owners.append(imgui.internal.get_key_owner(imgui.Key.page_down) == own)
+
+        with headless.context((400, 300)):
+            theme.set_up(1.0, "dark")
+            headless.frames(draw, headless.look(), 2)
+        assert owners[-1] is owned
