@@ -56,6 +56,26 @@ def test_a_damaged_step_is_made_again(tmp_path: Path, damage: bytes | None):
     assert len(list(tmp_path.iterdir())) == 1
 
 
+@pytest.mark.parametrize(("offset", "value"), [(8, 1), (10, 99)], ids=["encrypted", "unknown packing"])
+def test_an_archive_of_another_kind_is_made_again(tmp_path: Path, offset: int, value: int):
+    keep = Keep.of(tmp_path, {})
+    keep("step", lambda: {"values": np.arange(3)})
+    (path,) = tmp_path.iterdir()
+    content = bytearray(path.read_bytes())
+    content[content.index(b"PK\x01\x02") + offset] |= value
+    path.write_bytes(content)
+    assert np.array_equal(keep("step", lambda: {"values": np.ones(2)})["values"], np.ones(2))
+
+
+def test_an_array_in_the_place_of_an_archive_is_made_again(tmp_path: Path):
+    keep = Keep.of(tmp_path, {})
+    keep("step", lambda: {"values": np.arange(3)})
+    (path,) = tmp_path.iterdir()
+    with path.open("wb") as stream:
+        np.save(stream, np.ones(3))
+    assert np.array_equal(keep("step", lambda: {"values": np.ones(2)})["values"], np.ones(2))
+
+
 def test_other_files_of_the_folder_stay(tmp_path: Path):
     (tmp_path / "mine.txt").write_text("mine")
     Keep.of(tmp_path, {})("step", lambda: {"values": np.ones(2)})

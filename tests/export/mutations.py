@@ -124,7 +124,7 @@ def damaged_inside(name: str, content: bytes, other: bytes, rng: np.random.Gener
         return json.dumps(lied(json.loads(content), rng)).encode()
     if name == "three.spz":
         return gzip.compress(mutated(gzip.decompress(content), other, rng), 1)
-    if not name.endswith(".sog"):
+    if not name.endswith((".sog", ".npz")):
         return mutated(content, other, rng)
     packed = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(packed, "w") as new:

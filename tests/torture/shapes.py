@@ -58,7 +58,7 @@ def _by_build(name: str, content: bytes, other: bytes, rng: np.random.Generator)
         return gzip.compress(_numbers(gzip.decompress(content), rng), 1)
     if name.endswith(".spz"):
         return _streams(content, rng)
-    if name.endswith(".sog"):
+    if name.endswith((".sog", ".npz")):
         return damaged_inside(name, content, other, rng)
     return _numbers(content, rng)
 

@@ -74,12 +74,20 @@ def kept(photos: Sequence[Path]) -> Iterator[Path | None]:
 
 
 def sweep(but: Path) -> None:
-    """Remove old work, and what is too much, but for one folder."""
+    """Remove old work, and what is too much, but for one folder and those that other windows work in."""
     with suppress(OSError):
         others = sorted((f for f in _home().iterdir() if f.is_dir() and f != but), key=_changed, reverse=True)
         for place, folder in enumerate(others):
             if place >= MOST_FOLDERS - 1 or time.time() - _changed(folder) > MOST_DAYS * 86400:
-                forget(folder)
+                _forget_alone(folder)
+
+
+def _forget_alone(folder: Path) -> None:
+    """Forget work, unless another window is at it."""
+    with suppress(OutputError, OSError):
+        with held_alone(folder):
+            forget(folder)
+        folder.rmdir()  # what said who has it is gone
 
 
 def _changed(folder: Path) -> float:

@@ -101,6 +101,20 @@ def test_old_work_and_too_much_of_it_goes(photos, tmp_path):
     assert not unfinished.is_unfinished(sets[4]) and unfinished.is_unfinished(sets[3])
 
 
+def test_what_another_window_works_on_is_not_swept(photos, tmp_path):
+    """It may be the oldest of many: its steps are all that it has after a death."""
+    sets = [written(tmp_path / str(k), range(10 * k, 10 * k + 4)) for k in range(1, 6)]
+    at_work = began(sets[0])
+    with held_alone(at_work):
+        for some in (*sets[1:], photos):
+            began(some)
+            os.utime(at_work, (0, 0))
+        assert unfinished.is_unfinished(sets[0])
+    os.utime(at_work, (0, 0))
+    began(sets[1])
+    assert not at_work.exists()
+
+
 def test_the_window_s_job_keeps_its_work_and_forgets_it_when_it_is_cancelled(photos, monkeypatch):
     kept = []
 
