@@ -151,7 +151,7 @@ class ListParts(SceneErrand):
 def _divided(scene: "Scene", members: np.ndarray, kinds: np.ndarray, shares: "Tensor") -> np.ndarray:
     """(N,) numbers of parts, 0 of no member. shares: (V, N)."""
     import torch
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     from langflash_core.segments import connected_things
 
@@ -164,7 +164,7 @@ def _divided(scene: "Scene", members: np.ndarray, kinds: np.ndarray, shares: "Te
     rest = members & (numbers == 0)
     if rest.any():
         means, parted = np.nan_to_num(scene.gaussians.means.double().numpy()), np.flatnonzero(numbers)
-        numbers[rest] = numbers[parted[cKDTree(means[parted]).query(means[rest])[1]]]
+        numbers[rest] = numbers[parted[KDTree(means[parted]).query(means[rest])[1]]]
     return numbers
 
 

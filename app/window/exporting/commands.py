@@ -34,20 +34,21 @@ class ShowExport:
     what: Output | None = None
 
     def apply(self, state: State) -> State:
-        if state.scene.info is None:
+        info = state.scene.info
+        if info is None:
             text = "There is no scene to export; drop photos on the window first."
             return Notify(text).apply(state)
         wanted = self.what or (RGB if state.exporting.form.what in ROOM else state.exporting.form.what)
         state = EditForm(replace(state.exporting.form, what=wanted)).apply(state)
         form = state.exporting.form
         proposed = str(_place(state, form.what))
-        own = form.path not in ("", form.proposed) and form.serial == state.scene.info.serial
+        own = form.path not in ("", form.proposed) and form.serial == info.serial
         selected = form.only_selected and state.editing.num_selected > 0
         form = replace(
             form,
             path=form.path if own else proposed,
             proposed=proposed,
-            serial=state.scene.info.serial,
+            serial=info.serial,
             only_selected=selected,
         )
         return replace(state.with_exporting(form=form), dialog=Dialog.EXPORT)

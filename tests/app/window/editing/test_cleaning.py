@@ -67,13 +67,14 @@ def going(state: State) -> Mask:
 @pytest.mark.parametrize("recipe", RECIPES.values(), ids=RECIPES)
 @pytest.mark.parametrize("selecting", [False, True])
 def test_the_preview_is_what_the_command_takes(shown: State, recipe: Recipe, selecting: bool) -> None:
-    assert shown.scene.info is not None
+    info = shown.scene.info
+    assert info is not None
     within = Mask.first(COUNT, BLOCK) if selecting else None
     if within is not None:
         shown = after(shown, edit.Found(within, "replace", "here"), edit.FindFloaters())
     fields = ("strength", "kinds", "rules", "within", "invert", "crop")
     state = worked(after(shown, clean.ChangeRecipe({name: getattr(recipe, name) for name in fields})))
-    wanted = cleaned(shown.scene.info.scene, recipe, within=None if within is None else within.rows()).rows
+    wanted = cleaned(info.scene, recipe, within=None if within is None else within.rows()).rows
     assert np.array_equal(going(state).rows(), wanted)
     assert selecting or 0 < wanted.sum() < COUNT
 
