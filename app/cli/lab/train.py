@@ -123,6 +123,10 @@ def _late(args: Namespace, out: TextIO) -> None:
     folder = opened_folder(args)
     if not folder.labelled:
         raise InputError(f"{args.folder} has no names.csv, so its photos name nothing; give labelled ones")
+    if args.twice and not args.more:
+        raise InputError(
+            "--twice teaches with other sets of photos beside the labelled ones; name some with --more"
+        )
     more = [open_folder(place) for place in args.more]
     learned = chosen_ids(folder.ids, "train")
     kept = [id for id in folder.ids if id not in learned]
@@ -137,6 +141,7 @@ def _late(args: Namespace, out: TextIO) -> None:
             language_space(PRESETS[args.preset].space).encode,
             replace(_options(args, args.minutes), device=device),
             more=more,
+            twice=args.twice,
             preset=args.preset,
         )
         if leads():

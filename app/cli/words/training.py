@@ -236,6 +236,11 @@ def _add_late(actions) -> None:
         help="other photos, labelled, in part or not at all: learning goes on from what the weights have, "
         "and an average of the weights teaches what nobody labelled",
     )
+    late.add_argument(
+        "--twice",
+        action="store_true",
+        help="with --more: what the weights say of every photo mirrored and larger teaches them instead",
+    )
     add_output(late, "RUN", "folder of checkpoints and logs")
     late.add_argument("--minutes", required=True, type=minutes, metavar="M", help="of training")
     _add_loop(late)

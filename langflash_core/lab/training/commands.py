@@ -26,7 +26,7 @@ from langflash_core.lab.training.cache import (
 )
 from langflash_core.lab.training.dense import DenseSet
 from langflash_core.lab.training.frozen import FrozenSet
-from langflash_core.lab.training.further import Sets, judge_of, train_few
+from langflash_core.lab.training.further import Sets, judge_of, train_few, train_twice
 from langflash_core.lab.training.live import LivePhotos
 from langflash_core.lab.training.loop import LoopOptions, Validate, train_stage
 from langflash_core.lab.training.mixing import MixedSet
@@ -194,6 +194,7 @@ def run_late(
     options: LoopOptions,
     *,
     more: Sequence[PhotoFolder] = (),
+    twice: bool = False,
     preset: str = "mini",
 ) -> LoopState:
     """Train the late half, and the heads that read it, on labelled photos and the cached rooms.
@@ -201,7 +202,8 @@ def run_late(
     Args:
         ids: of the photos to learn from. kept: of those to judge by now and then. start: weights file that
             the run begins with. more: other sets, labelled, in part or not at all; with them the late half
-            goes on from what the weights have instead of beginning anew (`fewlabels`).
+            goes on from what the weights have instead of beginning anew (`fewlabels`). twice: what the
+            weights say of mirrored and larger photos teaches them (`twice`), instead of their average.
 
     Raises:
         InputError: no cache, or a photo cannot be used.
@@ -214,7 +216,8 @@ def run_late(
         if kept:
             judge = judge_of(photos, kept, encode, options.device)
         rooms.tokens = False  # of the frozen half alone, which is run with the other
-        return train_few(network, sets, rooms, phrase_table(folder, encode), run_dir, options, judge)
+        train = train_twice if twice else train_few
+        return train(network, sets, rooms, phrase_table(folder, encode), run_dir, options, judge)
     live = LivePhotos(photos, ids)
     words = Words(PhraseSampler(phrase_table(folder, encode)), torch.Generator().manual_seed(options.seed))
     targets = PhotoTargets.of(photos, live, encode)

@@ -173,7 +173,7 @@ def few_stage(bank: NameBank, weights: Weights | None = None) -> Stage:
 def _loss(network: GuidedDepthNet, batch: FewBatch, words: Words, bank: NameBank, counts: Weights) -> Loss:
     photos, generator = batch.told, words.generator
     tokens = network.encode(photos.relit, photos.Ks)
-    hidden = _read(network, thinned(tokens, HIDDEN, generator))
+    hidden = read(network, thinned(tokens, HIDDEN, generator))
     total, told = told_loss(hidden, network.language_head.out, photos, bank, counts.names, generator)
     known = (photos.depths > 0).flatten(1).any(1)
     if bool(known.any()) and counts.depth:
@@ -183,18 +183,25 @@ def _loss(network: GuidedDepthNet, batch: FewBatch, words: Words, bank: NameBank
         said, parts = _silent(network, batch.silent, bank, counts.names, generator)
         total, told = total + counts.silent * said, told | parts
     if batch.rooms is not None:
-        room = batch.rooms
-        own = SceneBatch(
-            room.images, room.depths, room.instances, room.viewmats, room.Ks,
-            network.encode(room.images, room.Ks), room.labels, room.seeds,
-        )  # fmt: skip
-        said, seen = language_stage(network, own, words), depth_stage(network, own, words)
-        total = total + counts.rooms * (said.total + counts.depth * seen.total)
-        told |= {"phrases": float(said.total.detach()), "room_depth": float(seen.total.detach())}
+        said, parts = room_loss(network, batch.rooms, words, counts.depth)
+        total, told = total + counts.rooms * said, told | parts
     return Loss(total, told)
 
 
-def _read(network: GuidedDepthNet, tokens: Tokens) -> Tensor:
+def room_loss(
+    network: GuidedDepthNet, room: SceneBatch, words: Words, depth: float = 1.0
+) -> tuple[Tensor, dict[str, float]]:
+    """Phrases and, times `depth`, depth of a rendered room, whose tokens are found anew."""
+    own = SceneBatch(
+        room.images, room.depths, room.instances, room.viewmats, room.Ks,
+        network.encode(room.images, room.Ks), room.labels, room.seeds,
+    )  # fmt: skip
+    said, seen = language_stage(network, own, words), depth_stage(network, own, words)
+    told = {"phrases": float(said.total.detach()), "room_depth": float(seen.total.detach())}
+    return said.total + depth * seen.total, told
+
+
+def read(network: GuidedDepthNet, tokens: Tokens) -> Tensor:
     """What the last layer reads, (B, h, w, F); photos teach nothing to the reader of the frozen half."""
     head = network.language_head
     with torch.no_grad():
@@ -209,7 +216,7 @@ def _depth(network: GuidedDepthNet, tokens: Tokens, Ks: Tensor, depths: Tensor) 
     return shape + 0.5 * slope + 0.05 * error_loss(logs, errors, depths)
 
 
-def _units(hidden: Tensor, out: nn.Conv2d, chosen: Tensor) -> Tensor:
+def units_at(hidden: Tensor, out: nn.Conv2d, chosen: Tensor) -> Tensor:
     """Unit vectors (P, C) of some pixels of `hidden` (B, h, w, F); the last layer is per pixel."""
     drawn = hidden.flatten(0, 2)[chosen.to(hidden.device)]
     return F.normalize(F.linear(drawn, out.weight[:, :, 0, 0], out.bias).float(), dim=-1)
@@ -230,10 +237,10 @@ def told_loss(
     names = nearest(photos.names, size).flatten().cpu()
     known = (classes >= 0).nonzero()[:, 0]
     drawn = known[torch.randperm(len(known), generator=generator)[:CLASS_PIXELS]]
-    by_class = class_loss(_units(hidden, out, drawn), classes[drawn], bank)
+    by_class = class_loss(units_at(hidden, out, drawn), classes[drawn], bank)
     chosen = evenly_drawn(names, NAME_PIXELS, generator)
     of_set = photos.sets[chosen.to(photos.sets.device) // (size[0] * size[1])]
-    by_name = name_loss(_units(hidden, out, chosen), names[chosen], of_set, bank)
+    by_name = name_loss(units_at(hidden, out, chosen), names[chosen], of_set, bank)
     told = {"classes": float(by_class.detach()), "names": float(by_name.detach())}
     return by_class + share * by_name, told
 
@@ -275,12 +282,12 @@ def _silent(
     drawn = torch.randperm(places.numel(), generator=generator)[:SILENT_PIXELS]
     origin = pasted(places, scaled(boxes, 4), other).flatten()[drawn]  # where the teacher saw the same
     with torch.no_grad():
-        vectors = _units(seen, teacher.out, origin)
+        vectors = units_at(seen, teacher.out, origin)
     known = nearest(photos.classes, size).flatten()[origin.to(photos.classes.device)]
     said = torch.where(known >= 0, known, teacher.surely(vectors, bank.classes.to(vectors)))
     sure = said >= 0
-    hidden = _read(network, thinned(network.encode(pictures, photos.Ks), HIDDEN, generator))
-    units = _units(hidden, out, drawn[sure.cpu()])
+    hidden = read(network, thinned(network.encode(pictures, photos.Ks), HIDDEN, generator))
+    units = units_at(hidden, out, drawn[sure.cpu()])
     by_class = class_loss(units, said[sure], bank)
     share = float(sure.float().mean())
     total = share * (by_class + ATTRACTION * _apart(units, vectors[sure]))
@@ -289,7 +296,7 @@ def _silent(
     chosen = evenly_drawn(rows, NAME_PIXELS, generator)
     if len(chosen):
         of_set = photos.sets[(origin[chosen] // (size[0] * size[1])).to(photos.sets.device)]
-        said = name_loss(_units(hidden, out, drawn[chosen]), rows[chosen], of_set, bank)
+        said = name_loss(units_at(hidden, out, drawn[chosen]), rows[chosen], of_set, bank)
         total, told = total + names * said, told | {"silent_names": float(said.detach())}
     return total, told
 

@@ -8,26 +8,28 @@ Sizes: B photos, H W pixels.
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import torch
 from torch import Tensor
 
 from langflash_core.lab.photos import PhotoFolder
-from langflash_core.lab.photos.fitting import FittedPhoto, drawn_window, fitted
+from langflash_core.lab.photos.fitting import Box, FittedPhoto, drawn_window, fitted
 from langflash_core.lab.photos.folder import LabelledPhoto
 from langflash_core.lab.training.bank import NameBank, NamedSet, Shown
 from langflash_core.lab.training.live import SIZES, relit, weathered
 
 RARER = 0.5
 """A photo is drawn by (how many photos show its rarest name)^-RARER."""
+LARGER = 17 / 14
+"""Sides of a larger picture, in whole patches, in shares of the drawn one's."""
 
 
 @dataclass(frozen=True)
 class DrawnPhotos:
     """images and relit (B, 1, 3, H, W) in [0, 1], own light and another; classes and names (B, H, W) rows of
     the bank, -1 = unknown; sets (B,): which set each is of; depths (B, H, W) metres, 0 = unknown; Ks
-    (B, 1, 3, 3); seeds (B): of the photos."""
+    (B, 1, 3, 3); seeds (B): of the photos; large and large_Ks: the same windows in more pixels, or None."""
 
     images: Tensor
     relit: Tensor
@@ -37,10 +39,13 @@ class DrawnPhotos:
     depths: Tensor
     Ks: Tensor
     seeds: tuple[str, ...] = ()
+    large: Tensor | None = None
+    large_Ks: Tensor | None = None
 
     def to(self, device: str | torch.device) -> "DrawnPhotos":
-        tensors = (getattr(self, field.name) for field in fields(self) if field.name != "seeds")
-        return DrawnPhotos(*(values.to(device) for values in tensors), seeds=self.seeds)
+        own = {field.name: getattr(self, field.name) for field in fields(self)}
+        moved = {name: values.to(device) for name, values in own.items() if isinstance(values, Tensor)}
+        return replace(self, **moved)
 
 
 @dataclass(frozen=True)
@@ -83,12 +88,13 @@ def _chances(shown: Sequence[Shown], count: int) -> Tensor:
 @dataclass(frozen=True)
 class PhotoPool:
     """Some of the sets that a bank knows. numbers: their places in it; strong: their other light is always
-    that of another camera, and they keep their own beside it."""
+    that of another camera, and they keep their own beside it; larger: larger pictures come with them."""
 
     sets: tuple[PhotoSet, ...]
     numbers: tuple[int, ...]
     bank: NameBank
     strong: bool = False
+    larger: bool = False
 
     def __len__(self) -> int:
         return sum(len(one.ids) for one in self.sets)
@@ -102,24 +108,44 @@ class PhotoPool:
         rows = [int(torch.multinomial(self.sets[s].chances, 1, generator=generator)) for s in drawn]
         seeds = torch.randint(2**31, (count,), generator=generator).tolist()
         photos = [self.sets[s].photo(row) for s, row in zip(drawn, rows, strict=True)]
-        views = [
-            fitted(photo, size, *drawn_window(photo, size, seed))
-            for photo, seed in zip(photos, seeds, strict=True)
-        ]
+        windows = [drawn_window(photo, size, seed) for photo, seed in zip(photos, seeds, strict=True)]
+        views = _through(photos, windows, size)
+        large = _through(photos, windows, larger(size)) if self.larger else []
         light: Callable = weathered if self.strong else relit
         other = torch.stack([light(view.rgb, generator) for view in views])[:, None].float() / 255
-        own = torch.stack([view.rgb for view in views])[:, None].float() / 255
         numbers = [self.numbers[s] for s in drawn]
         return DrawnPhotos(
-            own,
+            _pictures(views),
             other,
             _looked_up(views, [self.bank.class_of[n] for n in numbers]),
             _looked_up(views, [self.bank.name_of[n] for n in numbers]),
             torch.tensor(numbers),
             torch.stack([view.depths for view in views]),
-            torch.stack([view.K for view in views])[:, None],
+            _lenses(views),
             tuple(f"{self.sets[s].folder.root.name}/{p.id}" for s, p in zip(drawn, photos, strict=True)),
+            _pictures(large) if large else None,
+            _lenses(large) if large else None,
         )
+
+
+def larger(size: tuple[int, int]) -> tuple[int, int]:
+    """(width, height) of the larger picture, in whole patches of 14."""
+    width, height = (14 * round(LARGER * side / 14) for side in size)
+    return width, height
+
+
+def _through(
+    photos: Sequence[LabelledPhoto], windows: Sequence[tuple[Box, bool]], size: tuple[int, int]
+) -> list[FittedPhoto]:
+    return [fitted(photo, size, *window) for photo, window in zip(photos, windows, strict=True)]
+
+
+def _pictures(views: Sequence[FittedPhoto]) -> Tensor:
+    return torch.stack([view.rgb for view in views])[:, None].float() / 255
+
+
+def _lenses(views: Sequence[FittedPhoto]) -> Tensor:
+    return torch.stack([view.K for view in views])[:, None]
 
 
 def _looked_up(views: Sequence[FittedPhoto], tables: Sequence[Tensor]) -> Tensor:
