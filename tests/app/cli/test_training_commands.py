@@ -222,6 +222,9 @@ def test_the_late_half_goes_on_with_other_photos(run, checkpoint, photos, tmp_pa
     outcome = run("train", "late", tmp_path / "cache", *words, *where)
     assert outcome.code == 0 and "1 steps" in outcome.out, outcome.err
     assert {path.name for path in (tmp_path / "run").glob("*.pt")} == {"late.pt", "late_few.pt"}
+    where = ("-o", tmp_path / "twice", "--start", checkpoint)
+    assert run("train", "late", tmp_path / "cache", *words, *where, "--twice").code == 0
+    assert {path.name for path in (tmp_path / "twice").glob("*.pt")} == {"late.pt", "late_twice.pt"}
     words = ("--photos", photos, "--more", tmp_path / "gone", "--minutes", "5")
     assert "gone/images" in run("train", "late", tmp_path / "cache", *words, *where).err
 
@@ -361,6 +364,10 @@ def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_pat
         (
             ["train", "late", ".", "--photos", "PHOTOS", "-o", "out", "--minutes", "1"],
             "langflash train cache",
+        ),
+        (
+            ["train", "late", ".", "--photos", "PHOTOS", "-o", "out", "--minutes", "1", "--twice"],
+            "name some with --more",
         ),
         (["train", "photos", "nyu", "gone", "-o", "out"], "there is no gone"),
         (["train", "photos", "voc", "gone", "-o", "out"], "invalid choice"),

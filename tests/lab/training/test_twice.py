@@ -80,10 +80,10 @@ def test_a_copy_says_the_mean_of_what_it_sees_mirrored_and_larger(sets, network)
 
 
 def test_a_copy_stays_what_it_was(network):
-    copy, bias = Copy(network), network.language_head.out.bias
+    copy, bias = Copy(network), network.language_head.get_parameter("out.bias")
     with torch.no_grad():
         bias += 1
-    assert torch.allclose(copy.head.out.bias + 1, bias)
+    assert torch.allclose(copy.head.get_parameter("out.bias") + 1, bias)
     assert not any(value.requires_grad for value in copy.late.parameters())
 
 
