@@ -100,11 +100,12 @@ def registered(
         rounds = zip(_ROUNDS, (coarse, fine), strict=True) if len(others) > 1 else [(1, fine)]
         for partners, pictures in rounds:
             target, weight = torch.zeros(2, *cells)
-            surface = pictures.surface(view, own)
+            depths = F.interpolate(own[None, None], size=pictures.size, mode="bilinear")[0, 0]
+            texture = _texture(pictures.greys[view])
             for other in others[:partners]:
                 check()
                 pose = (viewmats[other] @ invert_rigid(viewmats[view])).cpu()
-                change, counts = pictures.compared(view, other, surface, pose, many)
+                change, counts = pictures.compared(view, other, depths, texture, pose, many)
                 target += _cells(counts * change, cells)
                 weight += _cells(counts, cells)
             own = own + _smooth(target, weight, own)
@@ -112,17 +113,6 @@ def registered(
 
     found = [each(view, partial(corrected, view)) for view in range(len(logs))]
     return DepthMaps(torch.stack(found), maps.log_errors)
-
-
-@dataclass(frozen=True)
-class _Surface:
-    """What every comparison of a view asks for: log depths (h, w), 1 / depth (h, w), points (3, h w) in the
-    camera's frame, structure tensor (3, h, w)."""
-
-    log_depths: Tensor
-    inverse: Tensor
-    points: Tensor
-    texture: Tensor
 
 
 @dataclass(frozen=True)
@@ -145,21 +135,16 @@ class _Pictures:
     def size(self) -> tuple[int, int]:
         return self.greys[0].shape[0], self.greys[0].shape[1]
 
-    def surface(self, view: int, log_depths: Tensor) -> _Surface:
-        """Of a view, from its map (H, W)."""
-        logs = F.interpolate(log_depths[None, None], size=self.size, mode="bilinear")[0, 0]
-        points = unproject(logs.exp(), self.Ks[view]).flatten(0, 1).T.contiguous()
-        return _Surface(logs, (-logs).exp(), points, _texture(self.greys[view]))
-
     def compared(
-        self, view: int, other: int, surface: _Surface, pose: Tensor, many: bool
+        self, view: int, other: int, depths: Tensor, texture: Tensor, pose: Tensor, many: bool
     ) -> tuple[Tensor, Tensor]:
-        """Changes of log depth (h, w) that another photo asks for, and what each counts."""
-        matches = _matched(surface.points, self.greys[view], self.greys[other], self.Ks[other], pose)
-        change, moves = _triangulated(surface, matches, self.Ks[view], self.Ks[other], pose)
+        """Changes of log depth (h, w) that another photo asks for, and what each counts; depths: log, (h,
+        w)."""
+        matches = _matched(depths, self.greys[view], self.greys[other], self.Ks[view], self.Ks[other], pose)
+        change, moves = _triangulated(depths, matches, self.Ks[view], self.Ks[other], pose)
         # `norm` over rows takes thirty times as long; of few photos it stays, to the last bit.
         length = (moves * moves).sum(0).sqrt() if many else moves.norm(dim=0)
-        known = _known_along(surface.texture, moves / length.clamp_min(1e-9))
+        known = _known_along(texture, moves / length.clamp_min(1e-9))
         return change, torch.from_numpy(matches.sure) * known * (length / _FLOW_ERROR) ** 2 / _ONE_SHIFT
 
 
@@ -172,8 +157,11 @@ def _cells(values: Tensor, size: tuple[int, int]) -> Tensor:
     return F.adaptive_avg_pool2d(values[None, None], size)[0, 0]
 
 
-def _matched(points: Tensor, grey: np.ndarray, other: np.ndarray, other_K: Tensor, pose: Tensor) -> _Matches:
-    height, width = grey.shape
+def _matched(
+    log_depths: Tensor, grey: np.ndarray, other: np.ndarray, K: Tensor, other_K: Tensor, pose: Tensor
+) -> _Matches:
+    height, width = log_depths.shape
+    points = unproject(log_depths.exp(), K).flatten(0, 1).T
     x, y, z = (along.view(height, width).numpy() for along in pictured(pose, other_K, points))
     seen = (z > 0) & (x > _MARGIN) & (y > _MARGIN) & (x < width - _MARGIN) & (y < height - _MARGIN)
     x, y = (np.where(seen, along, -1e4).astype(np.float32) for along in (x, y))
@@ -223,7 +211,7 @@ def _known_along(texture: Tensor, way: Tensor) -> Tensor:
 
 
 def _triangulated(
-    surface: _Surface, matches: _Matches, K: Tensor, other_K: Tensor, pose: Tensor
+    log_depths: Tensor, matches: _Matches, K: Tensor, other_K: Tensor, pose: Tensor
 ) -> tuple[Tensor, Tensor]:
     """Changes of log depth (h, w) that bring each pixel nearest to its match, and pixels (2, h, w) that the
     match moves for one unit nearer; 0 both where no depth does.
@@ -231,29 +219,21 @@ def _triangulated(
     With the ray a and the shift t in the other's frame, a point at inverse depth r is seen at a + r t: of
     each coordinate q, (q a_z - a_x) = r (t_x - q t_z), solved for r by least squares over both.
     """
-    ray = _turned_rays(surface.log_depths.shape, K, pose)
+    ray = unproject(torch.ones_like(log_depths), K) @ pose[:3, :3].T
     q = [
         (torch.from_numpy(along).float() - other_K[i, 2]) / other_K[i, i]
         for i, along in enumerate((matches.x, matches.y))
     ]
-    known = [q[i] * ray[2] - ray[i] for i in (0, 1)]
+    known = [q[i] * ray[..., 2] - ray[..., i] for i in (0, 1)]
     moving = [pose[i, 3] - q[i] * pose[2, 3] for i in (0, 1)]
     square = moving[0] ** 2 + moving[1] ** 2
     inverse = (known[0] * moving[0] + known[1] * moving[1]) / square.clamp_min(1e-12)
-    ahead = ray[2] + pose[2, 3] * inverse
+    ahead = ray[..., 2] + pose[2, 3] * inverse
     usable = (inverse > 1e-6) & (ahead > 1e-3) & (square > 1e-12)
-    change = (-inverse.clamp_min(1e-6).log() - surface.log_depths).clamp(-_FARTHEST, _FARTHEST)
-    pace = torch.where(usable, surface.inverse / ahead.clamp_min(1e-3) * other_K[0, 0], 0.0)
+    change = (-inverse.clamp_min(1e-6).log() - log_depths).clamp(-_FARTHEST, _FARTHEST)
+    pace = torch.where(usable, (-log_depths).exp() / ahead.clamp_min(1e-3) * other_K[0, 0], 0.0)
     moves = torch.stack(moving) * pace
     return torch.where(usable, change, 0.0).nan_to_num(), moves.nan_to_num()
-
-
-def _turned_rays(size: torch.Size, K: Tensor, pose: Tensor) -> list[Tensor]:
-    """x, y, z (h, w) of a picture's rays in another camera's frame: a sum of a row, a column and a number
-    each, which is no product of matrices for every pixel."""
-    x = (torch.arange(size[1]) + 0.5 - K[0, 2]) / K[0, 0]
-    y = (torch.arange(size[0]) + 0.5 - K[1, 2]) / K[1, 1]
-    return [row[0] * x + (row[1] * y + row[2])[:, None] for row in pose[:3, :3]]
 
 
 def _smooth(target: Tensor, weight: Tensor, log_depths: Tensor) -> Tensor:
