@@ -22,7 +22,7 @@ _POPUP = "places"
 _WIDTH, _HEIGHT = 380.0, 300.0  # of the map at most, design pixels
 _SHARE = 0.5  # of the window's height, that the map takes at most
 _DOT, _WAY, _NEAR = 4.5, 15.0, 13.0
-_SMALL = 200.0  # wide is the photo under the pointer
+_SMALL, _BESIDE = 200.0, 22.0  # wide is the photo under the pointer; from the map
 _LINES = 6  # of sentences below the map
 _NAMED = 6  # photos that could not be placed
 
@@ -102,7 +102,7 @@ def _map(state: State, info: SceneInfo, above: Above, extent: ImVec2, look: Look
     canvas.pop_clip_rect()
     if over is None:
         return []
-    _under_pointer(info, over, look)
+    _under_pointer(info, over, corner, look)
     return [camera.JumpTo(over)] if pressed else []
 
 
@@ -138,9 +138,12 @@ def _photo(
     canvas.add_circle(ImVec2(x, y), look.px(_DOT + 1), widgets.u32(ring), 0, look.px(1.5))
 
 
-def _under_pointer(info: SceneInfo, view: int, look: Look) -> None:
-    """The photo itself, its name, and what of it is left out."""
+def _under_pointer(info: SceneInfo, view: int, corner: ImVec2, look: Look) -> None:
+    """The photo itself, its name, and what of it is left out; beside the map, where there is room."""
     imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
+    if corner.x > look.px(_SMALL + 3 * _BESIDE):
+        beside = ImVec2(corner.x - look.px(_BESIDE), corner.y)
+        imgui.set_next_window_pos(beside, imgui.Cond_.always, ImVec2(1, 0))
     if not imgui.begin_tooltip():
         return
     picture = look.thumbnails.get(f"view {view}")

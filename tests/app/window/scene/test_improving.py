@@ -19,7 +19,7 @@ from langflash_core.types import Scene
 from tests.app.window.editing.test_mending import Desk
 from tests.splat.test_refine import wall
 
-STEPS = 24
+STEPS = 8
 
 
 def photographed(photos: Tensor | None = None) -> Scene:
@@ -73,7 +73,7 @@ def test_a_better_scene_takes_the_place_and_the_one_before_is_a_room(folders) ->
     desk.perform(Improve())  # once is enough
     (job,) = [each for each in desk.asked if isinstance(each, ImproveScene)]
     desk.asked.clear()
-    desk.perform(replace(job, seconds=2.0).run(8, lambda *_: None, lambda: False))
+    desk.perform(replace(job, seconds=1.0).run(8, lambda *_: None, lambda: False))
     scene = desk.state.scene
     assert scene.info is not None and scene.job is None
     assert scene.info.name == "wall (improved)" and scene.info.path is None
@@ -83,11 +83,11 @@ def test_a_better_scene_takes_the_place_and_the_one_before_is_a_room(folders) ->
 
 
 def test_where_nothing_is_gained_the_scene_stays(folders) -> None:
-    desk = desk_with(photographed(wall()[1].flip(-1)))
+    desk = desk_with(photographed())
     before = desk.state.scene.info
     desk.perform(Improve())
     assert before is not None
-    said = replace(ImproveScene(before), seconds=0.5).run(8, lambda *_: None, lambda: False)
+    said = replace(ImproveScene(before), seconds=1e-6).run(8, lambda *_: None, lambda: False)
     desk.perform(said)
     assert desk.state.scene.info is before and desk.state.scene.job is None
     assert "stays as it is" in desk.state.toasts[-1].text
