@@ -202,4 +202,4 @@ def test_a_count_of_thousands_of_digits_is_refused_in_a_sentence(tmp_path):
         b"ply\nformat binary_little_endian 1.0\nelement vertex " + b"9" * 5000 + b"\nend_header\n"
     )
     with pytest.raises(SceneFileError, match="has a header line 'element vertex 999"):
-        read_any_ply(path)
+        read(path)
