@@ -14,7 +14,7 @@ from tests.tools.same import ALIKE, ALONE, DIFFERENT, SAME, compared
 
 def npz(**arrays: np.ndarray) -> bytes:
     stream = io.BytesIO()
-    np.savez(stream, **arrays)
+    np.savez(stream, allow_pickle=False, **arrays)
     return stream.getvalue()
 
 
