@@ -160,6 +160,7 @@ def read_elements(stream: BinaryIO, name: str) -> tuple[str, list["_Element"], i
     return *_elements(lines, name), ended.end(), _OWN.encode() in head[: ended.start()]
 
 
+_DIGITS = 18  # of a count; int() itself refuses some thousand with an error of its own
 _Element = tuple[str, int, list[tuple[str, str]]]
 
 
@@ -172,7 +173,7 @@ def _elements(lines: list[list[str]], name: str) -> tuple[str, list[_Element]]:
                 raise SceneFileError(f"{name} is an ascii PLY, this program reads binary ones; {_REMEDY}")
             case ["format", kind, *_] if kind in _ORDERS:
                 order = _ORDERS[kind]
-            case ["element", element, count] if count.isdecimal():
+            case ["element", element, count] if count.isdecimal() and len(count) <= _DIGITS:
                 elements.append((element, int(count), []))
             case ["property", "list", *_, field] if elements:
                 elements[-1][2].append(("list", field))

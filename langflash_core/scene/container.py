@@ -176,10 +176,13 @@ def _check_counts(path: Path, header: dict) -> None:
         limit.check(count, path.name, SceneFileError)
 
 
+_DIGITS = 9  # of a version; int() itself refuses some thousand with an error of its own
+
+
 def _version(path: Path, header: dict[str, str]) -> int:
     version = header.get("version", "")
-    if not version.isdecimal() or int(version) < 1:
-        raise SceneFileError(f"{path.name} is damaged: its version reads {version!r}; {_REMEDY}")
+    if not version.isdecimal() or len(version) > _DIGITS or int(version) < 1:
+        raise SceneFileError(f"{path.name} is damaged: its version reads {version[:60]!r}; {_REMEDY}")
     if int(version) > VERSION:
         raise SceneFileError(
             f"{path.name} is a scene of format {version}, this program reads format {VERSION}; "

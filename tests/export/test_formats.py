@@ -36,7 +36,7 @@ class Kept:
 
     means: float = 0.0
     angle: float = 1e-3  # float32: acos of a dot product
-    scales: float = 1e-6
+    scales: float = 2e-6  # logarithms in float32, as `test_ply.py` allows
     opacities: float = 1e-6
     colours: float = 1e-6  # of 0.5 + SH_C0 f_dc
     rest: float = 0.0
@@ -44,6 +44,7 @@ class Kept:
     colour_range: tuple[float, float] = (-1e9, 1e9)
     rest_range: tuple[float, float] = (-1e9, 1e9)
     along_a_curve: bool = False
+    degree: int = 3  # of harmonics, at most
 
 
 # Three entries within e = 1 / 1022 / sqrt(2) of themselves and, at worst, of four equal ones, the fourth
@@ -102,7 +103,7 @@ def bounds(kind: str, gaussians: Gaussians) -> Kept:
             along_a_curve=True,
         )
     if kind == ".splat":
-        return Kept(angle=0.04, opacities=HALF, colours=HALF, colour_range=(0, 1))
+        return Kept(angle=0.04, opacities=HALF, colours=HALF, colour_range=(0, 1), degree=0)
     return Kept()
 
 
@@ -123,12 +124,11 @@ def compare(kind: str, before: Gaussians, after: Gaussians) -> None:
     assert float((after.opacities - before.opacities).abs().max()) <= kept.opacities
     shown = (0.5 + SH_C0 * before.sh[:, 0]).clamp(*kept.colour_range)
     assert float((0.5 + SH_C0 * after.sh[:, 0] - shown).abs().max()) <= kept.colours
-    if kind != ".splat":
-        num_bases = min(before.sh.shape[1], 16)
-        assert after.sh.shape == (len(before), num_bases, 3)
-        if num_bases > 1:
-            rest = before.sh[:, 1:num_bases].clamp(*kept.rest_range)
-            assert float((after.sh[:, 1:] - rest).abs().max()) <= kept.rest
+    num_bases = min(before.sh.shape[1], (kept.degree + 1) ** 2)
+    assert after.sh.shape == (len(before), num_bases, 3)
+    if num_bases > 1:
+        rest = before.sh[:, 1:num_bases].clamp(*kept.rest_range)
+        assert float((after.sh[:, 1:] - rest).abs().max()) <= kept.rest
 
 
 @dataclass(frozen=True)

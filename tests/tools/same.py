@@ -34,8 +34,10 @@ FLEETING = (
     "file_bytes",
 )
 """Keys whose values no two runs have in common."""
-SAME, FLEETING_ONLY, DIFFERENT, ONE_SIDE = "same bytes", "same but for times", "different", "in one alone"
-_VERDICTS = (SAME, FLEETING_ONLY, DIFFERENT, ONE_SIDE)
+SAME, ALIKE, DIFFERENT, ALONE = "same bytes", "same but for times", "different", "in one alone"
+PACKING = "packing"
+"""All values are the same, in another order, or under another date: safetensors and zip write such."""
+_VERDICTS = (SAME, ALIKE, DIFFERENT, ALONE)
 _MAKER = Path(__file__).with_name("made.py")
 
 
@@ -56,19 +58,18 @@ def compared(old: Path, new: Path) -> Iterator[tuple[str, str, str]]:
     files = [{str(p.relative_to(top)): p for p in top.rglob("*") if p.is_file()} for top in (old, new)]
     for name in sorted(files[0].keys() | files[1].keys()):
         if not (name in files[0] and name in files[1]):
-            yield name, ONE_SIDE, "old" if name in files[0] else "new"
+            yield name, ALONE, "old" if name in files[0] else "new"
             continue
         first, second = files[0][name].read_bytes(), files[1][name].read_bytes()
         if first == second:
             yield name, SAME, ""
             continue
         found = list(differences(name, first, second))
-        fleeting = all(_fleeting(each) for each in found)
-        yield name, FLEETING_ONLY if fleeting else DIFFERENT, "; ".join(found)
+        yield name, ALIKE if all(_fleeting(each) for each in found) else DIFFERENT, "; ".join(found)
 
 
 def _fleeting(difference: str) -> bool:
-    return any(part in FLEETING for part in difference.split(" ")[0].split("."))
+    return any(part in (PACKING, *FLEETING) for part in difference.split(" ")[0].split("."))
 
 
 def differences(name: str, first: bytes, second: bytes) -> Iterator[str]:
@@ -79,7 +80,7 @@ def differences(name: str, first: bytes, second: bytes) -> Iterator[str]:
         return
     before, after = reader(first), reader(second)
     found = list(_of_values("", before, after))
-    yield from found or [f"packing alone ({_of_bytes(first, second)})"]
+    yield from found or [f"{PACKING} {_of_bytes(first, second)}"]
 
 
 def _of_bytes(first: bytes, second: bytes) -> str:
@@ -154,6 +155,19 @@ def _plain(text: str) -> Any:
         return text
 
 
+def _glb(stored: bytes) -> dict:
+    """Each part of its buffer by itself; the language of a scene is a safetensors file in it."""
+    size = int.from_bytes(stored[12:16], "little")
+    said, body = json.loads(stored[20 : 20 + size]), stored[28 + size :]
+    parts: dict[str, Any] = {}
+    for number, view in enumerate(said.get("bufferViews", ())):
+        begin = view.get("byteOffset", 0)
+        part = body[begin : begin + view["byteLength"]]
+        named = part[8:9] == b"{" and b"__metadata__" in part[:64]
+        parts[str(number)] = _safetensors(part) if named else np.frombuffer(part, np.uint8)
+    return {"said": said, "parts": parts}
+
+
 def _zip(stored: bytes) -> dict:
     with zipfile.ZipFile(io.BytesIO(stored)) as archive:
         return {name: np.frombuffer(archive.read(name), np.uint8) for name in archive.namelist()}
@@ -161,7 +175,7 @@ def _zip(stored: bytes) -> dict:
 
 _READERS: dict[str, Callable[[bytes], Any]] = {
     ".json": _json, ".npz": _npz, ".npy": _npy, ".png": _picture, ".langflash": _safetensors,
-    ".safetensors": _safetensors, ".sog": _zip, ".usdz": _zip,
+    ".safetensors": _safetensors, ".sog": _zip, ".usdz": _zip, ".glb": _glb,
 }  # fmt: skip
 
 
@@ -183,7 +197,7 @@ def main() -> int:
         counts = Counter(verdict for _, verdict, _ in rows)
         table.append(f"| {way} | {len(rows)} | " + " | ".join(str(counts[v]) for v in _VERDICTS) + " |")
         for name, verdict, what in rows:
-            if verdict not in (SAME, FLEETING_ONLY):
+            if verdict not in (SAME, ALIKE):
                 sys.stdout.write(f"{way} {name}: {verdict}: {what[:400]}\n")
     heads = ["way", "files", *_VERDICTS]
     sys.stdout.write("\n".join([f"| {' | '.join(heads)} |", "|---" * len(heads) + "|", *table]) + "\n")
