@@ -63,8 +63,6 @@ _STEP = 0.5 / 255  # to which the photo is rounded there
 _OF_VIEWS = 0.75  # of the time, for which contributions are listed
 _SEEN = 0.05  # contributions of a Gaussian over all pixels, below which its colour stays
 _PROBE = 8  # of rows of pixels, by one of which a group is judged after others came
-_LEAVING, _AFTERWARDS = 2, 4
-"""How often what hinders is left out, and rounds after each time."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +98,7 @@ def solved_colours(
         owners: (N,) int64, the view that made each Gaussian; None: every photo speaks in all its pixels.
         ringing: how far colours may leave what the photos show around a Gaussian, in parts of how much that
             differs; None: within [0, 1], as far as they like.
-        leave_out: Gaussians that hinder may be found and left out.
+        leave_out: Gaussians that hinder are found, after half of the rounds, and left out.
         progress: called with the share that is done, before every view and every round; what it raises ends
             the work there.
 
@@ -122,8 +120,7 @@ def solved_colours(
     hinders, tally = np.zeros(len(first), bool), Tally.of(len(first))
     for begin, end in pairwise(bounds):
         told = _within(progress, begin / len(photos), (end - begin) / len(photos))
-        leaving = _LEAVING if leave_out and len(bounds) == 2 else 0
-        group = _Group(len(first), told, rounds + leaving * _AFTERWARDS)
+        group = _Group(len(first), told, rounds)
         for view in range(begin, end):
             told(_OF_VIEWS * (view - begin) / (end - begin))
             rows = packs.before(cameras[view])
@@ -135,11 +132,12 @@ def solved_colours(
             if len(photos) > _MANY:
                 give_back()  # each view leaves holes of other sizes
         before += [view.error(first) for view in group.views]
-        found = group.solved(answer.colours, rounds, ringing)
-        for _ in range(leaving):
-            hinders |= group.leave(found)
-            found = group.solved(found, _AFTERWARDS, ringing)
-        if leave_out and len(bounds) > 2:
+        judged = leave_out and len(bounds) == 2
+        found = group.solved(answer.colours, rounds - rounds // 2 if judged else rounds, ringing)
+        if judged:
+            hinders = group.leave(found)
+            found = group.solved(found, rounds // 2, ringing)
+        elif leave_out:
             group.tell(tally, found)
         answer.take(found, group.total)
         probes += group.views if len(bounds) == 2 else [view.every(_PROBE) for view in group.views]

@@ -67,14 +67,15 @@ def test_pixels_that_are_not_shown_say_nothing():
     pairs = pairs_of(gaussians, seen)
     assert np.abs(pairs.gains(colours, photo, np.zeros(480, bool))).max() == 0
     tally = Tally.of(50)
-    tally.take(pairs, np.arange(40) + 10, colours, photo, np.ones(480, bool))
-    assert not tally.hindering.any() and (tally.gains > 0).any(), "one view alone lets nothing go"
+    for _ in range(3):
+        tally.take(pairs, np.arange(40) + 10, colours, photo, np.ones(480, bool))
+    assert not tally.hindering.any() and (tally.gains > 0).any(), "three views let nothing go"
     tally.take(pairs, np.arange(40) + 10, colours, photo, np.ones(480, bool))
     assert tally.hindering.any() and not tally.hindering[:10].any()
 
 
 def wall_and_floaters() -> tuple[Gaussians, Tensor, list[Camera], list[Tensor]]:
-    """A wall of two colours, five cameras before it, its pictures there; and six Gaussians that hang before
+    """A wall of two colours, eight cameras before it, its pictures there; and six Gaussians that hang before
     it in the colour that the wall has behind them for the first camera."""
     side = torch.linspace(-0.9, 0.9, 40).tolist()
     places = [(x, y, 2.0) for y in side for x in side]
@@ -84,7 +85,7 @@ def wall_and_floaters() -> tuple[Gaussians, Tensor, list[Camera], list[Tensor]]:
     colours = torch.where(
         across[:, None] > -0.05, torch.tensor([0.9, 0.2, 0.1]), torch.tensor([0.1, 0.3, 0.9])
     )
-    cameras = [camera(pose=turned(0.0, (-0.25 * k, 0.0, 0.0))) for k in range(5)]
+    cameras = [camera(pose=turned(0.0, (0.12 * k, 0.0, 0.0))) for k in range(8)]
     wall = gaussians.rows(torch.arange(len(gaussians)) < len(places))
     photos = [
         rasterize(wall.map(lambda v: v.double()), colours[: len(wall)].double(), seen)[0]
@@ -107,14 +108,14 @@ def test_what_hangs_before_what_others_show_is_found():
     before = solved_colours(gaussians, colours, cameras, photos)
     assert not bool(before.hinders.any())
     assert np.mean(solved.psnr, 0)[1] > np.mean(before.psnr, 0)[1]
-    assert told == sorted(told) and len(told) > 5 + ROUNDS
+    assert told == sorted(told) and len(told) == 8 + ROUNDS
 
 
 def test_of_many_photos_too(monkeypatch):
     """Photos in groups: all of them judge."""
     gaussians, colours, cameras, photos = wall_and_floaters()
     together = solved_colours(gaussians, colours, cameras, photos, leave_out=True)
-    monkeypatch.setattr("langflash_core.splat.colours.TOGETHER", 3)
+    monkeypatch.setattr("langflash_core.splat.colours.TOGETHER", 4)
     apart = solved_colours(gaussians, colours, cameras, photos, leave_out=True)
     assert bool((apart.hinders & together.hinders).any())
     assert apart.hinders[:1600].float().mean() < 0.01
