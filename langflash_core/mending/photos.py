@@ -44,7 +44,7 @@ def painted_over(scene: Scene, view: int, mask: Bool[np.ndarray, "H W"], render:
     Raises:
         SceneFileError: the photo cannot be read.
     """
-    photo = decoded(scene, view)
+    photo = _decoded(scene.photos[view], view)
     height, width = photo.shape[:2]
     covered = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
     covered = cv2.GaussianBlur((covered > 0).astype(np.float32), (0, 0), width / mask.shape[1]) > _ROUNDED
@@ -64,7 +64,7 @@ def not_in_scene(scene: Scene, view: int, render: Render) -> Bool[np.ndarray, "H
         SceneFileError: the photo cannot be read.
     """
     width, height = scene.view_size
-    photo = cv2.resize(decoded(scene, view), (width, height), interpolation=cv2.INTER_AREA)
+    photo = cv2.resize(_decoded(scene.photos[view], view), (width, height), interpolation=cv2.INTER_AREA)
     shown = _in_its_light(_shown(render(scene, scene.camera(view), weight_maps=False)), scene, view)
     apart = abs(photo.astype(np.float32) - shown.astype(np.float32)).mean(-1) / 255
     return cv2.blur(apart, (_PATCH, _PATCH)) > _STRANGE
@@ -77,18 +77,12 @@ def with_photos(scene: Scene, photos: dict[int, bytes]) -> Scene:
 
 def without_photos(scene: Scene) -> Scene:
     """The scene without photos and their names."""
-    shares = {name: told for name, told in scene.record.left_out.items() if name == "shares"}
-    return replace(scene, photos=()).with_record(photos=(), left_out=shares)
+    return replace(scene, photos=()).with_record(photos=())
 
 
-def decoded(scene: Scene, view: int) -> UInt8[np.ndarray, "h w 3"]:
-    """A photo inside a scene, upright.
-
-    Raises:
-        SceneFileError: it cannot be read.
-    """
+def _decoded(photo: bytes, view: int) -> UInt8[np.ndarray, "h w 3"]:
     try:
-        with opened_picture(scene.photos[view], STORED) as opened:
+        with opened_picture(photo, STORED) as opened:
             return np.asarray(opened.convert("RGB"))
     except (OSError, SyntaxError, ValueError) as error:
         raise SceneFileError(

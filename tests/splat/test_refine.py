@@ -40,7 +40,7 @@ TRUE = _twisted(
 WRONG = _twisted(TRUE, [[0.0] * 6, [0.006, 0, 0.004, 0, 0.01, 0], [0, 0.008, 0, 0.01, 0, 0]])
 
 
-def wall(noise: float = 0.1, placed: Tensor = WRONG) -> tuple[Scene, Tensor]:
+def _wall(noise: float = 0.1, placed: Tensor = WRONG) -> tuple[Scene, Tensor]:
     """What a network might hand over: poses half a degree off, colours off by a tenth; and the photos.
 
     `placed`: the poses from which the Gaussians were put on the wall.
@@ -73,7 +73,7 @@ def wall(noise: float = 0.1, placed: Tensor = WRONG) -> tuple[Scene, Tensor]:
 
 
 def test_a_held_out_view_and_the_poses_come_closer():
-    scene, photos = wall()
+    scene, photos = _wall()
     told: list[float] = []
     found = refine(scene, photos, Budget(seconds=600, steps=50), lambda _, fraction: told.append(fraction))
     assert found.kept and found.view == 1 and found.steps == (25, 25)
@@ -99,7 +99,7 @@ def test_poses_come_closer(monkeypatch):
     """Only cameras move: pictures drawn from the true ones are met again where they were taken."""
     for name in RATES:
         monkeypatch.setitem(RATES, name, 2e-3 if name == "twists" else 0.0)
-    scene, _ = wall(noise=0.0, placed=TRUE)
+    scene, _ = _wall(noise=0.0, placed=TRUE)
     there = replace(scene, viewmats=TRUE)
     photos = torch.stack([render(there, there.camera(v)).rgb for v in range(3)]).movedim(-1, 1)
     far = _twisted(TRUE, [[0.0] * 6, [0.012, 0, 0.008, 0, 0.02, 0], [0, 0.016, 0, 0.02, 0, 0]])
@@ -110,7 +110,7 @@ def test_poses_come_closer(monkeypatch):
 
 def test_what_does_not_help_is_not_kept():
     """Photos of something else around an honest held-out one: fitting them moves away from it."""
-    scene, photos = wall()
+    scene, photos = _wall()
     misleading = torch.rand(photos.shape)
     misleading[1] = photos[1]
     found = refine(scene, misleading, Budget(seconds=600, steps=12))
@@ -120,12 +120,12 @@ def test_what_does_not_help_is_not_kept():
 
 
 def test_the_clock_ends_it():
-    scene, photos = wall()
+    scene, photos = _wall()
     assert refine(scene, photos, Budget(seconds=1e-6)).steps == (0, 0)
 
 
 def test_what_cannot_be_judged_is_said():
-    scene, photos = wall()
+    scene, photos = _wall()
     one = replace(scene, viewmats=scene.viewmats[:1], Ks=scene.Ks[:1], view_ids=None)
     with pytest.raises(InputError, match="at least two"):
         refine(one, photos[:1], Budget(1))

@@ -30,7 +30,6 @@ from ..opening import commands as opening
 from ..recovery import commands as keep
 from ..scene import camera, samples
 from ..scene import commands as show
-from ..scene.improving import Improve, can_improve
 from ..scene.panels import in_space
 from ..scene.standing import LevelScene
 from ..scene.state import possible
@@ -149,7 +148,6 @@ def _files() -> Iterable[Entry]:
     yield Entry("Merge a scene into this one ...", group, merging, _ctrl("m"), fa.ICON_FA_OBJECT_GROUP)
     reconstruct = show.Instead((show.Reconstruct(),))
     yield Entry("Reconstruct the photos", group, lambda s: reconstruct if s.scene.photos else None)
-    yield Entry("Improve the scene", group, lambda s: Improve() if can_improve(s) else None)
     yield Entry("Back to the room before", group, _room_before)
     yield Entry("Pause the reconstruction", group, _pause)
     yield Entry("Cancel the reconstruction", group, lambda s: show.CancelJob() if s.scene.job else None)

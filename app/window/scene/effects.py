@@ -43,7 +43,6 @@ from .commands import (
     dropped,
 )
 from .drops import sort_drop
-from .improving import Improve, Improved, ImproveScene, can_improve
 from .standing import LevelScene
 from .state import WHOLE, WHOLE_PHOTOS, SceneInfo
 from .unfinished import FEWEST
@@ -109,7 +108,6 @@ class SceneEffects(Effects):
             case Loaded() if state.scene.info is None and self._viewport.warm():
                 self._hands.dispatch(Loaded())
             case _:
-                self._improve(command, before, state)
                 self._go_on(command, before, state)
         self._look_for_work(before, state)
         self._show_whole(before, state)
@@ -120,14 +118,6 @@ class SceneEffects(Effects):
         job = before.scene.job
         if isinstance(command, CancelJob) and job is not None and job.pausable:
             self._hands.submit(DropWork(_paths(before)))
-
-    def _improve(self, command: Command, before: State, state: State) -> None:
-        """A scene that is to come closer to its photos, and the one that did."""
-        match command:
-            case Improve() if can_improve(before) and state.scene.info is not None:
-                self._hands.submit(ImproveScene(state.scene.info))
-            case Improved() if command.fits(before) and (arrival := command.arrival(before)) is not None:
-                self._hands.perform(arrival)
 
     def _look_for_work(self, before: State, state: State) -> None:
         """Other photos in the tray may be ones on which work was begun."""

@@ -51,8 +51,6 @@ class Photo:
 PAUSED = "Paused. Resume goes on from there, also when the program was closed and the same photos are opened."
 RECONSTRUCTING, RESTORING = "Reconstructing", "Restoring"
 """Titles of the jobs that make a scene out of the tray, and out of what an earlier session kept."""
-IMPROVING = "Improving"
-"""Title of the job that fits the scene on show to its photos."""
 
 LOOKING_THROUGH = "film"
 """The one stage of looking through a film, as the core calls it: what remains of it can be told."""

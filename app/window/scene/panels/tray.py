@@ -16,7 +16,6 @@ from ...kit.look import Look
 from ...opening import commands as opening
 from ...state import State
 from .. import commands as show
-from ..improving import Improve, can_improve
 from ..state import Job, Photo, said
 from . import rooms, stages
 
@@ -46,8 +45,6 @@ def draw(state: State, look: Look) -> list[do.Command]:
         issued += _buttons(state, look)
     else:
         issued += _open_button()
-    if can_improve(state):
-        issued += _improve_button()
     for sentence in _sentences(state):
         _warning(sentence)
     stages.draw(state, look)
@@ -244,15 +241,6 @@ def _open_button() -> list[do.Command]:
     """In the place of the others while there is no photo."""
     pressed = imgui.button(f"{fa.ICON_FA_FOLDER_OPEN}  Open ...", ImVec2(-1, 0))
     return [opening.OpenFiles()] if pressed else []
-
-
-def _improve_button() -> list[do.Command]:
-    pressed = imgui.button(f"{fa.ICON_FA_ARROW_TREND_UP}  Improve", ImVec2(-1, 0))
-    widgets.tooltip(
-        "Fit the scene to its photos for a minute; kept only where a photo that was held out comes closer.\n"
-        "It can be stopped at any time, and the scene before stays one click away"
-    )
-    return [Improve()] if pressed else []
 
 
 def _buttons(state: State, look: Look) -> list[do.Command]:
