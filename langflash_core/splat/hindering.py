@@ -24,8 +24,7 @@ from langflash_core.splat.projection import ALPHA_MAX
 
 _PASSED = 1e-4  # of a pixel's light, the least that is taken to reach a pair which is listed
 _WITNESSES = 4
-"""Views that show a Gaussian which may go. Of four photos two and three let whole panes of a window go, whose
-depth is hard."""
+"""Views that show a Gaussian which may go: two and three let whole panes of a window go."""
 _SEEN = 0.05  # contributions of a Gaussian over all pixels, from which a view shows it
 
 
