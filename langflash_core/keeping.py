@@ -78,6 +78,8 @@ def holds_steps(folder: Path) -> bool:
 def _read(path: Path) -> dict[str, np.ndarray] | None:
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files}
+            found = {name: stored[name] for name in stored.files}
+            # What is no array in an archive comes as its bytes.
+            return found if all(isinstance(each, np.ndarray) for each in found.values()) else None
     except Exception:  # zipfile, zlib and numpy have a dozen errors for what is damaged; it is made again
         return None

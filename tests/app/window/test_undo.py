@@ -2,6 +2,7 @@
 
 import sys
 import typing
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from datetime import datetime
 from enum import Enum
@@ -132,6 +133,7 @@ MADE: dict = {
     SceneInfo: lambda chance, state: state.scene.info,
     Pose: lambda chance, state: state.scene.pose,
     Vector: lambda chance, state: Vector(*chance.normal(size=3).tolist()),
+    Mapping[str, tuple[float | None, ...]]: lambda chance, state: {},
     bool: lambda chance, state: bool(chance.integers(2)),
     int: lambda chance, state: int(chance.integers(-1, 5)),
     float: lambda chance, state: float(chance.normal()),

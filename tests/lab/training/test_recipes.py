@@ -66,7 +66,7 @@ BAD = {
     ),
     "no views": (r"views = \{ 2 = 1.0 \}", "views = {}", "numbers above 0"),
     "no preset": (r'preset = "full"', 'preset = "large"', "preset must be one of"),
-    "half of a precision": (r'precision = "auto"', 'precision = "half"', "auto, float32 or bfloat16"),
+    "half of a precision": (r'precision = "auto"', 'precision = "half"', "auto, float32, bfloat16"),
     "three betas": (r"betas = \[0.9, 0.999\]", "betas = [0.9, 0.9, 0.9]", "betas are two numbers"),
     "too many photos": (r"photos = 0.0", "photos = 2.0", "photos is a share"),
 }

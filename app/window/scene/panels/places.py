@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from langflash_core.images.still_names import shown_name
-from langflash_core.scene.above import Above
 from langflash_core.scene.report import film_sentences, left_out_shares, unplaced_names
 
 from ... import commands as do
@@ -16,6 +16,9 @@ from ...kit.look import Look
 from ...state import State
 from .. import camera
 from ..state import ABOVE, SceneInfo
+
+if TYPE_CHECKING:
+    from langflash_core.scene.above import Above
 
 FEWEST = 3  # photos; two are seen at a glance
 _POPUP = "places"
@@ -81,7 +84,7 @@ def _extent(info: SceneInfo, look: Look) -> ImVec2:
     return ImVec2(width, width / aspect)
 
 
-def _map(state: State, info: SceneInfo, above: Above, extent: ImVec2, look: Look) -> list[do.Command]:
+def _map(state: State, info: SceneInfo, above: "Above", extent: ImVec2, look: Look) -> list[do.Command]:
     """From above: a click on a photo flies to its view."""
     corner = imgui.get_cursor_screen_pos()
     pressed = imgui.invisible_button("map", extent)
