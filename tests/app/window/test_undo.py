@@ -2,7 +2,6 @@
 
 import sys
 import typing
-from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from datetime import datetime
 from enum import Enum
@@ -33,6 +32,7 @@ from app.window.state import State
 from langflash_core.geometry.poses import Pose, Vector
 from langflash_core.language.relevance import CompiledQuery, compile_query
 from langflash_core.language.spaces import language_space
+from langflash_core.mending.recipes import Recipe
 from langflash_core.outputs import OFFERED, Output
 from langflash_core.pictures import PICTURES, Picture
 from langflash_core.scene.edited import edited_scene
@@ -133,7 +133,7 @@ MADE: dict = {
     SceneInfo: lambda chance, state: state.scene.info,
     Pose: lambda chance, state: state.scene.pose,
     Vector: lambda chance, state: Vector(*chance.normal(size=3).tolist()),
-    Mapping[str, tuple[float | None, ...]]: lambda chance, state: {},
+    Recipe: lambda chance, state: Recipe(strength=float(chance.random())),
     bool: lambda chance, state: bool(chance.integers(2)),
     int: lambda chance, state: int(chance.integers(-1, 5)),
     float: lambda chance, state: float(chance.normal()),

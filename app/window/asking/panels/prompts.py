@@ -28,8 +28,8 @@ def draw(state: State, look: Look) -> list[do.Command]:
     first = not state.asking.asked or imgui.get_io().display_size.y >= look.px(_HIGH)
     if first:  # what there is to ask
         issued += known.draw(state, look)
-    issued += parts.draw(state, look)
     issued += scores.draw(state, look)
+    issued += parts.draw(state, look)  # they come later, and must not move what is above them
     if not first:  # in a low window answers, which it would push out
         issued += known.draw(state, look)
     widgets.gap(look.px(2))
