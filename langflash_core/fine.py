@@ -164,6 +164,7 @@ def _counted(left_out: dict[str, list[float]]) -> tuple[str, str]:
 
 def _coloured(scene: Scene, photos: _Silent, progress: Callable[[float], None]) -> Scene:
     """The scene in the colours that make its photos (3, h, w) again; its record says how near they come."""
+    judged = len(photos) >= _JUDGES
     solved = solved_colours(
         scene.gaussians,
         sh_to_colour(scene.gaussians.sh, scene.gaussians.means),
@@ -171,12 +172,14 @@ def _coloured(scene: Scene, photos: _Silent, progress: Callable[[float], None]) 
         photos,
         owners=scene.view_ids,
         ringing=_RINGING,
-        leave_out=len(photos) >= _JUDGES,
+        leave_out=judged,
         progress=progress,
     )
     sh = colour_to_sh(solved.colours)[:, None]
     near = [round(after, 2) for _, after in solved.psnr]
     bought = {**scene.record.detail, "rounds": ROUNDS, "photos_psnr_db": near}
+    scene = replace(scene, gaussians=replace(scene.gaussians, sh=sh)).with_record(detail=bought)
+    if not judged:
+        return scene
     counts = {**scene.record.counts, "hindering": int(solved.hinders.sum())}
-    coloured = replace(scene, gaussians=replace(scene.gaussians, sh=sh)).with_record(detail=bought)
-    return coloured.rows(~solved.hinders).with_record(counts=counts)
+    return scene.rows(~solved.hinders).with_record(counts=counts)

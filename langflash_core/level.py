@@ -259,8 +259,6 @@ def _north(scene: Scene, found: Directions, north: Sequence[float] | None) -> tu
 def _floor(surface: Surface, up: np.ndarray, most: float) -> tuple[float, str]:
     """Height of the floor along up, below `most`, the lowest camera's; scene units, and who says so."""
     heights = surface.places @ up
-    if not len(heights):
-        raise InputError("this scene has no surface that could be a floor; there is nothing to level")
     level = np.abs(surface.normals @ up) >= _LEVEL
     window = _WINDOW * float(np.subtract(*np.quantile(heights, (0.99, 0.01))))
     named = surface.called("floor") & level & (heights < most)
@@ -270,8 +268,10 @@ def _floor(surface: Surface, up: np.ndarray, most: float) -> tuple[float, str]:
         # A ceiling is flat and large, too, and a word may find both.
         return densest(low[below] if below.mean() > _BOTH else low, window), "floor"
     low = heights[level] if level.any() else heights
-    lowest = low[low <= np.quantile(heights, 0.01) + 3 * window]
-    return densest(lowest if len(lowest) else low, window), "lowest"
+    bottom = float(np.quantile(heights, 0.01))
+    if low.min() > bottom + 3 * window:  # what lies lowest is not level: the lowest that is
+        bottom = float(low.min())
+    return densest(low[low <= bottom + 3 * window], window), "lowest"
 
 
 def densest(values: Float[np.ndarray, " n"], width: float) -> float:

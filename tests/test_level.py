@@ -166,6 +166,16 @@ def test_the_densest_window_is_found():
     assert level.densest(np.array([3.0]), 0.1) == 3.0
 
 
+def test_where_the_lowest_is_not_level_the_floor_is_the_lowest_that_is():
+    """Rubble at 0 to 0.4, a floor at 1 and a table at 2, of more points."""
+    heights = np.concatenate((np.linspace(0.0, 0.4, 30), np.full(20, 1.0), np.full(50, 2.0)))
+    flat = np.arange(100) >= 30
+    normals = np.where(flat[:, None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
+    places = np.stack((np.zeros(100), heights, np.zeros(100)), 1)
+    surface = level.Surface(places, normals, np.zeros((100, 4), bool))
+    assert level._floor(surface, np.array([0.0, 1.0, 0.0]), math.inf) == (1.0, "lowest")
+
+
 def test_a_scene_is_levelled_unasked_only_where_that_is_sure(room, monkeypatch):
     """Surfaces lean, so their word is not taken unasked; what edges say is, beside the same tensors."""
     unsure = levelled(room)

@@ -43,7 +43,7 @@ from langflash_core.splat.projection import Footprints, project
 from langflash_core.types import Camera, Gaussians
 
 ROUNDS = 8
-TOGETHER = 16
+TOGETHER = 10
 """Photos that are solved for at once: a group of them holds half a gigabyte at 672 x 672 pixels."""
 _MANY, _EVERY, _MOST_EVERY = 8, 8, 8
 """Photos up to which all speak everywhere; of more, those of which one speaks in a block, and in one block of
@@ -68,7 +68,8 @@ _PROBE = 8  # of rows of pixels, by one of which a group is judged after others 
 @dataclass(frozen=True)
 class Solved:
     """colours: (N, 3) in [0, 1]. psnr: dB of each view before the rounds and after them. hinders: (N,) bool,
-    without which the pictures are nearer to the photos, and which `psnr` leaves out."""
+    without which the pictures are nearer to the photos; colours and `psnr` are those without them where all
+    photos are one group."""
 
     colours: Float[Tensor, "N 3"]
     psnr: tuple[tuple[float, float], ...]
@@ -98,7 +99,8 @@ def solved_colours(
         owners: (N,) int64, the view that made each Gaussian; None: every photo speaks in all its pixels.
         ringing: how far colours may leave what the photos show around a Gaussian, in parts of how much that
             differs; None: within [0, 1], as far as they like.
-        leave_out: Gaussians that hinder are found, after half of the rounds, and left out.
+        leave_out: Gaussians that hinder are found: of one group after half of the rounds, the others
+            without them; of several after all.
         progress: called with the share that is done, before every view and every round; what it raises ends
             the work there.
 
@@ -117,7 +119,7 @@ def solved_colours(
     before, probes = [], []
     share = 1 if owners is None or len(photos) <= _MANY else min(-(-len(photos) // _EVERY), _MOST_EVERY)
     bounds, cuts = _groups(len(photos), share), _JUDGED if leave_out else {}
-    hinders, tally = np.zeros(len(first), bool), Tally.of(len(first))
+    tally, alone = Tally.of(len(first)), len(bounds) == 2
     for begin, end in pairwise(bounds):
         told = _within(progress, begin / len(photos), (end - begin) / len(photos))
         group = _Group(len(first), told, rounds)
@@ -132,19 +134,18 @@ def solved_colours(
             if len(photos) > _MANY:
                 give_back()  # each view leaves holes of other sizes
         before += [view.error(first) for view in group.views]
-        judged = leave_out and len(bounds) == 2
-        found = group.solved(answer.colours, rounds - rounds // 2 if judged else rounds, ringing)
-        if judged:
-            hinders = group.leave(found)
-            found = group.solved(found, rounds // 2, ringing)
-        elif leave_out:
+        first_rounds = rounds - rounds // 2 if leave_out and alone else rounds
+        found = group.solved(answer.colours, first_rounds, ringing)
+        if leave_out:
             group.tell(tally, found)
+        if first_rounds < rounds:
+            group.leave(tally.hindering)
+            found = group.solved(found, rounds - first_rounds, ringing)
         answer.take(found, group.total)
-        probes += group.views if len(bounds) == 2 else [view.every(_PROBE) for view in group.views]
+        probes += group.views if alone else [view.every(_PROBE) for view in group.views]
     after = [view.error(answer.colours) for view in probes]
-    hinders |= tally.hindering
     nearness = tuple(zip(before, after, strict=True))
-    return Solved(torch.from_numpy(answer.colours), nearness, torch.from_numpy(hinders))
+    return Solved(torch.from_numpy(answer.colours), nearness, torch.from_numpy(tally.hindering))
 
 
 def _groups(count: int, share: int = 1) -> list[int]:
@@ -223,13 +224,9 @@ class _Group:
         for view in self.views:
             view.tell(tally, colours)
 
-    def leave(self, colours: np.ndarray) -> np.ndarray:
-        """(N,) bool: what hinders in these colours (N, 3), and is now left out."""
-        tally = Tally.of(self._count)
-        self.tell(tally, colours)
-        gone = tally.hindering
+    def leave(self, gone: np.ndarray) -> None:
+        """Some Gaussians, (N,) bool, are not drawn any more."""
         self.views = [view.without(gone[view.ids]) for view in self.views]
-        return gone
 
     def _bounds(
         self, start: np.ndarray, ringing: float | None

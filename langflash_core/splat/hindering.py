@@ -7,9 +7,11 @@ behind i gets 1 / (1 - alpha_i) times its light once i is gone, so that F become
     F + alpha_i / (1 - alpha_i) B_i - c_i f_i,     B_i = sum of c_j f_j over all j behind i
 
 and the squared error falls by |F - photo|^2 less that of the new F. Where nothing is behind, the pixel
-becomes darker, so that a hole does not pay. Each is judged with all others there; what so many at once
-bring is seen by judging again. float32, sums of a picture in float64. Twin: `reference.rasterize` without
-each of them, tests/splat/test_hindering.py.
+becomes darker, so that a hole does not pay in the photos; between them it may open, which is why only many
+photos judge. Each is judged with all others there, though many go at once. float32, sums of a picture in
+float64. Twin: `reference.rasterize` without each of them, tests/splat/test_hindering.py.
+
+Source: own; that of what is drawn is the compositing of Porter and Duff 1984.
 
 Sizes: P pixels of a view, n Gaussians that it shows, M pairs of both, N Gaussians.
 """

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float
 
+from langflash_core.errors import InputError
 from langflash_core.lab.rooms.catalogue import PARAMETRIC, TRAIN_LIBRARIES, UNSEEN, Item
 from langflash_core.lab.rooms.pack import Pack
 from langflash_core.lab.rooms.plan import ODDS, ON_TOP, ROOM_PLANS, ROOM_SHARES, Step, hang_height, role
@@ -85,13 +86,15 @@ def make_room(seed: int, pack: Pack, libraries: tuple[str, ...] = TRAIN_LIBRARIE
         A room with at least walls, floor and ceiling.
 
     Raises:
-        ValueError: the pack holds nothing of these libraries.
+        InputError: the pack holds nothing of these libraries.
     """
     rng = np.random.default_rng(seed)
     allowed = pack.select(libraries)
     if not any(pack.items[i].library in libraries for i in allowed):
-        raise ValueError(
-            f"libraries: expected some of {sorted({i.library for i in pack.items})}, got {libraries}"
+        held = ", ".join(sorted({item.library for item in pack.items}))
+        raise InputError(
+            f"the furniture is of {held}, but these rooms are furnished from {', '.join(libraries)}; "
+            "choose another set of rooms (--set), or pack those libraries"
         )
     roles: dict[str, list[int]] = {}
     for i in allowed:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from langflash_core.errors import InputError
 from langflash_core.lab.rooms import HELD_OUT_LIBRARIES, TRAIN_LIBRARIES, Pack, make_room
 from langflash_core.lab.rooms.catalogue import UNSEEN
 from langflash_core.lab.rooms.layout import SLACK
@@ -31,7 +32,7 @@ def test_held_out_furniture_never_trains(split_pack: Pack) -> None:
 
 
 def test_unknown_library_is_named(pack: Pack) -> None:
-    with pytest.raises(ValueError, match="libraries"):
+    with pytest.raises(InputError, match="furnished from Nobody; choose another set"):
         make_room(0, pack, ("Nobody",))
 
 
