@@ -6,11 +6,14 @@ the photos, match them and read the weights. This module and what it imports kno
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Event
+from traceback import clear_frames
+from typing import Any
 
-from langflash_core.errors import InputError, WeightsError
+from langflash_core.errors import Cancelled, InputError, WeightsError
 from langflash_core.images.pictures import Picture, read_pictures
 from langflash_core.keeping import MATCHES, Arrays, Keep, not_kept
 from langflash_core.network.checkpoints.stored import Stored, read_header, read_stored, weights_file
@@ -30,6 +33,19 @@ class Ahead:
     matched: Future[Arrays | None]
     stored: Future[Stored] | None
     matching: "Matching" = field(default_factory=lambda: Matching())
+    ended: Event = field(default_factory=Event)
+
+    def end(self) -> None:
+        """What is still under way stops at its next photo or pair; returns when it has.
+
+        An error that was raised from a task holds frames that hold the task: what they hold goes here, not
+        when Python's collector comes by.
+        """
+        self.ended.set()
+        tasks: list[Future[Any]] = [self.pictures, self.matched, *([self.stored] if self.stored else [])]
+        wait(tasks)
+        for error in filter(None, (task.exception() for task in tasks)):
+            clear_frames(error.__traceback__)
 
     def check_photos(self) -> None:
         """Wait until the photos are read.
@@ -95,20 +111,27 @@ def begin(
     chosen = PRESETS[preset]
     area = chosen.native_area if size is None else _area(size)
     matches, stored = isinstance(chosen, GuidedDepth), None
+    ended = Event()
+
+    def going_on() -> None:
+        check()
+        if ended.is_set():
+            raise Cancelled("the reconstruction has ended without it")
+
     pool = ThreadPoolExecutor(
         min(_WORKERS, max(1, (os.cpu_count() or 1) - 1)), thread_name_prefix="langflash-ahead"
     )
     pictures = pool.submit(
-        read_pictures, photos, area=area, multiple=chosen.patch, square=chosen.square, check=check
+        read_pictures, photos, area=area, multiple=chosen.patch, square=chosen.square, check=going_on
     )
     if read_weights and matches:
         path = weights_file(preset, None if weights is None else Path(weights))
         read_header(path)
         stored = pool.submit(_stored, pictures, path)
     matching = Matching()
-    matched = pool.submit(_match, pictures, check, matching, keep) if matches else _nothing()
+    matched = pool.submit(_match, pictures, going_on, matching, keep) if matches else _nothing()
     pool.shutdown(wait=False)
-    return Ahead(pictures, matched, stored, matching)
+    return Ahead(pictures, matched, stored, matching, ended)
 
 
 def _stored(pictures: Future[list[Picture]], path: Path) -> Stored:

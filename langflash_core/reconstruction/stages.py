@@ -36,9 +36,32 @@ _AS_IT_IS = "the preset '{}' makes one Gaussian a pixel; the detail that was ask
 
 
 def scene_of(wishes: Wishes, run: Run, networks: Networks, ahead: Ahead | None) -> Scene:
-    """The scene that was wished for; errors and `ahead` as of `pipeline.reconstruct`."""
-    wishes = wishes.settled()
-    views, ahead = _photos(wishes, run, ahead)
+    """The scene that was wished for; errors and `ahead` as of `pipeline.reconstruct`. However it ends,
+    nothing of it runs on."""
+    try:
+        wishes = wishes.settled()
+        ahead = ahead or _begun(wishes, run)
+        return _made(wishes, run, networks, ahead)
+    finally:
+        if ahead is not None:
+            ahead.end()
+
+
+def _begun(wishes: Wishes, run: Run) -> Ahead:
+    """What can be done beside the rest."""
+    return begin(
+        wishes.photos,
+        preset=wishes.preset,
+        weights=wishes.weights,
+        size=wishes.size,
+        read_weights=False,
+        check=run.check,
+        keep=wishes.keep,
+    )
+
+
+def _made(wishes: Wishes, run: Run, networks: Networks, ahead: Ahead) -> Scene:
+    views = _photos(wishes, run, ahead)
     tools = _weights(wishes, run, networks, ahead, views)
     prediction, views = _found(wishes, run, ahead, tools, views)
     scene, images = _assembled(wishes, run, tools, prediction, views)
@@ -54,18 +77,9 @@ def scene_of(wishes: Wishes, run: Run, networks: Networks, ahead: Ahead | None) 
     return _with_cost(scene, run.timings)
 
 
-def _photos(wishes: Wishes, run: Run, ahead: Ahead | None) -> tuple[Views, Ahead]:
-    """The photos as views, with what was begun of them; the rest of what can be begins here."""
+def _photos(wishes: Wishes, run: Run, ahead: Ahead) -> Views:
+    """The photos as views."""
     with run.stage("photos"):
-        ahead = ahead or begin(
-            wishes.photos,
-            preset=wishes.preset,
-            weights=wishes.weights,
-            size=wishes.size,
-            read_weights=False,
-            check=run.check,
-            keep=wishes.keep,
-        )
         views = load_views(
             wishes.photos,
             fov=wishes.fov,
@@ -74,7 +88,7 @@ def _photos(wishes: Wishes, run: Run, ahead: Ahead | None) -> tuple[Views, Ahead
             pictures=ahead.pictures.result,
         )
         check_shown(views.names, list(views.images))
-    return posed_views(views, wishes.viewmats, wishes.preset), ahead
+    return posed_views(views, wishes.viewmats, wishes.preset)
 
 
 def _weights(wishes: Wishes, run: Run, networks: Networks, ahead: Ahead, views: Views) -> Tools:
