@@ -58,12 +58,13 @@ class RecoveryEffects(Effects):
         self._edits_wrote = False  # or have ever, and what removes them may not have come to it
         self._replaced: list[Errand] = []  # forget what goes once the same edits are written elsewhere
         self._snapshot: tuple = ()
+        self._saved: Preferences | None = None  # the preferences that this window found, or wrote last
         self._keep_at = self._keep_edits_at = self._save_at = NEVER
 
     def begin(self, loaded: Preferences, sentence: str, empty: bool) -> None:
         """The first commands of a window. empty: it opens without photos or a scene."""
         self._hands.perform(Prefer(loaded))
-        self._save_at = NEVER
+        self._saved, self._save_at = loaded, NEVER
         if sentence:
             self._hands.perform(Notify(sentence))
         kept = sessions.left_behind()
@@ -264,9 +265,11 @@ class RecoveryEffects(Effects):
     # What the writer's thread does
 
     def _save(self, wanted: Preferences) -> None:
-        problem = preferences.try_to_save(wanted)
+        problem = preferences.try_to_save(wanted, self._saved)
         if problem:
             self._hands.dispatch(Notify(problem))
+        else:
+            self._saved = wanted
 
     def _keep(self, kept: Kept, outlived: Path | None = None) -> None:
         try:

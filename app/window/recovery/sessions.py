@@ -6,18 +6,16 @@ however it dies. A file whose lock is free belongs to nobody: it is offered agai
 
 import json
 import os
-import sys
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from dataclasses import asdict, replace
 from math import isfinite
 from pathlib import Path
-from typing import BinaryIO
 
-from langflash_core.errors import OutputError
 from langflash_core.geometry.poses import read_pose
 
 from ..places import state_folder
 from ..scene.drops import SCENE_SUFFIX, still_there
+from .locks import is_free
 from .state import Kept
 
 PREFIX = "session-"
@@ -32,7 +30,7 @@ def left_behind() -> Kept | None:
     found: list[tuple[float, Kept]] = []
     with suppress(OSError):
         for path in state_folder().glob(f"{PREFIX}*.json"):
-            if not _abandoned(path.with_suffix(".lock")):
+            if not is_free(path.with_suffix(".lock")):
                 continue
             try:
                 kept = read(path)
@@ -110,45 +108,3 @@ def fields(kept: Kept) -> dict:
     content = asdict(replace(kept, file=None))
     del content["file"], content["missing"]
     return content
-
-
-def locked(path: Path) -> BinaryIO:
-    """A lock file, held until it is closed or the process ends."""
-    with ExitStack() as opened:
-        try:
-            stream = opened.enter_context(path.open("wb", buffering=0))
-            stream.write(b"\0")
-            _lock(stream)
-        except OSError as error:
-            raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
-        opened.pop_all()
-    return stream
-
-
-def _abandoned(path: Path) -> bool:
-    """Whether nobody holds the lock."""
-    try:
-        with path.open("r+b") as stream:
-            _lock(stream)
-    except FileNotFoundError:
-        return True
-    except OSError:
-        return False
-    return True
-
-
-def _lock(stream: BinaryIO) -> None:
-    """Without waiting.
-
-    Raises:
-        OSError: another process holds it.
-    """
-    if sys.platform == "win32":
-        import msvcrt
-
-        stream.seek(0)
-        msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)
-    else:
-        import fcntl
-
-        fcntl.flock(stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
