@@ -30,6 +30,6 @@ def test_of_a_state_on_a_full_disk_the_old_one_stays(tmp_path: Path) -> None:
 
 def test_a_shard_on_a_full_disk_is_a_sentence(tmp_path: Path) -> None:
     path = tmp_path / "a.safetensors"
-    with small_disk(1000), pytest.raises(OutputError, match="cannot write .*large.*; choose another place"):
+    with small_disk(1000), pytest.raises(OutputError, match=r"cannot write .*large.*; choose another place"):
         write_shard(path, [toy_record(0)])
     assert not list(tmp_path.iterdir())
