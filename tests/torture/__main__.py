@@ -36,6 +36,14 @@ def kills(args: argparse.Namespace, folder: Path) -> int:
     return report(everything(folder, args.count, args.seed), sys.stdout.write)
 
 
+def together(args: argparse.Namespace, folder: Path) -> int:
+    """Two programs at once: `together.py`."""
+    from tests.torture.kills import report
+    from tests.torture.together import everything
+
+    return report(everything(folder, args.rounds, args.seed), sys.stdout.write, "times")
+
+
 def photos(args: argparse.Namespace, folder: Path) -> int:
     """Photos that no scene is in, or that deceive: `hard_photos.py`."""
     from tests.torture.hard_photos import everything, report
@@ -70,7 +78,7 @@ def address(args: argparse.Namespace, folder: Path) -> int:
 
 
 PARTS = {
-    each.__name__: each for each in (files, address, calls, window, kills, photos, load)
+    each.__name__: each for each in (files, address, calls, window, kills, together, photos, load)
 }  # fmt: skip
 
 
@@ -81,6 +89,7 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=5.0, help="of each part, about (default: 5)")
     parser.add_argument("--files", type=int, default=100_000, help="hostile ones (default: 100,000)")
     parser.add_argument("--count", type=int, default=200, help="of kills while it writes (default: 200)")
+    parser.add_argument("--rounds", type=int, default=20, help="of two programs at once (default: 20)")
     parser.add_argument("--questions", type=int, default=10_000, help="in a row (default: 10,000)")
     parser.add_argument("--addresses", type=int, default=1_000_000, help="of pages (default: a million)")
     parser.add_argument("--only", nargs="+", help="of a part's rows those whose names begin so")

@@ -174,14 +174,14 @@ class InlineWorkers:
 
 def _inline(*words: str) -> Callable[[Path], tuple[int, str]]:
     def run(folder: Path) -> tuple[int, str]:
-        with _in_this_process():
+        with in_this_process():
             return command(*words)(folder)
 
     return run
 
 
 @contextmanager
-def _in_this_process() -> Iterator[None]:
+def in_this_process() -> Iterator[None]:
     from langflash_core.batch import processes
 
     before = processes.LocalWorkers

@@ -118,7 +118,7 @@ def save(preferences: Preferences, path: Path | None = None, since: Preferences 
 
 def merged(own: Preferences, since: Preferences, theirs: Preferences) -> Preferences:
     """`theirs`, with what has become of `since` in `own`."""
-    changed = {name: value for name, value in _values(own).items() if value != getattr(since, name)}
+    changed = {name: value for name, value in values_of(own).items() if value != getattr(since, name)}
     if own.recent and "recent" in changed:
         opened, gone = _opened(own.recent, since.recent), {*since.recent} - {*own.recent}
         others = (path for path in theirs.recent if path not in gone and path not in opened)
@@ -126,7 +126,8 @@ def merged(own: Preferences, since: Preferences, theirs: Preferences) -> Prefere
     return replace(theirs, **changed)
 
 
-def _values(preferences: Preferences) -> dict[str, Any]:
+def values_of(preferences: Preferences) -> dict[str, Any]:
+    """By name."""
     return {field.name: getattr(preferences, field.name) for field in fields(preferences)}
 
 
