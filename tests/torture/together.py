@@ -3,8 +3,8 @@ folder: what either finished is there afterwards, or a sentence has said what is
 
     python -m tests.torture together [--seed 1] [--rounds 20]
 
-Each program is a copy (fork) of this process that runs the product's own functions; both begin at once, and rest
-for random moments between what they do.
+Each program is a copy (fork) of this process that runs the product's own functions; both begin at once, and
+rest for random moments between what they do.
 """
 
 import json
