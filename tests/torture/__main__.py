@@ -6,6 +6,7 @@ Parts: `PARTS`. `make torture` runs them all in less than half an hour on two co
 import argparse
 import sys
 import tempfile
+import time
 import warnings
 from pathlib import Path
 
@@ -21,12 +22,10 @@ def files(args: argparse.Namespace, folder: Path) -> int:
 def calls(args: argparse.Namespace, folder: Path) -> int:
     """The n-th call fails: `nth.py`."""
     from tests.torture.jobs import prepared
-    from tests.torture.nth import report, torture
+    from tests.torture.nth import everything, report
 
     jobs = [job for job in prepared(folder) if any(job.name.startswith(name) for name in args.only or [""])]
-    share = 60 * args.minutes / max(len(jobs), 1)
-    rows = (row for job in jobs for row in torture(job, folder, share, args.seed))
-    return report(rows, sys.stdout.write)
+    return report(everything(jobs, folder, 60 * args.minutes, args.seed), sys.stdout.write)
 
 
 def kills(args: argparse.Namespace, folder: Path) -> int:
@@ -97,11 +96,18 @@ def main() -> int:
     unknown = [name for name in args.parts if name not in PARTS]
     if unknown:
         parser.error(f"no part {unknown[0]}; there are {', '.join(PARTS)}")
+    from tests.torture.nth import processor
+
     warnings.simplefilter("ignore")
+    sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
     finds = 0
     for name in args.parts or PARTS:
+        began, spent = time.monotonic(), processor()
         with tempfile.TemporaryDirectory() as folder:
             finds += PARTS[name](args, Path(folder))
+        say = f"{name}: {processor() - spent:.0f} s of the processor in {time.monotonic() - began:.0f} s\n"
+        sys.stdout.write(say)
+        sys.stdout.flush()
     sys.stdout.write(f"{finds} finds\n")
     return 1 if finds else 0
 

@@ -43,6 +43,15 @@ def test_a_few_failures_do_no_harm(known, folder, name):
         assert row.tried or not row.calls
 
 
+def test_jobs_share_the_time_and_what_is_left_out_is_said(known, folder):
+    """In the seed's order; that is all a bound on the processor's time can promise."""
+    some = [known["preferences"], known["save"]]
+    assert [row.kind for row in nth.everything(some, folder, 0.0)] == ["left out"] * 2
+    for seed, first in ((1, "preferences"), (5, "save")):
+        rows = list(nth.everything(some, folder, 0.3, seed))
+        assert rows[0].job == first and rows[0].tried and not any(row.finds for row in rows)
+
+
 def test_there_is_a_job_for_every_kind_of_file(known):
     names = " ".join(known)
     assert all(word in names for word in (".langflash", ".html", ".mp4", "reconstruct", "batch", "train"))
