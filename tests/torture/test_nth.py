@@ -125,6 +125,18 @@ def test_a_picture_without_memory_is_no_picture():
         raise moderngl.Error("\nline one\nline two")
 
 
+@pytest.mark.parametrize("ending", [".usda", ".usdc", ".usdz"])
+def test_a_full_disk_under_openusd_is_one_sentence(known, folder, capfd, ending):
+    pytest.importorskip("pxr")
+    path = folder / f"u{ending}"
+    path.write_bytes(b"old")
+    with small_disk(5000):
+        assert main(["export", str(folder / "in" / "s.langflash"), "-o", str(path), "--replace"]) == 2
+    said = capfd.readouterr().err
+    assert said.startswith(f"langflash: cannot write {path.name}: OpenUSD says '") and said.count("\n") == 1
+    assert path.read_bytes() == b"old" and not list(folder.glob(".*.part"))
+
+
 def test_a_film_that_a_full_disk_cuts_off_is_not_taken_for_whole(known, folder, capfd):
     pytest.importorskip("imageio_ffmpeg")
     words = ["export", str(folder / "in" / "s.langflash"), "--seconds", "0.2", "--size", "48x36"]
