@@ -76,7 +76,7 @@ def write_usd(scene: Scene, path: Path) -> None:
                     raise OutputError(f"cannot write {path.name}: OpenUSD could not pack it; name a .usdc")
                 plain = package
         except pxr.Tf.ErrorException as error:
-            why = f"OpenUSD says '{_reason(error)}'; make room, also for temporary files ({tempfile.gettempdir()})"
+            why = f"OpenUSD says '{_reason(error)}'; make room, also in {tempfile.gettempdir()}"
             raise OutputError(f"cannot write {path.name}: {why}") from error
         target.write_bytes(plain.read_bytes())
 
