@@ -61,19 +61,28 @@ def _counted(name: str, count: int, rng: random.Random, once: Callable[[random.R
 
 def both(work: Callable[[int], object]) -> list[str]:
     """Twice at once, to the end; what went wrong in either."""
-    children = []
+    finds, children = [], []
     for number in range(2):
+        heard, said = os.pipe()
         child = os.fork()
         if child == 0:
-            code = 1
+            words = "ended without a word"
             try:
                 work(number)
-                code = 0
+                words = ""
+            except Exception as error:
+                words = repr(error)
             finally:
-                os._exit(code)
-        children.append(child)
-    codes = [os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) for child in children]
-    return [f"the work of one of two failed: {codes}"] if any(codes) else []
+                os.write(said, words.encode()[:4000])
+                os._exit(0)
+        os.close(said)
+        children.append((child, heard))
+    for child, heard in children:
+        with os.fdopen(heard, "rb") as stream:
+            words = stream.read().decode()
+        if os.waitpid(child, 0)[1] or words:
+            finds.append(f"the work of one of two failed: {words}")
+    return finds
 
 
 def _rests(seed: float, number: int) -> random.Random:
