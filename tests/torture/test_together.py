@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from app.window.recovery import preferences
+from app.window.scene.work import LoadScene
+from langflash_core.errors import SceneFileError
 from tests.torture import together
 
 pytestmark = [
@@ -32,6 +34,12 @@ def test_two_programs_lose_nothing(own):
 
 def test_two_windows_that_die_together_are_both_had_back(own):
     assert together.windows(random.Random(1)) == []
+
+
+def test_what_another_window_has_taken_over_is_a_sentence(own):
+    kept = LoadScene(own / "a.langflash", own / "a.edits")
+    with pytest.raises(SceneFileError, match="another window goes on with it"):
+        kept.run(1, lambda *_: None, lambda: False)
 
 
 def test_what_is_lost_without_a_lock_would_be_found(own, monkeypatch):
