@@ -65,13 +65,13 @@ def test_words_narrow_down_in_any_order() -> None:
 
 
 def test_the_palette_opens_samples_and_recent_scenes() -> None:
-    """Else nobody without a mouse gets at them: the empty window's tiles and the menu take clicks alone."""
+    """By keys, from anywhere: tiles stand in the empty window alone."""
     assert found("sample desk") == ["Desk (Sample photos)"]
     assert found("recent") == []
     begun = after(State(), *(keep.Opened(Path(f"/rooms/{name}.langflash")) for name in ("hall", "den")))
     assert found("recent", begun) == ["den.langflash (Recent scenes)", "hall.langflash (Recent scenes)"]
     (hall,) = table.matching("hall", begun)
-    assert hall.make(begun) == show.OpenPaths((str(Path("/rooms/hall.langflash")),))
+    assert hall.make(begun) == keep.OpenProject(str(Path("/rooms/hall.langflash")))
 
 
 def made(name: str, state: State) -> Command | None:
