@@ -12,7 +12,6 @@ from app.window.editing import commands as edit
 from app.window.frame import dialogs, keys, table
 from app.window.kit import theme
 from app.window.recovery import commands as keep
-from app.window.scene import commands as show
 from app.window.state import State
 from app.window.touring import commands as tour
 from langflash_core import pictures
