@@ -5,6 +5,7 @@ and edits by the worker, which has the library.
 """
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from .commands import (
     Prefer,
     StandAgain,
     kept_photos,
+    kept_session,
 )
 from .keeper import Keeper
 from .preferences import Preferences
@@ -283,22 +285,8 @@ class RecoveryEffects(Effects):
     def _kept(self, state: State) -> Kept:
         info = state.scene.info
         path = None if info is None else info.path or (self._keeper.scene_file if self._copied else None)
-        prompts = [prompt for prompt in state.asking.prompts if prompt.text.strip()]
-        return Kept(
-            photos=tuple(str(photo.path) for photo in state.scene.photos),
-            fovs=tuple(photo.fov for photo in state.scene.photos),
-            scene="" if path is None else str(path),
-            edits="" if state.recovery.kept is None else str(state.recovery.kept),
-            saved=info is None or info.path is not None,
-            name="" if info is None else info.name,
-            phrases=tuple(prompt.text for prompt in prompts),
-            likes=tuple(prompt.like.hex() for prompt in prompts),
-            thresholds=tuple(prompt.threshold for prompt in prompts),
-            colours=tuple(prompt.colour for prompt in prompts),
-            visible=tuple(prompt.visible for prompt in prompts),
-            mode=state.scene.mode.name,
-            pose=None if info is None else state.scene.pose,
-        )
+        edits = "" if state.recovery.kept is None else str(state.recovery.kept)
+        return replace(kept_session(state, path), edits=edits)
 
 
 def _snapshot(state: State) -> tuple[Any, ...]:

@@ -22,6 +22,10 @@ PREFIX = "session-"
 MOST_LEFT = 8  # as many as there may be edits of
 EDITED, SELECTION = f".edited{SCENE_SUFFIX}", f".selection{SCENE_SUFFIX}"
 CONTENTS = (".json", SCENE_SUFFIX, EDITED, SELECTION)
+DAMAGED = (
+    OSError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError,
+)  # fmt: skip
+"""What reading a file that is damaged, or another's, raises."""
 
 
 def left_behind() -> Kept | None:
@@ -55,21 +59,29 @@ def read(path: Path) -> Kept | None:
     """
     stored = path.read_bytes()
     try:
-        content = json.loads(stored)
-        pose = content.pop("pose")
-        placed = None if pose is None else read_pose(pose)
-        lists = {name: tuple(content.pop(name)) for name in ("photos", "fovs", "phrases")}
-        asked = _asked(content, len(lists["phrases"]))
-        kept = Kept(pose=placed, file=path, **asked, **lists, **content)
-        words = (kept.scene, kept.edits, kept.name, kept.mode, *kept.photos, *kept.phrases)
-        if not all(isinstance(word, str) for word in words):  # a number would name an open file
-            raise ValueError("expected texts")
-        there, missing = still_there(zip(kept.photos, kept.fovs, strict=True))
-        photos, fovs = tuple(photo for photo, _ in there), tuple(fov for _, fov in there)
-        edits = kept.edits if kept.edits and os.path.isfile(kept.edits) else ""
-        scene = kept.scene if edits or (kept.scene and os.path.isfile(kept.scene)) else ""
-    except (OSError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError):
+        return understood(json.loads(stored), path)
+    except DAMAGED:
         return None
+
+
+def understood(content: dict, file: Path | None = None) -> Kept:
+    """A session of what `fields` gave, without what has gone since. file: that it was read from.
+
+    Raises:
+        One of `DAMAGED`: it is something else.
+    """
+    pose = content.pop("pose")
+    placed = None if pose is None else read_pose(pose)
+    lists = {name: tuple(content.pop(name)) for name in ("photos", "fovs", "phrases")}
+    asked = _asked(content, len(lists["phrases"]))
+    kept = Kept(pose=placed, file=file, **asked, **lists, **content)
+    words = (kept.scene, kept.edits, kept.name, kept.mode, *kept.photos, *kept.phrases)
+    if not all(isinstance(word, str) for word in words):  # a number would name an open file
+        raise ValueError("expected texts")
+    there, missing = still_there(zip(kept.photos, kept.fovs, strict=True))
+    photos, fovs = tuple(photo for photo, _ in there), tuple(fov for _, fov in there)
+    edits = kept.edits if kept.edits and os.path.isfile(kept.edits) else ""
+    scene = kept.scene if edits or (kept.scene and os.path.isfile(kept.scene)) else ""
     return replace(kept, photos=photos, fovs=fovs, scene=scene, edits=edits, missing=missing)
 
 
