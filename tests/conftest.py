@@ -64,6 +64,14 @@ def pytest_runtest_setup() -> None:
     random.seed(0)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _as_many_threads() -> Generator[None, None, None]:
+    """A command may set how many threads its process has; in the next module it would give other bits."""
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)
+
+
 _NEAR = ("127.", "::1", "localhost", "0.0.0.0")  # this computer
 
 
