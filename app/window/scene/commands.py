@@ -13,7 +13,7 @@ from langflash_core.scene.mask import Mask
 
 from ..commands import NOTHING_TO_SAVE, Command, Notify, ShowDialog
 from ..dialogs import Dialog
-from ..editing.state import fresh
+from ..editing.state import Editing, fresh
 from ..filming.state import NO_FILMING
 from ..state import State
 from .drops import MAX_PHOTOS
@@ -271,11 +271,16 @@ class SceneArrived:
                 job=None,
             ),
             asking=replace(asking, named=made and not asking.asked),
-            editing=fresh(state.editing, info.history, saved),
+            editing=self._editing(state.editing, saved),
             filming=NO_FILMING,
             listing=state.listing.without_scene(),
             recovery=replace(state.recovery, edits=None, kept=None),
         )
+
+    def _editing(self, before: Editing, saved: Marks | None) -> Editing:
+        """What stays in the hand; the clone brush keeps its source where that is there."""
+        after = fresh(before, self.info.history, saved)
+        return replace(after, source=before.source) if self.replaces else after
 
 
 def _start(info: SceneInfo) -> poses.Pose:
@@ -402,7 +407,7 @@ class MergeScene:
 class Merged:
     """The scene with number `serial`, of which there was so much, and another as one scene; or, where `gone`
     says what was taken away, what fills its hole, or stands for it but is not what is `denied`; or `copied`,
-    copies of what was selected."""
+    copies of what was selected, or laid over what is `gone`."""
 
     serial: int
     there: tuple[int, int]
@@ -427,7 +432,7 @@ class Merged:
         text = f"{self.name} was not merged, since another scene is on show by now; merge it again."
         if self.denied:
             text = "Nothing was taken out, since the scene is another by now; click it again."
-        elif self.gone is not None:
+        elif self.gone is not None and not self.copied:
             text = "Nothing was filled, since the scene is another by now; fill it again."
         elif self.copied:
             text = "Nothing was copied, since the scene is another by now; copy it again."
@@ -447,6 +452,9 @@ class Merged:
             kept = replace(after, selected=before.marks.selected)
             after = deny_atom(delete(kept, self.gone.of_count(count)), whole.there[1] - 1, self.denied)
             label = f"Take a part out of {self.denied}"
+        elif self.gone is not None and self.copied:
+            kept = replace(after, selected=before.marks.selected)
+            after, label = delete(kept, self.gone.of_count(count)), f"Clone {len(brought):,}"
         elif self.gone is not None:
             none = replace(after, selected=Mask.none(count))
             after, label = delete(none, self.gone.of_count(count)), f"Delete and fill {len(self.gone):,}"
