@@ -51,15 +51,18 @@ def write_atomically(path: Path, content: bytes | Iterable[bytes]) -> None:
 
 
 @contextmanager
-def written_atomically(path: Path) -> Iterator[Path]:
+def written_atomically(path: Path, library: type[Exception] = OSError) -> Iterator[Path]:
     """A path beside `path` to write to, moved onto it when the block ends well; for large files.
+
+    Args:
+        library: what is raised by one that writes by itself where the system refuses.
 
     Raises:
         OutputError: the folder cannot be made or written, or the disk is full.
     """
     make_folder(path.parent)
     temporary = part_beside(path)
-    with _cleared(path, temporary):
+    with _cleared(path, temporary, library=library):
         yield temporary
         os.replace(temporary, path)
 
@@ -132,7 +135,7 @@ def make_folder(folder: Path) -> None:
 
 
 @contextmanager
-def _cleared(path: Path, *temporaries: Path) -> Iterator[None]:
+def _cleared(path: Path, *temporaries: Path, library: type[Exception] = OSError) -> Iterator[None]:
     """The system's refusals inside are sentences about `path`; `temporaries` are gone afterwards.
 
     Raises:
@@ -140,8 +143,8 @@ def _cleared(path: Path, *temporaries: Path) -> Iterator[None]:
     """
     try:
         yield
-    except OSError as error:
-        reason = error.strerror or str(error)
+    except (OSError, library) as error:
+        reason = getattr(error, "strerror", None) or str(error)
         raise OutputError(f"cannot write {path}: {reason}; choose another place for it") from error
     finally:
         for temporary in temporaries:

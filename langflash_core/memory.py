@@ -7,7 +7,9 @@ way.
 
 import ctypes
 import sys
+from collections.abc import Iterator
 from contextlib import suppress
+from pathlib import Path
 
 _SAID = ("not enough memory", "can't allocate memory", "out of memory", "insufficient memory", "bad_alloc")
 _MMAP_THRESHOLD, _TRIM_THRESHOLD = -3, -1  # M_* of malloc.h
@@ -44,6 +46,29 @@ def peak_memory_mb() -> int | None:
         return None
     unit = 1 if sys.platform == "darwin" else 1024  # bytes there, KiB on Linux
     return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6)
+
+
+def free_memory() -> int | None:
+    """Bytes that this process can still have, by the system or a limit set to it; None where neither says."""
+    known = [*_left_of_limits()]
+    with suppress(OSError, IndexError, ValueError):
+        lines = Path("/proc/meminfo").read_text().splitlines()
+        known += [1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")]
+    return min(known, default=None)
+
+
+def _left_of_limits() -> Iterator[int]:
+    """What is left of the limits to a process's memory (ulimit -v and -d), bytes; Linux says what is used."""
+    if sys.platform != "linux":
+        return
+    import resource
+
+    with suppress(OSError, IndexError, ValueError):
+        pages = Path("/proc/self/statm").read_text().split()
+        for limit, used in ((resource.RLIMIT_AS, pages[0]), (resource.RLIMIT_DATA, pages[5])):
+            most = resource.getrlimit(limit)[0]
+            if most != resource.RLIM_INFINITY:
+                yield max(0, most - int(used) * resource.getpagesize())
 
 
 def out_of_memory(error: BaseException) -> bool:

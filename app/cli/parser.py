@@ -2,34 +2,43 @@
 
 import argparse
 from collections.abc import Sequence
+from importlib import import_module
 from typing import NoReturn
 
 import langflash_core
 from langflash_core.errors import InputError
 
-from .words.judging import add_bench, add_bench_network, add_eval
-from .words.scenes import (
-    add_batch,
-    add_clean,
-    add_export,
-    add_frames,
-    add_hide,
-    add_info,
-    add_inventory,
-    add_level,
-    add_lift,
-    add_query,
-    add_reconstruct,
-    add_render,
-    add_view,
-    add_weights,
-    add_words,
-)
-from .words.showing import add_completion, add_desktop, add_tour
-from .words.training import add_labels, add_rooms, add_train
-
 LAB = ("bench-network", "eval", "labels", "rooms", "train")
 """Commands that make and judge the weights."""
+
+_JUDGING, _SCENES, _SHOWING, _TRAINING = "judging", "scenes", "showing", "training"
+COMMANDS = {
+    "view": _SCENES,
+    "reconstruct": _SCENES,
+    "frames": _SCENES,
+    "batch": _SCENES,
+    "query": _SCENES,
+    "render": _SCENES,
+    "export": _SCENES,
+    "tour": _SHOWING,
+    "hide": _SCENES,
+    "clean": _SCENES,
+    "lift": _SCENES,
+    "level": _SCENES,
+    "inventory": _SCENES,
+    "info": _SCENES,
+    "bench": _JUDGING,
+    "bench-network": _JUDGING,
+    "rooms": _TRAINING,
+    "labels": _TRAINING,
+    "train": _TRAINING,
+    "eval": _JUDGING,
+    "weights": _SCENES,
+    "words": _SCENES,
+    "desktop": _SHOWING,
+    "completion": _SHOWING,
+}
+"""Every command, and the module of `words` whose `add_COMMAND` has its words."""
 
 
 class UsageError(InputError):
@@ -48,8 +57,8 @@ class Parser(argparse.ArgumentParser):
         raise UsageError(f"{message}; see {self.prog} --help")
 
 
-def build_parser() -> Parser:
-    """Every command this version has."""
+def build_parser(command: str | None = None) -> Parser:
+    """Every command this version has; `command` alone where it is one of them, which is sooner there."""
     parser = Parser(
         prog="langflash",
         description="Unposed photos to a 3D Gaussian scene that answers words.",
@@ -57,33 +66,9 @@ def build_parser() -> Parser:
     )
     parser.add_argument("--version", action="version", version=f"langflash {langflash_core.__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for add in (
-        add_view,
-        add_reconstruct,
-        add_frames,
-        add_batch,
-        add_query,
-        add_render,
-        add_export,
-        add_tour,
-        add_hide,
-        add_clean,
-        add_lift,
-        add_level,
-        add_inventory,
-        add_info,
-        add_bench,
-        add_bench_network,
-        add_rooms,
-        add_labels,
-        add_train,
-        add_eval,
-        add_weights,
-        add_words,
-        add_desktop,
-        add_completion,
-    ):
-        add(commands)
+    for name in [command] if command in COMMANDS else COMMANDS:
+        words = import_module(f".words.{COMMANDS[name]}", __package__)
+        getattr(words, f"add_{name.replace('-', '_')}")(commands)
     return parser
 
 

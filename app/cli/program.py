@@ -49,7 +49,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: Sequence[str] | None) -> int:
     try:
-        args = build_parser().parse_args(joined(sys.argv[1:] if argv is None else argv))
+        words = joined(sys.argv[1:] if argv is None else argv)
+        args = build_parser(words[0] if words else None).parse_args(words)
     except SystemExit as done:  # --help and --version
         return int(done.code or 0)
     if os.environ.get("LANGFLASH_PROGRESS"):

@@ -32,7 +32,7 @@ def explained(error: Exception) -> str:
     if isinstance(error, OSError):
         return f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
     if out_of_memory(error):
-        return "out of memory; try a smaller --size or fewer photos"
+        return "out of memory; close other programs, or try a smaller --size, fewer photos or fewer Gaussians"
     if os.environ.get("LANGFLASH_DEBUG"):
         traceback.print_exception(error)
     return (

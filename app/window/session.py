@@ -41,6 +41,7 @@ from .recovery.commands import Prefer
 from .recovery.effects import RecoveryEffects
 from .recovery.keeper import Keeper
 from .recovery.preferences import Preferences
+from .recovery.remembering import RememberingEffects
 from .rest import RestEffects
 from .scene.commands import OpenPaths
 from .scene.effects import SceneEffects
@@ -104,6 +105,7 @@ class Session:
         hands = Hands(self._perform, self._post, self._worker.submit, self._worker.cancel, self._now)
         keeper = Keeper()
         recovery = RecoveryEffects(hands, keeper)
+        remembering = RememberingEffects(hands, self._viewport, self._thumbnails)
         opening = OpeningEffects(hands, self._thumbnails, lambda: desktop.clipboard(self._window))
         self._effects = (
             SceneEffects(hands, self._viewport, self._thumbnails, self._entitle),
@@ -111,6 +113,7 @@ class Session:
             AskingEffects(hands, self._viewport),
             EditingEffects(hands, self._viewport),
             recovery,
+            remembering,
             ExportingEffects(hands, keeper),
             FilmingEffects(hands),
             InventoryEffects(hands),
@@ -120,6 +123,7 @@ class Session:
         )
         opening.begin()
         recovery.begin(remembered, complaint, empty=not paths)
+        remembering.begin(remembered.recent)
         if paths:
             self.dispatch(OpenPaths(tuple(str(p) for p in paths)))
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
+from jaxtyping import UInt8
 
 from langflash_core.errors import GraphicsError
 from langflash_core.geometry.poses import Pose
@@ -22,6 +23,7 @@ from .drawing.marked import Marked
 from .drawing.picture import ScenePicture
 from .drawing.values import Stand, View
 from .editing.state import Point, Reading
+from .governor import Plan
 from .scene.memory import SceneMemory
 from .state import State
 
@@ -159,6 +161,21 @@ class Viewport:
         """The picture to show, or None before the first scene, and where one that failed took its texture."""
         shown = None if self.picture is None else self.picture.easel.texture
         return shown if shown is not None and hasattr(shown.mglo, "use") else None
+
+    @property
+    def whole(self) -> bool:
+        """Whether the picture on show is the finest that there will be."""
+        drawn = None if self.picture is None else self.picture.easel.drawn
+        return self.failing or (drawn is not None and drawn.plan.covers(Plan(drawn.plan.kind)))
+
+    def seen(self) -> UInt8[np.ndarray, "H W 3"] | None:
+        """What is shown, read back; None where nothing is."""
+        shown = self.texture
+        if shown is None:
+            return None
+        kind = {"f1": np.uint8, "f2": np.float16, "f4": np.float32}[shown.dtype]
+        rgb = np.frombuffer(shown.read(), kind).reshape(shown.height, shown.width, -1)[..., :3]
+        return rgb if kind is np.uint8 else (rgb.clip(0, 1) * 255 + 0.5).astype(np.uint8)
 
     @property
     def pose(self) -> Pose:

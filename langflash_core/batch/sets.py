@@ -105,4 +105,5 @@ def check_name(name: str, where: str) -> None:
     taken = name.casefold() in (LEDGER, SUMMARY)
     too_long = len(name.encode()) > _LONGEST_NAME
     if not name or name.startswith(".") or name.endswith(".") or taken or too_long or _UNFIT.search(name):
-        raise InputError(f"{where}: '{name[:60]}' cannot be the name of a folder; choose another")
+        said = " ".join(name.split())[:60]
+        raise InputError(f"{where}: '{said}' cannot be the name of a folder; choose another")

@@ -13,11 +13,13 @@ import torch
 from langflash_core.errors import SceneFileError
 from langflash_core.geometry.quaternions import unit_quats
 from langflash_core.limits import GAUSSIANS
+from langflash_core.memory import free_memory
 from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Gaussians, Scene
 
 ROWS_AT_ONCE = 1 << 16  # 16 MB of a file with spherical harmonics of degree 3
 _SMALLEST, _LARGEST = 1e-30, 1e30  # of scales: beyond, float32 products vanish or overflow
+_COPIES = 2  # of all numbers, at most, while a file is opened: 10 million took 1.0 GB for 0.56 of their own
 _OPAQUE = 1 - 1e-7  # its logit, 16.1, is the largest that is written: infinity breaks other readers
 
 
@@ -48,9 +50,10 @@ class Gathering:
         """most: Gaussians of the file called `name`.
 
         Raises:
-            SceneFileError: a file may not hold so many.
+            SceneFileError: a file may not hold so many, or they do not fit into the memory that is free.
         """
         GAUSSIANS.check(most, name, SceneFileError)
+        _check_memory(most, num_bases, name)
         self._rows = Rows(
             *(np.empty((most, *shape), np.float32) for shape in ((3,), (4,), (3,), (), (num_bases, 3)))
         )
@@ -77,6 +80,21 @@ class Gathering:
     def stored(self) -> Rows:
         """What was taken so far, not copied."""
         return Rows(*(values[: self._count] for values in self._rows.all()))
+
+
+def _check_memory(most: int, num_bases: int, name: str) -> None:
+    """Before the work: where memory runs out on the way, the system may end the program.
+
+    Raises:
+        SceneFileError: too little is free for so many Gaussians.
+    """
+    needed, free = 4 * most * (11 + 3 * num_bases) * _COPIES, free_memory()
+    if free is not None and needed > free:
+        sizes = f"take {needed / 1e9:.1f} GB to open, and {max(free, 0) / 1e9:.1f} GB are free"
+        raise SceneFileError(
+            f"{name} says that it holds {most:,} Gaussians: they {sizes}; close other programs, or open it "
+            "where there is more memory"
+        )
 
 
 def to_scene(gathering: Gathering, name: str, warnings: list[str], *, logs: bool, logits: bool) -> Scene:

@@ -68,13 +68,23 @@ def write_usd(scene: Scene, path: Path) -> None:
     with tempfile.TemporaryDirectory() as folder, written_atomically(path) as target:
         suffix = path.suffix.lower()
         plain = Path(folder) / f"scene{'.usdc' if suffix == '.usdz' else suffix}"
-        _write_stage(scene, plain, pxr)
-        if suffix == ".usdz":
-            package = Path(folder) / "scene.usdz"
-            if not pxr.UsdUtils.CreateNewUsdzPackage(pxr.Sdf.AssetPath(str(plain)), str(package)):
-                raise OutputError(f"cannot write {path.name}: OpenUSD could not pack it; name a .usdc")
-            plain = package
+        try:
+            _write_stage(scene, plain, pxr)
+            if suffix == ".usdz":
+                package = Path(folder) / "scene.usdz"
+                if not pxr.UsdUtils.CreateNewUsdzPackage(pxr.Sdf.AssetPath(str(plain)), str(package)):
+                    raise OutputError(f"cannot write {path.name}: OpenUSD could not pack it; name a .usdc")
+                plain = package
+        except pxr.Tf.ErrorException as error:
+            why = f"OpenUSD says '{_reason(error)}'; make room, also in {tempfile.gettempdir()}"
+            raise OutputError(f"cannot write {path.name}: {why}") from error
         target.write_bytes(plain.read_bytes())
+
+
+def _reason(error: Exception) -> str:
+    """What OpenUSD says first: it stands in quotation marks behind the place in its source."""
+    first = str(error).strip().partition("\n")[0]
+    return first.partition(" : '")[2].removesuffix("'") or first
 
 
 def installed() -> bool:

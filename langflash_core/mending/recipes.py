@@ -158,6 +158,8 @@ def _recipe(content: dict[str, Any]) -> Recipe:
     crop, texts = content.get("crop"), [*content.get("within", []), *content.get("kinds", KINDS)]
     if not all(isinstance(text, str) for text in texts) or not isinstance(content.get("invert", False), bool):
         raise ValueError("expected phrases, kinds, and whether to invert")
+    if not all(isinstance(rule, dict) for rule in content.get("rules", [])):
+        raise ValueError("expected conditions by name")
     bounds = [value for rule in content.get("rules", []) for values in rule.values() for value in values]
     numbers = [value for value in bounds if value is not None]
     if not all(isinstance(value, int | float) and math.isfinite(value) for value in numbers):

@@ -26,6 +26,7 @@ _SHOWN = 0.97  # share of the slopes that the view from the origin shows
 # An even spread ends 2 median deviations from its middle, a normal one fades at 4.
 _DEVIATIONS = 2.5
 _MARGIN = 1.2
+_FARTHEST = 1e38  # float32 ends at 3.4e38, and a hostile file has means there
 
 
 def bare_scene(gaussians: Gaussians, source: str, warnings: tuple[str, ...] = ()) -> Scene:
@@ -93,7 +94,8 @@ def _from_outside(means: Tensor, width: float) -> Camera:
     distance = float((corners[:, :2].abs() / tangents - corners[:, 2:]).max())
     viewmat = torch.eye(4)
     viewmat[:3, :3] = axes
-    viewmat[:3, 3] = torch.tensor([0, 0, distance], dtype=torch.float64) - axes @ centre
+    place = torch.tensor([0, 0, distance], dtype=torch.float64) - axes @ centre
+    viewmat[:3, 3] = place.clamp(-_FARTHEST, _FARTHEST)
     return Camera(viewmat, K, *VIEW_SIZE)
 
 

@@ -4,6 +4,7 @@ wrong with a file is told at once. The format is described in `file.py`.
 
 import hashlib
 import json
+import os
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -116,14 +117,15 @@ def _read(path: Path) -> tuple[dict[str, str], bytes]:
         raise SceneFileError(f"{path} is a folder; name a scene file (.langflash)")
     try:
         with path.open("rb") as stream:
+            size = os.fstat(stream.fileno()).st_size  # of this very file: another may be saved onto its path
             start = stream.read(8)
             length = struct.unpack("<Q", start)[0] if len(start) == 8 else 0
-            if length <= path.stat().st_size:  # else it is none
+            if length <= size:  # else it is none
                 HEADER.check(length, path.name, SceneFileError)
             head = stream.read(length) if 2 <= length <= HEADER.value else b""
             header = _parse_header(path, start + head[:8], head)
             _check_counts(path, header)
-            _check_size(path, 8 + length, header, path.stat().st_size)
+            _check_size(path, 8 + length, header, size)
             return header["__metadata__"], start + head + stream.read()
     except FileNotFoundError as error:
         remedy = "check the path, or make it with: langflash reconstruct"

@@ -24,7 +24,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import scipy.ndimage
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
@@ -250,6 +249,8 @@ def _elsewhere(seed: Tensor, own: _Look, others: list[_Look], faced: Tensor) -> 
 
 def _grown(seeds: Tensor, may: Tensor) -> Tensor:
     """(h, w) bool: seeds, what goes on from there, holes and a margin."""
+    import scipy.ndimage  # a tenth of what is imported for a scene, where few have strangers
+
     grown = scipy.ndimage.binary_dilation(
         seeds.cpu().numpy(), _SQUARE, _FARTHEST, (may | seeds).cpu().numpy()
     )

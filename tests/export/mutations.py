@@ -20,6 +20,7 @@ import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,7 @@ from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.edits import History, Marks, Mask, hide, rename_atom
 from langflash_core.scene.edits_file import load_history, save_history
+from langflash_core.types import Scene
 from langflash_core.writing.cameras import read_camera
 from langflash_core.writing.films import read_key_frames
 from tests.app.cli.conftest import stripes
@@ -177,13 +179,19 @@ def outcome(path: Path) -> str:
     return "read"
 
 
+@cache
+def _edited() -> Scene:
+    """Made once: it asks the language model, which takes longer than reading."""
+    return stripes()
+
+
 def reader_of(path: Path) -> Callable[[], object]:
     """What reads a file of this name, and looks at what it read."""
     name = path.name
     if name in ("transforms.json", "cameras.txt", "images.txt"):
         return lambda: read_posed(path.with_name("cameras.txt") if name == "images.txt" else path)
     if name == "a.edits":
-        return lambda: load_history(path, stripes())
+        return lambda: load_history(path, _edited())
     if name == "one.camera.json":
         return lambda: read_camera(path)
     if name == "two.keys.json":

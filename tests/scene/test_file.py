@@ -12,6 +12,7 @@ import safetensors.torch
 import torch
 
 from langflash_core.errors import OutputError, SceneFileError
+from langflash_core.scene import container
 from langflash_core.scene.assemble import assemble
 from langflash_core.scene.fields import REQUIRED, field_bytes
 from langflash_core.scene.file import load, save
@@ -35,6 +36,19 @@ def scene() -> Scene:
 def path(scene, tmp_path):
     save(scene, tmp_path / "a.langflash")
     return tmp_path / "a.langflash"
+
+
+def test_a_scene_that_is_saved_over_while_it_is_read_is_read_as_it_was(scene, path, monkeypatch):
+    """By another program; the sizes of two files are not to be compared."""
+    parsed, known = container._parse_header, path.read_bytes()
+
+    def save_another(*given):
+        save(scene.with_record(others={"note": "longer " * 99}), path)
+        return parsed(*given)
+
+    monkeypatch.setattr(container, "_parse_header", save_another)
+    assert load(path).record.others == {"note": "grüße"}
+    assert path.read_bytes() != known and load(path).record.others["note"].startswith("longer")
 
 
 def tensors_of(scene: Scene) -> dict[str, torch.Tensor]:

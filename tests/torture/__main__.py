@@ -1,11 +1,13 @@
 """Everything that LangFlash is to survive, by parts: `python -m tests.torture [PART ...] [--seed 1]`.
 
-Parts: `PARTS`. `make torture` runs them all in less than half an hour on two cores.
+Parts: `PARTS`. Their defaults are such that `make torture` runs them all in less than half an hour on two
+idle cores; what each takes stands in README.md beside this file, and a part says it when it ends.
 """
 
 import argparse
 import sys
 import tempfile
+import time
 import warnings
 from pathlib import Path
 
@@ -21,12 +23,10 @@ def files(args: argparse.Namespace, folder: Path) -> int:
 def calls(args: argparse.Namespace, folder: Path) -> int:
     """The n-th call fails: `nth.py`."""
     from tests.torture.jobs import prepared
-    from tests.torture.nth import report, torture
+    from tests.torture.nth import everything, report
 
     jobs = [job for job in prepared(folder) if any(job.name.startswith(name) for name in args.only or [""])]
-    share = 60 * args.minutes / max(len(jobs), 1)
-    rows = (row for job in jobs for row in torture(job, folder, share, args.seed))
-    return report(rows, sys.stdout.write)
+    return report(everything(jobs, folder, 60 * _minutes(args, CALLS_MINUTES), args.seed), sys.stdout.write)
 
 
 def kills(args: argparse.Namespace, folder: Path) -> int:
@@ -34,6 +34,14 @@ def kills(args: argparse.Namespace, folder: Path) -> int:
     from tests.torture.kills import everything, report
 
     return report(everything(folder, args.count, args.seed), sys.stdout.write)
+
+
+def together(args: argparse.Namespace, folder: Path) -> int:
+    """Two programs at once: `together.py`."""
+    from tests.torture.kills import report
+    from tests.torture.together import everything
+
+    return report(everything(folder, args.rounds, args.seed), sys.stdout.write, "times")
 
 
 def photos(args: argparse.Namespace, folder: Path) -> int:
@@ -52,7 +60,9 @@ def window(args: argparse.Namespace, folder: Path) -> int:
     prepared(folder)
     (folder / "out").mkdir()
     with opened(folder / "in" / "s.langflash", folder / "out") as session:
-        return report(torture(session, folder, 60 * args.minutes, args.seed), sys.stdout.write)
+        return report(
+            torture(session, folder, 60 * _minutes(args, WINDOW_MINUTES), args.seed), sys.stdout.write
+        )
 
 
 def load(args: argparse.Namespace, folder: Path) -> int:
@@ -69,8 +79,15 @@ def address(args: argparse.Namespace, folder: Path) -> int:
     return report(folder, args.addresses, args.seed, sys.stdout.write)
 
 
+CALLS_MINUTES, WINDOW_MINUTES = 7, 3
+
+
+def _minutes(args: argparse.Namespace, usual: float) -> float:
+    return usual if args.minutes is None else args.minutes
+
+
 PARTS = {
-    each.__name__: each for each in (files, address, calls, window, kills, photos, load)
+    each.__name__: each for each in (files, address, calls, window, kills, together, photos, load)
 }  # fmt: skip
 
 
@@ -78,9 +95,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.torture", description=str(__doc__).splitlines()[0])
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(PARTS)} (default: all)")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--minutes", type=float, default=5.0, help="of each part, about (default: 5)")
-    parser.add_argument("--files", type=int, default=100_000, help="hostile ones (default: 100,000)")
+    budgets = f"calls {CALLS_MINUTES}, window {WINDOW_MINUTES}"
+    parser.add_argument("--minutes", type=float, help=f"of the processor, about (default: {budgets})")
+    parser.add_argument("--files", type=int, default=300_000, help="hostile ones (default: 300,000)")
     parser.add_argument("--count", type=int, default=200, help="of kills while it writes (default: 200)")
+    parser.add_argument("--rounds", type=int, default=20, help="of two programs at once (default: 20)")
     parser.add_argument("--questions", type=int, default=10_000, help="in a row (default: 10,000)")
     parser.add_argument("--addresses", type=int, default=1_000_000, help="of pages (default: a million)")
     parser.add_argument("--only", nargs="+", help="of a part's rows those whose names begin so")
@@ -88,11 +107,18 @@ def main() -> int:
     unknown = [name for name in args.parts if name not in PARTS]
     if unknown:
         parser.error(f"no part {unknown[0]}; there are {', '.join(PARTS)}")
+    from tests.torture.nth import processor
+
     warnings.simplefilter("ignore")
+    sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
     finds = 0
     for name in args.parts or PARTS:
+        began, spent = time.monotonic(), processor()
         with tempfile.TemporaryDirectory() as folder:
             finds += PARTS[name](args, Path(folder))
+        say = f"{name}: {processor() - spent:.0f} s of the processor in {time.monotonic() - began:.0f} s\n"
+        sys.stdout.write(say)
+        sys.stdout.flush()
     sys.stdout.write(f"{finds} finds\n")
     return 1 if finds else 0
 

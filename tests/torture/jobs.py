@@ -133,8 +133,8 @@ def _making() -> Iterator[Job]:
     labels = _inline("labels", "in/clips", "-o", "out/labels", "--workers", "1")
     yield Job("labels", labels, labels, FILES, same=False)
     train = ("train", "run", "in/cache", "-o", "out/run", "--stages", "depth", "--minutes", "1")
-    train = (*train, "--max-steps", "1")
-    yield Job("train run", command(*train), command(*train, "--seed", "5"), (*FILES, "memory"), same=False)
+    train, kinds = (*train, "--max-steps", "1"), (*FILES, "memory", "disk")  # torch writes by itself
+    yield Job("train run", command(*train), command(*train, "--seed", "5"), kinds, same=False)
 
 
 class InlineWorkers:
@@ -174,14 +174,14 @@ class InlineWorkers:
 
 def _inline(*words: str) -> Callable[[Path], tuple[int, str]]:
     def run(folder: Path) -> tuple[int, str]:
-        with _in_this_process():
+        with in_this_process():
             return command(*words)(folder)
 
     return run
 
 
 @contextmanager
-def _in_this_process() -> Iterator[None]:
+def in_this_process() -> Iterator[None]:
     from langflash_core.batch import processes
 
     before = processes.LocalWorkers

@@ -29,12 +29,10 @@ from app.window.recovery import preferences
 from app.window.recovery.effects import KEEP_AFTER
 from app.window.scene import commands as show
 from app.window.scene.work import LoadScene, describe_scene
-from langflash_core.errors import LangFlashError
 from langflash_core.export import export
-from langflash_core.files import held_alone, staged_folder
+from langflash_core.files import staged_folder
 from langflash_core.scene.edited import edited_scene, first_marks
 from langflash_core.scene.edits import Mask, delete
-from langflash_core.scene.file import save
 from langflash_core.types import Scene
 from tests.app.cli.conftest import stripes
 from tests.app.window.recovery.desk import Desk
@@ -102,7 +100,7 @@ def writing(folder: Path, count: int, rng: random.Random) -> Iterator[Row]:
 
 def _over_each_other(folder: Path, count: int, rng: random.Random) -> Row:
     """One file, written again and again by two scenes in turn."""
-    row, scenes = Row("save and export"), (stripes(), _fewer(stripes()))
+    row, scenes = Row("save and export"), (stripes(), fewer(stripes()))
     folder.mkdir(parents=True)
     known: dict[str, set[bytes]] = {}
     for ending in ENDINGS:
@@ -127,11 +125,11 @@ def _over_each_other(folder: Path, count: int, rng: random.Random) -> Row:
         if not path.is_file() or path.read_bytes() not in known[ending]:
             row.finds.append(f"{path.name} is neither of the two")
         export(scenes[0], path)
-        row.finds += [f"not swept up: {left}" for left in _parts(folder)]
+        row.finds += [f"not swept up: {left}" for left in parts(folder)]
     return row
 
 
-def _fewer(scene: Scene) -> Scene:
+def fewer(scene: Scene) -> Scene:
     return edited_scene(scene, delete(first_marks(scene), some(scene, 0)))
 
 
@@ -159,7 +157,7 @@ def _folders(folder: Path, count: int, rng: random.Random) -> Row:
             if len(content) != 20_000 or len(set(content)) != 1:
                 row.finds.append(f"{path.name} is torn")
         fill(0)
-        row.finds += [f"not swept up: {left}" for left in _parts(folder)]
+        row.finds += [f"not swept up: {left}" for left in parts(folder)]
     return row
 
 
@@ -178,7 +176,7 @@ def _preferred(count: int, rng: random.Random) -> Row:
         _, complaint = preferences.load()
         row.finds += [complaint] if complaint else []
         preferences.save(preferences.DEFAULTS)
-        row.finds += [f"not swept up: {left}" for left in _parts(config_folder())]
+        row.finds += [f"not swept up: {left}" for left in parts(config_folder())]
     return row
 
 
@@ -199,14 +197,14 @@ class Window(Desk):
             self.asked.append(LoadScene(command.path, command.edits, command.alone))
 
 
-def _edit(desk: Desk, scene: Scene, number: int) -> None:
+def make_edit(desk: Desk, scene: Scene, number: int) -> None:
     """One edit, and the time until it is kept."""
     desk.perform(edit.Found(some(scene, number), "replace", "here"))
     desk.perform(edit.Delete())
-    _rest(desk)
+    rest(desk)
 
 
-def _rest(desk: Desk) -> None:
+def rest(desk: Desk) -> None:
     """A moment without a change: everything is kept."""
     for _ in range(2):  # the session names edits that are kept
         desk.pass_time(2 * KEEP_AFTER)
@@ -220,21 +218,21 @@ def _count(desk: Desk) -> int:
     return 0 if history is None else len(history.done) // 2
 
 
-def _begin(scene: Scene, say: Say, most: int) -> None:
+def begin(scene: Scene, say: Say, most: int) -> None:
     """A window with an unsaved scene, and edits until it is killed."""
     desk = Window()
     desk.effects.begin(preferences.DEFAULTS, "", empty=True)
     desk.work()
     desk.perform(show.SceneArrived(describe_scene(scene, serial=1, name="room")))
     desk.work()
-    _rest(desk)
+    rest(desk)
     say(0)
     for number in range(1, most + 1):
-        _edit(desk, scene, number)
+        make_edit(desk, scene, number)
         say(number)
 
 
-def _recovered(say: Say | None = None) -> Desk:
+def recovered(say: Say | None = None) -> Desk:
     """A window that goes on with what was left behind, whichever way it is offered."""
     desk = Window()
     if say is not None:
@@ -246,15 +244,15 @@ def _recovered(say: Say | None = None) -> Desk:
     elif desk.state.recovery.edits is not None:
         desk.perform(keep.EndOffer(restore=True))
     desk.work()
-    _rest(desk)
+    rest(desk)
     return desk
 
 
 def _autosaves(count: int, rng: random.Random) -> Row:
     row, scene = Row("autosave"), stripes()
     for _ in range(count):
-        _clean()
-        done, inside = killed(lambda say: _begin(scene, say, 40), rng.uniform(0, 0.4))
+        clean()
+        done, inside = killed(lambda say: begin(scene, say, 40), rng.uniform(0, 0.4))
         row.kills, row.inside = row.kills + 1, row.inside + inside
         row.finds += _lost(max(done))
     return row
@@ -267,15 +265,15 @@ def recovering(count: int, rng: random.Random, again: bool) -> Row:
     scene = stripes()
 
     def second(say: Say) -> None:
-        desk = _recovered(say)
+        desk = recovered(say)
         if again and desk.state.scene.info is not None:
             for number in range(10, 40):
-                _edit(desk, desk.state.scene.info.scene, number)
+                make_edit(desk, desk.state.scene.info.scene, number)
                 say(_count(desk))
 
     for _ in range(count):
-        _clean()
-        done, _ = killed(lambda say: _begin(scene, say, 3), rng.uniform(0.05, 0.3))
+        clean()
+        done, _ = killed(lambda say: begin(scene, say, 3), rng.uniform(0.05, 0.3))
         done2, inside = killed(second, rng.uniform(0, 0.5 if again else 0.2))
         row.kills, row.inside = row.kills + 1, row.inside + inside
         row.finds += _lost(max(max(done), max(done2)))
@@ -284,7 +282,7 @@ def recovering(count: int, rng: random.Random, again: bool) -> Row:
 
 def _lost(kept: int) -> list[str]:
     """What is wrong with what can be had back, where so many edits were kept."""
-    desk = _recovered()
+    desk = recovered()
     finds = []
     have = _count(desk)
     if desk.state.scene.info is None:
@@ -292,95 +290,22 @@ def _lost(kept: int) -> list[str]:
     elif not kept <= have <= kept + 1:
         finds.append(f"{have} edits came back of {kept}")
     desk.effects.close(desk.state, crashed=False)
-    finds += [f"not swept up: {left}" for left in _parts(state_folder())]
+    finds += [f"not swept up: {left}" for left in parts(state_folder())]
     return finds
 
 
-def _clean() -> None:
+def clean() -> None:
     shutil.rmtree(state_folder(), ignore_errors=True)
 
 
-def _parts(folder: Path) -> list[str]:
+def parts(folder: Path) -> list[str]:
     return [path.name for path in folder.rglob("*.part")] if folder.is_dir() else []
 
 
-# --- two at once ----------------------------------------------------------------------------------
-
-
-def two_at_once(folder: Path) -> Row:
-    """Two programs on one scene, one folder of preferences, one recovery folder, one batch folder."""
-    row = Row("two programs at once")
-    scenes, path = (stripes(), _fewer(stripes())), folder / "both.langflash"
-    contents = set()
-    for scene in scenes:
-        save(scene, path)
-        contents.add(path.read_bytes())
-    row.finds += _both(lambda n: [save(scenes[n], path) for _ in range(20)])
-    if path.read_bytes() not in contents or _parts(folder):
-        row.finds.append("two saves into one file tore it")
-    row.finds += _both(
-        lambda n: [preferences.save(replace(preferences.DEFAULTS, scale=1.0 + n / 4)) for _ in range(50)]
-    )
-    if preferences.load()[1] or preferences.load()[0].scale not in (1.0, 1.25):
-        row.finds.append("two windows tore the preferences")
-    row.finds += _two_windows(scenes)
-    row.finds += _two_batches(folder)
-    row.kills = 4
-    return row
-
-
-def _both(work: Callable[[int], object]) -> list[str]:
-    """Twice at once, to the end."""
-    children = []
-    for number in range(2):
-        child = os.fork()
-        if child == 0:
-            code = 1
-            try:
-                work(number)
-                code = 0
-            finally:
-                os._exit(code)
-        children.append(child)
-    codes = [os.waitpid(child, 0)[1] for child in children]
-    return [f"one of two failed: {codes}"] if any(codes) else []
-
-
-def _two_windows(scenes: tuple[Scene, Scene]) -> list[str]:
-    """Both die with a scene that nobody saved; both scenes can be had back, one after the other."""
-    _clean()
-    for scene in scenes:
-        killed(lambda say, scene=scene: _begin(scene, say, 0), 0.3)
-    counts = set()
-    for _ in range(2):
-        desk = _recovered()
-        if desk.state.scene.info is not None:
-            counts.add(desk.state.scene.info.num_gaussians)
-        desk.effects.close(desk.state, crashed=False)
-    wanted = {len(scene.gaussians) for scene in scenes}
-    return [] if counts == wanted else [f"of scenes of {wanted} came back {counts}"]
-
-
-def _two_batches(folder: Path) -> list[str]:
-    with held_alone(folder / "batch"):
-        child = os.fork()
-        if child == 0:
-            code = 1
-            try:
-                with held_alone(folder / "batch"):
-                    code = 2
-            except LangFlashError as error:
-                code = 0 if "another run" in str(error) else 3
-            finally:
-                os._exit(code)
-        code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    return [] if code == 0 else [f"a second batch into one folder ended with {code}"]
-
-
-def report(rows: Iterator[Row], say: Callable[[str], object]) -> int:
-    """The table; how many finds."""
+def report(rows: Iterator[Row], say: Callable[[str], object], times: str = "kills") -> int:
+    """The table; how many finds. times: what is counted."""
     finds = 0
-    say(f"{'what':28}{'kills':>7}{'at work':>9}{'finds':>7}\n")
+    say(f"{'what':28}{times:>7}{'at work':>9}{'finds':>7}\n")
     for row in rows:
         say(f"{row.name:28}{row.kills:7,}{row.inside:9,}{len(row.finds):7}\n")
         for words in row.finds[:10]:
@@ -395,7 +320,6 @@ def everything(folder: Path, count: int, seed: int) -> Iterator[Row]:
     os.environ["LANGFLASH_STATE"], os.environ["LANGFLASH_CONFIG"] = (
         str(folder / "state"), str(folder / "config"),
     )  # fmt: skip
-    yield two_at_once(folder)
     yield from writing(folder, count, rng)
     yield recovering(count // 5, rng, again=False)
     yield recovering(count // 5, rng, again=True)

@@ -6,7 +6,8 @@ as it was or as it was to be, nothing is lost, and what went wrong is one senten
 A job runs in this process, once whole into an empty folder for what it is to make, once with other words for
 what lies there before. Then it runs over and over, a later call failing each time: over what was there, or
 (every other time) into an empty folder. Where a job has more calls than its share of the time allows, their
-numbers are spread evenly, and the table says how many of how many were tried.
+numbers are spread evenly, and the table says how many of how many were tried. The seed says in which order
+the jobs come; those that no time is left for are said to be left out.
 """
 
 import contextlib
@@ -16,10 +17,11 @@ import hashlib
 import io
 import itertools
 import json
+import os
+import random
 import shutil
-import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -72,6 +74,24 @@ class Row:
     finds: dict[str, str] = field(default_factory=dict)
 
 
+def everything(jobs: Sequence[Job], folder: Path, seconds: float, seed: int = 1) -> Iterator[Row]:
+    """Rows of all jobs in an order of the seed's; the processor's `seconds` are shared among those to come,
+    and a job that none are left for is said to be left out, for another seed."""
+    end = processor() + seconds
+    order = random.Random(seed).sample(jobs, len(jobs))
+    for place, job in enumerate(order):
+        left = end - processor()
+        if left > 0:
+            yield from torture(job, folder, left / (len(order) - place), seed)
+        else:
+            yield Row(job.name, "left out")
+
+
+def processor() -> float:
+    """Seconds of the processor that this process and those it waited for have used."""
+    return sum(os.times()[:4])
+
+
 def torture(job: Job, folder: Path, seconds: float, seed: int = 1) -> Iterator[Row]:
     """A row per kind; `seconds` for all of them."""
     out, new, old = folder / "out", folder / "new", folder / "old"
@@ -84,12 +104,12 @@ def torture(job: Job, folder: Path, seconds: float, seed: int = 1) -> Iterator[R
     share = seconds / len(job.kinds)
     for kind in job.kinds:
         row = Row(job.name, kind)
-        began = time.process_time()
+        began = processor()
         for nth in _numbers(job, folder, kind, row, share, seed):
             empty = job.fresh and (nth + seed) % 2 == 0
             _lay(out, None if empty else old)
             _try(job, folder, kind, nth, row, {} if empty else _digests(old), _digests(new))
-            if time.process_time() - began > 3 * share:
+            if processor() - began > 3 * share:
                 break
         gc.collect()
         yield row
@@ -101,11 +121,11 @@ def _numbers(job: Job, folder: Path, kind: str, row: Row, share: float, seed: in
         row.calls = STEPS
         return list(range(STEPS))
     _lay(folder / "out", folder / "old")
-    began = time.process_time()
+    began = processor()
     with _fault(kind, 10**9, folder) as fault:
         _spoken(job.run, folder)
     assert fault is not None
-    each = (time.process_time() - began) * 0.6 + 0.002  # the later a call, the longer until it fails
+    each = (processor() - began) * 0.6 + 0.002  # the later a call, the longer until it fails
     row.calls = fault.calls
     wanted = row.calls * (len(ERRORS.get(kind, ())) or 1)
     most = max(4, int(share / each))

@@ -27,11 +27,6 @@ def test_a_few_kills_lose_nothing(own):
 
 
 @pytest.mark.filterwarnings("ignore:This process")
-def test_two_programs_at_once(own):
-    assert kills.two_at_once(own).finds == []
-
-
-@pytest.mark.filterwarnings("ignore:This process")
 def test_a_torn_file_would_be_found(own):
     """What writes without care is caught."""
     path, finds = own / "a", 0

@@ -43,6 +43,15 @@ def test_a_few_failures_do_no_harm(known, folder, name):
         assert row.tried or not row.calls
 
 
+def test_jobs_share_the_time_and_what_is_left_out_is_said(known, folder):
+    """In the seed's order; that is all a bound on the processor's time can promise."""
+    some = [known["preferences"], known["save"]]
+    assert [row.kind for row in nth.everything(some, folder, 0.0)] == ["left out"] * 2
+    for seed, first in ((1, "preferences"), (5, "save")):
+        rows = list(nth.everything(some, folder, 0.3, seed))
+        assert rows[0].job == first and rows[0].tried and not any(row.finds for row in rows)
+
+
 def test_there_is_a_job_for_every_kind_of_file(known):
     names = " ".join(known)
     assert all(word in names for word in (".langflash", ".html", ".mp4", "reconstruct", "batch", "train"))
@@ -114,6 +123,18 @@ def test_a_picture_without_memory_is_no_picture():
         pass
     with pytest.raises(GraphicsError, match=r"refused \(line one\); x"), refusals_said(None, "x"):
         raise moderngl.Error("\nline one\nline two")
+
+
+@pytest.mark.parametrize("ending", [".usda", ".usdc", ".usdz"])
+def test_a_full_disk_under_openusd_is_one_sentence(known, folder, capfd, ending):
+    pytest.importorskip("pxr")
+    path = folder / f"u{ending}"
+    path.write_bytes(b"old")
+    with small_disk(5000):
+        assert main(["export", str(folder / "in" / "s.langflash"), "-o", str(path), "--replace"]) == 2
+    said = capfd.readouterr().err
+    assert said.startswith(f"langflash: cannot write {path.name}: OpenUSD says '") and said.count("\n") == 1
+    assert path.read_bytes() == b"old" and not list(folder.glob(".*.part"))
 
 
 def test_a_film_that_a_full_disk_cuts_off_is_not_taken_for_whole(known, folder, capfd):

@@ -182,7 +182,8 @@ def _told(
         write_json(document, out)
     else:
         print(_sentence(document), file=out)
-    if len(jobs) == 1 and failed:
+    told_by_table = args.workers is not None or args.address is not None
+    if len(jobs) == 1 and failed and not told_by_table:
         say_error(failed[0].reason)
     if stopped:
         say_error("stopped; the same command goes on from here")

@@ -1,15 +1,37 @@
 """What a person taught a scene, kept for other scenes, and taken from there."""
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
+from langflash_core.files import make_folder
 from langflash_core.scene import edits
 
 from ..commands import Notify
+from ..recovery.locks import one_at_a_time
 from ..state import State
 from .commands import with_edit
 
+if TYPE_CHECKING:
+    from langflash_core.language.lessons import Lessons
+
 WORDS = "mine.words.json"
 """In the folder of preferences; `langflash words` reads it, too."""
+
+
+def with_kept(lessons: "Lessons", path: Path) -> "Lessons":
+    """Add lessons to a vocabulary, which other windows add to as well; what it holds then.
+
+    Raises:
+        LangFlashError: it is damaged, of another network or full, or cannot be written.
+    """
+    from langflash_core.language.lessons import read_lessons, write_lessons
+
+    make_folder(path.parent)
+    with one_at_a_time(path.with_suffix(".lock")):
+        known = read_lessons(path).joined(lessons) if path.exists() else lessons
+        write_lessons(known, path)
+    return known
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from langflash_core.errors import LangFlashError
-from langflash_core.files import make_folder
 from langflash_core.geometry.poses import Pose, to_camera
 from langflash_core.mending.recipes import Box, Recipe
 from langflash_core.scene.edits import Combine, Marks
@@ -36,7 +35,7 @@ from .commands import (
 )  # fmt: skip
 from .pointing import AtomsNamed, Named, ReadingTaken
 from .state import BY_STRENGTH, PICK_RADIUS, Point, Reading, Region, strongest
-from .teaching import WordsFound
+from .teaching import WordsFound, with_kept
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -428,7 +427,7 @@ class KeepLessons(EditErrand):
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.appearance import appearances
-        from langflash_core.language.lessons import lessons_of, read_lessons, write_lessons
+        from langflash_core.language.lessons import lessons_of
         from langflash_core.scene.edited import spoken_scene
 
         record = spoken_scene(self.scene, self.marks).record
@@ -437,9 +436,7 @@ class KeepLessons(EditErrand):
             return
         looks = appearances(self.scene)
         lessons = lessons_of(record, looks.rows, looks.network)
-        known = read_lessons(self.path).joined(lessons) if self.path.exists() else lessons
-        make_folder(self.path.parent)
-        write_lessons(known, self.path)
+        known = with_kept(lessons, self.path)
         yield Notify(f"Kept {len(lessons)} for other scenes; you taught {len(known)} in all.", "info")
 
 

@@ -11,6 +11,7 @@ from ..editing.panels import gizmo
 from ..editing.state import Tool
 from ..filming import commands as film
 from ..opening import commands as opening
+from ..opening.panels import welcome
 from ..scene import commands as show
 from ..state import State
 from . import table
@@ -20,6 +21,8 @@ AREAS = (
     "##bar3", "##card", "##ruler", "##keys", "##views", "Dictionary", "Tour", "Inventory", "Rules",
 )  # fmt: skip
 """Windows that F6 goes through, by name: questions first."""
+_EMPTY = "##picture"
+"""One more, where it has tiles to open instead of a scene."""
 _PAGES = (imgui.Key.page_up, imgui.Key.page_down)
 _ARROWS = (imgui.Key.left_arrow, imgui.Key.right_arrow, imgui.Key.up_arrow, imgui.Key.down_arrow)
 
@@ -68,7 +71,8 @@ def step_to_area(state: State) -> None:
     if not (lost or imgui.is_key_pressed(imgui.Key.f6, False)) or _covered(state):
         return
     here = context.nav_window.name if context.nav_window is not None else ""
-    found = {name: imgui.internal.find_window_by_name(name) for name in AREAS}
+    areas = (*AREAS, _EMPTY) if welcome.waits(state) else AREAS
+    found = {name: imgui.internal.find_window_by_name(name) for name in areas}
     there = [name for name, window in found.items() if window is not None and window.was_active]
     step = 0 if lost else 1
     following = there[(there.index(here) + step) % len(there)] if here in there else there[0]

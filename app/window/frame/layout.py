@@ -10,6 +10,7 @@ from ..filming import panel as film_panel
 from ..inventory import panel as inventory_panel
 from ..kit import theme, widgets
 from ..kit.look import Look
+from ..opening.panels import welcome
 from ..recovery import panels as recovery_panels
 from ..scene.panels import axes, legend, tray, views
 from ..state import State
@@ -78,7 +79,8 @@ def _side(state: State, look: Look) -> list[do.Command]:
 
 def _picture(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
-    with widgets.window("##picture", place, size, imgui.WindowFlags_.no_background | widgets.NO_KEYS):
+    keys_go_by = 0 if welcome.waits(state) else widgets.NO_KEYS
+    with widgets.window("##picture", place, size, imgui.WindowFlags_.no_background | keys_go_by):
         imgui.pop_style_var()
         issued = canvas.draw(state, look)
     if state.scene.info is not None and state.scene.info.views:

@@ -101,7 +101,7 @@ def matching(text: str, state: State) -> tuple[Entry, ...]:
 def recent(state: State) -> Iterable[Entry]:
     """The scenes that were open last, the newest first."""
     for path in state.preferences.recent:
-        yield Entry(Path(path).name, "Recent scenes", _always(show.OpenPaths((path,))))
+        yield Entry(Path(path).name, "Recent scenes", _always(keep.OpenProject(path)))
 
 
 def sample_photos() -> Iterable[Entry]:

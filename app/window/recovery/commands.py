@@ -14,7 +14,7 @@ from ..scene.commands import scene_photos
 from ..scene.state import Photo
 from ..state import State
 from .preferences import PANEL_WIDTHS, SCALES, SPEEDS, Preferences
-from .state import Kept, KeptPhoto, Offer
+from .state import Kept, KeptPhoto, Offer, Project
 
 # Preferences
 
@@ -50,10 +50,65 @@ class Opened:
 
 @dataclass(frozen=True)
 class ForgetRecent:
-    """Empty the list of recent files."""
+    """Empty the list of recent files, or take one out of it; what is remembered of them goes too."""
+
+    path: str | None = None
 
     def apply(self, state: State) -> State:
-        return replace(state, preferences=replace(state.preferences, recent=()))
+        recent, projects = state.preferences.recent, state.recovery.projects
+        left = () if self.path is None else tuple(each for each in recent if each != self.path)
+        state = state.with_recovery(projects=tuple(each for each in projects if each.path in left))
+        return replace(state, preferences=replace(state.preferences, recent=left))
+
+
+# Scenes that were open lately
+
+
+@dataclass(frozen=True)
+class ProjectsRead:
+    """What is remembered of the recent scenes that are still there, the newest first."""
+
+    projects: tuple[Project, ...]
+
+    def apply(self, state: State) -> State:
+        recent = state.preferences.recent
+        return state.with_recovery(projects=tuple(each for each in self.projects if each.path in recent))
+
+
+@dataclass(frozen=True)
+class OpenProject:
+    """Open a recent scene as it was left."""
+
+    path: str
+
+    def apply(self, state: State) -> State:
+        return replace(state, dialog=None)
+
+
+@dataclass(frozen=True)
+class GoOnWith:
+    """Read the scene of a project, now that nothing is in its way."""
+
+    kept: Kept
+
+    def apply(self, state: State) -> State:
+        return state
+
+
+@dataclass(frozen=True)
+class StandAsLeft:
+    """The scene of a project is there: its photos, its phrases, where one stood. Phrases of another scene go
+    where it has its own."""
+
+    kept: Kept
+
+    def apply(self, state: State) -> State:
+        if state.scene.info is None:
+            return state
+        kept = self.kept
+        state = restored_tray(state, tuple(zip(kept.photos, kept.fovs, strict=True)), kept.missing)
+        state = restored_phrases(state, kept)
+        return StandAgain(kept.pose, kept.mode, kept.name, saved=True).apply(state)
 
 
 # A session that ended badly
@@ -107,6 +162,25 @@ def restored_tray(state: State, photos: Iterable[KeptPhoto], missing: Sequence[s
 def kept_photos(state: State) -> tuple[KeptPhoto, ...]:
     """The photos of the scene on show, to be kept with it."""
     return tuple((str(photo.path), photo.fov) for photo in scene_photos(state))
+
+
+def kept_session(state: State, scene: Path | None) -> Kept:
+    """What is kept of the tray, the phrases and the view. scene: where the scene on show lies, if it does."""
+    info, prompts = state.scene.info, [prompt for prompt in state.asking.prompts if prompt.text.strip()]
+    return Kept(
+        photos=tuple(str(photo.path) for photo in state.scene.photos),
+        fovs=tuple(photo.fov for photo in state.scene.photos),
+        scene="" if scene is None else str(scene),
+        saved=info is None or info.path is not None,
+        name="" if info is None else info.name,
+        phrases=tuple(prompt.text for prompt in prompts),
+        likes=tuple(prompt.like.hex() for prompt in prompts),
+        thresholds=tuple(prompt.threshold for prompt in prompts),
+        colours=tuple(prompt.colour for prompt in prompts),
+        visible=tuple(prompt.visible for prompt in prompts),
+        mode=state.scene.mode.name,
+        pose=None if info is None else state.scene.pose,
+    )
 
 
 def restored_phrases(state: State, kept: Kept) -> State:

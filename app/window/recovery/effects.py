@@ -5,6 +5,7 @@ and edits by the worker, which has the library.
 """
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from .commands import (
     Prefer,
     StandAgain,
     kept_photos,
+    kept_session,
 )
 from .keeper import Keeper
 from .preferences import Preferences
@@ -58,12 +60,13 @@ class RecoveryEffects(Effects):
         self._edits_wrote = False  # or have ever, and what removes them may not have come to it
         self._replaced: list[Errand] = []  # forget what goes once the same edits are written elsewhere
         self._snapshot: tuple = ()
+        self._saved: Preferences | None = None  # the preferences that this window found, or wrote last
         self._keep_at = self._keep_edits_at = self._save_at = NEVER
 
     def begin(self, loaded: Preferences, sentence: str, empty: bool) -> None:
         """The first commands of a window. empty: it opens without photos or a scene."""
         self._hands.perform(Prefer(loaded))
-        self._save_at = NEVER
+        self._saved, self._save_at = loaded, NEVER
         if sentence:
             self._hands.perform(Notify(sentence))
         kept = sessions.left_behind()
@@ -264,9 +267,11 @@ class RecoveryEffects(Effects):
     # What the writer's thread does
 
     def _save(self, wanted: Preferences) -> None:
-        problem = preferences.try_to_save(wanted)
+        problem = preferences.try_to_save(wanted, self._saved)
         if problem:
             self._hands.dispatch(Notify(problem))
+        else:
+            self._saved = wanted
 
     def _keep(self, kept: Kept, outlived: Path | None = None) -> None:
         try:
@@ -280,22 +285,8 @@ class RecoveryEffects(Effects):
     def _kept(self, state: State) -> Kept:
         info = state.scene.info
         path = None if info is None else info.path or (self._keeper.scene_file if self._copied else None)
-        prompts = [prompt for prompt in state.asking.prompts if prompt.text.strip()]
-        return Kept(
-            photos=tuple(str(photo.path) for photo in state.scene.photos),
-            fovs=tuple(photo.fov for photo in state.scene.photos),
-            scene="" if path is None else str(path),
-            edits="" if state.recovery.kept is None else str(state.recovery.kept),
-            saved=info is None or info.path is not None,
-            name="" if info is None else info.name,
-            phrases=tuple(prompt.text for prompt in prompts),
-            likes=tuple(prompt.like.hex() for prompt in prompts),
-            thresholds=tuple(prompt.threshold for prompt in prompts),
-            colours=tuple(prompt.colour for prompt in prompts),
-            visible=tuple(prompt.visible for prompt in prompts),
-            mode=state.scene.mode.name,
-            pose=None if info is None else state.scene.pose,
-        )
+        edits = "" if state.recovery.kept is None else str(state.recovery.kept)
+        return replace(kept_session(state, path), edits=edits)
 
 
 def _snapshot(state: State) -> tuple[Any, ...]:

@@ -16,7 +16,8 @@ from ..places import state_folder
 from ..scene.drops import SCENE_SUFFIX
 from ..scene.state import SceneInfo
 from . import edits
-from .sessions import CONTENTS, EDITED, PREFIX, SELECTION, fields, locked
+from .locks import locked
+from .sessions import CONTENTS, EDITED, PREFIX, SELECTION, fields
 from .state import Kept, KeptPhoto
 
 

@@ -1,10 +1,12 @@
 """What the program remembers from one day to the next: one small JSON file, written whole.
 
 A file that is damaged, foreign or from another version never stops the start: what cannot be
-used falls back to its default, and one sentence says so.
+used falls back to its default, and one sentence says so. Windows share the file: each writes what it has
+changed itself, and leaves the rest as the others have kept it.
 """
 
 import json
+import os
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ from langflash_core.files import make_folder, write_atomically
 from langflash_core.formats import COLOUR_MAPS
 
 from ..places import config_folder
+from .locks import one_at_a_time
 
 MOST_RECENT = 10
 THEMES = ("dark", "light")
@@ -72,10 +75,18 @@ def load(path: Path | None = None) -> tuple[Preferences, str]:
     """The preferences, and a sentence when some of them could not be used."""
     path = path or file()
     try:
-        content = json.loads(path.read_bytes())
+        return _read(path.read_bytes(), path)
     except FileNotFoundError:
         return DEFAULTS, ""
-    except (OSError, ValueError, RecursionError):
+    except OSError:
+        return DEFAULTS, f"The preferences could not be read, so the defaults are used; see {path}."
+
+
+def _read(stored: bytes, path: Path) -> tuple[Preferences, str]:
+    """The same of a file's content."""
+    try:
+        content = json.loads(stored)
+    except (ValueError, RecursionError):
         return DEFAULTS, f"The preferences could not be read, so the defaults are used; see {path}."
     if not isinstance(content, dict):
         return DEFAULTS, f"The preferences hold something else, so the defaults are used; see {path}."
@@ -87,21 +98,68 @@ def load(path: Path | None = None) -> tuple[Preferences, str]:
     return Preferences(**kept), sentence
 
 
-def save(preferences: Preferences, path: Path | None = None) -> None:
+def save(preferences: Preferences, path: Path | None = None, since: Preferences | None = None) -> None:
     """Write them, whole.
 
+    Args:
+        since: what this window knew before: what it has not changed since stays as another has kept it. None:
+            all is written as it is.
+
     Raises:
-        OutputError: the folder cannot be written.
+        OutputError: the folder cannot be written, or what another window kept cannot be read.
     """
     path = path or file()
     make_folder(path.parent)
-    write_atomically(path, json.dumps(asdict(preferences), indent=2).encode())
+    with one_at_a_time(path.with_suffix(".lock")):
+        if since is not None and os.path.exists(path):
+            preferences = merged(preferences, since, _kept_by_others(path, preferences))
+        write_atomically(path, json.dumps(asdict(preferences), indent=2).encode())
 
 
-def try_to_save(preferences: Preferences) -> str:
+def merged(own: Preferences, since: Preferences, theirs: Preferences) -> Preferences:
+    """`theirs`, with what has become of `since` in `own`."""
+    changed = {name: value for name, value in values_of(own).items() if value != getattr(since, name)}
+    if own.recent and "recent" in changed:
+        opened, gone = _opened(own.recent, since.recent), {*since.recent} - {*own.recent}
+        others = (path for path in theirs.recent if path not in gone and path not in opened)
+        changed["recent"] = (*opened, *others)[:MOST_RECENT]
+    return replace(theirs, **changed)
+
+
+def values_of(preferences: Preferences) -> dict[str, Any]:
+    """By name."""
+    return {field.name: getattr(preferences, field.name) for field in fields(preferences)}
+
+
+def _opened(own: tuple[str, ...], since: tuple[str, ...]) -> tuple[str, ...]:
+    """The first ones of `own`: what follows them stands in `since` in the same order."""
+    end = len(since)
+    for place in range(len(own) - 1, -1, -1):
+        if own[place] not in since[:end]:
+            return own[: place + 1]
+        end = since.index(own[place])
+    return ()
+
+
+def _kept_by_others(path: Path, own: Preferences) -> Preferences:
+    """What lies on the disk; `own` where nothing of it can be used.
+
+    Raises:
+        OutputError: the system does not give it, so it is not written over.
+    """
+    try:
+        stored = path.read_bytes()
+    except OSError as error:
+        reason = error.strerror or error
+        raise OutputError(f"cannot read {path}, where other windows keep theirs: {reason}") from error
+    theirs, complaint = _read(stored, path)
+    return own if complaint and theirs == DEFAULTS else theirs
+
+
+def try_to_save(preferences: Preferences, since: Preferences | None = None) -> str:
     """Save; a sentence where that failed."""
     try:
-        save(preferences)
+        save(preferences, since=since)
     except OutputError as error:
         return f"The preferences are not kept: {error}."
     return ""

@@ -6,24 +6,26 @@ however it dies. A file whose lock is free belongs to nobody: it is offered agai
 
 import json
 import os
-import sys
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from dataclasses import asdict, replace
 from math import isfinite
 from pathlib import Path
-from typing import BinaryIO
 
-from langflash_core.errors import OutputError
 from langflash_core.geometry.poses import read_pose
 
 from ..places import state_folder
 from ..scene.drops import SCENE_SUFFIX, still_there
+from .locks import is_free
 from .state import Kept
 
 PREFIX = "session-"
 MOST_LEFT = 8  # as many as there may be edits of
 EDITED, SELECTION = f".edited{SCENE_SUFFIX}", f".selection{SCENE_SUFFIX}"
 CONTENTS = (".json", SCENE_SUFFIX, EDITED, SELECTION)
+DAMAGED = (
+    OSError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError,
+)  # fmt: skip
+"""What reading a file that is damaged, or another's, raises."""
 
 
 def left_behind() -> Kept | None:
@@ -32,7 +34,7 @@ def left_behind() -> Kept | None:
     found: list[tuple[float, Kept]] = []
     with suppress(OSError):
         for path in state_folder().glob(f"{PREFIX}*.json"):
-            if not _abandoned(path.with_suffix(".lock")):
+            if not is_free(path.with_suffix(".lock")):
                 continue
             try:
                 kept = read(path)
@@ -57,21 +59,29 @@ def read(path: Path) -> Kept | None:
     """
     stored = path.read_bytes()
     try:
-        content = json.loads(stored)
-        pose = content.pop("pose")
-        placed = None if pose is None else read_pose(pose)
-        lists = {name: tuple(content.pop(name)) for name in ("photos", "fovs", "phrases")}
-        asked = _asked(content, len(lists["phrases"]))
-        kept = Kept(pose=placed, file=path, **asked, **lists, **content)
-        words = (kept.scene, kept.edits, kept.name, kept.mode, *kept.photos, *kept.phrases)
-        if not all(isinstance(word, str) for word in words):  # a number would name an open file
-            raise ValueError("expected texts")
-        there, missing = still_there(zip(kept.photos, kept.fovs, strict=True))
-        photos, fovs = tuple(photo for photo, _ in there), tuple(fov for _, fov in there)
-        edits = kept.edits if kept.edits and os.path.isfile(kept.edits) else ""
-        scene = kept.scene if edits or (kept.scene and os.path.isfile(kept.scene)) else ""
-    except (OSError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError):
+        return understood(json.loads(stored), path)
+    except DAMAGED:
         return None
+
+
+def understood(content: dict, file: Path | None = None) -> Kept:
+    """A session of what `fields` gave, without what has gone since. file: that it was read from.
+
+    Raises:
+        One of `DAMAGED`: it is something else.
+    """
+    pose = content.pop("pose")
+    placed = None if pose is None else read_pose(pose)
+    lists = {name: tuple(content.pop(name)) for name in ("photos", "fovs", "phrases")}
+    asked = _asked(content, len(lists["phrases"]))
+    kept = Kept(pose=placed, file=file, **asked, **lists, **content)
+    words = (kept.scene, kept.edits, kept.name, kept.mode, *kept.photos, *kept.phrases)
+    if not all(isinstance(word, str) for word in words):  # a number would name an open file
+        raise ValueError("expected texts")
+    there, missing = still_there(zip(kept.photos, kept.fovs, strict=True))
+    photos, fovs = tuple(photo for photo, _ in there), tuple(fov for _, fov in there)
+    edits = kept.edits if kept.edits and os.path.isfile(kept.edits) else ""
+    scene = kept.scene if edits or (kept.scene and os.path.isfile(kept.scene)) else ""
     return replace(kept, photos=photos, fovs=fovs, scene=scene, edits=edits, missing=missing)
 
 
@@ -110,45 +120,3 @@ def fields(kept: Kept) -> dict:
     content = asdict(replace(kept, file=None))
     del content["file"], content["missing"]
     return content
-
-
-def locked(path: Path) -> BinaryIO:
-    """A lock file, held until it is closed or the process ends."""
-    with ExitStack() as opened:
-        try:
-            stream = opened.enter_context(path.open("wb", buffering=0))
-            stream.write(b"\0")
-            _lock(stream)
-        except OSError as error:
-            raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
-        opened.pop_all()
-    return stream
-
-
-def _abandoned(path: Path) -> bool:
-    """Whether nobody holds the lock."""
-    try:
-        with path.open("r+b") as stream:
-            _lock(stream)
-    except FileNotFoundError:
-        return True
-    except OSError:
-        return False
-    return True
-
-
-def _lock(stream: BinaryIO) -> None:
-    """Without waiting.
-
-    Raises:
-        OSError: another process holds it.
-    """
-    if sys.platform == "win32":
-        import msvcrt
-
-        stream.seek(0)
-        msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)
-    else:
-        import fcntl
-
-        fcntl.flock(stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)

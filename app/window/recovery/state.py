@@ -71,17 +71,41 @@ class Offer:
 
 
 @dataclass(frozen=True)
+class Project:
+    """A scene that was open lately, as it was left. path: of its file. views: photos that it is made of, 0
+    where nobody knows. when: it was open last; None where that is not known."""
+
+    path: str
+    kept: Kept = Kept()
+    views: int = 0
+    when: datetime | None = None
+
+    @property
+    def picture(self) -> str:
+        """What its small picture is called."""
+        return f"project {self.path}"
+
+    def sentence(self) -> str:
+        """What it holds, for people; nothing where it is not known."""
+        phrases = sum(bool(phrase.strip()) for phrase in self.kept.phrases)
+        counted = ((self.views, "photo"), (phrases, "phrase"))
+        return ", ".join(f"{count} {word}{'s' * (count > 1)}" for count, word in counted if count)
+
+
+@dataclass(frozen=True)
 class Recovery:
     """The recovery half of the state.
 
     session: one that ended badly, offered again. edits: those of an earlier session that nobody
     saved. copy: where a scene that nobody saved is kept. kept: the file that holds unsaved edits.
+    projects: scenes that were open before this window, the last one first.
     """
 
     session: Kept | None = None
     edits: Offer | None = None
     copy: Path | None = None
     kept: Path | None = None
+    projects: tuple[Project, ...] = ()
 
 
 NO_RECOVERY = Recovery()

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 from langflash_core.files import make_folder
 from langflash_core.scene.edits import History, Marks
 
-from ..commands import Command
+from ..commands import Command, ShowPicture
 from ..requests import Asked, Errand, SceneErrand
-from . import edits
-from .commands import CopyKept, EditsKept, OfferEdits
+from . import edits, projects
+from .commands import CopyKept, EditsKept, OfferEdits, ProjectsRead
 from .state import KeptPhoto
 
 if TYPE_CHECKING:
@@ -100,3 +100,20 @@ class LookForEdits(SceneErrand):
         offer = edits.find(self.scene, self.path)
         if offer is not None:
             yield OfferEdits(offer)
+
+
+@dataclass(frozen=True)
+class ReadProjects(Errand):
+    """What is remembered of recent scenes, then their small pictures; nothing of those that have gone."""
+
+    recent: tuple[str, ...]
+
+    light = True
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        there = tuple(map(projects.read, projects.sweep(self.recent)))
+        yield ProjectsRead(there)
+        for project in there:
+            small = projects.picture(project.path)
+            if small is not None:
+                yield ShowPicture(project.picture, small)

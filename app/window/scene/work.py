@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from langflash_core.detail import DEFAULT_DETAIL
-from langflash_core.errors import ImageError, LangFlashError
+from langflash_core.errors import ImageError, LangFlashError, SceneFileError
 from langflash_core.geometry.poses import Vector, from_view
 from langflash_core.geometry.reach import median_reach
 from langflash_core.images.still_names import film_of, shown_name
@@ -104,6 +104,8 @@ class LoadScene(Job):
     def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> SceneArrived:
         from langflash_core.export import read as read_scene
 
+        if self.edits is not None and not (self.edits.is_file() and self.path.is_file()):
+            raise SceneFileError("what was kept is not there any more; another window goes on with it")
         scene = read_scene(self.path)
         if self.edits is not None:
             return SceneArrived(_restored(describe_scene(scene, serial, ""), self.edits), self.alone)

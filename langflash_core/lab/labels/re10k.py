@@ -20,7 +20,7 @@ import torch
 
 from langflash_core.batch.sets import check_name
 from langflash_core.errors import InputError
-from langflash_core.files import held_alone, written_atomically
+from langflash_core.files import held_alone
 from langflash_core.lab.labels.clips import INDEX
 from langflash_core.lab.labels.storage import (
     FORMAT,
@@ -33,6 +33,7 @@ from langflash_core.lab.labels.storage import (
 )
 from langflash_core.lab.photos.published import read_chunk
 from langflash_core.lab.photos.reading import read_table
+from langflash_core.lab.saving import save_whole
 
 ENTRY = "labels"
 
@@ -72,8 +73,7 @@ def _enriched(path: Path, labelled: Path, keys: Collection[str]) -> int:
             entry[ENTRY] = labels
             count += 1
     if changed:
-        with written_atomically(path) as temporary:
-            torch.save(entries, temporary)
+        save_whole(entries, path)
     return count
 
 

@@ -16,6 +16,7 @@ from torch import Tensor
 from langflash_core.errors import InputError
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.rooms import HELD_OUT_LIBRARIES, VALIDATION_LIBRARIES, RoomRenderer, load_pack
+from langflash_core.lab.saving import save_whole
 from langflash_core.lab.training.batches import RoomSet
 from langflash_core.lab.training.cache import (
     HELD_OUT_SEED,
@@ -364,9 +365,7 @@ def _table(folder: Path, labels: Sequence[Label], encode: Encode) -> PhraseTable
         return torch.stack([known[phrase] for phrase in phrases])
 
     table = build_table(labels, remembered)
-    temporary = path.with_suffix(f".{time.time_ns()}.part")
-    torch.save({"phrases": list(table.phrases), "embeddings": table.embeddings}, temporary)
-    temporary.replace(path)
+    save_whole({"phrases": list(table.phrases), "embeddings": table.embeddings}, path)
     return table
 
 

@@ -14,16 +14,16 @@ JSON in the file's header. A shard is written whole or not at all.
 """
 
 import json
-import os
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import torch
-from safetensors import safe_open
+from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
+
+from langflash_core.files import written_atomically
 
 NOTHING = 255
 
@@ -93,14 +93,8 @@ def write_shard(path: Path, records: Sequence[RoomRecord]) -> None:
         {"seed": record.seed, "labels": [[lb.name, lb.group, list(lb.words)] for lb in record.labels]}
         for record in records
     ]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    os.close(handle)
-    try:
+    with written_atomically(path, SafetensorError) as temporary:
         save_file(tensors, temporary, metadata={"scenes": json.dumps(header)})
-        os.replace(temporary, path)
-    finally:
-        Path(temporary).unlink(missing_ok=True)
 
 
 def _fields(record: RoomRecord) -> tuple[str, ...]:

@@ -2,7 +2,6 @@
 
 import json
 import logging
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from langflash_core.files import write_atomically
+from langflash_core.lab.saving import save_whole
 from langflash_core.lab.training.ranks import leads
 from langflash_core.lab.training.stages.stage import Stage, modules_of
 from langflash_core.network.model import LangFlashNet
@@ -70,12 +71,8 @@ def save_cut(path: Path, network: LangFlashNet, stage: Stage, state: LoopState) 
 
 
 def _write(path: Path, content: Mapping[str, Any]) -> None:
-    if not leads():
-        return
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_suffix(".part")
-    torch.save(dict(content), temporary)
-    os.replace(temporary, path)
+    if leads():
+        save_whole(dict(content), path)
 
 
 def restore_state(
@@ -99,9 +96,7 @@ def forget_later_rows(path: Path, step: int) -> None:
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
     kept = [line for line in lines if line.endswith("\n") and json.loads(line)["step"] <= step]
     if len(kept) < len(lines):
-        temporary = path.with_suffix(".part")
-        temporary.write_text("".join(kept), encoding="utf-8")
-        os.replace(temporary, path)
+        write_atomically(path, "".join(kept).encode())
 
 
 def load_averaged(network: LangFlashNet, run_dir: Path, stage_name: str) -> tuple[int, float] | None:

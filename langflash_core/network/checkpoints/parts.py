@@ -96,7 +96,7 @@ def write_part(
         "filtered": isinstance(preset, PointMaps) and preset.mask_filter is not None,
     }  # fmt: skip
     whole = {name: value.detach().cpu().contiguous() for name, value in tensors.items()}
-    with written_atomically(path) as temporary:
+    with written_atomically(path, SafetensorError) as temporary:
         save_file(whole, temporary, {"langflash": json.dumps(header)})
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import torch
 from jaxtyping import Shaped
-from safetensors import safe_open
+from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
@@ -66,7 +66,7 @@ def install(
     if not imported.clip:
         return Installed((path,), notes)
     clip = weights_folder() / CLIP_FILE
-    with written_atomically(clip) as temporary:
+    with written_atomically(clip, SafetensorError) as temporary:
         save_file({name: value.contiguous() for name, value in imported.clip.items()}, temporary)
     return Installed((path, clip), notes)
 

@@ -14,6 +14,7 @@ from langflash_core.lab.labels.making import REPORT
 from langflash_core.lab.labels.storage import LABELS, read_labels
 from langflash_core.resources import asset_path
 from tests.lab.photos import layouts_made
+from tests.torture.jobs import in_this_process
 
 
 def write_clip(folder: Path, name: str, frames: int = 3) -> None:
@@ -110,6 +111,15 @@ def test_chunks_that_were_enriched_are_not_labelled_again(tmp_path, capsys):
 def test_what_cannot_be_is_one_sentence_and_nothing_is_written(clips, tmp_path, capsys, options, sentence):
     assert main(["labels", str(clips), "-o", str(tmp_path / "out"), *options]) == 2
     assert sentence in capsys.readouterr().err and not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("options", [(), ("--workers", "1")])
+def test_why_one_clip_failed_is_said_once(clips, tmp_path, capsys, options):
+    """A table of workers says it in its row."""
+    with in_this_process():
+        words = ["labels", str(clips / "broken"), "-o", str(tmp_path / "out"), *options]
+        assert main(words) == 1
+    assert capsys.readouterr().err.count("001.png") == 1
 
 
 def test_frames_are_not_written_over(clips, capsys):

@@ -12,7 +12,6 @@ from app.window.editing import commands as edit
 from app.window.frame import dialogs, keys, table
 from app.window.kit import theme
 from app.window.recovery import commands as keep
-from app.window.scene import commands as show
 from app.window.state import State
 from app.window.touring import commands as tour
 from langflash_core import pictures
@@ -65,13 +64,13 @@ def test_words_narrow_down_in_any_order() -> None:
 
 
 def test_the_palette_opens_samples_and_recent_scenes() -> None:
-    """Else nobody without a mouse gets at them: the empty window's tiles and the menu take clicks alone."""
+    """By keys, from anywhere: tiles stand in the empty window alone."""
     assert found("sample desk") == ["Desk (Sample photos)"]
     assert found("recent") == []
     begun = after(State(), *(keep.Opened(Path(f"/rooms/{name}.langflash")) for name in ("hall", "den")))
     assert found("recent", begun) == ["den.langflash (Recent scenes)", "hall.langflash (Recent scenes)"]
     (hall,) = table.matching("hall", begun)
-    assert hall.make(begun) == show.OpenPaths((str(Path("/rooms/hall.langflash")),))
+    assert hall.make(begun) == keep.OpenProject(str(Path("/rooms/hall.langflash")))
 
 
 def made(name: str, state: State) -> Command | None:

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 
 from app.window.commands import Command
-from app.window.recovery import panels, preferences
+from app.window.recovery import locks, panels, preferences
 from app.window.recovery.commands import Prefer
 from app.window.recovery.preferences import DEFAULTS, MOST_RECENT, Preferences
 from app.window.state import State
 from tests.app.window.headless import context, frames, look
+from tests.torture.failing import failing
 
 
 def test_they_come_back_as_they_were_left(folders: Path) -> None:
@@ -82,6 +83,57 @@ def test_recent_files_are_few_and_newest_first() -> None:
     remembered = remembered.opened(Path("5"))
     assert remembered.recent[:2] == ("5", str(MOST_RECENT + 2))
     assert len(remembered.recent) == len(set(remembered.recent)) == MOST_RECENT
+
+
+def test_of_two_windows_each_keeps_what_it_changed(folders: Path) -> None:
+    """The second one did not know of what the first had changed since both began."""
+    began = replace(DEFAULTS, recent=("/old",), scale=1.5)
+    preferences.save(began)
+    one = replace(began, theme="light", speed=2.0, recent=("/one", "/old"))
+    other = replace(began, scale=1.0, speed=3.0, recent=("/other", "/old"))
+    assert not preferences.try_to_save(one, began) and not preferences.try_to_save(other, began)
+    both = replace(DEFAULTS, theme="light", scale=1.0, speed=3.0, recent=("/other", "/one", "/old"))
+    assert preferences.load() == (both, "")
+    # Neither shows what the other did, and neither takes it back.
+    assert not preferences.try_to_save(replace(one, fill_gaps=False), one)
+    assert preferences.load() == (replace(both, fill_gaps=False), "")
+
+
+@pytest.mark.parametrize(
+    ("own", "since", "theirs", "together"),
+    [
+        ("ab", "ab", "cab", "cab"), ("ba", "ab", "cab", "bca"), ("", "ab", "cab", ""),
+        ("x", "ab", "cab", "xc"), ("ab", "ab", "", ""), ("cab", "ab", "", "c"),
+        ("kabcdefghi", "abcdefghij", "zabcdefghi", "kzabcdefgh"),
+    ],
+)  # fmt: skip
+def test_recent_files_of_two_windows(own: str, since: str, theirs: str, together: str) -> None:
+    lists = (Preferences(recent=tuple(each)) for each in (own, since, theirs))
+    assert preferences.merged(*lists).recent == tuple(together)
+
+
+def test_what_cannot_be_merged_is_written_or_said(folders: Path) -> None:
+    """Damaged, it holds nothing to lose; where it cannot be read, another's settings may be in it."""
+    preferences.save(DEFAULTS)
+    own = replace(DEFAULTS, theme="light", scale=1.25)
+    for content in (b"{cut short", b"[1]"):
+        preferences.file().write_bytes(content)
+        preferences.save(own, since=own)
+        assert preferences.load() == (own, "")
+    with failing("read", 1, folders):
+        assert "other windows" in preferences.try_to_save(replace(own, theme="dark"), own)
+    assert preferences.load() == (own, "")
+    preferences.file().unlink()
+    preferences.save(own, since=own)
+    assert preferences.load() == (own, "")
+
+
+def test_a_window_that_never_ends_writing_is_waited_for_and_said(folders: Path, monkeypatch) -> None:
+    monkeypatch.setattr(locks, "_PATIENCE", 0.05)
+    preferences.save(DEFAULTS)
+    with locks.one_at_a_time(preferences.file().with_suffix(".lock")):
+        said = preferences.try_to_save(replace(DEFAULTS, theme="light"), DEFAULTS)
+    assert "not kept" in said and preferences.load() == (DEFAULTS, "")
 
 
 def test_a_folder_that_cannot_be_written_is_a_sentence(folders: Path) -> None:

@@ -13,6 +13,7 @@ from app.window.places import state_folder
 from app.window.recovery import sessions
 from app.window.recovery.commands import restored_phrases
 from app.window.recovery.keeper import Keeper
+from app.window.recovery.locks import locked
 from app.window.recovery.state import Kept
 from app.window.state import State
 from langflash_core.errors import OutputError
@@ -23,6 +24,7 @@ ROOT = Path(__file__).parents[4]
 DYING = """
 import os, sys, signal
 from app.window.recovery.keeper import Keeper
+from app.window.recovery.locks import locked
 from app.window.recovery.state import Kept
 from app.window.state import State
 keeper = Keeper()
@@ -150,6 +152,6 @@ def test_a_lock_on_a_full_disk_leaves_no_open_file(folders: Path) -> None:
     state_folder().mkdir(parents=True)
     before = set(os.listdir("/proc/self/fd")) if Path("/proc/self/fd").is_dir() else set()
     with failing("write", 1, folders), pytest.raises(OutputError, match="cannot write"):
-        sessions.locked(state_folder() / "session-1-a.lock")
+        locked(state_folder() / "session-1-a.lock")
     if before:
         assert len(os.listdir("/proc/self/fd")) == len(before)

@@ -1,0 +1,48 @@
+"""Two programs at once, once each; 20 times by `python -m tests.torture together`."""
+
+import contextlib
+import random
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.window.recovery import preferences
+from app.window.scene.work import LoadScene
+from langflash_core.errors import SceneFileError
+from tests.torture import together
+
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="copies of a process"),
+    pytest.mark.filterwarnings("ignore:This process"),  # threads of torch's, which the copy does not use
+]
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch) -> Path:
+    monkeypatch.setenv("LANGFLASH_STATE", str(tmp_path / "state"))
+    monkeypatch.setenv("LANGFLASH_CONFIG", str(tmp_path / "config"))
+    return tmp_path
+
+
+def test_two_programs_lose_nothing(own):
+    rng = random.Random(1)
+    finds = together.saves(own, rng) + together.settings(own, rng) + together.taught(rng)
+    finds += together.one_scene(own, rng) + together.both_recover(rng)
+    assert finds == []
+
+
+def test_two_windows_that_die_together_are_both_had_back(own):
+    assert together.windows(random.Random(1)) == []
+
+
+def test_what_another_window_has_taken_over_is_a_sentence(own):
+    kept = LoadScene(own / "a.langflash", own / "a.edits")
+    with pytest.raises(SceneFileError, match="another window goes on with it"):
+        kept.run(1, lambda *_: None, lambda: False)
+
+
+def test_what_is_lost_without_a_lock_would_be_found(own, monkeypatch):
+    monkeypatch.setattr(preferences, "one_at_a_time", lambda _: contextlib.nullcontext())
+    finds = [find for number in range(12) for find in together.settings(own, random.Random(number))]
+    assert finds
