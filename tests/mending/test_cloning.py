@@ -47,7 +47,7 @@ def every(scene: Scene) -> torch.Tensor:
 
 def test_the_wall_is_laid_on_the_floor_turned_by_their_normals(scene, draw):
     source, place = (0.6, -0.2, 1.3), (0.3, 0.4, 1.15)
-    part, gone = clone(scene, every(scene), source, stroke_on(scene, place), draw)
+    part, gone = clone(scene, every(scene), source, stroke_on(scene, place, 6.0), draw)
     means = part.gaussians.means.double().numpy()
     assert len(means) > 15 and abs(means[:, 1] - 0.4).max() < 1e-5
     # Slow twin: turned about x until the wall's normal -z is the floor's -y: (x, y, z) -> (x, z, -y).
@@ -63,7 +63,7 @@ def test_the_wall_is_laid_on_the_floor_turned_by_their_normals(scene, draw):
     normals = quats_to_matrices(part.gaussians.quats.double())[:, :, 2]
     assert float(normals[:, 1].abs().min()) > 1 - 1e-9
     assert part.confidences is not None and not bool(part.confidences.any())
-    assert gone[FLOOR].sum() > 30 and not gone[WALL].any()
+    assert gone[FLOOR].sum() > 15 and not gone[WALL].any()
 
 
 def test_what_was_there_goes_and_the_picture_shows_the_copy(scene, draw):

@@ -285,10 +285,11 @@ def strongest(weights: np.ndarray) -> tuple[tuple[int, float], ...]:
     return tuple((int(k), float(weights[k]) / total) for k in order if weights[k] > 0.005 * total)
 
 
-def fresh(editing: Editing, history: History | None, saved: Marks | None) -> Editing:
-    """Editing of a scene that has just come; tool and settings stay in the hand."""
+def fresh(editing: Editing, history: History | None, saved: Marks | None, *, same: bool = False) -> Editing:
+    """Editing of a scene that has just come; tool and settings stay in the hand. same: with more in it, it is
+    the one on show, and so the source of the clone brush is there."""
     return Editing(
         history=history, saved=saved, tool=editing.tool, combine=editing.combine, radius=editing.radius,
         through=editing.through, reach=editing.reach, handle=editing.handle, last_tint=editing.last_tint,
-        recipe_path=editing.recipe_path, fit=editing.fit,
+        recipe_path=editing.recipe_path, fit=editing.fit, source=editing.source if same else None,
     )  # fmt: skip

@@ -33,6 +33,12 @@ from tests.app.window.scenes import room
 COUNT, BLOCK = 12_300, 2500
 
 
+class Pictured(Nothing):
+    """A picture's place of twice the room's views."""
+
+    size = (448, 336)
+
+
 @dataclass
 class Desk:
     """A session without its window, with the effects of scene, editing and recovery."""
@@ -42,7 +48,7 @@ class Desk:
 
     def __post_init__(self) -> None:
         hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: self.state.now)
-        nothing = Nothing()
+        nothing = Pictured()
         self.recovery = RecoveryEffects(hands, Keeper())
         scene = SceneEffects(hands, nothing, nothing, str)  # type: ignore[arg-type]
         self.effects = (scene, EditingEffects(hands, nothing), self.recovery)  # type: ignore[arg-type]
@@ -189,8 +195,7 @@ def test_clean_up_keeps_to_the_selection(desk: Desk) -> None:
 
 
 def test_a_stroke_of_the_clone_brush_is_one_edit_and_the_next_begins_at_the_same_source(desk: Desk) -> None:
-    place, at = (448, 336), (340.0, 120.0)  # twice the view; on the wall, right of the block
-    desk.effects[1]._viewport.size = place
+    at = (340.0, 120.0)  # on the wall, right of the block
     stroke = mending.CloneStroke(Region((at, (352.0, 126.0)), 14.0))
     desk.perform(point.SetTool(Tool.CLONE), stroke)
     assert desk.state.scene.job is None and not desk.state.editing.draws
@@ -222,7 +227,6 @@ def test_a_stroke_of_the_clone_brush_is_one_edit_and_the_next_begins_at_the_same
 
 
 def test_a_stroke_over_nothing_is_said_and_ends_its_job(desk: Desk) -> None:
-    desk.effects[1]._viewport.size = (448, 336)
     desk.perform(point.SetTool(Tool.CLONE), mending.PickSource((0.0, -50.0, 1.3)))
     desk.perform(mending.CloneStroke(Region(((340.0, 120.0),), 14.0)))
     with pytest.raises(InputError, match="choose another source"):
