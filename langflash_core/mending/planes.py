@@ -46,6 +46,8 @@ def planes(
     draws = np.random.default_rng(len(points))
     while len(found) < most and left.sum() >= max(3, share * len(points)):
         plane = _best(points[left], tolerances[left], draws)
+        if plane is None:
+            break
         on_it = left & (abs(plane.apart(points)) <= tolerances)
         if on_it.sum() < max(3, share * len(points)):
             break
@@ -57,7 +59,8 @@ def planes(
 
 def _best(
     points: Float[np.ndarray, "n 3"], tolerances: Float[np.ndarray, " n"], draws: np.random.Generator
-) -> Plane:
+) -> Plane | None:
+    """None where all triples lie in a line."""
     triples = points[draws.integers(len(points), size=(_TRIPLES, 3))]  # (t, 3, 3)
     normals = np.cross(triples[:, 1] - triples[:, 0], triples[:, 2] - triples[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -65,6 +68,8 @@ def _best(
     offsets = (normals * triples[:, 0]).sum(1)
     on_it = (abs(normals @ points.T - offsets[:, None]) <= tolerances) & (lengths > 1e-12)  # (t, n)
     inliers: Bool[np.ndarray, " n"] = on_it[on_it.sum(1).argmax()]
+    if not inliers.any():
+        return None
     plane = _through(points[inliers])
     for _ in range(_REFITS):
         inliers = abs(plane.apart(points)) <= tolerances

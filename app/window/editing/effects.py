@@ -10,13 +10,22 @@ from ..effects import Effects, Hands
 from ..places import config_folder
 from ..requests import Job
 from ..scene.commands import SceneArrived
-from ..scene.mended import CopyPart, FillHole, HidePart
+from ..scene.mended import ClonePart, CopyPart, FillHole, HidePart
 from ..scene.state import Room, SceneInfo
 from ..state import State
 from ..viewport import Viewport
 from .cleaning import LoadRecipe, ReadRecipe, SaveRecipe, WriteRecipe
 from .commands import FindFloaters, StopWaiting
-from .mending import BringBack, CopySelection, FillSelection, HiddenForGood, HideForGood, RememberUnhidden
+from .mending import (
+    BringBack,
+    CloneStroke,
+    CopySelection,
+    FillSelection,
+    HiddenForGood,
+    HideForGood,
+    PickSource,
+    RememberUnhidden,
+)
 from .pointing import CardOpened, Named, ReadingTaken, RulerPlaced
 from .state import Reading, Tool
 from .teaching import WORDS, KeepWords, TakeWords
@@ -72,6 +81,9 @@ class EditingEffects(Effects):
         reading, weights = found
         if state.editing.tool is Tool.RULER:
             self._hands.perform(RulerPlaced(reading))
+            return
+        if state.editing.tool is Tool.CLONE:
+            self._hands.perform(PickSource(reading.point))
             return
         self._hands.perform(CardOpened(reading))
         if reading.point is None or not info.num_atoms:
@@ -132,6 +144,10 @@ class EditingEffects(Effects):
         match command:
             case FillSelection() | CopySelection() | HideForGood() if type(command) in jobs:
                 self._hands.submit(jobs[type(command)])
+            case CloneStroke(region) if info is not None and marks is not None:
+                source, place = before.editing.source, (state.scene.pose, self._viewport.size)
+                if source is not None and before.scene.job is None:
+                    self._hands.submit(ClonePart(info, marks, source, region, *place, before.editing.fit))
             case HiddenForGood() if command.fits(before):
                 self._take_hidden(command, before)
             case BringBack() if unhidden is not None:

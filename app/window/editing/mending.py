@@ -13,8 +13,9 @@ from ..commands import Notify
 from ..scene.commands import SceneArrived
 from ..scene.state import Job, Room, SceneInfo
 from ..state import State
+from .state import Region, Spot
 
-HIDING, FILLING, COPYING = "Hiding", "Filling", "Copying"
+HIDING, FILLING, COPYING, CLONING = "Hiding", "Filling", "Copying", "Cloning"
 """Titles of the jobs."""
 
 
@@ -104,3 +105,44 @@ class FillSelection:
         if not state.editing.num_selected:
             return state
         return state.with_scene(job=Job(FILLING, "looking", started=state.now))
+
+
+@dataclass(frozen=True)
+class PickSource:
+    """What the clone brush copies is at this place; None: nothing was there."""
+
+    spot: Spot | None
+
+    def apply(self, state: State) -> State:
+        return state.with_editing(asked=None, source=self.spot or state.editing.source)
+
+
+@dataclass(frozen=True)
+class ForgetSource:
+    """The next click says what the clone brush copies."""
+
+    def apply(self, state: State) -> State:
+        return state.with_editing(source=None)
+
+
+@dataclass(frozen=True)
+class SetFit:
+    """Whether copies are scaled until they lie as close together as what they cover."""
+
+    fit: bool
+
+    def apply(self, state: State) -> State:
+        return state.with_editing(fit=self.fit)
+
+
+@dataclass(frozen=True)
+class CloneStroke:
+    """Lay what is round the source where the brush went; one stroke after the other."""
+
+    region: Region
+
+    def apply(self, state: State) -> State:
+        state = state.with_editing(drag=())
+        if state.editing.source is None or state.scene.job is not None:
+            return state
+        return state.with_scene(job=Job(CLONING, "looking", started=state.now))

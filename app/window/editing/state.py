@@ -31,6 +31,7 @@ class Tool(Enum):
     PICK = "Thing"
     PLACE = "Place"
     RULER = "Ruler"
+    CLONE = "Clone"
 
     @property
     def selects(self) -> bool:
@@ -172,7 +173,8 @@ class Editing:
     names: nearest words of each atom, best first. ruler: the ends of what is measured, world.
     gesture: a change of the selection that is shown and not made yet. tint: of it, while a colour is chosen.
     hiding: the way in which the selection is to be hidden for good, while that is asked. recipe_path: where a
-    clean-up's recipe was written or read last.
+    clean-up's recipe was written or read last. source: of the clone brush, world; fit: its
+    copies are as fine as what is around them.
     """
 
     history: History | None = None
@@ -196,6 +198,8 @@ class Editing:
     hiding: str = ""
     last_tint: Tint = Tint()
     recipe_path: Path | None = None
+    source: Spot | None = None
+    fit: bool = False
 
     @property
     def marks(self) -> Marks | None:
@@ -208,6 +212,11 @@ class Editing:
     @property
     def num_deleted(self) -> int:
         return len(self.history.marks.deleted) if self.history else 0
+
+    @property
+    def draws(self) -> bool:
+        """Whether the left button draws on the picture; without a source a clone brush is given one first."""
+        return self.tool.selects or (self.tool is Tool.CLONE and self.source is not None)
 
     @property
     def placing(self) -> bool:
@@ -276,10 +285,11 @@ def strongest(weights: np.ndarray) -> tuple[tuple[int, float], ...]:
     return tuple((int(k), float(weights[k]) / total) for k in order if weights[k] > 0.005 * total)
 
 
-def fresh(editing: Editing, history: History | None, saved: Marks | None) -> Editing:
-    """Editing of a scene that has just come; tool and settings stay in the hand."""
+def fresh(editing: Editing, history: History | None, saved: Marks | None, *, same: bool = False) -> Editing:
+    """Editing of a scene that has just come; tool and settings stay in the hand. same: with more in it, it is
+    the one on show, and so the source of the clone brush is there."""
     return Editing(
         history=history, saved=saved, tool=editing.tool, combine=editing.combine, radius=editing.radius,
         through=editing.through, reach=editing.reach, handle=editing.handle, last_tint=editing.last_tint,
-        recipe_path=editing.recipe_path,
+        recipe_path=editing.recipe_path, fit=editing.fit, source=editing.source if same else None,
     )  # fmt: skip

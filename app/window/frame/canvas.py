@@ -53,11 +53,11 @@ def draw(state: State, look: Look) -> list[do.Command]:
         pose = moving.flown(state.scene.pose, state.preferences.speed)
         return over + ([camera.MoveTo(pose)] if pose != state.scene.pose else [])
     issued = over + hands.hover(state, corner)
-    if state.editing.tool.selects and not imgui.get_io().key_alt:
+    if state.editing.draws and not imgui.get_io().key_alt:
         issued += hands.region(state, look, corner)
     elif state.editing.tool is Tool.PLACE:
         issued += hands.pick(state, look, corner)
-    elif state.editing.tool in (Tool.POINT, Tool.RULER):
+    elif state.editing.tool in (Tool.POINT, Tool.RULER, Tool.CLONE):
         issued += hands.ask(look, corner)
     elif state.editing.tool is Tool.MOVE and imgui.get_io().key_ctrl:
         issued += [TakePartAt(each.at) for each in hands.ask(look, corner)]

@@ -186,7 +186,7 @@ def _path_field(state: State, label: str, place: bool = False) -> tuple[list[do.
 
 def _help(state: State, look: Look) -> list[do.Command]:
     """Gestures and the keys of the table, by group, in two columns."""
-    imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(8, 4))
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(8, 3))
     for column, groups in enumerate(COLUMNS):
         if column:
             imgui.same_line(look.px(_HELP / 2))

@@ -308,6 +308,7 @@ def _tools() -> Iterable[Entry]:
         ("Select the thing under a click", "c", Tool.PICK), ("Measure", "t", Tool.RULER),
     ):  # fmt: skip
         yield Entry(name, group, _shown(point.SetTool(tool)), _plain(key))
+    yield Entry("Clone brush", group, _shown(point.SetTool(Tool.CLONE)), _ctrl("b"))
     for name, key, handle in (
         ("Move the selection", "y", Handle.MOVE), ("Turn the selection", "u", Handle.TURN),
         ("Scale the selection", "i", Handle.SCALE),

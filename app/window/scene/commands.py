@@ -271,7 +271,7 @@ class SceneArrived:
                 job=None,
             ),
             asking=replace(asking, named=made and not asking.asked),
-            editing=fresh(state.editing, info.history, saved),
+            editing=fresh(state.editing, info.history, saved, same=self.replaces),
             filming=NO_FILMING,
             listing=state.listing.without_scene(),
             recovery=replace(state.recovery, edits=None, kept=None),
@@ -402,7 +402,7 @@ class MergeScene:
 class Merged:
     """The scene with number `serial`, of which there was so much, and another as one scene; or, where `gone`
     says what was taken away, what fills its hole, or stands for it but is not what is `denied`; or `copied`,
-    copies of what was selected."""
+    copies of what was selected, or laid over what is `gone`."""
 
     serial: int
     there: tuple[int, int]
@@ -427,10 +427,10 @@ class Merged:
         text = f"{self.name} was not merged, since another scene is on show by now; merge it again."
         if self.denied:
             text = "Nothing was taken out, since the scene is another by now; click it again."
-        elif self.gone is not None:
-            text = "Nothing was filled, since the scene is another by now; fill it again."
         elif self.copied:
             text = "Nothing was copied, since the scene is another by now; copy it again."
+        elif self.gone is not None:
+            text = "Nothing was filled, since the scene is another by now; fill it again."
         return Notify(text).apply(state.with_scene(job=None))
 
     def arrival(self, state: State) -> "SceneArrived":
@@ -443,13 +443,13 @@ class Merged:
         before = before.of_size(count, whole.atoms)
         brought = Mask.full(count) - Mask.first(count, self.there[0])
         after, label = replace(before.marks, there=whole.there, selected=brought), f"Merge {self.name}"
-        if self.gone is not None and self.denied:
-            kept = replace(after, selected=before.marks.selected)
-            after = deny_atom(delete(kept, self.gone.of_count(count)), whole.there[1] - 1, self.denied)
-            label = f"Take a part out of {self.denied}"
-        elif self.gone is not None:
-            none = replace(after, selected=Mask.none(count))
-            after, label = delete(none, self.gone.of_count(count)), f"Delete and fill {len(self.gone):,}"
+        if self.gone is not None:
+            kept = before.marks.selected if self.denied or self.copied else Mask.none(count)
+            after = delete(replace(after, selected=kept), self.gone.of_count(count))
+            label = f"Clone {len(brought):,}" if self.copied else f"Delete and fill {len(self.gone):,}"
+            if self.denied:
+                after = deny_atom(after, whole.there[1] - 1, self.denied)
+                label = f"Take a part out of {self.denied}"
         elif self.copied:
             label = f"Copy {len(brought):,}"
         history = before.edited(label, after)

@@ -11,18 +11,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from langflash_core.errors import Cancelled
+from langflash_core.geometry.poses import Pose, to_camera
 from langflash_core.scene.edits import Marks
 from langflash_core.scene.mask import Mask
 
 from ..editing.mending import HiddenForGood
+from ..editing.state import Region, Spot
 from ..requests import Asked, Job
 from .commands import Merged
 from .state import SceneInfo
 from .work import describe_scene
 
 if TYPE_CHECKING:
+    from langflash_core.mending.cloning import Stroke
     from langflash_core.types import Frame
 
+MOST_SIDE = 720  # pixels of the picture that a brush is looked at in
 _EDGE = 0.01  # of a photo's longer side: so far colours of a thing run over its edge
 
 
@@ -72,6 +76,49 @@ class CopyPart(Job):
         copies = own.memory.changed(marks).rows(chosen)
         info = describe_scene(appended(there(own.scene, marks), copies), serial, own.name, own.path)
         return Merged(own.serial, marks.there, info, own.name, copied=True)
+
+
+@dataclass(frozen=True)
+class ClonePart(Job):
+    """What lies round `source`, laid where a brush went over the picture's place, which has `size`."""
+
+    info: SceneInfo
+    marks: Marks = field(repr=False)
+    source: Spot
+    region: Region
+    pose: Pose
+    size: tuple[int, int]
+    fit: bool
+
+    def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> Merged:
+        import torch
+
+        from langflash_core.mending.cloning import clone
+        from langflash_core.mending.looks import drawn
+        from langflash_core.scene.edited import there
+        from langflash_core.scene.joining import appended
+
+        progress("looking", 0.1)
+        own, marks = self.info, self.marks
+        visible = torch.from_numpy(marks.visible.rows()[: marks.there[0]])
+        shown = there(own.memory.changed(marks), marks)
+        render = _watched(drawn, progress, cancelled)
+        copies, gone = clone(shown, visible, self.source, self._stroke(), render, fit=self.fit)
+        rows = np.zeros(marks.selected.count, bool)
+        rows[: len(gone)] = gone.numpy()
+        info = describe_scene(appended(there(own.scene, marks), copies), serial, own.name, own.path)
+        return Merged(own.serial, marks.there, info, own.name, Mask.of(rows), copied=True)
+
+    def _stroke(self) -> "Stroke":
+        """As the library takes it, of a coarser picture where this one is large."""
+        from langflash_core.mending.cloning import Stroke
+
+        scale = min(1.0, MOST_SIDE / max(self.size))
+        width, height = (max(1, round(side * scale)) for side in self.size)
+        x, y = self.region.points[0]
+        radius = scale * (self.region.radius or 0.0)
+        pixels = self.region.pixels(width, height, scale)
+        return Stroke(to_camera(self.pose, width, height), pixels, (scale * x, scale * y), radius)
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ def editing(now: Editing) -> dict:
         "edits": [edit.label for edit in history.done] if history else [],
         "undone": len(history.undone) if history else 0,
         "changes": [type(change).__name__ for change in history.marks.changes] if history else [],
+        "source": now.source,
         "gesture": None if now.gesture is None else type(now.gesture).__name__,
         "handle": now.handle.name,
         "waiting": now.waiting,

@@ -45,12 +45,13 @@ def edited(**changes) -> State:
     "state",
     [
         edited(tool=Tool.BRUSH),
+        edited(tool=Tool.CLONE, source=(0.0, 0.0, 1.0)),
         edited(tool=Tool.PLACE),
         edited(tint=Tint((0.8, 0.2, 0.2), 0.8)),
         edited(floaters=Floaters(bytes(4 * 12_300))),
         edited(hiding="blur"),
     ],
-    ids=["brush", "gizmo", "tint", "floaters", "hiding"],
+    ids=["brush", "clone", "gizmo", "tint", "floaters", "hiding"],
 )
 def test_bars_end_where_the_window_ends(state: State, scale: float) -> None:
     """At 800 x 500 the selection's bar ended with half a bin, and the way out of it was beyond."""

@@ -10,6 +10,7 @@ from ... import commands as do
 from ...kit.look import Look
 from ...state import State
 from .. import commands as edit
+from .. import mending
 from .. import pointing as point
 from ..state import Point, Region, Tool
 
@@ -73,6 +74,8 @@ def region(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
             return [edit.SelectSphere(start, math.dist(start, here), combine)]
         case Tool.BRUSH:
             return [edit.SelectRegion(Region(path, editing.radius * unit), combine)]
+        case Tool.CLONE:
+            return [mending.CloneStroke(Region(path, editing.radius * unit))]
         case Tool.BOX if len(path) > 1:
             return [edit.SelectRegion(Region(path), combine)]
         case Tool.LASSO if not clicked or _closed(path, CLOSE * unit):
@@ -84,7 +87,7 @@ def region(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
 
 def _path(tool: Tool, before: tuple[Point, ...], start: Point, here: Point) -> tuple[Point, ...]:
     """What is drawn so far, with the pointer at `here`, pressed at `start`."""
-    if tool in (Tool.BRUSH, Tool.LASSO):
+    if tool in (Tool.BRUSH, Tool.CLONE, Tool.LASSO):
         path = before or (start,)
         return path if path[-1] == here else (*path, here)
     return (start,) if tool is Tool.PICK or start == here else (start, here)

@@ -28,6 +28,10 @@ def draw_marks(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
     """On the picture, in the present window: the region under way, and the place that was asked about."""
     _region(state, look, place, size)
     editing = state.editing
+    if editing.tool is Tool.CLONE and editing.source is not None:
+        at = _pinned_at(state, Reading((0.0, 0.0), editing.source), place, size)
+        if at is not None:
+            _pin(at, look)
     if editing.card is not None:
         at = _pinned_at(state, editing.card.reading, place, size)
         if at is not None:
@@ -55,15 +59,17 @@ def _on_screen(at: Point, place: ImVec2) -> ImVec2:
 def _region(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
     """The box or stroke under way, or the brush that waits at the pointer."""
     editing = state.editing
-    if not editing.tool.selects:
+    if not editing.draws:
         return
     io, canvas = imgui.get_io(), imgui.get_window_draw_list()
     canvas.push_clip_rect(place, ImVec2(place.x + size.x, place.y + size.y), True)
     combine = "add" if io.key_shift else "remove" if io.key_ctrl else editing.combine
+    combine = combine if editing.tool.selects else "replace"
     colour = theme.BAD if combine == "remove" else theme.SELECTED
     line, fill = widgets.u32(colour), widgets.u32(ImVec4(colour.x, colour.y, colour.z, 0.22))
     path = [_on_screen(at, place) for at in editing.drag]
-    radius = look.px(editing.radius if editing.tool is Tool.BRUSH else PICK_RADIUS)
+    brush = editing.tool in (Tool.BRUSH, Tool.CLONE)
+    radius = look.px(editing.radius if brush else PICK_RADIUS)
     if editing.tool is Tool.BOX and len(path) > 1:
         low = ImVec2(min(path[0].x, path[-1].x), min(path[0].y, path[-1].y))
         high = ImVec2(max(path[0].x, path[-1].x), max(path[0].y, path[-1].y))
@@ -76,13 +82,13 @@ def _region(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
         way = math.hypot(path[-1].x - path[0].x, path[-1].y - path[0].y)
         canvas.add_circle_filled(path[0], way, fill)
         canvas.add_circle(path[0], way, line, 0, look.px(1.5))
-    elif editing.tool is Tool.BRUSH and path:
+    elif brush and path:
         if len(path) > 1:
             canvas.add_polyline([*path], col=fill, thickness=2 * radius, flags=0)
         canvas.add_circle_filled(path[0], radius, fill)
         canvas.add_circle_filled(path[-1], radius, fill)
         canvas.add_circle(path[-1], radius, line, 0, look.px(1.5))
-    elif editing.hover is not None and editing.tool in (Tool.BRUSH, Tool.PICK):
+    elif editing.hover is not None and (brush or editing.tool is Tool.PICK):
         canvas.add_circle(imgui.get_mouse_pos(), radius, line, 0, look.px(1.5))
     if editing.hover is not None and combine != "replace":
         sign = fa.ICON_FA_PLUS if combine == "add" else fa.ICON_FA_MINUS

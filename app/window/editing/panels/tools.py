@@ -25,6 +25,7 @@ _TOOLS = (
     (Tool.SPHERE, fa.ICON_FA_CIRCLE_DOT, "Select with a ball: press on its middle and pull  (O)"),
     (Tool.PICK, fa.ICON_FA_ARROW_POINTER, "Select the thing under a click  (C)"),
     (Tool.PLACE, fa.ICON_FA_CUBE, "Move, turn or scale the selection  (Y, U, I)"),
+    (Tool.CLONE, fa.ICON_FA_STAMP, "Clone brush: copy what is at one place over another  (Ctrl+B)"),
     (Tool.RULER, fa.ICON_FA_RULER, "Measure, and tell how large things are: click on both ends  (T)"),
 )
 _COMBINES: tuple[tuple[Combine, str, str], ...] = (
@@ -39,7 +40,7 @@ _WAYS = (
 )
 _BUTTON = 36.0  # design pixels of a tool's side
 _SMALLEST = 20.0
-_GAP = 3.0
+_GAP = 2.0
 _AROUND = 34.0  # of the strip, beside its tools: its edge and two lines
 _VIEWS = 92.0  # that the viewpoints below it take
 _MARGIN = 12.0
@@ -63,6 +64,8 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     bars = []
     if state.editing.tool.selects:
         bars.append(lambda: _options(state, look, right))
+    if state.editing.tool is Tool.CLONE:
+        bars.append(lambda: _cloning(state, look, right))
     if state.editing.tool is Tool.PLACE:
         bars.append(lambda: placing_bar.draw(state, look, right))
     if state.editing.num_selected or state.editing.waiting:
@@ -181,13 +184,38 @@ def _options(state: State, look: Look, right: float) -> list[do.Command]:
         issued.append(point.SetThrough(not editing.through))
     widgets.tooltip("Also select what is hidden behind other things")
     if editing.tool is Tool.BRUSH:
-        tip, width = "Radius of the brush, pixels  ([ and ])", look.px(150)
-        widgets.go_on(width, right, look.px(14))
-        text = f"{editing.radius:.0f} px"
-        changed, radius = widgets.slider("##radius", editing.radius, RADIUS_RANGE, text, tip, width)
-        if changed:
-            issued.append(point.SetRadius(radius))
+        issued += _radius(state, look, right)
     return issued
+
+
+def _radius(state: State, look: Look, right: float) -> list[do.Command]:
+    """How large the brush is."""
+    tip, width = "Radius of the brush, pixels  ([ and ])", look.px(150)
+    widgets.go_on(width, right, look.px(14))
+    text = f"{state.editing.radius:.0f} px"
+    changed, radius = widgets.slider("##radius", state.editing.radius, RADIUS_RANGE, text, tip, width)
+    return [point.SetRadius(radius)] if changed else []
+
+
+def _cloning(state: State, look: Look, right: float) -> list[do.Command]:
+    """What the clone brush waits for, and how it works."""
+    editing = state.editing
+    imgui.align_text_to_frame_padding()
+    if editing.source is None:
+        imgui.text("Click on what is to be copied")
+        return []
+    imgui.text("Paint over what it is to cover")
+    issued: list[do.Command] = []
+    widgets.go_on(widgets.button_width(fa.ICON_FA_EYE_DROPPER), right, look.px(14))
+    if imgui.button(fa.ICON_FA_EYE_DROPPER):
+        issued.append(mending.ForgetSource())
+    widgets.tooltip("Copy another place  (Alt and a click; Alt and a drag turns the view)")
+    label = f"{fa.ICON_FA_UP_RIGHT_AND_DOWN_LEFT_FROM_CENTER}  Fit"
+    widgets.go_on(widgets.button_width(label), right)
+    if widgets.primary_button(label) if editing.fit else imgui.button(label):
+        issued.append(mending.SetFit(not editing.fit))
+    widgets.tooltip("Scale copies until they are as fine as what is there; else they keep their size")
+    return issued + _radius(state, look, right)
 
 
 def _selection(state: State, look: Look, right: float) -> list[do.Command]:

@@ -25,7 +25,7 @@ _FLY_KEYS = (
 
 def pointed(state: State, look: Look, size: ImVec2) -> Pose:
     """The pose after this frame's dragging and wheel; with a selecting tool Alt orbits."""
-    io, pose, selecting = imgui.get_io(), state.scene.pose, state.editing.tool.selects
+    io, pose, selecting = imgui.get_io(), state.scene.pose, state.editing.draws
     dx, dy = io.mouse_delta.x, io.mouse_delta.y
     held = imgui.is_item_active() or imgui.is_item_deactivated()
     # On a slow machine the way to the place and the press share a frame: that way is no drag.

@@ -11,8 +11,9 @@ import torch
 from app.window.commands import Command, OfScene, Tick, apply
 from app.window.editing import commands as edit
 from app.window.editing import mending, placing
+from app.window.editing import pointing as point
 from app.window.editing.effects import EditingEffects
-from app.window.editing.state import Tool
+from app.window.editing.state import Region, Tool
 from app.window.effects import Hands
 from app.window.places import state_folder
 from app.window.recovery.effects import KEEP_AFTER, RecoveryEffects
@@ -22,6 +23,7 @@ from app.window.scene import commands as show
 from app.window.scene.effects import SceneEffects
 from app.window.scene.work import describe_scene
 from app.window.state import State
+from langflash_core.errors import InputError
 from langflash_core.scene.changes import Moved
 from langflash_core.scene.file import load, save
 from langflash_core.scene.mask import Mask
@@ -29,6 +31,12 @@ from tests.app.window.scene.test_rooms import Nothing
 from tests.app.window.scenes import room
 
 COUNT, BLOCK = 12_300, 2500
+
+
+class Pictured(Nothing):
+    """A picture's place of twice the room's views."""
+
+    size = (448, 336)
 
 
 @dataclass
@@ -40,7 +48,7 @@ class Desk:
 
     def __post_init__(self) -> None:
         hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: self.state.now)
-        nothing = Nothing()
+        nothing = Pictured()
         self.recovery = RecoveryEffects(hands, Keeper())
         scene = SceneEffects(hands, nothing, nothing, str)  # type: ignore[arg-type]
         self.effects = (scene, EditingEffects(hands, nothing), self.recovery)  # type: ignore[arg-type]
@@ -184,3 +192,42 @@ def test_clean_up_keeps_to_the_selection(desk: Desk) -> None:
     desk.perform(edit.FloatersFound(least.tobytes()), edit.SetStrength(0.3), edit.EndFloaters("delete"))
     marks = desk.state.editing.marks
     assert marks is not None and len(marks.deleted) == BLOCK
+
+
+def test_a_stroke_of_the_clone_brush_is_one_edit_and_the_next_begins_at_the_same_source(desk: Desk) -> None:
+    at = (340.0, 120.0)  # on the wall, right of the block
+    stroke = mending.CloneStroke(Region((at, (352.0, 126.0)), 14.0))
+    desk.perform(point.SetTool(Tool.CLONE), stroke)
+    assert desk.state.scene.job is None and not desk.state.editing.draws
+    desk.perform(mending.PickSource((-0.15, 0.1, 0.65)), mending.PickSource(None), stroke)
+    assert desk.state.scene.job is not None and desk.state.editing.draws
+    desk.perform(stroke)  # while the first is under way: not lost, and not twice
+    assert sum(type(each).__name__ == "ClonePart" for each in desk.asked) == 1
+    desk.work()
+    editing, info = desk.state.editing, desk.state.scene.info
+    assert editing.history is not None and editing.marks is not None and info is not None
+    brought = editing.marks.there[0] - COUNT
+    assert editing.history.done[-1].label == f"Clone {brought:,}" and brought > 50
+    assert (
+        editing.source == (-0.15, 0.1, 0.65) and editing.tool is Tool.CLONE and editing.num_selected == BLOCK
+    )
+    assert bool((info.scene.semantics.weight_ids[COUNT:] == 0).all())  # means what it was copied from
+    assert float((info.scene.gaussians.means[COUNT:, 2] - 1.3).abs().max()) < 1e-4
+    assert editing.num_deleted > 10 and not editing.marks.deleted.rows()[:BLOCK].any()
+    desk.rest()
+    desk.perform(edit.Undo())
+    marks = desk.state.editing.marks
+    assert marks is not None and marks.there == (COUNT, 3) and not marks.deleted
+    desk.perform(edit.Redo(), stroke)
+    desk.work(8)
+    marks = desk.state.editing.marks
+    assert marks is not None and marks.there[0] > COUNT + brought
+    desk.perform(mending.ForgetSource())
+    assert desk.state.editing.source is None
+
+
+def test_a_stroke_over_nothing_is_said_and_ends_its_job(desk: Desk) -> None:
+    desk.perform(point.SetTool(Tool.CLONE), mending.PickSource((0.0, -50.0, 1.3)))
+    desk.perform(mending.CloneStroke(Region(((340.0, 120.0),), 14.0)))
+    with pytest.raises(InputError, match="choose another source"):
+        desk.work()
