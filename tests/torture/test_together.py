@@ -3,6 +3,7 @@
 import contextlib
 import random
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -44,5 +45,11 @@ def test_what_another_window_has_taken_over_is_a_sentence(own):
 
 def test_what_is_lost_without_a_lock_would_be_found(own, monkeypatch):
     monkeypatch.setattr(preferences, "one_at_a_time", lambda _: contextlib.nullcontext())
-    finds = [find for number in range(12) for find in together.settings(own, random.Random(number))]
-    assert finds
+    merged = preferences.merged
+
+    def slowly(*of):
+        time.sleep(0.01)  # between reading and writing: on two processors the other one comes between
+        return merged(*of)
+
+    monkeypatch.setattr(preferences, "merged", slowly)
+    assert any(together.settings(own, random.Random(number)) for number in range(12))

@@ -24,6 +24,7 @@ from app.window.exporting import commands as export
 from app.window.filming import commands as film
 from app.window.opening import commands as opening
 from app.window.recovery import commands as keep
+from app.window.recovery.state import Kept
 from app.window.scene import camera
 from app.window.scene import commands as show
 from app.window.scene.state import SceneInfo
@@ -133,6 +134,9 @@ MADE: dict = {
     SceneInfo: lambda chance, state: state.scene.info,
     Pose: lambda chance, state: state.scene.pose,
     Vector: lambda chance, state: Vector(*chance.normal(size=3).tolist()),
+    Kept: lambda chance, state: replace(
+        keep.kept_session(state, Path("/nowhere/a.langflash")), photos=("a.png", "b.png"), fovs=(None, 60.0)
+    ),
     Recipe: lambda chance, state: Recipe(strength=float(chance.random())),
     bool: lambda chance, state: bool(chance.integers(2)),
     int: lambda chance, state: int(chance.integers(-1, 5)),
