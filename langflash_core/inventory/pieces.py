@@ -159,7 +159,9 @@ class Pieces:
             if other <= after or contact < CONTACT * min(self._border(piece), self._border(other)):
                 continue
             none = [bool(self._structure[self.means[each].argmax()]) for each in (piece, other)]
-            limit = things if not any(none) else 0.0 if all(none) else room
+            if all(none):  # no things, whatever they are joined to
+                continue
+            limit = room if any(none) else things
             price = self.price(piece, other)
             if price <= limit:
                 row = (price, piece, other, int(self._changes[piece]), int(self._changes[other]))

@@ -206,11 +206,7 @@ def judge_world(scene: Scene, world: World, unit: float, staged: StagedRoom) -> 
 def judge_things(found: Inventory, staged: StagedRoom) -> tuple[dict[str, float], tuple[float, ...]]:
     """Precision and recall of things, what counts are off by per kind; and errors of sizes, as shares."""
     views = staged.views
-    shown = np.array(
-        [[float((ids == i).mean()) for i in range(len(views.groups))] for ids in views.instances]
-    ).max(0)
-    true = [i for i in range(1, len(views.groups)) if views.groups[i] not in STRUCTURE and shown[i] >= SHOWN]
-    wanted = {i for i in true if shown[i] >= SEEN}
+    true, wanted = true_things(staged, SHOWN), set(true_things(staged, SEEN))
     pairs = _pairs(found, staged, true)
     right = {thing.id: i for thing, i in pairs if views.groups[i] == thing.kind}
     true_of = {thing.id: i for thing, i in pairs if views.groups[i] in groups_of(thing.kind)}
@@ -251,6 +247,19 @@ def seen_through(views: RoomViews) -> np.ndarray:
             ids = np.where(ids == 0, ids[tuple(np.asarray(nearest))], ids)
         filled.append(ids)
     return np.stack(filled)
+
+
+def matched_things(found: Inventory, staged: StagedRoom, least: float = SHOWN) -> list[tuple[Thing, int]]:
+    """Things with the true one that they share most with, where that is `OVERLAP` and more; of several that
+    share most with the same one, the one that shares more. True ones fill `least` of a photo and more."""
+    return _pairs(found, staged, true_things(staged, least))
+
+
+def true_things(staged: StagedRoom, least: float) -> list[int]:
+    """Instances that fill so much of a photo, without what rooms are made of."""
+    views, count = staged.views, len(staged.views.groups)
+    shown = np.stack([np.bincount(ids.ravel(), minlength=count) / ids.size for ids in views.instances]).max(0)
+    return [i for i in range(1, count) if views.groups[i] not in STRUCTURE and shown[i] >= least]
 
 
 def _pairs(found: Inventory, staged: StagedRoom, true: Sequence[int]) -> list[tuple[Thing, int]]:
