@@ -27,7 +27,7 @@ from scipy.spatial.transform import Rotation
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
-from langflash_core.inventory.things import Inventory, Thing
+from langflash_core.inventory.things import OPENINGS, Inventory, Thing, inventory
 from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.scene.thin import covered_areas
@@ -49,7 +49,8 @@ _LOOKS = 2.0  # m of way, that a cosine lower by 1 weighs as much as
 _SURFACE = 2000  # points of a thing, about
 _RATIO = 0.8  # Lowe's, of matches
 _POINTS = 3000  # of a photo
-_LEAST = 12  # matches that agree
+_LEAST, _AGREE = 12, 0.15  # matches that agree, and share of all: fewer do by chance
+_SCALES = (1.6, 2.5)  # up to which scenes in metres, guessed ones too, and others may differ
 _NEAR = 0.12  # m: how well they agree
 _TRIES = 4000
 
@@ -105,26 +106,33 @@ def difference(first: Inventory, second: Inventory, render: Render) -> Differenc
     fit = aligned(first, second, render)
     metre = _metre(first)
     back, here = _Looks(second, fit, render, metre), _Looks(first, None, render, metre)
-    old = [_Seen(thing, thing, _look(first, thing), back.states(first, thing)) for thing in first.things]
+    old = [_Seen(thing, thing, _look(first, thing), back.states(first, thing)) for thing in _all(first)]
     new = [
         _Seen(thing, _placed(thing, fit), _look(second, thing), here.states(second, thing, fit))
-        for thing in second.things
+        for thing in _all(second)
     ]
     moved = _paired([one for one in old if one.absent], [one for one in new if one.absent], metre, far=True)
-    here_still = _paired(
+    still = _paired(
         [one for one in old if not one.absent], [one for one in new if not one.absent], metre, far=False
     )
-    flat = [pair for pair in here_still if _flat(pair.before, metre) and pair.by > _still(pair.before, metre)]
-    stayed = [pair for pair in here_still if pair not in flat]
-    paired = {pair.before.id for pair in (*moved, *here_still)}
-    has = {pair.after.id for pair in (*moved, *here_still)}
-    left = [one for one in old if one.thing.id not in paired]
+    flat = [pair for pair in still if _flat(pair.before, metre) and pair.by > _still(pair.before, metre)]
+    listed = {thing.id for thing in first.things}, {thing.id for thing in second.things}
+    stayed = [pair for pair in still if pair not in flat and pair.before.id in listed[0]]
+    had = listed[0] - {pair.before.id for pair in (*moved, *still)}
+    has = listed[1] - {pair.after.id for pair in (*moved, *still)}
     return Difference(
         fit, tuple(stayed), (*moved, *flat),
-        tuple(one.thing for one in left if one.absent),
-        tuple(one.thing for one in new if one.absent and one.thing.id not in has),
-        tuple(one.thing for one in left if not one.absent), first.unit,
+        tuple(one.thing for one in old if one.absent and one.thing.id in had),
+        tuple(one.thing for one in new if one.absent and one.thing.id in has),
+        tuple(one.thing for one in old if not one.absent and one.thing.id in had), first.unit,
     )  # fmt: skip
+
+
+def _all(found: Inventory) -> list[Thing]:
+    """Also what answers its name too little to be listed: one scene alone may list a thing, and whether it
+    moved is told by depth."""
+    listed = {thing.id for thing in found.things}
+    return [*found.things, *(t for t in inventory(found.scene, threshold=0.0).things if t.id not in listed)]
 
 
 def _metre(found: Inventory) -> float:
@@ -149,8 +157,9 @@ def aligned(first: Inventory, second: Inventory, render: Render) -> Fit:
         if not found.scene.photos:
             raise InputError("scenes are compared by their photos, and one has none; name scenes of photos")
     ours, theirs = _matched(_described(first, render), _described(second, render))
-    fit = _fitted(ours, theirs, _metre(first))
-    if fit is None or fit.matches < _LEAST:
+    most = _SCALES[0] if first.unit == second.unit == "m" else _SCALES[1]
+    fit = _fitted(ours, theirs, _metre(first), most)
+    if fit is None or fit.matches < max(_LEAST, _AGREE * fit.tried):
         raise InputError(
             "the photos of both scenes show too little in common; take some from the same places"
         )
@@ -216,8 +225,11 @@ def _matched(ours, theirs) -> tuple[np.ndarray, np.ndarray]:
     return ours[0][rows[:, 0]], theirs[0][rows[:, 1]]
 
 
-def _fitted(ours: Float[np.ndarray, "n 3"], theirs: Float[np.ndarray, "n 3"], metre: float) -> Fit | None:
-    """The quarter turn, scale and shift that most matches agree with, then exact on those."""
+def _fitted(
+    ours: Float[np.ndarray, "n 3"], theirs: Float[np.ndarray, "n 3"], metre: float, most: float = _SCALES[1]
+) -> Fit | None:
+    """The quarter turn, scale (1 / `most` to `most`) and shift that most matches agree with, then exact on
+    those."""
     if len(ours) < 2:
         return None
     rng, best, chosen = np.random.default_rng(0), np.zeros(len(ours), bool), None
@@ -229,7 +241,7 @@ def _fitted(ours: Float[np.ndarray, "n 3"], theirs: Float[np.ndarray, "n 3"], me
         if length < 0.3 * metre or own @ step < 0.98 * np.linalg.norm(own) * length:
             continue
         scale = float(np.linalg.norm(own)) / length
-        if not 0.4 < scale < 2.5:
+        if not 1 / most < scale < most:
             continue
         shift = ours[a] - scale * turn @ theirs[a]
         agree = np.linalg.norm(scale * theirs @ turn.T + shift - ours, axis=1) < _NEAR * metre
@@ -297,9 +309,9 @@ class _Seen:
 
     @property
     def absent(self) -> bool:
-        """Whether it is not in the other scene, where this one has it."""
+        """Whether it is not in the other scene, where this one has it. Doors and windows stay."""
         known, through = self.states
-        return known >= _KNOWN and through >= _GONE * known
+        return self.thing.kind not in OPENINGS and known >= _KNOWN and through >= _GONE * known
 
 
 def _paired(before: Sequence[_Seen], after: Sequence[_Seen], metre: float, *, far: bool) -> list[Pair]:

@@ -147,30 +147,33 @@ def kinds_of(scene: Scene, threshold: float | None = None) -> np.ndarray:
 def _things(
     whole: Inventory, parts: Parts, shares: np.ndarray, threshold: float | None, least: float
 ) -> list[Thing]:
-    """Parts that are things, are seen well enough, and answer their name: in relevancy as the threshold says,
-    and in cosine, unless somebody gave a threshold."""
+    """Parts that are things, are seen well enough, and answer their name as the threshold says: the scene's
+    own in relevancy and in cosine, or the one that somebody gave. What the scene's own leaves in is numbered
+    first, so that a lower one changes no name."""
     seen = _sums(parts.numbers, shares, len(parts.kinds))  # (V, parts)
-    chosen = [
+    large = [
         number
         for number in np.argsort(-seen.max(0), kind="stable")
-        if parts.kinds[number] not in STRUCTURE
-        and seen[:, number].max() >= least
-        and (threshold is not None or parts.cosines[number] >= parts.present)
+        if parts.kinds[number] not in STRUCTURE and seen[:, number].max() >= least
     ]
-    if not chosen:
+    if not large:
         return []
     scene, areas = whole.scene, covered_areas(whole.scene.gaussians)
-    names = sorted({parts.kinds[number] for number in chosen})
+    names = sorted({parts.kinds[number] for number in large})
     compiled = compile_query(scene, language_space(scene.semantics.space), names)
     relevance = dict(zip(names, gaussian_relevance(scene.semantics, compiled).numpy(), strict=True))
-    limit = compiled.threshold if threshold is None else threshold
+    rows = {number: np.flatnonzero(parts.numbers == number) for number in large}
+    sure = {
+        number: float(np.average(relevance[parts.kinds[number]][own], weights=areas[own] + 1e-12))
+        for number, own in rows.items()
+    }
+    told = {n for n in large if sure[n] >= compiled.threshold and parts.cosines[n] >= parts.present}
+    chosen = told if threshold is None else {n for n in large if sure[n] >= threshold}
     things: list[Thing] = []
-    for number in chosen:
-        kind, own = parts.kinds[number], np.flatnonzero(parts.numbers == number)
-        sure = float(np.average(relevance[kind][own], weights=areas[own] + 1e-12))
-        if sure >= limit:
-            id = f"{kind} {1 + sum(thing.kind == kind for thing in things)}"
-            things.append(_thing(whole, id, kind, sure, own, areas, seen[:, number]))
+    for number in sorted(chosen, key=lambda n: (n not in told, large.index(n))):  # so no number changes
+        kind = parts.kinds[number]
+        id = f"{kind} {1 + sum(thing.kind == kind for thing in things)}"
+        things.append(_thing(whole, id, kind, sure[number], rows[number], areas, seen[:, number]))
     return things
 
 

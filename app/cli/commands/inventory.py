@@ -134,7 +134,7 @@ def _changes(changed: "Difference") -> list[str]:
         "came": [thing.title for thing in changed.came],
         "went": [thing.title for thing in changed.went],
         "stayed": [pair.before.title for pair in changed.stayed],
-        "not looked at": [thing.title for thing in changed.unseen],
+        "not known": [thing.title for thing in changed.unseen],
     }
     matches = f"{changed.fit.matches} of {changed.fit.tried} matches agree"
     return ["", f"Beside the other scene ({matches}):"] + [

@@ -16,14 +16,16 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from langflash_core.errors import InputError
 from langflash_core.inventory import Inventory, Thing, inventory
-from langflash_core.inventory.beside import Difference, difference
+from langflash_core.inventory.beside import difference
 from langflash_core.inventory.things import OPENINGS, STRUCTURE
 from langflash_core.lab.evaluation.level import (
     drawn_room,
     kept_scene,
     matched_things,
     seen_through,
+    true_instances,
     true_unit,
 )
 from langflash_core.lab.evaluation.numbers import rounded
@@ -33,6 +35,7 @@ from langflash_core.lab.rooms.sensor import expose
 from langflash_core.lab.training.measures import nan_mean
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.running import Progress
+from langflash_core.segments import photo_shares
 from langflash_core.types import Frame
 
 THINGS = 3
@@ -72,9 +75,9 @@ def run_moved(
         render: draws depth of a scene from a camera. keep: where scenes are kept and read again.
 
     Returns:
-        Plain JSON: `rooms` (a row each) and `summary`.
+        Plain JSON: `rooms` (a row each), `refused` (seeds whose scenes cannot be compared) and `summary`.
     """
-    chosen, rows, networks = list(seeds), [], Networks()
+    chosen, rows, refused, networks = list(seeds), [], [], Networks()
     with RoomRenderer(pack) as drawer:
         for number, seed in enumerate(chosen):
             progress(f"room {seed}", number / max(1, len(chosen)))
@@ -90,11 +93,15 @@ def run_moved(
                 inventory(scene.with_record(metric_scale=true_unit(scene, staged)))
                 for scene, staged in zip(scenes, (pushed.before, pushed.after), strict=True)
             ]
-            rows.append({"seed": seed, **rounded(judge_moved(found[0], found[1], pushed, render))})
+            try:
+                rows.append({"seed": seed, **rounded(judge_moved(found[0], found[1], pushed, render))})
+            except InputError:  # their photos show too little in common
+                refused.append(seed)
     names = [name for name in (rows[0] if rows else {}) if name != "seed"]
     means = {f"{name}_mean": nan_mean(row[name] for row in rows) for name in ("agree",) if rows}
     totals = {name: float(sum(row[name] or 0 for row in rows)) for name in names if name != "agree"}
-    return {"rooms": rows, "summary": rounded({"rooms": float(len(rows)), **totals, **means})}
+    counts = {"rooms": float(len(rows)), "refused": float(len(refused))}
+    return {"rooms": rows, "refused": refused, "summary": rounded(counts | totals | means)}
 
 
 def judge_moved(
@@ -103,15 +110,17 @@ def judge_moved(
     """Counts of what the comparison says of things that were moved, and of others."""
     said = difference(before, after, render)
     first, second = _instances(before, pushed.before), _instances(after, pushed.after)
-    of_moved = {}
-    wrong = 0
+    shown = _mostly(before, pushed.before), _mostly(after, pushed.after)
+    of_moved, wrong, went_along = {}, 0, {*pushed.ways, *pushed.along}
     for pair in said.moved:
-        known = {first.get(pair.before.id), second.get(pair.after.id)} & {*pushed.ways, *pushed.along}
-        wrong += not known
-        of_moved |= dict.fromkeys(known & set(pushed.ways), pair.by)
+        wrong += not {shown[0][pair.before.id], shown[1][pair.after.id]} & went_along
+        known = {first.get(pair.before.id), second.get(pair.after.id)} & set(pushed.ways)
+        of_moved |= dict.fromkeys(known, pair.by)
     half = _known(said.went, first) | _known(said.came, second)
     ways = {i: float(np.linalg.norm(way)) for i, way in pushed.ways.items()}
     right = [i for i in of_moved if abs(of_moved[i] - ways[i]) <= max(BY, BY * ways[i])]
+    others = sum(shown[0][thing.id] not in went_along for thing in said.went)
+    others += sum(shown[1][thing.id] not in went_along for thing in said.came)
     return {
         "moved": float(len(ways)),
         "in_both": float(len(set(ways) & set(first.values()) & set(second.values()))),
@@ -119,7 +128,7 @@ def judge_moved(
         "found_by_way": float(len(right)),
         "half": float(len((half & set(ways)) - set(of_moved))),
         "false_moved": float(wrong),
-        "false_came_or_went": float(_others(said, first, second, {**ways, **pushed.along})),
+        "false_came_or_went": float(others),
         "stayed": float(len(said.stayed)),
         "unseen": float(len(said.unseen)),
         "agree": said.fit.matches / max(1, said.fit.tried),
@@ -131,14 +140,16 @@ def _instances(found: Inventory, staged: StagedRoom) -> dict[str, int]:
     return {thing.id: instance for thing, instance in matched_things(found, staged)}
 
 
+def _mostly(found: Inventory, staged: StagedRoom) -> dict[str, int]:
+    """What most of each thing shows, be it a part of that, or a wall."""
+    shares, ids = photo_shares(found.scene).sum(0).numpy(), true_instances(found.scene, staged)
+    return {
+        thing.id: int(np.bincount(ids[thing.rows], shares[thing.rows]).argmax()) for thing in found.things
+    }
+
+
 def _known(things: Sequence[Thing], instances: dict[str, int]) -> set[int]:
     return {instances[thing.id] for thing in things if thing.id in instances}
-
-
-def _others(said: Difference, first: dict[str, int], second: dict[str, int], ways: dict) -> int:
-    """Things said to have come or gone that show nothing that was moved."""
-    went = sum(first.get(thing.id) not in ways for thing in said.went)
-    return went + sum(second.get(thing.id) not in ways for thing in said.came)
 
 
 # Rooms
@@ -264,6 +275,7 @@ def _shifted(one: Instance, way: Float[np.ndarray, "3"]) -> Instance:
 
 MEASURES = (
     ("Rooms", "rooms"),
+    ("... refused, since their photos share too little", "refused"),
     ("Things moved", "moved"),
     ("... that both inventories hold", "in_both"),
     ("... said to have moved", "found"),

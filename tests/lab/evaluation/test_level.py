@@ -4,22 +4,26 @@ import json
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
-import torch
 
 from langflash_core.errors import GraphicsError
-from langflash_core.geometry.cameras import invert_rigid, transform, unproject
-from langflash_core.geometry.quaternions import matrices_to_quats
-from langflash_core.geometry.surfels import ellipses, spans
+from langflash_core.inventory import inventory
 from langflash_core.lab.evaluation import level
-from langflash_core.lab.evaluation.level import judge, judge_world, level_markdown, summary, true_unit
+from langflash_core.lab.evaluation.level import (
+    judge,
+    judge_things,
+    judge_world,
+    level_markdown,
+    matched_things,
+    seen_through,
+    summary,
+    true_unit,
+)
 from langflash_core.lab.rooms import RoomRenderer, load_pack, staged_room
-from langflash_core.language.spaces import language_space
 from langflash_core.level import found_world
-from langflash_core.types import Gaussians, Record, Scene, Semantics
+from tests.lab.evaluation.true_scenes import UNIT, true_scene
 from tests.lab.rooms.conftest import TINY_PACK
-
-UNIT = 1.7
 
 
 @pytest.fixture(scope="module")
@@ -37,42 +41,7 @@ def staged():
 
 @pytest.fixture(scope="module")
 def scene(staged):
-    """Every pixel of the photos a Gaussian in its true place, called what it is; a unit is 1.7 m."""
-    views, parts = staged.views, []
-    groups = sorted({group for group in views.groups if group})
-    for view in range(2):
-        depths, K = torch.from_numpy(views.depths[view]), torch.from_numpy(views.Ks[view])
-        pos_c = unproject(depths, K) / UNIT
-        footprint = depths / K[0, 0] / UNIT
-        axes, sides = ellipses(*spans(pos_c, footprint))
-        pose = invert_rigid(_scaled(torch.from_numpy(views.viewmats[view])))
-        ids = torch.from_numpy(views.instances[view]).long()
-        known = (depths > 0) & (ids > 0)
-        named = torch.tensor([groups.index(group) if group else 0 for group in views.groups])[ids]
-        scales = torch.cat((sides, 0.1 * sides[..., 1:]), -1).clamp_min(1e-4)
-        parts.append(
-            (
-                transform(pose, pos_c[known]), pose[:3, :3] @ axes[known], 0.5 * scales[known], named[known],
-                torch.full((int(known.sum()),), view),
-            )
-        )  # fmt: skip
-    means, axes, scales, named, view_ids = (torch.cat(each) for each in zip(*parts, strict=True))
-    count = len(means)
-    gaussians = Gaussians(
-        means, matrices_to_quats(axes), scales, torch.full((count,), 0.9), torch.zeros(count, 1, 3)
-    )
-    atoms = language_space("minilm").encode(groups)
-    viewmats = torch.stack([_scaled(torch.from_numpy(each)) for each in views.viewmats])
-    return Scene(
-        gaussians, Semantics(named[:, None], torch.ones(count, 1), atoms, "minilm"), viewmats,
-        torch.from_numpy(views.Ks), (112, 112), view_ids=view_ids, record=Record(preset="mini"),
-    )  # fmt: skip
-
-
-def _scaled(viewmat: torch.Tensor) -> torch.Tensor:
-    scaled = viewmat.clone()
-    scaled[:3, 3] /= UNIT
-    return scaled
+    return true_scene(staged)
 
 
 @pytest.fixture(scope="module")
@@ -98,6 +67,34 @@ def test_wrong_names_wrong_up_and_wrong_lengths_are_told(scene, staged, judged):
     assert numbers["up_error"] > 5 and numbers["up_right"] == 0
     said = judge_world(scene, found_world(scene), 3 * UNIT, staged)
     assert math.isnan(said["length_error"]) or said["length_right"] == 0
+
+
+def test_of_two_halves_of_a_thing_one_is_right(scene, staged):
+    found = inventory(scene.with_record(metric_scale=UNIT))
+    pairs = matched_things(found, staged)
+    thing, instance = pairs[0]
+    rows = np.flatnonzero(thing.rows)
+    larger, smaller = np.zeros_like(thing.rows), np.zeros_like(thing.rows)
+    larger[rows[: int(0.6 * len(rows))]] = smaller[rows[int(0.6 * len(rows)) :]] = True
+    halves = replace(thing, id="a", rows=smaller), replace(thing, id="b", rows=larger)
+    split = replace(found, things=(*halves, *(other for other in found.things if other is not thing)))
+    assert [(t.id, i) for t, i in matched_things(split, staged) if i == instance] == [("b", instance)]
+    before, after = judge_things(found, staged)[0], judge_things(split, staged)[0]
+    assert after["precision_any_name"] == pytest.approx(
+        before["precision_any_name"] * len(found.things) / len(split.things)
+    )
+
+
+def test_what_is_seen_through_a_window_is_of_it_and_elsewhere_nothing_changes(staged):
+    views = staged.views
+    ids = np.zeros((2, 3, 5), np.uint8)
+    ids[0] = [[1, 2, 0, 2, 1], [1, 2, 0, 3, 0], [1, 1, 1, 1, 1]]
+    ids[1] = 1
+    ids[1, 0, 0] = 0
+    small = replace(views, images=views.images[:, :3, :5], depths=views.depths[:, :3, :5], instances=ids)
+    filled = seen_through(replace(small, groups=("", "wall", "window", "door")))
+    assert filled[0].tolist() == [[1, 2, 2, 2, 1], [1, 2, 2, 3, 3], [1, 1, 1, 1, 1]]
+    assert (filled[1] == ids[1]).all()  # no opening there: nobody knows what it is
 
 
 def test_a_summary_and_its_table_hold_every_number(judged):
