@@ -109,6 +109,7 @@ def judge_moved(
 ) -> dict[str, float]:
     """Counts of what the comparison says of things that were moved, and of others."""
     said = difference(before, after, render)
+    before, after = _with(before, [p.before for p in said.moved]), _with(after, [p.after for p in said.moved])
     first, second = _instances(before, pushed.before), _instances(after, pushed.after)
     shown = _mostly(before, pushed.before), _mostly(after, pushed.after)
     of_moved, wrong, went_along = {}, 0, {*pushed.ways, *pushed.along}
@@ -133,6 +134,12 @@ def judge_moved(
         "unseen": float(len(said.unseen)),
         "agree": said.fit.matches / max(1, said.fit.tried),
     }
+
+
+def _with(found: Inventory, things: Sequence[Thing]) -> Inventory:
+    """Also what the comparison names though the inventory does not list it."""
+    known = {thing.id for thing in found.things}
+    return replace(found, things=(*found.things, *(thing for thing in things if thing.id not in known)))
 
 
 def _instances(found: Inventory, staged: StagedRoom) -> dict[str, int]:
