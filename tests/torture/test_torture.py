@@ -78,6 +78,9 @@ def test_hangs_and_bad_sentences_are_finds(tmp_path, monkeypatch):
     for read, word in ((forever, "Slow"), (talks, "bad sentence")):
         found = fuzz._outcome(Reader("odd", ("a",), read), tmp_path / "a", fuzz.Told())
         assert found is not None and word in found
+        assert fuzz.kind_of(found) == {"Slow": "over 10 s", "bad sentence": "bad sentences"}[word]
+    assert fuzz.kind_of("MemoryError in bare.py:read:3") == "over 1 GB"
+    assert fuzz.kind_of("IndexError in bare.py:read:3") == "crashes"
 
 
 def test_damage_by_build_gets_past_checksums(prepared):
