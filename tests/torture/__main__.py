@@ -69,7 +69,7 @@ def load(args: argparse.Namespace, folder: Path) -> int:
     """Much at once, and often: `load.py`."""
     from tests.torture.load import everything, report
 
-    return report(everything(folder, args.questions), sys.stdout.write)
+    return report(everything(folder, args.questions, args.only), sys.stdout.write)
 
 
 def address(args: argparse.Namespace, folder: Path) -> int:
