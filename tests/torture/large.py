@@ -19,7 +19,7 @@ from tests.torture.rows import Row
 
 LARGE = 10_000_000
 MEMORY = 6 << 30  # bytes that opening the large scene may take
-WINDOW_MEMORY = 10 << 30  # and showing it, with OpenGL on the processor
+WINDOW_MEMORY = 6 << 30  # and showing it, with OpenGL on the processor
 PATIENCE = 1800.0
 
 _OPEN = """

@@ -35,7 +35,6 @@ from .host import relevancy
 
 _PIXELS_AT_ONCE = 1 << 13  # 1.3 MB of 40 weights: within a core's cache
 _AT_ONCE = 1_000_000  # Gaussians that are projected; some 500 MB
-_OF_FOOTPRINTS = ("centres", "roots", "opacities")
 _KEPT = 4  # answers of a picture, the newest
 _HALF_MAX = 65504.0
 _names = count(1)
@@ -217,8 +216,12 @@ def _footprints(gaussians: Gaussians, camera: Camera, go_on: Callable[[], None])
     ids = torch.cat([part.ids + start for part, start in zip(parts, starts, strict=True)])
     depths = torch.cat([part.depths for part in parts])
     order = depths.argsort(stable=True)  # each part keeps the order of equal depths, and so do they
-    rest = (torch.cat([getattr(part, name) for part in parts])[order] for name in _OF_FOOTPRINTS)
-    return Footprints(ids[order], *rest, depths[order], sum(part.num_dropped for part in parts))
+    centres, roots, opacities = (
+        torch.cat([getattr(part, name) for part in parts])[order]
+        for name in ("centres", "roots", "opacities")
+    )
+    dropped = sum(part.num_dropped for part in parts)
+    return Footprints(ids[order], centres, roots, opacities, depths[order], dropped)
 
 
 def _sparse_in_half(semantics: Semantics) -> Tensor:
