@@ -34,8 +34,9 @@ def run(args: Namespace, out: TextIO) -> None:
 
     from langflash_core.export.paint import write_picture
     from langflash_core.mending.cleaning import answering
-    from langflash_core.mending.hiding import BLOCKS, MARGIN, Hiding, hide, preview
+    from langflash_core.mending.hiding import BLOCKS, Hiding, hide, preview
     from langflash_core.mending.looks import before_and_after
+    from langflash_core.mending.recipes import MARGIN
     from langflash_core.scene.file import save
 
     blocks, margin = (

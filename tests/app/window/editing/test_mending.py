@@ -24,6 +24,9 @@ from app.window.scene.effects import SceneEffects
 from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core.errors import InputError
+from langflash_core.mending.hiding import preview
+from langflash_core.mending.looks import drawn
+from langflash_core.mending.recipes import MARGIN, MOST_MARGIN
 from langflash_core.scene.changes import Moved
 from langflash_core.scene.file import load, save
 from langflash_core.scene.mask import Mask
@@ -135,8 +138,8 @@ def test_a_copy_lies_where_it_was_shown_with_the_gizmo_in_hand(desk: Desk) -> No
 def test_what_is_hidden_is_another_scene_until_then_undone_at_once(desk: Desk, how: str) -> None:
     before = desk.state.scene.info
     desk.perform(mending.AskToHide(how))
-    assert desk.state.editing.hiding == how
-    desk.perform(mending.HideForGood(how))
+    assert desk.state.editing.hiding is not None and desk.state.editing.hiding.how == how
+    desk.perform(mending.HideForGood(how, MARGIN))
     desk.work()
     scene = desk.state.scene
     assert (
@@ -153,10 +156,50 @@ def test_what_is_hidden_is_another_scene_until_then_undone_at_once(desk: Desk, h
     assert again.editing.num_selected == BLOCK and again.scene.unhidden is None
 
 
+def test_the_margin_is_seen_before_and_hidden_as_it_was_seen(desk: Desk) -> None:
+    """The window hid with the usual margin, and showed none of it before."""
+    info, marks = desk.state.scene.info, desk.state.editing.marks
+    assert info is not None and marks is not None
+    desk.perform(mending.AskToHide("blur"))
+    asked = desk.state.editing.hiding
+    assert asked is not None and asked.margin == MARGIN and asked.mask(marks) is None
+    desk.work()
+    counts = []
+    for margin in (0.0, MARGIN, 0.1, 7.0):
+        desk.perform(mending.SetMargin(margin), mending.AskToHide("pixels"))
+        asked = desk.state.editing.hiding
+        assert asked is not None and asked.margin == min(margin, MOST_MARGIN) and not desk.asked
+        found = asked.mask(marks)
+        assert found is not None and not marks.selected - found
+        counts.append(len(found))
+    slow = preview(info.scene, torch.from_numpy(marks.selected.rows()), drawn, 0.1)
+    assert counts[2] == int(slow.sum()) and BLOCK <= counts[0] < counts[1] < counts[2] < counts[3] < COUNT
+    desk.perform(mending.SetMargin(0.1), mending.HideForGood("pixels", 0.1))
+    desk.work()
+    hidden = desk.state
+    assert f"Hidden: {counts[2]:,} Gaussians" in hidden.toasts[-1].text and hidden.editing.hiding is None
+    assert hidden.editing.margin == 0.1  # the next part is asked about with it
+
+
+def test_the_margin_is_looked_for_again_where_the_selection_is_another(desk: Desk) -> None:
+    desk.perform(mending.AskToHide("blur"))
+    late = desk.asked.pop()
+    desk.perform(edit.Found(Mask.first(COUNT, BLOCK // 2), "replace", "here"))
+    assert isinstance(late, Errand)
+    desk.perform(*late.run(lambda: False))  # comes too late
+    asked, marks = desk.state.editing.hiding, desk.state.editing.marks
+    assert asked is not None and marks is not None and asked.mask(marks) is None
+    desk.work()
+    asked = desk.state.editing.hiding
+    assert asked is not None and (found := asked.mask(marks)) is not None and not marks.selected - found
+    desk.perform(edit.Deselect(), mending.AskToHide(""))
+    assert desk.state.editing.hiding is None and not desk.asked
+
+
 def test_once_saved_nothing_on_the_disk_brings_it_back(desk: Desk, tmp_path: Path) -> None:
     secret = [row.tobytes() for row in room(torch.eye(3)).gaussians.means[:BLOCK:50].numpy()]
     assert any(each in content for content in kept_of(state_folder()) for each in secret)
-    desk.perform(mending.HideForGood("blur"))
+    desk.perform(mending.HideForGood("blur", MARGIN))
     desk.work()
     desk.rest()
     assert not any(each in content for content in kept_of(state_folder()) for each in secret)
@@ -171,7 +214,7 @@ def test_once_saved_nothing_on_the_disk_brings_it_back(desk: Desk, tmp_path: Pat
 
 
 def test_what_was_edited_meanwhile_is_not_lost(desk: Desk) -> None:
-    desk.perform(mending.HideForGood("blur"))
+    desk.perform(mending.HideForGood("blur", MARGIN))
     desk.perform(edit.Delete())
     desk.work()
     assert desk.state.scene.info is not None and desk.state.scene.info.serial == 1
@@ -181,7 +224,7 @@ def test_what_was_edited_meanwhile_is_not_lost(desk: Desk) -> None:
 def test_without_a_selection_nothing_happens(desk: Desk) -> None:
     desk.perform(edit.Deselect())
     before = desk.state
-    desk.perform(mending.AskToHide(), mending.HideForGood("blur"), mending.FillSelection())
+    desk.perform(mending.AskToHide(), mending.HideForGood("blur", MARGIN), mending.FillSelection())
     assert desk.state == before and not desk.asked
 
 
