@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...places import config_folder
 from ..commands import Command, Notify
 from ..effects import Effects, Hands
-from ..places import config_folder
 from ..requests import Job
-from ..scene.commands import SceneArrived
+from ..scene.commands import SceneArrived, room_of
 from ..scene.mended import ClonePart, CopyPart, FillHole, HidePart
-from ..scene.state import Room, SceneInfo
+from ..scene.state import SceneInfo
 from ..state import State
 from ..viewport import Viewport
 from .cleaning import LoadRecipe, ReadRecipe, SaveRecipe, WriteRecipe
@@ -176,11 +176,9 @@ class EditingEffects(Effects):
 
     def _take_hidden(self, command: HiddenForGood, before: State) -> None:
         """Show it, and remember what was on show until it is saved."""
-        scene, editing = before.scene, before.editing
-        assert scene.info is not None
-        room = Room(scene.info, scene.photos, editing.history, editing.saved, scene.pose)
+        assert before.scene.info is not None
         self._hands.perform(command.arrival(before))
-        self._hands.perform(RememberUnhidden(room))
+        self._hands.perform(RememberUnhidden(room_of(before, before.scene.info)))
         self._hands.perform(Notify(command.said, "info"))
 
     def _atoms_changed(self, before: State, state: State) -> None:

@@ -10,7 +10,7 @@ from langflash_core.mending.recipes import HOWS, MOST_MARGIN
 from langflash_core.scene.edits import Marks
 
 from ..commands import Notify
-from ..scene.commands import SceneArrived
+from ..scene.commands import SceneArrived, room_of
 from ..scene.state import Job, Room, SceneInfo
 from ..state import State
 from .state import Hiding, Region, Spot
@@ -95,7 +95,7 @@ class HiddenForGood:
 
     def arrival(self, state: State) -> SceneArrived:
         """What brings it into a state that it fits."""
-        room = Room(self.info, state.scene.photos, None, None, state.scene.pose)
+        room = replace(room_of(state, self.info), history=None, saved=None, unhidden=None)
         return SceneArrived(self.info, room=room, replaces=True)
 
 
@@ -106,7 +106,9 @@ class RememberUnhidden:
     room: Room
 
     def apply(self, state: State) -> State:
-        return state.with_scene(unhidden=self.room)
+        path, files = self.room.info.path, state.scene.shown_by
+        files = files if path is None or path in files else (*files, path)
+        return state.with_scene(unhidden=replace(self.room, unhidden=None), shown_by=files)
 
 
 @dataclass(frozen=True)
