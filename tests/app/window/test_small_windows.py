@@ -9,7 +9,7 @@ from imgui_bundle import ImVec2, imgui
 from app.window.editing import commands as edit
 from app.window.editing.panels import tools
 from app.window.editing.panels.tools import _GAP, _MARGIN, _TOOLS, tool_side
-from app.window.editing.state import Floaters, Tint, Tool
+from app.window.editing.state import Floaters, Hiding, Tint, Tool
 from app.window.frame import layout
 from app.window.inventory import commands as take
 from app.window.kit import theme
@@ -56,7 +56,7 @@ def edited(**changes) -> State:
         edited(tool=Tool.PLACE),
         edited(tint=Tint((0.8, 0.2, 0.2), 0.8)),
         edited(floaters=Floaters(bytes(4 * 12_300))),
-        edited(hiding="blur"),
+        edited(hiding=Hiding("blur")),
     ],
     ids=["brush", "clone", "gizmo", "tint", "floaters", "hiding"],
 )

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from app.window.places import state_folder
+from app.places import state_folder
 from app.window.recovery import sessions
 from app.window.recovery.commands import restored_phrases
 from app.window.recovery.keeper import Keeper
