@@ -46,6 +46,7 @@ from .rest import RestEffects
 from .scene.commands import OpenPaths
 from .scene.effects import SceneEffects
 from .state import State, Stats
+from .touring.effects import TouringEffects
 from .typed import TypedEffects
 from .viewport import Viewport
 from .worker import Worker
@@ -116,6 +117,7 @@ class Session:
             remembering,
             ExportingEffects(hands, keeper),
             FilmingEffects(hands),
+            TouringEffects(hands, self._viewport),
             InventoryEffects(hands),
             LogEffects(hands),
             TypedEffects(hands),

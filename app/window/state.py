@@ -148,6 +148,11 @@ class State:
         return read_tour(self.editing.marks.tour) if self.editing.marks else NO_TOUR
 
     @property
+    def shows_notes(self) -> bool:
+        """Whether notes are drawn on the picture: while the tour's panel is open or a tour plays."""
+        return self.scene.info is not None and (self.touring.open or self.filming.tour is not None)
+
+    @property
     def metric(self) -> float | None:
         """Metres per scene unit, where that is known."""
         return self.editing.marks.metric_scale if self.editing.marks else None

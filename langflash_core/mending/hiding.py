@@ -30,11 +30,11 @@ from langflash_core.types import Camera, Scene
 from .coarse import coarsened
 from .filling import fill
 from .looks import Progress, Render, mattes
-from .photos import grown, not_in_scene, painted_over, with_photos, without_photos
+from .photos import grown, not_in_scene, painted_over, reaches, with_photos, without_photos
+from .recipes import MARGIN, MOST_MARGIN
 
 How = Literal["blur", "pixels", "remove"]
 BLOCKS, MOST_BLOCKS = 6.0, 16.0
-MARGIN, MOST_MARGIN = 0.02, 0.25
 _MATTE = 0.02  # of a pixel's light: a photo shows the part from there on
 _BESIDE = 1.03  # times as deep as what a view shows: still that surface
 _OWN = 0.5  # of an atom's opacity in what is hidden: a name of it may say who that was
@@ -128,34 +128,44 @@ def hide(
 
 def preview(scene: Scene, members: Tensor, render: Render, margin: float = MARGIN) -> Tensor:
     """(N,) bool: all Gaussians that `hide` would change."""
-    return _masked(scene, members.cpu(), margin, render)[1]
+    return least_margins(scene, members, render) <= margin
+
+
+def least_margins(scene: Scene, members: Tensor, render: Render) -> Tensor:
+    """(N,) the margin from which on `hide` changes each Gaussian; infinite where none does, 0 of the part."""
+    return _reached(scene, members.cpu(), render)[1]
 
 
 def _masked(scene: Scene, members: Tensor, margin: float, render: Render) -> tuple[list[np.ndarray], Tensor]:
     """Masks (H, W) of the part in all views, and (N,) bool of what is hidden with it."""
+    margins, least = _reached(scene, members, render)
+    return [each <= margin for each in margins], least <= margin
+
+
+def _reached(scene: Scene, members: Tensor, render: Render) -> tuple[list[np.ndarray], Tensor]:
+    """The margins from which on pixels (H, W) of all views, and Gaussians (N,), are hidden with the part."""
     cameras = [scene.camera(view) for view in range(scene.num_views)]
-    rows, means, masks = members.clone(), scene.gaussians.means.cpu(), []
+    means, margins = scene.gaussians.means.cpu(), []
+    least = torch.where(members, 0.0, torch.inf)
     for camera, (matte, depths) in zip(cameras, mattes(scene, members, cameras, render), strict=True):
-        shown = (matte >= _MATTE).numpy()
-        mask = grown(shown, margin) if shown.any() else shown
-        masks.append(mask)
-        if mask.any():
-            inside, near = _lying_in(means, camera, torch.from_numpy(mask), depths)
-            own = torch.zeros_like(near) if scene.view_ids is None else scene.view_ids.cpu() == len(masks) - 1
-            rows |= inside & (near | own)
-    return masks, rows
+        margins.append(reaches((matte >= _MATTE).numpy()))
+        inside, pixels, near = _lying_in(means, camera, depths)
+        own = torch.zeros_like(near) if scene.view_ids is None else scene.view_ids.cpu() == len(margins) - 1
+        told = torch.from_numpy(margins[-1]).flatten()[pixels]
+        least = torch.where(inside & (near | own), torch.minimum(least, told), least)
+    return margins, least
 
 
-def _lying_in(means: Tensor, camera: Camera, mask: Tensor, depths: Tensor) -> tuple[Tensor, Tensor]:
-    """(N,) bool each: places in a view's mask (H, W); and those no farther than what it shows there (H,
-    W)."""
+def _lying_in(means: Tensor, camera: Camera, depths: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """(N,) each: whether places are in a view's picture, at which of its pixels (0 outside), and whether they
+    are no farther than what it shows there, depths (H, W)."""
     columns, lines, z = pictured(camera.viewmat.cpu(), camera.K.cpu(), means.T)
-    height, width = mask.shape
+    height, width = depths.shape
     x, y = columns.floor(), lines.floor()
     inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
     pixels = torch.where(inside, y * width + x, 0).long()
     shown = depths.flatten()[pixels]
-    return inside & mask.flatten()[pixels], (shown * _BESIDE >= z) | (shown <= 0)
+    return inside, pixels, (shown * _BESIDE >= z) | (shown <= 0)
 
 
 def _block_side(scene: Scene, members: Tensor, blocks: float) -> float:

@@ -13,7 +13,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import torch
-from jaxtyping import Bool, UInt8
+from jaxtyping import Bool, Float, UInt8
 from PIL import Image
 
 from langflash_core.errors import SceneFileError
@@ -25,14 +25,22 @@ from .looks import Render
 
 QUALITY = 90  # of JPEG
 _PATCH, _STRANGE = 5, 0.12  # pixels; mean difference of a photo from the scene over so many
+_LEAST = 2.0  # pixels around a mask that always belong to it
 _ROUNDED = 0.2  # of a blurred mask: it grows a little, and loses the corners of its pixels
 
 
 def grown(mask: Bool[np.ndarray, "H W"], margin: float) -> Bool[np.ndarray, "H W"]:
     """The mask with all within a margin of it, as a share of the longer side; two pixels at least."""
-    reach = max(2, round(margin * max(mask.shape)))
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    return cv2.dilate(mask.astype(np.uint8), disc) > 0
+    return reaches(mask) <= margin
+
+
+def reaches(mask: Bool[np.ndarray, "H W"]) -> Float[np.ndarray, "H W"]:
+    """The margin, of the longer side, from which on each pixel is within it: 0 up to two pixels from the
+    mask, infinite where that is empty."""
+    if not mask.any():
+        return np.full(mask.shape, np.inf, np.float32)
+    far = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.where(far <= _LEAST, 0.0, far / max(mask.shape)).astype(np.float32)
 
 
 def painted_over(scene: Scene, view: int, mask: Bool[np.ndarray, "H W"], render: Render) -> bytes:

@@ -24,6 +24,8 @@ from langflash_core.limits import TEXT
 FORMAT, VERSION = "langflash-recipe", 1
 HOWS = ("blur", "pixels", "remove")
 """How a part can be hidden (`hiding.py`)."""
+MARGIN, MOST_MARGIN = 0.02, 0.25
+"""Around a part that is hidden, in photos, of their longer side: the usual one, and the widest."""
 KINDS = ("floaters", "sheets", "flyaways", "crumbs")
 MEASURES = ("confidence", "size", "opacity", "depth", "photos")
 """What a rule may bound: sureness of depth in [0, 1]; radius, scene units; opacity in [0, 1]; distance from

@@ -10,8 +10,9 @@ from PIL import Image
 
 from langflash_core.errors import InputError, SceneFileError
 from langflash_core.geometry.cameras import invert_rigid
-from langflash_core.mending.hiding import Hiding, hide, preview
+from langflash_core.mending.hiding import Hiding, hide, least_margins, preview
 from langflash_core.mending.looks import drawn
+from langflash_core.mending.photos import grown, reaches
 from langflash_core.scene.file import load, save
 from langflash_core.types import Camera, Record
 
@@ -182,6 +183,27 @@ def test_a_preview_is_what_changes(known, done, draw):
     report = done["blur"][1]
     assert int(rows.sum()) == report.members + report.rim
     assert bool(rows[known.members].all())
+
+
+def test_the_least_margin_of_a_pixel_is_its_distance_from_the_mask():
+    """Against all pairs of pixels, in float64."""
+    chosen = np.random.default_rng(3)
+    mask = chosen.random((30, 40)) > 0.995
+    rows, columns = np.indices(mask.shape)
+    far = np.min([np.hypot(rows - y, columns - x) for y, x in np.argwhere(mask)], axis=0)
+    true = np.where(far <= 2, 0.0, far / 40)
+    assert np.abs(reaches(mask) - true).max() < 1e-6  # float32
+    for margin in (0.0, 0.06, 0.11):
+        assert (grown(mask, margin) == (true <= margin)).all()
+    assert np.isinf(reaches(np.zeros((5, 6), bool))).all() and not grown(np.zeros((5, 6), bool), 1.0).any()
+
+
+def test_the_least_margins_are_those_of_every_preview(known, draw):
+    least = least_margins(known.scene, known.members, draw)
+    assert (least[known.members] == 0).all() and float(least[least.isfinite()].max()) > 0.02
+    for margin in (0.0, 0.05):
+        report = hide(known.scene, known.members, draw, Hiding("blur", BLOCKS, margin))[1]
+        assert report.members + report.rim == int((least <= margin).sum())
 
 
 def test_what_cannot_be_hidden_is_said(known, draw):

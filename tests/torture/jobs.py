@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 
 from app.cli import main
-from app.window.places import state_folder
+from app.places import state_folder
 from app.window.recovery import edits, preferences, sessions
 from app.window.recovery.keeper import Keeper
 from app.window.recovery.state import Kept

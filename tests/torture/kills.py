@@ -21,9 +21,9 @@ from pathlib import Path
 
 import numpy as np
 
+from app.places import config_folder, state_folder
 from app.window.commands import Command
 from app.window.editing import commands as edit
-from app.window.places import config_folder, state_folder
 from app.window.recovery import commands as keep
 from app.window.recovery import preferences
 from app.window.recovery.effects import KEEP_AFTER

@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
+from app.places import config_folder
 from app.window.editing.teaching import WORDS, with_kept
-from app.window.places import config_folder
 from app.window.recovery import preferences
 from app.window.recovery.preferences import DEFAULTS, Preferences
 from app.window.scene.commands import SceneArrived

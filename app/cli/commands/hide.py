@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from langflash_core.errors import InputError
 from langflash_core.files import check_output_file, make_folder
 
+from ...places import forget_pictures
 from ..files import checked_scene
 from ..renderers import open_renderer
 from ..report import ProgressBar, write_json
@@ -34,8 +35,9 @@ def run(args: Namespace, out: TextIO) -> None:
 
     from langflash_core.export.paint import write_picture
     from langflash_core.mending.cleaning import answering
-    from langflash_core.mending.hiding import BLOCKS, MARGIN, Hiding, hide, preview
+    from langflash_core.mending.hiding import BLOCKS, Hiding, hide, preview
     from langflash_core.mending.looks import before_and_after
+    from langflash_core.mending.recipes import MARGIN
     from langflash_core.scene.file import save
 
     blocks, margin = (
@@ -52,6 +54,7 @@ def run(args: Namespace, out: TextIO) -> None:
             picture = (before_and_after(scene, rows, done, renderer) * 255).round().byte().numpy()
     make_folder(args.output.parent)
     save(done, args.output)
+    forget_pictures([args.scene, args.output])
     if args.preview is not None and picture is not None:
         write_picture(args.preview, picture)
     document = {"scene": str(args.output), "prompts": args.prompts, **report.document()}

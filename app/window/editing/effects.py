@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...places import config_folder
 from ..commands import Command, Notify
 from ..effects import Effects, Hands
-from ..places import config_folder
 from ..requests import Job
-from ..scene.commands import SceneArrived
+from ..scene.commands import SceneArrived, room_of
 from ..scene.mended import ClonePart, CopyPart, FillHole, HidePart
-from ..scene.state import Room, SceneInfo
+from ..scene.state import SceneInfo
 from ..state import State
 from ..viewport import Viewport
 from .cleaning import LoadRecipe, ReadRecipe, SaveRecipe, WriteRecipe
@@ -29,7 +29,16 @@ from .mending import (
 from .pointing import CardOpened, Named, ReadingTaken, RulerPlaced
 from .state import Reading, Tool
 from .teaching import WORDS, KeepWords, TakeWords
-from .work import FindLessons, KeepLessons, NameAtoms, NamePlace, ScoreFloaters, Weigh, request_for
+from .work import (
+    FindLessons,
+    FindMargins,
+    KeepLessons,
+    NameAtoms,
+    NamePlace,
+    ScoreFloaters,
+    Weigh,
+    request_for,
+)
 
 
 class EditingEffects(Effects):
@@ -46,6 +55,8 @@ class EditingEffects(Effects):
         """Bring deletions, selection and preview into the picture."""
         marks, preview = state.editing.marks, state.editing.floaters
         doomed = preview.mask(marks.visible) if marks is not None and preview is not None else None
+        if marks is not None and state.editing.hiding is not None:
+            doomed = state.editing.hiding.mask(marks)
         memory = None if state.scene.info is None else state.scene.info.memory
         self._viewport.mark(memory, marks, doomed, state.editing.gesture)
 
@@ -119,6 +130,7 @@ class EditingEffects(Effects):
                 elif state.editing.waiting and not before.editing.waiting:
                     self._hands.perform(StopWaiting())
         self._find_floaters(command, before, state)
+        self._find_margins(before, state)
         self._mend(command, before, state)
         if marks != before.editing.marks and state.scene.info is before.scene.info:
             self._atoms_changed(before, state)
@@ -133,6 +145,14 @@ class EditingEffects(Effects):
         if not same or isinstance(command, FindFloaters):
             self._hands.submit(ScoreFloaters(info.serial, info.memory, marks, new.recipe))
 
+    def _find_margins(self, before: State, state: State) -> None:
+        """Look at what lies around the selection once it is to be hidden, and where it became another."""
+        info, marks = state.scene.info, state.editing.marks
+        if info is None or marks is None or state.editing.hiding is None or not marks.selected:
+            return
+        if before.editing.hiding is None or before.editing.marks != marks:
+            self._hands.submit(FindMargins(info.serial, info.memory, marks))
+
     def _mend(self, command: Command, before: State, state: State) -> None:
         """What makes another scene of the one on show, and what goes back to that."""
         info, marks, unhidden = state.scene.info, state.editing.marks, before.scene.unhidden
@@ -140,7 +160,7 @@ class EditingEffects(Effects):
         if info is not None and marks is not None and marks.selected:
             jobs = {FillSelection: FillHole(info, marks), CopySelection: CopyPart(info, marks)}
             if isinstance(command, HideForGood):
-                jobs[HideForGood] = HidePart(info, marks, command.how)
+                jobs[HideForGood] = HidePart(info, marks, command.how, command.margin)
         match command:
             case FillSelection() | CopySelection() | HideForGood() if type(command) in jobs:
                 self._hands.submit(jobs[type(command)])
@@ -156,11 +176,9 @@ class EditingEffects(Effects):
 
     def _take_hidden(self, command: HiddenForGood, before: State) -> None:
         """Show it, and remember what was on show until it is saved."""
-        scene, editing = before.scene, before.editing
-        assert scene.info is not None
-        room = Room(scene.info, scene.photos, editing.history, editing.saved, scene.pose)
+        assert before.scene.info is not None
         self._hands.perform(command.arrival(before))
-        self._hands.perform(RememberUnhidden(room))
+        self._hands.perform(RememberUnhidden(room_of(before, before.scene.info)))
         self._hands.perform(Notify(command.said, "info"))
 
     def _atoms_changed(self, before: State, state: State) -> None:

@@ -4,16 +4,16 @@ Hiding makes another scene: with the history of the one before, what was hidden 
 one is remembered until the hidden one is saved (`Showing.unhidden`), and can be gone back to until then.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
-from langflash_core.mending.recipes import HOWS
+from langflash_core.mending.recipes import HOWS, MOST_MARGIN
 from langflash_core.scene.edits import Marks
 
 from ..commands import Notify
-from ..scene.commands import SceneArrived
+from ..scene.commands import SceneArrived, room_of
 from ..scene.state import Job, Room, SceneInfo
 from ..state import State
-from .state import Region, Spot
+from .state import Hiding, Region, Spot
 
 HIDING, FILLING, COPYING, CLONING = "Hiding", "Filling", "Copying", "Cloning"
 """Titles of the jobs."""
@@ -26,8 +26,37 @@ class AskToHide:
     how: str = HOWS[0]
 
     def apply(self, state: State) -> State:
-        asked = self.how if state.editing.num_selected and self.how in HOWS else ""
-        return state.with_editing(hiding=asked)
+        if not state.editing.num_selected or self.how not in HOWS:
+            return state.with_editing(hiding=None)
+        before = state.editing.hiding or Hiding(self.how, state.editing.margin)
+        return state.with_editing(hiding=replace(before, how=self.how))
+
+
+@dataclass(frozen=True)
+class SetMargin:
+    """How far around the selection is hidden with it, of a photo's longer side."""
+
+    margin: float
+
+    def apply(self, state: State) -> State:
+        if state.editing.hiding is None:
+            return state
+        margin = min(max(self.margin, 0.0), MOST_MARGIN)
+        return state.with_editing(hiding=replace(state.editing.hiding, margin=margin), margin=margin)
+
+
+@dataclass(frozen=True)
+class MarginsFound:
+    """The margin from which on each Gaussian is hidden with what `marks` select: (N,) float32 bytes."""
+
+    marks: Marks = field(repr=False)
+    least: bytes = field(repr=False)
+
+    def apply(self, state: State) -> State:
+        asked = state.editing.hiding
+        if asked is None or state.editing.marks != self.marks:
+            return state  # what is to be hidden now is on its way
+        return state.with_editing(hiding=replace(asked, least=self.least, of=self.marks))
 
 
 @dataclass(frozen=True)
@@ -35,12 +64,13 @@ class HideForGood:
     """Hide the selection in scene and photos, as was chosen."""
 
     how: str
+    margin: float
 
     def apply(self, state: State) -> State:
         if not state.editing.num_selected:
             return state
         job = Job(HIDING, "looking", started=state.now)
-        return state.with_editing(hiding="").with_scene(job=job)
+        return state.with_editing(hiding=None).with_scene(job=job)
 
 
 @dataclass(frozen=True)
@@ -65,7 +95,7 @@ class HiddenForGood:
 
     def arrival(self, state: State) -> SceneArrived:
         """What brings it into a state that it fits."""
-        room = Room(self.info, state.scene.photos, None, None, state.scene.pose)
+        room = replace(room_of(state, self.info), history=None, saved=None, unhidden=None)
         return SceneArrived(self.info, room=room, replaces=True)
 
 
@@ -76,7 +106,9 @@ class RememberUnhidden:
     room: Room
 
     def apply(self, state: State) -> State:
-        return state.with_scene(unhidden=self.room)
+        path, files = self.room.info.path, state.scene.shown_by
+        files = files if path is None or path in files else (*files, path)
+        return state.with_scene(unhidden=replace(self.room, unhidden=None), shown_by=files)
 
 
 @dataclass(frozen=True)

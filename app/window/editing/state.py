@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from langflash_core.mending.recipes import STRENGTH, Box, Recipe
+from langflash_core.mending.recipes import MARGIN, STRENGTH, Box, Recipe
 from langflash_core.scene.changes import Change
 from langflash_core.scene.edits import Combine, History, Marks
 from langflash_core.scene.mask import Mask
@@ -163,6 +163,27 @@ class Floaters:
 
 
 @dataclass(frozen=True)
+class Hiding:
+    """How the selection is to be hidden for good, while that is asked.
+
+    margin: around it in photos, of their longer side. least: (N,) float32 bytes, the margin from which on
+    each Gaussian is hidden with it; of: the marks that this was found for, None while it is computed.
+    """
+
+    how: str
+    margin: float = MARGIN
+    least: bytes = field(default=b"", repr=False)
+    of: Marks | None = field(default=None, repr=False)
+
+    def mask(self, marks: Marks) -> Mask | None:
+        """Gaussians that are hidden, as `langflash_core.mending.hiding.hide` finds them; None: not known
+        yet."""
+        if self.of != marks:
+            return None
+        return Mask.of(np.frombuffer(self.least, np.float32) <= self.margin)
+
+
+@dataclass(frozen=True)
 class Editing:
     """The editing half of the state.
 
@@ -172,9 +193,9 @@ class Editing:
     hover: what is under the pointer. asked: where a click waits for the picture to rest.
     names: nearest words of each atom, best first. ruler: the ends of what is measured, world.
     gesture: a change of the selection that is shown and not made yet. tint: of it, while a colour is chosen.
-    hiding: the way in which the selection is to be hidden for good, while that is asked. recipe_path: where a
-    clean-up's recipe was written or read last. source: of the clone brush, world; fit: its
-    copies are as fine as what is around them.
+    hiding: how the selection is to be hidden for good, while that is asked; margin: of the last time.
+    recipe_path: where a clean-up's recipe was written or read last. source: of the clone brush, world; fit:
+    its copies are as fine as what is around them.
     """
 
     history: History | None = None
@@ -195,7 +216,8 @@ class Editing:
     handle: Handle = Handle.MOVE
     gesture: Change | None = None
     tint: Tint | None = None
-    hiding: str = ""
+    hiding: Hiding | None = None
+    margin: float = MARGIN
     last_tint: Tint = Tint()
     recipe_path: Path | None = None
     source: Spot | None = None
@@ -291,5 +313,6 @@ def fresh(editing: Editing, history: History | None, saved: Marks | None, *, sam
     return Editing(
         history=history, saved=saved, tool=editing.tool, combine=editing.combine, radius=editing.radius,
         through=editing.through, reach=editing.reach, handle=editing.handle, last_tint=editing.last_tint,
-        recipe_path=editing.recipe_path, fit=editing.fit, source=editing.source if same else None,
+        margin=editing.margin, recipe_path=editing.recipe_path, fit=editing.fit,
+        source=editing.source if same else None,
     )  # fmt: skip

@@ -33,6 +33,7 @@ from .commands import (
     SelectThing,
     StopWaiting,
 )  # fmt: skip
+from .mending import MarginsFound
 from .pointing import AtomsNamed, Named, ReadingTaken
 from .state import BY_STRENGTH, PICK_RADIUS, Point, Reading, Region, strongest
 from .teaching import WordsFound, with_kept
@@ -292,6 +293,32 @@ class ScoreFloaters(EditErrand):
             box = box_of(shown, recipe.crop, self.marks.visible.rows())
             outside = Mask.of(~inside(shown, box))
         return ruled, spoken, outside, box
+
+
+@dataclass(frozen=True)
+class FindMargins(EditErrand):
+    """The margin from which on every Gaussian is hidden with the selection."""
+
+    newest_counts = True
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        marks = self.marks
+        about = (marks.changes, marks.there, marks.left, marks.selected)
+        yield MarginsFound(marks, self.memory.answered("margins", about, self._least))
+
+    def _least(self) -> bytes:
+        """(N,) float32, infinite where nothing is left."""
+        import torch
+
+        from langflash_core.mending.hiding import least_margins
+        from langflash_core.mending.looks import drawn
+        from langflash_core.scene.edited import edited_scene
+
+        left = self.marks.left.rows()
+        members = torch.from_numpy(self.marks.selected.rows()[left])
+        found = np.full(len(left), np.inf, np.float32)
+        found[left] = least_margins(edited_scene(self.scene, self.marks), members, drawn).numpy()
+        return found.tobytes()
 
 
 def request_for(

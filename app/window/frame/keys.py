@@ -104,7 +104,7 @@ def _escape(state: State) -> list[do.Command]:
         return [placing.EndGesture(keep=False)]
     if editing.card is not None or editing.asked is not None:
         return [point.CloseCard()]
-    if editing.hiding:
+    if editing.hiding is not None:
         return [mending.AskToHide("")]
     if editing.floaters is not None:
         return [edit.EndFloaters()]

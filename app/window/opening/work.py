@@ -15,8 +15,8 @@ from langflash_core.errors import Cancelled, ImageError, LangFlashError
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.formats import is_film
 
+from ...places import state_folder
 from ..commands import Command, ShowPicture
-from ..places import state_folder
 from ..requests import Asked, Errand, Job
 from ..scene.commands import OpenPaths
 from ..scene.drops import PHOTO_SUFFIXES, SCENE_SUFFIXES

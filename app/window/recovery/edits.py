@@ -5,7 +5,7 @@ opened, and the history of its edits. Both are written whole. The eight newest a
 names the session.
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from langflash_core.errors import SceneFileError
 from langflash_core.scene.edits import History
 
-from ..places import state_folder
+from ...places import state_folder
 from ..scene.drops import SCENE_SUFFIX, still_there
 from .state import KeptPhoto, Offer
 
@@ -73,15 +73,15 @@ def forget_file(edits: Path) -> None:
             file.unlink(missing_ok=True)
 
 
-def forget_scene(scene: "Scene", path: Path | None) -> None:
-    """Remove the edits that all sessions kept of a scene, found by its content or its path."""
+def forget_scene(scene: "Scene | None", paths: Collection[Path]) -> None:
+    """Remove the edits that all sessions kept of a scene, found by its content or its paths."""
     from langflash_core.scene.edits_file import read_about, scene_digest
 
-    digest = scene_digest(scene)
+    digest, names = None if scene is None else scene_digest(scene), {str(path) for path in paths}
     for edits in _newest_first():
         with suppress(SceneFileError):
             found, about, _ = read_about(edits)
-            if found == digest or (path is not None and about.get("path") == str(path)):
+            if found == digest or about.get("path") in names:
                 forget_file(edits)
 
 
@@ -91,7 +91,7 @@ def find(scene: "Scene | None" = None, path: Path | None = None) -> Offer | None
 
     wanted = None if scene is None else scene_digest(scene)
     for edits in _newest_first():
-        with suppress(SceneFileError):  # a damaged file is passed over
+        with suppress(SceneFileError, OSError):  # what is damaged, or went meanwhile, is passed over
             digest, about, count = read_about(edits)
             ours = path is not None and about.get("path") == str(path)
             if count and edits.with_suffix(SCENE_SUFFIX).is_file() and (wanted in (None, digest) or ours):

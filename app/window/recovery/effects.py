@@ -130,9 +130,7 @@ class RecoveryEffects(Effects):
                 self._arrived(info, before, state, replaces)
             case SceneSaved(path):
                 self._settle(state)
-                if before.scene.unhidden is not None:
-                    room = before.scene.unhidden
-                    self._hands.submit(ForgetScene(room.info.scene, room.info.path))
+                self._forget_unhidden(before)
                 self._hands.perform(Opened(path))
             case CopyKept(path) if path == self._keeper.scene_file:
                 self._copied = True
@@ -149,6 +147,15 @@ class RecoveryEffects(Effects):
             case _:
                 pass
         self._note_changes(before, state)
+
+    def _forget_unhidden(self, before: State) -> None:
+        """With what was hidden saved, nothing that this program keeps shows it any more."""
+        room, files = before.scene.unhidden, before.scene.shown_by
+        if room is None and not files:
+            return
+        self._copied = False
+        copies = tuple(self._keeper.copies)
+        self._hands.submit(ForgetScene(None if room is None else room.info.scene, files, copies))
 
     def _note_changes(self, before: State, state: State) -> None:
         if state.editing.marks != before.editing.marks and state.scene.info is before.scene.info:

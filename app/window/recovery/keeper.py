@@ -12,7 +12,7 @@ from typing import BinaryIO
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.scene.edits import History
 
-from ..places import state_folder
+from ...places import state_folder
 from ..scene.drops import SCENE_SUFFIX
 from ..scene.state import SceneInfo
 from . import edits
@@ -49,6 +49,11 @@ class Keeper:
     def selection_file(self) -> Path:
         """Where an export finds what is selected."""
         return self._folder / f"{self._stem}{SELECTION}"
+
+    @property
+    def copies(self) -> tuple[Path, ...]:
+        """All files of this session that may hold a scene."""
+        return self.scene_file, self.edited_file, self.selection_file
 
     def keep(self, kept: Kept) -> None:
         """Write the session where it has changed.

@@ -16,7 +16,7 @@ from langflash_core.errors import OutputError
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.formats import COLOUR_MAPS
 
-from ..places import config_folder
+from ...places import config_folder
 from .locks import one_at_a_time
 
 MOST_RECENT = 10

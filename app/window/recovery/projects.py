@@ -11,7 +11,6 @@ import os
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from datetime import datetime
-from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,7 @@ from PIL import Image, ImageOps
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.picture_files import opened_picture
 
-from ..places import config_folder
+from ...places import PICTURE, project_file, projects_folder
 from .sessions import DAMAGED, fields, understood
 from .state import Kept, Project
 
@@ -30,7 +29,7 @@ SIDES = (270, 180)
 MOST_BYTES = 10 * 1024  # of a small picture
 MOST_RECORD = 2**18  # bytes; some thousand phrases
 _QUALITIES = (80, 65, 50, 35, 20, 10)  # of JPEG, until it is small enough
-_RECORD, _PICTURE = ".json", ".jpg"
+_RECORD = ".json"
 
 
 def stamp(path: Path) -> str:
@@ -68,14 +67,14 @@ def keep_picture(path: str, seen: UInt8[np.ndarray, "H W 3"], stamped: str) -> N
         stream = io.BytesIO()
         small.save(stream, "JPEG", quality=quality, comment=stamped.encode())
         if stream.tell() <= MOST_BYTES:
-            _write(path, _PICTURE, stream.getvalue())
+            _write(path, PICTURE, stream.getvalue())
             return
     drop_picture(path)
 
 
 def read(path: str) -> Project:
     """What is remembered of a scene: its path alone where the record is damaged, another's, or not there."""
-    file = _place(path, _RECORD)
+    file = project_file(path, _RECORD)
     try:
         content = json.loads(_bytes(file, MOST_RECORD))
         kept = understood(content["session"])
@@ -90,7 +89,7 @@ def read(path: str) -> Project:
 def picture(path: str) -> UInt8[np.ndarray, "H W 3"] | None:
     """The small picture of a scene; None, and no file any more, where it is damaged, another's, or older than
     the scene."""
-    file = _place(path, _PICTURE)
+    file = project_file(path, PICTURE)
     try:
         with opened_picture(_bytes(file, MOST_BYTES), ("JPEG",)) as small:
             stamped = bytes(small.info.get("comment", b"")).decode(errors="replace")
@@ -105,16 +104,16 @@ def picture(path: str) -> UInt8[np.ndarray, "H W 3"] | None:
 def drop_picture(path: str) -> None:
     """Remove the small picture of a scene; none there is fine."""
     with suppress(OSError):
-        _place(path, _PICTURE).unlink(missing_ok=True)
+        project_file(path, PICTURE).unlink(missing_ok=True)
 
 
 def sweep(recent: Sequence[str]) -> tuple[str, ...]:
     """Remove what is kept of scenes that have gone, or are not among the recent ones; returns those that are
     there."""
     there = tuple(path for path in recent if path and os.path.isfile(path))
-    names = {_place(path, suffix).name for path in there for suffix in (_RECORD, _PICTURE)}
+    names = {project_file(path, suffix).name for path in there for suffix in (_RECORD, PICTURE)}
     with suppress(OSError):
-        _remove(file for file in _folder().iterdir() if file.name not in names)
+        _remove(file for file in projects_folder().iterdir() if file.name not in names)
     return there
 
 
@@ -136,13 +135,5 @@ def _bytes(file: Path, most: int) -> bytes:
 
 
 def _write(path: str, suffix: str, content: bytes) -> None:
-    make_folder(_folder())
-    write_atomically(_place(path, suffix), content)
-
-
-def _folder() -> Path:
-    return config_folder() / "projects"
-
-
-def _place(path: str, suffix: str) -> Path:
-    return _folder() / f"{sha256(os.fsencode(path)).hexdigest()[:24]}{suffix}"
+    make_folder(projects_folder())
+    write_atomically(project_file(path, suffix), content)

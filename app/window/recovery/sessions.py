@@ -13,7 +13,7 @@ from pathlib import Path
 
 from langflash_core.geometry.poses import read_pose
 
-from ..places import state_folder
+from ...places import state_folder
 from ..scene.drops import SCENE_SUFFIX, still_there
 from .locks import is_free
 from .state import Kept
@@ -31,19 +31,20 @@ DAMAGED = (
 def left_behind() -> Kept | None:
     """The newest session that ended badly and holds something; the one before it is offered once that is
     done with, and so on. Empty ones are removed, and those that are older than the newest `MOST_LEFT`."""
+    forget_exported()
     found: list[tuple[float, Kept]] = []
     with suppress(OSError):
         for path in state_folder().glob(f"{PREFIX}*.json"):
             if not is_free(path.with_suffix(".lock")):
                 continue
             try:
-                kept = read(path)
+                kept, when = read(path), path.stat().st_mtime
             except OSError:
-                continue  # what cannot be read today may be read tomorrow
+                continue  # another window ended it meanwhile; or it can be read tomorrow
             if kept is None or kept.empty:
                 forget(path)
             else:
-                found.append((path.stat().st_mtime, kept))
+                found.append((when, kept))
     found.sort(key=lambda each: each[0], reverse=True)
     for _, old in found[MOST_LEFT:]:
         if old.file is not None:
@@ -113,6 +114,16 @@ def forget(path: Path) -> None:
     for suffix in (*CONTENTS, ".lock"):
         with suppress(OSError):
             path.with_suffix(suffix).unlink(missing_ok=True)
+
+
+def forget_exported() -> None:
+    """Remove scenes that exports of sessions which ended badly were made from; nobody goes on with those."""
+    for suffix in (EDITED, SELECTION):
+        with suppress(OSError):
+            for file in list(state_folder().glob(f"{PREFIX}*{suffix}")):
+                stem = file.name.removesuffix(suffix)
+                if is_free(file.with_name(f"{stem}.lock")):
+                    file.unlink(missing_ok=True)
 
 
 def fields(kept: Kept) -> dict:

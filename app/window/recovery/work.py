@@ -4,6 +4,7 @@ Heavy imports wait until they are needed.
 """
 
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command, ShowPicture
 from ..requests import Asked, Errand, SceneErrand
-from . import edits, projects
+from . import edits, projects, sessions
 from .commands import CopyKept, EditsKept, OfferEdits, ProjectsRead
 from .state import KeptPhoto
 
@@ -68,13 +69,19 @@ class ForgetEdits(Errand):
 
 @dataclass(frozen=True)
 class ForgetScene(Errand):
-    """Remove all that any session kept of a scene, by its content or its path."""
+    """Remove all that any session kept of a scene, by its content or its paths; of this session its `copies`,
+    and of those that ended badly what they exported."""
 
-    scene: "Scene" = field(repr=False)
-    path: Path | None
+    scene: "Scene | None" = field(repr=False)
+    paths: tuple[Path, ...]
+    copies: tuple[Path, ...] = ()
 
     def run(self, stopping: Asked) -> Iterable[Command]:
-        edits.forget_scene(self.scene, self.path)
+        edits.forget_scene(self.scene, self.paths)
+        for file in self.copies:
+            with suppress(OSError):
+                file.unlink(missing_ok=True)
+        sessions.forget_exported()
         return ()
 
 

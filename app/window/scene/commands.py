@@ -247,7 +247,8 @@ class SceneArrived:
         if self.room is None:
             return state
         state = state.with_editing(saved=self.room.saved)
-        return state.with_scene(photos=self.room.photos, pose=self.room.pose, view=None)
+        hidden = {"unhidden": self.room.unhidden, "shown_by": self.room.shown_by}
+        return state.with_scene(photos=self.room.photos, pose=self.room.pose, view=None, **hidden)
 
     def _others(self, state: State) -> tuple[Room, ...]:
         return state.scene.rooms if self.replaces else _rooms(state, self.info)
@@ -268,6 +269,7 @@ class SceneArrived:
                 flight=None,
                 view=0 if info.views and start == info.views[0] else None,
                 unhidden=None,
+                shown_by=(),
                 job=None,
             ),
             asking=replace(asking, named=made and not asking.asked),
@@ -291,12 +293,19 @@ def _start(info: SceneInfo) -> poses.Pose:
     return poses.righted(start, -turn[1]) if abs(poses.roll(start, -turn[1])) > ASLANT else start
 
 
+def room_of(state: State, info: SceneInfo) -> Room:
+    """The scene on show as it is left, `info`, to go back to."""
+    scene, editing = state.scene, state.editing
+    hidden = scene.unhidden, scene.shown_by
+    return Room(info, scene.photos, editing.history, editing.saved, scene.pose, *hidden)
+
+
 def _rooms(state: State, coming: SceneInfo) -> tuple[Room, ...]:
     """Those to go back to once `coming` is on show; the same file twice only where there are edits."""
-    info, editing, left = state.scene.info, state.editing, ()
+    info, left = state.scene.info, ()
     if info is not None:
         rested = replace(info, memory=SceneMemory(info.scene))  # one not on show holds its scene alone
-        left = (Room(rested, scene_photos(state), editing.history, editing.saved, state.scene.pose),)
+        left = (replace(room_of(state, rested), photos=scene_photos(state)),)
     rooms = (room for room in (*left, *state.scene.rooms) if room.info.serial != coming.serial)
     kept = (room for room in rooms if room.edited or room.info.path is None or room.info.path != coming.path)
     return tuple(kept)[:MOST_ROOMS]
@@ -455,7 +464,7 @@ class Merged:
         history = before.edited(label, after)
         if saved is not None:
             saved = saved.of_size(self.there[0], saved.atoms[: self.there[1]]).of_size(count, whole.atoms)
-        room = Room(self.info, state.scene.photos, history, saved, state.scene.pose)
+        room = replace(room_of(state, self.info), history=history, saved=saved)
         return SceneArrived(replace(self.info, history=history), room=room, replaces=True)
 
 
@@ -480,22 +489,17 @@ class SceneSaved:
     marks: Marks | None = None
 
     def apply(self, state: State) -> State:
-        info = (
-            None
-            if state.scene.info is None
-            else replace(state.scene.info, path=self.path, name=self.path.name)
-        )
-        saved = self.marks or state.editing.saved
-        state = state.with_scene(info=info, rooms=self._others(state), unhidden=None)
-        state = state.with_editing(saved=saved)
+        info = state.scene.info
+        info = None if info is None else replace(info, path=self.path, name=self.path.name)
+        state = state.with_scene(info=info, rooms=self._others(state), unhidden=None, shown_by=())
+        state = state.with_editing(saved=self.marks or state.editing.saved)
         return Notify(f"Saved {self.path}", "info").apply(state)
 
     def _others(self, state: State) -> tuple[Room, ...]:
         """Rooms without those that show what is hidden in the file."""
-        before = state.scene.unhidden
-        if before is None:
+        if state.scene.unhidden is None and not state.scene.shown_by:
             return state.scene.rooms
-        paths = {before.info.path, self.path}
+        paths = {*state.scene.shown_by, self.path}
         return tuple(room for room in state.scene.rooms if room.info.path not in paths)
 
 
@@ -507,11 +511,8 @@ class CancelJob:
     """Ask the job to stop; it ends after its present stage."""
 
     def apply(self, state: State) -> State:
-        return (
-            state
-            if state.scene.job is None
-            else state.with_scene(job=replace(state.scene.job, cancelling=True))
-        )
+        job = state.scene.job
+        return state if job is None else state.with_scene(job=replace(job, cancelling=True))
 
 
 @dataclass(frozen=True)

@@ -150,6 +150,7 @@ class HidePart(Job):
     info: SceneInfo
     marks: Marks = field(repr=False)
     how: str
+    margin: float
 
     def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> HiddenForGood:
         import torch
@@ -163,7 +164,7 @@ class HidePart(Job):
         scene = edited_scene(own.scene, marks)
         members = torch.from_numpy(marks.selected.rows()[marks.left.rows()])
         render = _watched(drawn, progress, cancelled)
-        done, report = hide(scene, members, render, Hiding(self.how))  # type: ignore[arg-type]
+        done, report = hide(scene, members, render, Hiding(self.how, margin=self.margin))  # type: ignore[arg-type]
         count = report.members + report.rim
         photos = f", {len(report.photos)} photos painted over" if report.photos else ""
         still = "" if own.path is None else f" {own.path.name} on the disk still shows it."

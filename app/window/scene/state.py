@@ -137,13 +137,16 @@ class SceneInfo:
 
 @dataclass(frozen=True)
 class Room:
-    """A scene that was on show, as it was left: its photos, its edits, where one stood."""
+    """A scene that was on show, as it was left: its photos, its edits, where one stood. unhidden,
+    shown_by: as in `Showing`."""
 
     info: SceneInfo
     photos: tuple[Photo, ...] = ()
     history: "History | None" = field(default=None, compare=False, repr=False)
     saved: Marks | None = field(default=None, compare=False, repr=False)
     pose: Pose = START
+    unhidden: "Room | None" = field(default=None, compare=False, repr=False)
+    shown_by: tuple[Path, ...] = ()
 
     @property
     def edited(self) -> bool:
@@ -169,7 +172,8 @@ class Showing:
     asked where they belong. pending: commands that wait for an answer about unsaved edits. view: of the photo
     stood at, if any. compare: where the photo begins, 0 to 1 across the picture; None: not compared.
     unfinished: photos on which work was begun and kept.
-    unhidden: the scene on show as it was before something in it was hidden for good, until that is saved.
+    unhidden: the scene on show as it was before something in it was hidden for good, until that is saved;
+    shown_by: files of scenes that show what was hidden in it by then.
     """
 
     photos: tuple[Photo, ...] = ()
@@ -185,6 +189,7 @@ class Showing:
     view: int | None = None
     compare: float | None = None
     unhidden: Room | None = None
+    shown_by: tuple[Path, ...] = ()
     job: Job | None = None
     unfinished: tuple[Path, ...] = ()
 

@@ -30,6 +30,16 @@ class ShowTour:
 
 
 @dataclass(frozen=True)
+class NotesJudged:
+    """Which notes lie behind what the picture shows."""
+
+    behind: frozenset[Note]
+
+    def apply(self, state: State) -> State:
+        return state.with_touring(behind=self.behind)
+
+
+@dataclass(frozen=True)
 class AddStop:
     """The present view is the next stop; what is asked now is asked there."""
 

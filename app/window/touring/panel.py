@@ -2,7 +2,7 @@
 picture."""
 
 import numpy as np
-from imgui_bundle import ImVec2, imgui
+from imgui_bundle import ImVec2, ImVec4, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from langflash_core.geometry import poses
@@ -18,6 +18,7 @@ from . import commands as tour
 _SIZE = (330.0, 400.0)  # design pixels, the height at most
 _BELOW = 150.0  # of the axes and the key frames, which are above
 _MARGIN, _BUTTON = 12.0, 30.0
+_FAINT = 0.35  # how much is seen of a note that is behind a surface
 _LETTERS = 40  # of a note that are shown in the picture
 
 
@@ -159,14 +160,15 @@ def _measured(state: State, note: Note) -> str:
 
 
 def draw_notes(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
-    """On the picture, in the present window: every note at its point, while the panel is open or a tour
-    plays."""
-    playing = state.filming.tour is not None
-    if state.scene.info is None or not (state.touring.open or playing):
+    """On the picture, in the present window: every note at its point; one behind a surface as a faint mark
+    without words."""
+    if not state.shows_notes:
         return
-    canvas, colour = imgui.get_window_draw_list(), widgets.u32(theme.DARK.ACCENT)
+    canvas, accent = imgui.get_window_draw_list(), theme.DARK.ACCENT
+    behind = state.touring.behind
     canvas.push_clip_rect(corner, ImVec2(corner.x + size.x, corner.y + size.y), True)
-    for note in state.tour.notes:
+    for note in sorted(state.tour.notes, key=lambda each: each not in behind):
+        colour = widgets.u32(ImVec4(accent.x, accent.y, accent.z, _FAINT if note in behind else 1.0))
         ends = [note.at] if note.to is None else [note.at, note.to]
         found = poses.project(np.array(ends), state.scene.pose, (size.x, size.y))
         if found is None:
@@ -176,6 +178,8 @@ def draw_notes(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
             canvas.add_line(points[0], points[1], colour, look.px(2))
         for point in points:
             canvas.add_circle_filled(point, look.px(4), colour)
+        if note in behind:
+            continue
         middle = ImVec2(sum(p.x for p in points) / len(points), sum(p.y for p in points) / len(points))
         text = note.text if len(note.text) <= _LETTERS else note.text[: _LETTERS - 1] + "…"
         _caption(look, middle, " · ".join(filter(None, (text, _measured(state, note)))))

@@ -21,7 +21,9 @@ def editing(now: Editing) -> dict:
         "tool": now.tool.name,
         "selected": now.num_selected,
         "deleted": len(history.marks.deleted) if history else 0,
-        "hiding": now.hiding,
+        "hiding": "" if now.hiding is None else now.hiding.how,
+        "margin": None if now.hiding is None else now.hiding.margin,
+        "hides": _hides(now),
         "hidden": len(history.marks.hidden) if history else 0,
         "edits": [edit.label for edit in history.done] if history else [],
         "undone": len(history.undone) if history else 0,
@@ -38,6 +40,12 @@ def editing(now: Editing) -> dict:
         if preview is None or not preview.least or history is None
         else len(preview.mask(history.marks.visible)),
     }
+
+
+def _hides(now: Editing) -> int | None:
+    """How many Gaussians are previewed as hidden; None: none are, or not yet."""
+    found = None if now.hiding is None or now.marks is None else now.hiding.mask(now.marks)
+    return None if found is None else len(found)
 
 
 def summary(session: Session) -> dict:

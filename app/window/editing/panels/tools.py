@@ -3,6 +3,7 @@
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from langflash_core.mending.recipes import MOST_MARGIN
 from langflash_core.scene.edits import Combine
 
 from ... import commands as do
@@ -13,7 +14,7 @@ from .. import cleaning as clean
 from .. import commands as edit
 from .. import mending, placing
 from .. import pointing as point
-from ..state import RADIUS_RANGE, REACH_RANGE, Floaters, Tool
+from ..state import RADIUS_RANGE, REACH_RANGE, Floaters, Hiding, Tool
 from . import placing as placing_bar
 
 _TOOLS = (
@@ -47,6 +48,7 @@ _MARGIN = 12.0
 _TALL = 6.0  # height of what a selection can do in two lines, in lines of text
 _REACH = 104.0  # width of the slider of how far a selection grows
 _GROWING = _REACH + 130.0  # and of the buttons before it
+_MARGIN_SLIDER = 116.0  # of how much around a part is hidden with it
 _PADDING = 10.0  # of a bar, left and right
 _BAR = (
     widgets.PLAIN | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
@@ -73,8 +75,9 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     if state.editing.tint is not None:
         tint = state.editing.tint
         bars.append(lambda: placing_bar.draw_tint(state, tint, look, right))
-    if state.editing.hiding and state.editing.num_selected:
-        bars.append(lambda: _hiding(state.editing.hiding, look, right))
+    if state.editing.hiding is not None and state.editing.num_selected:
+        hiding = state.editing.hiding
+        bars.append(lambda: _hiding(state, hiding, look, right))
     if state.editing.floaters is not None:
         found = state.editing.floaters
         bars.append(lambda: _floaters(state, found, look, right))
@@ -305,28 +308,50 @@ def _floaters(state: State, found: Floaters, look: Look, right: float) -> list[d
     return issued + _end_floaters(count, found.open, look, right)
 
 
-def _hiding(chosen: str, look: Look, right: float) -> list[do.Command]:
-    """The ways to hide the selection for good."""
+def _hiding(state: State, asked: Hiding, look: Look, right: float) -> list[do.Command]:
+    """The ways to hide the selection for good, and how much around it; in red in the picture."""
     issued: list[do.Command] = []
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.SELECTED, fa.ICON_FA_USER_SECRET)
     imgui.same_line()
-    imgui.text("Hide for good, in the photos too:")
+    imgui.text("Hide for good, in photos too:")
     for place, (how, name, tip) in enumerate(_WAYS):
         widgets.go_on(widgets.button_width(name), right, look.px(14 if place == 0 else 4))
         label = f"{name}##{how}"
-        if widgets.primary_button(label) if how == chosen else imgui.button(label):
+        if widgets.primary_button(label) if how == asked.how else imgui.button(label):
             issued.append(mending.AskToHide(how))
         widgets.tooltip(tip)
+    issued += _margin(state, asked, look, right)
     widgets.go_on(widgets.button_width("Hide it"), right, look.px(14))
     if widgets.primary_button("Hide it##for good"):
-        issued.append(mending.HideForGood(chosen))
+        issued.append(mending.HideForGood(asked.how, asked.margin))
     widgets.tooltip("It can be brought back until the scene is saved, and never from the file")
     widgets.go_on(widgets.button_width("Cancel"), right)
     if imgui.button("Cancel##hiding"):
         issued.append(mending.AskToHide(""))
     widgets.tooltip("Leave all as it is  (Esc)")
     return issued
+
+
+def _margin(state: State, asked: Hiding, look: Look, right: float) -> list[do.Command]:
+    """How much around the selection is hidden with it, and how many Gaussians that are."""
+    tip = "Margin: hidden with it, of a photo's longer side, so that no rim of it is left"
+    name, text = "Margin", f"{100 * asked.margin:.1f} %"
+    beside = imgui.calc_text_size(f"{name}{100 * MOST_MARGIN:.1f} %").x + 2 * imgui.get_style().item_spacing.x
+    widgets.go_on(look.px(_MARGIN_SLIDER) + beside, right, look.px(14))
+    imgui.align_text_to_frame_padding()
+    imgui.text(name)
+    imgui.same_line()
+    limits = (0.0, MOST_MARGIN)
+    changed, margin = widgets.slider("##margin", asked.margin, limits, text, tip, look.px(_MARGIN_SLIDER))
+    found = None if state.editing.marks is None else asked.mask(state.editing.marks)
+    words = "looking ..." if found is None else f"{len(found):,} in all"
+    count = 0 if state.scene.info is None else state.scene.info.num_gaussians
+    widest = max(imgui.calc_text_size(text).x for text in (words, f"{count:,} in all"))
+    widgets.go_on(widest, right)  # so it stays in its line
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.MUTED if found is None else theme.BAD, words)
+    return [mending.SetMargin(margin)] if changed else []
 
 
 def _end_floaters(count: int, opened: bool, look: Look, right: float) -> list[do.Command]:

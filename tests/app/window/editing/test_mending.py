@@ -1,6 +1,7 @@
 """Hiding for good and filling, without a window: what comes of them, what is kept, and what is not."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 
+from app.places import state_folder
 from app.window.commands import Command, OfScene, Tick, apply
 from app.window.editing import commands as edit
 from app.window.editing import mending, placing
@@ -15,15 +17,20 @@ from app.window.editing import pointing as point
 from app.window.editing.effects import EditingEffects
 from app.window.editing.state import Region, Tool
 from app.window.effects import Hands
-from app.window.places import state_folder
+from app.window.recovery import edits
 from app.window.recovery.effects import KEEP_AFTER, RecoveryEffects
 from app.window.recovery.keeper import Keeper
+from app.window.recovery.sessions import EDITED
+from app.window.recovery.work import KeepCopy
 from app.window.requests import Errand, Job, SceneErrand
 from app.window.scene import commands as show
 from app.window.scene.effects import SceneEffects
 from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core.errors import InputError
+from langflash_core.mending.hiding import preview
+from langflash_core.mending.looks import drawn
+from langflash_core.mending.recipes import MARGIN, MOST_MARGIN
 from langflash_core.scene.changes import Moved
 from langflash_core.scene.file import load, save
 from langflash_core.scene.mask import Mask
@@ -49,7 +56,8 @@ class Desk:
     def __post_init__(self) -> None:
         hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: self.state.now)
         nothing = Pictured()
-        self.recovery = RecoveryEffects(hands, Keeper())
+        self.keeper = Keeper()
+        self.recovery = RecoveryEffects(hands, self.keeper)
         scene = SceneEffects(hands, nothing, nothing, str)  # type: ignore[arg-type]
         self.effects = (scene, EditingEffects(hands, nothing), self.recovery)  # type: ignore[arg-type]
 
@@ -79,6 +87,7 @@ class Desk:
     def rest(self) -> None:
         self.perform(Tick(self.state.now + 2 * KEEP_AFTER))
         self.recovery.tick(self.state, self.state.now)
+        self.recovery._writer.submit(lambda: None).result()  # it has written all that it was given
         self.work()
 
 
@@ -96,8 +105,12 @@ def desk(folders: Path, tmp_path: Path) -> Iterator[Desk]:
 
 
 def kept_of(path: Path) -> list[bytes]:
-    """All files of a folder."""
-    return [file.read_bytes() for file in path.rglob("*") if file.is_file()]
+    """All files of a folder; the writer's thread may remove one meanwhile."""
+    found = []
+    for file in path.rglob("*"):
+        with suppress(FileNotFoundError):
+            found += [file.read_bytes()] if file.is_file() else []
+    return found
 
 
 def test_a_hole_is_filled_as_one_edit(desk: Desk) -> None:
@@ -135,8 +148,8 @@ def test_a_copy_lies_where_it_was_shown_with_the_gizmo_in_hand(desk: Desk) -> No
 def test_what_is_hidden_is_another_scene_until_then_undone_at_once(desk: Desk, how: str) -> None:
     before = desk.state.scene.info
     desk.perform(mending.AskToHide(how))
-    assert desk.state.editing.hiding == how
-    desk.perform(mending.HideForGood(how))
+    assert desk.state.editing.hiding is not None and desk.state.editing.hiding.how == how
+    desk.perform(mending.HideForGood(how, MARGIN))
     desk.work()
     scene = desk.state.scene
     assert (
@@ -153,10 +166,50 @@ def test_what_is_hidden_is_another_scene_until_then_undone_at_once(desk: Desk, h
     assert again.editing.num_selected == BLOCK and again.scene.unhidden is None
 
 
+def test_the_margin_is_seen_before_and_hidden_as_it_was_seen(desk: Desk) -> None:
+    """The window hid with the usual margin, and showed none of it before."""
+    info, marks = desk.state.scene.info, desk.state.editing.marks
+    assert info is not None and marks is not None
+    desk.perform(mending.AskToHide("blur"))
+    asked = desk.state.editing.hiding
+    assert asked is not None and asked.margin == MARGIN and asked.mask(marks) is None
+    desk.work()
+    counts = []
+    for margin in (0.0, MARGIN, 0.1, 7.0):
+        desk.perform(mending.SetMargin(margin), mending.AskToHide("pixels"))
+        asked = desk.state.editing.hiding
+        assert asked is not None and asked.margin == min(margin, MOST_MARGIN) and not desk.asked
+        found = asked.mask(marks)
+        assert found is not None and not marks.selected - found
+        counts.append(len(found))
+    slow = preview(info.scene, torch.from_numpy(marks.selected.rows()), drawn, 0.1)
+    assert counts[2] == int(slow.sum()) and BLOCK <= counts[0] < counts[1] < counts[2] < counts[3] < COUNT
+    desk.perform(mending.SetMargin(0.1), mending.HideForGood("pixels", 0.1))
+    desk.work()
+    hidden = desk.state
+    assert f"Hidden: {counts[2]:,} Gaussians" in hidden.toasts[-1].text and hidden.editing.hiding is None
+    assert hidden.editing.margin == 0.1  # the next part is asked about with it
+
+
+def test_the_margin_is_looked_for_again_where_the_selection_is_another(desk: Desk) -> None:
+    desk.perform(mending.AskToHide("blur"))
+    late = desk.asked.pop()
+    desk.perform(edit.Found(Mask.first(COUNT, BLOCK // 2), "replace", "here"))
+    assert isinstance(late, Errand)
+    desk.perform(*late.run(lambda: False))  # comes too late
+    asked, marks = desk.state.editing.hiding, desk.state.editing.marks
+    assert asked is not None and marks is not None and asked.mask(marks) is None
+    desk.work()
+    asked = desk.state.editing.hiding
+    assert asked is not None and (found := asked.mask(marks)) is not None and not marks.selected - found
+    desk.perform(edit.Deselect(), mending.AskToHide(""))
+    assert desk.state.editing.hiding is None and not desk.asked
+
+
 def test_once_saved_nothing_on_the_disk_brings_it_back(desk: Desk, tmp_path: Path) -> None:
     secret = [row.tobytes() for row in room(torch.eye(3)).gaussians.means[:BLOCK:50].numpy()]
     assert any(each in content for content in kept_of(state_folder()) for each in secret)
-    desk.perform(mending.HideForGood("blur"))
+    desk.perform(mending.HideForGood("blur", MARGIN))
     desk.work()
     desk.rest()
     assert not any(each in content for content in kept_of(state_folder()) for each in secret)
@@ -170,8 +223,72 @@ def test_once_saved_nothing_on_the_disk_brings_it_back(desk: Desk, tmp_path: Pat
     assert desk.state.scene.info is not None and desk.state.scene.info.serial == 7
 
 
+def shows(path: Path) -> int:
+    """How many files of a folder hold what was hidden first."""
+    secret = [row.tobytes() for row in room(torch.eye(3)).gaussians.means[:BLOCK:50].numpy()]
+    return sum(any(each in content for each in secret) for content in kept_of(path))
+
+
+def copied(desk: Desk) -> None:
+    """Something else becomes of the hidden scene, which makes another one of it."""
+    marks = desk.state.editing.marks
+    assert marks is not None
+    desk.perform(edit.Found(Mask.first(marks.deleted.count, 300), "replace", "it"), mending.CopySelection())
+    desk.work(8)
+
+
+def visited(desk: Desk) -> None:
+    """Another scene is opened, and the hidden one gone back to."""
+    assert desk.state.scene.info is not None
+    serial = desk.state.scene.info.serial
+    desk.perform(
+        show.SceneArrived(describe_scene(room(torch.eye(3)).rows(torch.arange(8000, COUNT)), 8, "b"))
+    )
+    desk.perform(show.GoToRoom(serial))
+    desk.work(9)
+    assert desk.state.scene.info.serial == serial and desk.state.scene.unhidden is not None
+
+
+def hidden_again(desk: Desk) -> None:
+    """More is hidden, and that brought back; then hidden again."""
+    marks = desk.state.editing.marks
+    assert marks is not None
+    desk.perform(edit.Found(Mask.first(marks.deleted.count, 300), "replace", "more"))
+    desk.perform(mending.HideForGood("blur", MARGIN))
+    desk.work(8)
+    desk.perform(mending.BringBack())
+    assert desk.state.scene.unhidden is None and desk.state.editing.num_selected == 300
+    desk.perform(mending.HideForGood("blur", MARGIN))
+    desk.work(9)
+
+
+@pytest.mark.parametrize("then", [lambda desk: None, copied, visited, hidden_again])
+def test_whatever_follows_nothing_that_the_program_kept_shows_it_once_it_is_saved(
+    desk: Desk, tmp_path: Path, then: Callable[[Desk], None]
+) -> None:
+    """Edits of an earlier session, what this one and one that crashed exported of."""
+    info, history = desk.state.scene.info, desk.state.editing.history
+    assert info is not None and history is not None
+    edits.keep(info.scene, history, info.name, info.path, "earlier")
+    for file in desk.keeper.copies[1:]:  # as the dialog of exports has it done
+        desk.asked.append(KeepCopy(info.serial, info.scene, file, history.marks))
+    desk.work()
+    save(info.scene, state_folder() / f"session-1-dead{EDITED}")
+    assert shows(state_folder()) == 5
+    desk.perform(mending.HideForGood("blur", MARGIN))
+    desk.work()
+    then(desk)
+    desk.perform(show.SaveScene(tmp_path / "room.langflash"))
+    desk.work(11)
+    desk.rest()
+    assert shows(tmp_path) == 0
+    scene = desk.state.scene
+    assert scene.unhidden is None and not scene.shown_by
+    assert all(each.info.path is None and each.unhidden is None for each in scene.rooms)
+
+
 def test_what_was_edited_meanwhile_is_not_lost(desk: Desk) -> None:
-    desk.perform(mending.HideForGood("blur"))
+    desk.perform(mending.HideForGood("blur", MARGIN))
     desk.perform(edit.Delete())
     desk.work()
     assert desk.state.scene.info is not None and desk.state.scene.info.serial == 1
@@ -181,7 +298,7 @@ def test_what_was_edited_meanwhile_is_not_lost(desk: Desk) -> None:
 def test_without_a_selection_nothing_happens(desk: Desk) -> None:
     desk.perform(edit.Deselect())
     before = desk.state
-    desk.perform(mending.AskToHide(), mending.HideForGood("blur"), mending.FillSelection())
+    desk.perform(mending.AskToHide(), mending.HideForGood("blur", MARGIN), mending.FillSelection())
     assert desk.state == before and not desk.asked
 
 

@@ -56,6 +56,13 @@ def press(program: Program, key: str, tool: str) -> None:
     raise AssertionError(f"the tool stays {program.state['tool']}")
 
 
+def reddened(picture: np.ndarray, before: np.ndarray) -> int:
+    """Pixels of the canvas that are redder than before."""
+    canvas = (slice(TOP + 140, CANVAS[0].stop), slice(LEFT + 60, SIZE[0] - 20))
+    more = (picture[canvas].astype(int) - before[canvas])[..., :3]
+    return int((more[..., 0] - more[..., 1:].mean(-1) > 20).sum())
+
+
 def move(program: Program, at: tuple[int, int]) -> None:
     program.xdotool("mousemove", *map(str, at))
 
@@ -209,7 +216,15 @@ def test_a_thing_is_hidden_for_good_and_brought_back_until_it_is_saved(program: 
     program.click(HIDE)
     program.until(lambda s: s["hiding"] == "blur", "the ways to hide it")
     program.click("##pixels")
-    program.until(lambda s: s["hiding"] == "pixels", "the other way")
+    state = program.until(lambda s: s["hiding"] == "pixels" and s["hides"], "the other way, and its margin")
+    few = state["hides"]
+    program.at_rest()
+    narrow = program.picture()
+    _, top, right, bottom = program.state["items"]["##margin"][0]
+    program.xdotool("mousemove", str(right - 30), str((top + bottom) // 2), "click", "1")
+    program.until(lambda s: s["margin"] > 0.15 and s["hides"] > 1.2 * few, "a wider margin")
+    program.at_rest()
+    assert reddened(program.picture(), narrow) > 2000, "what goes with it is red, and at once"
     program.click("##for good")
     state = program.until(lambda s: s["unhidden"] and s["job"] is None, "the hidden scene")
     assert state["unsaved"] and any("Ctrl+Z brings it back" in toast for toast in state["toasts"])

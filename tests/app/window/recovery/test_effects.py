@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import torch
 
+from app.places import state_folder
 from app.window.asking.state import Prompt
 from app.window.commands import Command, Notify, OfScene, apply
 from app.window.editing import commands as edit
 from app.window.editing.pointing import LIKE_THRESHOLD
-from app.window.places import state_folder
 from app.window.recovery import commands as keep
 from app.window.recovery import edits, sessions, work
 from app.window.recovery.effects import KEEP_AFTER

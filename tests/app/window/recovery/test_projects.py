@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.window.places import config_folder
+from app.places import config_folder
 from app.window.recovery import projects
 from app.window.recovery.state import Kept, Project
 from langflash_core.geometry.poses import Pose, Vector
