@@ -78,7 +78,7 @@ test-machines: setup
 	ATEN_CPU_CAPABILITY=avx2 OMP_NUM_THREADS=1 $(BIN)/python -m pytest $(SHUFFLED)=$(SEED)
 	ATEN_CPU_CAPABILITY=default OMP_NUM_THREADS=2 $(BIN)/python -m pytest $(SHUFFLED)=$$(($(SEED) + 1))
 
-# Hostile files, failing calls, kills, two at once, hard photos, load: some 20 minutes on two cores.
+# Hostile files, failing calls, kills, two at once, hard photos, load: two at a time, some 12 minutes on two cores.
 PARTS ?=
 torture: setup
 	PYTHONHASHSEED=0 OMP_NUM_THREADS=1 $(BIN)/python -m tests.torture $(PARTS) --seed $(SEED)

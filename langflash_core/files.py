@@ -5,25 +5,19 @@ The hidden one beside it is called `.NAME.HOST-PROCESS-RANDOM.part`. A killed pr
 behind; the next write into the folder from the same computer sweeps it up.
 """
 
-import hashlib
 import json
 import os
-import platform
 import re
-import secrets
 import shutil
 import sys
-import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 
 from langflash_core.errors import InputError, OutputError
 from langflash_core.formats import kind_of
 
-# Of a shared folder, only parts of this computer can be judged by their process number.
-_HOST = hashlib.sha256(platform.node().encode()).hexdigest()[:6]
-_PART = re.compile(rf"\..*\.{_HOST}-(\d+)-[0-9a-f]{{12}}\.part", re.DOTALL)
 _HELD = "held"  # names the part that says who has a folder
 _STILL_ACTIVE = 259  # what Windows has for the exit code of a process that runs
 
@@ -118,7 +112,7 @@ def _others_hold(own: Path) -> bool:
     except OSError as error:
         reason = error.strerror or str(error)
         raise OutputError(f"cannot write to {folder}: {reason}; choose another place") from error
-    return any(_PART.fullmatch(name) for name in others)
+    return any(_part().fullmatch(name) for name in others)
 
 
 def make_folder(folder: Path) -> None:
@@ -154,14 +148,28 @@ def _cleared(path: Path, *temporaries: Path, library: type[Exception] = OSError)
 def part_beside(path: Path) -> Path:
     """The hidden file or folder to write to beside `path`; those of processes that are gone are swept up."""
     _sweep(path.parent)
-    return path.parent / f".{path.name[:100]}.{_HOST}-{os.getpid()}-{secrets.token_hex(6)}.part"
+    return path.parent / f".{path.name[:100]}.{_host()}-{os.getpid()}-{os.urandom(6).hex()}.part"
+
+
+@cache
+def _host() -> str:
+    """Six digits for this computer: of a shared folder, only its own parts can be judged by their process."""
+    import hashlib  # these two take longer than the words of a command
+    import platform
+
+    return hashlib.sha256(platform.node().encode()).hexdigest()[:6]
+
+
+@cache
+def _part() -> re.Pattern[str]:
+    return re.compile(rf"\..*\.{_host()}-(\d+)-[0-9a-f]{{12}}\.part", re.DOTALL)
 
 
 def _sweep(folder: Path) -> None:
     """Remove what processes left half-written that are gone."""
     with suppress(OSError):
         for name in os.listdir(folder):
-            found = _PART.fullmatch(name)
+            found = _part().fullmatch(name)
             if found and not _runs(int(found[1])):
                 _remove(folder / name)
 
@@ -229,6 +237,8 @@ def check_folder(folder: Path) -> None:
     nearest = _nearest(folder)
     if not nearest.is_dir():
         raise OutputError(f"cannot write to {folder}: {nearest} is not a folder; choose another -o")
+    import tempfile
+
     try:
         tempfile.TemporaryFile(dir=nearest).close()
     except OSError as problem:

@@ -5,7 +5,6 @@ Giving back works with the GNU C library alone: elsewhere memory is kept and giv
 way.
 """
 
-import ctypes
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
@@ -79,5 +78,7 @@ def out_of_memory(error: BaseException) -> bool:
 
 def _call(name: str, *arguments: int) -> None:
     if sys.platform == "linux":
+        import ctypes
+
         with suppress(OSError, AttributeError):
             getattr(ctypes.CDLL(None), name)(*arguments)

@@ -109,7 +109,7 @@ def test_output_file(tmp_path):
 
 def test_what_a_killed_process_left_beside_a_new_folder_is_swept_up(tmp_path):
     """It lay beside the folder, which was not there yet; the next export writes into the folder."""
-    gone = f".export.{files._HOST}-{2**22 + 7}-0123456789ab.part"  # no process has such a number
+    gone = f".export.{files._host()}-{2**22 + 7}-0123456789ab.part"  # no process has such a number
     (tmp_path / gone).mkdir()
     (tmp_path / gone / "half").write_bytes(b"x")
     (tmp_path / "out").mkdir()

@@ -5,7 +5,6 @@ import os
 import shutil
 import sys
 import time
-import traceback
 from argparse import Namespace
 from collections.abc import Iterable
 from typing import Any, TextIO
@@ -34,6 +33,8 @@ def explained(error: Exception) -> str:
     if out_of_memory(error):
         return "out of memory; close other programs, or try a smaller --size, fewer photos or fewer Gaussians"
     if os.environ.get("LANGFLASH_DEBUG"):
+        import traceback
+
         traceback.print_exception(error)
     return (
         f"a bug in LangFlash, {type(error).__name__}: {error}; "

@@ -34,7 +34,7 @@ from .picture import DrawnPicture, Picture
 from .processor.still import Still
 from .processor.still_picture import StillPicture
 from .question import Question
-from .scene import Level, LiveScene, MakeSplats
+from .scene import Level, LiveScene, MakeSplats, Thinned
 from .splats import SplatBuffers
 from .targets import context_lives, read
 from .view import ViewTargets
@@ -85,13 +85,13 @@ class SplatRenderer:
 
     # --- what to draw -----------------------------------------------------------------------
 
-    def set_scene(self, scene: Scene, share: float = 1.0) -> None:
-        """Upload a scene, this share of it now; the same object again does nothing. The query is kept if it
-        still fits."""
+    def set_scene(self, scene: Scene, share: float = 1.0, thinned: Thinned | None = None) -> None:
+        """Upload a scene, this share of it now, as thinned where that is given; the same object again does
+        nothing. The query is kept if it still fits."""
         if self._scene is not None and self._scene.scene is scene:
             return
         self._release_scene()
-        self._scene = LiveScene(self._canvas.painter, scene, self._splats, share)
+        self._scene = LiveScene(self._canvas.painter, scene, self._splats, share, thinned)
         asked, self._question = self._question, None
         if asked is not None and asked.compiled.factor.shape[0] == scene.semantics.num_atoms:
             self._question = Question(asked.compiled, asked.answers)

@@ -23,6 +23,8 @@ from .shapes import MakeShapes
 from .splats import SplatBuffers
 
 MakeSplats = Callable[[moderngl.Context, Programs, Scene, MakeShapes], SplatBuffers]
+Thinned = tuple[Scene, np.ndarray]
+"""What `thin_with_rows` gives."""
 _names = count(1)  # each given once, so that no two contents are ever taken for each other
 
 
@@ -89,9 +91,15 @@ class LiveScene:
     """Owns what of a scene is on the graphics card."""
 
     def __init__(
-        self, painter: Painter, scene: Scene, make_splats: MakeSplats = SplatBuffers, share: float = 1.0
+        self,
+        painter: Painter,
+        scene: Scene,
+        make_splats: MakeSplats = SplatBuffers,
+        share: float = 1.0,
+        thinned: Thinned | None = None,
     ):
-        """share: of the Gaussians, that is uploaded at once; others as they are wanted."""
+        """share: of the Gaussians, that is uploaded at once; others as they are wanted. thinned: to that
+        share, where it is made already."""
         self.scene = scene
         self._painter = painter
         self._make_splats = make_splats
@@ -99,7 +107,10 @@ class LiveScene:
         self._changes: tuple[Change, ...] = ()
         self._photos: dict[bool, PhotoDepths] = {}  # by whether each sees its own Gaussians alone
         self._levels: dict[float, Level] = {}  # by share of the Gaussians
-        self.level(share)
+        if thinned is None:
+            self.level(share)
+        else:
+            self.give(share, *thinned)
 
     @property
     def whole(self) -> Level:

@@ -3,11 +3,11 @@
 While the camera moves, a picture should take `MOVING_SECONDS`: one that takes longer sends the next
 ones down a ladder of smaller pictures, for large scenes also of fewer Gaussians once those are made; where
 OpenGL runs on the processor, a scene that knows its levels moves as its coarse Gaussians with less and less
-of the detail on them. Ones that take less than three quarters send them up again, a rung at a time, and less
-than half where the next rung is known to take too long. Colour, colour with the fast mode's relevance, and
-exact maps are paced apart, because they cost so differently. At rest the picture settles: at once at full
-size where that is quick, else smaller first and full after a longer pause, so that neither the next drag nor
-the next keystroke is met by a frozen window.
+of the detail on them, and of a huge one only ever a small share is brought there. Ones that take less than
+three quarters send them up again, a rung at a time, and less than half where the next rung is known to take
+too long. Colour, colour with the fast mode's relevance, and exact maps are paced apart, because they cost so
+differently. At rest the picture settles: at once at full size where that is quick, else smaller first and
+full after a longer pause, so that neither the next drag nor the next keystroke is met by a frozen window.
 """
 
 import math
@@ -20,6 +20,7 @@ SETTLE_AFTER = 0.12  # seconds since the last motion, key or pointer event
 FULL_AFTER = 0.70
 LARGE_SCENE = 200_000  # Gaussians, from which drawing fewer of them pays
 MIDDLING_SCENE = 30_000  # the same where OpenGL runs on the processor
+HUGE_SCENE = 3_000_000  # the same, from which bringing all of them there would stop the window for seconds
 MANY_COARSE = 60_000  # coarse Gaussians, from which drawing fewer of these pays there
 _RUNG_FACTOR = 1.8  # about what a rung saves
 
@@ -114,8 +115,16 @@ class Governor:
     tried: dict[tuple[Kind, int], float] = field(default_factory=dict)
 
     @property
+    def huge(self) -> bool:
+        """Whether all that moves is a share made elsewhere."""
+        return self.slow and self.coarse == 1 and self.num_gaussians >= HUGE_SCENE
+
+    @property
     def share(self) -> float:
-        """Of the Gaussians that move before others are made: all, or the coarse ones."""
+        """Of the Gaussians that move before others are made: all, the coarse ones, or of a huge scene as many
+        as a large one has."""
+        if self.huge:
+            return LARGE_SCENE / self.num_gaussians
         return self.coarse if self.slow and self.num_gaussians >= MIDDLING_SCENE else 1.0
 
     @property
@@ -126,6 +135,8 @@ class Governor:
     @property
     def _best(self) -> tuple[tuple[float, float], ...]:
         """The ladder once everything is made."""
+        if self.huge:
+            return tuple((scale, self.share) for scale, _ in SIZES)
         return _ladder(self.num_gaussians, self.slow, self.coarse)
 
     @property

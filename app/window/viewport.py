@@ -54,6 +54,8 @@ class Viewport:
         self._stand = Stand()
         self._adjusting = False  # what is drawn changes with every frame
         self._fresh = False  # a scene has just been taken
+        self._awaited: tuple[int, Scene, float] | None = None  # a huge scene, and the share that is to come
+        self._asked: tuple[tuple[int, ...], CompiledQuery | None, int] | None = None  # of it, meanwhile
 
     def _made(self) -> "SplatRenderer":
         """The renderer, once torch is loaded."""
@@ -83,18 +85,23 @@ class Viewport:
 
     def set_scene(self, serial: int, scene: "Scene") -> None:
         """Upload a scene; the first one builds the renderer. What pictures of another took is given back.
+        A huge one, where OpenGL runs on the processor, waits for `thin`.
 
         Raises:
             GraphicsError: the OpenGL here cannot do it.
         """
-        self._warming = None
+        self._warming = self._awaited = self._asked = None
         renderer = self._made()
         if self.picture is not None:
             self.picture.release(patience=0.0)
         self.picture = None
         if draws_in_software(self._ctx):
-            from .drawing.processor import ProcessorPicture
+            from .drawing.processor import ProcessorPicture, governor_of
 
+            governor = governor_of(scene)
+            if governor.huge:
+                self._awaited = serial, scene, governor.share
+                return
             self.picture = ProcessorPicture(renderer, serial, scene, self._notify)
         else:
             from .drawing.card import CardPicture
@@ -102,9 +109,20 @@ class Viewport:
             self.picture = CardPicture(renderer, serial, scene)
         self._fresh = True
 
+    def _begin(self, serial: int, scene: "Scene", thinned: "Scene", rows: np.ndarray) -> None:
+        """Show a huge scene, now that the share of it that moves is made."""
+        from .drawing.processor import ProcessorPicture
+
+        self._awaited = None
+        self.picture = ProcessorPicture(self._made(), serial, scene, self._notify, (thinned, rows))
+        self._fresh = True
+        if self._asked is not None:
+            self.picture.ask(*self._asked)
+
     def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", lapses: int = 0) -> None:
         """Ask the prompts `keys`, in the order of `query`, compiled when `Asking.lapses` was `lapses`;
         None asks nothing."""
+        self._asked = keys, query, lapses
         if self.picture is not None:
             self.picture.ask(keys, query, lapses)
 
@@ -130,11 +148,20 @@ class Viewport:
     @property
     def shares(self) -> tuple[float, ...]:
         """Of the scene's Gaussians, that moving through it wants; `thin` takes them."""
+        if self._awaited is not None:
+            return (self._awaited[2],)
         return () if self.picture is None else self.picture.governor.wants
 
     def thin(self, scene: "Scene", share: float, thinned: "Scene", rows: np.ndarray) -> None:
-        """A share of the scene's Gaussians is made."""
-        if self.picture is not None:
+        """A share of the scene's Gaussians is made.
+
+        Raises:
+            GraphicsError: the OpenGL here cannot do it.
+        """
+        awaited = self._awaited
+        if awaited is not None and awaited[1] is scene and awaited[2] == share:
+            self._begin(awaited[0], scene, thinned, rows)
+        elif self.picture is not None:
             self.picture.easel.renderer.give_level(scene, share, thinned, rows)
             self.picture.governor = self.picture.governor.with_share(share)
 
@@ -237,7 +264,7 @@ class Viewport:
         """Free what the renderer holds."""
         if self.picture is not None:
             self.picture.release(_PATIENCE)
-        self.picture = self._warming = None
+        self.picture = self._warming = self._awaited = None
         if self._renderer is not None:
             self._renderer.release()
         self._renderer = None

@@ -5,9 +5,13 @@ scale and a shift. Key points of the photos inside the scenes are matched; each 
 by the depth drawn there; of many pairs of matches each tells a scale and a shift, and the turn, scale and
 shift that most matches agree with win. What moved is in the minority there, like what matches wrongly.
 
-Then things of one kind are paired, the nearest first: what is within `STAYS` of its own size stayed, what is
-farther moved. What has no partner came or went, but only where a photo of the other scene looks at its place;
-else nobody knows. Sizes: n matches.
+What changed is told by depth, not by names, which may differ between the scenes. A thing is no longer where
+it was where the other scene's photos look through the place of its surface at what is behind. What went from
+the first scene and what came into the second are paired where they are called the same, or look the same to
+the language, and are about one size: those moved. What is flat is not looked through; there a thing of the
+same kind that is farther than `STAYS` of its own width moved. What no photo of the other scene looks at
+nobody knows.
+Sizes: n matches, m points.
 """
 
 import itertools
@@ -26,7 +30,9 @@ from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.inventory.things import Inventory, Thing
 from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.picture_files import STORED, opened_picture
+from langflash_core.scene.thin import covered_areas
 from langflash_core.scene.world import turn_of
+from langflash_core.segments import evenly
 from langflash_core.types import Camera, Frame
 
 Render = Callable[..., Frame]  # (scene, camera, weight_maps=True)
@@ -34,6 +40,13 @@ STAYS = 0.35
 """Share of a thing's width by which it may seem to move, and stayed; at least `_STILL`."""
 _STILL = 0.12  # m
 _ALIKE = 0.5  # share by which widths and heights of one thing may differ between two scenes
+_FLAT = 0.12  # m
+_KNOWN, _GONE = 0.3, 0.5
+"""Of a thing's surface: that has to be seen, and of that, what is looked through where the thing is not."""
+_SPARE = (0.08, 0.05)  # m, and share of depth, by which a surface may be off
+_SAME_LOOK = 0.8  # cosine of what two things say
+_LOOKS = 2.0  # m of way, that a cosine lower by 1 weighs as much as
+_SURFACE = 2000  # points of a thing, about
 _RATIO = 0.8  # Lowe's, of matches
 _POINTS = 3000  # of a photo
 _LEAST = 12  # matches that agree
@@ -68,8 +81,8 @@ class Pair:
 
 @dataclass(frozen=True)
 class Difference:
-    """What changed from the first scene to the second; `unseen`: where a photo of the other scene did not
-    look, so nobody knows."""
+    """What changed from the first scene to the second; `unseen`: of the first, where no photo of the second
+    looks, or something is there that it has no name for, so nobody knows."""
 
     fit: Fit
     stayed: tuple[Pair, ...]
@@ -90,22 +103,42 @@ def difference(first: Inventory, second: Inventory, render: Render) -> Differenc
         InputError: a scene holds no photos, or their photos show no common room.
     """
     fit = aligned(first, second, render)
-    placed = [_placed(thing, fit) for thing in second.things]
-    metre = 1.0 if first.unit == "m" else first.stands[:, [0, 2]].std() / 1.2
-    pairs, left, new = _paired(first.things, placed, metre)
-    stayed, moved = [], []
-    for before, after, by in pairs:
-        still = by <= max(_STILL * metre, STAYS * before.size[0])
-        (stayed if still else moved).append(Pair(before, second.things[placed.index(after)], by))
-    back = _Looks(second, fit, render), _Looks(first, None, render)
-    went = [thing for thing in left if back[0].see(thing)]
-    came = [after for after in new if back[1].see(after)]
-    known = {thing.id for thing in went}
-    unseen = [thing for thing in left if thing.id not in known]
+    metre = _metre(first)
+    back, here = _Looks(second, fit, render, metre), _Looks(first, None, render, metre)
+    old = [_Seen(thing, thing, _look(first, thing), back.states(first, thing)) for thing in first.things]
+    new = [
+        _Seen(thing, _placed(thing, fit), _look(second, thing), here.states(second, thing, fit))
+        for thing in second.things
+    ]
+    moved = _paired([one for one in old if one.absent], [one for one in new if one.absent], metre, far=True)
+    here_still = _paired(
+        [one for one in old if not one.absent], [one for one in new if not one.absent], metre, far=False
+    )
+    flat = [pair for pair in here_still if _flat(pair.before, metre) and pair.by > _still(pair.before, metre)]
+    stayed = [pair for pair in here_still if pair not in flat]
+    paired = {pair.before.id for pair in (*moved, *here_still)}
+    has = {pair.after.id for pair in (*moved, *here_still)}
+    left = [one for one in old if one.thing.id not in paired]
     return Difference(
-        fit, tuple(stayed), tuple(moved), tuple(went),
-        tuple(second.things[placed.index(after)] for after in came), tuple(unseen), first.unit,
+        fit, tuple(stayed), (*moved, *flat),
+        tuple(one.thing for one in left if one.absent),
+        tuple(one.thing for one in new if one.absent and one.thing.id not in has),
+        tuple(one.thing for one in left if not one.absent), first.unit,
     )  # fmt: skip
+
+
+def _metre(found: Inventory) -> float:
+    """In the inventory's unit; of one without a scale, by how far its surface spreads in rooms."""
+    return 1.0 if found.unit == "m" else float(found.stands[:, [0, 2]].std() / 1.2)
+
+
+def _still(thing: Thing, metre: float) -> float:
+    return max(_STILL * metre, STAYS * thing.size[0])
+
+
+def _flat(thing: Thing, metre: float) -> bool:
+    """Whether what is behind it is too near to be told from it."""
+    return min(thing.size) < _FLAT * metre
 
 
 def aligned(first: Inventory, second: Inventory, render: Render) -> Fit:
@@ -116,7 +149,7 @@ def aligned(first: Inventory, second: Inventory, render: Render) -> Fit:
         if not found.scene.photos:
             raise InputError("scenes are compared by their photos, and one has none; name scenes of photos")
     ours, theirs = _matched(_described(first, render), _described(second, render))
-    fit = _fitted(ours, theirs, 1.0 if first.unit == "m" else first.stands[:, [0, 2]].std() / 1.2)
+    fit = _fitted(ours, theirs, _metre(first))
     if fit is None or fit.matches < _LEAST:
         raise InputError(
             "the photos of both scenes show too little in common; take some from the same places"
@@ -240,24 +273,56 @@ def _placed(thing: Thing, fit: Fit) -> Thing:
     )
 
 
-def _paired(
-    before: Sequence[Thing], after: Sequence[Thing], metre: float
-) -> tuple[list[tuple[Thing, Thing, float]], list[Thing], list[Thing]]:
-    """Things of one kind and about one size, so that the sum of their ways is least; and who is left over."""
-    far = 1e6
-    costs = np.full((len(before), len(after)), far)
+def _look(found: Inventory, thing: Thing) -> Float[np.ndarray, " C"]:
+    """What a thing's surface says on average, unit length."""
+    semantics = found.scene.semantics
+    rows = np.flatnonzero(thing.rows)
+    areas = covered_areas(found.scene.gaussians)[rows]
+    weights = semantics.weight_values.double().numpy()[rows] * (areas + 1e-12)[:, None]
+    ids = semantics.weight_ids.numpy()[rows]
+    mean = np.bincount(ids.ravel(), weights.ravel(), semantics.num_atoms)
+    vector = mean @ np.nan_to_num(semantics.dictionary.double().numpy())
+    return vector / max(float(np.linalg.norm(vector)), 1e-12)
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """A thing, as it stands in the first world, its look, and the shares of its surface that the other scene
+    shows, and looks through."""
+
+    thing: Thing
+    placed: Thing
+    look: Float[np.ndarray, " C"]
+    states: tuple[float, float]
+
+    @property
+    def absent(self) -> bool:
+        """Whether it is not in the other scene, where this one has it."""
+        known, through = self.states
+        return known >= _KNOWN and through >= _GONE * known
+
+
+def _paired(before: Sequence[_Seen], after: Sequence[_Seen], metre: float, *, far: bool) -> list[Pair]:
+    """Things that may be the same, so that the sum of their differences is least.
+
+    Args:
+        far: they are alike in name or look, and size; else they are near, or of one name and size.
+    """
+    never = 1e6
+    costs = np.full((len(before), len(after)), never)
     for row, one in enumerate(before):
         for column, other in enumerate(after):
-            if one.kind == other.kind and _alike(one, other):
-                costs[row, column] = math.dist(one.place, other.place) / metre
+            way = math.dist(one.placed.place, other.placed.place)
+            look, named = float(one.look @ other.look), one.thing.kind == other.thing.kind
+            same = (named or (far and look >= _SAME_LOOK)) and _alike(one.placed, other.placed)
+            if same or (not far and way <= _still(one.thing, metre)):
+                costs[row, column] = way / metre + _LOOKS * (1 - look) + (not named)
     rows, columns = linear_sum_assignment(costs)
-    pairs = [
-        (before[r], after[c], float(costs[r, c] * metre))
+    return [
+        Pair(before[r].thing, after[c].thing, math.dist(before[r].placed.place, after[c].placed.place))
         for r, c in zip(rows, columns, strict=True)
-        if costs[r, c] < far
+        if costs[r, c] < never
     ]
-    had, has = {one.id for one, _, _ in pairs}, {other.id for _, other, _ in pairs}
-    return pairs, [t for t in before if t.id not in had], [t for t in after if t.id not in has]
 
 
 def _alike(one: Thing, other: Thing) -> bool:
@@ -269,42 +334,49 @@ def _alike(one: Thing, other: Thing) -> bool:
 
 
 class _Looks:
-    """Whether photos of a scene look at a place of the first world, and nothing stands before it."""
+    """What photos of a scene show at places of the first world."""
 
-    def __init__(self, found: Inventory, fit: Fit | None, render: Render):
-        self._found, self._fit = found, fit
+    def __init__(self, found: Inventory, fit: Fit | None, render: Render, metre: float):
+        self._found, self._fit, self._metre = found, fit, metre
         scene = found.scene
         self._cameras = [scene.camera(view) for view in range(scene.num_views)]
-        self._frames = [render(scene, camera, weight_maps=False) for camera in self._cameras]
+        frames = [render(scene, camera, weight_maps=False) for camera in self._cameras]
+        self._depths = [
+            np.where(frame.alphas.cpu().numpy() >= COVERED_ALPHA, frame.depths.cpu().double().numpy(), 0.0)
+            for frame in frames
+        ]
 
-    def see(self, thing: Thing) -> bool:
-        """Most of its box's corners and middle are in one of the photos, not behind what is seen there."""
-        heights = -np.array([thing.bottom, thing.bottom + thing.size[2]])
-        points = [[east, height, north] for east, north in thing.corners for height in heights]
-        points = np.array([*points, thing.place])
+    def states(self, whose: Inventory, thing: Thing, fit: Fit | None = None) -> tuple[float, float]:
+        """Shares of a thing's surface that some photo shows, or looks through at what is behind.
+
+        Args:
+            fit: from the thing's own world to the first, if it is another.
+        """
+        own = np.flatnonzero(thing.rows)
+        chosen = own[evenly(covered_areas(whose.scene.gaussians)[own])]
+        points = whose.stands[chosen[:: max(1, len(chosen) // _SURFACE)]]
+        points = points if fit is None else fit.placed(points)
         if self._fit is not None:
             points = (points - self._fit.shift) @ self._fit.turn / self._fit.scale
         world = self._found.world
         inside = points / self._found.scale @ turn_of(world) + np.array(world.origin)
-        return any(
-            self._share(camera, frame, inside) > 0.6
-            for camera, frame in zip(self._cameras, self._frames, strict=True)
-        )
+        behind, known = np.zeros(len(inside), bool), np.zeros(len(inside), bool)
+        for camera, depths in zip(self._cameras, self._depths, strict=True):
+            through, met = self._one(camera, depths, inside)
+            behind, known = behind | through, known | through | met
+        return float(known.mean()), float(behind.mean())
 
-    @staticmethod
-    def _share(camera: Camera, frame: Frame, points: np.ndarray) -> float:
+    def _one(self, camera: Camera, depths: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(m,) whether a camera looks through each point, and whether it shows a surface there."""
         viewmat, K = camera.viewmat.double().numpy(), camera.K.double().numpy()
         pos_c = points @ viewmat[:3, :3].T + viewmat[:3, 3]
         with np.errstate(all="ignore"):
-            columns, rows = ((pos_c / pos_c[:, 2:]) @ K[:2].T).T
-        good = (
-            (pos_c[:, 2] > 0)
-            & (columns >= 0)
-            & (rows >= 0)
-            & (columns < camera.width)
-            & (rows < camera.height)
-        )
-        depths = frame.depths.cpu().double().numpy()
-        seen = np.zeros(len(points), bool)
-        seen[good] = pos_c[good, 2] <= 1.1 * depths[rows[good].astype(int), columns[good].astype(int)]
-        return float(seen.mean())
+            columns, rows = np.nan_to_num((pos_c / pos_c[:, 2:]) @ K[:2].T, nan=-1.0).T
+        height, width = depths.shape
+        good = (pos_c[:, 2] > 0) & (columns >= 0) & (rows >= 0) & (columns < width) & (rows < height)
+        seen = np.zeros(len(points))
+        seen[good] = depths[rows[good].astype(int), columns[good].astype(int)]
+        spare = _SPARE[0] * self._metre / (self._found.scale * (self._fit.scale if self._fit else 1.0))
+        spare = spare + _SPARE[1] * np.abs(pos_c[:, 2])
+        through = good & (seen > pos_c[:, 2] + spare)
+        return through, good & (seen > 0) & (np.abs(seen - pos_c[:, 2]) <= spare)

@@ -1,9 +1,9 @@
 """What is in a room, how many, how large, where, how sure, and seen by which photos.
 
-Every Gaussian is of the one kind of the vocabulary that it answers best, where it answers that at all; what
-touches and is of one kind is a thing (`langflash_core/segments.py`). Things stand upright: a box has a height
-and a rectangle on the floor, along the walls unless another turn saves `_SAVES` of its area. Sizes are those
-of what photos saw: the back of a cupboard that nobody saw is not measured.
+Pieces that touch are one thing where one name of the vocabulary does for all of them
+(`langflash_core/inventory/pieces.py`), and it counts where it answers that name. Things stand upright: a box
+has a height and a rectangle on the floor, along the walls unless another turn saves `_SAVES` of its area.
+Sizes are those of what photos saw: the back of a cupboard that nobody saw is not measured.
 
 Lengths are metres where the scene's scale is known or guessed, else scene units. World: +x east, +y down,
 +z north, the floor at y = 0 (`langflash_core.records.World`). Sizes: N Gaussians, G kinds, V views.
@@ -17,9 +17,9 @@ from functools import cached_property
 import numpy as np
 import torch
 from jaxtyping import Bool, Float
-from torch import Tensor
 
 from langflash_core.errors import InputError
+from langflash_core.inventory.pieces import STRUCTURE, Parts, parts_of_room
 from langflash_core.language.answers import BOX_QUANTILES
 from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.relevance import compile_query
@@ -29,13 +29,11 @@ from langflash_core.level import found_world, metres_of
 from langflash_core.records import Guess, World
 from langflash_core.scene.thin import covered_areas
 from langflash_core.scene.world import turn_of
-from langflash_core.segments import connected_things, evenly, photo_shares
+from langflash_core.segments import evenly, photo_shares
 from langflash_core.types import Scene, Segments
 
-STRUCTURE = ("wall", "floor", "ceiling")
-"""Kinds that rooms are made of: no things."""
 OPENINGS = ("door", "window")
-LEAST_SHARE = 0.002
+LEAST_SHARE = 0.003
 """Of a photo: what no photo shows so large is no thing of an inventory."""
 SEEN = 0.0005  # of a photo that shows a thing
 _SAVES = 0.12
@@ -117,7 +115,7 @@ def inventory(scene: Scene, *, threshold: float | None = None, least: float = LE
     """The things of a scene.
 
     Args:
-        threshold: relevancy from which a Gaussian is of a kind; None: the scene's calibration. least: share
+        threshold: mean relevancy from which a thing counts; None: the scene's calibration. least: share
             of a photo that a thing must fill in some photo.
 
     Raises:
@@ -131,62 +129,69 @@ def inventory(scene: Scene, *, threshold: float | None = None, least: float = LE
     scale = metres or (guess.metres if guess else 1.0)
     unit = "m" if metres or guess else "units"
     whole = Inventory(scene, world, unit, scale, guess, ())
-    kinds, relevance = _kinds(scene, threshold)
     shares = photo_shares(scene)
-    things = [
-        thing
-        for kind in sorted({str(kind) for kind in kinds} - {""})
-        if kind not in STRUCTURE
-        for thing in _of_kind(whole, kind, kinds == kind, relevance, shares, least)
-    ]
+    parts = parts_of_room(scene, shares.sum(0).double().numpy())
+    things = _things(whole, parts, shares.numpy(), threshold, least)
     return replace(whole, things=tuple(sorted(things, key=lambda thing: -max(thing.shares))))
 
 
 def kinds_of(scene: Scene, threshold: float | None = None) -> np.ndarray:
-    """(N,) words of the vocabulary, "" of what answers none: the kind of each Gaussian."""
-    return _kinds(scene, threshold)[0]
-
-
-def _kinds(scene: Scene, threshold: float | None) -> tuple[np.ndarray, np.ndarray]:
-    """(N,) kinds, and (N,) how well each Gaussian answers its own."""
+    """(N,) words of the vocabulary, "" of what answers none: the kind of each Gaussian by itself."""
     names = list(OWN)
     compiled = compile_query(scene, language_space(scene.semantics.space), names)
     best, which = gaussian_relevance(scene.semantics, compiled).max(0)
     limit = compiled.threshold if threshold is None else threshold
-    found = np.where((best >= limit).numpy(), np.array(names)[which.numpy()], "")
-    return found, best.numpy()
+    return np.where((best >= limit).numpy(), np.array(names)[which.numpy()], "")
 
 
-def _of_kind(
-    whole: Inventory,
-    kind: str,
-    members: np.ndarray,
-    relevance: np.ndarray,
-    shares: Tensor,
-    least: float,
+def _things(
+    whole: Inventory, parts: Parts, shares: np.ndarray, threshold: float | None, least: float
 ) -> list[Thing]:
-    """The things of one kind."""
-    scene = whole.scene
-    numbers = connected_things(scene, torch.from_numpy(members), shares).numpy()
+    """Parts that are things, are seen well enough, and answer their name: in relevancy as the threshold says,
+    and in cosine, unless somebody gave a threshold."""
+    seen = _sums(parts.numbers, shares, len(parts.kinds))  # (V, parts)
+    chosen = [
+        number
+        for number in np.argsort(-seen.max(0), kind="stable")
+        if parts.kinds[number] not in STRUCTURE
+        and seen[:, number].max() >= least
+        and (threshold is not None or parts.cosines[number] >= parts.present)
+    ]
+    if not chosen:
+        return []
+    scene, areas = whole.scene, covered_areas(whole.scene.gaussians)
+    names = sorted({parts.kinds[number] for number in chosen})
+    compiled = compile_query(scene, language_space(scene.semantics.space), names)
+    relevance = dict(zip(names, gaussian_relevance(scene.semantics, compiled).numpy(), strict=True))
+    limit = compiled.threshold if threshold is None else threshold
     things: list[Thing] = []
-    areas = covered_areas(scene.gaussians)
-    for number in range(1, int(numbers.max(initial=0)) + 1):
-        rows = numbers == number
-        seen = shares[:, torch.from_numpy(rows)].sum(1).numpy()  # (V,)
-        if float(seen.max()) < least:
-            continue
-        own = rows.nonzero()[0]
-        sure = float(np.average(relevance[own], weights=areas[own] + 1e-12))
-        order = [int(view) for view in np.argsort(-seen, kind="stable") if seen[view] >= SEEN]
-        id = f"{kind} {len(things) + 1}"
-        things.append(
-            Thing(
-                id, kind, scene.record.thing_names.get(id, ""), sure,
-                *upright_box(whole.stands[own[evenly(areas[own])]]),
-                tuple(order), tuple(float(seen[view]) for view in order), _cut(whole, rows, order), rows,
-            )
-        )  # fmt: skip
+    for number in chosen:
+        kind, own = parts.kinds[number], np.flatnonzero(parts.numbers == number)
+        sure = float(np.average(relevance[kind][own], weights=areas[own] + 1e-12))
+        if sure >= limit:
+            id = f"{kind} {1 + sum(thing.kind == kind for thing in things)}"
+            things.append(_thing(whole, id, kind, sure, own, areas, seen[:, number]))
     return things
+
+
+def _sums(numbers: np.ndarray, shares: np.ndarray, count: int) -> np.ndarray:
+    """(V, count) of the photos that each part fills."""
+    some = numbers >= 0
+    return np.stack([np.bincount(numbers[some], row[some], count) for row in shares])
+
+
+def _thing(
+    whole: Inventory, id: str, kind: str, sure: float, own: np.ndarray, areas: np.ndarray, seen: np.ndarray
+) -> Thing:
+    """The thing of some rows of the scene."""
+    order = [int(view) for view in np.argsort(-seen, kind="stable") if seen[view] >= SEEN]
+    rows = np.zeros(len(areas), bool)
+    rows[own] = True
+    return Thing(
+        id, kind, whole.scene.record.thing_names.get(id, ""), sure,
+        *upright_box(whole.stands[own[evenly(areas[own])]]),
+        tuple(order), tuple(float(seen[view]) for view in order), _cut(whole, rows, order), rows,
+    )  # fmt: skip
 
 
 def upright_box(

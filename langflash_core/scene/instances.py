@@ -62,14 +62,33 @@ def disc_radii(gaussians: Gaussians) -> Float[np.ndarray, " N"]:
     return np.nan_to_num(scales[:, 1:].mean(1), nan=0.0, posinf=0.0, neginf=0.0)
 
 
+def touching(
+    gaussians: Gaussians, link: float = LINK
+) -> tuple[Integer[np.ndarray, " m"], Integer[np.ndarray, " m"]]:
+    """Rows of the pairs of Gaussians that touch, as `instances` says; what is not finite touches nothing."""
+    means = gaussians.means.detach().cpu().double().numpy()
+    rows = np.flatnonzero(np.isfinite(means).all(1))
+    starts, others = _pairs(means[rows], disc_radii(gaussians)[rows], link)
+    return rows[starts], rows[others]
+
+
 def _touching(
     means: Float[np.ndarray, "n 3"], radii: Float[np.ndarray, " n"], link: float
 ) -> Integer[np.ndarray, " n"]:
     """A number from 0 for the connected part of each."""
+    starts, others = _pairs(means, radii, link)
+    graph = coo_matrix((np.ones(len(starts), bool), (starts, others)), shape=(len(means), len(means)))
+    return connected_components(graph, directed=False)[1]
+
+
+def _pairs(
+    means: Float[np.ndarray, "n 3"], radii: Float[np.ndarray, " n"], link: float
+) -> tuple[Integer[np.ndarray, " m"], Integer[np.ndarray, " m"]]:
+    """Rows of the pairs that touch; each is a pair with itself, too."""
     count = len(means)
+    if not count:
+        return np.zeros(0, int), np.zeros(0, int)
     distances, others = KDTree(means).query(means, k=min(_NEIGHBOURS + 1, count))
     distances, others = np.reshape(distances, (count, -1)), np.reshape(others, (count, -1))
     near = distances <= link * (radii[:, None] + radii[others]) / 2
-    starts = np.repeat(np.arange(count), near.sum(1))
-    graph = coo_matrix((np.ones(len(starts), bool), (starts, others[near])), shape=(count, count))
-    return connected_components(graph, directed=False)[1]
+    return np.repeat(np.arange(count), near.sum(1)), others[near]

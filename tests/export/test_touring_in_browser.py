@@ -100,6 +100,8 @@ def test_notes_hide_behind_what_is_before_them_and_the_keyboard_reaches_them(ope
     assert opened.value("document.querySelector('#chips [aria-pressed=true]').textContent").startswith(
         "armchair"
     )
+    until(opened, "langflash.then((page) => page.moving.flight === null)")
+    until(opened, f"({away})[1]")
     opened.value("document.querySelectorAll('.note')[1].focus()")
     until(opened, "langflash.then((page) => page.moving.flight === null)")
     turned = np.array(opened.value("langflash.then((page) => page.orbit.turn[2])"))

@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 from langflash_core.errors import InputError
 from langflash_core.inventory import beside, inventory
 from langflash_core.inventory.beside import Fit, difference
+from langflash_core.language.spaces import language_space
 from langflash_core.splat import render
-from tests.boxroom import CHAIRS, METRES, TABLE, box_room
+from tests.boxroom import CHAIRS, METRES, TABLE, WORDS, box_room
 
 SAME = Fit(np.eye(3), 1.0, np.zeros(3), 40, 50)
 
@@ -60,6 +61,18 @@ def test_a_room_beside_itself_is_the_same(room, monkeypatch):
     found = difference(room, room, render)
     assert not (found.moved or found.came or found.went or found.unseen)
     assert len(found.stayed) == len(room.things) and max(pair.by for pair in found.stayed) == 0
+
+
+def test_what_the_other_scene_calls_something_else_is_not_said_to_have_gone(room, monkeypatch):
+    monkeypatch.setattr(beside, "aligned", lambda first, second, render: SAME)
+    scene = box_room().with_record(metric_scale=METRES)
+    atoms = scene.semantics.dictionary.clone()
+    atoms[WORDS.index("table")] = language_space("minilm").encode(("stool",))[0]
+    misnamed = inventory(replace(scene, semantics=replace(scene.semantics, dictionary=atoms)))
+    assert "table" not in misnamed.counts and misnamed.counts["stool"] == 1
+    found = difference(room, misnamed, render)
+    assert not (found.moved or found.went or found.came)
+    assert ("table", "stool") in [(pair.before.kind, pair.after.kind) for pair in found.stayed]
 
 
 def test_what_no_photo_of_the_other_scene_looks_at_is_not_said_to_have_gone(room, monkeypatch):

@@ -6,7 +6,8 @@ import pytest
 import torch
 from torch.nn.functional import normalize
 
-from langflash_core.language.relevance import compile_query, relevance_maps
+from langflash_core.errors import PromptError
+from langflash_core.language.relevance import compile_query, relevance_maps, spoken_dictionary
 from langflash_core.language.spaces import language_space
 from langflash_core.language.taught import ALIKE, taught_dictionary
 from langflash_core.types import Record, Scene
@@ -29,6 +30,14 @@ def score(scene: Scene, phrase: str) -> list[float]:
 
 def taught(scene: Scene, **lessons) -> Scene:
     return replace(scene, record=replace(scene.record, **lessons))
+
+
+def test_what_was_taught_in_other_numbers_is_one_sentence():
+    """A file may say that it speaks minilm, and hold atoms of another length."""
+    strange = taught(room(torch.eye(3)), atom_names={1: "aquarium"})
+    for each in (strange, strange.semantics):
+        with pytest.raises(PromptError, match=r"speaks 'minilm' with 3 numbers, .* with 384; query"):
+            spoken_dictionary(each, SPACE)
 
 
 def test_a_named_group_answers_to_its_name_as_well(scene):

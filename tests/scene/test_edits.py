@@ -11,13 +11,17 @@ import pytest
 import torch
 
 from langflash_core.errors import SceneFileError
+from langflash_core.geometry.poses import Pose, Vector
 from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import LanguageSpace
+from langflash_core.records import World
+from langflash_core.scene.changes import Moved, Recoloured
 from langflash_core.scene.edited import edited_scene, first_marks, spoken_scene
 from langflash_core.scene.edits import (
     History,
     Marks,
     Mask,
+    change,
     delete,
     deny_atom,
     hide,
@@ -31,6 +35,7 @@ from langflash_core.scene.edits import (
 )
 from langflash_core.scene.edits_file import load_history, read_about, save_history, scene_digest
 from langflash_core.scene.file import load, save
+from langflash_core.scene.tour import Note, Stop, Tour, told_tour
 from langflash_core.splat import render
 from langflash_core.types import Scene
 from tests.splat.scenes import camera, cloud
@@ -265,6 +270,35 @@ def test_edits_of_the_version_before_open_and_newer_ones_name_their_version(scen
     del content["before"], content["forgotten"]
     path.write_text(json.dumps({**content, "version": 1}))
     assert load_history(path, scene) == history
+
+
+KEPT = Path(__file__).parents[1] / "fixtures"
+KEPT_EDITS = tuple(KEPT / "edits" / f"version_{number}.edits" for number in (1, 2, 3, 4))
+
+
+@pytest.mark.parametrize("version", [1, 2, 3, 4])
+def test_kept_edits_of_each_version_open_with_all_they_say(version):
+    """Each written by the last program of its version, of the kept scene of format 2; then one undone."""
+    scene = load(KEPT / "scenes" / "version_2.langflash")
+    path = KEPT_EDITS[version - 1]
+    assert json.loads(path.read_text())["version"] == version
+    history, rows = load_history(path, scene), [Mask.of(np.arange(54) % 7 == k) for k in range(4)]
+    first = first_marks(scene)
+    want = rename_atom(delete(first, rows[0]), 1, "door")
+    want = replace(deny_atom(want, 0, "wall"), metric_scale=1.25)
+    if version >= 2:
+        want = change(want, Moved(rows[1], offset=(0.25, 0.0, -0.5)))
+        want = change(want, Recoloured.tinted(rows[2], (0.5, 0.25, 1.0), 0.5, 0.5))
+    if version >= 3:
+        stop = Stop("The wall", Pose(Vector(0.0, 0.0, -1.0)), "look")
+        tour = Tour((stop,), (Note("A note", Vector(0.0, 0.0, 1.0)),))
+        want = replace(want, tour=told_tour(tour))
+    if version >= 4:
+        world = World((1.0, 0.0, 0.0, 0.0), (0.0, 1.5, 0.0))
+        want = replace(want, thing_names={"1": "my chair"}, world=world)
+    assert history.marks == want and history.first == first
+    assert history.redo().marks == hide(want, rows[3])
+    assert edited_scene(scene, history.marks).gaussians.means.shape == (54 - len(rows[0]), 3)
 
 
 def with_done(text: str, **changes) -> str:

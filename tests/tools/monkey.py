@@ -29,9 +29,11 @@ from typing import Any
 
 import glfw
 import numpy as np
+from PIL import Image
 
 from app.window.asking import commands as ask
 from app.window.filming import commands as film
+from app.window.frame.table import ENTRIES, Chord, named
 from app.window.scene import camera
 from app.window.session import Session
 from langflash_core import pictures
@@ -46,18 +48,46 @@ from tests.app.window.x11 import Client
 PATIENCE = 120.0  # seconds without any sign of life that count as a hang, also on a busy machine
 STEPS_AT_ONCE = 12
 MODE_SECONDS = 2.0
-IDLE = 10.0  # seconds in which nothing follows a drop
+IDLE = 30.0  # seconds in which nothing follows a drop, also on a busy machine
+LONGEST_QUEUE = 40.0  # seconds in which a slow window takes the letters of a command
 AT_REST = 3.0  # seconds without a frame; what is free is given back one second after the last command
 LONGEST_REST = 15.0  # seconds until a window counts that never rests, as where a text cursor blinks
 WARM_MINUTES = 10.0
 SLOPE_MB = 8.0  # a minute; a scene that leaked at each opening would be 20, a reconstruction hundreds
-KEYS = (
-    *"wasdqehzfpkvxrbcglonmjtyui1234567890", "bracketleft", "bracketright", "Delete", "BackSpace", "Escape",
-    "Return", "Tab", "shift+Tab", "Up", "Down", "Left", "Right", "Home", "End", "space", "F1", "F2",
-    "minus", "plus", *(f"ctrl+{letter}" for letter in "zyadisoepqvcftm"),
-    *(f"ctrl+{key}" for key in ("Left", "Right", "Up", "Down", "Prior", "Next")),
-    "ctrl+comma", "ctrl+shift+z", "F6", "F11",
-)  # fmt: skip
+_NAMES = {
+    **{f"{way}_arrow": way.capitalize() for way in ("up", "down", "left", "right")},
+    **{f"{side}_bracket": f"bracket{side}" for side in ("left", "right")},
+    "page_up": "Prior", "page_down": "Next", "home": "Home", "delete": "Delete", "backspace": "BackSpace",
+}  # fmt: skip
+_OTHERS = (
+    "Escape",
+    "Return",
+    "Tab",
+    "shift+Tab",
+    "End",
+    "space",
+    "minus",
+    "plus",
+    "F6",
+    "F11",
+    "ctrl+c",
+    *"wasdqet0",
+)
+
+
+def chord(keys: Chord) -> str:
+    """A chord of the window in xdotool's words, as "ctrl+shift+Left"."""
+    name = str(keys.key.name).strip("_")
+    if name.startswith("keypad"):
+        name = name.replace("keypad", "KP_")
+    elif name[0] == "f" and name[1:].isdigit():
+        name = name.upper()
+    return "ctrl+" * keys.ctrl + "shift+" * keys.shift + _NAMES.get(name, name)
+
+
+KEYS = (*(chord(keys) for entry in ENTRIES for keys in entry.keys), *_OTHERS)
+COMMANDS = tuple(entry.name for entry in ENTRIES)
+PALETTE = chord(named("All commands").keys[0])
 SURE = ("Discard", "Open it")  # buttons of the questions before a scene that is opened
 WORDS = (
     "armchair",
@@ -86,6 +116,7 @@ class Outcome:
     problems: list[str] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
     latest: float = 0.0  # seconds, of the frame that came latest
+    picture: np.ndarray | None = None  # of the screen where it went wrong
 
     def slope(self) -> float:
         """MB a minute over the checkpoints after the first two, when caches have filled; 0 of fewer."""
@@ -250,7 +281,7 @@ class Hands:
         raise TimeoutError("no window")
 
     def act(self) -> None:
-        """Some random steps, or one drop, resize or close."""
+        """Some random steps, or one drop, resize, close or command by its name."""
         chosen = self._random.random()
         if chosen < 0.06:
             self.drop(self._random.choice(self._droppable))
@@ -260,6 +291,10 @@ class Hands:
         elif chosen < 0.10:
             with self._client() as client:
                 client.ask_to_close(self.window)
+        elif chosen < 0.20:
+            self._xdotool("key", "Escape", "key", PALETTE)
+            self._xdotool("type", "--delay", "5", self._random.choice(COMMANDS))
+            self._xdotool("sleep", "0.2", "key", "Return")
         else:
             steps = [self._step() for _ in range(STEPS_AT_ONCE)]
             self._xdotool(*(word for step in steps for word in step))
@@ -284,6 +319,11 @@ class Hands:
         left, top, right, bottom = box
         at = (str((left + right) // 2), str((top + bottom) // 2))
         self._xdotool("mousemove", *at, "sleep", "0.3", "click", "1", "sleep", "1")
+
+    def look(self) -> np.ndarray:
+        """The screen, (H, W, 3) uint8."""
+        with self._client() as client:
+            return client.picture(*self._size)
 
     def _step(self) -> list[str]:
         r = self._random
@@ -371,14 +411,23 @@ class Watched:
                 idle, seen = time.monotonic(), now
             if time.monotonic() - idle > IDLE:
                 return False
-            if self.last.get("discard"):
-                click(self.last["discard"])
+            if box := self.last.get("discard"):
+                click(box)
+                self._is_answered(box, end)
+                idle = time.monotonic()
             elif self._has_come(before, count):
                 time.sleep(2.0)  # for what follows a scene: words of its atoms, files kept
                 if not self.last.get("discard"):
                     return self._has_come(before, count)
             time.sleep(0.2)
         return False
+
+    def _is_answered(self, box: list[int], end: float) -> None:
+        """Wait until a click on a question has come through what was typed before, of which a frame takes one
+        letter. A second click would meet the next question's button."""
+        end = min(end, time.monotonic() + LONGEST_QUEUE)
+        while self.last.get("discard") == box and time.monotonic() < end and self.process.poll() is None:
+            time.sleep(0.1)
 
     def reconstructs(self) -> bool:
         """Wait for the scene of the photos that the window was launched with."""
@@ -484,6 +533,8 @@ def run(
                 outcome.steps += 1
                 outcome.problems += watched.problems()
             outcome.problems += [p for p in watched.problems() if p not in outcome.problems]
+            if outcome.problems:
+                outcome.picture = hands.look()
         finally:
             code = watched.end()
         if code and not outcome.problems:
@@ -512,6 +563,9 @@ def main() -> int:
     photos = [asset_path(f"photos/{name}") for name in PAIR]
     outcome = run(60 * args.minutes, args.seed, (width, height), photos=photos, say=say)
     say(f"{outcome.steps} batches, {outcome.frames} frames, the latest by {outcome.latest:.2f} s")
+    if outcome.picture is not None:
+        Image.fromarray(outcome.picture).save("monkey.png")
+        say("what the screen showed is in monkey.png")
     growth = outcome.growth()
     if growth is not None:
         say(f"memory {100 * growth:+.2f} % from minute {WARM_MINUTES:.0f} to the end")

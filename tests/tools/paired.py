@@ -138,6 +138,18 @@ def opening(scene: Path) -> float:
     return timed(act)
 
 
+def starting(scene: Path) -> float:
+    """The window from its first step until a scene is there."""
+    show = importlib.import_module("app.window.scene.commands")
+
+    def act() -> None:
+        with _window() as guide:
+            guide.tell(show.OpenPaths((str(scene),)))
+            guide.until(lambda: _shown(guide), "the scene")
+
+    return timed(act)
+
+
 def turning(scene: Path) -> float:
     """A step of the window's loop while a scene with a heat-map is turned; pictures are as fine as the window
     makes them then."""
@@ -158,7 +170,8 @@ def turning(scene: Path) -> float:
 
 CASES: dict[str, Callable[[Path], float]] = {
     "help": help_of_the_command, "import": importing, "load": loading, "save": saving,
-    "query": asking, "draw": drawing, "query-gl": answering, "window": opening, "turn": turning,
+    "query": asking, "draw": drawing, "query-gl": answering, "start": starting,
+    "window": opening, "turn": turning,
 }  # fmt: skip
 
 

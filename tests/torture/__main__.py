@@ -1,14 +1,19 @@
 """Everything that LangFlash is to survive, by parts: `python -m tests.torture [PART ...] [--seed 1]`.
 
 Parts: `PARTS`. Their defaults are such that `make torture` runs them all in less than half an hour on two
-idle cores; what each takes stands in README.md beside this file, and a part says it when it ends.
+idle cores; what each takes stands in README.md beside this file, and a part says it when it ends. Several
+parts run two at a time, each in a process of its own, and are told as they end.
 """
 
 import argparse
+import os
+import subprocess
 import sys
 import tempfile
 import time
 import warnings
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 
@@ -69,7 +74,7 @@ def load(args: argparse.Namespace, folder: Path) -> int:
     """Much at once, and often: `load.py`."""
     from tests.torture.load import everything, report
 
-    return report(everything(folder, args.questions), sys.stdout.write)
+    return report(everything(folder, args.questions, args.only), sys.stdout.write)
 
 
 def address(args: argparse.Namespace, folder: Path) -> int:
@@ -86,9 +91,35 @@ def _minutes(args: argparse.Namespace, usual: float) -> float:
     return usual if args.minutes is None else args.minutes
 
 
-PARTS = {
-    each.__name__: each for each in (files, address, calls, window, kills, together, photos, load)
+PARTS = {  # the longest first, so that two at a time end together
+    each.__name__: each for each in (calls, files, load, photos, kills, window, together, address)
 }  # fmt: skip
+
+
+def side_by_side(parts: Sequence[str], words: Sequence[str], at_once: int) -> int:
+    """Run parts, some at a time; how many of them found something or died."""
+
+    def run(part: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "tests.torture", part, *words]
+        return subprocess.run(command, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+
+    wrong = 0
+    with ThreadPoolExecutor(at_once) as pool:
+        for done in as_completed([pool.submit(run, part) for part in parts]):
+            sys.stdout.write(done.result().stdout)
+            wrong += done.result().returncode != 0
+    sys.stdout.write(f"{wrong} of {len(parts)} parts with finds\n")
+    return wrong
+
+
+def _words(args: argparse.Namespace) -> list[str]:
+    """Of a command line that says the same, but for the parts."""
+    said = {name: value for name, value in vars(args).items() if name != "parts" and value is not None}
+    return [
+        word
+        for name, value in said.items()
+        for word in (f"--{name.replace('_', '-')}", *map(str, value if isinstance(value, list) else [value]))
+    ]
 
 
 def main() -> int:
@@ -102,6 +133,7 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=20, help="of two programs at once (default: 20)")
     parser.add_argument("--questions", type=int, default=10_000, help="in a row (default: 10,000)")
     parser.add_argument("--addresses", type=int, default=1_000_000, help="of pages (default: a million)")
+    parser.add_argument("--at-once", type=int, default=min(2, os.cpu_count() or 1), help="parts (default: 2)")
     parser.add_argument("--only", nargs="+", help="of a part's rows those whose names begin so")
     args = parser.parse_args()
     unknown = [name for name in args.parts if name not in PARTS]
@@ -111,6 +143,8 @@ def main() -> int:
 
     warnings.simplefilter("ignore")
     sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
+    if len(args.parts) != 1 and args.at_once > 1:
+        return 1 if side_by_side(args.parts or [*PARTS], _words(args), args.at_once) else 0
     finds = 0
     for name in args.parts or PARTS:
         began, spent = time.monotonic(), processor()

@@ -35,6 +35,11 @@ FINDS = Path(__file__).with_name("finds")
 QUICK = Path("/dev/shm")  # where writing a file takes a hundredth of the time that a disk takes
 SECONDS = 10
 MEMORY = 2**30  # bytes that reading one of these files of some 10 kB may take beside what the program holds
+KINDS = {  # of finds: how their words begin; all others are crashes
+    f"over {SECONDS} s": "Slow ",
+    f"over {MEMORY >> 30} GB": "MemoryError ",
+    "bad sentences": "a bad sentence ",
+}
 _MOST_KEPT = 400  # files of a reader that are damaged further
 _TRIES = 300  # to make a find smaller
 
@@ -185,9 +190,14 @@ def main(words: Sequence[str] | None = None) -> int:
         return bounded(lambda: _all(chosen, files, Path(folder), args))
 
 
+def kind_of(found: str) -> str:
+    """Which of `KINDS` a find's words name; whatever has no name of its own is a crash."""
+    return next((kind for kind, begins in KINDS.items() if found.startswith(begins)), "crashes")
+
+
 def _all(chosen: list[Reader], files: dict[str, bytes], folder: Path, args: argparse.Namespace) -> int:
-    finds, started = 0, time.process_time()
-    say = sys.stdout.write
+    finds, started = dict.fromkeys(("crashes", *KINDS), 0), time.process_time()
+    count, longest, say = 0, 0.0, sys.stdout.write
     names = ("files", "read", "refused", "steps", "kept", "a file", "longest", "finds")
     say(f"{'reader':12}" + "".join(f"{name:>9}" for name in names) + "\n")
     for reader in chosen:
@@ -199,11 +209,14 @@ def _all(chosen: list[Reader], files: dict[str, bytes], folder: Path, args: argp
         say(f"{each:6.2f} ms{told.longest:7.2f} s{len(told.finds):9}\n")
         for words, (name, content) in told.finds.items():
             say(f"    {words}: {keep_find(reader, name, content, args.keep)}\n")
+            finds[kind_of(words)] += 1
         sys.stdout.flush()
-        finds += len(told.finds)
+        count, longest = count + told.count, max(longest, told.longest)
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
-    say(f"{finds} finds; {time.process_time() - started:.0f} s of processor time, at most {most} MB\n")
-    return 1 if finds else 0
+    say(f"{count:,} files: {', '.join(f'{number} {kind}' for kind, number in finds.items())}; ")
+    say(f"the slowest {longest:.2f} s, the whole program at most {most} MB, ")
+    say(f"{time.process_time() - started:.0f} s of processor time\n")
+    return 1 if any(finds.values()) else 0
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""Much at once, and often: large scenes, many atoms and phrases, thousands of questions in a row.
+"""Much at once, and often: large scenes (`large.py`), many atoms and phrases, thousands of questions.
 
-    python -m tests.torture load [--count 10000]
+    python -m tests.torture load [--questions 10000] [--only atoms questions large]
 
 Memory is that of the process (resident), after a tenth of the questions and after the last; handles, threads
 and the names that OpenGL gives to new objects are counted then as well.
@@ -8,15 +8,12 @@ and the names that OpenGL gives to new objects are counted then as well.
 
 import gc
 import os
-import subprocess
-import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import torch
 
 from app.cli.renderers import GlRenderer
@@ -27,26 +24,29 @@ from langflash_core.memory import give_back
 from langflash_core.types import Camera, Scene, Semantics
 from langflash_core.writing.renderers import TorchRenderer
 from tests.app.cli.conftest import WORDS, stripes
+from tests.torture.large import LARGE, large_scene, large_window, write_splat
+from tests.torture.rows import Row
 
-LARGE = 10_000_000
 ATOMS, PHRASES = 256, 64
 MOST_GROWTH = 0.01
-MEMORY = 6 << 30  # bytes that opening the large scene may take
 CLOSE = 5e-3  # relevance of float16 maps beside the reference; means are within 1e-4 (app/gl/renderer.py)
 
 
-@dataclass
-class Row:
-    name: str
-    told: str = ""
-    finds: list[str] = field(default_factory=list)
+def everything(folder: Path, count: int, only: Sequence[str] | None = None) -> Iterator[Row]:
+    """All rows, or those whose names begin so; count: of questions in a row."""
 
+    def wanted(name: str) -> bool:
+        return any(name.startswith(word) for word in only or [""])
 
-def everything(folder: Path, count: int) -> Iterator[Row]:
-    """All rows; count: of questions in a row."""
-    yield many_atoms(ATOMS, PHRASES)
-    yield many_questions(count)
-    yield large_scene(folder, LARGE)
+    if wanted("atoms"):
+        yield many_atoms(ATOMS, PHRASES)
+    if wanted("questions"):
+        yield many_questions(count)
+    if wanted("large"):
+        path = folder / "large.splat"
+        write_splat(path, LARGE)
+        yield large_scene(path, LARGE)
+        yield large_window(path, LARGE, folder / "large.png")
 
 
 def camera_of(scene: Scene) -> Camera:
@@ -121,46 +121,6 @@ def _held(ctx) -> tuple[int, int, int, tuple[int, ...]]:
         each.release()
     resident = int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     return resident, len(os.listdir("/proc/self/fd")), threading.active_count(), names
-
-
-_OPEN = """
-import resource, sys, time
-resource.setrlimit(resource.RLIMIT_DATA, (int(sys.argv[2]),) * 2)
-from langflash_core.export import read
-from app.cli.report import explained
-began = time.process_time()
-try:
-    said = f"{len(read(sys.argv[1]).gaussians):,} Gaussians"
-except Exception as error:
-    said = explained(error)
-most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
-print(f"{said}; {time.process_time() - began:.1f} s of the processor, {most} MB")
-"""
-
-
-def large_scene(folder: Path, count: int) -> Row:
-    """A .splat of so many opens within `MEMORY`, or is refused in one sentence, before the work."""
-    row, path = Row(f"{count:,} Gaussians"), folder / "large.splat"
-    rng = np.random.default_rng(0)
-    kind = np.dtype([("mean", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("quat", "u1", 4)])
-    with path.open("wb") as stream:
-        for start in range(0, count, 1_000_000):
-            some = np.zeros(min(1_000_000, count - start), kind)
-            some["mean"] = rng.normal(0, 1, some["mean"].shape)
-            some["scale"], some["rgba"], some["quat"] = 0.01, 200, (255, 128, 128, 128)
-            stream.write(some.tobytes())
-    words = [sys.executable, "-c", _OPEN, str(path), str(MEMORY)]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=600)
-    row.told = done.stdout.strip()
-    opened = row.told.startswith(f"{count:,} Gaussians")
-    if (
-        done.returncode
-        or "\n" in row.told
-        or not (opened or "GB to open" in row.told or "more than" in row.told)
-    ):
-        row.finds.append(f"exit code {done.returncode}: {done.stderr[-200:]}")
-    path.unlink()
-    return row
 
 
 def report(rows: Iterator[Row], say: Callable[[str], object]) -> int:

@@ -9,7 +9,7 @@ import pytest
 from langflash_core.errors import SceneFileError
 from langflash_core.export import stored
 from langflash_core.memory import free_memory
-from tests.torture import load
+from tests.torture import large, load
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="/proc")
 
@@ -45,9 +45,11 @@ def test_a_limit_to_this_process_is_known():
 
 
 def test_a_large_scene_is_opened_or_refused_in_a_sentence(tmp_path, monkeypatch):
-    monkeypatch.setattr(load, "MEMORY", 900 << 20)
-    row = load.large_scene(tmp_path, 100_000)
+    monkeypatch.setattr(large, "MEMORY", 900 << 20)
+    path = tmp_path / "large.splat"
+    large.write_splat(path, 100_000)
+    row = large.large_scene(path, 100_000)
     assert row.finds == [] and row.told.startswith("100,000 Gaussians"), row
     monkeypatch.setenv("LANGFLASH_MOST_GAUSSIANS", "1000")
-    row = load.large_scene(tmp_path, 1001)
+    row = large.large_scene(path, 100_000)
     assert row.finds == [] and "more than 1,000" in row.told

@@ -8,6 +8,7 @@ import pytest
 
 from langflash_core.errors import SceneFileError
 from tests.torture import fuzz
+from tests.torture.__main__ import side_by_side
 from tests.torture.readers import Reader, prepare
 from tests.torture.shapes import damaged
 
@@ -78,6 +79,9 @@ def test_hangs_and_bad_sentences_are_finds(tmp_path, monkeypatch):
     for read, word in ((forever, "Slow"), (talks, "bad sentence")):
         found = fuzz._outcome(Reader("odd", ("a",), read), tmp_path / "a", fuzz.Told())
         assert found is not None and word in found
+        assert fuzz.kind_of(found) == {"Slow": "over 10 s", "bad sentence": "bad sentences"}[word]
+    assert fuzz.kind_of("MemoryError in bare.py:read:3") == "over 1 GB"
+    assert fuzz.kind_of("IndexError in bare.py:read:3") == "crashes"
 
 
 def test_damage_by_build_gets_past_checksums(prepared):
@@ -101,3 +105,11 @@ def test_one_seed_makes_the_same_files(prepared):
     for name, content in files.items():
         one, other = (damaged(name, content, b"other" * 40, np.random.default_rng(5)) for _ in range(2))
         assert one == other
+
+
+def test_parts_run_side_by_side_and_one_that_fails_is_counted(capsys):
+    words = ("--files", "2", "--only", "phrases")
+    assert side_by_side(("files", "nothing of that name"), words, 2) == 1
+    said = capsys.readouterr().out
+    assert "phrases " in said and "0 crashes" in said and "no part nothing of that name" in said
+    assert said.endswith("1 of 2 parts with finds\n")

@@ -20,6 +20,7 @@ from ..report import ProgressBar, say_warnings, write_json, write_tables
 from .evals.ablations import ablations
 from .evals.labels import labels
 from .evals.level import level
+from .evals.moved import moved
 from .evals.protocol import protocol
 from .evals.report import report
 from .evals.sharp import sharp
@@ -48,6 +49,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "posed": _posed,
         "labels": labels,
         "level": level,
+        "moved": moved,
         "protocol": protocol,
         "report": report,
         "sharp": sharp,

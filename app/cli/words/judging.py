@@ -112,6 +112,7 @@ def add_eval(commands) -> None:
     _add_sharp(actions)
     _add_walk(actions)
     _add_level(actions)
+    _add_moved(actions)
     _add_labels(actions)
     _add_protocol(actions)
     _add_report(actions)
@@ -250,6 +251,19 @@ def _add_level(actions) -> None:
         "--keep", type=Path, metavar="FOLDER", help="scenes that are made stay there and are read again"
     )
     command.add_argument("--no-things", action="store_true", help="leave inventory and plan out")
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
+    add_json(command)
+
+
+def _add_moved(actions) -> None:
+    command = new_command(actions, "moved", "what is found of things that were moved between two scenes")
+    command.add_argument("pack", type=Path, metavar="PACK", help="furniture, made by rooms pack")
+    command.add_argument("--limit", type=whole_count, metavar="N", help="so many rooms (default: 10)")
+    command.add_argument("--first-seed", type=seed, metavar="N", help="(default: of the held-out rooms)")
+    command.add_argument(
+        "--keep", type=Path, metavar="FOLDER", help="scenes that are made stay there and are read again"
+    )
+    add_backend(command)
     command.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
     add_json(command)
 

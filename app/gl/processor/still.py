@@ -18,15 +18,23 @@ from torch import Tensor
 
 from langflash_core.errors import Cancelled
 from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
-from langflash_core.splat.projection import ALPHA_MIN, NEAR, drawable_rows, project, view_colours
+from langflash_core.splat.projection import (
+    ALPHA_MIN,
+    NEAR,
+    Footprints,
+    drawable_rows,
+    project,
+    view_colours,
+)
 from langflash_core.splat.tiles import rasterize_tiles
-from langflash_core.types import LUMA, Camera, Frame, Scene, Semantics
+from langflash_core.types import LUMA, Camera, Frame, Gaussians, Scene, Semantics
 
 from ..answers import in_numbers, temperature_of
 from ..splats import TINTED, TINTS
 from .host import relevancy
 
 _PIXELS_AT_ONCE = 1 << 13  # 1.3 MB of 40 weights: within a core's cache
+_AT_ONCE = 1_000_000  # Gaussians that are projected; some 500 MB
 _KEPT = 4  # answers of a picture, the newest
 _HALF_MAX = 65504.0
 _names = count(1)
@@ -177,8 +185,7 @@ def draw_still(
         kept &= torch.from_numpy(marks[0])
     gaussians = scene.gaussians.map(lambda v: v.detach()[kept])
     go_on()
-    footprints = project(gaussians.map(lambda v: v.double()), camera)
-    go_on()
+    footprints = _footprints(gaussians, camera, go_on)
     colours = view_colours(gaussians, camera).float().clamp_max(_HALF_MAX)
     if marks is not None:
         colours = _tinted(colours, torch.from_numpy(marks[1])[kept])
@@ -195,6 +202,26 @@ def draw_still(
     depth = torch.stack((maps[0][..., 3], alphas), -1).numpy()
     still = StillMaps(maps[1]) if weight_maps else None
     return Still(camera, colour, depth, _middle(footprints.depths), still)
+
+
+def _footprints(gaussians: Gaussians, camera: Camera, go_on: Callable[[], None]) -> Footprints:
+    """As `project` in float64, some at a time: ten million at once take several GB beside themselves."""
+    parts, starts = [], range(0, max(len(gaussians), 1), _AT_ONCE)
+    for start in starts:
+        rows = slice(start, start + _AT_ONCE)
+        parts.append(project(gaussians.map(lambda v, rows=rows: v[rows].double()), camera))
+        go_on()
+    if len(parts) == 1:
+        return parts[0]
+    ids = torch.cat([part.ids + start for part, start in zip(parts, starts, strict=True)])
+    depths = torch.cat([part.depths for part in parts])
+    order = depths.argsort(stable=True)  # each part keeps the order of equal depths, and so do they
+    centres, roots, opacities = (
+        torch.cat([getattr(part, name) for part in parts])[order]
+        for name in ("centres", "roots", "opacities")
+    )
+    dropped = sum(part.num_dropped for part in parts)
+    return Footprints(ids[order], centres, roots, opacities, depths[order], dropped)
 
 
 def _sparse_in_half(semantics: Semantics) -> Tensor:

@@ -14,6 +14,7 @@ from langflash_core.pictures import Picture
 
 from ...gl import SplatRenderer
 from ...gl.paints import PAINTS, Wanted
+from ...gl.scene import Thinned
 from ..asking.state import Prompt
 from ..editing.state import Point, Reading, strongest
 from ..governor import SETTLE_AFTER, Kind, Plan
@@ -38,13 +39,21 @@ class Easel:
     """Holds one picture after the other. drawn: its name; camera: that it was drawn for; seconds: that it
     took; size: its pixels; texture: to show, None before the first one is painted."""
 
-    def __init__(self, renderer: SplatRenderer, serial: int, scene: "Scene", share: float):
-        """Bring a scene to the renderer, this share of it at once; what pictures of another took goes back.
+    def __init__(
+        self,
+        renderer: SplatRenderer,
+        serial: int,
+        scene: "Scene",
+        share: float,
+        thinned: Thinned | None = None,
+    ):
+        """Bring a scene to the renderer, this share of it at once, as thinned where that is given; what
+        pictures of another took goes back.
 
         Raises:
             GraphicsError: the OpenGL here cannot do it.
         """
-        renderer.set_scene(scene, share)
+        renderer.set_scene(scene, share, thinned)
         renderer.canvas.forget()
         renderer.ask(None)
         self.renderer = renderer

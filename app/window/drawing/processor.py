@@ -18,24 +18,37 @@ if TYPE_CHECKING:
     from langflash_core.language.relevance import CompiledQuery
     from langflash_core.types import Scene
 
+    from ...gl.scene import Thinned
+
 LONG_SECONDS = 0.1  # a picture that took as long is painted in the next frame, and so is a scene's first
+
+
+def governor_of(scene: "Scene") -> Governor:
+    """That a scene begins with."""
+    return Governor(len(scene.gaussians), slow=True, coarse=coarse_share(scene))
 
 
 class ProcessorPicture:
     """As `ScenePicture`: small pictures at once, still ones beside the frames."""
 
     def __init__(
-        self, renderer: SplatRenderer, serial: int, scene: "Scene", notify: Callable[[], None]
+        self,
+        renderer: SplatRenderer,
+        serial: int,
+        scene: "Scene",
+        notify: Callable[[], None],
+        thinned: "Thinned | None" = None,
     ) -> None:
         """
         Args:
-            notify: called from a thread when `update` has something new to show.
+            notify: called from a thread when `update` has something new to show. thinned: of a huge scene, to
+                `governor_of(scene).share`.
 
         Raises:
             GraphicsError: the OpenGL here cannot do it.
         """
-        self.governor = Governor(len(scene.gaussians), slow=True, coarse=coarse_share(scene))
-        self.easel = Easel(renderer, serial, scene, self.governor.share)
+        self.governor = governor_of(scene)
+        self.easel = Easel(renderer, serial, scene, self.governor.share, thinned)
         self.stills = Stills(self.easel, scene, notify)
         self._unpainted = False  # a picture was drawn that the next frame paints
         self._carried = True  # whether Gaussians have their numbers for the query

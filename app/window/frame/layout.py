@@ -59,7 +59,7 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
         issued += cleaning.draw(state, look, place, size)
         issued += dictionary.draw(state, look, place, size)
     issued += recovery_panels.draw_offer(state, look, place, size)
-    issued += recovery_panels.draw_edits_offer(state, look, place, size)
+    issued += recovery_panels.draw_edits_offer(state, look, place, _above_views(state, look, size))
     issued += toasts.draw(state, look, ImVec2(width, height - bar))
     issued += dialogs.draw(state, look)
     issued += keys.draw(state)
@@ -77,13 +77,22 @@ def _side(state: State, look: Look) -> list[do.Command]:
     return issued + history.draw(state, look)
 
 
+def _above_views(state: State, look: Look, size: ImVec2) -> ImVec2:
+    """The size of the picture's place without the strip of photos at its foot."""
+    return ImVec2(size.x, size.y - look.px(_VIEWS)) if _has_views(state) else size
+
+
+def _has_views(state: State) -> bool:
+    return state.scene.info is not None and bool(state.scene.info.views)
+
+
 def _picture(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
     keys_go_by = 0 if welcome.waits(state) else widgets.NO_KEYS
     with widgets.window("##picture", place, size, imgui.WindowFlags_.no_background | keys_go_by):
         imgui.pop_style_var()
         issued = canvas.draw(state, look)
-    if state.scene.info is not None and state.scene.info.views:
+    if _has_views(state):
         corner = ImVec2(place.x, place.y + size.y - look.px(_VIEWS))
         flags = imgui.WindowFlags_.no_background | imgui.WindowFlags_.always_auto_resize
         imgui.set_next_window_pos(corner)

@@ -21,8 +21,7 @@ def draw(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
         imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
         imgui.push_style_color(imgui.Col_.window_bg, imgui.get_style().color_(imgui.Col_.popup_bg))
         imgui.begin(f"##toast{toast.key}", None, _FLAGS)
-        if not imgui.is_popup_open("", imgui.PopupFlags_.any_popup):  # menus and dialogs stay in front
-            imgui.internal.bring_window_to_display_front(imgui.internal.get_current_window())
+        widgets.to_front()
         issued += _toast(toast, look)
         bottom -= imgui.get_window_height() + look.px(8)
         imgui.end()

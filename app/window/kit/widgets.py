@@ -28,6 +28,12 @@ def window(name: str, pos: ImVec2, size: ImVec2, flags: int = 0, scrolls: bool =
         imgui.end()
 
 
+def to_front() -> None:
+    """The window that is being drawn comes before others; menus and dialogs stay before it."""
+    if not imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
+        imgui.internal.bring_window_to_display_front(imgui.internal.get_current_window())
+
+
 @contextmanager
 def colours(**changes: ImVec4) -> Iterator[None]:
     """Style colours by their name in `imgui.Col_`, for a few widgets."""

@@ -91,7 +91,7 @@ def find(scene: "Scene | None" = None, path: Path | None = None) -> Offer | None
 
     wanted = None if scene is None else scene_digest(scene)
     for edits in _newest_first():
-        with suppress(SceneFileError):  # a damaged file is passed over
+        with suppress(SceneFileError, OSError):  # what is damaged, or went meanwhile, is passed over
             digest, about, count = read_about(edits)
             ours = path is not None and about.get("path") == str(path)
             if count and edits.with_suffix(SCENE_SUFFIX).is_file() and (wanted in (None, digest) or ours):

@@ -99,17 +99,18 @@ def draw_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do
 
 
 def draw_edits_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
-    """Edits that nobody saved, offered without standing in the way."""
+    """Edits that nobody saved, offered at the foot of a place, before what panels are there."""
     offer = state.recovery.edits
     if offer is None or state.scene.job is not None:
         return []
     issued: list[do.Command] = []
     corner = ImVec2(place.x + size.x / 2, place.y + size.y - look.px(14))
     imgui.set_next_window_pos(corner, 0, ImVec2(0.5, 1))
-    imgui.set_next_window_size(ImVec2(look.px(_EDITS_OFFER), 0))
+    imgui.set_next_window_size(ImVec2(min(look.px(_EDITS_OFFER), size.x - look.px(24)), 0))
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     with widgets.colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
         imgui.begin("##offer", None, widgets.PLAIN | imgui.WindowFlags_.no_focus_on_appearing)
+        widgets.to_front()
         edits, were = ("1 edit", "was") if offer.count == 1 else (f"{offer.count} edits", "were")
         imgui.text_colored(theme.ACCENT, fa.ICON_FA_CLOCK_ROTATE_LEFT)
         imgui.same_line()

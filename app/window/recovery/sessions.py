@@ -38,13 +38,13 @@ def left_behind() -> Kept | None:
             if not is_free(path.with_suffix(".lock")):
                 continue
             try:
-                kept = read(path)
+                kept, when = read(path), path.stat().st_mtime
             except OSError:
-                continue  # what cannot be read today may be read tomorrow
+                continue  # another window ended it meanwhile; or it can be read tomorrow
             if kept is None or kept.empty:
                 forget(path)
             else:
-                found.append((path.stat().st_mtime, kept))
+                found.append((when, kept))
     found.sort(key=lambda each: each[0], reverse=True)
     for _, old in found[MOST_LEFT:]:
         if old.file is not None:

@@ -1,7 +1,7 @@
 """What the scene asks of the world: paths from the disk, the worker's jobs, the scene in the renderer."""
 
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -104,7 +104,8 @@ class SceneEffects(Effects):
                 for share in self._viewport.shares:
                     submit(Thin(info.serial, info.scene, share))
             case Thinned(scene, share, thinned, rows):
-                self._viewport.thin(scene, share, thinned, rows)
+                with self._told():
+                    self._viewport.thin(scene, share, thinned, rows)
             case Loaded() if state.scene.info is None and self._viewport.warm():
                 self._hands.dispatch(Loaded())
             case _:
@@ -184,10 +185,8 @@ class SceneEffects(Effects):
     def _show(self, info: SceneInfo, old: SceneInfo | None) -> None:
         """Bring a scene to the renderer; the worker decodes its photos, of which many take longer than a
         frame. No photo of the `old` one stays on a button of another's."""
-        try:
+        with self._told():
             self._viewport.set_scene(info.serial, info.scene)
-        except LangFlashError as error:
-            self._hands.perform(Notify(str(error)))
         photos = () if old is None else old.scene.photos
         if photos != info.scene.photos:
             for index in range(len(photos)):
@@ -199,6 +198,14 @@ class SceneEffects(Effects):
         for colormap in COLOUR_MAPS:
             self._thumbnails.put(f"bar {colormap}", colour_bar(colormap))
         self._entitle(f"{info.name} - LangFlash")
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """What OpenGL cannot do is a message."""
+        try:
+            yield
+        except LangFlashError as error:
+            self._hands.perform(Notify(str(error)))
 
 
 def _paths(state: State) -> tuple[Path, ...]:

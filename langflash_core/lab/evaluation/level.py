@@ -12,22 +12,31 @@ Sizes: N Gaussians, I true instances, V photos.
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 import torch
 from PIL import Image
+from scipy.ndimage import distance_transform_edt
 
 from langflash_core.files import make_folder
 from langflash_core.inventory import Inventory, Thing, inventory
 from langflash_core.inventory.plan import Plan, floor_plan
-from langflash_core.inventory.things import STRUCTURE
+from langflash_core.inventory.things import OPENINGS, STRUCTURE
 from langflash_core.lab.evaluation.numbers import rounded
-from langflash_core.lab.rooms import HELD_OUT_LIBRARIES, Pack, RoomRenderer, StagedRoom, staged_room
+from langflash_core.lab.rooms import (
+    HELD_OUT_LIBRARIES,
+    Pack,
+    RoomRenderer,
+    RoomViews,
+    StagedRoom,
+    staged_room,
+)
 from langflash_core.lab.training.cache import SIZES
 from langflash_core.lab.training.measures import nan_mean
+from langflash_core.language.vocabulary import groups_of
 from langflash_core.level import found_world
 from langflash_core.pipeline import reconstruct
 from langflash_core.reconstruction.networks import Networks
@@ -133,7 +142,8 @@ def judge(seed: int, scene: Scene, staged: StagedRoom, *, things: bool = True) -
     if not things:
         return Judged(seed, numbers)
     found = inventory(scene.with_record(world=world, metric_scale=unit))
-    more, sizes = judge_things(found, staged)
+    views = replace(staged.views, instances=seen_through(staged.views))
+    more, sizes = judge_things(found, replace(staged, views=views))
     walls, seen = judge_walls(found, floor_plan(found), staged)
     return Judged(seed, numbers | more | seen, walls, sizes)
 
@@ -196,19 +206,18 @@ def judge_world(scene: Scene, world: World, unit: float, staged: StagedRoom) -> 
 def judge_things(found: Inventory, staged: StagedRoom) -> tuple[dict[str, float], tuple[float, ...]]:
     """Precision and recall of things, what counts are off by per kind; and errors of sizes, as shares."""
     views = staged.views
-    shown = np.array(
-        [[float((ids == i).mean()) for i in range(len(views.groups))] for ids in views.instances]
-    ).max(0)
-    true = [i for i in range(1, len(views.groups)) if views.groups[i] not in STRUCTURE and shown[i] >= SHOWN]
-    wanted = {i for i in true if shown[i] >= SEEN}
+    true, wanted = true_things(staged, SHOWN), set(true_things(staged, SEEN))
     pairs = _pairs(found, staged, true)
     right = {thing.id: i for thing, i in pairs if views.groups[i] == thing.kind}
+    true_of = {thing.id: i for thing, i in pairs if views.groups[i] in groups_of(thing.kind)}
     counts, truth = Counter(thing.kind for thing in found.things), Counter(views.groups[i] for i in wanted)
     kinds = set(counts) | set(truth)
     number = len(found.things)
     numbers = {
         "precision": len(right) / number if number else math.nan,
         "recall": len(set(right.values()) & wanted) / len(wanted) if wanted else math.nan,
+        "precision_true_name": len(true_of) / number if number else math.nan,
+        "recall_true_name": len(set(true_of.values()) & wanted) / len(wanted) if wanted else math.nan,
         "precision_any_name": len(pairs) / number if number else math.nan,
         "recall_any_name": len({i for _, i in pairs} & wanted) / len(wanted) if wanted else math.nan,
         "count_error": nan_mean(float(abs(counts[kind] - truth[kind])) for kind in kinds),
@@ -224,20 +233,51 @@ def judge_things(found: Inventory, staged: StagedRoom) -> tuple[dict[str, float]
     return numbers, tuple(sizes)
 
 
+def seen_through(views: RoomViews) -> np.ndarray:
+    """(V, H, W) instances, where what is seen through a window or door is of it: the nearest in the photo.
+
+    Rooms have nothing outside; who looks at a photo calls that part of it a window all the same.
+    """
+    openings = [i for i, group in enumerate(views.groups) if group in OPENINGS]
+    filled = []
+    for ids in views.instances:
+        of_openings = np.isin(ids, openings)
+        if of_openings.any():
+            nearest = distance_transform_edt(~of_openings, return_distances=False, return_indices=True)
+            ids = np.where(ids == 0, ids[tuple(np.asarray(nearest))], ids)
+        filled.append(ids)
+    return np.stack(filled)
+
+
+def matched_things(found: Inventory, staged: StagedRoom, least: float = SHOWN) -> list[tuple[Thing, int]]:
+    """Things with the true one that they share most with, where that is `OVERLAP` and more; of several that
+    share most with the same one, the one that shares more. True ones fill `least` of a photo and more."""
+    return _pairs(found, staged, true_things(staged, least))
+
+
+def true_things(staged: StagedRoom, least: float) -> list[int]:
+    """Instances that fill so much of a photo, without what rooms are made of."""
+    views, count = staged.views, len(staged.views.groups)
+    shown = np.stack([np.bincount(ids.ravel(), minlength=count) / ids.size for ids in views.instances]).max(0)
+    return [i for i in range(1, count) if views.groups[i] not in STRUCTURE and shown[i] >= least]
+
+
 def _pairs(found: Inventory, staged: StagedRoom, true: Sequence[int]) -> list[tuple[Thing, int]]:
-    """Things with the true one that they share most with, where that is `OVERLAP` and more."""
+    """Things with the true one that they share most with, where that is `OVERLAP` and more; of several that
+    share most with the same one, the one that shares more."""
     shares = photo_shares(found.scene).sum(0).numpy()
     ids = true_instances(found.scene, staged)
     masses = {i: float(shares[ids == i].sum()) for i in true}
-    pairs = []
+    best: dict[int, tuple[float, Thing]] = {}
     for thing in found.things:
         own = float(shares[thing.rows].sum())
         both = {i: float(shares[thing.rows & (ids == i)].sum()) for i in true}
         overlap = {i: both[i] / max(own + masses[i] - both[i], 1e-12) for i in true}
-        best = max(overlap, key=lambda i: overlap[i], default=None)
-        if best is not None and overlap[best] >= OVERLAP:
-            pairs.append((thing, best))
-    return pairs
+        instance = max(overlap, key=lambda i: overlap[i], default=None)
+        if instance is None or overlap[instance] < max(OVERLAP, best.get(instance, (0.0, thing))[0]):
+            continue
+        best[instance] = (overlap[instance], thing)
+    return [(thing, instance) for instance, (_, thing) in best.items()]
 
 
 def true_instances(scene: Scene, staged: StagedRoom) -> np.ndarray:
@@ -362,6 +402,8 @@ MEASURES = (
     ("True length within the guess's bounds", "length_within_said"),
     ("Things: precision", "precision"),
     ("Things: recall", "recall"),
+    ("Things by a name that is true of them (a desk is a table): precision", "precision_true_name"),
+    ("Things by a name that is true of them: recall", "recall_true_name"),
     ("Things, whatever they are called: precision", "precision_any_name"),
     ("Things, whatever they are called: recall", "recall_any_name"),
     ("Count error per kind", "count_error"),

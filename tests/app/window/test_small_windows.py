@@ -1,5 +1,8 @@
 """Nothing covers anything else where the window is small or the interface large."""
 
+from datetime import datetime
+from pathlib import Path
+
 import pytest
 from imgui_bundle import ImVec2, imgui
 
@@ -7,7 +10,11 @@ from app.window.editing import commands as edit
 from app.window.editing.panels import tools
 from app.window.editing.panels.tools import _GAP, _MARGIN, _TOOLS, tool_side
 from app.window.editing.state import Floaters, Hiding, Tint, Tool
+from app.window.frame import layout
+from app.window.inventory import commands as take
 from app.window.kit import theme
+from app.window.recovery import commands as keep
+from app.window.recovery.state import Offer
 from app.window.scene.panels.legend import covers_views
 from app.window.state import State
 from langflash_core.scene.edited import first_marks
@@ -79,3 +86,18 @@ def test_small_tools_show_their_whole_icons(monkeypatch) -> None:
         theme.set_up(1.0, "dark")
         frames(lambda at: tools.draw(shown_scene(), at, ImVec2(348, 52), ImVec2(452, 416)), look())
     assert seen and all(taken <= side for taken, side in seen)
+
+
+@pytest.mark.parametrize("size", [(800, 500), (1000, 700)])
+def test_kept_edits_are_offered_above_the_viewpoints_and_before_panels(size: tuple[int, int]) -> None:
+    """The strip of photos and the inventory covered what they are taken back with."""
+    offer = Offer(Path("x.edits"), "room", 3, datetime(2026, 1, 2))
+    state = after(shown_scene(), keep.OfferEdits(offer), take.ShowInventory(True))
+    with context(size):
+        theme.set_up(1.0, "dark")
+        frames(lambda seen: layout.draw_all(state, seen), look())
+        left, _top, right, bottom = box("##offer")
+        order = [window.name for window in imgui.get_current_context().windows]
+        views = box("##views")
+    assert left >= 348 and right <= size[0] and bottom <= views[1]
+    assert order.index("##offer") > max(order.index(name) for name in order if "nventory" in name)

@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from app.gl.processor import still
+from app.window.drawing.card import CardPicture
 from app.window.drawing.processor import ProcessorPicture
 from app.window.drawing.stills import RETRY_SECONDS
 from app.window.governor import Governor, Kind, Plan
@@ -265,3 +266,44 @@ def test_a_scene_with_levels_moves_coarse_and_rests_whole(context, monkeypatch) 
         viewport.release()
     assert 0.25 in moved and moved <= {0.25, 1.0}
     assert rested == Plan(Kind.COLOUR), "all of them"
+
+
+def test_of_a_huge_scene_only_a_share_is_brought_to_opengl_on_the_processor(context, monkeypatch) -> None:
+    """All of ten million stopped the window for half a minute; at rest threads draw them all."""
+    monkeypatch.setattr("app.window.governor.HUGE_SCENE", 10_000)
+    monkeypatch.setattr("app.window.governor.LARGE_SCENE", 2_000)
+    space = language_space("minilm")
+    scene = room(space.encode(list(PHRASES)))
+    share = 2_000 / len(scene.gaussians)
+    shown = shown_scene()
+    assert shown.scene.info is not None
+    state = shown.with_scene(info=replace(shown.scene.info, scene=scene))
+    with context:
+        viewport = Viewport(context)
+        viewport.set_scene(1, scene)
+        if isinstance(viewport.picture, CardPicture):
+            viewport.release()
+            pytest.skip("OpenGL here has a graphics card")
+        assert viewport.picture is None and viewport.shares == (share,) and not viewport.whole
+        viewport.ask((0,), compile_query(scene, space, list(PHRASES[:1])))
+        viewport.update(state, SIZE, touched=0.0)
+        other = room(torch.eye(3, 384))
+        viewport.thin(other, share, *thin_with_rows(other, share))  # of a scene that was there before
+        assert viewport.picture is None and viewport.drawn is None
+        viewport.thin(scene, share, *thin_with_rows(scene, share))
+        picture = viewport.picture
+        assert picture is not None and picture.easel.asked.keys == (0,) and viewport.shares == ()
+        plans = []
+        for turn in range(300):
+            pose = orbit(shown.scene.pose, 0.02 * min(turn, 20), 0.0)
+            state = replace(state.with_scene(pose=pose), now=state.now + 0.05)
+            viewport.update(state, SIZE, touched=state.now if turn < 20 else 0.0)
+            plans.append(getattr(viewport.drawn, "plan", None))
+            if turn > 20 and viewport.whole and not viewport.settling:
+                break
+            time.sleep(0.01)
+        live = viewport._made()._scene
+        assert live is not None and {*live._levels} == {share}
+        viewport.release()
+    moved = {plan.share for plan in plans[:20] if plan is not None}
+    assert moved == {share} and plans[-1] is not None and plans[-1].share == 1

@@ -10,6 +10,7 @@ import torch
 
 from app.gl import SplatRenderer
 from app.gl.canvas import Canvas
+from app.gl.processor import still
 from app.gl.processor.still import StillMaps, draw_still
 from app.gl.warming import SIDE, warm_up
 from langflash_core.language.relevance import relevance_maps
@@ -69,6 +70,19 @@ def test_a_renderer_shows_it_as_its_own(gl, scene, what: str) -> None:
     # What lies just beside the image counts for OpenGL's range of depths, and moves its colours a little.
     assert np.mean(different > (8 if what == "depth" else STEP)) < 0.02
     renderer.release()
+
+
+def test_a_large_scene_is_projected_in_parts_to_the_same_picture(scene, monkeypatch) -> None:
+    """Also where two of different parts lie equally deep: they keep their order."""
+    means = scene.gaussians.means.clone()
+    means[-40:] = means[:40]
+    scene = replace(scene, gaussians=replace(scene.gaussians, means=means))
+    whole = draw_still(scene, camera(64, 48))
+    monkeypatch.setattr(still, "_AT_ONCE", len(means) // 3 + 1)
+    parts = draw_still(scene, camera(64, 48))
+    assert (whole.colour == parts.colour).all() and (whole.depth == parts.depth).all()
+    assert whole.maps is not None and parts.maps is not None
+    assert torch.equal(whole.maps.weights, parts.maps.weights) and whole.depth_range == parts.depth_range
 
 
 def test_it_is_drawn_as_marked(gl, scene) -> None:

@@ -87,6 +87,7 @@ class Desk:
     def rest(self) -> None:
         self.perform(Tick(self.state.now + 2 * KEEP_AFTER))
         self.recovery.tick(self.state, self.state.now)
+        self.recovery._writer.submit(lambda: None).result()  # it has written all that it was given
         self.work()
 
 

@@ -36,7 +36,7 @@ BLOCK = Mask.first(12_300, 2500)  # the first rows of the room are its block
 
 @pytest.fixture(scope="module")
 def info():
-    return describe_scene(room(torch.eye(3)), serial=1, name="room")
+    return describe_scene(room(torch.eye(3, 384)), serial=1, name="room")
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ from app.window.recovery import edits, work
 from app.window.requests import Errand
 from app.window.scene.work import LoadScene, describe_scene
 from langflash_core.language.spaces import language_space
+from langflash_core.scene import edits_file
 from langflash_core.scene.edits import Mask, delete, rename_atom
 from tests.app.window.scenes import PHRASES, room
 
@@ -74,3 +75,22 @@ def test_only_the_newest_are_kept_and_damaged_ones_passed_over(info, state_folde
     newest.edits.write_text("{")
     passed = edits.find(info.scene)
     assert passed is not None and passed.name == f"room {edits.MOST_KEPT}"
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_edits_that_another_window_removes_meanwhile_are_passed_over(info, monkeypatch, when: str) -> None:
+    """Between the list and the look, or between that and the time of the file."""
+    for number in range(2):
+        file = edits.keep(info.scene, edited(info), f"room {number}", None, f"t{number}")
+        os.utime(file, (1000 + number, 1000 + number))
+    looked = edits_file.read_about
+
+    def read_about(path: Path) -> tuple[str, dict, int]:
+        about = looked(path)
+        if path == file:
+            path.unlink()  # its scene, as yet, is there
+        return looked(path) if when == "before" else about
+
+    monkeypatch.setattr(edits_file, "read_about", read_about)
+    offer = edits.find(info.scene)
+    assert offer is not None and offer.name == "room 0"

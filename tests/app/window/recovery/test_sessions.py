@@ -148,6 +148,27 @@ def test_of_two_windows_that_died_together_both_come_back(folders: Path) -> None
     assert sessions.left_behind() is None
 
 
+@pytest.mark.parametrize("when", ["listed", "read"])
+def test_one_that_another_window_ends_meanwhile_hides_no_other(folders: Path, monkeypatch, when: str) -> None:
+    state_folder().mkdir(parents=True)
+    for number in (1, 2):
+        kept = Kept(phrases=(f"door {number}",))
+        (state_folder() / f"session-{number}-a.json").write_text(json.dumps(sessions.fields(kept)))
+    read, gone = sessions.read, []
+
+    def ended(path: Path) -> Kept | None:
+        first, before = not gone, read(path)
+        if first:
+            sessions.forget(path)
+            gone.append(path)
+        return read(path) if first and when == "listed" else before
+
+    monkeypatch.setattr(sessions, "read", ended)
+    kept = sessions.left_behind()
+    assert kept is not None and kept.file is not None
+    assert kept.file != gone[0] and kept.file.is_file()
+
+
 def test_a_lock_on_a_full_disk_leaves_no_open_file(folders: Path) -> None:
     state_folder().mkdir(parents=True)
     before = set(os.listdir("/proc/self/fd")) if Path("/proc/self/fd").is_dir() else set()
