@@ -18,7 +18,7 @@ from . import table
 
 AREAS = (
     "##session", "##offer", "##panel", "##export", "##toolbar", "##tools", "##bar0", "##bar1", "##bar2",
-    "##bar3", "##card", "##ruler", "##keys", "##views", "Dictionary", "Tour", "Inventory", "Rules",
+    "##bar3", "##bar4", "##card", "##ruler", "##keys", "##views", "Dictionary", "Tour", "Inventory", "Rules",
 )  # fmt: skip
 """Windows that F6 goes through, by name: questions first."""
 _EMPTY = "##picture"

@@ -56,7 +56,7 @@ from .work import (
     LookForWork,
     MakeThumbnails,
     ReconstructPhotos,
-    ShrinkPhotos,
+    ShowPhotos,
     Thin,
     WriteScene,
 )
@@ -100,7 +100,7 @@ class SceneEffects(Effects):
             case ChoosePair() if state.scene.choosing and not before.scene.choosing:
                 submit(FindPair(tuple(photo.path for photo in state.scene.photos)))
             case SceneArrived(info):
-                self._show(info)
+                self._show(info, before.scene.info)
                 for share in self._viewport.shares:
                     submit(Thin(info.serial, info.scene, share))
             case Thinned(scene, share, thinned, rows):
@@ -182,15 +182,17 @@ class SceneEffects(Effects):
         elif drop.scenes and not drop.films:
             perform(Instead((OpenScene(drop.scenes[0], alone=True),)))
 
-    def _show(self, info: SceneInfo) -> None:
+    def _show(self, info: SceneInfo, old: SceneInfo | None) -> None:
+        """Bring a scene to the renderer; the worker decodes its photos, of which many take longer than a
+        frame. No photo of the `old` one stays on a button of another's."""
         with self._told():
             self._viewport.set_scene(info.serial, info.scene)
-        if len(info.scene.photos) > WHOLE_PHOTOS:
-            self._hands.submit(ShrinkPhotos(info.serial, info.scene.photos))
-        for index, photo in enumerate(info.scene.photos[:WHOLE_PHOTOS]):
-            # A scene whose small photos are damaged still shows; buttons get numbers.
-            with suppress(OSError, SyntaxError, ValueError):
-                self._thumbnails.put_encoded(f"view {index}", photo)
+        photos = () if old is None else old.scene.photos
+        if photos != info.scene.photos:
+            for index in range(len(photos)):
+                self._thumbnails.drop(f"view {index}")
+        if info.scene.photos:
+            self._hands.submit(ShowPhotos(info.serial, info.scene.photos))
         if info.above is not None:
             self._hands.submit(DrawAbove(info.serial, info.scene, info.above))
         for colormap in COLOUR_MAPS:

@@ -37,7 +37,7 @@ from .commands import (
 )
 from .memory import SceneMemory
 from .standing import Levelled
-from .state import ABOVE, SceneInfo
+from .state import ABOVE, WHOLE_PHOTOS, SceneInfo
 
 if TYPE_CHECKING:
     from langflash_core.images.decode import Photo
@@ -235,17 +235,19 @@ class Thin(SceneErrand):
 
 
 @dataclass(frozen=True)
-class ShrinkPhotos(SceneErrand):
-    """Small pictures of a scene's many photos, one after another: all of them whole would fill the graphics
-    card."""
+class ShowPhotos(SceneErrand):
+    """A scene's photos as pictures, one after another: few of them whole, many small, since all of them whole
+    would fill the graphics card."""
 
     photos: tuple[bytes, ...] = field(repr=False)
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         for index, encoded in enumerate(self.photos):
+            # A scene whose small photos are damaged still shows; buttons get numbers.
             with suppress(OSError, SyntaxError, ValueError), opened_picture(encoded, STORED) as photo:
-                photo.draft("RGB", (THUMBNAIL_SIDE, THUMBNAIL_SIDE))  # a damaged one's button has a number
-                photo.thumbnail((THUMBNAIL_SIDE, THUMBNAIL_SIDE))
+                if len(self.photos) > WHOLE_PHOTOS:
+                    photo.draft("RGB", (THUMBNAIL_SIDE, THUMBNAIL_SIDE))
+                    photo.thumbnail((THUMBNAIL_SIDE, THUMBNAIL_SIDE))
                 yield ShowPicture(f"view {index}", np.asarray(photo.convert("RGB")))
 
 

@@ -2,17 +2,23 @@
 photo."""
 
 import io
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import pytest
+import torch
 from PIL import Image
 
 from app.window.commands import ShowPicture
-from app.window.scene.commands import Progressed
+from app.window.effects import Hands
+from app.window.scene.commands import Progressed, SceneArrived
+from app.window.scene.effects import SceneEffects
 from app.window.scene.panels import tray
-from app.window.scene.state import Job, head_of, said
-from app.window.scene.work import THUMBNAIL_SIDE, ShrinkPhotos
+from app.window.scene.state import WHOLE_PHOTOS, Job, head_of, said
+from app.window.scene.work import THUMBNAIL_SIDE, ShowPhotos, describe_scene
 from app.window.state import State
+from tests.app.window.scene.test_rooms import Nothing
+from tests.app.window.scenes import after, room
 
 
 def jpeg(side: int) -> bytes:
@@ -21,11 +27,43 @@ def jpeg(side: int) -> bytes:
     return stream.getvalue()
 
 
-def test_many_photos_are_shown_small_and_a_damaged_one_by_its_number() -> None:
-    shown = list(ShrinkPhotos(7, (jpeg(768), b"no picture", jpeg(30))).run(lambda: False))
-    assert [command.key for command in shown if isinstance(command, ShowPicture)] == ["view 0", "view 2"]
-    sizes = [command.rgb.shape for command in shown if isinstance(command, ShowPicture)]
-    assert sizes == [(THUMBNAIL_SIDE, THUMBNAIL_SIDE, 3), (30, 30, 3)]
+@pytest.mark.parametrize(("more", "side"), [(0, 768), (WHOLE_PHOTOS, THUMBNAIL_SIDE)])
+def test_few_photos_are_shown_whole_many_small_and_a_damaged_one_by_its_number(more: int, side: int) -> None:
+    photos = (jpeg(768), b"no picture", jpeg(30), *((jpeg(30),) * more))
+    shown = [each for each in ShowPhotos(7, photos).run(lambda: False) if isinstance(each, ShowPicture)]
+    assert [each.key for each in shown[:2]] == ["view 0", "view 2"] and len(shown) == 2 + more
+    assert [each.rgb.shape for each in shown[:2]] == [(side, side, 3), (30, 30, 3)]
+
+
+@dataclass
+class Drawer(Nothing):
+    """Takes thumbnails; those that are dropped are noted, and one that is decoded here would be."""
+
+    dropped: list[str] = field(default_factory=list)
+    decoded: list[str] = field(default_factory=list)
+
+    def drop(self, key: str) -> None:
+        self.dropped.append(key)
+
+    def put_encoded(self, key: str, encoded: bytes) -> None:
+        self.decoded.append(key)
+
+
+def test_no_frame_decodes_the_photos_of_a_scene_and_none_shows_those_of_another() -> None:
+    """32 small photos took .16 processor seconds of the frame that showed their scene."""
+    asked, drawer = [], Drawer()
+    hands = Hands(lambda *_: None, lambda *_: None, asked.append, lambda: None, lambda: 0.0)
+    effects = SceneEffects(hands, drawer, drawer, str)  # type: ignore[arg-type]
+    few = replace(room(torch.eye(3)), photos=(jpeg(30), jpeg(30)))
+    other = replace(few, photos=(jpeg(40), jpeg(40)))
+    state = State()
+    for serial, (scene, goes) in enumerate(((few, []), (few, []), (other, ["view 0", "view 1"])), 1):
+        before, command = state, SceneArrived(describe_scene(scene, serial, "room"))
+        asked.clear()
+        state = after(state, command)
+        effects.follow(command, before, state)
+        assert [each.photos for each in asked if isinstance(each, ShowPhotos)] == [scene.photos]
+        assert [key for key in drawer.dropped if key.startswith("view")] == goes and not drawer.decoded
 
 
 def test_a_stage_is_one_whatever_photo_it_is_at() -> None:
