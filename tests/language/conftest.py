@@ -2,7 +2,7 @@ import pytest
 import torch
 
 
-@pytest.fixture(autouse=True, scope="session")
+@pytest.fixture(autouse=True)
 def one_thread():
     """Small tensors: threads only get in each other's way, and timings would depend on their number."""
     before = torch.get_num_threads()
