@@ -48,10 +48,11 @@ def sets(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def made(sets) -> tuple[Path, int]:
-    """The output of a run over all sets, and its exit code."""
+def made(sets) -> tuple[Path, int, dict[str, dict[str, str]]]:
+    """The output of a run over all sets, its exit code, and its ledger before other runs."""
     output = sets.parent / "out"
-    return output, main(["batch", str(sets), "-o", str(output), "--workers", "2", *ASKED, *SMALL])
+    code = main(["batch", str(sets), "-o", str(output), "--workers", "2", *ASKED, *SMALL])
+    return output, code, rows(output)
 
 
 def rows(output: Path) -> dict[str, dict[str, str]]:
@@ -64,8 +65,7 @@ def written(folder: Path) -> dict[Path, int]:
 
 
 def test_ledger(made):
-    output, code = made
-    ledger = rows(output)
+    _, code, ledger = made
     assert code == 1 and list(ledger) == ["damaged", "desk", "empty", "living room"]
     assert {name: row["status"] for name, row in ledger.items()} == {
         "damaged": "failed",
@@ -81,7 +81,7 @@ def test_ledger(made):
 
 
 def test_what_is_in_the_output(made):
-    output, _ = made
+    output, *_ = made
     assert sorted(os.listdir(output)) == ["desk", "ledger.csv", "living room", "summary.html"]
     files = set(os.listdir(output / "desk"))
     images = {"scene.langflash", "scene.ply", "scene.csv", "transforms.json", "images", "thumbnail.jpg"}
@@ -96,14 +96,14 @@ def test_what_is_in_the_output(made):
 @pytest.mark.parametrize("name", ["desk", "living room"])
 def test_scenes_are_those_of_reconstruct(made, sets, tmp_path, name):
     """Byte for byte, since both have as many threads (`OMP_NUM_THREADS`)."""
-    output, _ = made
+    output, *_ = made
     scene = pipeline.reconstruct(sorted((sets / name).iterdir()), size=84)
     save(scene, tmp_path / "scene.langflash")
     assert (tmp_path / "scene.langflash").read_bytes() == (output / name / "scene.langflash").read_bytes()
 
 
 def test_answers_are_those_of_query(made, run, tmp_path):
-    output, _ = made
+    output, *_ = made
     scene = output / "desk" / "scene.langflash"
     words = ("plant", "submarine", "-o", tmp_path, "--backend", "torch", "--json")
     single = run("query", scene, *words).json()
@@ -116,7 +116,7 @@ def test_answers_are_those_of_query(made, run, tmp_path):
 
 
 def test_exports_are_those_of_export(made, run, tmp_path):
-    output, _ = made
+    output, *_ = made
     scene = output / "desk" / "scene.langflash"
     run("export", scene, "-o", tmp_path / "scene.ply")
     words = ("--prompt", "plant", "submarine", "--all-views", "--backend", "torch")
@@ -127,7 +127,7 @@ def test_exports_are_those_of_export(made, run, tmp_path):
 
 def test_nothing_is_done_twice(made, sets, run):
     """A table of the good sets by other paths: names, sizes and times of their photos are the same."""
-    output, _ = made
+    output, *_ = made
     table = sets.parent / "good.csv"
     pairs = (
         (name, [f"sets/{name}/{side}.png" for side in ("left", "right")]) for name in ("desk", "living room")
