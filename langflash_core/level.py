@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, UInt8
-from scipy.spatial.transform import Rotation
 
 from langflash_core.errors import InputError, LangFlashError
 from langflash_core.geometry.manhattan import Directions, Sights, found_directions
@@ -117,6 +116,8 @@ def found_world(
     up_by, error = (
         ("told", 0.0) if up is not None else ("edges" if edged else "surfaces", round(found.error, 2))
     )
+    from scipy.spatial.transform import Rotation  # .08 s, which reading a scene has not to wait for
+
     w, x, y, z = Rotation.from_matrix(axes).as_quat(scalar_first=True).tolist()
     world = World((w, x, y, z), tuple(place.tolist()), up_by, error, floor_by, north_by)
     return replace(world, guess=guessed(evidence(scene, world, surface)))

@@ -21,7 +21,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial.transform import Rotation
 
 MOST_PITCH = 60.0  # degrees by which the first camera may look up or down
 _PITCHES, _ROLLS = np.arange(-MOST_PITCH, MOST_PITCH + 1, 3.0), np.arange(-12.0, 13.0, 3.0)
@@ -87,6 +86,8 @@ def found_directions(sights: Sights, up: Float[np.ndarray, " 3"] | None = None) 
 
 def _starts(sights: Sights) -> list[np.ndarray]:
     """The directions up that most speaks for, `_APART` from each other."""
+    from scipy.spatial.transform import Rotation  # .08 s, which reading a scene has not to wait for
+
     home = sights.cameras[0].T
     turns = Rotation.from_euler("zx", [(roll, pitch) for roll in _ROLLS for pitch in _PITCHES], degrees=True)
     ups = (home @ turns.apply([0.0, -1.0, 0.0]).T).T  # (U, 3)
@@ -150,6 +151,8 @@ def _walls_of(sights: Sights, up: np.ndarray) -> np.ndarray:
 
 def _fitted(sights: Sights, axes: np.ndarray, fixed: bool) -> Directions:
     """Gauss-Newton from these axes; with `fixed`, about their up alone."""
+    from scipy.spatial.transform import Rotation
+
     information = np.zeros((3, 3))
     for width in _ROUNDS:
         information, pull = _normal_equations(sights, axes, width)

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import torch
 from jaxtyping import Float, Int
-from scipy.spatial import KDTree
 from torch import Tensor
 
 from langflash_core.types import Gaussians, Scene
@@ -88,6 +87,8 @@ def _leveled(scene: Scene, share: float, coarse: float) -> tuple[Scene, np.ndarr
 def _told(coarse: Gaussians, detail: Gaussians) -> np.ndarray:
     """How much each of the detail (n,) changes what the nearest coarse one shows: its area times the mean
     difference of their colours."""
+    from scipy.spatial import KDTree
+
     areas = covered_areas(detail)
     there, own = (_finite(each.means).numpy() for each in (coarse, detail))
     tells = np.zeros(len(areas))
