@@ -218,7 +218,8 @@ def _help_group(group: str | None, look: Look) -> None:
     imgui.text_colored(theme.ACCENT, group or "Mouse and hands")
     for keys, meaning in help_rows(group):
         imgui.text(keys)
-        imgui.same_line(look.px(_KEYS if group else _HANDS))
+        taken = imgui.calc_text_size(keys).x + look.px(12)
+        imgui.same_line(max(look.px(_KEYS if group else _HANDS), taken))
         imgui.text_colored(theme.MUTED, meaning)
     widgets.gap(look.px(4))
 

@@ -99,6 +99,30 @@ def test_help_fits_a_window_of_800_lines() -> None:
     assert ("Ctrl+Z", "Undo") in dialogs.help_rows("Edit")
 
 
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+def test_what_keys_do_stands_beside_them(scale: float, monkeypatch) -> None:
+    """The keys of a step around the scene lay under what they do."""
+    ends, gaps = list[float](), list[float]()
+    real, coloured = imgui.text, imgui.text_colored
+
+    def text(words: str) -> None:
+        real(words)
+        ends.append(imgui.get_item_rect_max().x)
+
+    def text_colored(colour, words: str) -> None:
+        coloured(colour, words)
+        if ends:
+            gaps.append(imgui.get_item_rect_min().x - ends.pop())
+
+    monkeypatch.setattr(imgui, "text", text)
+    monkeypatch.setattr(imgui, "text_colored", text_colored)
+    shown = replace(State(), dialog=Dialog.HELP)
+    with headless.context((1920, 1200)):
+        theme.set_up(scale)
+        headless.frames(lambda look: dialogs.draw(shown, look), headless.look(scale), 3)
+    assert len(gaps) > 100 and min(gaps) > 0
+
+
 def test_the_page_keys_of_a_tour_do_not_move_the_focus() -> None:
     """Page down went to the next stop and to another control at once."""
     for state, owned in ((with_marks(), False), (after(with_marks(), tour.AddStop()), True)):
