@@ -564,8 +564,9 @@ def main() -> int:
     outcome = run(60 * args.minutes, args.seed, (width, height), photos=photos, say=say)
     say(f"{outcome.steps} batches, {outcome.frames} frames, the latest by {outcome.latest:.2f} s")
     if outcome.picture is not None:
-        Image.fromarray(outcome.picture).save("monkey.png")
-        say("what the screen showed is in monkey.png")
+        picture = Path(tempfile.gettempdir()) / "monkey.png"
+        Image.fromarray(outcome.picture).save(picture)
+        say(f"what the screen showed is in {picture}")
     growth = outcome.growth()
     if growth is not None:
         say(f"memory {100 * growth:+.2f} % from minute {WARM_MINUTES:.0f} to the end")

@@ -124,30 +124,31 @@ def _shown(guide) -> bool:
     return state.info is not None and state.job is None
 
 
-def opening(scene: Path) -> float:
-    """The window from its first step until a scene that was asked four phrases rests in it."""
+def _until_shown(scene: Path, then: Callable[..., object] = lambda guide: None) -> float:
     show = importlib.import_module("app.window.scene.commands")
 
     def act() -> None:
         with _window() as guide:
             guide.tell(show.OpenPaths((str(scene),)))
             guide.until(lambda: _shown(guide), "the scene")
-            guide.ask(*PHRASES)
-            guide.rest()
+            then(guide)
 
     return timed(act)
 
 
 def starting(scene: Path) -> float:
     """The window from its first step until a scene is there."""
-    show = importlib.import_module("app.window.scene.commands")
+    return _until_shown(scene)
 
-    def act() -> None:
-        with _window() as guide:
-            guide.tell(show.OpenPaths((str(scene),)))
-            guide.until(lambda: _shown(guide), "the scene")
 
-    return timed(act)
+def opening(scene: Path) -> float:
+    """The window from its first step until a scene that was asked four phrases rests in it."""
+
+    def asked(guide) -> None:
+        guide.ask(*PHRASES)
+        guide.rest()
+
+    return _until_shown(scene, asked)
 
 
 def turning(scene: Path) -> float:

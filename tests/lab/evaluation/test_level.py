@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from langflash_core.errors import GraphicsError
 from langflash_core.inventory import inventory
 from langflash_core.lab.evaluation import level
 from langflash_core.lab.evaluation.level import (
@@ -20,23 +19,14 @@ from langflash_core.lab.evaluation.level import (
     summary,
     true_unit,
 )
-from langflash_core.lab.rooms import RoomRenderer, load_pack, staged_room
 from langflash_core.level import found_world
-from tests.lab.evaluation.true_scenes import UNIT, true_scene
-from tests.lab.rooms.conftest import TINY_PACK
+from tests.lab.evaluation.true_scenes import UNIT, staged, true_scene
 
 
-@pytest.fixture(scope="module")
-def staged():
-    pack = load_pack(TINY_PACK)
-    try:
-        drawer = RoomRenderer(pack)
-    except GraphicsError as error:
-        pytest.skip(str(error))
-    with drawer:
-        return staged_room(
-            900_000_002, pack, drawer, num_views=2, size=(112, 112), libraries=("BlendSwap-CC-0",)
-        )
+@pytest.fixture(scope="module", name="staged")
+def two_photos():
+    with staged(900_000_002, photos=2, side=112) as (room, _):
+        return room
 
 
 @pytest.fixture(scope="module")

@@ -3,29 +3,20 @@
 import numpy as np
 import pytest
 
-from langflash_core.errors import GraphicsError
 from langflash_core.inventory import beside, inventory
 from langflash_core.inventory.beside import Fit
 from langflash_core.lab.evaluation.moved import SEEN, WAY, judge_moved, moved_markdown, pushed_room
-from langflash_core.lab.rooms import RoomRenderer, load_pack, staged_room
 from langflash_core.level import found_world
 from langflash_core.splat import render
-from tests.lab.evaluation.true_scenes import UNIT, true_scene
-from tests.lab.rooms.conftest import TINY_PACK
+from tests.lab.evaluation.true_scenes import UNIT, staged, true_scene
 
 SEED = 900_000_204
 
 
 @pytest.fixture(scope="module")
 def pushed():
-    pack = load_pack(TINY_PACK)
-    try:
-        drawer = RoomRenderer(pack)
-    except GraphicsError as error:
-        pytest.skip(str(error))
-    with drawer:
-        staged = staged_room(SEED, pack, drawer, num_views=4, size=(80, 80), libraries=("BlendSwap-CC-0",))
-        return pushed_room(staged, drawer, SEED)
+    with staged(SEED, photos=4, side=80) as (room, drawer):
+        return pushed_room(room, drawer, SEED)
 
 
 def test_three_things_are_pushed_over_the_floor_into_free_places_that_photos_see(pushed):

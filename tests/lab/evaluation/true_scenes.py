@@ -1,15 +1,37 @@
 """Scenes that are true: what the photos of a rendered room show, where it is."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
 import torch
 
+from langflash_core.errors import GraphicsError
 from langflash_core.geometry.cameras import invert_rigid, transform, unproject
 from langflash_core.geometry.quaternions import matrices_to_quats
 from langflash_core.geometry.surfels import ellipses, spans
-from langflash_core.lab.rooms import StagedRoom
+from langflash_core.lab.rooms import RoomRenderer, StagedRoom, load_pack, staged_room
 from langflash_core.language.spaces import language_space
 from langflash_core.types import Gaussians, Record, Scene, Semantics
+from tests.lab.rooms.conftest import TINY_PACK
 
 UNIT = 1.7
+
+
+@contextmanager
+def staged(seed: int, photos: int, side: int) -> Iterator[tuple[StagedRoom, RoomRenderer]]:
+    """A room of the tiny pack in square photos, and what draws it; skips where there is no OpenGL."""
+    pack = load_pack(TINY_PACK)
+    try:
+        drawer = RoomRenderer(pack)
+    except GraphicsError as error:
+        pytest.skip(str(error))
+    libraries = ("BlendSwap-CC-0",)
+    with drawer:
+        yield (
+            staged_room(seed, pack, drawer, num_views=photos, size=(side, side), libraries=libraries),
+            drawer,
+        )
 
 
 def true_scene(staged: StagedRoom) -> Scene:
