@@ -23,7 +23,6 @@ from .drawing.marked import Marked
 from .drawing.picture import ScenePicture
 from .drawing.values import Stand, View
 from .editing.state import Point, Reading
-from .governor import Plan
 from .scene.memory import SceneMemory
 from .state import State
 
@@ -192,8 +191,7 @@ class Viewport:
     @property
     def whole(self) -> bool:
         """Whether the picture on show is the finest that there will be."""
-        drawn = None if self.picture is None else self.picture.easel.drawn
-        return self.failing or (drawn is not None and drawn.plan.covers(Plan(drawn.plan.kind)))
+        return self.picture is not None and self.picture.whole
 
     def seen(self) -> UInt8[np.ndarray, "H W 3"] | None:
         """What is shown, read back; None where nothing is."""

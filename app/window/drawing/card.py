@@ -54,5 +54,9 @@ class CardPicture:
     def _numbers(self) -> "tuple[Frame, Tensor]":
         return self.easel.renderer.frame(), self.easel.renderer.relevance()
 
+    @property
+    def whole(self) -> bool:
+        return self.easel.finest
+
     def release(self, patience: float) -> None:
         pass

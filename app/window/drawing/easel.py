@@ -93,6 +93,11 @@ class Easel:
         """Whether what is on show is at least what is wanted."""
         return self.drawn is not None and self.drawn.covers(wanted)
 
+    @property
+    def finest(self) -> bool:
+        """Whether what is on show leaves out no pixel and no Gaussian."""
+        return self.drawn is not None and self.drawn.plan.covers(Plan(self.drawn.plan.kind))
+
     def draw(self, wanted: Drawn) -> None:
         """Draw that picture, by the renderer."""
         plan, renderer = wanted.plan, self.renderer

@@ -39,6 +39,11 @@ class ScenePicture(Protocol):
         ...
 
     @property
+    def whole(self) -> bool:
+        """Whether what is on show is the finest that there will be; also where no finer one can be drawn."""
+        ...
+
+    @property
     def settling(self) -> bool:
         """Whether a finer picture than the one on show is being drawn."""
         ...

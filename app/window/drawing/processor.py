@@ -96,6 +96,10 @@ class ProcessorPicture:
         return self.easel.view(state, stand, lambda: self.stills.numbers(state))
 
     @property
+    def whole(self) -> bool:
+        return self.failing or (self.stills.shown is not None and self.easel.finest)
+
+    @property
     def settling(self) -> bool:
         return self.stills.busy
 
