@@ -8,10 +8,12 @@ the run goes on. It begins with a reconstruction, a phrase and every mode of the
 and the shaders are there from the start and not from whichever minute random hands ask for them. Every
 minute the same scene is opened in a window of the same size, and memory is compared there at rest, without
 what the rooms take that the window holds to go back to: which these are is up to random hands. The scene's
-file is written anew before, since they merge scenes into it and save it.
+file is written anew before, since they merge scenes into it and save it. Each line says what memory is asked
+of the C library, free in its hands and mapped from files, and which modules were loaded since the last.
 """
 
 import argparse
+import ctypes
 import json
 import os
 import random
@@ -160,11 +162,13 @@ def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
     if photos:
         _see_everything(session)
     frames, said, latest = 0, 0.0, 0.0
+    loaded, came = _packages(), list[str]()
     while not ended.is_set() and not session.should_close:
         if session.step(0.25):
             frames, latest = frames + 1, max(latest, session.lag)
         if asked.is_set():
             asked.clear()
+            loaded, came = _packages(), [*came, *sorted(_packages() - loaded)]
             for prompt in session.state.asking.prompts:
                 session.dispatch(ask.RemovePrompt(prompt.key))
             session.dispatch(camera.SetMode(pictures.RGB))
@@ -176,6 +180,8 @@ def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
                 "frames": frames,
                 "latest": latest,
                 "rss": resident_mb(os.getpid()),
+                "taken": memory_parts(os.getpid()),
+                "loaded": came,
                 "rooms": held_mb(state.scene.rooms) if state.scene.rooms else 0.0,
                 "scene": state.scene.info.serial if state.scene.info and state.scene.job is None else None,
                 "gaussians": state.scene.info.num_gaussians if state.scene.info else 0,
@@ -219,6 +225,39 @@ def resident_mb(process: int) -> float:
         if line.startswith("VmRSS:"):
             return int(line.split()[1]) / 1024
     raise ValueError("status: expected a line VmRSS")
+
+
+def memory_parts(process: int) -> dict[str, float]:
+    """What memory is, MB, of this process: asked of the C library by whoever holds it, free in its hands,
+    mapped from files; and how many threads and open files there are."""
+    found = _Mallinfo2()
+    with suppress(AttributeError):  # before glibc 2.33, and elsewhere
+        ask_library = ctypes.CDLL(None).mallinfo2
+        ask_library.restype = _Mallinfo2
+        found = ask_library()
+    lines = dict(line.split(":", 1) for line in Path(f"/proc/{process}/status").read_text().splitlines())
+    mapped = sum(int(lines[name].split()[0]) for name in ("RssFile", "RssShmem")) / 1024
+    return {
+        "asked": (found.uordblks + found.hblkhd) / 2**20,
+        "free": found.fordblks / 2**20,
+        "files": mapped,
+        "threads": int(lines["Threads"]),
+        "handles": len(os.listdir(f"/proc/{process}/fd")),
+    }
+
+
+class _Mallinfo2(ctypes.Structure):
+    """Of mallinfo(3)."""
+
+    _fields_ = (
+        *((name, ctypes.c_size_t) for name in ("arena", "ordblks", "smblks", "hblks", "hblkhd")),
+        *((name, ctypes.c_size_t) for name in ("usmblks", "fsmblks", "uordblks", "fordblks", "keepcost")),
+    )
+
+
+def _packages() -> set[str]:
+    """Names of loaded modules, to the second dot."""
+    return {".".join(name.split(".")[:2]) for name in list(sys.modules)}
 
 
 def held_mb(value: Any) -> float:
@@ -513,7 +552,7 @@ def run(
             if photos and not watched.reconstructs():
                 outcome.problems.append(f"the photos became no scene: {watched.last}")
             start = time.monotonic()
-            checkpoint = 0.0
+            checkpoint, known = 0.0, 0
             while not outcome.problems:
                 now = time.monotonic() - start
                 if now >= checkpoint or now >= seconds:
@@ -525,7 +564,11 @@ def run(
                     memory = watched.last.get("rss", 0.0) - rooms
                     outcome.checkpoints.append((now / 60, memory))
                     sizes = f"{memory:6.0f} MB and {rooms:.0f} of rooms"
-                    say(f"{now / 60:5.1f} min  {sizes}  {outcome.steps} steps")
+                    parts = ", ".join(f"{k} {v:.0f}" for k, v in watched.last.get("taken", {}).items())
+                    came = watched.last.get("loaded", [])
+                    since = " ".join(came[known:])
+                    say(f"{now / 60:5.1f} min  {sizes}  {outcome.steps} steps; {parts}; {since}")
+                    known = len(came)
                     checkpoint = now + every
                 if now >= seconds:
                     break
