@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 _SAID = ("not enough memory", "can't allocate memory", "out of memory", "insufficient memory", "bad_alloc")
-_MMAP_THRESHOLD, _TRIM_THRESHOLD = -3, -1  # M_* of malloc.h
+_MMAP_THRESHOLD, _TRIM_THRESHOLD, _ARENA_MAX = -3, -1, -8  # M_* of malloc.h
 LARGE_BYTES = 4 << 20
 """From here on an array has pages of its own, which go with it.
 
@@ -23,8 +23,15 @@ then), 24 % with 256 KB.
 """
 
 
-def keep_large_apart() -> None:
-    """Give every large array pages of its own, from here on; before any is made."""
+def keep_tidy() -> None:
+    """From here on every large array has pages of its own, and what one thread gives back serves the others;
+    before any thread or array is made.
+
+    By itself the library gives each thread its own arena, up to eight per core, each with holes of its own: a
+    window under random hands gained 59 MB within two and a half minutes, and 7 with one arena, which were
+    asked for. Pictures at rest, drawn by two threads, take the same time.
+    """
+    _call("mallopt", _ARENA_MAX, 1)
     _call("mallopt", _MMAP_THRESHOLD, LARGE_BYTES)
     _call("mallopt", _TRIM_THRESHOLD, 2 * LARGE_BYTES)
 

@@ -18,7 +18,7 @@ from imgui_bundle.python_backends.glfw_backend import GlfwRenderer
 
 from langflash_core.errors import LangFlashError
 from langflash_core.graphics import refusals_said
-from langflash_core.memory import keep_large_apart
+from langflash_core.memory import keep_tidy
 
 from . import desktop
 from .asking.effects import AskingEffects
@@ -72,7 +72,7 @@ class Session:
     def __init__(self, paths: Sequence[str | Path] = (), size: tuple[int, int] | None = None) -> None:
         remembered, complaint = preferences.load()
         sys.setswitchinterval(SWITCH_SECONDS)
-        keep_large_apart()
+        keep_tidy()
         self.state = State()
         self.gl_errors: list[str] = []
         self.lag = 0.0  # seconds that the last step took, without its nap and without drawing the scene

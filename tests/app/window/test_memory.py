@@ -31,7 +31,7 @@ def resident_mb():
     return next(int(line.split()[1]) for line in lines if line.startswith("RssAnon:")) / 1024
 
 if sys.argv[1] == "apart":
-    memory.keep_large_apart()
+    memory.keep_tidy()
 np.ones(30 << 20, np.uint8)  # a picture that is gone raises the library's own border to its size
 before, stays = resident_mb(), []
 arrays = []
@@ -60,6 +60,48 @@ def test_large_arrays_leave_nothing_behind() -> None:
     usual, later = held_mb("as usual")
     assert usual > 2 * HELD_MB  # what the library does by itself, else this test could not fail
     assert later < HELD_MB  # what `give_back` is for
+
+
+THREADS_BY_TURNS = """
+import sys
+from threading import Event, Thread
+from langflash_core import memory
+
+def resident_mb():
+    lines = open("/proc/self/status").read().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("RssAnon:")) / 1024
+
+if sys.argv[1] == "tidy":
+    memory.keep_tidy()
+turns, stays = [Event() for _ in range(9)], []
+
+def take(turn):
+    turns[turn].wait()
+    pieces = [bytearray(64_000) for _ in range(640)]
+    stays.extend(pieces[::100])
+    del pieces
+    turns[turn + 1].set()
+    turns[-1].wait()  # a thread that has ended would leave its arena to the next
+
+threads = [Thread(target=take, args=(turn,), daemon=True) for turn in range(8)]
+for thread in threads:
+    thread.start()
+before = resident_mb()
+turns[0].set()
+turns[-1].wait()
+print(resident_mb() - before)
+"""
+
+
+def test_what_one_thread_gives_back_serves_the_next() -> None:
+    """Eight threads take 39 MB each, one after the other, and keep a hundredth."""
+
+    def gained(how: str) -> float:
+        program = [sys.executable, "-c", THREADS_BY_TURNS, how]
+        return float(subprocess.run(program, cwd=ROOT, capture_output=True, text=True, check=True).stdout)
+
+    assert gained("tidy") < 2 * 39  # once, and the pieces that stay
+    assert gained("as usual") > 4 * 39  # what the library does by itself, else this test could not fail
 
 
 A_JOB_OF_CRUMBS = """
