@@ -1,6 +1,7 @@
 """What was hidden is not in the file: not in its photos, not in its tensors, from no side."""
 
 import io
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -58,7 +59,10 @@ def test_no_photo_shows_the_pattern(known, done, how):
         part = np.s_[rows.min() + 1 : rows.max(), columns.min() + 1 : columns.max()]
         secret, before = known.photos[view].movedim(0, -1).numpy(), pixels(known.scene.photos[view])
         assert likeness(before[part], secret[part]) > 0.9  # the measure finds it where it is
-        assert abs(likeness(pixels(scene.photos[view])[part], secret[part])) < 0.25
+        # A column of blocks varies at their few edges alone, and of r rows e are as like as sqrt(2 e / r) to
+        # any wave that they happen to meet at its steepest.
+        by_chance = math.sqrt(2 * math.ceil(BLOCKS) / np.ptp(rows)) if how == "pixels" else 0.25
+        assert abs(likeness(pixels(scene.photos[view])[part], secret[part])) < by_chance
         assert screen.mean() < report.photos[view] < 2 * screen.mean() + 0.1
 
 
