@@ -2,7 +2,7 @@
 
 python -m torch.distributed.run ... tests/lab/training/shared_steps.py ROOMS RUN BATCHES STEPS STAGE...
 
-A stage with a mark, as in "refine!", has no finite loss in the second batch of the second step.
+A stage with a mark, as in "refine!", has no finite loss in the second batch of the first step.
 """
 
 import sys
@@ -29,7 +29,7 @@ def spoiled(stage: Stage) -> Stage:
         seed = words.generator.initial_seed()
         calls[seed] = calls.get(seed, 0) + 1
         found = stage.loss(network, batch, words)
-        return Loss(found.total * torch.nan, found.parts) if seed != 5 and calls[seed] == 2 else found
+        return Loss(found.total * torch.nan, found.parts) if seed != 5 and calls[seed] == 1 else found
 
     return replace(stage, name=f"{stage.name}!", loss=loss)
 

@@ -144,7 +144,7 @@ def test_a_few_steps_teach_names_and_end_in_a_cut_half(photos, targets, tmp_path
     network.late.begin(network.encoder.vit)
     table = build_table([Label("chair", "chair")], encode)
     words = Words(PhraseSampler(table), torch.Generator().manual_seed(0))
-    options = LoopOptions(minutes=10, max_steps=6, report_s=0.0, learning_rate=3e-3)
+    options = LoopOptions(minutes=10, max_steps=6, report_s=0.0, pictures=2, learning_rate=3e-3)
     state = train_late(network, targets, JointSet(coloured, None), words, tmp_path, options)
     assert state.step == 6 and isinstance(network.late, LateHalf)
     for part in ("late_whole", "late_heads"):
