@@ -58,6 +58,8 @@ _CLOSING = (
 def draw(state: State, look: Look) -> list[do.Command]:
     """The dialog that is open, if any."""
     if state.dialog is None:
+        if imgui.internal.get_top_most_popup_modal() is not None:  # Esc, or what it asked about is gone
+            imgui.internal.close_popup_to_level(0, True)  # or keys go on in whatever stands on top
         return []
     title = state.dialog.value
     _place(state.dialog, look)
