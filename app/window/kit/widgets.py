@@ -67,22 +67,33 @@ def primary_button(label: str, size: ImVec2 | None = None) -> bool:
 
 
 def choice(options: Sequence[tuple[str, _Value]], chosen: _Value) -> _Value:
-    """One of several values, a button each in a row; returns the one that now holds."""
+    """One of several values, a button each in a row, or in more where the window ends; returns the one that
+    now holds."""
+    imgui.begin_group()
     for index, (label, value) in enumerate(options):
         if index:
-            imgui.same_line(0, 0.5 * imgui.get_style().item_spacing.x)
+            beside(button_width(label), 0.5 * imgui.get_style().item_spacing.x)
         if primary_button(label) if value == chosen else imgui.button(label):
             chosen = value
+    imgui.end_group()
     return chosen
 
 
 def checkbox(label: str, on: bool) -> tuple[bool, bool]:
-    """A box with an edge, so that it is seen while empty."""
+    """A box with an edge, so that it is seen while empty; its words in more lines where the window ends."""
     imgui.push_style_var(imgui.StyleVar_.frame_border_size, 1.0)
+    room = imgui.get_content_region_avail().x - imgui.get_frame_height()
+    fits = imgui.calc_text_size(label, True).x + imgui.get_style().item_inner_spacing.x <= room
     with colours(border=theme.PRESSED):
-        changed = imgui.checkbox(label, on)
+        changed, now = imgui.checkbox(label if fits else f"##{label}", on)
     imgui.pop_style_var()
-    return changed
+    if not fits:
+        imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
+        imgui.align_text_to_frame_padding()
+        imgui.text_wrapped(label)
+        if imgui.is_item_clicked():
+            changed, now = True, not on
+    return changed, now
 
 
 def button_width(label: str) -> float:
@@ -93,9 +104,14 @@ def button_width(label: str) -> float:
 def go_on(width: float, right: float, gap: float = -1.0) -> None:
     """Put the next item, of this width, beside the last one, or below where it would end beyond `right`;
     pixels of the screen. gap: between both; negative: the style's."""
-    imgui.same_line(0, gap)
-    if imgui.get_cursor_screen_pos().x + width > right:
-        imgui.new_line()
+    between = gap if gap >= 0 else imgui.get_style().item_spacing.x
+    if imgui.internal.get_current_window().dc.cursor_pos_prev_line.x + between + width <= right:
+        imgui.same_line(0, gap)
+
+
+def beside(width: float, gap: float = -1.0) -> None:
+    """`go_on` as far as the present window reaches."""
+    go_on(width, imgui.internal.get_current_window().work_rect.max.x, gap)
 
 
 def quiet_button(label: str, tip: str = "") -> bool:

@@ -1,18 +1,22 @@
 """Nothing covers anything else where the window is small or the interface large."""
 
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
 import pytest
 from imgui_bundle import ImVec2, imgui
 
+from app.window.commands import Command
+from app.window.dialogs import Dialog
 from app.window.editing import commands as edit
 from app.window.editing.panels import tools
 from app.window.editing.panels.tools import _GAP, _MARGIN, _TOOLS, tool_side
 from app.window.editing.state import Floaters, Hiding, Tint, Tool
-from app.window.frame import layout
+from app.window.frame import dialogs, layout
 from app.window.inventory import commands as take
-from app.window.kit import theme
+from app.window.kit import theme, widgets
+from app.window.kit.look import Look
 from app.window.recovery import commands as keep
 from app.window.recovery.state import Offer
 from app.window.scene.panels.legend import covers_views
@@ -21,6 +25,7 @@ from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History
 from tests.app.window.headless import box, context, frames, look
 from tests.app.window.scenes import after, shown_scene
+from tests.app.window.test_stumbles import Hands
 
 SEPARATORS = 2 * (1 + _GAP) + 12  # two lines, and the strip's padding
 
@@ -101,3 +106,56 @@ def test_kept_edits_are_offered_above_the_viewpoints_and_before_panels(size: tup
         views = box("##views")
     assert left >= 348 and right <= size[0] and bottom <= views[1]
     assert order.index("##offer") > max(order.index(name) for name in order if "nventory" in name)
+
+
+@pytest.mark.parametrize(
+    ("size", "scale"), [((800, 500), 0.75), ((800, 500), 1.0), ((800, 500), 2.0), ((1280, 800), 2.0)]
+)
+@pytest.mark.parametrize("dialog", list(Dialog), ids=lambda dialog: dialog.name)
+def test_no_dialog_scrolls_sideways(dialog: Dialog, size: tuple[int, int], scale: float) -> None:
+    """The help's second column, a fifth of the preferences and Cancel were out of sight."""
+    state = replace(edited(), dialog=dialog)
+    with context(size):
+        theme.set_up(scale, "dark")
+        frames(lambda seen: dialogs.draw(state, seen), look(scale), 8)
+        window = imgui.internal.find_window_by_name(dialog.value)
+        assert window is not None and window.scroll_max.x == 0
+        assert window.size.x <= size[0] and window.size.y <= size[1]
+
+
+def test_the_help_is_scrolled_by_the_keys() -> None:
+    state = replace(edited(), dialog=Dialog.HELP)
+    with context((800, 500)):
+        theme.set_up(1.0, "dark")
+        hands = Hands(lambda seen: dialogs.draw(state, seen))
+        hands.frames(6)
+        window = imgui.internal.find_window_by_name(Dialog.HELP.value)
+        assert window is not None and window.scroll_max.y > 0
+        hands.key(imgui.Key.down_arrow)
+        assert 0 < window.scroll.y < window.scroll_max.y
+        hands.key(imgui.Key.end)
+        assert window.scroll.y == window.scroll_max.y
+        hands.key(imgui.Key.home)
+        assert window.scroll.y == 0
+
+
+def test_the_words_of_a_box_go_on_below_and_can_be_clicked() -> None:
+    words = "Keep to what the photos saw: orbits slow down, and the rest fades"
+    seen: list[tuple[bool, bool]] = []
+
+    def panel(_look: Look) -> list[Command]:
+        imgui.set_next_window_pos(ImVec2(0, 0))
+        imgui.set_next_window_size(ImVec2(260, 200))
+        imgui.begin("narrow")
+        seen.append(widgets.checkbox(words, True))
+        assert imgui.get_item_rect_max().x <= 260
+        assert imgui.get_item_rect_size().y > 2 * imgui.get_text_line_height()
+        imgui.end()
+        return []
+
+    with context((800, 500)):
+        theme.set_up(1.0, "dark")
+        hands = Hands(panel)
+        hands.frames(3)
+        hands.click(120, 60)
+    assert (True, False) in seen
