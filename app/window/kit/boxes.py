@@ -31,6 +31,14 @@ def clear(box: Box, walls: Iterable[Box], furthest: float) -> Box:
     return box
 
 
+def window_box(name: str) -> Box | None:
+    """Where a window of ImGui stood in the last frame; None: it did not."""
+    window = imgui.internal.find_window_by_name(name)
+    if window is None or not window.was_active:
+        return None
+    return (window.pos.x, window.pos.y, window.pos.x + window.size.x, window.pos.y + window.size.y)
+
+
 def windows_over(picture: Box) -> tuple[Box, ...]:
     """ImGui's windows that stood over the picture in the last frame, but for what comes and goes; not the one
     that is being drawn."""

@@ -16,16 +16,20 @@ from app.window.editing.state import Floaters, Hiding, Tint, Tool
 from app.window.frame import dialogs, layout
 from app.window.inventory import commands as take
 from app.window.kit import theme, widgets
+from app.window.kit.boxes import overlap, window_box
 from app.window.kit.look import Look
 from app.window.recovery import commands as keep
-from app.window.recovery.state import Offer
+from app.window.recovery.state import Offer, Project
 from app.window.scene.panels.legend import covers_views
 from app.window.state import State
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History
 from tests.app.window.headless import box, context, frames, look
+from tests.app.window.items import Items
 from tests.app.window.scenes import after, shown_scene
-from tests.app.window.test_stumbles import Hands
+from tests.app.window.test_stumbles import Hands, items
+
+__all__ = ["items"]  # a fixture
 
 SEPARATORS = 2 * (1 + _GAP) + 12  # two lines, and the strip's padding
 
@@ -106,6 +110,59 @@ def test_kept_edits_are_offered_above_the_viewpoints_and_before_panels(size: tup
         views = box("##views")
     assert left >= 348 and right <= size[0] and bottom <= views[1]
     assert order.index("##offer") > max(order.index(name) for name in order if "nventory" in name)
+
+
+OFFER = Offer(Path("x.edits"), "living_room_left.langflash", 13, datetime(2026, 11, 25))
+
+
+@pytest.mark.parametrize(("size", "scale"), [((800, 500), 1.0), ((1280, 800), 1.5), ((1280, 800), 1.0)])
+@pytest.mark.parametrize(
+    "state",
+    [
+        after(edited(), edit.Deselect()),
+        edited(tool=Tool.CLONE, source=(0.0, 0.0, 1.0)),
+        edited(floaters=Floaters(bytes(4 * 12_300))),
+        edited(hiding=Hiding("blur")),
+        edited(tool=Tool.BRUSH, hiding=Hiding("blur")),
+    ],
+    ids=["nothing", "clone", "floaters", "hiding", "brush and hiding"],
+)
+def test_kept_edits_are_offered_beside_the_tools_and_their_bars(
+    monkeypatch, state: State, size: tuple[int, int], scale: float
+) -> None:
+    """At 800 x 500 the lower third of the tools was behind it, undo among them, and the bar that hides."""
+    monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
+    with context(size):
+        theme.set_up(scale, "dark")
+        frames(lambda seen: layout.draw_all(after(state, keep.OfferEdits(OFFER)), seen), look(scale), 8)
+        offer = window_box("##offer")
+        bars = [found for number in range(5) if (found := window_box(f"##bar{number}")) is not None]
+        others = [box("##tools"), box("##views"), *bars]
+    assert offer is None or not any(overlap(offer, other) for other in others)
+    if offer is None:  # it waits where there is no room alone
+        assert size == (800, 500) and max(bar[3] for bar in bars) > 280
+    else:
+        assert offer[0] >= 348 * scale and offer[2] <= size[0]
+
+
+def test_in_the_empty_window_kept_edits_are_offered_above_what_can_be_opened(
+    monkeypatch, items: Items
+) -> None:
+    """It stood before the tile of the very scene that it is about."""
+    project = Project("/rooms/living_room_left.langflash", when=datetime(2026, 11, 25))
+    state = State().with_recovery(projects=(project,))
+    with context((800, 500)):
+        theme.set_up(1.0, "dark")
+        frames(lambda seen: layout.draw_all(after(state, keep.OfferEdits(OFFER)), seen), look(), 6)
+        offer = box("##offer")
+        words = ("##project", "##forget", "##sample", "Photos ...", "Paste")
+        opening = {
+            name: places for name, places in items.now().items() if any(word in name for word in words)
+        }
+    assert len(opening) >= 6
+    covered = [name for name, places in opening.items() for x0, y0, x1, y1 in places
+               if overlap(offer, (x0, y0, x1, y1))]  # fmt: skip
+    assert covered == []
 
 
 @pytest.mark.parametrize(
