@@ -39,6 +39,12 @@ def window_box(name: str) -> Box | None:
     return (window.pos.x, window.pos.y, window.pos.x + window.size.x, window.pos.y + window.size.y)
 
 
+def bars() -> list[Box]:
+    """Where the bars of the tools stood in the last frame, from above."""
+    names = [window.name for window in imgui.get_current_context().windows if window.name.startswith("##bar")]
+    return sorted((box for name in names if (box := window_box(name)) is not None), key=lambda box: box[1])
+
+
 def windows_over(picture: Box) -> tuple[Box, ...]:
     """ImGui's windows that stood over the picture in the last frame, but for what comes and goes; not the one
     that is being drawn."""

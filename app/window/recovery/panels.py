@@ -154,6 +154,5 @@ def _stands(state: State, look: Look, place: ImVec2, size: ImVec2) -> tuple[Box,
 
 def _in_hand(box: Box) -> bool:
     """Whether what belongs to a tool in hand stands there."""
-    names = [window.name for window in imgui.get_current_context().windows]
-    found = [boxes.window_box(name) for name in names if name.startswith("##bar") or name in _OF_TOOLS]
+    found = [*boxes.bars(), *map(boxes.window_box, _OF_TOOLS)]
     return any(boxes.overlap(box, other) for other in found if other is not None)

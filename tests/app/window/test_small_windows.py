@@ -13,10 +13,11 @@ from app.window.editing import commands as edit
 from app.window.editing.panels import tools
 from app.window.editing.panels.tools import _GAP, _MARGIN, _TOOLS, tool_side
 from app.window.editing.state import Floaters, Hiding, Tint, Tool
+from app.window.filming import commands as film
 from app.window.frame import dialogs, layout
 from app.window.inventory import commands as take
 from app.window.kit import theme, widgets
-from app.window.kit.boxes import overlap, window_box
+from app.window.kit.boxes import bars, overlap, window_box
 from app.window.kit.look import Look
 from app.window.recovery import commands as keep
 from app.window.recovery.state import Offer, Project
@@ -115,18 +116,31 @@ def test_kept_edits_are_offered_above_the_viewpoints_and_before_panels(size: tup
 OFFER = Offer(Path("x.edits"), "living_room_left.langflash", 13, datetime(2026, 11, 25))
 
 
+IN_HAND = {
+    "nothing": after(edited(), edit.Deselect()),
+    "clone": edited(tool=Tool.CLONE, source=(0.0, 0.0, 1.0)),
+    "floaters": edited(floaters=Floaters(bytes(4 * 12_300))),
+    "hiding": edited(hiding=Hiding("blur")),
+    "brush and hiding": edited(tool=Tool.BRUSH, hiding=Hiding("blur")),
+}
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+@pytest.mark.parametrize("state", IN_HAND.values(), ids=IN_HAND)
+def test_the_key_frames_stand_below_the_bars(monkeypatch, state: State, scale: float) -> None:
+    """They were before the buttons that hide for good, or do not."""
+    monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
+    state = after(state, film.AddKey(), film.AddKey())
+    for size in ((1280, 800), (round(800 * scale), round(500 * scale))):
+        with context(size):
+            theme.set_up(scale, "dark")
+            frames(lambda seen: layout.draw_all(state, seen), look(scale), 8)
+            keys = box("##keys")
+            assert keys[2] <= size[0] and not any(overlap(keys, bar) for bar in bars())
+
+
 @pytest.mark.parametrize(("size", "scale"), [((800, 500), 1.0), ((1280, 800), 1.5), ((1280, 800), 1.0)])
-@pytest.mark.parametrize(
-    "state",
-    [
-        after(edited(), edit.Deselect()),
-        edited(tool=Tool.CLONE, source=(0.0, 0.0, 1.0)),
-        edited(floaters=Floaters(bytes(4 * 12_300))),
-        edited(hiding=Hiding("blur")),
-        edited(tool=Tool.BRUSH, hiding=Hiding("blur")),
-    ],
-    ids=["nothing", "clone", "floaters", "hiding", "brush and hiding"],
-)
+@pytest.mark.parametrize("state", IN_HAND.values(), ids=IN_HAND)
 def test_kept_edits_are_offered_beside_the_tools_and_their_bars(
     monkeypatch, state: State, size: tuple[int, int], scale: float
 ) -> None:
@@ -136,11 +150,11 @@ def test_kept_edits_are_offered_beside_the_tools_and_their_bars(
         theme.set_up(scale, "dark")
         frames(lambda seen: layout.draw_all(after(state, keep.OfferEdits(OFFER)), seen), look(scale), 8)
         offer = window_box("##offer")
-        bars = [found for number in range(5) if (found := window_box(f"##bar{number}")) is not None]
-        others = [box("##tools"), box("##views"), *bars]
+        lowest = max((bar[3] for bar in bars()), default=0.0)
+        others = [box("##tools"), box("##views"), *bars()]
     assert offer is None or not any(overlap(offer, other) for other in others)
     if offer is None:  # it waits where there is no room alone
-        assert size == (800, 500) and max(bar[3] for bar in bars) > 280
+        assert size == (800, 500) and lowest > 280
     else:
         assert offer[0] >= 348 * scale and offer[2] <= size[0]
 
