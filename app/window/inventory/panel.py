@@ -10,7 +10,7 @@ from langflash_core.scene.edits import Combine
 
 from .. import commands as do
 from ..exporting import commands as export
-from ..kit import theme, widgets
+from ..kit import boxes, theme, widgets
 from ..kit.look import Look
 from ..scene.standing import LevelScene
 from ..state import State
@@ -20,7 +20,7 @@ from .state import Row
 SURE = 0.95
 """From here on a thing is what it is called: `langflash_core.writing.inventory.words`, which loads torch."""
 _SIZE = (372.0, 560.0)  # design pixels, the height at most
-_LEAST, _NARROW = (300.0, 220.0), 640.0
+_LEAST = (300.0, 220.0)
 _BELOW, _MARGIN = 150.0, 12.0  # of axes and key frames, which are above; of the picture's border
 _BAR = 46.0  # of how sure
 _NAME = "##name"
@@ -39,8 +39,7 @@ def button(state: State) -> list[do.Command]:
 
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
-    """The window over the picture's right side; where that is narrow, over the panel at its left, so that
-    what one flies to is seen."""
+    """The window over the picture's right side, or over the panel where that is narrow."""
     if not state.listing.open:
         return []
     corner, extent = _stands(look, place, size)
@@ -62,9 +61,10 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
 
 def _stands(look: Look, place: ImVec2, size: ImVec2) -> tuple[ImVec2, ImVec2]:
     """Its corner and its size where it opens."""
+    aside = boxes.over_panel(place, size, look)
+    if aside is not None:
+        return aside
     margin = look.px(_MARGIN)
-    if size.x < look.px(_NARROW) and place.x >= look.px(_LEAST[0]):
-        return ImVec2(margin, margin), ImVec2(place.x - 2 * margin, place.y + size.y - 2 * margin)
     top = place.y + look.px(_BELOW)
     width = min(look.px(_SIZE[0]), size.x - 2 * margin)
     height = min(look.px(_SIZE[1]), max(place.y + size.y - top - margin, look.px(_LEAST[1])))

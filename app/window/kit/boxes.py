@@ -2,10 +2,13 @@
 
 from collections.abc import Iterable
 
-from imgui_bundle import imgui
+from imgui_bundle import ImVec2, imgui
+
+from .look import Look
 
 Box = tuple[float, float, float, float]
 
+_NARROW, _PANEL, _MARGIN = 640.0, 300.0, 12.0  # design pixels: of pictures, of panels, around windows
 _PASSING = imgui.WindowFlags_.child_window | imgui.WindowFlags_.tooltip | imgui.WindowFlags_.popup
 
 
@@ -43,6 +46,15 @@ def bars() -> list[Box]:
     """Where the bars of the tools stood in the last frame, from above."""
     names = [window.name for window in imgui.get_current_context().windows if window.name.startswith("##bar")]
     return sorted((box for name in names if (box := window_box(name)) is not None), key=lambda box: box[1])
+
+
+def over_panel(place: ImVec2, size: ImVec2, look: Look) -> tuple[ImVec2, ImVec2] | None:
+    """Corner and size of a window about a picture of `size` at `place`: over the panel at its left where the
+    picture is narrow, so that what one flies to is seen; None: it opens over the picture."""
+    margin = look.px(_MARGIN)
+    if size.x >= look.px(_NARROW) or place.x < look.px(_PANEL):
+        return None
+    return ImVec2(margin, margin), ImVec2(place.x - 2 * margin, place.y + size.y - 2 * margin)
 
 
 def windows_over(picture: Box) -> tuple[Box, ...]:

@@ -23,6 +23,7 @@ from app.window.recovery import commands as keep
 from app.window.recovery.state import Offer, Project
 from app.window.scene.panels.legend import covers_views
 from app.window.state import State
+from app.window.touring import commands as tour
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History
 from tests.app.window.headless import box, context, frames, look
@@ -230,3 +231,20 @@ def test_the_words_of_a_box_go_on_below_and_can_be_clicked() -> None:
         hands.frames(3)
         hands.click(120, 60)
     assert (True, False) in seen
+
+
+@pytest.mark.parametrize(("size", "scale"), [((800, 500), 1.0), ((1200, 750), 1.5), ((1280, 800), 1.0)])
+def test_a_tour_leaves_the_view_to_see_that_it_takes(
+    monkeypatch, size: tuple[int, int], scale: float
+) -> None:
+    """At 800 x 500 it covered the picture, the photos' strip and what a note is pinned to."""
+    monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
+    state = after(shown_scene(), tour.ShowTour(True), tour.AddStop())
+    with context(size):
+        theme.set_up(scale, "dark")
+        frames(lambda seen: layout.draw_all(state, seen), look(scale), 6)
+        left, top, right, bottom = box("Tour")
+        views = box("##views")
+    assert left >= 0 and top >= 0 and right <= size[0] and bottom <= size[1]
+    covered = max(0.0, right - max(left, 348 * scale)) / (size[0] - 348 * scale)
+    assert covered < 0.4 and not overlap((left, top, right, bottom), views)
