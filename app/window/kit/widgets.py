@@ -80,20 +80,25 @@ def choice(options: Sequence[tuple[str, _Value]], chosen: _Value) -> _Value:
 
 
 def checkbox(label: str, on: bool) -> tuple[bool, bool]:
-    """A box with an edge, so that it is seen while empty; its words in more lines where the window ends."""
+    """A box with an edge, so that it is seen while empty."""
     imgui.push_style_var(imgui.StyleVar_.frame_border_size, 1.0)
-    room = imgui.get_content_region_avail().x - imgui.get_frame_height()
-    fits = imgui.calc_text_size(label, True).x + imgui.get_style().item_inner_spacing.x <= room
     with colours(border=theme.PRESSED):
-        changed, now = imgui.checkbox(label if fits else f"##{label}", on)
+        changed = imgui.checkbox(label, on)
     imgui.pop_style_var()
-    if not fits:
-        imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
-        imgui.align_text_to_frame_padding()
-        imgui.text_wrapped(label)
-        if imgui.is_item_clicked():
-            changed, now = True, not on
-    return changed, now
+    return changed
+
+
+def worded_checkbox(words: str, on: bool) -> tuple[bool, bool]:
+    """The same in a window of a fixed width: where that ends, the words go on below."""
+    room = imgui.get_content_region_avail().x - imgui.get_frame_height()
+    gap = imgui.get_style().item_inner_spacing.x
+    if imgui.calc_text_size(words).x + gap <= room:
+        return checkbox(words, on)
+    changed, now = checkbox(f"##{words}", on)
+    imgui.same_line(0, gap)
+    imgui.align_text_to_frame_padding()
+    imgui.text_wrapped(words)
+    return (True, not on) if imgui.is_item_clicked() else (changed, now)
 
 
 def button_width(label: str) -> float:

@@ -56,7 +56,7 @@ def draw_settings(state: State, look: Look) -> list[do.Command]:
         ("Fill gaps by what is around them", "fill_gaps"),
         ("Reconstruct as soon as photos are dropped", "start_at_once"),
     ):
-        changed, value = widgets.checkbox(text, getattr(old, name))
+        changed, value = widgets.worded_checkbox(text, getattr(old, name))
         if changed:
             new = replace(new, **{name: value})
     widgets.gap(look.px(4))

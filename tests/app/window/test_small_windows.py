@@ -219,7 +219,7 @@ def test_the_words_of_a_box_go_on_below_and_can_be_clicked() -> None:
         imgui.set_next_window_pos(ImVec2(0, 0))
         imgui.set_next_window_size(ImVec2(260, 200))
         imgui.begin("narrow")
-        seen.append(widgets.checkbox(words, True))
+        seen.append(widgets.worded_checkbox(words, True))
         assert imgui.get_item_rect_max().x <= 260
         assert imgui.get_item_rect_size().y > 2 * imgui.get_text_line_height()
         imgui.end()
