@@ -183,12 +183,13 @@ class FindInSphere(AtPixel):
 
 @dataclass(frozen=True)
 class FindByPhrase(Selection):
-    """Gaussians that a phrase, or a language vector `like`, means from `threshold` on."""
+    """Gaussians that a phrase, or a language vector `like`, means from `threshold` on; None: from the
+    calibrated one, which the window does not know before the first answer."""
 
     text: str
     like: bytes
     negatives: tuple[str, ...]
-    threshold: float
+    threshold: float | None
     combine: Combine
 
     def run(self, stopping: Asked) -> Iterator[Command]:
@@ -209,7 +210,8 @@ class FindByPhrase(Selection):
         if self.like:
             vector = torch.from_numpy(np.frombuffer(self.like, np.float32).copy())
             query = with_vectors(query, spoken_dictionary(scene, space), {0: vector})
-        return (gaussian_relevance(scene.semantics, query)[0] >= self.threshold).numpy()
+        least = query.threshold if self.threshold is None else self.threshold
+        return (gaussian_relevance(scene.semantics, query)[0] >= least).numpy()
 
 
 @dataclass(frozen=True)
@@ -355,7 +357,7 @@ def _phrase(state: State, info: SceneInfo, marks: Marks, key: int, combine: Comb
         prompt.text.strip(),
         prompt.like,
         state.asking.negatives,
-        prompt.cut,
+        prompt.threshold,
         combine,
     )
 

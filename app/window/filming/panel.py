@@ -4,7 +4,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from .. import commands as do
-from ..kit import theme, widgets
+from ..kit import boxes, theme, widgets
 from ..kit.look import Look
 from ..scene import camera
 from ..state import State
@@ -21,7 +21,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
         return []
     issued: list[do.Command] = []
     corner = ImVec2(place.x + size.x - look.px(_MARGIN), place.y + look.px(_BELOW + _MARGIN))
-    imgui.set_next_window_pos(corner, 0, ImVec2(1, 0))
+    imgui.set_next_window_pos(ImVec2(corner.x, _below_bars(corner, look)), 0, ImVec2(1, 0))
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     imgui.push_style_var(imgui.StyleVar_.window_padding, look.vec(8, 6))
     flags = widgets.PLAIN | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
@@ -31,6 +31,17 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
         imgui.end()
     imgui.pop_style_var(2)
     return issued
+
+
+def _below_bars(corner: ImVec2, look: Look) -> float:
+    """Where the bar begins that would have its upper right corner there: below bars that it would cover."""
+    own, top = imgui.internal.find_window_by_name("##keys"), corner.y
+    if own is None:
+        return top
+    for bar in boxes.bars():
+        if boxes.overlap((corner.x - own.size.x, top, corner.x, top + own.size.y), bar):
+            top = bar[3] + look.px(8)
+    return top
 
 
 def _bar(state: State, look: Look) -> list[do.Command]:

@@ -25,6 +25,7 @@ from ..state import State
 from . import palette, table
 
 _HELP, _HANDS, _KEYS = 940.0, 208.0, 170.0  # design pixels of the help, and of its keys
+_COLUMN = 350.0  # of a column of two, at the least
 WIDTHS = {  # design pixels; others 520
     Dialog.EXPORT: export_panel.WIDTH,
     Dialog.SETTINGS: 560.0,
@@ -58,6 +59,8 @@ _CLOSING = (
 def draw(state: State, look: Look) -> list[do.Command]:
     """The dialog that is open, if any."""
     if state.dialog is None:
+        if imgui.internal.get_top_most_popup_modal() is not None:  # Esc, or what it asked about is gone
+            imgui.internal.close_popup_to_level(0, True)  # or keys go on in whatever stands on top
         return []
     title = state.dialog.value
     _place(state.dialog, look)
@@ -172,7 +175,7 @@ def _file(
 def _path_field(state: State, label: str, place: bool = False) -> tuple[list[do.Command], bool]:
     """A path to edit, with a button for its folder if it is a `place` to write to; the second value tells
     whether Enter was pressed."""
-    imgui.text(label)
+    imgui.text_wrapped(label)
     imgui.set_next_item_width(-widgets.folder_room() if place else -1)
     if imgui.is_window_appearing():
         imgui.set_keyboard_focus_here()
@@ -185,17 +188,38 @@ def _path_field(state: State, label: str, place: bool = False) -> tuple[list[do.
 
 
 def _help(state: State, look: Look) -> list[do.Command]:
-    """Gestures and the keys of the table, by group, in two columns."""
+    """Gestures and the keys of the table, by group; in two columns where there is room."""
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(8, 3))
+    left, room = imgui.get_cursor_pos_x(), imgui.get_content_region_avail().x
+    two = room >= 2 * look.px(_COLUMN)
     for column, groups in enumerate(COLUMNS):
-        if column:
-            imgui.same_line(look.px(_HELP / 2))
+        if column and two:
+            imgui.same_line(left + room / 2)
         imgui.begin_group()
         for group in groups:
-            _help_group(group, look)
+            _help_group(group, look, room / 2 - look.px(8) if two else room)
         imgui.end_group()
     imgui.pop_style_var()
+    _scroll_by_keys()
     return []
+
+
+def _scroll_by_keys() -> None:
+    """Where there is nothing that the keys could go to, ImGui scrolls nothing either."""
+    line, page = 3 * imgui.get_text_line_height(), 0.9 * imgui.get_window_height()
+    steps = (
+        (imgui.Key.down_arrow, line),
+        (imgui.Key.page_down, page),
+        (imgui.Key.end, imgui.get_scroll_max_y()),
+    )
+    back = (
+        (imgui.Key.up_arrow, -line),
+        (imgui.Key.page_up, -page),
+        (imgui.Key.home, -imgui.get_scroll_max_y()),
+    )
+    moved = sum(step for key, step in (*steps, *back) if imgui.is_key_pressed(key))
+    if moved:
+        imgui.set_scroll_y(min(max(imgui.get_scroll_y() + moved, 0.0), imgui.get_scroll_max_y()))
 
 
 def help_rows(group: str | None) -> list[tuple[str, str]]:
@@ -214,13 +238,16 @@ def help_rows(group: str | None) -> list[tuple[str, str]]:
     return rows
 
 
-def _help_group(group: str | None, look: Look) -> None:
+def _help_group(group: str | None, look: Look, room: float) -> None:
+    """`room` wide, pixels; what does not fit goes on below."""
     imgui.text_colored(theme.ACCENT, group or "Mouse and hands")
+    imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + room)
     for keys, meaning in help_rows(group):
         imgui.text(keys)
         taken = imgui.calc_text_size(keys).x + look.px(12)
-        imgui.same_line(max(look.px(_KEYS if group else _HANDS), taken))
+        imgui.same_line(max(min(look.px(_KEYS if group else _HANDS), room / 2), taken))
         imgui.text_colored(theme.MUTED, meaning)
+    imgui.pop_text_wrap_pos()
     widgets.gap(look.px(4))
 
 
@@ -229,10 +256,10 @@ def _leave(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     if widgets.primary_button("Save first", look.vec(120, 0)):
         issued.append(do.ShowDialog(Dialog.SAVE))
-    imgui.same_line()
+    widgets.beside(look.px(120))
     if imgui.button("Leave", look.vec(120, 0)):
         issued.append(do.Leave(sure=True))
-    imgui.same_line()
+    widgets.beside(look.px(120))
     if imgui.button("Stay", look.vec(120, 0)):
         issued.append(do.ShowDialog(None))
     return issued

@@ -70,7 +70,7 @@ def step_to_area(state: State) -> None:
     lost = tab and not typing() and (context.nav_id == 0 or not imgui.get_io().nav_active)
     if not (lost or imgui.is_key_pressed(imgui.Key.f6, False)) or _covered(state):
         return
-    here = context.nav_window.name if context.nav_window is not None else ""
+    here = context.nav_window.root_window.name if context.nav_window is not None else ""
     areas = (*AREAS, _EMPTY) if welcome.waits(state) else AREAS
     found = {name: imgui.internal.find_window_by_name(name) for name in areas}
     there = [name for name, window in found.items() if window is not None and window.was_active]

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Pose, Vector
@@ -17,6 +18,8 @@ from .state import Row
 
 ROOM = 1.5
 """Of a thing's box, that is shown of the room where one flies to it."""
+AROUND = 1.15
+"""The same, where a panel covers a part of the picture, of the box's width."""
 NEAREST = 0.55
 """Of the way between a photo and a thing: what is seen nearer than that falls apart."""
 LONGEST_NAME = 60
@@ -96,7 +99,7 @@ class ChooseThing:
             return state
         verb = {"replace": "Select", "add": "Add", "remove": "Unselect"}[self.combine]
         after = with_edit(state, f"{verb} {self.id}", edits.select(marks, row.rows, self.combine))
-        there = aside(seen_best(after, row), *self.picture)
+        there = aside(seen_best(after, row), row.corners, *self.picture)
         return FlyTo(there).apply(after.with_listing(chosen=self.id))
 
 
@@ -121,10 +124,12 @@ def seen_best(state: State, row: Row) -> Pose:
     return poses.zoom(there, max(1.0, nearest / there.reach)) if views and there.span is None else there
 
 
-def aside(pose: Pose, width: float, height: float, covered: float) -> Pose:
-    """The pose with its pivot in the middle of what is not covered of the picture, pixels, and as far away as
-    that is narrower."""
+def aside(pose: Pose, corners: Float[np.ndarray, "8 3"], width: float, height: float, covered: float) -> Pose:
+    """The pose with its pivot in the middle of what is not covered of the picture, pixels, and so far away
+    that the box's corners (8, 3) fit in there."""
     share = min(covered / max(width, 1.0), 0.6)
-    away = poses.zoom(pose, 1 / (1 - share))
+    found = poses.project(corners, pose, (width, height))
+    wide = width if found is None else float(np.ptp(found[1][:, 0]))
+    away = poses.zoom(pose, max(1.0, AROUND * wide / ((1 - share) * width)))
     unit = poses.units_per_pixel(away, max(round(width), 1), max(round(height), 1))
     return poses.pan(away, share * width / 2 * unit, 0.0)

@@ -10,7 +10,7 @@ from langflash_core.scene.edits import Combine
 
 from .. import commands as do
 from ..exporting import commands as export
-from ..kit import theme, widgets
+from ..kit import boxes, theme, widgets
 from ..kit.look import Look
 from ..scene.standing import LevelScene
 from ..state import State
@@ -20,9 +20,10 @@ from .state import Row
 SURE = 0.95
 """From here on a thing is what it is called: `langflash_core.writing.inventory.words`, which loads torch."""
 _SIZE = (372.0, 560.0)  # design pixels, the height at most
-_LEAST, _NARROW = (300.0, 220.0), 640.0
-_BELOW, _MARGIN = 108.0, 12.0  # of the axes, which are above; of the picture's border
+_LEAST = (300.0, 220.0)
+_BELOW, _MARGIN = 150.0, 12.0  # of axes and key frames, which are above; of the picture's border
 _BAR = 46.0  # of how sure
+_NAME = "##name"
 _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 
 
@@ -38,8 +39,7 @@ def button(state: State) -> list[do.Command]:
 
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
-    """The window over the picture's right side; where that is narrow, over the panel at its left, so that
-    what one flies to is seen."""
+    """The window over the picture's right side, or over the panel where that is narrow."""
     if not state.listing.open:
         return []
     corner, extent = _stands(look, place, size)
@@ -61,9 +61,10 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
 
 def _stands(look: Look, place: ImVec2, size: ImVec2) -> tuple[ImVec2, ImVec2]:
     """Its corner and its size where it opens."""
+    aside = boxes.over_panel(place, size, look)
+    if aside is not None:
+        return aside
     margin = look.px(_MARGIN)
-    if size.x < look.px(_NARROW) and place.x >= look.px(_LEAST[0]):
-        return ImVec2(margin, margin), ImVec2(place.x - 2 * margin, place.y + size.y - 2 * margin)
     top = place.y + look.px(_BELOW)
     width = min(look.px(_SIZE[0]), size.x - 2 * margin)
     height = min(look.px(_SIZE[1]), max(place.y + size.y - top - margin, look.px(_LEAST[1])))
@@ -99,19 +100,29 @@ def _body(state: State, look: Look, picture: tuple[float, float, float]) -> list
 
 
 def _row(state: State, row: Row, look: Look, picture: tuple[float, float, float]) -> list[do.Command]:
-    """Picture | name and how sure | size, place, photos; the picture and the words lead there."""
+    """Picture | name and how sure | size, place, photos; the picture and the words lead there.
+
+    Up and Down walk from picture to picture: of the names that of the row with the keys alone is a stop, and
+    no words are, since ImGui goes to what is nearest, which they would be.
+    """
     issued: list[do.Command] = []
     chosen = state.listing.chosen == row.id
     pressed = _picture(row, chosen, look)
+    has_keys = imgui.is_item_focused() or imgui.get_current_context().nav_id == imgui.get_id(_NAME)
     imgui.same_line(0, look.px(10))
     imgui.begin_group()
     start, room = imgui.get_cursor_pos_x(), imgui.get_content_region_avail().x - look.px(6)
+    imgui.push_item_flag(imgui.ItemFlags_.no_nav, not has_keys)
     issued += _name(state, row, room - look.px(_BAR + 52))
+    imgui.pop_item_flag()
     _sure(row, start + room, look)
     lines = words(row, state.listing.unit)
     with widgets.colours(text=theme.ACCENT if chosen else theme.MUTED):
         text = "\n".join(widgets.shortened(line, room) for line in lines)
-        pressed |= imgui.selectable(f"{text}##go", False, 0, ImVec2(room, 0))[0]
+        imgui.push_item_flag(imgui.ItemFlags_.no_nav, True)
+        lit = has_keys and imgui.get_io().nav_visible
+        pressed |= imgui.selectable(f"{text}##go", lit, 0, ImVec2(room, 0))[0]
+        imgui.pop_item_flag()
     widgets.tooltip("\n".join((*lines, "Select it and fly there; Shift adds to the selection, Ctrl removes")))
     imgui.end_group()
     if pressed:
@@ -137,7 +148,7 @@ def _picture(row: Row, chosen: bool, look: Look) -> bool:
                 "picture", texture, ImVec2(inner, inner), *widgets.middle(aspect, 1.0)
             )
             imgui.pop_style_var()
-    widgets.tooltip("Select it and fly there")
+    widgets.tooltip("Select it and fly there  (Enter; Tab: its name)")
     return pressed
 
 
@@ -148,7 +159,7 @@ def _name(state: State, row: Row, width: float) -> list[do.Command]:
     imgui.set_next_item_width(width)
     maybe = "" if row.sure >= SURE else "?"
     entered, name = imgui.input_text_with_hint(
-        "##name", row.id + maybe, own, imgui.InputTextFlags_.enter_returns_true
+        _NAME, row.id + maybe, own, imgui.InputTextFlags_.enter_returns_true
     )
     widgets.tooltip(f"{row.id}; type to name it")
     changed = entered or imgui.is_item_deactivated_after_edit()

@@ -2,10 +2,13 @@
 
 from collections.abc import Iterable
 
-from imgui_bundle import imgui
+from imgui_bundle import ImVec2, imgui
+
+from .look import Look
 
 Box = tuple[float, float, float, float]
 
+_NARROW, _PANEL, _MARGIN = 640.0, 300.0, 12.0  # design pixels: of pictures, of panels, around windows
 _PASSING = imgui.WindowFlags_.child_window | imgui.WindowFlags_.tooltip | imgui.WindowFlags_.popup
 
 
@@ -29,6 +32,29 @@ def clear(box: Box, walls: Iterable[Box], furthest: float) -> Box:
             if abs(x + y) <= furthest:
                 box = (box[0] + x, box[1] + y, box[2] + x, box[3] + y)
     return box
+
+
+def window_box(name: str) -> Box | None:
+    """Where a window of ImGui stood in the last frame; None: it did not."""
+    window = imgui.internal.find_window_by_name(name)
+    if window is None or not window.was_active:
+        return None
+    return (window.pos.x, window.pos.y, window.pos.x + window.size.x, window.pos.y + window.size.y)
+
+
+def bars() -> list[Box]:
+    """Where the bars of the tools stood in the last frame, from above."""
+    names = [window.name for window in imgui.get_current_context().windows if window.name.startswith("##bar")]
+    return sorted((box for name in names if (box := window_box(name)) is not None), key=lambda box: box[1])
+
+
+def over_panel(place: ImVec2, size: ImVec2, look: Look) -> tuple[ImVec2, ImVec2] | None:
+    """Corner and size of a window about a picture of `size` at `place`: over the panel at its left where the
+    picture is narrow, so that what one flies to is seen; None: it opens over the picture."""
+    margin = look.px(_MARGIN)
+    if size.x >= look.px(_NARROW) or place.x < look.px(_PANEL):
+        return None
+    return ImVec2(margin, margin), ImVec2(place.x - 2 * margin, place.y + size.y - 2 * margin)
 
 
 def windows_over(picture: Box) -> tuple[Box, ...]:

@@ -67,12 +67,15 @@ def primary_button(label: str, size: ImVec2 | None = None) -> bool:
 
 
 def choice(options: Sequence[tuple[str, _Value]], chosen: _Value) -> _Value:
-    """One of several values, a button each in a row; returns the one that now holds."""
+    """One of several values, a button each in a row, or in more where the window ends; returns the one that
+    now holds."""
+    imgui.begin_group()
     for index, (label, value) in enumerate(options):
         if index:
-            imgui.same_line(0, 0.5 * imgui.get_style().item_spacing.x)
+            beside(button_width(label), 0.5 * imgui.get_style().item_spacing.x)
         if primary_button(label) if value == chosen else imgui.button(label):
             chosen = value
+    imgui.end_group()
     return chosen
 
 
@@ -85,6 +88,19 @@ def checkbox(label: str, on: bool) -> tuple[bool, bool]:
     return changed
 
 
+def worded_checkbox(words: str, on: bool) -> tuple[bool, bool]:
+    """The same in a window of a fixed width: where that ends, the words go on below."""
+    room = imgui.get_content_region_avail().x - imgui.get_frame_height()
+    gap = imgui.get_style().item_inner_spacing.x
+    if imgui.calc_text_size(words).x + gap <= room:
+        return checkbox(words, on)
+    changed, now = checkbox(f"##{words}", on)
+    imgui.same_line(0, gap)
+    imgui.align_text_to_frame_padding()
+    imgui.text_wrapped(words)
+    return (True, not on) if imgui.is_item_clicked() else (changed, now)
+
+
 def button_width(label: str) -> float:
     """What a button of this label takes, pixels."""
     return imgui.calc_text_size(label, True).x + 2 * imgui.get_style().frame_padding.x
@@ -93,9 +109,14 @@ def button_width(label: str) -> float:
 def go_on(width: float, right: float, gap: float = -1.0) -> None:
     """Put the next item, of this width, beside the last one, or below where it would end beyond `right`;
     pixels of the screen. gap: between both; negative: the style's."""
-    imgui.same_line(0, gap)
-    if imgui.get_cursor_screen_pos().x + width > right:
-        imgui.new_line()
+    between = gap if gap >= 0 else imgui.get_style().item_spacing.x
+    if imgui.internal.get_current_window().dc.cursor_pos_prev_line.x + between + width <= right:
+        imgui.same_line(0, gap)
+
+
+def beside(width: float, gap: float = -1.0) -> None:
+    """`go_on` as far as the present window reaches."""
+    go_on(width, imgui.internal.get_current_window().work_rect.max.x, gap)
 
 
 def quiet_button(label: str, tip: str = "") -> bool:

@@ -76,6 +76,16 @@ class ProjectsRead:
 
 
 @dataclass(frozen=True)
+class PictureGone:
+    """The file of a scene has become another, and no small picture is of that (effects drop the old one)."""
+
+    path: str
+
+    def apply(self, state: State) -> State:
+        return state
+
+
+@dataclass(frozen=True)
 class OpenProject:
     """Open a recent scene as it was left."""
 

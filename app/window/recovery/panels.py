@@ -9,7 +9,8 @@ from langflash_core.detail import DETAILS
 from langflash_core.formats import COLOUR_MAPS
 
 from .. import commands as do
-from ..kit import theme, widgets
+from ..kit import boxes, theme, widgets
+from ..kit.boxes import Box
 from ..kit.look import Look
 from ..state import State
 from . import commands as keep
@@ -17,8 +18,9 @@ from . import preferences
 from .preferences import SPEEDS, THEMES
 
 _LABELS = 190.0  # design pixels
-_EDITS_OFFER = 470.0  # design pixels wide
+_EDITS_OFFER, _ANSWER, _NAME = 470.0, 108.0, 180.0  # design pixels wide; its buttons; a scene's name
 _OFFER = 480.0  # design pixels
+_OF_TOOLS = ("##card", "##ruler", "##keys", "Rules")  # windows, beside their bars
 _DETAIL_TIP = (
     "How fine the next scene of photos is\nnormal: some 140,000 Gaussians for two photos\n"
     "high: 1.4 times as many, slower to draw\nlow: a third, quicker to draw"
@@ -54,7 +56,7 @@ def draw_settings(state: State, look: Look) -> list[do.Command]:
         ("Fill gaps by what is around them", "fill_gaps"),
         ("Reconstruct as soon as photos are dropped", "start_at_once"),
     ):
-        changed, value = widgets.checkbox(text, getattr(old, name))
+        changed, value = widgets.worded_checkbox(text, getattr(old, name))
         if changed:
             new = replace(new, **{name: value})
     widgets.gap(look.px(4))
@@ -99,14 +101,18 @@ def draw_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do
 
 
 def draw_edits_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
-    """Edits that nobody saved, offered at the foot of a place, before what panels are there."""
+    """Edits that nobody saved, offered before what panels are there; it waits while what a tool in hand needs
+    stands where it would."""
     offer = state.recovery.edits
     if offer is None or state.scene.job is not None:
         return []
     issued: list[do.Command] = []
-    corner = ImVec2(place.x + size.x / 2, place.y + size.y - look.px(14))
-    imgui.set_next_window_pos(corner, 0, ImVec2(0.5, 1))
-    imgui.set_next_window_size(ImVec2(min(look.px(_EDITS_OFFER), size.x - look.px(24)), 0))
+    box, pivot = _stands(state, look, place, size)
+    if _in_hand(box):
+        return []
+    middle = (box[0] + box[2]) / 2
+    imgui.set_next_window_pos(ImVec2(middle, box[3] if pivot else box[1]), 0, ImVec2(0.5, pivot))
+    imgui.set_next_window_size(ImVec2(box[2] - box[0], 0))
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     with widgets.colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
         imgui.begin("##offer", None, widgets.PLAIN | imgui.WindowFlags_.no_focus_on_appearing)
@@ -114,16 +120,39 @@ def draw_edits_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> l
         edits, were = ("1 edit", "was") if offer.count == 1 else (f"{offer.count} edits", "were")
         imgui.text_colored(theme.ACCENT, fa.ICON_FA_CLOCK_ROTATE_LEFT)
         imgui.same_line()
-        imgui.text_wrapped(f"{edits} of {offer.name} {were} not saved ({offer.when:%d %B, %H:%M}).")
-        if widgets.primary_button("Restore", look.vec(120, 0)):
+        name = widgets.shortened(offer.name, look.px(_NAME))
+        imgui.text_wrapped(f"{edits} of {name} {were} not saved ({offer.when:%d %B, %H:%M}).")
+        if widgets.primary_button("Restore", look.vec(_ANSWER, 0)):
             issued.append(keep.EndOffer(restore=True))
-        imgui.same_line()
-        if imgui.button("Later", look.vec(120, 0)):
+        widgets.beside(look.px(_ANSWER))
+        if imgui.button("Later", look.vec(_ANSWER, 0)):
             issued.append(keep.EndOffer())
         widgets.tooltip("They are offered again next time")
-        imgui.same_line()
-        if imgui.button("Forget them", look.vec(120, 0)):
+        widgets.beside(look.px(_ANSWER))
+        if imgui.button("Forget them", look.vec(_ANSWER, 0)):
             issued.append(keep.EndOffer(forget=True))
         imgui.end()
     imgui.pop_style_var()
     return issued
+
+
+def _stands(state: State, look: Look, place: ImVec2, size: ImVec2) -> tuple[Box, float]:
+    """Where kept edits are offered, as high as they last were: at the foot of a place, beside the tools; in
+    the empty window, whose tiles are there, at its head. The second value: its edge that stays, 0 or 1."""
+    strip, margin = boxes.window_box("##tools"), look.px(12)
+    own = imgui.internal.find_window_by_name("##offer")
+    height = 0.0 if own is None else own.size.y
+    left = (place.x if strip is None else strip[2]) + margin
+    room = place.x + size.x - margin - left
+    width = min(look.px(_EDITS_OFFER), room)
+    if state.scene.info is None:
+        left, top = left + (room - width) / 2, place.y + look.px(16)
+        return (left, top, left + width, top + height), 0.0
+    foot = place.y + size.y - look.px(14)
+    return (left, foot - height, left + width, foot), 1.0
+
+
+def _in_hand(box: Box) -> bool:
+    """Whether what belongs to a tool in hand stands there."""
+    found = [*boxes.bars(), *map(boxes.window_box, _OF_TOOLS)]
+    return any(boxes.overlap(box, other) for other in found if other is not None)

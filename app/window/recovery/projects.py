@@ -41,6 +41,11 @@ def stamp(path: Path) -> str:
     return f"langflash {seen.st_size} {seen.st_mtime_ns}"
 
 
+def stamps(path: str) -> tuple[str, str]:
+    """Of a scene's file and of its small picture: others once its tile is to show something else."""
+    return stamp(Path(path)), stamp(project_file(path, PICTURE))
+
+
 def keep(kept: Kept, views: int) -> None:
     """Write the record of `kept.scene`, which is made of so many photos; one that is too long is left out.
 

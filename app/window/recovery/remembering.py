@@ -2,17 +2,18 @@
 
 A moment after the last change the record of the scene on show is written, and what is seen of it as a small
 picture, by a thread of one. No picture is kept of what is not, or not yet, in the scene's file: of a scene
-that nobody saved, or in which something was hidden for good.
+that nobody saved, or in which something was hidden for good. While tiles are on show their files are looked
+at again: another process may hide something in one of them.
 """
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 from langflash_core.errors import LangFlashError
 
-from ..commands import Command, Log
+from ..commands import Command, Log, ShowPicture
 from ..editing.mending import HiddenForGood
 from ..effects import Effects, Hands
 from ..kit.textures import Thumbnails
@@ -29,12 +30,13 @@ from ..scene.work import MakeThumbnails
 from ..state import State
 from ..viewport import Viewport
 from . import projects
-from .commands import ForgetRecent, GoOnWith, OpenProject, StandAsLeft, kept_session
+from .commands import ForgetRecent, GoOnWith, OpenProject, PictureGone, StandAsLeft, kept_session
 from .state import Kept, Project
 from .work import ReadProjects
 
 REMEMBER_AFTER = 1.0  # seconds without a change, so that a burst is once
 SETTLING = 0.5  # seconds until a picture that is still being drawn is asked for again
+LOOK_AGAIN = 1.0  # seconds between two looks at the files of tiles
 NEVER = float("inf")
 
 
@@ -51,6 +53,9 @@ class RememberingEffects(Effects):
         self._stamps: dict[int, str] = {}  # of scenes by their number: the file that they are in
         self._last: tuple | None = None  # what was remembered last
         self._at = NEVER
+        self._looking: Future | None = None  # at the files of the tiles on show
+        self._look_at = NEVER
+        self._tiles: dict[str, tuple[str, str]] = {}  # stamps of what they show; the writer's thread alone
 
     def begin(self, recent: tuple[str, ...]) -> None:
         """Look for what is remembered of these scenes."""
@@ -58,11 +63,12 @@ class RememberingEffects(Effects):
 
     @property
     def due(self) -> float:
-        """When what has changed has rested long enough."""
-        return self._at
+        """When what has changed has rested long enough, or tiles are looked at again."""
+        return min(self._at, self._look_at)
 
     def tick(self, state: State, now: float) -> None:
         """Remember the scene on show, once its picture is whole."""
+        self._watch_tiles(state, now)
         if now < self._at:
             return
         busy = state.scene.info is not None and not self._viewport.whole
@@ -100,6 +106,8 @@ class RememberingEffects(Effects):
             case SceneSaved(path) if state.scene.info is not None:
                 self._drop_picture(state)
                 self._stamps[state.scene.info.serial] = projects.stamp(path)
+            case PictureGone(path):
+                self._thumbnails.drop(Project(path).picture)
             case ForgetRecent():
                 for project in set(before.recovery.projects) - set(state.recovery.projects):
                     self._thumbnails.drop(project.picture)
@@ -123,7 +131,27 @@ class RememberingEffects(Effects):
         if kept is not None and kept.scene == str(info.path):
             self._hands.perform(StandAsLeft(kept))
 
+    def _watch_tiles(self, state: State, now: float) -> None:
+        """Show what their files are by now, at once where they come on show."""
+        projects_shown = state.recovery.projects if state.scene.info is None and not state.scene.job else ()
+        if not projects_shown:
+            self._look_at = NEVER
+        elif self._look_at == NEVER or now >= self._look_at:
+            self._look_at = now + LOOK_AGAIN
+            if self._looking is None or self._looking.done():  # a slow disk is not asked twice
+                self._looking = self._write(lambda: self._renew(projects_shown))
+
     # What the writer's thread does
+
+    def _renew(self, shown: tuple[Project, ...]) -> None:
+        for project in shown:
+            stamped = projects.stamps(project.path)
+            if self._tiles.get(project.path) == stamped:
+                continue
+            self._tiles[project.path] = stamped
+            small = projects.picture(project.path)
+            known = PictureGone(project.path) if small is None else ShowPicture(project.picture, small)
+            self._hands.dispatch(known)
 
     def _remember(self, state: State) -> None:
         project = _project(state)
@@ -145,8 +173,8 @@ class RememberingEffects(Effects):
             path = str(info.path)
             self._write(lambda: projects.drop_picture(path))
 
-    def _write(self, work: Callable[[], object]) -> None:
-        self._writer.submit(self._written, work)
+    def _write(self, work: Callable[[], object]) -> Future:
+        return self._writer.submit(self._written, work)
 
     def _written(self, work: Callable[[], object]) -> None:
         try:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from langflash_core.files import make_folder
 from langflash_core.scene.edits import History, Marks
 
-from ..commands import Command, ShowPicture
+from ..commands import Command
 from ..requests import Asked, Errand, SceneErrand
 from . import edits, projects, sessions
 from .commands import CopyKept, EditsKept, OfferEdits, ProjectsRead
@@ -111,16 +111,11 @@ class LookForEdits(SceneErrand):
 
 @dataclass(frozen=True)
 class ReadProjects(Errand):
-    """What is remembered of recent scenes, then their small pictures; nothing of those that have gone."""
+    """What is remembered of recent scenes; nothing of those that have gone."""
 
     recent: tuple[str, ...]
 
     light = True
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        there = tuple(map(projects.read, projects.sweep(self.recent)))
-        yield ProjectsRead(there)
-        for project in there:
-            small = projects.picture(project.path)
-            if small is not None:
-                yield ShowPicture(project.picture, small)
+        yield ProjectsRead(tuple(map(projects.read, projects.sweep(self.recent))))

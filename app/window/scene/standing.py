@@ -11,6 +11,7 @@ from ..editing.commands import with_edit
 from ..state import State
 from .camera import FlyTo
 
+LOOKING = "Looking for the floor, and for what is upright ..."
 UNSURE = "Its photos do not tell for sure which way is up, so this is a guess; undo it (Ctrl+Z) if it leans."
 
 
@@ -21,7 +22,7 @@ class LevelScene:
     def apply(self, state: State) -> State:
         if state.scene.info is None:
             return state
-        return Notify("Looking for the floor, and for what is upright ...", "info").apply(state)
+        return Notify(LOOKING, "info").apply(state)
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ class Levelled:
         text = f"Level: {world_line(self.world)}."
         if marks.world == self.world:
             text = f"The scene is level already: {world_line(self.world)}."
-        after = with_edit(state, "Level the scene", replace(marks, world=self.world))
+        told = tuple(toast for toast in state.toasts if toast.text != LOOKING)
+        after = with_edit(replace(state, toasts=told), "Level the scene", replace(marks, world=self.world))
         after = Notify(text if self.world.sure else f"{UNSURE} {text}", "info").apply(after)
         return FlyTo(poses.righted(after.scene.pose, after.up)).apply(after)

@@ -10,7 +10,7 @@ from langflash_core.scene.tour import Note, Stop
 
 from .. import commands as do
 from ..filming import commands as film
-from ..kit import theme, widgets
+from ..kit import boxes, theme, widgets
 from ..kit.look import Look
 from ..state import State
 from . import commands as tour
@@ -34,15 +34,12 @@ def button(state: State) -> list[do.Command]:
 
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
-    """The window over the picture's right side."""
+    """The window over the picture's right side, or over the panel where that is narrow."""
     if not state.touring.open:
         return []
-    top = place.y + look.px(_BELOW)
-    room = max(place.y + size.y - top - look.px(_MARGIN), look.px(120))
-    corner = ImVec2(place.x + size.x - look.px(_MARGIN), top)
-    imgui.set_next_window_pos(corner, imgui.Cond_.appearing, ImVec2(1, 0))
-    width = min(look.px(_SIZE[0]), size.x - 2 * look.px(_MARGIN))
-    imgui.set_next_window_size(ImVec2(width, min(look.px(_SIZE[1]), room)), imgui.Cond_.appearing)
+    corner, extent = boxes.over_panel(place, size, look) or _over_picture(look, place, size)
+    imgui.set_next_window_pos(corner, imgui.Cond_.appearing)
+    imgui.set_next_window_size(extent, imgui.Cond_.appearing)
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     flags = imgui.WindowFlags_.no_collapse | imgui.WindowFlags_.no_saved_settings
     issued: list[do.Command] = []
@@ -59,6 +56,14 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     imgui.end()
     imgui.pop_style_var()
     return issued if kept else [*issued, tour.ShowTour(False)]
+
+
+def _over_picture(look: Look, place: ImVec2, size: ImVec2) -> tuple[ImVec2, ImVec2]:
+    """Its corner and its size where it opens."""
+    top, margin = place.y + look.px(_BELOW), look.px(_MARGIN)
+    height = min(look.px(_SIZE[1]), max(place.y + size.y - top - margin, look.px(120)))
+    width = min(look.px(_SIZE[0]), size.x - 2 * margin)
+    return ImVec2(place.x + size.x - margin - width, top), ImVec2(width, height)
 
 
 def _bar(state: State, look: Look) -> list[do.Command]:

@@ -1,10 +1,12 @@
 """Every control of bars and panels over the picture is reached by Tab, also where the window is small."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import pytest
 from imgui_bundle import ImVec2, imgui
 
+from app.window.asking.panels import dictionary
 from app.window.editing import commands as edit
 from app.window.editing.panels import cleaning, tools
 from app.window.editing.state import Floaters, Hiding, Tint, Tool
@@ -102,6 +104,19 @@ def test_tab_goes_to_every_control(
         wanted = dict(controls[name])
         reached = set(visited(name, draw, 2 * len(wanted)))
     assert len(wanted) > 2
+    assert [label for key, label in wanted.items() if key not in reached] == []
+
+
+def test_the_rows_of_the_dictionary_are_reached_too(controls: dict[str, dict[int, str]]) -> None:
+    """Tab went past them: they lie in a part of its window of its own."""
+    state = replace(edited(), preferences=replace(State().preferences, dictionary_open=True))
+    with context((1280, 800)):
+        theme.set_up(1.0, "dark")
+        draw = lambda seen: dictionary.draw(state, seen, ImVec2(348, 52), ImVec2(932, 716))  # noqa: E731
+        frames(draw, look(), 5)
+        wanted = {key: label for name in controls for key, label in controls[name].items()}
+        assert sum(label == "##name" for label in wanted.values()) == 3
+        reached = set(visited("Dictionary", draw, 2 * len(wanted)))
     assert [label for key, label in wanted.items() if key not in reached] == []
 
 

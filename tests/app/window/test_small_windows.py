@@ -1,26 +1,37 @@
 """Nothing covers anything else where the window is small or the interface large."""
 
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
 import pytest
 from imgui_bundle import ImVec2, imgui
 
+from app.window.commands import Command
+from app.window.dialogs import Dialog
 from app.window.editing import commands as edit
 from app.window.editing.panels import tools
 from app.window.editing.panels.tools import _GAP, _MARGIN, _TOOLS, tool_side
 from app.window.editing.state import Floaters, Hiding, Tint, Tool
-from app.window.frame import layout
+from app.window.filming import commands as film
+from app.window.frame import dialogs, layout
 from app.window.inventory import commands as take
-from app.window.kit import theme
+from app.window.kit import theme, widgets
+from app.window.kit.boxes import bars, overlap, window_box
+from app.window.kit.look import Look
 from app.window.recovery import commands as keep
-from app.window.recovery.state import Offer
+from app.window.recovery.state import Offer, Project
 from app.window.scene.panels.legend import covers_views
 from app.window.state import State
+from app.window.touring import commands as tour
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History
 from tests.app.window.headless import box, context, frames, look
+from tests.app.window.items import Items
 from tests.app.window.scenes import after, shown_scene
+from tests.app.window.test_stumbles import Hands, items
+
+__all__ = ["items"]  # a fixture
 
 SEPARATORS = 2 * (1 + _GAP) + 12  # two lines, and the strip's padding
 
@@ -101,3 +112,139 @@ def test_kept_edits_are_offered_above_the_viewpoints_and_before_panels(size: tup
         views = box("##views")
     assert left >= 348 and right <= size[0] and bottom <= views[1]
     assert order.index("##offer") > max(order.index(name) for name in order if "nventory" in name)
+
+
+OFFER = Offer(Path("x.edits"), "living_room_left.langflash", 13, datetime(2026, 11, 25))
+
+
+IN_HAND = {
+    "nothing": after(edited(), edit.Deselect()),
+    "clone": edited(tool=Tool.CLONE, source=(0.0, 0.0, 1.0)),
+    "floaters": edited(floaters=Floaters(bytes(4 * 12_300))),
+    "hiding": edited(hiding=Hiding("blur")),
+    "brush and hiding": edited(tool=Tool.BRUSH, hiding=Hiding("blur")),
+}
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5])
+@pytest.mark.parametrize("state", IN_HAND.values(), ids=IN_HAND)
+def test_the_key_frames_stand_below_the_bars(monkeypatch, state: State, scale: float) -> None:
+    """They were before the buttons that hide for good, or do not."""
+    monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
+    state = after(state, film.AddKey(), film.AddKey())
+    for size in ((1280, 800), (round(800 * scale), round(500 * scale))):
+        with context(size):
+            theme.set_up(scale, "dark")
+            frames(lambda seen: layout.draw_all(state, seen), look(scale), 8)
+            keys = box("##keys")
+            assert keys[2] <= size[0] and not any(overlap(keys, bar) for bar in bars())
+
+
+@pytest.mark.parametrize(("size", "scale"), [((800, 500), 1.0), ((1280, 800), 1.5), ((1280, 800), 1.0)])
+@pytest.mark.parametrize("state", IN_HAND.values(), ids=IN_HAND)
+def test_kept_edits_are_offered_beside_the_tools_and_their_bars(
+    monkeypatch, state: State, size: tuple[int, int], scale: float
+) -> None:
+    """At 800 x 500 the lower third of the tools was behind it, undo among them, and the bar that hides."""
+    monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
+    with context(size):
+        theme.set_up(scale, "dark")
+        frames(lambda seen: layout.draw_all(after(state, keep.OfferEdits(OFFER)), seen), look(scale), 8)
+        offer = window_box("##offer")
+        lowest = max((bar[3] for bar in bars()), default=0.0)
+        others = [box("##tools"), box("##views"), *bars()]
+    assert offer is None or not any(overlap(offer, other) for other in others)
+    if offer is None:  # it waits where there is no room alone
+        assert size == (800, 500) and lowest > 280
+    else:
+        assert offer[0] >= 348 * scale and offer[2] <= size[0]
+
+
+def test_in_the_empty_window_kept_edits_are_offered_above_what_can_be_opened(
+    monkeypatch, items: Items
+) -> None:
+    """It stood before the tile of the very scene that it is about."""
+    project = Project("/rooms/living_room_left.langflash", when=datetime(2026, 11, 25))
+    state = State().with_recovery(projects=(project,))
+    with context((800, 500)):
+        theme.set_up(1.0, "dark")
+        frames(lambda seen: layout.draw_all(after(state, keep.OfferEdits(OFFER)), seen), look(), 6)
+        offer = box("##offer")
+        words = ("##project", "##forget", "##sample", "Photos ...", "Paste")
+        opening = {
+            name: places for name, places in items.now().items() if any(word in name for word in words)
+        }
+    assert len(opening) >= 6
+    covered = [name for name, places in opening.items() for x0, y0, x1, y1 in places
+               if overlap(offer, (x0, y0, x1, y1))]  # fmt: skip
+    assert covered == []
+
+
+@pytest.mark.parametrize(
+    ("size", "scale"), [((800, 500), 0.75), ((800, 500), 1.0), ((800, 500), 2.0), ((1280, 800), 2.0)]
+)
+@pytest.mark.parametrize("dialog", list(Dialog), ids=lambda dialog: dialog.name)
+def test_no_dialog_scrolls_sideways(dialog: Dialog, size: tuple[int, int], scale: float) -> None:
+    """The help's second column, a fifth of the preferences and Cancel were out of sight."""
+    state = replace(edited(), dialog=dialog)
+    with context(size):
+        theme.set_up(scale, "dark")
+        frames(lambda seen: dialogs.draw(state, seen), look(scale), 8)
+        window = imgui.internal.find_window_by_name(dialog.value)
+        assert window is not None and window.scroll_max.x == 0
+        assert window.size.x <= size[0] and window.size.y <= size[1]
+
+
+def test_the_help_is_scrolled_by_the_keys() -> None:
+    state = replace(edited(), dialog=Dialog.HELP)
+    with context((800, 500)):
+        theme.set_up(1.0, "dark")
+        hands = Hands(lambda seen: dialogs.draw(state, seen))
+        hands.frames(6)
+        window = imgui.internal.find_window_by_name(Dialog.HELP.value)
+        assert window is not None and window.scroll_max.y > 0
+        hands.key(imgui.Key.down_arrow)
+        assert 0 < window.scroll.y < window.scroll_max.y
+        hands.key(imgui.Key.end)
+        assert window.scroll.y == window.scroll_max.y
+        hands.key(imgui.Key.home)
+        assert window.scroll.y == 0
+
+
+def test_the_words_of_a_box_go_on_below_and_can_be_clicked() -> None:
+    words = "Keep to what the photos saw: orbits slow down, and the rest fades"
+    seen: list[tuple[bool, bool]] = []
+
+    def panel(_look: Look) -> list[Command]:
+        imgui.set_next_window_pos(ImVec2(0, 0))
+        imgui.set_next_window_size(ImVec2(260, 200))
+        imgui.begin("narrow")
+        seen.append(widgets.worded_checkbox(words, True))
+        assert imgui.get_item_rect_max().x <= 260
+        assert imgui.get_item_rect_size().y > 2 * imgui.get_text_line_height()
+        imgui.end()
+        return []
+
+    with context((800, 500)):
+        theme.set_up(1.0, "dark")
+        hands = Hands(panel)
+        hands.frames(3)
+        hands.click(120, 60)
+    assert (True, False) in seen
+
+
+@pytest.mark.parametrize(("size", "scale"), [((800, 500), 1.0), ((1200, 750), 1.5), ((1280, 800), 1.0)])
+def test_a_tour_leaves_the_view_to_see_that_it_takes(
+    monkeypatch, size: tuple[int, int], scale: float
+) -> None:
+    """At 800 x 500 it covered the picture, the photos' strip and what a note is pinned to."""
+    monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
+    state = after(shown_scene(), tour.ShowTour(True), tour.AddStop())
+    with context(size):
+        theme.set_up(scale, "dark")
+        frames(lambda seen: layout.draw_all(state, seen), look(scale), 6)
+        left, top, right, bottom = box("Tour")
+        views = box("##views")
+    assert left >= 0 and top >= 0 and right <= size[0] and bottom <= size[1]
+    covered = max(0.0, right - max(left, 348 * scale)) / (size[0] - 348 * scale)
+    assert covered < 0.4 and not overlap((left, top, right, bottom), views)

@@ -99,7 +99,7 @@ def _atoms(state: State, atoms: tuple[Atom, ...], look: Look) -> list[do.Command
     shares = _shares(state.asking.insight, atoms)
     heads.sort(key=lambda k: -shares[k])
     footer = imgui.get_frame_height() + look.px(2) + 2 * imgui.get_style().item_spacing.y
-    imgui.begin_child("##rows", ImVec2(0, -footer))
+    imgui.begin_child("##rows", ImVec2(0, -footer), imgui.ChildFlags_.nav_flattened)  # keys walk in and out
     for k in heads:
         imgui.push_id(k)
         issued += _row(state, k, atoms, float(shares[k]), look)

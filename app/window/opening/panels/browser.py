@@ -65,8 +65,8 @@ def _way(folder: Folder, look: Look) -> list[do.Command]:
     if imgui.button(f"{fa.ICON_FA_HOUSE}##home"):
         issued.append(opening.LookInto(Path.home()))
     for parent in (*reversed(folder.path.parents[:3]), folder.path):
-        imgui.same_line(0, look.px(2))
         name = widgets.shortened(parent.name or str(parent), look.px(150))
+        widgets.beside(widgets.button_width(name), look.px(2))
         if widgets.quiet_button(f"{name}##{parent}"):
             issued.append(opening.LookInto(parent))
     return issued
@@ -167,9 +167,9 @@ def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
     imgui.same_line()
     if imgui.button("Cancel", look.vec(110, 0)):
         issued.append(do.ShowDialog(None))
-    imgui.same_line(0, look.px(14))
-    imgui.align_text_to_frame_padding()
     told = "Enter merges it" if merging else "The space bar takes several, Enter opens"
+    widgets.beside(imgui.calc_text_size(told).x, look.px(14))
+    imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, told)
     if typed and (pressed or confirmed):
         path = typed_path(typed)

@@ -62,11 +62,11 @@ def draw_drop(state: State, look: Look) -> list[do.Command]:
     widgets.tooltip(
         known if state.scene.photos else "This room came from a file; its photos are not in the tray"
     )
-    imgui.same_line()
+    widgets.beside(look.px(130))
     if widgets.primary_button("New room", look.vec(130, 0)):
         issued.append(show.dropped(state, state.scene.dropped, new=True))
     widgets.tooltip("Of these photos alone; the present room stays one click away")
-    imgui.same_line()
+    widgets.beside(look.px(110))
     if imgui.button("Cancel", look.vec(110, 0)):
         issued.append(do.ShowDialog(None))
     return issued
@@ -85,11 +85,11 @@ def draw_scene_drop(state: State, look: Look) -> list[do.Command]:
     if widgets.primary_button("Open it", look.vec(130, 0)):
         issued.append(show.Instead((show.OpenScene(path, alone=True),)))
     widgets.tooltip("The present scene stays one click away")
-    imgui.same_line()
+    widgets.beside(look.px(190))
     if imgui.button("Merge into this scene", look.vec(190, 0)):
         issued.append(show.MergeScene(path))
     widgets.tooltip("Beside what is there, to be put in its place; Ctrl+Z undoes")
-    imgui.same_line()
+    widgets.beside(look.px(110))
     if imgui.button("Cancel", look.vec(110, 0)):
         issued.append(do.ShowDialog(None))
     return issued
@@ -105,10 +105,10 @@ def draw_unsaved(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     if widgets.primary_button("Save ...", look.vec(120, 0)):
         issued.append(show.SaveFirst())
-    imgui.same_line()
+    widgets.beside(look.px(120))
     if imgui.button("Discard", look.vec(120, 0)):
         issued.append(show.GoOn())
-    imgui.same_line()
+    widgets.beside(look.px(120))
     if imgui.button("Cancel", look.vec(120, 0)):
         issued.append(do.ShowDialog(None))
     return issued

@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 import torch
 
+from app.window.asking.commands import Calibrated, EditPrompt, SetThreshold
 from app.window.editing import commands as edit
 from app.window.editing import work
 from app.window.editing.state import Reading, Region
 from app.window.requests import SceneErrand
+from app.window.scene.commands import SceneArrived
 from app.window.scene.work import describe_scene
+from app.window.state import State
 from langflash_core.geometry.poses import orthographic, project, to_camera, units_per_pixel
 from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import language_space
@@ -20,7 +23,7 @@ from langflash_core.scene.edits import Mask, deny_atom, hide, merge_atoms, renam
 from langflash_core.splat import render
 from langflash_core.splat.picking import SEEN
 from langflash_core.splat.reference import rasterize
-from tests.app.window.scenes import CHAIR, PHRASES, room
+from tests.app.window.scenes import CHAIR, PHRASES, after, room
 
 SIZE = (224, 168)
 CHAIRS = 2500
@@ -81,7 +84,7 @@ def test_a_large_box_is_looked_at_coarser(info, monkeypatch) -> None:
     assert (fine & coarse).sum() > 0.9 * (fine | coarse).sum()
 
 
-def by_phrase(info, text: str, like: bytes = b"", threshold: float = 0.8) -> work.FindByPhrase:
+def by_phrase(info, text: str, like: bytes = b"", threshold: float | None = 0.8) -> work.FindByPhrase:
     return work.FindByPhrase(*scene_of(info), text, like, (), threshold, "replace")
 
 
@@ -93,6 +96,21 @@ def test_a_phrase_selects_its_gaussians_and_a_place_those_like_it(info) -> None:
     wall = result(by_phrase(info, "like this", like, 0.97))
     assert isinstance(wall, edit.Found)
     assert (wall.mask.rows() == (info.scene.semantics.weight_ids[:, 0].numpy() == 1)).all()
+
+
+def test_a_phrase_selects_the_same_before_its_first_answer_as_after_it(info) -> None:
+    """Until then 0.5 was its threshold: nearly twice as much was selected, and would have been hidden."""
+    state = after(State(), SceneArrived(info), EditPrompt(0, "armchair"))
+    marks, asked = state.editing.marks, edit.SelectByPhrase(0)
+    assert marks is not None
+    early = work.request_for(asked, state, info, marks, SIZE)
+    query = compile_query(info.scene, language_space("minilm"), ["armchair"])
+    known = after(state, Calibrated(query.threshold))
+    assert query.threshold != 0.5 and work.request_for(asked, known, info, marks, SIZE) == early
+    own = work.request_for(asked, after(known, SetThreshold(0, 0.97)), info, marks, SIZE)
+    assert isinstance(own, work.FindByPhrase) and own.threshold == 0.97
+    assert isinstance(early, work.FindByPhrase)
+    assert result(early) == result(replace(early, threshold=query.threshold))
 
 
 def test_an_atom_selects_itself_and_what_it_was_merged_with(info) -> None:

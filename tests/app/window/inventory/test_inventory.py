@@ -124,6 +124,27 @@ def test_a_click_selects_a_thing_and_flies_to_where_it_is_seen(listed: State) ->
     assert after(listed, take.ChooseThing("ghost 1")) == listed
 
 
+@pytest.mark.parametrize("thing", ["table 1", "chair 1", "chair 2", "door 1"])
+@pytest.mark.parametrize("covered", [200.0, 300.0])
+def test_a_panel_beside_it_makes_a_thing_no_smaller_than_it_must(
+    listed: State, thing: str, covered: float
+) -> None:
+    """One flew to a plant, and it was smaller than in the photo."""
+
+    def seen(covered: float) -> np.ndarray:
+        state = after(listed, take.ChooseThing(thing, picture=(600.0, 450.0, covered)))
+        row, landed = state.listing.row(thing), after(state, do.Tick(state.now + FLIGHT_SECONDS + 1))
+        assert row is not None
+        found = poses.project(row.corners, landed.scene.pose, (600.0, 450.0))
+        assert found is not None
+        return found[1]
+
+    alone, beside = seen(0.0), seen(covered)
+    assert beside[:, 0].min() >= 0 and beside[:, 0].max() <= 600 - covered
+    assert np.ptp(alone[:, 0]) * take.AROUND <= 600 - covered, "it has room there"
+    assert np.ptp(beside[:, 1]) == pytest.approx(np.ptp(alone[:, 1]), abs=1.0)  # moved aside alone
+
+
 def test_a_thing_that_no_photo_shows_is_flown_to_as_one_stands(listed: State) -> None:
     row = listed.listing.row("table 1")
     assert row is not None

@@ -8,14 +8,16 @@ import numpy as np
 import pytest
 import torch
 
+from app.places import forget_pictures
 from app.window.asking.commands import EditPrompt
+from app.window.commands import Command, ShowPicture
 from app.window.editing.mending import HiddenForGood, RememberUnhidden
 from app.window.effects import Hands
 from app.window.recovery import commands as keep
 from app.window.recovery import projects
 from app.window.recovery.commands import Opened, OpenProject
 from app.window.recovery.preferences import MOST_RECENT
-from app.window.recovery.remembering import REMEMBER_AFTER, RememberingEffects
+from app.window.recovery.remembering import LOOK_AGAIN, REMEMBER_AFTER, RememberingEffects
 from app.window.recovery.work import ReadProjects
 from app.window.scene import commands as show
 from app.window.scene.camera import MoveTo, SetMode
@@ -36,12 +38,14 @@ class Seen:
     settling: bool = False
     drawn: int = 0
     dropped: list[str] = field(default_factory=list)
+    shades: dict[str, int] = field(default_factory=dict)  # of small pictures
 
     def seen(self) -> np.ndarray:
         return np.full((60, 90, 3), 40 * (self.drawn + 1), np.uint8)
 
     def drop(self, key: str) -> None:
         self.dropped.append(key)
+        self.shades.pop(key, None)
 
 
 @dataclass
@@ -57,6 +61,17 @@ class Table(Desk):
     def settle(self) -> None:
         self.pass_time(1.1 * REMEMBER_AFTER)
         self.effects._writer.submit(lambda: None).result()
+
+    def perform(self, command: Command) -> None:
+        super().perform(command)
+        if isinstance(command, ShowPicture):
+            self.picture.shades[command.key] = int(command.rgb.mean().round())
+
+    def tiles(self) -> dict[str, int]:
+        """Shades of the pictures of tiles, a moment later."""
+        self.pass_time(1.1 * LOOK_AGAIN)
+        self.effects._writer.submit(lambda: None).result()
+        return dict(self.picture.shades)
 
     def small(self, path: Path) -> int | None:
         """The shade of the small picture of a scene; None where there is none."""
@@ -199,13 +214,11 @@ def test_no_more_are_kept_than_the_list_has(desk: Table, path: Path) -> None:
     assert desk.small(path) is None and projects.read(str(path)).views == 0
 
 
-def test_recent_scenes_are_read_with_their_pictures_and_those_that_have_gone_are_none(
-    desk: Table, path: Path
-) -> None:
+def test_recent_scenes_are_read_and_those_that_have_gone_are_none(desk: Table, path: Path) -> None:
     opened(desk, path)
     desk.settle()
     found = list(ReadProjects((str(path), str(path.with_name("gone.langflash")))).run(lambda: False))
-    assert [type(each).__name__ for each in found] == ["ProjectsRead", "ShowPicture"]
+    assert [type(each).__name__ for each in found] == ["ProjectsRead"]
     assert [project.path for project in found[0].projects] == [str(path)]  # type: ignore[attr-defined]
     assert projects.sweep([]) == ()
     (read,) = ReadProjects((str(path),)).run(lambda: False)
@@ -216,3 +229,29 @@ def test_a_project_that_has_gone_is_said(desk: Table, path: Path) -> None:
     path.unlink()
     desk.perform(OpenProject(str(path)))
     assert desk.state.scene.job is None and not desk.state.scene.pending
+
+
+def test_a_tile_shows_what_its_file_is_by_now(desk: Table, path: Path) -> None:
+    """Another process hid something in it, and the open window went on showing that."""
+    opened(desk, path)
+    desk.settle()
+    empty = Table()
+    empty.perform(Opened(path))
+    empty.effects.begin((str(path),))
+    empty.work()
+    key = f"project {path}"
+    assert empty.tiles() == {key: 40} and empty.effects.due <= empty.state.now + LOOK_AGAIN
+    empty.picture.shades[key] = 7
+    assert empty.tiles() == {key: 7}, "what has not changed is not read again"
+    save(room(torch.eye(3)).rows(torch.arange(11_000)), path)  # as `langflash hide` does
+    assert empty.tiles() == {}
+    forget_pictures([path])
+    assert empty.tiles() == {}
+    projects.keep_picture(str(path), desk.picture.seen(), projects.stamp(path))  # by another window
+    assert empty.tiles() == {key: 40}
+    forget_pictures([path])  # something was hidden in a copy of it
+    assert empty.tiles() == {}
+    read(empty, path)
+    empty.settle()
+    assert empty.effects.due == float("inf"), "nobody looks at tiles"
+    empty.effects.close(empty.state, crashed=False)

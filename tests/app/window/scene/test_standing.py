@@ -54,7 +54,12 @@ def leaning(state: State) -> float:
 
 
 def test_levelling_is_an_edit_that_is_saved_and_undone(shown: State, tmp_path: Path) -> None:
-    assert told(after(shown, LevelScene())).startswith("Looking for the floor")
+    looking = after(shown, LevelScene())
+    assert told(looking).startswith("Looking for the floor")
+    (answer,) = after(
+        looking, Levelled(STANDS)
+    ).toasts  # the question stayed beside it, as if it were still open
+    assert answer.text.startswith("Level:")
     state = after(shown, Levelled(STANDS))
     assert state.world == STANDS and state.editing.unsaved and told(state).startswith("Level: up as edges")
     assert "a guess from door" in told(state)
