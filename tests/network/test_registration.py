@@ -9,6 +9,7 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -561,3 +562,29 @@ def test_guided_depth_registers_photos_of_known_pose_and_leaves_planes(pair):
     left = (found.log_depths - logs)[:2]
     assert left.abs().mean() < 0.01 * ripples.abs().mean() / 3
     assert left[:, 10:-10, 15:-15].std() < 0.01 * ripples.std() / 4
+
+
+@pytest.mark.parametrize("wrong", ["bent", "too far"])
+def test_many_photos_are_compared_at_half_their_size_to_the_same_depth(wrong, monkeypatch):
+    """Each pixel of the halves is two of the photo, of which flow errs by as many; the same share of an error
+    stays (`kept`), and no more flow is computed than there are pixels of the halves."""
+    seen, sizes = room(THREE), []
+    monkeypatch.setattr(registration, "FEW", 2)
+    flow = registration._Care.flow
+
+    class Counted:
+        def __init__(self, care: registration._Care):
+            self.flow = flow(care)
+
+        def calc(self, left: np.ndarray, right: np.ndarray, none: Any) -> np.ndarray:
+            sizes.append(left.shape)
+            return self.flow.calc(left, right, none)
+
+    monkeypatch.setattr(registration._Care, "flow", lambda care: Counted(care))
+    off = bend() if wrong == "bent" else torch.full((HEIGHT, WIDTH), BEND)
+    share = kept(seen, OWN + BENDING) if wrong == "bent" else kept(seen, OWN)
+    left = (seen.registered(seen.logs + off) - seen.logs).abs()
+    middle = (slice(None), slice(15, -15), slice(20, -20))
+    flows = 0.02 / min(moves(seen, view) for view in range(3))  # a hundredth of a pixel of the halves
+    assert left[middle].mean() < share * off.expand_as(left)[middle].abs().mean() + flows
+    assert set(sizes) == {(HEIGHT * RATIO // 2, WIDTH * RATIO // 2)}

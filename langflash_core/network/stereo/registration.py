@@ -6,7 +6,10 @@ pictures are the same; what optical flow finds between them is a remaining shift
 match in the neighbour to a fraction of a pixel, and a depth by triangulation. What flow says counts by
 how sure it is (there and back, same brightness, texture) and by how many pixels the match moves for a
 change of depth; a smooth correction of log depth takes it over, cut where depth jumps (one sparse linear
-system a view). Of more than `_CAREFUL` photos the first round is at half of their size.
+system a view).
+
+Flow ends at half of the pictures' size. So many photos are halved first and it goes on to their last pixel:
+the same flow, and a quarter of the pixels that it is judged at. Their first round ends at a quarter.
 
 Sizes: V views, H W pixels of the maps, h w pixels of the photos.
 
@@ -15,7 +18,7 @@ Search", of OpenCV.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -52,8 +55,33 @@ _ALIKE = 50  # cells that are off together: errors of the maps are slow
 _STIFF = 3000.0  # of the correction from a cell to the next
 _JUMP = 0.03  # log depth between cells from which it is cut
 _ITERATIONS = 250
-_CAREFUL = 32  # photos
+_STRIDE, _DESCENTS = 5, 8  # of flow between many photos: pixels from patch to patch, steps of each
 _MARGIN = 1.0  # pixels at the border that say nothing
+
+
+@dataclass(frozen=True)
+class _Care:
+    """How two pictures are compared. flow_error, there_and_back: their pixels. quick: flow from fewer
+    patches, with fewer steps. finest: halvings of the pictures at which flow ends."""
+
+    flow_error: float = _FLOW_ERROR
+    there_and_back: float = _THERE_AND_BACK
+    quick: bool = False
+    finest: int = 1
+
+    def flow(self) -> cv2.DISOpticalFlow:
+        flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+        if self.quick:
+            flow.setPatchStride(_STRIDE)
+            flow.setGradientDescentIterations(_DESCENTS)
+        flow.setFinestScale(self.finest)
+        return flow
+
+
+_WHOLE = _Care()
+"""Of few photos; many are halved, for the first round and for the others."""
+_COARSE = _Care(there_and_back=2.0, quick=True)
+_FINE = _Care(flow_error=_FLOW_ERROR / 2, there_and_back=1.5, quick=True, finest=0)
 
 
 @dataclass(frozen=True)
@@ -90,10 +118,12 @@ def registered(
     if min(size) < _SMALLEST:
         return maps
     many = len(logs) > FEW
-    fine = _Pictures.of(photos, size, Ks, cells)
     half = (size[0] // 2, size[1] // 2)
-    hasty = len(logs) > _CAREFUL and min(half) >= _SMALLEST
-    coarse = _Pictures.of(photos, half, Ks, cells) if hasty else fine
+    if many and min(half) >= _SMALLEST:
+        coarse = _Pictures.of(photos, half, Ks, cells, _COARSE)
+        fine = replace(coarse, care=_FINE)
+    else:
+        coarse = fine = _Pictures.of(photos, size, Ks, cells, _WHOLE)
 
     def corrected(view: int) -> Tensor:
         own, others = logs[view].cpu(), near[view]
@@ -117,19 +147,20 @@ def registered(
 
 @dataclass(frozen=True)
 class _Pictures:
-    """Photos (h, w) uint8 of one size, and their intrinsics (V, 3, 3) there."""
+    """Photos (h, w) uint8 of one size, their intrinsics (V, 3, 3) there, and how they are compared."""
 
     greys: list[np.ndarray]
     Ks: Tensor
+    care: _Care
 
     @staticmethod
     def of(
-        photos: Sequence[np.ndarray], size: tuple[int, ...], Ks: Tensor, cells: tuple[int, int]
+        photos: Sequence[np.ndarray], size: tuple[int, ...], Ks: Tensor, cells: tuple[int, int], care: _Care
     ) -> "_Pictures":
         """Ks: pixels of maps of so many cells."""
         greys = [photo if photo.shape == size else _resized(photo, size) for photo in photos]
         ratio = torch.tensor([size[1] / cells[1], size[0] / cells[0], 1.0])
-        return _Pictures(greys, Ks.cpu() * ratio[:, None])
+        return _Pictures(greys, Ks.cpu() * ratio[:, None], care)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -140,12 +171,14 @@ class _Pictures:
     ) -> tuple[Tensor, Tensor]:
         """Changes of log depth (h, w) that another photo asks for, and what each counts; depths: log, (h,
         w)."""
-        matches = _matched(depths, self.greys[view], self.greys[other], self.Ks[view], self.Ks[other], pose)
+        greys = (self.greys[view], self.greys[other])
+        matches = _matched(depths, *greys, self.Ks[view], self.Ks[other], pose, self.care)
         change, moves = _triangulated(depths, matches, self.Ks[view], self.Ks[other], pose)
         # `norm` over rows takes thirty times as long; of few photos it stays, to the last bit.
         length = (moves * moves).sum(0).sqrt() if many else moves.norm(dim=0)
         known = _known_along(texture, moves / length.clamp_min(1e-9))
-        return change, torch.from_numpy(matches.sure) * known * (length / _FLOW_ERROR) ** 2 / _ONE_SHIFT
+        sure = torch.from_numpy(matches.sure)
+        return change, sure * known * (length / self.care.flow_error) ** 2 / _ONE_SHIFT
 
 
 def _resized(photo: np.ndarray, size: tuple[int, ...]) -> np.ndarray:
@@ -158,7 +191,13 @@ def _cells(values: Tensor, size: tuple[int, int]) -> Tensor:
 
 
 def _matched(
-    log_depths: Tensor, grey: np.ndarray, other: np.ndarray, K: Tensor, other_K: Tensor, pose: Tensor
+    log_depths: Tensor,
+    grey: np.ndarray,
+    other: np.ndarray,
+    K: Tensor,
+    other_K: Tensor,
+    pose: Tensor,
+    care: _Care,
 ) -> _Matches:
     height, width = log_depths.shape
     points = unproject(log_depths.exp(), K).flatten(0, 1).T
@@ -166,7 +205,7 @@ def _matched(
     seen = (z > 0) & (x > _MARGIN) & (y > _MARGIN) & (x < width - _MARGIN) & (y < height - _MARGIN)
     x, y = (np.where(seen, along, -1e4).astype(np.float32) for along in (x, y))
     brought = _looked_up(other, x - 0.5, y - 0.5)
-    flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    flow = care.flow()
     none: Any = None  # begins with no flow, which OpenCV's stubs deny
     there, back = flow.calc(grey, brought, none), flow.calc(brought, grey, none)
     columns, rows = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
@@ -175,7 +214,7 @@ def _matched(
     differs = _looked_up(brought, columns, rows).astype(np.float32) - grey
     differs -= cv2.blur(differs, (15, 15))
     differs = cv2.blur(np.square(differs), (5, 5))
-    sure = 1 / (1 + missed / _THERE_AND_BACK**2) ** 2 / (1 + differs / _BRIGHTNESS**2)
+    sure = 1 / (1 + missed / care.there_and_back**2) ** 2 / (1 + differs / _BRIGHTNESS**2)
     known = seen & (_looked_up(seen.astype(np.float32), columns, rows, cv2.BORDER_CONSTANT) > 0.999)
     sure = np.where(known, sure, 0.0)
     if sure.sum() < _CHANCE * seen.sum():
