@@ -7,7 +7,7 @@ match in the neighbour to a fraction of a pixel, and a depth by triangulation. O
 across it alone, so depth comes from that part of a shift that what is to be seen tells (the aperture
 problem). It counts by how sure it is (there and back, same brightness) and by how many pixels the match moves
 for a change of depth. A smooth correction of log depth takes it over, cut where depth jumps and where the
-photo has an edge; within these, surfaces are rather flat than bent (one sparse linear system a view).
+photo has an edge (one sparse linear system a view).
 
 Flow ends at half of the pictures' size. So many photos are halved first and it goes on to their last pixel:
 the same flow, and a quarter of the pixels that it is judged at. Their first round ends at a quarter.
@@ -52,13 +52,12 @@ _TEXTURE = 2.0  # squared grey values a pixel, of gradient along a shift at whic
 _FLAT = 0.1  # of that, noise
 _ONE_SHIFT = 10  # cells of the maps: flow finds one shift for 16 x 16 pixels and more
 _FARTHEST = 0.3  # log depth that a match may ask for
-_EXPECTED = 0.3  # log depth, what the maps may be off
+_EXPECTED = 0.15  # log depth, what the maps may be off
 _ALIKE = 50  # cells that are off together: errors of the maps are slow
 _STIFF = 3000.0  # of the correction from a cell to the next
 _JUMP = 0.03  # log depth between cells from which it is cut
 _EDGE = 5.0  # of 255, difference of brightness between cells from which it is cut
-_BENT = 1000.0  # of what bends inverse depth, a share of itself from cell to cell, within an edge
-_AROUND = 9  # cells, whose mean inverse depth is the unit of a bend
+_ACROSS = 0.02  # what is left of it there: most edges are drawn on one surface
 _ITERATIONS = 250
 _STRIDE, _DESCENTS = 5, 8  # of flow between many photos: pixels from patch to patch, steps of each
 _MARGIN = 1.0  # pixels at the border that say nothing
@@ -305,54 +304,29 @@ def _turned_back(vectors: list[Tensor], pose: Tensor) -> list[np.ndarray]:
 
 
 def _smooth(target: Tensor, weight: Tensor, log_depths: Tensor, guide: np.ndarray) -> Tensor:
-    """The correction x (H, W) that minimises sum w (x - t)^2 + x^2 / s^2 + sum g (x_i - x_j)^2 + sum h (u_i -
-    2 u_j + u_k)^2 over cells, their neighbours, and three in a row or column.
-
-    g is cut where depth jumps, or is no number, and where the guide (H, W), the photo in cells, has an edge;
-    h at edges alone. u is inverse depth after the correction, to first order, in units of what is around: of
-    planes it is linear. target: w t.
-    """
-    cells = np.arange(log_depths.numel()).reshape(log_depths.shape)
-    alike = [np.exp(-np.square(np.diff(guide, axis=axis) / _EDGE)) for axis in (0, 1)]
-    together = [
-        one * torch.exp(-((log_depths.diff(dim=dim) / _JUMP) ** 2)).nan_to_num().double().numpy()
-        for dim, one in enumerate(alike)
-    ]
-    inverse = (-log_depths.double()).exp().nan_to_num(0.0, 0.0, 0.0).numpy()
-    around = np.maximum(cv2.blur(inverse, (_AROUND, _AROUND)), 1e-12)
-    ties = _rows([(cells[:-1], -1.0), (cells[1:], 1.0)], [(cells[:, :-1], -1.0), (cells[:, 1:], 1.0)])
-    bends = _rows(
-        [(cells[:-2], 1.0), (cells[1:-1], -2.0), (cells[2:], 1.0)],
-        [(cells[:, :-2], 1.0), (cells[:, 1:-1], -2.0), (cells[:, 2:], 1.0)],
+    """The correction x (H, W) that minimises sum w (x - t)^2 + x^2 / s^2 + sum g (x_i - x_j)^2 over cells and
+    their neighbours, g cut where depth jumps or is no number, and at edges of the guide (H, W), the photo in
+    cells; target: w t."""
+    height, width = log_depths.shape
+    across, down = (
+        _STIFF * _alike(guide, dim) * torch.exp(-((log_depths.diff(dim=dim) / _JUMP) ** 2)).nan_to_num()
+        for dim in (1, 0)
     )
-    stiff = _STIFF * np.concatenate([one.ravel() for one in together])
-    flat = _BENT * np.concatenate(
-        [(alike[0][1:] * alike[0][:-1]).ravel(), (alike[1][:, 1:] * alike[1][:, :-1]).ravel()]
-    )
-    flat /= np.square(np.concatenate([around[1:-1].ravel(), around[:, 1:-1].ravel()]))
-    bent = bends @ scipy.sparse.diags(inverse.ravel())
+    cells = np.arange(height * width).reshape(height, width)
+    first = np.concatenate((cells[:, :-1].ravel(), cells[:-1].ravel()))
+    second = np.concatenate((cells[:, 1:].ravel(), cells[1:].ravel()))
+    ties = np.concatenate((across.ravel(), down.ravel())).astype(np.float64)
     own = weight.double().numpy().ravel() + 1 / (_ALIKE * _EXPECTED**2)
-    system = scipy.sparse.diags(own) + ties.T @ scipy.sparse.diags(stiff) @ ties
-    system = (system + bent.T @ scipy.sparse.diags(flat) @ bent).tocsr()
-    right = target.double().numpy().ravel() + bent.T @ (flat * (bends @ inverse.ravel()))
-    diagonal = system.diagonal()
+    own += np.bincount(first, ties, cells.size) + np.bincount(second, ties, cells.size)
+    places = (np.concatenate((cells.ravel(), first, second)), np.concatenate((cells.ravel(), second, first)))
+    system = scipy.sparse.coo_matrix((np.concatenate((own, -ties, -ties)), places)).tocsr()
+    right = target.double().numpy().ravel()
     found, _ = cg(
-        system,
-        right,
-        x0=right / diagonal,
-        rtol=1e-3,
-        maxiter=_ITERATIONS,
-        M=scipy.sparse.diags(1 / diagonal),
+        system, right, x0=right / own, rtol=1e-3, maxiter=_ITERATIONS, M=scipy.sparse.diags(1 / own)
     )
-    return torch.from_numpy(found.reshape(cells.shape)).float()
+    return torch.from_numpy(found.reshape(height, width)).float()
 
 
-def _rows(*sums: list[tuple[np.ndarray, float]]) -> scipy.sparse.csr_matrix:
-    """A matrix whose rows take sums of cells, each with its factor."""
-    parts, first = [], 0
-    for terms in sums:
-        rows = first + np.arange(terms[0][0].size)
-        parts += [(rows, cells.ravel(), np.full(cells.size, factor)) for cells, factor in terms]
-        first += len(rows)
-    rows, columns, factors = (np.concatenate(some) for some in zip(*parts, strict=True))
-    return scipy.sparse.csr_matrix((factors, (rows, columns)))
+def _alike(guide: np.ndarray, dim: int) -> Tensor:
+    """Of each two cells that follow each other, 1 where the guide shows one thing, `_ACROSS` at an edge."""
+    return torch.from_numpy(_ACROSS + (1 - _ACROSS) * np.exp(-np.square(np.diff(guide, axis=dim) / _EDGE)))
