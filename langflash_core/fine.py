@@ -5,10 +5,11 @@ in shape.
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import overload
 
 import torch
+from jaxtyping import Bool
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -33,7 +34,16 @@ _RINGING = 0.3
 """Of what a photo varies by around a Gaussian, how far its colour may go beyond: blur needs some of it."""
 
 
-@torch.no_grad()
+@dataclass(frozen=True)
+class Covered:
+    """A scene in its photos' own colours; the photos, where they say nothing, and their light."""
+
+    scene: Scene
+    photos: "_Photos"
+    left: Bool[Tensor, "V H W"]
+    light: Light
+
+
 def fine_scene(
     prediction: Prediction,
     views: Views,
@@ -44,6 +54,24 @@ def fine_scene(
     progress: Progress = lambda stage, fraction: None,
 ) -> tuple[Scene, Light]:
     """The scene of a prediction whose depth maps are surfaces, and the light its photos were brought to.
+
+    Args and raises: as `covered_scene`.
+    """
+    covered = covered_scene(prediction, views, detail, gaussians=gaussians, preset=preset, progress=progress)
+    return coloured_scene(covered, progress), covered.light
+
+
+@torch.no_grad()
+def covered_scene(
+    prediction: Prediction,
+    views: Views,
+    detail: Detail,
+    *,
+    gaussians: int | None,
+    preset: str,
+    progress: Progress = lambda stage, fraction: None,
+) -> Covered:
+    """All of `fine_scene` that needs the prediction, whose maps of many photos are much memory.
 
     Args:
         gaussians: about so many; None: as `detail` has it. preset: recorded.
@@ -73,19 +101,24 @@ def fine_scene(
         preset=preset,
         progress=lambda done: progress("elements", 0.1 + 0.3 * done),
     )
-    solving = time.perf_counter()
-    scene = _coloured(scene, _Silent(photos, left), lambda done: progress("colours", 0.4 + 0.5 * done))
-    timings = {
-        **prediction.timings,
-        "assembly": solving - start,
-        "colours": time.perf_counter() - solving,
-    }
+    timings = {**prediction.timings, "assembly": time.perf_counter() - start}
+    return Covered(scene.with_record(cost=Cost(timings)), photos, left, light)
+
+
+@torch.no_grad()
+def coloured_scene(covered: Covered, progress: Progress = lambda stage, fraction: None) -> Scene:
+    """The scene in the colours of all its photos, without what nobody sees; `progress` as `covered_scene`."""
+    solving, left = time.perf_counter(), covered.left
+    silent = _Silent(covered.photos, left)
+    scene = _coloured(covered.scene, silent, lambda done: progress("colours", 0.4 + 0.5 * done))
+    timings = {**scene.record.cost.timings, "colours": time.perf_counter() - solving}
     shares = _shares(left)
     said = (*scene.record.warnings, *([_LEFT_OUT.format(*_counted(shares))] if shares else []))
     left_out = {**scene.record.left_out, **shares}
-    scene = scene.with_record(light=light.stored(), left_out=left_out, warnings=said, cost=Cost(timings))
+    record = {"light": covered.light.stored(), "left_out": left_out, "warnings": said}
+    scene = scene.with_record(**record, cost=Cost(timings))
     progress("prune", 0.9)
-    return prune(scene, merge=False), light
+    return prune(scene, merge=False)
 
 
 class _Photos(Sequence[Tensor]):

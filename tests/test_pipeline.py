@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+import weakref
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from langflash_core.images.straight import straightened
 from langflash_core.language.spaces import language_space
 from langflash_core.level import levelled
 from langflash_core.network import PRESETS, GuidedDepthNet, build_network, save_network
+from langflash_core.reconstruction import stages
 from langflash_core.reconstruction.views import found_views, straight_prediction
 from langflash_core.records import BentLens, FoundFocal
 from langflash_core.resources import asset_path
@@ -125,6 +127,24 @@ def test_one_photo_and_progress(weights, photos):
     told = {stage for stage, _ in steps}
     assert {"photos", "weights", "network", "encoder", "assemble", "done"} <= told
     assert {"light", "elements", "colours", "prune"} <= told
+
+
+def test_the_weight_maps_of_photos_are_gone_when_colours_are_solved_for(weights, photos, monkeypatch):
+    """Five megabytes a photo, of which a hundred are as much as all else; one photo is enough to see it."""
+    covered, coloured, maps, left = stages.covered_scene, stages.coloured_scene, [], []
+
+    def remembered(prediction: Prediction, *args, **more):
+        maps.append(weakref.ref(prediction.weights))
+        return covered(prediction, *args, **more)
+
+    def looked_up(*args):
+        left.extend(known() for known in maps)
+        return coloured(*args)
+
+    monkeypatch.setattr(stages, "covered_scene", remembered)
+    monkeypatch.setattr(stages, "coloured_scene", looked_up)
+    lf.reconstruct(photos[:1], weights=weights, size=SMALL)
+    assert left == [None]
 
 
 def test_the_lens_is_taken(weights, photos):

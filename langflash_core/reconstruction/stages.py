@@ -12,7 +12,7 @@ from torch import Tensor
 
 from langflash_core.ahead import Ahead, begin
 from langflash_core.detail import DEFAULT_DETAIL
-from langflash_core.fine import fine_scene
+from langflash_core.fine import coloured_scene, covered_scene
 from langflash_core.images.triage import check_shown
 from langflash_core.images.views import load_views
 from langflash_core.level import levelled
@@ -27,7 +27,7 @@ from langflash_core.running import Run
 from langflash_core.scene.assemble import assemble
 from langflash_core.scene.prune import prune
 from langflash_core.scene.world import in_world
-from langflash_core.types import Cost, Prediction, Scene, Views
+from langflash_core.types import Cost, FoundLens, Prediction, Scene, Views
 
 # Where each begins in the whole, from its measured share of the time on two CPU cores.
 STAGES = {"photos": 0.0, "weights": 0.08, "network": 0.16, "assemble": 0.66, "refine": 0.97, "level": 0.98}
@@ -63,12 +63,11 @@ def _begun(wishes: Wishes, run: Run) -> Ahead:
 def _made(wishes: Wishes, run: Run, networks: Networks, ahead: Ahead) -> Scene:
     views = _photos(wishes, run, ahead)
     tools = _weights(wishes, run, networks, ahead, views)
-    prediction, views = _found(wishes, run, ahead, tools, views)
-    scene, images = _assembled(wishes, run, tools, prediction, views)
+    scene, images, lenses = _assembled(wishes, run, ahead, tools, views)
     if wishes.refine_seconds is not None:
         scene = _refined(wishes, run, scene, images)
-    if prediction.lenses:
-        scene = scene.with_record(lens={"found": [asdict(lens) for lens in prediction.lenses]})
+    if lenses:
+        scene = scene.with_record(lens={"found": [asdict(lens) for lens in lenses]})
     run.check()
     scene = _in_world(wishes, scene)
     with run.stage("level"):
@@ -120,25 +119,29 @@ def _found(wishes: Wishes, run: Run, ahead: Ahead, tools: Tools, views: Views) -
 
 
 def _assembled(
-    wishes: Wishes, run: Run, tools: Tools, prediction: Prediction, views: Views
-) -> tuple[Scene, Float[Tensor, "V 3 H W"]]:
-    """The scene, and the photos that have a place in it, in the light that its colours are of."""
+    wishes: Wishes, run: Run, ahead: Ahead, tools: Tools, views: Views
+) -> tuple[Scene, Float[Tensor, "V 3 H W"], tuple[FoundLens, ...]]:
+    """The scene; the photos with a place in it, in the light that its colours are of; the lenses found."""
+    prediction, views = _found(wishes, run, ahead, tools, views)
     images = views.images[[v for v in range(views.num_views) if v not in prediction.unplaced]]
+    lenses = prediction.lenses
     with run.stage("assemble"), torch.no_grad():
         if tools.finer is None:
             if wishes.gaussians is not None or wishes.detail not in (None, DEFAULT_DETAIL):
                 note = _AS_IT_IS.format(wishes.preset)
                 prediction = replace(prediction, warnings=(*prediction.warnings, note))
-            return prune(assemble(prediction, views, preset=wishes.preset)), images
-        scene, light = fine_scene(
+            return prune(assemble(prediction, views, preset=wishes.preset)), images, lenses
+        told = run.within("assemble")
+        covered = covered_scene(
             prediction,
             views,
             tools.finer,
             gaussians=wishes.gaussians,
             preset=wishes.preset,
-            progress=run.within("assemble"),
+            progress=told,
         )
-        return scene, light.corrected(images).clamp(0, 1)
+        del prediction  # five megabytes a photo that nobody asks for any more
+        return coloured_scene(covered, told), covered.light.corrected(images).clamp(0, 1), lenses
 
 
 def _refined(wishes: Wishes, run: Run, scene: Scene, images: Float[Tensor, "V 3 H W"]) -> Scene:

@@ -36,9 +36,9 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from langflash_core.memory import give_back
-from langflash_core.splat.frustum import Packs
+from langflash_core.splat.frustum import Packs, reaches
 from langflash_core.splat.hindering import Pairs, Tally
-from langflash_core.splat.mixing import mixed
+from langflash_core.splat.mixing import FAINT, mixed
 from langflash_core.splat.projection import Footprints, project
 from langflash_core.types import Camera, Gaussians
 
@@ -252,18 +252,43 @@ class _Spoken:
     view: int
     share: int
 
-    def loudness(self, footprints: Footprints, size: tuple[int, int]) -> np.ndarray:
-        """(h, w) of a picture of `size`: 1 in its blocks, less where it speaks for its own Gaussians, else
-        0."""
+    def blocks(self, centres: Tensor, size: tuple[int, int]) -> np.ndarray:
+        """(h', w') of the blocks of a picture of `size`: 1 where it speaks, less where it does for its own
+        Gaussians, else 0. centres: (n, 2) pixels of all that it may see."""
         high, wide = (-(-side // _BLOCK) for side in size)
-        x, y = (footprints.centres // _BLOCK).long().cpu().numpy().T
+        x, y = (centres // _BLOCK).clamp(-1, max(high, wide)).long().cpu().numpy().T
         inside = (x >= 0) & (y >= 0) & (x < wide) & (y < high)
-        places, own = (y * wide + x)[inside], self.own[footprints.ids.cpu().numpy()[inside]]
+        places, own = (y * wide + x)[inside], self.own[inside]
         counts, mine = (np.bincount(places, of, minlength=high * wide) for of in (None, own))
         turns = np.arange(high)[:, None] * _TURN + np.arange(wide) + self.view
         known = ((mine >= _OWN * counts) & (mine > 0)).reshape(high, wide)
-        told = np.where(turns % self.share == 0, 1, np.where(known, _LOW, 0)).astype(np.float32)
-        return told.repeat(_BLOCK, 0).repeat(_BLOCK, 1)[: size[0], : size[1]]
+        return np.where(turns % self.share == 0, 1, np.where(known, _LOW, 0)).astype(np.float32)
+
+    def heard(self, gaussians: Gaussians, camera: Camera) -> tuple[Tensor, np.ndarray]:
+        """(n,) bool, which of the Gaussians that the photo may see touch a block where it speaks; and (h, w)
+        how loud it is in each pixel."""
+        centres, reach = reaches(gaussians, camera, FAINT)
+        told = self.blocks(centres, (camera.height, camera.width))
+        loud = told.repeat(_BLOCK, 0).repeat(_BLOCK, 1)
+        return _meets(told > 0, centres, reach), loud[: camera.height, : camera.width]
+
+
+def _meets(blocks: np.ndarray, centres: Tensor, reach: Tensor) -> Tensor:
+    """(n,) bool: the rectangle that goes so far (n, 2) from each centre (n, 2), pixels, has a part in one of
+    the blocks (h', w') bool."""
+    high, wide = blocks.shape
+    sums = torch.zeros(high + 1, wide + 1, dtype=torch.int64)
+    sums[1:, 1:] = torch.from_numpy(blocks).long().cumsum(0).cumsum(1)
+    last = torch.tensor([wide, high])
+    low = ((centres - reach) / _BLOCK).floor().clamp_min(0).minimum(last).long()
+    end = ((centres + reach) / _BLOCK).floor().add(1).clamp_min(0).minimum(last).long()
+    (left, top), (right, bottom) = low.T, end.T
+    rows = sums.flatten()
+    corners = (
+        rows[y * (wide + 1) + x] for y, x in ((bottom, right), (top, left), (top, right), (bottom, left))
+    )
+    whole, outer, above, before = corners
+    return (whole + outer - above - before > 0) & (low < end).all(1)
 
 
 @dataclass(frozen=True)
@@ -298,8 +323,11 @@ class _View:
     ) -> "_View":
         """seen: rows of the Gaussians that the camera may see. cuts: as `mixing` takes them, or nothing.
         spoken: where the photo speaks; None: everywhere."""
+        loudness = None
+        if spoken is not None:
+            some, loudness = spoken.heard(gaussians.rows(seen), camera)
+            seen = seen[some]
         footprints = project(gaussians.rows(seen), camera)
-        loudness = None if spoken is None else spoken.loudness(footprints, (camera.height, camera.width))
         wanted = None if loudness is None else loudness > 0
         matrix, stays = mixed(footprints, camera, len(seen), **cuts, wanted=wanted)
         matrix, some = _narrowed(matrix, len(seen))

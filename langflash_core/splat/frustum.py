@@ -18,6 +18,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from langflash_core.geometry.cameras import transform
 from langflash_core.splat.projection import ALPHA_MIN, DILATION, NEAR, TAN_MARGIN, finite_rows
 from langflash_core.types import Camera, Gaussians
 
@@ -66,6 +67,27 @@ class Packs:
         some = some[some < len(self.rows)]
         seen = self.means[some] @ planes.T + offsets + self.scales[some, None] * outs >= 0
         return self.rows[some[seen.all(1)]].sort().values
+
+
+def reaches(
+    gaussians: Gaussians, camera: Camera, least: float
+) -> tuple[Float[Tensor, "n 2"], Float[Tensor, "n 2"]]:
+    """Where Gaussians before a camera lie, and how far at most their footprints go from there along both
+    axes, in pixels: nothing that takes the size of a covariance is computed.
+
+    Args:
+        least: alpha below which nothing of them counts.
+    """
+    K, viewmat = camera.K.to(gaussians.means), camera.viewmat.to(gaussians.means)
+    pos_c = transform(viewmat, gaussians.means)
+    ahead = torch.ones_like(pos_c[:, 2:]) if camera.orthographic else pos_c[:, 2:].clamp_min(NEAR)
+    focal, principal = K.diagonal()[:2], K[:2, 2]
+    size = torch.tensor([camera.width, camera.height]).to(focal)
+    steepest = torch.maximum(principal, size - principal) / focal + TAN_MARGIN * 0.5 * size / focal
+    radii = (2 * (gaussians.opacities / least).clamp_min(1).log()).sqrt()[:, None]
+    grown = gaussians.scales.amax(1, keepdim=True) / ahead
+    reach = radii * (grown * focal * (1 + steepest.square()).sqrt() + math.sqrt(DILATION)) + _SLACK
+    return pos_c[:, :2] / ahead * focal + principal, reach
 
 
 def _curve(means: Tensor) -> Tensor:

@@ -353,3 +353,22 @@ def test_few_photos_speak_everywhere_whoever_made_what():
     owners = torch.arange(400) % 4
     with_owners = solved_colours(gaussians, grey(colours), cameras, photos, owners=owners)
     assert torch.equal(with_owners.colours, solved_colours(gaussians, grey(colours), cameras, photos).colours)
+
+
+@pytest.mark.parametrize("size", [0.01, 0.2])
+def test_only_what_touches_blocks_where_a_photo_speaks_is_looked_at(monkeypatch, size):
+    """What is left out contributes nothing there: the same contributions, row by row, as of all."""
+    monkeypatch.setattr(module, "_BLOCK", 8)
+    scene, seen = cloud(400, size=size, dtype=torch.float32), camera()
+    rows, photo = torch.arange(400), torch.rand(3, seen.height, seen.width)
+    spoken = module._Spoken(np.zeros(400, bool), 1, 4)
+    some, loud = spoken.heard(scene.gaussians, seen)
+    assert not some.all() and 0 < (loud > 0).mean() < 0.5
+    found = module._View.of(scene.gaussians, rows, seen, photo, None, {}, spoken)
+    monkeypatch.setattr(
+        module, "_meets", lambda blocks, centres, reach: torch.ones(len(centres), dtype=torch.bool)
+    )
+    whole = module._View.of(scene.gaussians, rows, seen, photo, None, {}, spoken)
+    assert np.array_equal(found.ids, whole.ids)
+    difference = abs(found.contributions - whole.contributions)
+    assert difference.nnz == 0 or difference.max() < 1e-5  # float32, in batches of another size

@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from langflash_core.splat import frustum as module
-from langflash_core.splat.frustum import Packs
-from langflash_core.splat.projection import project
+from langflash_core.splat.frustum import Packs, reaches
+from langflash_core.splat.projection import ALPHA_MIN, project
 from langflash_core.types import Gaussians
 from tests.splat.scenes import camera, cloud, parallel, splats, turned
 
@@ -71,3 +71,19 @@ def test_what_is_no_number_is_left_out(value):
 def test_any_number(count):
     gaussians = splats([(0.01 * k, 0.0, 1.0) for k in range(count)]) if count else Gaussians.none()
     assert Packs.of(gaussians).before(camera()).tolist() == list(range(count))
+
+
+@pytest.mark.parametrize("size", [0.003, 0.3, 3.0])
+@pytest.mark.parametrize("seen", [camera(pose=turned(1.3, (0.5, -0.2, 0.7))), parallel(camera())])
+def test_no_footprint_goes_farther_than_it_is_said_to_reach(size, seen):
+    """Of what a projection keeps: the same centres, and boxes that end where it reaches, whose own pixel of
+    slack the reach has too."""
+    gaussians = around(2000, size)
+    kept = project(gaussians, seen)
+    centres, reach = (values[kept.ids] for values in reaches(gaussians, seen, ALPHA_MIN))
+    torch.testing.assert_close(
+        centres, kept.centres, rtol=1e-5, atol=1e-3
+    )  # float32, thousands of pixels off
+    boxes = kept.boxes()
+    assert (boxes[:, :2] >= (centres - reach - 1).floor()).all()  # a box is of whole pixels
+    assert (boxes[:, 2:] <= (centres + reach + 1).ceil()).all()
