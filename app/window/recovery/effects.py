@@ -4,6 +4,7 @@ Small files are written by a thread of one, because waiting for a disk is no bus
 and edits by the worker, which has the library.
 """
 
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -136,7 +137,7 @@ class RecoveryEffects(Effects):
                 self._copied = True
                 self._snapshot = ()  # the session now has a scene to name
                 self._drop_outlived(state)
-            case EditsKept(file) if file is not None:
+            case EditsKept(file) if file is not None and self._outlived is None:
                 for errand in self._replaced:
                     self._hands.submit(errand)
                 self._replaced = []
@@ -251,9 +252,12 @@ class RecoveryEffects(Effects):
             self._drop_outlived(state)
 
     def _drop_outlived(self, state: State) -> None:
-        """The restored session's files go once this session has its own, which is written first."""
+        """The restored session's files go once this session has its own, which is written first; so do edits
+        that it names, once they are kept anew."""
         if self._outlived is not None:
-            self._writer.submit(self._keep, self._kept(state), self._outlived)
+            kept = self._kept(state)
+            replaced, self._replaced = (self._replaced, []) if kept.edits else ([], self._replaced)
+            self._writer.submit(self._keep, kept, self._outlived, replaced)
             self._outlived = None
 
     def _end_session_offer(self, kept: Kept, restore: bool) -> None:
@@ -280,7 +284,7 @@ class RecoveryEffects(Effects):
         else:
             self._saved = wanted
 
-    def _keep(self, kept: Kept, outlived: Path | None = None) -> None:
+    def _keep(self, kept: Kept, outlived: Path | None = None, replaced: Iterable[Errand] = ()) -> None:
         try:
             self._keeper.keep(kept)
         except LangFlashError as error:
@@ -288,6 +292,8 @@ class RecoveryEffects(Effects):
             return
         if outlived is not None:
             sessions.forget(outlived)
+        for errand in replaced:
+            list(errand.run(lambda: False))
 
     def _kept(self, state: State) -> Kept:
         info = state.scene.info

@@ -155,6 +155,7 @@ def test_a_session_of_the_version_before_is_restored_with_its_edits(desk: Desk, 
         "armchair"
     ]
     desk.work()
+    desk.effects._writer.submit(lambda: None).result()
     assert not file.exists()  # this window keeps them under its own name
     again = edits.find(info.scene)
     assert again is not None and desk.keeper.own(again.edits)
@@ -280,3 +281,32 @@ def test_a_restored_session_goes_only_once_this_one_is_on_the_disk(desk: Desk, i
     kept = sessions.read(own)
     assert own != session and not scene.exists() and kept is not None
     assert kept.scene == str(desk.keeper.scene_file) and desk.keeper.scene_file.is_file()
+
+
+def test_edits_that_a_restored_session_names_stay_until_it_goes(desk: Desk, info) -> None:
+    """Killed between the two, the session came back without its edits."""
+    ended = Desk()
+    ended.perform(show.SceneArrived(info))
+    ended.perform(edit.Found(some(), "replace", "here"))
+    ended.perform(edit.Delete())
+    for _ in range(2):
+        ended.pass_time(1.1 * KEEP_AFTER)
+        ended.work()
+    named = ended.state.recovery.kept
+    ended.effects.close(ended.state, crashed=True)
+    assert named is not None and ended.keeper._lock is not None
+    ended.keeper._lock.close()  # as the system does
+    desk.effects.begin(DEFAULTS, "", empty=True)
+    desk.perform(keep.EndSessionOffer(restore=True))
+    desk.perform(scene_work.LoadScene(named.with_suffix(".langflash"), named).run(3, print, lambda: False))
+    first, rest = [desk.asked[0]], desk.asked[1:]
+    assert isinstance(first[0], work.KeepEdits)
+    desk.asked[:] = first
+    desk.work()
+    assert named.exists() and desk.state.recovery.kept not in (None, named)
+    desk.asked[:] = rest
+    desk.work()
+    desk.effects._writer.submit(lambda: None).result()
+    (own,) = state_folder().glob("session-*.json")
+    kept = sessions.read(own)
+    assert kept is not None and kept.edits == str(desk.state.recovery.kept) and not named.exists()
