@@ -264,7 +264,10 @@ class GuidedDepthNet(LangFlashNet):
             maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)
             sharp = _one_by_one(sharpened, maps.log_depths, images[0])
             maps = replace(maps, log_depths=in_groups(flattened, sharp, maps.log_errors))
-            maps = _agreed(maps, views, poses, viewmats[0], Ks[0], run)
+            agreed_maps = _agreed(maps, views, poses, viewmats[0], Ks[0], run)
+            if agreed_maps is not maps:  # what moved lies beside its edges
+                sharp = _one_by_one(sharpened, agreed_maps.log_depths, images[0])
+                maps = replace(agreed_maps, log_depths=sharp)
         if not elements:
             return _geometry(Gaussians.none(), maps, poses, viewmats[0], Ks[0], views)
         with run.stage("Gaussians"):
