@@ -44,23 +44,6 @@ class Covered:
     light: Light
 
 
-def fine_scene(
-    prediction: Prediction,
-    views: Views,
-    detail: Detail,
-    *,
-    gaussians: int | None,
-    preset: str,
-    progress: Progress = lambda stage, fraction: None,
-) -> tuple[Scene, Light]:
-    """The scene of a prediction whose depth maps are surfaces, and the light its photos were brought to.
-
-    Args and raises: as `covered_scene`.
-    """
-    covered = covered_scene(prediction, views, detail, gaussians=gaussians, preset=preset, progress=progress)
-    return coloured_scene(covered, progress), covered.light
-
-
 @torch.no_grad()
 def covered_scene(
     prediction: Prediction,
@@ -71,7 +54,8 @@ def covered_scene(
     preset: str,
     progress: Progress = lambda stage, fraction: None,
 ) -> Covered:
-    """All of `fine_scene` that needs the prediction, whose maps of many photos are much memory.
+    """The scene of a prediction whose depth maps are surfaces, before colours are solved for: all that needs
+    the prediction, whose maps of many photos are much memory.
 
     Args:
         gaussians: about so many; None: as `detail` has it. preset: recorded.

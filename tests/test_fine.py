@@ -8,7 +8,7 @@ from torch import Tensor
 
 from langflash_core.detail import DETAILS
 from langflash_core.errors import InputError
-from langflash_core.fine import fine_scene
+from langflash_core.fine import coloured_scene, covered_scene
 from langflash_core.images.views import source_pictures
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.detailed import assemble_detailed
@@ -22,7 +22,8 @@ NORMAL = DETAILS["normal"]
 
 
 def made(given: Photographed) -> tuple[Scene, Light]:
-    return fine_scene(given.prediction, given.views, NORMAL, gaussians=None, preset="mini")
+    covered = covered_scene(given.prediction, given.views, NORMAL, gaussians=None, preset="mini")
+    return coloured_scene(covered), covered.light
 
 
 @pytest.fixture(scope="module")
@@ -143,7 +144,9 @@ def test_no_group_survived(given):
 
 def test_the_number_asked_for_is_kept():
     given = photographed(screen=False, busy=True)
-    scene, _ = fine_scene(given.prediction, given.views, NORMAL, gaussians=4000, preset="mini")
+    scene = coloured_scene(
+        covered_scene(given.prediction, given.views, NORMAL, gaussians=4000, preset="mini")
+    )
     assert abs(len(scene.gaussians) - 4000) < 400
     assert scene.record.detail["asked"] == 4000
 

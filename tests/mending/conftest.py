@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.detail import DETAILS
-from langflash_core.fine import fine_scene
+from langflash_core.fine import coloured_scene, covered_scene
 from langflash_core.mending.looks import drawn
 from langflash_core.types import Scene
 from tests.scene.photographed import SCREEN, WALL, photographed
@@ -35,7 +35,8 @@ class Known:
 @pytest.fixture(scope="session")
 def known() -> Known:
     made = photographed(2)
-    scene, _ = fine_scene(made.prediction, made.views, DETAILS["normal"], gaussians=None, preset="mini")
+    covered = covered_scene(made.prediction, made.views, DETAILS["normal"], gaussians=None, preset="mini")
+    scene = coloured_scene(covered)
     unit = float(scene.gaussians.means[:, 2].quantile(0.9)) / WALL
     members = scene.gaussians.means[:, 2] < (WALL + SCREEN) / 2 * unit
     return Known(scene, members, made.photos, photographed(2, screen=False).photos)

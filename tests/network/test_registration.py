@@ -155,7 +155,7 @@ def test_wrong_depth_comes_back(places, planes, wrong):
     assert share < {("bent", 2): 1 / 3, ("bent", 3): 1 / 5}.get((wrong, len(places)), 1 / 6)
     left = (seen.registered(seen.logs + off) - seen.logs).abs()
     middle = (slice(None), slice(15, -15), slice(20, -20))
-    flows = 0.04 / min(moves(seen, view) for view in range(len(places)))  # as near as it comes, pixels
+    flows = 0.04 / min(moves(seen, view) for view in range(len(places)))  # pixels: flow's own error is .03
     assert left[middle].mean() < share * off.expand_as(left)[middle].abs().mean() + flows
     assert left.mean() < (share + 1 / 6) * off.abs().mean()
 
