@@ -60,7 +60,8 @@ lint: $(STAMP)-dev
 	@if [ -x $(BIN)/biome ]; then echo $(BIN)/biome ci; $(BIN)/biome ci; \
 	else echo "The JavaScript of web pages is not checked: no Biome for this machine."; fi
 
-PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
+# Three at a time on two cores: windows, browsers and killed processes are waited for more than worked for.
+PYTEST := $(BIN)/python -m pytest --numprocesses 3 --dist loadfile
 test: setup lint
 	$(PYTEST)
 
@@ -74,9 +75,9 @@ test-all: setup lint $(STAMP)-everything
 SEED ?= 1
 SHUFFLED = --random-order --random-order-seed
 test-machines: setup
-	env -u ATEN_CPU_CAPABILITY OMP_NUM_THREADS=2 $(BIN)/python -m pytest
-	ATEN_CPU_CAPABILITY=avx2 OMP_NUM_THREADS=1 $(BIN)/python -m pytest $(SHUFFLED)=$(SEED)
-	ATEN_CPU_CAPABILITY=default OMP_NUM_THREADS=2 $(BIN)/python -m pytest $(SHUFFLED)=$$(($(SEED) + 1))
+	env -u ATEN_CPU_CAPABILITY OMP_NUM_THREADS=2 $(PYTEST)
+	ATEN_CPU_CAPABILITY=avx2 OMP_NUM_THREADS=1 $(PYTEST) $(SHUFFLED)=$(SEED)
+	ATEN_CPU_CAPABILITY=default OMP_NUM_THREADS=2 $(PYTEST) $(SHUFFLED)=$$(($(SEED) + 1))
 
 # Hostile files, failing calls, kills, two at once, hard photos, load: two at a time, some 12 minutes on two cores.
 PARTS ?=
