@@ -60,8 +60,9 @@ lint: $(STAMP)-dev
 	@if [ -x $(BIN)/biome ]; then echo $(BIN)/biome ci; $(BIN)/biome ci; \
 	else echo "The JavaScript of web pages is not checked: no Biome for this machine."; fi
 
-# Three at a time on two cores: windows, browsers and killed processes are waited for more than worked for.
-PYTEST := $(BIN)/python -m pytest --numprocesses 3 --dist loadfile
+# Three at a time on two cores: windows, browsers and killed processes are waited for more than worked for. In
+# the order of folders: by their number of tests, xdist would leave the few long ones for the end.
+PYTEST := $(BIN)/python -m pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder
 test: setup lint
 	$(PYTEST)
 

@@ -13,7 +13,6 @@ of the C library, free in its hands and mapped from files, and which modules wer
 """
 
 import argparse
-import ctypes
 import json
 import os
 import random
@@ -25,9 +24,8 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, is_dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import glfw
 import numpy as np
@@ -46,6 +44,7 @@ from tests.app.window.guarded import REFUSED, environment
 from tests.app.window.items import Items
 from tests.app.window.test_window import ROOT, x_server
 from tests.app.window.x11 import Client
+from tests.tools.memory import held_mb, memory_parts, packages, resident_mb
 
 PATIENCE = 120.0  # seconds without any sign of life that count as a hang, also on a busy machine
 STEPS_AT_ONCE = 12
@@ -162,13 +161,13 @@ def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
     if photos:
         _see_everything(session)
     frames, said, latest = 0, 0.0, 0.0
-    loaded, came = _packages(), list[str]()
+    loaded, came = packages(), list[str]()
     while not ended.is_set() and not session.should_close:
         if session.step(0.25):
             frames, latest = frames + 1, max(latest, session.lag)
         if asked.is_set():
             asked.clear()
-            loaded, came = _packages(), [*came, *sorted(_packages() - loaded)]
+            loaded, came = packages(), [*came, *sorted(packages() - loaded)]
             for prompt in session.state.asking.prompts:
                 session.dispatch(ask.RemovePrompt(prompt.key))
             session.dispatch(camera.SetMode(pictures.RGB))
@@ -217,69 +216,6 @@ def _see_everything(session: Session) -> None:
     session.dispatch(film.StopTour())
     session.dispatch(film.ClearKeys())
     session.dispatch(camera.SetMode(pictures.RGB))
-
-
-def resident_mb(process: int) -> float:
-    """Memory of a process, MB."""
-    for line in Path(f"/proc/{process}/status").read_text().splitlines():
-        if line.startswith("VmRSS:"):
-            return int(line.split()[1]) / 1024
-    raise ValueError("status: expected a line VmRSS")
-
-
-def memory_parts(process: int) -> dict[str, float]:
-    """What memory is, MB, of this process: asked of the C library by whoever holds it, free in its hands,
-    mapped from files; and how many threads and open files there are."""
-    found = _Mallinfo2()
-    with suppress(AttributeError):  # before glibc 2.33, and elsewhere
-        ask_library = ctypes.CDLL(None).mallinfo2
-        ask_library.restype = _Mallinfo2
-        found = ask_library()
-    lines = dict(line.split(":", 1) for line in Path(f"/proc/{process}/status").read_text().splitlines())
-    mapped = sum(int(lines[name].split()[0]) for name in ("RssFile", "RssShmem")) / 1024
-    return {
-        "asked": (found.uordblks + found.hblkhd) / 2**20,
-        "free": found.fordblks / 2**20,
-        "files": mapped,
-        "threads": int(lines["Threads"]),
-        "handles": len(os.listdir(f"/proc/{process}/fd")),
-    }
-
-
-class _Mallinfo2(ctypes.Structure):
-    """Of mallinfo(3)."""
-
-    _fields_ = (
-        *((name, ctypes.c_size_t) for name in ("arena", "ordblks", "smblks", "hblks", "hblkhd")),
-        *((name, ctypes.c_size_t) for name in ("usmblks", "fsmblks", "uordblks", "fordblks", "keepcost")),
-    )
-
-
-def _packages() -> set[str]:
-    """Names of loaded modules, to the second dot."""
-    return {".".join(name.split(".")[:2]) for name in list(sys.modules)}
-
-
-def held_mb(value: Any) -> float:
-    """What the arrays and tensors take that a value holds, each once, MB."""
-    import torch  # the window's worker loads it, not its first frame
-
-    sizes: dict[int, int] = {}
-
-    def walk(each: Any) -> None:
-        if isinstance(each, torch.Tensor):
-            storage = each.untyped_storage()
-            sizes[storage.data_ptr()] = storage.nbytes()
-        elif isinstance(each, np.ndarray):
-            sizes[each.ctypes.data] = each.nbytes
-        elif is_dataclass(each):
-            walk(list(vars(each).values()))
-        elif isinstance(each, list | tuple):
-            for part in each:
-                walk(part)
-
-    walk(value)
-    return sum(sizes.values()) / 1e6
 
 
 class Hands:
@@ -548,8 +484,11 @@ def run(
         watched = Watched(display, folder, size, photos)
         try:
             hands = Hands(display, folder, scene, size, seed)
-            hands.find()
-            if photos and not watched.reconstructs():
+            try:
+                hands.find()
+            except TimeoutError as error:
+                outcome.problems += [str(error), *watched.problems()]
+            if not outcome.problems and photos and not watched.reconstructs():
                 outcome.problems.append(f"the photos became no scene: {watched.last}")
             start = time.monotonic()
             checkpoint, known = 0.0, 0

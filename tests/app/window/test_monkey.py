@@ -11,6 +11,7 @@ from tests.app.window import test_window
 from tests.app.window.guarded import REFUSED, environment
 from tests.app.window.scenes import PHRASES, room
 from tests.tools import monkey
+from tests.tools.memory import held_mb
 
 pytestmark = test_window.pytestmark
 SECONDS = 15.0
@@ -66,6 +67,6 @@ def test_memory_that_grows_is_told_from_memory_that_comes_and_goes() -> None:
 
 def test_what_rooms_hold_is_counted_once() -> None:
     scene = room(language_space("minilm").encode(list(PHRASES)))
-    once = monkey.held_mb(scene)
+    once = held_mb(scene)
     assert once > scene.gaussians.means.nbytes / 1e6
-    assert monkey.held_mb((scene, scene)) == once == monkey.held_mb([replace(scene)])
+    assert held_mb((scene, scene)) == once == held_mb([replace(scene)])

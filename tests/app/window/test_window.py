@@ -44,10 +44,11 @@ pytestmark = [
 
 @contextmanager
 def x_server(width: int, height: int) -> Iterator[str]:
-    """An X server of our own and its display; it picks a free number itself."""
+    """An X server of our own and its display; it picks a free number itself. It stays as it is when its last
+    client goes: xdotool may come and go before the window, which a server that resets would shut out."""
     reader, writer = os.pipe()
     screen = ["-screen", "0", f"{width}x{height}x24"]
-    command = ["Xvfb", "-displayfd", str(writer), *screen, "-nolisten", "tcp"]
+    command = ["Xvfb", "-displayfd", str(writer), *screen, "-nolisten", "tcp", "-noreset"]
     server = subprocess.Popen(command, pass_fds=[writer], stderr=subprocess.DEVNULL)
     os.close(writer)
     with os.fdopen(reader) as numbers:
