@@ -33,7 +33,7 @@ APT := install() { \
 	echo "Installing $$*"; \
 	$$add "$$@" >/dev/null 2>&1 || { $$get update >/dev/null && $$add "$$@" >/dev/null; }; }
 
-.PHONY: help setup run lint test test-all test-machines torture portable
+.PHONY: help setup run lint checked test test-all test-machines torture portable
 help:
 	@sed -n '1,8s/^# //p' Makefile
 
@@ -63,11 +63,15 @@ lint: $(STAMP)-dev
 # Three at a time on two cores: windows, browsers and killed processes are waited for more than worked for. In
 # the order of folders: by their number of tests, xdist would leave the few long ones for the end.
 PYTEST := $(BIN)/python -m pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder
-test: setup lint
+test: checked
 	$(PYTEST)
 
+# While the type checker works on one core, modules are compiled for all workers on the other.
+checked: setup
+	@$(BIN)/python -m pytest --collect-only --quiet >/dev/null & $(MAKE) --no-print-directory lint; wait
+
 # Where a package is missing its tests fail here, instead of being left out.
-test-all: setup lint $(STAMP)-everything
+test-all: checked $(STAMP)-everything
 	$(PYTEST) --nothing-missing
 
 # Results must not hang on the processor's vector units (ATEN_CPU_CAPABILITY: what torch uses of them,
