@@ -238,7 +238,9 @@ def _looking() -> Iterable[Entry]:
     yield Entry("Add a key frame", group, _shown(film.AddKey()), _plain("m"))
     yield Entry("Remove the last key frame", group, lambda s: film.RemoveKey() if s.keys else None)
     yield Entry("Fly along the key frames", group, _shown(film.Preview()), _plain("j"))
-    yield Entry("Inventory: what is in the room", group, _inventory, _ctrl("l"), fa.ICON_FA_LIST_CHECK)
+    yield Entry(
+        "Inventory: what is in the room", group, _inventory, _ctrl("l"), fa.ICON_FA_LIST_CHECK, in_fields=True
+    )
     yield Entry("Tour: stops and notes", group, _tour, icon=fa.ICON_FA_SIGNS_POST)
     yield Entry("Tour: the present view is a stop", group, _shown(tour.AddStop()))
     yield Entry("Tour: play", group, lambda s: tour.Play() if s.tour.stops else None)

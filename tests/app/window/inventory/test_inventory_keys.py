@@ -12,7 +12,7 @@ from app.window import commands as do
 from app.window.dialogs import Dialog
 from app.window.editing.state import Floaters
 from app.window.exporting import commands as export
-from app.window.frame import layout
+from app.window.frame import keys, layout
 from app.window.inventory import commands as take
 from app.window.inventory.state import Row
 from app.window.kit import theme
@@ -159,3 +159,12 @@ def test_after_a_dialog_that_esc_closed_keys_go_on_where_they_were(monkeypatch) 
         hands.frames(4)
         hands.press(KEY.down_arrow)
         assert hands.here() == "desk 1"
+
+
+def test_the_key_of_the_list_works_while_a_name_is_typed(monkeypatch) -> None:
+    """It was lost: after a name was given, the list would not go."""
+    with keyboard(_SIZES[0], monkeypatch, [listed()]) as hands:
+        hands.to_area("Inventory")
+        hands.press(KEY.tab)
+        assert keys.typing()
+        assert take.ShowInventory(False) in hands.press(KEY.l, held=KEY.mod_ctrl)
