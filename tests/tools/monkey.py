@@ -4,8 +4,8 @@
 
 Ends with 0 when the window lived through it without an exception, an OpenGL error or a hang, and its
 memory stayed. The window can write only in a temporary folder (guarded.py); leaving is refused, so that
-the run goes on. It begins with a reconstruction, a phrase and every mode of the picture, so that the network
-and the shaders are there from the start and not from whichever minute random hands ask for them. Every
+the run goes on. It begins with a reconstruction, a phrase, every mode of the picture and every command, so that
+the network and the shaders are there from the start and not from whichever minute random hands ask for them. Every
 minute the same scene is opened in a window of the same size, and memory is compared there at rest, without
 what the rooms take that the window holds to go back to: which these are is up to random hands. The scene's
 file is written anew before, since they merge scenes into it and save it. Each line says what memory is asked
@@ -31,7 +31,9 @@ import glfw
 import numpy as np
 from PIL import Image
 
+from app.window import commands as do
 from app.window.asking import commands as ask
+from app.window.editing import commands as edit
 from app.window.filming import commands as film
 from app.window.frame.table import ENTRIES, Chord, named
 from app.window.scene import camera
@@ -49,6 +51,7 @@ from tests.tools.memory import held_mb, memory_parts, packages, resident_mb
 PATIENCE = 120.0  # seconds without any sign of life that count as a hang, also on a busy machine
 STEPS_AT_ONCE = 12
 MODE_SECONDS = 2.0
+COMMAND_SECONDS = 0.7
 IDLE = 30.0  # seconds in which nothing follows a drop, also on a busy machine
 LONGEST_QUEUE = 40.0  # seconds in which a slow window takes the letters of a command
 AT_REST = 3.0  # seconds without a frame; what is free is given back one second after the last command
@@ -196,7 +199,8 @@ def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
 
 
 def _see_everything(session: Session) -> None:
-    """Wait for the scene of the photos, ask, look at it in every mode, and on a way between two places."""
+    """Wait for the scene of the photos, ask, look at it in every mode, on a way between two places, and after
+    every command: what OpenGL compiles for each, and keeps, is there before memory is compared."""
 
     def goes_on(seconds: float, until: Callable[[], bool]) -> None:
         end = time.monotonic() + seconds
@@ -215,6 +219,13 @@ def _see_everything(session: Session) -> None:
     goes_on(PATIENCE, lambda: session.state.filming.tour is not None)
     session.dispatch(film.StopTour())
     session.dispatch(film.ClearKeys())
+    for entry in ENTRIES:
+        session.dispatch(edit.SelectAll())
+        command = entry.make(session.state)
+        if command is not None:
+            session.dispatch(command)
+            goes_on(COMMAND_SECONDS, lambda: False)
+            session.dispatch(do.ShowDialog(None))
     session.dispatch(camera.SetMode(pictures.RGB))
 
 
