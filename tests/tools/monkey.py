@@ -4,8 +4,8 @@
 
 Ends with 0 when the window lived through it without an exception, an OpenGL error or a hang, and its
 memory stayed. The window can write only in a temporary folder (guarded.py); leaving is refused, so that
-the run goes on. It begins with a reconstruction, a phrase, every mode of the picture and every command, so that
-the network and the shaders are there from the start and not from whichever minute random hands ask for them. Every
+the run goes on. It begins with a reconstruction, a phrase, every mode of the picture and every command, so
+that the network and the shaders are there from the start, not from whichever minute hands ask for them. Every
 minute the same scene is opened in a window of the same size, and memory is compared there at rest, without
 what the rooms take that the window holds to go back to: which these are is up to random hands. The scene's
 file is written anew before, since they merge scenes into it and save it. Each line says what memory is asked
