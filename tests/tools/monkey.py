@@ -29,6 +29,7 @@ from pathlib import Path
 
 import glfw
 import numpy as np
+from imgui_bundle import imgui
 from PIL import Image
 
 from app.window import commands as do
@@ -190,6 +191,7 @@ def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
                 "unexpected": [t.text for t in state.toasts if "unexpected" in t.text],
                 "gl_errors": session.gl_errors,
                 "dialog": None if state.dialog is None else state.dialog.name,
+                "queued": len(imgui.get_current_context().input_events_queue),
                 "job": None if state.scene.job is None else state.scene.job.stage,
                 "discard": next((now[name][0] for name in SURE if now.get(name)), None),
             }
@@ -385,6 +387,15 @@ class Watched:
             found.append(errors[-3000:])
         return found
 
+    def has_listened(self) -> None:
+        """Wait until the window has taken the input that waits: a frame takes one letter of a command, so
+        what a slow one was sent would answer the questions of what comes now."""
+        start = time.monotonic()
+        while time.monotonic() < start + PATIENCE and self.process.poll() is None:
+            if self.heard > start + 1.0 and not self.last.get("queued"):
+                return
+            time.sleep(0.2)
+
     def until_scene(self, before: int | None, count: int, click: Callable[[list[int]], None]) -> bool:
         """Wait for another scene than number `before`, of `count` Gaussians, at rest; edits that would be
         lost are to be discarded with a click. Input that waited may have merged it instead, or have answered
@@ -465,6 +476,7 @@ def opened(hands: Hands, watched: Watched, count: int) -> bool:
     """Open the scene, of `count` Gaussians; again where random input that still waited has opened another one
     since."""
     for _ in range(3):
+        watched.has_listened()
         before = watched.last.get("scene")
         hands.open_scene()
         if watched.until_scene(before, count, hands.click):
