@@ -60,9 +60,8 @@ lint: $(STAMP)-dev
 	@if [ -x $(BIN)/biome ]; then echo $(BIN)/biome ci; $(BIN)/biome ci; \
 	else echo "The JavaScript of web pages is not checked: no Biome for this machine."; fi
 
-# Three at a time on two cores: windows, browsers and killed processes are waited for more than worked for. In
-# the order of folders: by their number of tests, xdist would leave the few long ones for the end.
-PYTEST := $(BIN)/python -m pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder
+# No more at a time than cores: three on two were quicker by two minutes, and bounds of time were missed.
+PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 test: checked
 	$(PYTEST)
 

@@ -2,6 +2,7 @@
 
 import gc
 import itertools
+import math
 import os
 import sys
 import time
@@ -63,7 +64,8 @@ def cancelled_in(worker: Worker, stage: str, wait: float) -> tuple[float, float,
     """Cancel `wait` seconds into a stage.
 
     Returns:
-        Seconds until the person hears of it, until the worker is free; and MB that stayed.
+        Seconds until the person hears of it, until the worker is free; and MB that stayed; infinite where it
+        ended before.
     """
     gc.collect()
     give_back()
@@ -76,8 +78,10 @@ def cancelled_in(worker: Worker, stage: str, wait: float) -> tuple[float, float,
     time.sleep(wait)
     start = time.monotonic()
     worker.cancel()
-    wait_for(worker, show.JobCancelled)
+    ended = wait_for(worker, (show.JobCancelled, show.SceneArrived))
     heard = time.monotonic() - start
+    if isinstance(ended[-1], show.SceneArrived):  # it was quicker than its rehearsal
+        return math.inf, math.inf, math.inf
     worker.submit(work.LoadScene(Path("gone.langflash")))  # its turn comes when the job has ended
     wait_for(worker, show.JobFailed)
     return heard, time.monotonic() - start, resident_mb() - before
