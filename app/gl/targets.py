@@ -7,7 +7,7 @@ from contextlib import contextmanager
 import moderngl
 import numpy as np
 
-from langflash_core.graphics import bound_framebuffer
+from langflash_core.graphics import bound_framebuffer, draws_in_software
 
 _GL_FRAMEBUFFER = 0x8D40
 _GL_COLOR_ATTACHMENT0 = 0x8CE0
@@ -43,7 +43,8 @@ def drawing(
     """Draw into `framebuffer` with this blending and no tests; afterwards all is as a window expects.
 
     The framebuffer bound before is bound again with its own viewport; blending, depth test and
-    culling are off, blend function and equation are OpenGL's usual ones.
+    culling are off, blend function and equation are OpenGL's usual ones. On a processor it is drawn then:
+    of each pass that waits for another Mesa keeps what it binned, until as many wait again.
     """
     ctx = framebuffer.ctx
     previous = bound_framebuffer(ctx)
@@ -59,6 +60,8 @@ def drawing(
         ctx.blend_equation = SUM
         ctx.enable_only(moderngl.NOTHING)
         previous.use()
+        if draws_in_software(ctx):
+            ctx.finish()
 
 
 def read(texture: moderngl.Texture | moderngl.TextureArray) -> np.ndarray:
