@@ -61,7 +61,7 @@ lint: $(STAMP)-dev
 	else echo "The JavaScript of web pages is not checked: no Biome for this machine."; fi
 
 # No more at a time than cores: three on two were quicker by two minutes, and bounds of time were missed.
-PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
+PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
 test: checked
 	$(PYTEST)
 

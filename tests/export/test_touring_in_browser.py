@@ -61,7 +61,7 @@ def file(scene, tmp_path_factory) -> Path:
 
 @pytest.fixture
 def opened(page, file):
-    page.open(file, (960, 640))
+    page.open(file, (640, 440))
     page.value(_READY)
     yield page
     assert page.errors == [] and page.requests == [file.resolve().as_uri()]
@@ -224,7 +224,7 @@ def test_the_snippet_of_the_guide_embeds_a_page_that_tells_and_obeys(page, file,
     outside = file.with_name("outside.html")
     listening = "<script>heard = []; addEventListener('message', ({ data }) => heard.push(data));</script>"
     outside.write_text(f"<!doctype html><title>out</title>{listening}{snippet(file.name)}")
-    page.open(outside, (900, 700))
+    page.open(outside, (640, 480))
     until(page, f"{_HEARD}.includes('answers') && {_HEARD}.includes('camera')")
     camera = page.value("heard.findLast(({ langflash }) => langflash === 'camera')")
     found = lf.query(scene, "armchair", camera=camera_from(camera))

@@ -10,7 +10,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +26,7 @@ SIZE = (1280, 800)
 PHOTOS = [asset_path(f"photos/living_room_{side}.png") for side in ("left", "right")]
 PATIENCE = 180.0  # seconds; an upper bound for a busy machine, never waited for in full
 LEFT, TOP = int(theme.PANEL_WIDTH), 52
-REST = 12.0  # seconds without a change; a full picture of a fine scene on a busy software renderer takes six
+REST = 2.0  # seconds without a change or work: longer than the window waits before it draws the full picture
 
 
 class Person:
@@ -84,14 +84,18 @@ class Person:
         return seconds
 
     def rest(self) -> np.ndarray:
-        """The screen, once its picture stays the same."""
+        """The screen, once its picture stays the same and most looks at the program find no thread that runs
+        or would: a full picture may take many seconds, the frames of a blinking cursor take few of them."""
         end = time.monotonic() + PATIENCE
-        before, since = self.canvas, time.monotonic()
-        while time.monotonic() - since < REST and time.monotonic() < end:
+        before, since, looks = self.canvas, time.monotonic(), [False]
+        while time.monotonic() < end:
             time.sleep(0.1)
             now = self.canvas
-            if not np.array_equal(now, before):
-                before, since = now, time.monotonic()
+            looks.append(runs(self.process.pid))
+            if not np.array_equal(now, before) or sum(looks) > len(looks) / 2:
+                before, since, looks = now, time.monotonic(), [False]
+            elif time.monotonic() - since > REST:
+                break
         return self.see()
 
     def title(self) -> str:
@@ -143,6 +147,27 @@ def person(size: tuple[int, int] = SIZE, words: tuple[str, ...] = (), code: Path
             yield someone
         finally:
             someone.leave()
+
+
+def runs(process: int) -> bool:
+    """Whether a thread of a process, or of those that it started, is at work or waits for its turn."""
+    parents: dict[int, int] = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):  # it ended meanwhile
+            parents[int(path.parent.name)] = int(_stat(path)[1])
+    family = {process}
+    while more := {child for child, parent in parents.items() if parent in family} - family:
+        family |= more
+    for member in family:
+        with suppress(OSError):
+            if any(_stat(path)[0] in "RD" for path in Path(f"/proc/{member}/task").glob("*/stat")):
+                return True
+    return False
+
+
+def _stat(path: Path) -> list[str]:
+    """State, parent and on: what stands after the name, which may hold spaces."""
+    return path.read_text().rpartition(")")[2].split()
 
 
 def lit(canvas: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from langflash_core.lab.training.stages.language import language_stage
 from langflash_core.lab.training.stages.stage import Stage, modules_of
 from langflash_core.lab.training.states import load_averaged
 from langflash_core.network.build import network_class
-from langflash_core.network.checkpoints.files import initial_network, save_network, start_from
+from langflash_core.network.checkpoints.files import initial_network, read_weights, save_network, start_from
 from langflash_core.network.checkpoints.parts import TRAINED_HERE, fingerprint, write_part
 from langflash_core.network.checkpoints.store import network_to_train
 from langflash_core.network.model import LangFlashNet
@@ -53,13 +53,14 @@ def begin(network: LangFlashNet, start: Path, done: Iterable[str]) -> list[str]:
     """The stages whose modules are trained in a run or could be filled from `start`, but for `done`."""
     done = set(done)
     filled = {module for name in done for module in (LATE if name == LATE.name else ALL_STAGES[name]).modules}
+    tensors, _ = read_weights(start)
     if LATE.name not in done:
-        start_from(network, start, ("late",))
+        start_from(network, tensors, ("late",))
     names = [name for name in ALL_STAGES if name not in done]
     return [
         name
         for name in names
-        if start_from(network, start, [m for m in ALL_STAGES[name].modules if m not in filled])
+        if start_from(network, tensors, [m for m in ALL_STAGES[name].modules if m not in filled])
     ]
 
 

@@ -107,14 +107,15 @@ def adopt_frozen(preset: Preset, encoder: Path, local: Path, out: Path, seed: in
     save_network(network, out)
 
 
-def start_from(network: LangFlashNet, weights: Path, modules: Sequence[str]) -> bool:
-    """Fill some modules from a weights file; False, and nothing changed, where it does not hold
-    exactly their tensors (an older shape of the network, say).
+def start_from(
+    network: LangFlashNet, tensors: Mapping[str, Shaped[Tensor, "..."]], modules: Sequence[str]
+) -> bool:
+    """Fill some modules from what `read_weights` found; False, and nothing changed, where it does not
+    hold exactly their tensors (an older shape of the network, say).
 
     Args:
         modules: attribute names of the network, all or none of which are filled.
     """
-    tensors, _ = read_weights(weights)
     prefixes = tuple(f"{name}." for name in modules)
     own = {k: v for k, v in tensors.items() if k.startswith(prefixes)}
     wanted = {k: v.shape for k, v in network.state_dict().items() if k.startswith(prefixes)}

@@ -119,10 +119,13 @@ class Program:
         """Wait until the picture is full and exact and nothing moves: no news for a while."""
         full = [SIZE[0] - LEFT, CANVAS[0].stop - TOP]
         end = time.monotonic() + PATIENCE
+        seen, since = self.state, time.monotonic()
         while time.monotonic() < end:
-            seen = self.state
-            time.sleep(1.2)  # FULL_AFTER and a full picture of this small room
-            if self.state == seen and seen["picture"] == full and not seen["settling"]:
+            time.sleep(0.1)
+            if self.state != seen:
+                seen, since = self.state, time.monotonic()
+            still = time.monotonic() - since > 1.2  # FULL_AFTER and a full picture of this small room
+            if still and seen["picture"] == full and not seen["settling"]:
                 return seen
         raise AssertionError(f"no rest; last state {self.state}")
 
