@@ -94,26 +94,30 @@ def wiggle(program: Program, seconds: float) -> None:
         program.xdotool(*steps)
 
 
-def lags(program: Program, first: int) -> list[float]:
-    """By how much each frame of the lines from `first` on came late."""
+def lags(program: Program, first: int) -> dict[str | None, list[float]]:
+    """By how much each frame of the lines from `first` on came late, by the stage of the job meanwhile."""
+    late: dict[str | None, list[float]] = {}
     with program._changed:
-        return [lag for line in program._lines[first:] for lag in line["lags"]]
+        for line in program._lines[first:]:
+            late.setdefault(line["job"], []).extend(line["lags"])
+    return {stage: frames for stage, frames in late.items() if frames}
 
 
 def test_a_reconstruction_never_blocks_the_window(program: Program) -> None:
     """With a scene on show and the pointer moving over it.
 
-    What other programs take only adds, so the best of three reconstructions counts; of each the latest
-    frame less the latest one of an idle second before.
+    What other programs take only adds, and comes at any time, where the window itself would hold a frame
+    up at the same stage each time: so of each stage the best of three reconstructions counts; of it the
+    latest frame less the latest one of an idle second before.
     """
     program.client.drop(program.window, PHOTOS, (LEFT + 300, TOP + 200))
     program.until(lambda s: s["scene"] is not None and s["job"] is None, "the first scene")
-    excess = []
+    excess: dict[str | None, float] = {}
     for _ in range(3):
         time.sleep(3.0)  # words of the atoms, the kept copy
         first = len(program._lines)
         wiggle(program, 1.0)
-        idle = max(lags(program, first), default=0.0)
+        idle = max((lag for frames in lags(program, first).values() for lag in frames), default=0.0)
         first = len(program._lines)
         program.client.drop(program.window, PHOTOS, (LEFT + 300, TOP + 200))
         program.click("New room")
@@ -121,9 +125,10 @@ def test_a_reconstruction_never_blocks_the_window(program: Program) -> None:
         while program.state["job"] is not None:
             wiggle(program, 0.5)
         late = lags(program, first)
-        assert len(late) > 20  # there was something to be late
-        excess.append(max(late) - min(idle, 0.1))
-        if excess[-1] < HELD_SECONDS:
+        assert sum(map(len, late.values())) > 20  # there was something to be late
+        for stage, frames in late.items():
+            excess[stage] = min(excess.get(stage, np.inf), max(frames) - min(idle, 0.1))
+        if max(excess.values()) < HELD_SECONDS:
             break
-    assert min(excess) < HELD_SECONDS, f"latest frames: {[round(1000 * e) for e in excess]} ms"
+    assert max(excess.values()) < HELD_SECONDS, {stage: f"{1000 * e:.0f} ms" for stage, e in excess.items()}
     assert program.state["gl_errors"] == [] and program.state["toasts"] == []
