@@ -11,7 +11,6 @@ from ..state import State
 from . import commands as film
 
 _MARGIN = 12.0  # design pixels
-_BELOW = 96.0  # of the axes, which are above
 _MOST_SHOWN = 8
 
 
@@ -20,8 +19,8 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     if not state.keys:
         return []
     issued: list[do.Command] = []
-    corner = ImVec2(place.x + size.x - look.px(_MARGIN), place.y + look.px(_BELOW + _MARGIN))
-    imgui.set_next_window_pos(ImVec2(corner.x, _below_bars(corner, look)), 0, ImVec2(1, 0))
+    corner = ImVec2(place.x + size.x - look.px(_MARGIN), place.y + look.px(_MARGIN))
+    imgui.set_next_window_pos(ImVec2(corner.x, _top(corner, look)), 0, ImVec2(1, 0))
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     imgui.push_style_var(imgui.StyleVar_.window_padding, look.vec(8, 6))
     flags = widgets.PLAIN | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
@@ -33,15 +32,12 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     return issued
 
 
-def _below_bars(corner: ImVec2, look: Look) -> float:
-    """Where the bar begins that would have its upper right corner there: below bars that it would cover."""
-    own, top = imgui.internal.find_window_by_name("##keys"), corner.y
-    if own is None:
-        return top
-    for bar in boxes.bars():
-        if boxes.overlap((corner.x - own.size.x, top, corner.x, top + own.size.y), bar):
-            top = bar[3] + look.px(8)
-    return top
+def _top(corner: ImVec2, look: Look) -> float:
+    """Where the bar begins whose upper right corner is to be there: below axes and bars in its way."""
+    own = imgui.internal.find_window_by_name("##keys")
+    size = ImVec2(0, 0) if own is None else own.size
+    box, axes = (corner.x - size.x, corner.y, corner.x, corner.y + size.y), boxes.window_box("##axes")
+    return boxes.lowered(box, [*boxes.bars(), *([] if axes is None else [axes])], look.px(8))
 
 
 def _bar(state: State, look: Look) -> list[do.Command]:

@@ -34,6 +34,15 @@ def clear(box: Box, walls: Iterable[Box], furthest: float) -> Box:
     return box
 
 
+def lowered(box: Box, walls: Iterable[Box], gap: float) -> float:
+    """The top of the box once it has gone down, `gap` below each wall that it would cover."""
+    left, top, right, bottom = box
+    for wall in sorted(walls, key=lambda wall: wall[1]):
+        if overlap((left, top, right, top + bottom - box[1]), wall):
+            top = wall[3] + gap
+    return top
+
+
 def window_box(name: str) -> Box | None:
     """Where a window of ImGui stood in the last frame; None: it did not."""
     window = imgui.internal.find_window_by_name(name)
@@ -43,9 +52,9 @@ def window_box(name: str) -> Box | None:
 
 
 def bars() -> list[Box]:
-    """Where the bars of the tools stood in the last frame, from above."""
+    """Where the bars of the tools stood in the last frame."""
     names = [window.name for window in imgui.get_current_context().windows if window.name.startswith("##bar")]
-    return sorted((box for name in names if (box := window_box(name)) is not None), key=lambda box: box[1])
+    return [box for name in names if (box := window_box(name)) is not None]
 
 
 def over_panel(place: ImVec2, size: ImVec2, look: Look) -> tuple[ImVec2, ImVec2] | None:

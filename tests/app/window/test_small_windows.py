@@ -128,16 +128,20 @@ IN_HAND = {
 
 @pytest.mark.parametrize("scale", [1.0, 1.5])
 @pytest.mark.parametrize("state", IN_HAND.values(), ids=IN_HAND)
-def test_the_key_frames_stand_below_the_bars(monkeypatch, state: State, scale: float) -> None:
-    """They were before the buttons that hide for good, or do not."""
+def test_key_frames_and_axes_stand_below_the_bars(monkeypatch, state: State, scale: float) -> None:
+    """Key frames were before the buttons that hide for good, or do not; axes were behind them."""
     monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
     state = after(state, film.AddKey(), film.AddKey())
     for size in ((1280, 800), (round(800 * scale), round(500 * scale))):
         with context(size):
             theme.set_up(scale, "dark")
             frames(lambda seen: layout.draw_all(state, seen), look(scale), 8)
-            keys = box("##keys")
+            keys, axes = box("##keys"), window_box("##axes")
             assert keys[2] <= size[0] and not any(overlap(keys, bar) for bar in bars())
+            if axes is None:  # there is no room above the viewpoints
+                assert max(bar[3] for bar in bars()) > box("##views")[1] - 100 * scale
+            else:
+                assert not any(overlap(axes, other) for other in (keys, box("##views"), *bars()))
 
 
 @pytest.mark.parametrize(("size", "scale"), [((800, 500), 1.0), ((1280, 800), 1.5), ((1280, 800), 1.0)])

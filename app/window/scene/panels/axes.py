@@ -5,26 +5,31 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from ... import commands as do
-from ...kit import theme, widgets
+from ...kit import boxes, theme, widgets
 from ...kit.look import Look
 from ...state import State
 from .. import camera
 
 SIZE = 84.0  # design pixels
 _ARM, _BALL = 30.0, 8.0
+_MARGIN = 8.0
 _RAYS = 28.0  # design pixels, of the button beside them
+_VIEWS = 88.0  # design pixels, of the strip of photos
 _LETTERS = "XYZ"
 
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
-    """A ball at each end of an axis; the near ones last, on top."""
-    if state.scene.info is None or size.x < look.px(3 * SIZE) or size.y < look.px(4 * SIZE):
+    """A ball at each end of an axis, near ones last, on top; in the corner, or below bars that reach it."""
+    if state.scene.info is None or size.x < look.px(3 * SIZE):
+        return []
+    half, rays, margin = look.px(SIZE / 2), look.px(_RAYS), look.px(_MARGIN)
+    left, right = place.x + size.x - margin - 2 * half - rays, place.x + size.x - margin
+    top = boxes.lowered((left, place.y + margin, right, place.y + margin + 2 * half), boxes.bars(), margin)
+    if top + 2 * half > place.y + size.y - look.px(_VIEWS):
         return []
     issued: list[do.Command] = []
-    middle = ImVec2(place.x + size.x - look.px(SIZE / 2 + 8), place.y + look.px(SIZE / 2 + 8))
-    half = look.px(SIZE / 2)
-    rays = look.px(_RAYS)
-    imgui.set_next_window_pos(ImVec2(middle.x - half - rays, middle.y - half))
+    middle = ImVec2(right - half, top + half)
+    imgui.set_next_window_pos(ImVec2(left, top))
     imgui.set_next_window_size(ImVec2(2 * half + rays, 2 * half))
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
     flags = widgets.PLAIN | imgui.WindowFlags_.no_background | imgui.WindowFlags_.no_focus_on_appearing
