@@ -2,8 +2,9 @@
 
 Walls are planes: what answers "wall", "door" or "window" and is upright lies, seen from above, on a few lines
 along two directions across each other. Their common turn is the mean of the normals' azimuths, modulo a
-quarter; along it and across it a histogram of offsets, weighted by area, has a peak a wall. A wall reaches as
-far as its points do, over gaps of `_GAP`, and to the wall it meets.
+quarter; along it and across it a histogram of offsets has a peak a wall. A piece weighs its area over its
+distance from the nearest photo, since depth errs with that. A wall reaches as far as its points do, over gaps
+of `_GAP`, and to the wall it meets.
 
 Lengths are in the inventory's unit; places are (east, north). Sizes: n points.
 """
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
+from scipy.spatial import cKDTree
 
 from langflash_core.inventory.things import OPENINGS, Inventory, Thing, kinds_of
 from langflash_core.level import normals_of
@@ -28,7 +30,8 @@ _THICK = 0.15  # m from a wall's plane, of what belongs to it
 _APART = 0.30  # m between two walls side by side
 _STEP, _GAP, _SHORTEST = 0.10, 1.2, 0.5  # m along a wall
 _MEETS = 0.6  # m by which a wall is lengthened to the wall that it meets
-_LEAST = 0.03  # of the area of all walls
+_LEAST = 0.03  # of the weight of all walls
+_NEAREST = 0.5  # m from a photo: what is nearer weighs no more
 _BESIDE = 0.75  # m from a larger wall along the same piece of floor: what is there stands before it
 _LOW = 0.6  # of the height that walls are seen to: what ends below is furniture
 _UPRIGHT, _FACES = math.sin(math.radians(35)), math.cos(math.radians(40))
@@ -40,7 +43,7 @@ Place = tuple[float, float]  # east, north
 
 @dataclass(frozen=True)
 class PlanWall:
-    """A straight wall. share: of the area of all walls that photos saw."""
+    """A straight wall. share: of the weight of all walls that photos saw."""
 
     start: Place
     end: Place
@@ -86,7 +89,7 @@ class Plan:
 def floor_plan(found: Inventory) -> Plan:
     """The plan of an inventory."""
     metre = 1.0 if found.unit == "m" else _room_size(found) / 4
-    pieces = _upright_pieces(found)
+    pieces = _upright_pieces(found, metre)
     turn = _common_turn(pieces)
     matrix = _turned(turn)
     walls = _met(_walls(pieces.along(matrix), metre), metre)
@@ -118,19 +121,19 @@ def _room_size(found: Inventory) -> float:
 
 @dataclass(frozen=True)
 class _Pieces:
-    """n pieces of what walls are made of: places and unit normals (n, 2) on the floor; heights, areas."""
+    """n pieces of what walls are made of: places and unit normals (n, 2) on the floor; heights, weights."""
 
     places: Float[np.ndarray, "n 2"]
     normals: Float[np.ndarray, "n 2"]
     heights: Float[np.ndarray, " n"]
-    areas: Float[np.ndarray, " n"]
+    weights: Float[np.ndarray, " n"]
 
     def along(self, matrix: Float[np.ndarray, "2 2"]) -> "_Pieces":
         """Seen along other axes of the floor."""
-        return _Pieces(self.places @ matrix.T, self.normals @ matrix.T, self.heights, self.areas)
+        return _Pieces(self.places @ matrix.T, self.normals @ matrix.T, self.heights, self.weights)
 
 
-def _upright_pieces(found: Inventory) -> _Pieces:
+def _upright_pieces(found: Inventory, metre: float) -> _Pieces:
     scene = found.scene
     normals = normals_of(scene.gaussians) @ turn_of(found.world).T
     flat = normals[:, [0, 2]]
@@ -139,13 +142,16 @@ def _upright_pieces(found: Inventory) -> _Pieces:
     chosen = np.isin(kinds, _OF_WALLS) & (np.abs(normals[:, 1]) < _UPRIGHT) & (length > 0.5) & (areas > 0)
     chosen &= np.isfinite(found.stands).all(1)
     stands = found.stands[chosen]
-    return _Pieces(stands[:, [0, 2]], flat[chosen] / length[chosen, None], -stands[:, 1], areas[chosen])
+    places, weights = stands[:, [0, 2]], areas[chosen]
+    if eyes := _eyes(found):
+        weights = weights / np.maximum(cKDTree(eyes).query(places)[0], _NEAREST * metre)
+    return _Pieces(places, flat[chosen] / length[chosen, None], -stands[:, 1], weights)
 
 
 def _common_turn(pieces: _Pieces) -> float:
     """Radians in [-pi/4, pi/4): the azimuth that most walls share, modulo a quarter; 0 of nothing."""
     azimuths = 4 * np.arctan2(pieces.normals[:, 1], pieces.normals[:, 0])
-    mean = complex(pieces.areas @ np.exp(1j * azimuths)) if len(azimuths) else 0j
+    mean = complex(pieces.weights @ np.exp(1j * azimuths)) if len(azimuths) else 0j
     return 0.0 if abs(mean) < 1e-12 else math.atan2(mean.imag, mean.real) / 4
 
 
@@ -156,19 +162,19 @@ def _turned(turn: float) -> np.ndarray:
 def _walls(pieces: _Pieces, metre: float) -> list[PlanWall]:
     """Walls along both axes, the largest first."""
     walls: list[PlanWall] = []
-    total = float(pieces.areas.sum())
-    tall = _LOW * weighted_quantile(pieces.heights, pieces.areas, 0.9) if total else 0.0
+    total = float(pieces.weights.sum())
+    tall = _LOW * weighted_quantile(pieces.heights, pieces.weights, 0.9) if total else 0.0
     for axis in (0, 1):
         facing = np.abs(pieces.normals[:, axis]) >= _FACES
         offsets, along = pieces.places[facing, axis], pieces.places[facing, 1 - axis]
-        areas, heights = pieces.areas[facing], pieces.heights[facing]
-        for offset in _peaks(offsets, areas, metre, _LEAST * total):
+        weights, heights = pieces.weights[facing], pieces.heights[facing]
+        for offset in _peaks(offsets, weights, metre, _LEAST * total):
             near = np.abs(offsets - offset) <= _THICK * metre
-            exact = weighted_quantile(offsets[near], areas[near], 0.5)
-            for low, high in _runs(along[near], areas[near], metre):
+            exact = weighted_quantile(offsets[near], weights[near], 0.5)
+            for low, high in _runs(along[near], weights[near], metre):
                 own = near & (along >= low) & (along <= high)
-                share = float(areas[own].sum()) / total
-                if share >= _LEAST / 2 and weighted_quantile(heights[own], areas[own], 0.9) >= tall:
+                share = float(weights[own].sum()) / total
+                if share >= _LEAST / 2 and weighted_quantile(heights[own], weights[own], 0.9) >= tall:
                     ends = ((exact, low), (exact, high)) if axis == 0 else ((low, exact), (high, exact))
                     walls.append(PlanWall(*ends, share))
     walls.sort(key=lambda wall: -wall.share)
