@@ -43,10 +43,13 @@ def drawing(
     """Draw into `framebuffer` with this blending and no tests; afterwards all is as a window expects.
 
     The framebuffer bound before is bound again with its own viewport; blending, depth test and
-    culling are off, blend function and equation are OpenGL's usual ones. On a processor it is drawn then:
-    of each pass that waits for another Mesa keeps what it binned, until as many wait again.
+    culling are off, blend function and equation are OpenGL's usual ones. On a processor nothing else waits
+    to be drawn meanwhile: of a pass behind another Mesa keeps all that it binned, until as many wait again.
     """
     ctx = framebuffer.ctx
+    alone = draws_in_software(ctx)
+    if alone:
+        ctx.finish()  # a target was cleared
     previous = bound_framebuffer(ctx)
     framebuffer.use()
     ctx.enable_only(moderngl.NOTHING if blend is None else moderngl.BLEND)
@@ -60,7 +63,7 @@ def drawing(
         ctx.blend_equation = SUM
         ctx.enable_only(moderngl.NOTHING)
         previous.use()
-        if draws_in_software(ctx):
+        if alone:
             ctx.finish()
 
 
