@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from langflash_core.inventory.things import OPENINGS, Inventory, Thing, kinds_of
 from langflash_core.level import normals_of
@@ -144,7 +144,7 @@ def _upright_pieces(found: Inventory, metre: float) -> _Pieces:
     stands = found.stands[chosen]
     places, weights = stands[:, [0, 2]], areas[chosen]
     if eyes := _eyes(found):
-        weights = weights / np.maximum(cKDTree(eyes).query(places)[0], _NEAREST * metre)
+        weights = weights / np.maximum(KDTree(eyes).query(places)[0], _NEAREST * metre)
     return _Pieces(places, flat[chosen] / length[chosen, None], -stands[:, 1], weights)
 
 
