@@ -28,7 +28,7 @@ __all__ = ["display", "pytestmark", "scene_file"]  # fixtures and the mark of th
 ACROSS, DOWN = SIZE[0] - LEFT, CANVAS[0].stop - TOP
 CHAIR = (LEFT + ACROSS * 3 // 10, TOP + DOWN * 6 // 10)  # as in test_the_scene_is_drawn
 HIDE = fa.ICON_FA_USER_SECRET
-WALL = (LEFT + ACROSS * 8 // 10, TOP + DOWN * 3 // 10)  # below the bars
+WALL = (LEFT + ACROSS * 13 // 20, TOP + DOWN * 3 // 10)  # below the bars, beside the axes
 
 
 @pytest.fixture
