@@ -83,7 +83,8 @@ def test_nothing_leaks_in_1000_frames(gl, queries, use_another_program):
     renderer.release()
     renderer.release()
     use_another_program()
-    assert living(gl) == before
+    # No more than before: a program that an earlier test left in use may go meanwhile.
+    assert all(count <= before[kind] for kind, count in living(gl).items()), (living(gl), before)
 
 
 def test_a_released_renderer_draws_again(gl):
