@@ -15,6 +15,9 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
 
+# Modules are compiled once and kept, whatever the environment says: tests start hundreds of programs.
+export PYTHONDONTWRITEBYTECODE :=
+
 BIN := .venv/bin
 STAMP := .venv/.langflash
 PHOTOS := assets/photos/living_room_left.png assets/photos/living_room_right.png
