@@ -7,9 +7,10 @@ memory stayed. The window can write only in a temporary folder (guarded.py); lea
 the run goes on. It begins with a reconstruction, a phrase, every mode of the picture and every command, so
 that the network and the shaders are there from the start, not from whichever minute hands ask for them. Every
 minute the same scene is opened in a window of the same size, and memory is compared there at rest, without
-what the rooms take that the window holds to go back to: which these are is up to random hands. The scene's
-file is written anew before, since they merge scenes into it and save it. Each line says what memory is asked
-of the C library, free in its hands and mapped from files, and which modules were loaded since the last.
+what the rooms take that the window holds to go back to: which these are is up to random hands, as is which
+panels are open, so those are closed, and preferences put back. The scene's file is written anew before, since
+hands merge scenes into it and save it. Each line says what memory is asked of the C library, free in its
+hands and mapped from files, and which modules were loaded since the last.
 """
 
 import argparse
@@ -37,8 +38,12 @@ from app.window.asking import commands as ask
 from app.window.editing import commands as edit
 from app.window.filming import commands as film
 from app.window.frame.table import ENTRIES, Chord, named
+from app.window.inventory.commands import ShowInventory
+from app.window.recovery.commands import Prefer
+from app.window.recovery.preferences import DEFAULTS
 from app.window.scene import camera
 from app.window.session import Session
+from app.window.touring.commands import ShowTour
 from langflash_core import pictures
 from langflash_core.files import write_atomically
 from langflash_core.pictures import PICTURES
@@ -151,7 +156,7 @@ class Staying(Session):
 
 def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
     """The process of the window: a line of JSON about it twice a second, until stdin ends. A line there asks
-    for the size and the picture of the checkpoints, without phrases."""
+    for the window of the checkpoints, as if nobody had left anything open in it."""
     ended, asked = threading.Event(), threading.Event()
 
     def listen() -> None:
@@ -172,9 +177,7 @@ def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
         if asked.is_set():
             asked.clear()
             loaded, came = packages(), [*came, *sorted(packages() - loaded)]
-            for prompt in session.state.asking.prompts:
-                session.dispatch(ask.RemovePrompt(prompt.key))
-            session.dispatch(camera.SetMode(pictures.RGB))
+            _tidy(session)
             glfw.set_window_size(session._window, width, height)
         if time.monotonic() - said > 0.5:
             said, state = time.monotonic(), session.state
@@ -198,6 +201,23 @@ def inside(width: int, height: int, photos: tuple[str, ...]) -> None:
             sys.stdout.write(json.dumps(line) + "\n")
             sys.stdout.flush()
     session.close()
+
+
+def _tidy(session: Session) -> None:
+    """Without phrases, panels or a photo beside the picture, and with the preferences of a new window."""
+    for prompt in session.state.asking.prompts:
+        session.dispatch(ask.RemovePrompt(prompt.key))
+    own = session.state.preferences
+    plain = replace(DEFAULTS, window=own.window, recent=own.recent, folder=own.folder)
+    for command in (
+        camera.SetMode(pictures.RGB),
+        camera.Compare(None),
+        ShowInventory(False),
+        ShowTour(False),
+        do.ShowDialog(None),
+        Prefer(plain),
+    ):
+        session.dispatch(command)
 
 
 def _see_everything(session: Session) -> None:
