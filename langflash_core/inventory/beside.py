@@ -1,74 +1,45 @@
 """Two scenes of one room: what came, what went, what moved.
 
-Both stand level and along the room's walls, so one comes onto the other by one of four quarter turns, a
-scale and a shift. Key points of the photos inside the scenes are matched; each is a place in its own scene,
-by the depth drawn there; of many pairs of matches each tells a scale and a shift, and the turn, scale and
-shift that most matches agree with win. What moved is in the minority there, like what matches wrongly.
-
-What changed is told by depth, not by names, which may differ between the scenes. A thing is no longer where
-it was where the other scene's photos look through the place of its surface at what is behind. What went from
-the first scene and what came into the second are paired where they are called the same, or look the same to
-the language, and are about one size: those moved. What is flat is not looked through; there a thing of the
-same kind that is farther than `STAYS` of its own width moved. What no photo of the other scene looks at
-nobody knows.
-Sizes: n matches, m points.
+One is brought onto the other (`langflash_core/inventory/alignment.py`). What changed is told by what photos
+see, not by names, which may differ between the scenes: a listed thing of which half has gone
+(`langflash_core/inventory/gone.py`) is not there; and what else has gone, touches and is large enough is a
+thing too, since an inventory lists neither what it cannot name nor what it takes for a part of the wall.
+What went from the first scene and what came into the second are paired where they are called the same, or
+look the same to the language, and are about one size: those moved. What is flat is not looked through; there
+a thing of the same kind that is farther than `STAYS` of its own width moved. What no photo of the other scene
+looks at nobody knows.
 """
 
-import itertools
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Integer
 from scipy.optimize import linear_sum_assignment
-from scipy.spatial.transform import Rotation
+from scipy.spatial import KDTree
 
-from langflash_core.errors import InputError
-from langflash_core.geometry.cameras import invert_rigid
-from langflash_core.inventory.things import OPENINGS, Inventory, Thing, inventory
-from langflash_core.language.answers import COVERED_ALPHA
-from langflash_core.picture_files import STORED, opened_picture
+from langflash_core.geometry.harmonics import SH_C0
+from langflash_core.inventory.alignment import Fit, Render, aligned
+from langflash_core.inventory.gone import LEAST, Fate, changes, fate
+from langflash_core.inventory.things import OPENINGS, Inventory, Thing, unlisted, unsure
 from langflash_core.scene.thin import covered_areas
-from langflash_core.scene.world import turn_of
-from langflash_core.segments import evenly
-from langflash_core.types import Camera, Frame
 
-Render = Callable[..., Frame]  # (scene, camera, weight_maps=True)
 STAYS = 0.35
 """Share of a thing's width by which it may seem to move, and stayed; at least `_STILL`."""
 _STILL = 0.12  # m
-_ALIKE = 0.5  # share by which widths and heights of one thing may differ between two scenes
+_ALIKE = 0.6  # share by which widths and heights of one thing may differ between two scenes
 _FLAT = 0.12  # m
 _KNOWN, _GONE = 0.3, 0.5
 """Of a thing's surface: that has to be seen, and of that, what is looked through where the thing is not."""
-_SPARE = (0.08, 0.05)  # m, and share of depth, by which a surface may be off
-_SAME_LOOK = 0.8  # cosine of what two things say
-_LOOKS = 2.0  # m of way, that a cosine lower by 1 weighs as much as
-_SURFACE = 2000  # points of a thing, about
-_RATIO = 0.8  # Lowe's, of matches
-_POINTS = 3000  # of a photo
-_LEAST, _AGREE = 12, 0.15  # matches that agree, and share of all: fewer do by chance
-_SCALES = (1.6, 2.5)  # up to which scenes in metres, guessed ones too, and others may differ
-_NEAR = 0.12  # m: how well they agree
-_TRIES = 4000
-
-
-@dataclass(frozen=True)
-class Fit:
-    """From places of the second inventory's world to the first's: scale turn p + shift. matches: that agree,
-    of how many (`tried`)."""
-
-    turn: Float[np.ndarray, "3 3"] = field(repr=False)
-    scale: float
-    shift: Float[np.ndarray, " 3"] = field(repr=False)
-    matches: int
-    tried: int
-
-    def placed(self, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-        """Points of the second world in the first."""
-        return self.scale * points @ self.turn.T + self.shift
+_EDGE = 1 / 3
+"""Of a thing: where less has gone, that is an edge of it that lies otherwise, and the thing is there."""
+_REST = 0.5  # of a change, that is of no listed thing
+_SAME = 1.25
+"""Affinity of looks from which two things may be one: the same one in two scenes has 1.3 to 1.9, others up to
+1.5 (8 rooms beyond those judged)."""
+_LOOKS = 2.0  # m of way, that an affinity lower by 1 weighs as much as
+_TOUCHING = 0.1  # m
 
 
 @dataclass(frozen=True)
@@ -103,41 +74,79 @@ def difference(first: Inventory, second: Inventory, render: Render) -> Differenc
     Raises:
         InputError: a scene holds no photos, or their photos show no common room.
     """
-    fit = aligned(first, second, render)
-    metre = _metre(first)
-    back, here = _Looks(second, fit, render, metre), _Looks(first, None, render, metre)
-    old = [_Seen(thing, thing, _look(first, thing), back.states(first, thing)) for thing in _all(first)]
-    new = [
-        _Seen(thing, _placed(thing, fit), _look(second, thing), here.states(second, thing, fit))
-        for thing in _all(second)
-    ]
-    moved = _paired([one for one in old if one.absent], [one for one in new if one.absent], metre, far=True)
-    still = _paired(
-        [one for one in old if not one.absent], [one for one in new if not one.absent], metre, far=False
+    fit, metre = aligned(first, second, render), first.metre
+    fates = (
+        fate(first, second, fit.inverse, render, metre / fit.scale),
+        fate(second, first, fit, render, metre),
     )
+    every = (*first.things, *unsure(first)), (*second.things, *unsure(second))
+    gone, come = _absent(first, every[0], fates[0]), _absent(second, every[1], fates[1])
+    moved = _paired(_seen(first, gone), _seen(second, come, fit), metre, far=True)
+    here = [
+        [thing for thing in things if not _has_gone(found, thing, told)]
+        for found, things, told in zip((first, second), every, fates, strict=True)
+    ]
+    still = _paired(_seen(first, here[0]), _seen(second, here[1], fit), metre, far=False)
     flat = [pair for pair in still if _flat(pair.before, metre) and pair.by > _still(pair.before, metre)]
-    listed = {thing.id for thing in first.things}, {thing.id for thing in second.things}
-    stayed = [pair for pair in still if pair not in flat and pair.before.id in listed[0]]
-    had = listed[0] - {pair.before.id for pair in (*moved, *still)}
-    has = listed[1] - {pair.after.id for pair in (*moved, *still)}
+    had = {pair.before.id for pair in (*moved, *still)} | {thing.id for thing in gone}
+    listed = {thing.id for thing in first.things}
     return Difference(
-        fit, tuple(stayed), (*moved, *flat),
-        tuple(one.thing for one in old if one.absent and one.thing.id in had),
-        tuple(one.thing for one in new if one.absent and one.thing.id in has),
-        tuple(one.thing for one in old if not one.absent and one.thing.id in had), first.unit,
+        fit, tuple(pair for pair in still if pair not in flat and pair.before.id in listed), (*moved, *flat),
+        _rest(gone, [pair.before for pair in moved], first, metre),
+        _rest(come, [pair.after for pair in moved], second, metre),
+        tuple(thing for thing in first.things if thing.id not in had), first.unit,
     )  # fmt: skip
 
 
-def _all(found: Inventory) -> list[Thing]:
-    """Also what answers its name too little to be listed: one scene alone may list a thing, and whether it
-    moved is told by depth."""
-    listed = {thing.id for thing in found.things}
-    return [*found.things, *(t for t in inventory(found.scene, threshold=0.0).things if t.id not in listed)]
+def _absent(found: Inventory, every: Sequence[Thing], told: Fate) -> list[Thing]:
+    """Things that the other scene has not where this one has them; also what no name was given to."""
+    things = [t for t in found.things if _has_gone(found, t, told) and max(t.shares) >= LEAST]
+    taken, standing = np.zeros((2, len(told.gone)), bool)
+    for thing in every:
+        if thing in things:
+            taken |= thing.rows
+        elif _shares(found, thing, told)[1] < _EDGE:
+            standing |= thing.rows
+    for rows in changes(found, told.gone & ~standing):
+        left = rows[~taken[rows]]
+        if _fills(found, left) >= max(LEAST, _REST * _fills(found, rows)):
+            things.append(unlisted(found, left, things))
+    return things
 
 
-def _metre(found: Inventory) -> float:
-    """In the inventory's unit; of one without a scale, by how far its surface spreads in rooms."""
-    return 1.0 if found.unit == "m" else float(found.stands[:, [0, 2]].std() / 1.2)
+def _rest(
+    things: Sequence[Thing], moved: Sequence[Thing], found: Inventory, metre: float
+) -> tuple[Thing, ...]:
+    """What is left of what changed, but for pieces of what moved: they touch it and look the same."""
+    left = [thing for thing in things if thing not in moved]
+    looks = {thing.id: _look(found, thing) for thing in things}
+    trees = [(thing, KDTree(found.stands[thing.rows])) for thing in moved]
+
+    def piece(thing: Thing) -> bool:
+        return any(
+            looks[thing.id].affinity(looks[other.id]) >= _SAME
+            and tree.query(found.stands[thing.rows])[0].min() <= _TOUCHING * metre
+            for other, tree in trees
+        )
+
+    return tuple(thing for thing in left if not piece(thing))
+
+
+def _shares(found: Inventory, thing: Thing, told: Fate) -> tuple[float, float]:
+    """Of a thing, as photos show it, that the other photos look at; and of that, what has gone."""
+    own = found.shares.sum(0) * thing.rows
+    known = float(own[told.known].sum())
+    return known / max(float(own.sum()), 1e-30), float(own[told.gone].sum()) / max(known, 1e-30)
+
+
+def _has_gone(found: Inventory, thing: Thing, told: Fate) -> bool:
+    known, gone = _shares(found, thing, told)
+    return thing.kind not in OPENINGS and known >= _KNOWN and gone >= _GONE
+
+
+def _fills(found: Inventory, rows: Integer[np.ndarray, " n"]) -> float:
+    """Of the photo that shows most of some rows."""
+    return float(found.shares[:, rows].sum(1).max())
 
 
 def _still(thing: Thing, metre: float) -> float:
@@ -145,133 +154,8 @@ def _still(thing: Thing, metre: float) -> float:
 
 
 def _flat(thing: Thing, metre: float) -> bool:
-    """Whether what is behind it is too near to be told from it."""
-    return min(thing.size) < _FLAT * metre
-
-
-def aligned(first: Inventory, second: Inventory, render: Render) -> Fit:
-    """Raises:
-    InputError: a scene holds no photos, or too few of their key points match.
-    """
-    for found in (first, second):
-        if not found.scene.photos:
-            raise InputError("scenes are compared by their photos, and one has none; name scenes of photos")
-    ours, theirs = _matched(_described(first, render), _described(second, render))
-    most = _SCALES[0] if first.unit == second.unit == "m" else _SCALES[1]
-    fit = _fitted(ours, theirs, _metre(first), most)
-    if fit is None or fit.matches < max(_LEAST, _AGREE * fit.tried):
-        raise InputError(
-            "the photos of both scenes show too little in common; take some from the same places"
-        )
-    return fit
-
-
-def _described(found: Inventory, render: Render) -> tuple[np.ndarray, np.ndarray]:
-    """Places (n, 3) in the world of all photos' key points, and their descriptors (n, 128)."""
-    places: list[np.ndarray] = [np.zeros((0, 3))]
-    descriptors: list[np.ndarray] = [np.zeros((0, 128), np.float32)]
-    sift = cv2.SIFT.create(_POINTS, contrastThreshold=0.01)
-    for view, photo in enumerate(found.scene.photos):
-        try:
-            with opened_picture(photo, STORED) as opened:
-                grey = np.asarray(opened.convert("L"))
-        except (OSError, SyntaxError, ValueError):
-            continue
-        points, described = sift.detectAndCompute(np.ascontiguousarray(grey), None)
-        if described is None:
-            continue
-        camera = found.scene.camera(view)
-        frame = render(found.scene, camera, weight_maps=False)
-        pixels = np.array([point.pt for point in points]) + 0.5
-        pixels *= np.array([camera.width / grey.shape[1], camera.height / grey.shape[0]])
-        own, whole = _world_places(found, camera, frame, pixels)
-        places.append(own[whole])
-        descriptors.append(described[whole].astype(np.float32))
-    return np.concatenate(places), np.concatenate(descriptors)
-
-
-def _world_places(
-    found: Inventory, camera: Camera, frame: Frame, pixels: Float[np.ndarray, "n 2"]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Where pixels are in the world, and which show something."""
-    columns, rows = pixels.astype(int).T
-    columns, rows = columns.clip(0, camera.width - 1), rows.clip(0, camera.height - 1)
-    depths = frame.depths.cpu().double().numpy()[rows, columns]
-    covered = frame.alphas.cpu().numpy()[rows, columns] >= COVERED_ALPHA
-    rays = np.concatenate((pixels, np.ones((len(pixels), 1))), 1) @ np.linalg.inv(camera.K.double().numpy()).T
-    pose = invert_rigid(camera.viewmat.double()).cpu().numpy()
-    points = (rays * depths[:, None]) @ pose[:3, :3].T + pose[:3, 3]
-    return _stood(found, points), covered & (depths > 0)
-
-
-def _stood(found: Inventory, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-    """Points of the scene in its world, in the inventory's unit."""
-    return found.scale * (points - np.array(found.world.origin)) @ turn_of(found.world).T
-
-
-def _matched(ours, theirs) -> tuple[np.ndarray, np.ndarray]:
-    """Places (n, 3) of key points that are each other's nearest, in both worlds."""
-    if min(len(ours[1]), len(theirs[1])) < 2:
-        return np.zeros((0, 3)), np.zeros((0, 3))
-    matcher = cv2.BFMatcher(cv2.NORM_L2)
-    there = {
-        m.queryIdx: m.trainIdx
-        for m, n in matcher.knnMatch(ours[1], theirs[1], k=2)
-        if m.distance < _RATIO * n.distance
-    }
-    back = {m.queryIdx: m.trainIdx for (m,) in matcher.knnMatch(theirs[1], ours[1], k=1)}
-    both = [(a, b) for a, b in there.items() if back.get(b) == a]
-    rows = np.array(both, int).reshape(-1, 2)
-    return ours[0][rows[:, 0]], theirs[0][rows[:, 1]]
-
-
-def _fitted(
-    ours: Float[np.ndarray, "n 3"], theirs: Float[np.ndarray, "n 3"], metre: float, most: float = _SCALES[1]
-) -> Fit | None:
-    """The quarter turn, scale (1 / `most` to `most`) and shift that most matches agree with, then exact on
-    those."""
-    if len(ours) < 2:
-        return None
-    rng, best, chosen = np.random.default_rng(0), np.zeros(len(ours), bool), None
-    pairs = rng.integers(len(ours), size=(_TRIES, 2))
-    for quarter, (a, b) in itertools.product(range(4), pairs):
-        turn = Rotation.from_euler("y", 90 * quarter, degrees=True).as_matrix()
-        step, own = turn @ (theirs[b] - theirs[a]), ours[b] - ours[a]
-        length = float(np.linalg.norm(step))
-        if length < 0.3 * metre or own @ step < 0.98 * np.linalg.norm(own) * length:
-            continue
-        scale = float(np.linalg.norm(own)) / length
-        if not 1 / most < scale < most:
-            continue
-        shift = ours[a] - scale * turn @ theirs[a]
-        agree = np.linalg.norm(scale * theirs @ turn.T + shift - ours, axis=1) < _NEAR * metre
-        if agree.sum() > best.sum():
-            best, chosen = agree, turn
-    if chosen is None or best.sum() < 3:
-        return None
-    turn, scale, shift = _similarity(ours, theirs, best, metre)
-    agree = np.linalg.norm(scale * theirs @ turn.T + shift - ours, axis=1) < _NEAR * metre
-    return Fit(turn, scale, shift, int(agree.sum()), len(ours))
-
-
-def _similarity(ours, theirs, agree, metre: float) -> tuple[np.ndarray, float, np.ndarray]:
-    """Of least squares over the matches that agree, which are chosen anew a few times.
-
-    Source: Umeyama 1991.
-    """
-    turn, scale, shift = np.eye(3), 1.0, np.zeros(3)
-    for _ in range(4):
-        if agree.sum() < 3:
-            break
-        a, b = ours[agree], theirs[agree]
-        middle_a, middle_b = a.mean(0), b.mean(0)
-        u, values, v = np.linalg.svd((a - middle_a).T @ (b - middle_b))
-        signs = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ v))])
-        turn = (u * signs) @ v
-        scale = float((values * signs).sum() / ((b - middle_b) ** 2).sum())
-        shift = middle_a - scale * turn @ middle_b
-        agree = np.linalg.norm(scale * theirs @ turn.T + shift - ours, axis=1) < _NEAR * metre
-    return turn, scale, shift
+    """Whether what is behind it is too near to be told from it. Doors and windows stay."""
+    return thing.kind not in OPENINGS and min(thing.size) < _FLAT * metre
 
 
 def _placed(thing: Thing, fit: Fit) -> Thing:
@@ -285,33 +169,42 @@ def _placed(thing: Thing, fit: Fit) -> Thing:
     )
 
 
-def _look(found: Inventory, thing: Thing) -> Float[np.ndarray, " C"]:
-    """What a thing's surface says on average, unit length."""
-    semantics = found.scene.semantics
-    rows = np.flatnonzero(thing.rows)
-    areas = covered_areas(found.scene.gaussians)[rows]
-    weights = semantics.weight_values.double().numpy()[rows] * (areas + 1e-12)[:, None]
-    ids = semantics.weight_ids.numpy()[rows]
-    mean = np.bincount(ids.ravel(), weights.ravel(), semantics.num_atoms)
+@dataclass(frozen=True)
+class _Look:
+    """What a thing's surface says on average, unit length, and the shares of its colours, 64 bins."""
+
+    language: Float[np.ndarray, " r"]
+    colours: Float[np.ndarray, " 64"]
+
+    def affinity(self, other: "_Look") -> float:
+        """Cosine of what both say, and Bhattacharyya's coefficient of their colours: at most 2."""
+        return float(self.language @ other.language) + float(np.sqrt(self.colours * other.colours).sum())
+
+
+def _look(found: Inventory, thing: Thing) -> _Look:
+    scene, rows = found.scene, np.flatnonzero(thing.rows)
+    semantics, areas = scene.semantics, covered_areas(scene.gaussians)[rows] + 1e-12
+    weights, ids = semantics.weight_values.double().numpy()[rows], semantics.weight_ids.numpy()[rows]
+    mean = np.bincount(ids.ravel(), (weights * areas[:, None]).ravel(), semantics.num_atoms)
     vector = mean @ np.nan_to_num(semantics.dictionary.double().numpy())
-    return vector / max(float(np.linalg.norm(vector)), 1e-12)
+    colours = (0.5 + SH_C0 * scene.gaussians.sh[:, 0].double().numpy()[rows]).clip(0, 1 - 1e-9)
+    bins = np.bincount((4 * colours).astype(int) @ [16, 4, 1], areas, 64)
+    return _Look(vector / max(float(np.linalg.norm(vector)), 1e-12), bins / bins.sum())
 
 
 @dataclass(frozen=True)
 class _Seen:
-    """A thing, as it stands in the first world, its look, and the shares of its surface that the other scene
-    shows, and looks through."""
+    """A thing, as it stands in the first world, and its look."""
 
     thing: Thing
     placed: Thing
-    look: Float[np.ndarray, " C"]
-    states: tuple[float, float]
+    look: _Look
 
-    @property
-    def absent(self) -> bool:
-        """Whether it is not in the other scene, where this one has it. Doors and windows stay."""
-        known, through = self.states
-        return self.thing.kind not in OPENINGS and known >= _KNOWN and through >= _GONE * known
+
+def _seen(found: Inventory, things: Sequence[Thing], fit: Fit | None = None) -> list[_Seen]:
+    return [
+        _Seen(thing, thing if fit is None else _placed(thing, fit), _look(found, thing)) for thing in things
+    ]
 
 
 def _paired(before: Sequence[_Seen], after: Sequence[_Seen], metre: float, *, far: bool) -> list[Pair]:
@@ -325,10 +218,10 @@ def _paired(before: Sequence[_Seen], after: Sequence[_Seen], metre: float, *, fa
     for row, one in enumerate(before):
         for column, other in enumerate(after):
             way = math.dist(one.placed.place, other.placed.place)
-            look, named = float(one.look @ other.look), one.thing.kind == other.thing.kind
-            same = (named or (far and look >= _SAME_LOOK)) and _alike(one.placed, other.placed)
+            alike, named = one.look.affinity(other.look), one.thing.kind == other.thing.kind
+            same = (named or (far and alike >= _SAME)) and _alike(one.placed, other.placed)
             if same or (not far and way <= _still(one.thing, metre)):
-                costs[row, column] = way / metre + _LOOKS * (1 - look) + (not named)
+                costs[row, column] = way / metre + _LOOKS * (2 - alike)
     rows, columns = linear_sum_assignment(costs)
     return [
         Pair(before[r].thing, after[c].thing, math.dist(before[r].placed.place, after[c].placed.place))
@@ -343,52 +236,3 @@ def _alike(one: Thing, other: Thing) -> bool:
         return True
     sides = ((one.size[0], other.size[0]), (one.size[2], other.size[2]))
     return all(abs(a - b) <= _ALIKE * max(a, b) for a, b in sides)
-
-
-class _Looks:
-    """What photos of a scene show at places of the first world."""
-
-    def __init__(self, found: Inventory, fit: Fit | None, render: Render, metre: float):
-        self._found, self._fit, self._metre = found, fit, metre
-        scene = found.scene
-        self._cameras = [scene.camera(view) for view in range(scene.num_views)]
-        frames = [render(scene, camera, weight_maps=False) for camera in self._cameras]
-        self._depths = [
-            np.where(frame.alphas.cpu().numpy() >= COVERED_ALPHA, frame.depths.cpu().double().numpy(), 0.0)
-            for frame in frames
-        ]
-
-    def states(self, whose: Inventory, thing: Thing, fit: Fit | None = None) -> tuple[float, float]:
-        """Shares of a thing's surface that some photo shows, or looks through at what is behind.
-
-        Args:
-            fit: from the thing's own world to the first, if it is another.
-        """
-        own = np.flatnonzero(thing.rows)
-        chosen = own[evenly(covered_areas(whose.scene.gaussians)[own])]
-        points = whose.stands[chosen[:: max(1, len(chosen) // _SURFACE)]]
-        points = points if fit is None else fit.placed(points)
-        if self._fit is not None:
-            points = (points - self._fit.shift) @ self._fit.turn / self._fit.scale
-        world = self._found.world
-        inside = points / self._found.scale @ turn_of(world) + np.array(world.origin)
-        behind, known = np.zeros(len(inside), bool), np.zeros(len(inside), bool)
-        for camera, depths in zip(self._cameras, self._depths, strict=True):
-            through, met = self._one(camera, depths, inside)
-            behind, known = behind | through, known | through | met
-        return float(known.mean()), float(behind.mean())
-
-    def _one(self, camera: Camera, depths: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(m,) whether a camera looks through each point, and whether it shows a surface there."""
-        viewmat, K = camera.viewmat.double().numpy(), camera.K.double().numpy()
-        pos_c = points @ viewmat[:3, :3].T + viewmat[:3, 3]
-        with np.errstate(all="ignore"):
-            columns, rows = np.nan_to_num((pos_c / pos_c[:, 2:]) @ K[:2].T, nan=-1.0).T
-        height, width = depths.shape
-        good = (pos_c[:, 2] > 0) & (columns >= 0) & (rows >= 0) & (columns < width) & (rows < height)
-        seen = np.zeros(len(points))
-        seen[good] = depths[rows[good].astype(int), columns[good].astype(int)]
-        spare = _SPARE[0] * self._metre / (self._found.scale * (self._fit.scale if self._fit else 1.0))
-        spare = spare + _SPARE[1] * np.abs(pos_c[:, 2])
-        through = good & (seen > pos_c[:, 2] + spare)
-        return through, good & (seen > 0) & (np.abs(seen - pos_c[:, 2]) <= spare)

@@ -9,6 +9,7 @@ Lengths are metres where the scene's scale is known or guessed, else scene units
 +z north, the floor at y = 0 (`langflash_core.records.World`). Sizes: N Gaussians, G kinds, V views.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -16,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Integer
 
 from langflash_core.errors import InputError
 from langflash_core.inventory.pieces import STRUCTURE, Parts, parts_of_room
@@ -82,14 +83,17 @@ class Thing:
 
 @dataclass(frozen=True)
 class Inventory:
-    """The things of a room. scale: units of `unit` per scene unit. guess: where the scale is one."""
+    """The things of a room. scale: units of `unit` per scene unit. guess: where the scale is one. shares: of
+    the photos that each Gaussian makes up. parts: of the room; those that answer well are its things."""
 
     scene: Scene = field(repr=False)
     world: World
     unit: str
     scale: float
     guess: Guess | None
-    things: tuple[Thing, ...]
+    shares: Float[np.ndarray, "V N"] = field(repr=False)
+    parts: Parts = field(repr=False)
+    things: tuple[Thing, ...] = ()
 
     @property
     def counts(self) -> dict[str, int]:
@@ -102,6 +106,11 @@ class Inventory:
         """Where the scene's Gaussians are in the world, in `unit`."""
         means = self.scene.gaussians.means.detach().cpu().double().numpy()
         return self.scale * (means - np.array(self.world.origin)) @ turn_of(self.world).T
+
+    @property
+    def metre(self) -> float:
+        """One in `unit`; of a scene without a scale, by how far its surface spreads in rooms."""
+        return 1.0 if self.unit == "m" else float(self.stands[:, [0, 2]].std() / 1.2)
 
     def segments(self) -> Segments:
         """Its things as phrases of one part each, for `langflash_core.segments`."""
@@ -128,11 +137,35 @@ def inventory(scene: Scene, *, threshold: float | None = None, least: float = LE
     metres, guess = metres_of(scene)
     scale = metres or (guess.metres if guess else 1.0)
     unit = "m" if metres or guess else "units"
-    whole = Inventory(scene, world, unit, scale, guess, ())
-    shares = photo_shares(scene)
-    parts = parts_of_room(scene, shares.sum(0).double().numpy())
-    things = _things(whole, parts, shares.numpy(), threshold, least)
-    return replace(whole, things=tuple(sorted(things, key=lambda thing: -max(thing.shares))))
+    shares = photo_shares(scene).numpy()
+    parts = parts_of_room(scene, shares.sum(0, dtype=float))
+    whole = Inventory(scene, world, unit, scale, guess, shares, parts)
+    return replace(whole, things=_things(whole, threshold, least))
+
+
+def unsure(whole: Inventory) -> tuple[Thing, ...]:
+    """What answers its name too little to be listed, named on from what is."""
+    listed = {thing.id for thing in whole.things}
+    return tuple(thing for thing in _things(whole, 0.0, LEAST_SHARE) if thing.id not in listed)
+
+
+def unlisted(whole: Inventory, rows: Integer[np.ndarray, " n"], others: Sequence[Thing]) -> Thing:
+    """Some rows of a scene as a thing that the inventory does not list, called what they answer best.
+
+    Args:
+        others: whose names are taken, besides those of the list.
+    """
+    scene, names = whole.scene, [name for name in OWN if name not in (*STRUCTURE, *OPENINGS)]
+    areas, seen = covered_areas(scene.gaussians), whole.shares[:, rows].sum(1)
+    space, some = language_space(scene.semantics.space), scene.semantics.rows(torch.from_numpy(rows))
+    cosines = gaussian_relevance(some, compile_query(scene, space, names, mode="cosine"))
+    weights = torch.from_numpy(areas[rows] + 1e-12).to(cosines)
+    kind = names[int((cosines @ weights).argmax())]
+    relevance = gaussian_relevance(some, compile_query(scene, space, [kind]))[0]
+    sure = float(relevance @ weights.to(relevance) / weights.sum())
+    taken = {thing.id for thing in (*whole.things, *others)}
+    id = next(id for number in itertools.count(1) if (id := f"{kind} {number}") not in taken)
+    return _thing(whole, id, kind, sure, rows, areas, seen)
 
 
 def kinds_of(scene: Scene, threshold: float | None = None) -> np.ndarray:
@@ -144,20 +177,19 @@ def kinds_of(scene: Scene, threshold: float | None = None) -> np.ndarray:
     return np.where((best >= limit).numpy(), np.array(names)[which.numpy()], "")
 
 
-def _things(
-    whole: Inventory, parts: Parts, shares: np.ndarray, threshold: float | None, least: float
-) -> list[Thing]:
+def _things(whole: Inventory, threshold: float | None, least: float) -> tuple[Thing, ...]:
     """Parts that are things, are seen well enough, and answer their name as the threshold says: the scene's
     own in relevancy and in cosine, or the one that somebody gave. What the scene's own leaves in is numbered
     first, so that a lower one changes no name."""
-    seen = _sums(parts.numbers, shares, len(parts.kinds))  # (V, parts)
+    parts = whole.parts
+    seen = _sums(parts.numbers, whole.shares, len(parts.kinds))  # (V, parts)
     large = [
         number
         for number in np.argsort(-seen.max(0), kind="stable")
         if parts.kinds[number] not in STRUCTURE and seen[:, number].max() >= least
     ]
     if not large:
-        return []
+        return ()
     scene, areas = whole.scene, covered_areas(whole.scene.gaussians)
     names = sorted({parts.kinds[number] for number in large})
     compiled = compile_query(scene, language_space(scene.semantics.space), names)
@@ -174,7 +206,7 @@ def _things(
         kind = parts.kinds[number]
         id = f"{kind} {1 + sum(thing.kind == kind for thing in things)}"
         things.append(_thing(whole, id, kind, sure[number], rows[number], areas, seen[:, number]))
-    return things
+    return tuple(sorted(things, key=lambda thing: -max(thing.shares)))
 
 
 def _sums(numbers: np.ndarray, shares: np.ndarray, count: int) -> np.ndarray:

@@ -7,8 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from langflash_core.errors import InputError
-from langflash_core.inventory import beside, inventory
-from langflash_core.inventory.beside import Fit, difference
+from langflash_core.inventory import alignment, beside, inventory
+from langflash_core.inventory.alignment import Fit
+from langflash_core.inventory.beside import difference
 from langflash_core.language.spaces import language_space
 from langflash_core.splat import render
 from tests.boxroom import CHAIRS, METRES, TABLE, WORDS, box_room
@@ -27,7 +28,7 @@ def test_the_turn_scale_and_shift_of_matches_are_found_among_wrong_ones():
     turn = Rotation.from_euler("y", 90.7, degrees=True).as_matrix()
     ours = 1.3 * theirs @ turn.T + [0.5, 0.1, -1.0]
     ours[::3] = rng.uniform(-3, 3, (20, 3))
-    fit = beside._fitted(ours, theirs, 1.0)
+    fit = alignment._fitted(ours, theirs, 1.0)
     assert fit is not None and fit.matches >= 40 and fit.tried == 60
     assert fit.scale == pytest.approx(1.3, abs=0.01) and np.allclose(fit.turn, turn, atol=0.01)
     good = np.arange(60) % 3 > 0
@@ -36,9 +37,9 @@ def test_the_turn_scale_and_shift_of_matches_are_found_among_wrong_ones():
 
 def test_matches_that_agree_on_nothing_are_no_fit():
     rng = np.random.default_rng(1)
-    fit = beside._fitted(rng.uniform(-2, 2, (30, 3)), rng.uniform(-2, 2, (30, 3)), 1.0)
-    assert fit is None or fit.matches < beside._LEAST
-    assert beside._fitted(np.zeros((1, 3)), np.zeros((1, 3)), 1.0) is None
+    fit = alignment._fitted(rng.uniform(-2, 2, (30, 3)), rng.uniform(-2, 2, (30, 3)), 1.0)
+    assert fit is None or fit.matches < alignment._LEAST
+    assert alignment._fitted(np.zeros((1, 3)), np.zeros((1, 3)), 1.0) is None
 
 
 def test_three_changes_are_told_by_numbers(room, monkeypatch):

@@ -1,12 +1,15 @@
 """The plan of a room whose walls are known."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from langflash_core.inventory import inventory
 from langflash_core.inventory.plan import floor_plan, weighted_quantile
+from langflash_core.scene.world import turn_of
 from tests.boxroom import DEEP, EYE, METRES, WIDE, box_room
 
 
@@ -47,6 +50,20 @@ def test_a_scene_in_its_own_unit_has_the_same_plan():
     room = box_room()
     scaled = floor_plan(inventory(room))
     assert len(scaled.walls) == 3 and len(scaled.openings) == 1
+
+
+def test_a_wall_is_where_its_near_half_is():
+    """Depth errs with distance: the farther 56 % of the west wall are seen 12 cm behind it."""
+    found = inventory(box_room().with_record(metric_scale=METRES))
+    east, north = (found.stands[:, [0, 2]] + [EYE[0], EYE[2]]).T
+    means = found.scene.gaussians.means.clone()
+    behind = torch.from_numpy(turn_of(found.world)[0]).float() * 0.12 / METRES
+    means[(np.abs(east) < 0.02) & (north > 2.2)] -= behind
+    gaussians = replace(found.scene.gaussians, means=means)
+    bent = replace(found.scene, gaussians=gaussians, photos=(b"", b""))  # taken where its cameras are
+    walls = floor_plan(inventory(bent)).walls
+    west = min((wall.start[0] + wall.end[0]) / 2 for wall in walls) + EYE[0]
+    assert west == pytest.approx(0, abs=0.02)
 
 
 def test_quantiles_by_weight_are_those_of_repeated_values():

@@ -44,7 +44,6 @@ from langflash_core.records import World
 from langflash_core.running import Progress
 from langflash_core.scene.file import load, save
 from langflash_core.scene.world import turn_of
-from langflash_core.segments import photo_shares
 from langflash_core.types import Scene
 
 TIMES = 2
@@ -265,7 +264,7 @@ def true_things(staged: StagedRoom, least: float) -> list[int]:
 def _pairs(found: Inventory, staged: StagedRoom, true: Sequence[int]) -> list[tuple[Thing, int]]:
     """Things with the true one that they share most with, where that is `OVERLAP` and more; of several that
     share most with the same one, the one that shares more."""
-    shares = photo_shares(found.scene).sum(0).numpy()
+    shares = found.shares.sum(0)
     ids = true_instances(found.scene, staged)
     masses = {i: float(shares[ids == i].sum()) for i in true}
     best: dict[int, tuple[float, Thing]] = {}

@@ -35,7 +35,6 @@ from langflash_core.lab.rooms.sensor import expose
 from langflash_core.lab.training.measures import nan_mean
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.running import Progress
-from langflash_core.segments import photo_shares
 from langflash_core.types import Frame
 
 THINGS = 3
@@ -109,22 +108,25 @@ def judge_moved(
 ) -> dict[str, float]:
     """Counts of what the comparison says of things that were moved, and of others."""
     said = difference(before, after, render)
-    before, after = _with(before, [p.before for p in said.moved]), _with(after, [p.after for p in said.moved])
-    first, second = _instances(before, pushed.before), _instances(after, pushed.after)
+    before = _with(before, [*(pair.before for pair in said.moved), *said.went])
+    after = _with(after, [*(pair.after for pair in said.moved), *said.came])
+    listed = _instances(before, pushed.before), _instances(after, pushed.after)
     shown = _mostly(before, pushed.before), _mostly(after, pushed.after)
-    of_moved, wrong, went_along = {}, 0, {*pushed.ways, *pushed.along}
+    of_moved, half, wrong, went_along = {}, set(), 0, {*pushed.ways, *pushed.along}
     for pair in said.moved:
-        wrong += not {shown[0][pair.before.id], shown[1][pair.after.id]} & went_along
-        known = {first.get(pair.before.id), second.get(pair.after.id)} & set(pushed.ways)
-        of_moved |= dict.fromkeys(known, pair.by)
-    half = _known(said.went, first) | _known(said.came, second)
+        known = {shown[0][pair.before.id], shown[1][pair.after.id]}
+        wrong += not known & went_along
+        half |= known
+        if len(known) == 1:
+            of_moved |= dict.fromkeys(known & set(pushed.ways), pair.by)
+    half |= {shown[0][thing.id] for thing in said.went} | {shown[1][thing.id] for thing in said.came}
     ways = {i: float(np.linalg.norm(way)) for i, way in pushed.ways.items()}
     right = [i for i in of_moved if abs(of_moved[i] - ways[i]) <= max(BY, BY * ways[i])]
     others = sum(shown[0][thing.id] not in went_along for thing in said.went)
     others += sum(shown[1][thing.id] not in went_along for thing in said.came)
     return {
         "moved": float(len(ways)),
-        "in_both": float(len(set(ways) & set(first.values()) & set(second.values()))),
+        "in_both": float(len(set(ways) & set(listed[0].values()) & set(listed[1].values()))),
         "found": float(len(of_moved)),
         "found_by_way": float(len(right)),
         "half": float(len((half & set(ways)) - set(of_moved))),
@@ -149,14 +151,10 @@ def _instances(found: Inventory, staged: StagedRoom) -> dict[str, int]:
 
 def _mostly(found: Inventory, staged: StagedRoom) -> dict[str, int]:
     """What most of each thing shows, be it a part of that, or a wall."""
-    shares, ids = photo_shares(found.scene).sum(0).numpy(), true_instances(found.scene, staged)
+    shares, ids = found.shares.sum(0), true_instances(found.scene, staged)
     return {
         thing.id: int(np.bincount(ids[thing.rows], shares[thing.rows]).argmax()) for thing in found.things
     }
-
-
-def _known(things: Sequence[Thing], instances: dict[str, int]) -> set[int]:
-    return {instances[thing.id] for thing in things if thing.id in instances}
 
 
 # Rooms

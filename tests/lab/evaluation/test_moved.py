@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from langflash_core.inventory import beside, inventory
-from langflash_core.inventory.beside import Fit
+from langflash_core.inventory.alignment import Fit
 from langflash_core.lab.evaluation.moved import SEEN, WAY, judge_moved, moved_markdown, pushed_room
 from langflash_core.level import found_world
 from langflash_core.splat import render
