@@ -12,7 +12,7 @@ import os
 import sys
 import threading
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -166,7 +166,8 @@ class Worker:
         def progress(stage: str, fraction: float) -> None:
             if not stale():
                 self._put(Progressed(stage, fraction))
-            self._run_errands()
+            with _outside_inference():
+                self._run_errands()
 
         self._serial += 1
         try:
@@ -183,6 +184,13 @@ class Worker:
         if spoken and outcome is not None:
             self._put(outcome)
         give_back()
+
+
+def _outside_inference() -> AbstractContextManager[None]:
+    """A network tells of its progress in the mode in which it predicts; tensors that are made there can never
+    be changed outside of it, and those of errands are kept and changed."""
+    torch = sys.modules.get("torch")
+    return nullcontext() if torch is None else torch.inference_mode(False)
 
 
 def _import_heavy() -> None:

@@ -1,17 +1,21 @@
 """The worker thread, for real: files, the text tower, cancel, and latest-wins."""
 
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+import torch
 from PIL import Image
 
 from app.window.asking import commands as ask
 from app.window.asking.work import Answer, Encode
-from app.window.commands import OfScene, ShowPicture
+from app.window.commands import Command, OfScene, ShowPicture
+from app.window.requests import Errand, Job
 from app.window.scene import commands as show
 from app.window.scene import work
 from app.window.worker import Worker
+from langflash_core.errors import Cancelled
 from langflash_core.language.answers import answer
 from langflash_core.language.relevance import relevance_maps
 from langflash_core.language.spaces import language_space
@@ -46,6 +50,43 @@ def wait_for(worker: Worker, kind, count: int = 1) -> list:
         results += [each.command if isinstance(each, OfScene) else each for each in worker.poll()]
         time.sleep(0.01)
     return results
+
+
+@dataclass(frozen=True)
+class Predicting(Job):
+    """Tells of its progress from within the network's own mode, as reconstructions do."""
+
+    def run(self, serial, progress, cancelled):
+        with torch.inference_mode():
+            while not cancelled():
+                progress("predicting", 0.5)
+                time.sleep(0.01)
+        raise Cancelled
+
+
+@dataclass(frozen=True)
+class Counting(Errand):
+    """Makes a tensor that is kept."""
+
+    def run(self, stopping):
+        yield Kept(torch.zeros(3))
+
+
+@dataclass(frozen=True)
+class Kept(Command):
+    tensor: torch.Tensor
+
+    def apply(self, state):
+        return state
+
+
+def test_tensors_of_errands_within_a_prediction_can_be_changed_after_it(worker: Worker) -> None:
+    worker.submit(Predicting())
+    wait_for(worker, show.Progressed)
+    worker.submit(Counting())
+    (kept,) = (each for each in wait_for(worker, Kept) if isinstance(each, Kept))
+    worker.cancel()
+    assert kept.tensor.add_(1).tolist() == [1, 1, 1]  # an inference tensor refuses that
 
 
 def test_a_scene_is_loaded_and_phrases_are_scored(worker: Worker, scene_file: Path) -> None:
