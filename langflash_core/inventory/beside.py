@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Integer
+from jaxtyping import Bool, Float, Integer
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import KDTree
 
@@ -33,7 +33,7 @@ _FLAT = 0.12  # m
 _KNOWN, _GONE = 0.3, 0.5
 """Of a thing's surface: that has to be seen, and of that, what is looked through where the thing is not."""
 _EDGE = 1 / 3
-"""Of a thing: where less has gone, that is an edge of it that lies otherwise, and the thing is there."""
+"""Of a part of the room: where less has gone, that is an edge of it that lies otherwise."""
 _REST = 0.5  # of a change, that is of no listed thing
 _SAME = 1.25
 """Affinity of looks from which two things may be one: the same one in two scenes has 1.3 to 1.9, others up to
@@ -80,7 +80,7 @@ def difference(first: Inventory, second: Inventory, render: Render) -> Differenc
         fate(second, first, fit, render, metre),
     )
     every = (*first.things, *unsure(first)), (*second.things, *unsure(second))
-    gone, come = _absent(first, every[0], fates[0]), _absent(second, every[1], fates[1])
+    gone, come = _absent(first, fates[0]), _absent(second, fates[1])
     moved = _paired(_seen(first, gone), _seen(second, come, fit), metre, far=True)
     here = [
         [thing for thing in things if not _has_gone(found, thing, told)]
@@ -98,20 +98,27 @@ def difference(first: Inventory, second: Inventory, render: Render) -> Differenc
     )  # fmt: skip
 
 
-def _absent(found: Inventory, every: Sequence[Thing], told: Fate) -> list[Thing]:
+def _absent(found: Inventory, told: Fate) -> list[Thing]:
     """Things that the other scene has not where this one has them; also what no name was given to."""
     things = [t for t in found.things if _has_gone(found, t, told) and max(t.shares) >= LEAST]
-    taken, standing = np.zeros((2, len(told.gone)), bool)
-    for thing in every:
-        if thing in things:
-            taken |= thing.rows
-        elif _shares(found, thing, told)[1] < _EDGE:
-            standing |= thing.rows
-    for rows in changes(found, told.gone & ~standing):
+    taken = np.zeros(len(told.gone), bool)
+    for thing in things:
+        taken |= thing.rows
+    for rows in changes(found, told.gone & ~_stands(found, told)):
         left = rows[~taken[rows]]
         if _fills(found, left) >= max(LEAST, _REST * _fills(found, rows)):
             things.append(unlisted(found, left, things))
     return things
+
+
+def _stands(found: Inventory, told: Fate) -> Bool[np.ndarray, " N"]:
+    """Whose part of the room, a thing, wall or floor, is still there: of it less than `_EDGE` has gone."""
+    numbers, own = found.parts.numbers, found.shares.sum(0)
+    some, count = numbers >= 0, len(found.parts.kinds)
+    known, gone = (
+        np.bincount(numbers[some], (own * which)[some], count) for which in (told.known, told.gone)
+    )
+    return np.append(gone < _EDGE * known, False)[numbers]
 
 
 def _rest(
