@@ -5,6 +5,7 @@ import multiprocessing
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -153,7 +154,10 @@ def _made_apart(paths: Sequence[Path], options: dict[str, Any]) -> tuple[Scene, 
     context = multiprocessing.get_context("spawn")
     with TemporaryDirectory() as folder, ProcessPoolExecutor(1, context) as pool:
         file = Path(folder) / "scene.langflash"
-        cost = pool.submit(_saved, paths, options, file, torch.get_num_threads()).result()
+        try:
+            cost = pool.submit(_saved, paths, options, file, torch.get_num_threads()).result()
+        except BrokenProcessPool as error:
+            raise MemoryError("the system ended the process of a scene") from error
         return load(file), cost
 
 

@@ -1,6 +1,8 @@
 """Walks in more and more photos: which frames are photos, and that the truth scores as the truth."""
 
 import json
+import os
+import signal
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -238,3 +240,13 @@ def test_more_photos_are_set_against_fewer_at_the_frames_that_both_have():
     assert "gain_psnr" not in flat(photos, "2")
     row = summary([{"name": "a", "photos": photos}])["by_photos"]["4"]
     assert row["placed"] is None and row["gain_psnr"] == 1.0
+
+
+def _killed(*args):
+    os.kill(os.getpid(), signal.SIGKILL)  # as Linux does where memory ends
+
+
+def test_a_scene_whose_process_the_system_ends_is_told_as_want_of_memory(monkeypatch):
+    monkeypatch.setattr(walk_scenes, "_saved", _killed)
+    with pytest.raises(MemoryError, match="ended the process"):
+        walk_scenes._made_apart([], {})
