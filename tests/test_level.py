@@ -127,11 +127,25 @@ def test_a_pixel_shows_the_point_that_lies_behind_it(room):
 
 def test_evidence_is_weighed_and_what_stands_alone_left_out():
     assert guessed([]) is None
-    both = guessed([Evidence("door", 2.0, 0.05), Evidence("depth", 2.2, 0.05)])
-    assert both is not None and both.metres == pytest.approx(math.sqrt(2.0 * 2.2))
-    wrong = [Evidence("door", 9.0, 0.05), Evidence("ceiling", 2.0, 0.05), Evidence("depth", 2.1, 0.2)]
-    found = guessed(wrong)
+    alone = guessed([Evidence("depth", 2.2, 0.05)])
+    assert alone is not None and alone.metres == pytest.approx(2.2, rel=1e-6)
+    assert math.log(alone.high / alone.low) / 2 == pytest.approx(0.05, rel=0.01)
+    both = guessed([Evidence("door", 2.0, 0.05, 2.0), Evidence("depth", 2.2, 0.05)])
+    assert both is not None and both.metres == pytest.approx(math.sqrt(2.0 * 2.2), rel=0.02)
+    heights = Evidence("door", 9.0, 0.05, 2.0), Evidence("ceiling", 2.0, 0.05, 2.6)
+    found = guessed([*heights, Evidence("depth", 2.1, 0.2)])
     assert found is not None and found.by == ("ceiling", "depth") and 1.9 < found.metres < 2.1
+
+
+def test_heights_over_a_table_top_do_not_tell_how_large_it_is():
+    """Of a scene of 1 m a unit, seen from 1.5 m, whose "floor" is a table of .75 m: its camera is
+    .75 high, its ceiling 1.85."""
+    told = [Evidence("ceiling", 2.6 / 1.85, 0.09, 2.6), Evidence("camera height", 1.5 / 0.75, 0.2, 1.5)]
+    found = guessed([*told, Evidence("depth", 1.0, 0.22)])
+    assert found is not None and found.by == ("depth",)
+    assert found.low < 1 < found.metres < 1.2  # the mean by errors is 1.40
+    weights = [1 / each.error**2 for each in (*told, Evidence("depth", 1.0, 0.22))]
+    assert np.average([math.log(2.6 / 1.85), math.log(2), 0.0], weights=weights) > math.log(1.35)
 
 
 def test_an_upright_scene_stands_and_stays_where_it_is(room, world):
