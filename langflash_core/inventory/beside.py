@@ -19,6 +19,7 @@ from jaxtyping import Bool, Float, Integer
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import KDTree
 
+from langflash_core.errors import InputError
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.inventory.alignment import Fit, Render, aligned
 from langflash_core.inventory.gone import LEAST, Fate, changes, fate
@@ -72,8 +73,13 @@ def difference(first: Inventory, second: Inventory, render: Render) -> Differenc
         render: draws depth of a scene from a camera.
 
     Raises:
-        InputError: a scene holds no photos, or their photos show no common room.
+        InputError: a scene holds no photos, their photos show no common room, or their languages differ.
     """
+    spaces = first.scene.semantics.space, second.scene.semantics.space
+    if spaces[0] != spaces[1]:
+        raise InputError(
+            f"one scene speaks {spaces[0]}, the other {spaces[1]}; make both with the same language"
+        )
     fit, metre = aligned(first, second, render), first.metre
     fates = (
         fate(first, second, fit.inverse, render, metre / fit.scale),

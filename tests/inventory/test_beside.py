@@ -89,3 +89,10 @@ def test_what_no_photo_of_the_other_scene_looks_at_is_not_said_to_have_gone(room
 def test_scenes_without_photos_are_refused(room):
     with pytest.raises(InputError, match="photos"):
         difference(room, room, render)
+
+
+def test_scenes_of_two_languages_are_refused(room):
+    semantics = replace(room.scene.semantics, space="another")
+    other = replace(room, scene=replace(room.scene, semantics=semantics))
+    with pytest.raises(InputError, match="speaks minilm, the other another"):
+        difference(room, other, render)
