@@ -94,8 +94,8 @@ torture: setup
 PACKING := .venv-portable
 portable: | $(BIN)/python
 	@test -x $(PACKING)/bin/python || $(BIN)/python -m venv $(PACKING)
-	@$(PACKING)/bin/python -m pip install --quiet --no-compile --disable-pip-version-check torch==2.13.0
-	@$(PACKING)/bin/python -m pip install --quiet --no-compile --disable-pip-version-check 'pyinstaller>=6.10' '.[window]'
+	@$(PACKING)/bin/python -m pip install --quiet --disable-pip-version-check torch==2.13.0
+	@$(PACKING)/bin/python -m pip install --quiet --disable-pip-version-check 'pyinstaller>=6.10' '.[window]'
 	@$(PACKING)/bin/python -m pip uninstall --quiet --yes langflash
 	@PYTHONPATH=$(CURDIR) $(PACKING)/bin/python -m PyInstaller --noconfirm --log-level WARN --workpath build/portable --distpath dist .ci/portable/langflash.spec
 	@du -sh dist/langflash
@@ -124,20 +124,20 @@ $(BIN)/python:
 	echo "Making .venv with $$($$chosen --version)"; \
 	$$chosen -m venv .venv
 
-# torch first and alone: its pin decides which build of the rest fits. What is used is compiled when it is used.
+# torch first and alone: its pin decides which build of the rest fits.
 $(STAMP)-package: pyproject.toml | $(BIN)/python
 	@echo "Installing LangFlash and what it needs into .venv (the first time takes minutes)"
 	@$(BIN)/python -m pip --version >/dev/null 2>&1 || $(BIN)/python -m ensurepip >/dev/null
-	@$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check torch==2.13.0
-	@$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --editable '.[window]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check torch==2.13.0
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[window]'
 	@touch $@
 
 $(STAMP)-dev: $(STAMP)-package
-	@$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --editable '.[dev]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@touch $@
 
 $(STAMP)-everything: $(STAMP)-dev
-	@$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --editable '.[everything]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[everything]'
 	@touch $@
 
 # OpenGL without a screen; macOS brings its own.
