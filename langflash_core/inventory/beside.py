@@ -5,7 +5,7 @@ see, not by names, which may differ between the scenes: a listed thing of which 
 (`langflash_core/inventory/gone.py`) is not there; and what else has gone, touches and is large enough is a
 thing too, since an inventory lists neither what it cannot name nor what it takes for a part of the wall.
 What went from the first scene and what came into the second are paired where they are called the same, or
-look the same to the language, and are about one size: those moved. What is flat is not looked through; there
+language and colours agree, and are about one size: those moved. What is flat is not looked through; there
 a thing of the same kind that is farther than `STAYS` of its own width moved. What no photo of the other scene
 looks at nobody knows.
 """

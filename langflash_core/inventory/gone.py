@@ -121,7 +121,7 @@ def _sight(
     columns, rows, depth, inside = _pixels(camera, points)
     met = inside & (frame.alphas.cpu().numpy()[rows, columns] >= COVERED_ALPHA)
     chosen, cosines = np.flatnonzero(met), np.zeros(len(points))
-    maps = frame.weight_maps.cpu().double().numpy()[rows[chosen], columns[chosen]]
+    maps = frame.weight_maps.cpu().numpy()[rows[chosen], columns[chosen]].astype(float)
     ids = own.weight_ids.numpy()[chosen]
     cosines[chosen] = _cosines(maps, scene.semantics, ids, unit[chosen], own)
     seen = frame.depths.cpu().double().numpy()[rows, columns]
