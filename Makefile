@@ -36,7 +36,7 @@ APT := install() { \
 	echo "Installing $$*"; \
 	$$add "$$@" >/dev/null 2>&1 || { $$get update >/dev/null && $$add "$$@" >/dev/null; }; }
 
-.PHONY: help setup run lint checked test test-all test-machines torture portable
+.PHONY: help setup run lint test test-all test-machines torture portable
 help:
 	@sed -n '1,8s/^# //p' Makefile
 
@@ -64,16 +64,18 @@ lint: $(STAMP)-dev
 
 # No more at a time than cores: three on two were quicker by two minutes, and bounds of time were missed.
 PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
-test: checked
-	$(PYTEST)
+test: setup
+	@$(call CHECKED,$(PYTEST))
 
-# While the type checker works on one core, modules are compiled for all workers on the other.
-checked: setup
-	@$(BIN)/python -m pytest --collect-only --quiet >/dev/null & $(MAKE) --no-print-directory lint; wait
+# The checks take the processor time that tests leave (they wait for windows, disks and each other): that
+# is enough for them, and nobody waits for a type checker. What fails in either fails the whole.
+CHECKED = nice -n 19 $(MAKE) --no-print-directory lint & checks=$$!; \
+	$(1) || failed=$$?; \
+	wait $$checks; exit $${failed:-0}
 
 # Where a package is missing its tests fail here, instead of being left out.
-test-all: checked $(STAMP)-everything
-	$(PYTEST) --nothing-missing
+test-all: setup $(STAMP)-everything
+	@$(call CHECKED,$(PYTEST) --nothing-missing)
 
 # Results must not hang on the processor's vector units (ATEN_CPU_CAPABILITY: what torch uses of them,
 # all that is there where it is unset), on the number of threads, or on which test ran before. Three
