@@ -42,7 +42,7 @@ from langflash_core.scene.elements import (
     placed,
     under,
 )
-from langflash_core.scene.ownership import covered, owned
+from langflash_core.scene.ownership import filled, owned
 from langflash_core.scene.upsampling import Upsampled, upsampled
 from langflash_core.types import Camera, Cost, Gaussians, Prediction, Record, Scene, Views
 
@@ -221,7 +221,7 @@ def _kept(
     through = seen_through(points.flatten(0, 1), prediction.viewmats, Ks, depths, trusts).view_as(usable)
     between = outvoted(points, prediction.viewmats, Ks, depths)
     keep = owned(depths, prediction.viewmats, Ks, usable & ~through & ~between)
-    keep |= usable & ~covered(depths, prediction.viewmats, Ks, keep, between)
+    keep = filled(depths, prediction.viewmats, Ks, keep, usable, between)
     return depths, keep, unit, int((through | between).sum())
 
 

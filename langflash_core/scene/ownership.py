@@ -63,8 +63,31 @@ def owned(
             finest = torch.where(takes, area, finest)
             mine = takes if other == view else mine & ~takes
         keep[view] = mine.view_as(keep[view])
-    keep = _closed(keep) & known
-    return keep | (known & ~covered(depths, viewmats, Ks, keep))
+    return filled(depths, viewmats, Ks, _closed(keep) & known, known)
+
+
+def filled(
+    depths: Float[Tensor, "V H W"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+    keep: Bool[Tensor, "V H W"],
+    known: Bool[Tensor, "V H W"],
+    anything: Bool[Tensor, "V H W"] | None = None,
+) -> Bool[Tensor, "V H W"]:
+    """(V, H, W) bool: what is kept, and what that leaves uncovered, of the first photo that knows it: each
+    one's cells count as kept for those after it, so that many photos do not all fill one gap.
+
+    Args:
+        depths, viewmats, Ks, anything: as `covered`. keep, known: (V, H, W) bool, as `owned`.
+    """
+    bare, found = known & ~covered(depths, viewmats, Ks, keep, anything), keep.clone()
+    before = depths.new_zeros(3, 0)
+    for view in bare.flatten(1).any(1).nonzero().flatten().tolist():
+        points, _ = _surface(depths[view], viewmats[view], Ks[view])
+        own = bare[view] & ~_hit(before, viewmats[view], Ks[view], (1 + _ABOUT) * depths[view])
+        found[view] |= own
+        before = torch.cat((before, points[:, own.flatten()]), 1)
+    return found
 
 
 def covered(
@@ -92,13 +115,19 @@ def covered(
     if anything is not None:
         farthest = torch.where(anything, torch.inf, farthest)
     for limit, viewmat, K in zip(farthest, viewmats, Ks, strict=True):
-        x, y, z = pictured(viewmat, K, everything.before(viewmat, K, (height, width)))
-        inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
-        hit = torch.zeros(height * width)
-        place, z = (y.floor() * width + x.floor())[inside].long(), z[inside]
-        hit[place[z < limit.flatten()[place]]] = 1
-        found.append(F.max_pool2d(hit.view(1, 1, height, width), 3, 1, 1)[0, 0] > 0)
+        found.append(_hit(everything.before(viewmat, K, (height, width)), viewmat, K, limit))
     return torch.stack(found)
+
+
+def _hit(points: Tensor, viewmat: Tensor, K: Tensor, farthest: Tensor) -> Tensor:
+    """(H, W) bool: cells in which, or beside which, one of the points (3, m) lies before `farthest`."""
+    height, width = farthest.shape
+    x, y, z = pictured(viewmat, K, points)
+    inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    hit = torch.zeros(height * width)
+    place, z = (y.floor() * width + x.floor())[inside].long(), z[inside]
+    hit[place[z < farthest.flatten()[place]]] = 1
+    return F.max_pool2d(hit.view(1, 1, height, width), 3, 1, 1)[0, 0] > 0
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid, rays, transform, unproject
 from langflash_core.scene import ownership
-from langflash_core.scene.ownership import BEFORE, BEHIND, covered, owned
+from langflash_core.scene.ownership import BEFORE, BEHIND, covered, filled, owned
 
 HEIGHT, WIDTH = 24, 32
 WALL = (0.0, 0.0, 1.0), 3.0  # n x = d, in the world
@@ -142,6 +142,36 @@ def test_three_photos_do_not_leave_a_surface_to_each_other():
     assert keep[2].all()
     common = inside(*given, view=0, other=2, margin=1)
     assert not keep[0][~grown(~common, 2)].any() and keep[0][~inside(*given, view=0, other=1)].all()
+
+
+@pytest.mark.parametrize("views", [2, 5])
+def test_a_gap_that_all_see_is_filled_by_the_first(views):
+    """And by none again: 128 photos that each filled it made 3.6 times the Gaussians of 64."""
+    given = seen([camera()] * views)
+    found = filled(*given, keep=torch.zeros_like(given[0], dtype=torch.bool), known=given[0] > 0)
+    assert found[0].all() and not found[1:].any()
+
+
+def test_what_lies_before_what_fills_a_gap_fills_it_too():
+    """A fifth farther is about the same depth, more is another surface."""
+    depths = torch.tensor([1.0, 1.19, 0.8])[:, None, None].expand(3, HEIGHT, WIDTH) * 3
+    nothing = torch.zeros_like(depths, dtype=torch.bool)
+    found = filled(depths, torch.eye(4).repeat(3, 1, 1), lens(3), nothing, ~nothing)
+    assert found[0].all() and not found[1].any() and found[2].all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_after_gaps_are_filled_nothing_that_is_known_is_bare(seed):
+    """Some photos' halves are kept, some cells are not known; what was kept stays, and less is added than
+    everybody's share."""
+    given = seen(drawn_views(seed, 5), [WALL, ((0.9, 0.1, 0.42), 1.9)][: 1 + seed % 2])
+    drawn = torch.rand(given[0].shape, generator=torch.Generator().manual_seed(seed))
+    keep, known = torch.zeros_like(drawn, dtype=torch.bool), drawn < 0.9
+    keep[::2, :, : WIDTH // 2] = True
+    found = filled(*given, keep, known)
+    assert (found & keep).equal(keep) and not (found & ~keep & ~known).any()
+    assert not (known & ~covered(*given, found)).any()
+    assert (found & ~keep).sum() < (known & ~covered(*given, keep)).sum()
 
 
 def drawn_views(seed: int, count: int) -> list[Tensor]:
