@@ -1,9 +1,10 @@
 """Which photo covers which surface: where several see one, the one that sees it finest, and nothing
 twice.
 
-Photos come in their order: the first that sees a surface has it, and each later one takes it over where
-it sees it finer by `_FINER` than who has it. So all pixels that show one surface find the same photo, however
-many photos there are. What stands before a surface that another photo knows better is given up as well
+Photos come from the middle outwards: the first that sees a surface has it, and each later one takes it over
+where it sees it finer by `_FINER` than who has it. So all pixels that show one surface find the same photo,
+however many photos there are, and it is one that the others lie around: what its depth errs by moves little
+in their pictures. What stands before a surface that another photo knows better is given up as well
 (`consistency.seen_through`).
 
 Of more than `_ALL` photos, who has what is decided at every eighth cell of a row and of a column first; a
@@ -46,15 +47,15 @@ def owned(
     known = torch.ones_like(depths, dtype=torch.bool) if known is None else known
     if len(depths) == 1:
         return known
-    keep = torch.zeros_like(known)
+    keep, order = torch.zeros_like(known), from_the_middle(depths, viewmats)
     logs = depths.log().flatten(1)
     for view in range(len(depths)):
         points, normals = _surface(depths[view], viewmats[view], Ks[view])
         finest, mine = torch.full_like(points[0], torch.inf), torch.zeros_like(points[0], dtype=torch.bool)
-        others = range(len(depths))
+        others = order
         if len(depths) > _ALL:
             tried = _tried(depths.shape[1:])
-            others = _holders(view, points[:, tried], normals[:, tried], viewmats, Ks, logs, known)
+            others = _holders(view, points[:, tried], normals[:, tried], viewmats, Ks, logs, known, order)
         for other in others:
             area = _covered_area(points, normals, viewmats[other], Ks[other])
             takes = _FINER * area < finest
@@ -64,6 +65,17 @@ def owned(
             mine = takes if other == view else mine & ~takes
         keep[view] = mine.view_as(keep[view])
     return filled(depths, viewmats, Ks, _closed(keep) & known, known)
+
+
+def from_the_middle(depths: Float[Tensor, "V H W"], viewmats: Float[Tensor, "V 4 4"]) -> list[int]:
+    """Photos by how near they are to all others, the nearest first: places over the median depth, and unit
+    vectors of view. Of two neither is nearer: as they come."""
+    if len(depths) <= 2:
+        return [*range(len(depths))]
+    poses = invert_rigid(viewmats.double())
+    seen_at = torch.cat((poses[:, :3, 3] / depths.median(), poses[:, :3, 2]), 1)
+    between = (seen_at[:, None] - seen_at).unflatten(2, (2, 3)).norm(dim=-1)  # (V, V, 2)
+    return between.sum((1, 2)).argsort(stable=True).tolist()
 
 
 def filled(
@@ -82,7 +94,7 @@ def filled(
     """
     bare, found = known & ~covered(depths, viewmats, Ks, keep, anything), keep.clone()
     before = depths.new_zeros(3, 0)
-    for view in bare.flatten(1).any(1).nonzero().flatten().tolist():
+    for view in from_the_middle(depths, viewmats):
         points, _ = _surface(depths[view], viewmats[view], Ks[view])
         own = bare[view] & ~_hit(before, viewmats[view], Ks[view], (1 + _ABOUT) * depths[view])
         found[view] |= own
@@ -173,9 +185,16 @@ def _tried(size: torch.Size) -> Tensor:
 
 
 def _holders(
-    view: int, points: Tensor, normals: Tensor, viewmats: Tensor, Ks: Tensor, logs: Tensor, known: Tensor
+    view: int,
+    points: Tensor,
+    normals: Tensor,
+    viewmats: Tensor,
+    Ks: Tensor,
+    logs: Tensor,
+    known: Tensor,
+    order: list[int],
 ) -> list[int]:
-    """The photos, in order, that have one of some points (3, n) of a view at some time, and itself."""
+    """The photos, in their order, that have one of some points (3, n) of a view at some time, and itself."""
     height, width = known.shape[1:]
     centres = torch.stack([invert_rigid(own)[:3, 3] for own in viewmats])
     towards = points - centres[..., None]  # (V, 3, n)
@@ -191,11 +210,11 @@ def _holders(
     same = inside & known.flatten(1).gather(1, place) & (gap < BEHIND) & (gap > -BEFORE)
     same[view] = True
     finest, held = torch.full_like(points[0], torch.inf), []
-    for other, (area, there) in enumerate(zip(areas, same, strict=True)):
-        takes = there & (_FINER * area < finest)
+    for other in order:
+        takes = same[other] & (_FINER * areas[other] < finest)
         if other == view or bool(takes.any()):
             held.append(other)
-            finest = torch.where(takes, area, finest)
+            finest = torch.where(takes, areas[other], finest)
     return held
 
 

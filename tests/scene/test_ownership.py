@@ -10,7 +10,7 @@ from torch import Tensor
 
 from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid, rays, transform, unproject
 from langflash_core.scene import ownership
-from langflash_core.scene.ownership import BEFORE, BEHIND, covered, filled, owned
+from langflash_core.scene.ownership import BEFORE, BEHIND, covered, filled, from_the_middle, owned
 
 HEIGHT, WIDTH = 24, 32
 WALL = (0.0, 0.0, 1.0), 3.0  # n x = d, in the world
@@ -133,15 +133,26 @@ def test_surfaces_are_the_same_within_what_depths_err(gap):
     assert keep[0].all() and keep[1].all() == (not -BEFORE < gap < BEHIND)
 
 
-def test_three_photos_do_not_leave_a_surface_to_each_other():
-    """Areas of 1, .62 and .38 in a row: the second is left to the first, the third to neither: less than half
-    the first. By pairs the first would be left to the third, the third to the second, and so nobody's."""
-    views = [camera((0.0, 0.0, 3 - 3 * share**0.5)) for share in (1.0, 0.62, 0.38)]
+def test_photos_do_not_leave_a_surface_to_each_other():
+    """Areas of 1 thrice, .62 and .38, in this order: the fourth is left to the first, the last to neither, as
+    it is less than half the first. By pairs the first would be left to the last, the last to the fourth, and
+    so nobody's."""
+    views = [camera((0.0, 0.0, 3 - 3 * share**0.5)) for share in (1.0, 1.0, 1.0, 0.62, 0.38)]
     given = seen(views, fov=20)
+    assert from_the_middle(given[0], given[1]) == [0, 1, 2, 3, 4]
     keep = owned(*given)
-    assert keep[2].all()
-    common = inside(*given, view=0, other=2, margin=1)
-    assert not keep[0][~grown(~common, 2)].any() and keep[0][~inside(*given, view=0, other=1)].all()
+    assert keep[4].all()
+    common = inside(*given, view=0, other=4, margin=1)
+    assert not keep[0][~grown(~common, 2)].any() and keep[0][~inside(*given, view=0, other=3)].all()
+
+
+def test_photos_come_from_the_middle_outwards():
+    """Of five in a row, of five turned on one spot, and of two; what is as far comes as it does."""
+    row = seen([camera((float(x), 0.0, 0.0)) for x in (4, 3, 0, 1, 2)])
+    assert from_the_middle(row[0], row[1]) == [4, 1, 3, 0, 2]
+    fan = seen([camera(turn=(0.2 * k, 0.0)) for k in (2, 0, 1)])
+    assert from_the_middle(fan[0], fan[1])[0] == 2
+    assert from_the_middle(row[0][:2], row[1][:2]) == [0, 1]
 
 
 @pytest.mark.parametrize("views", [2, 5])
@@ -235,7 +246,7 @@ def plain_owner(depths: np.ndarray, viewmats: np.ndarray, Ks: np.ndarray, view: 
     point = pose[:3, :3] @ point_of(depths[view], Ks[view], y, x) + pose[:3, 3]
     normal = pose[:3, :3] @ normal_of(depths[view], Ks[view], y, x)
     owner, finest = -1, math.inf
-    for other in range(len(depths)):
+    for other in plain_order(depths, viewmats):
         at = viewmats[other][:3, :3] @ point + viewmats[other][:3, 3]
         if other != view and not same_surface(at, depths[other], Ks[other]):
             continue
@@ -245,6 +256,18 @@ def plain_owner(depths: np.ndarray, viewmats: np.ndarray, Ks: np.ndarray, view: 
         if 2 * area < finest:
             owner, finest = other, area
     return owner
+
+
+def plain_order(depths: np.ndarray, viewmats: np.ndarray) -> list[int]:
+    """From the middle outwards; two as they come."""
+    poses = np.linalg.inv(viewmats)
+    median = np.sort(depths.ravel())[(depths.size - 1) // 2]
+
+    def apart(a: np.ndarray, b: np.ndarray) -> float:
+        return np.linalg.norm(a[:3, 3] - b[:3, 3]) / median + np.linalg.norm(a[:3, 2] - b[:3, 2])
+
+    sums = [sum(apart(a, b) for b in poses) if len(poses) > 2 else 0 for a in poses]
+    return sorted(range(len(poses)), key=sums.__getitem__)
 
 
 def point_of(depths: np.ndarray, K: np.ndarray, y: int, x: int) -> np.ndarray:
