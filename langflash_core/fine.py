@@ -15,10 +15,10 @@ from torch.nn import functional as F
 
 from langflash_core.detail import Detail
 from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
-from langflash_core.images.views import source_picture
+from langflash_core.images.views import source_picture, source_size
 from langflash_core.running import Progress
 from langflash_core.scene.assemble import placed_views
-from langflash_core.scene.detailed import assemble_detailed, working_photo
+from langflash_core.scene.detailed import assemble_detailed, working_photo, working_size
 from langflash_core.scene.light import Light, photo_light
 from langflash_core.scene.prune import prune
 from langflash_core.scene.report import left_out_line
@@ -82,6 +82,7 @@ def covered_scene(
         detail,
         gaussians=gaussians,
         strangers=left if bool(left.any()) else None,
+        fineness=photos.fineness,
         preset=preset,
         progress=lambda done: progress("elements", 0.1 + 0.3 * done),
     )
@@ -135,8 +136,13 @@ class _Photos(Sequence[Tensor]):
 
     def size(self, index: int) -> tuple[int, int]:
         """(width, height) of one."""
-        photo = self[index]
-        return photo.shape[-1], photo.shape[-2]
+        height, width = working_size(source_size(self._views, index), self._grid)
+        return width, height
+
+    @property
+    def fineness(self) -> Tensor:
+        """(V,) pixels of each in a row of a cell of the grid."""
+        return torch.tensor([self.size(v)[0] / self._grid[1] for v in range(len(self))])
 
 
 class _Silent(Sequence[Tensor]):

@@ -55,7 +55,8 @@ def test_pictures_at_the_photos_places_are_nearer_to_them_than_with_copied_colou
     check_scene(scene)
     photos = [light.corrected(photo, view=v).clamp(0, 1) for v, photo in enumerate(given.photos)]
     lit = replace(given.views, images=light.corrected(given.views.images).clamp(0, 1))
-    copied = assemble_detailed(given.prediction, lit, photos, NORMAL)
+    fineness = torch.tensor([float(ratio) for ratio in ratios])
+    copied = assemble_detailed(given.prediction, lit, photos, NORMAL, fineness=fineness)
     assert torch.equal(copied.gaussians.means, scene.gaussians.means)
     for view, photo in enumerate(photos):
         assert difference(scene, view, photo) > difference(copied, view, photo) + 0.5

@@ -79,6 +79,7 @@ def assemble_detailed(
     *,
     gaussians: int | None = None,
     strangers: Bool[Tensor, "V H W"] | None = None,
+    fineness: Float[Tensor, " V"] | None = None,
     top_m: int = 8,
     preset: str = "mini",
     progress: Callable[[float], None] = lambda done: None,
@@ -91,6 +92,7 @@ def assemble_detailed(
         gaussians: about as many; None: as `detail` has it.
         strangers: (V, H, W) bool, of the placed views: what gets no Gaussians, and says nothing of those of
             others; None: nothing.
+        fineness: (V,) pixels of each placed photo in a row of a cell of the grid; None: as many in all.
         progress: called with the share that is done, twice a photo; what it raises ends the work.
 
     Returns:
@@ -107,7 +109,7 @@ def assemble_detailed(
     prediction, views = placed_views(prediction, views)
     if not bool(torch.isfinite(prediction.viewmats).all()):
         raise ValueError("viewmats: expected finite poses, received others")
-    known, keep, unit, through = _kept(prediction, views, strangers)
+    known, keep, unit, through = _kept(prediction, views, strangers, fineness)
     sights = _Sights(lambda v: _Sight.of(photos[v], views.images[v], known[v].log(), keep[v]), len(photos))
     budget = gaussians or round(detail.most * _area(keep))
     trees, limit = _trees(sights, detail, budget, 0.0 if gaussians else detail.gain, progress)
@@ -202,7 +204,7 @@ def _area(keep: Tensor) -> float:
 
 
 def _kept(
-    prediction: Prediction, views: Views, strangers: Tensor | None = None
+    prediction: Prediction, views: Views, strangers: Tensor | None, fineness: Tensor | None
 ) -> tuple[Tensor, Tensor, float, int]:
     """Depths (V, H, W) with what is no number put right; cells (V, H, W) bool that each photo covers itself;
     the scene's unit; how many cells others see through."""
@@ -220,7 +222,7 @@ def _kept(
         usable, trusts = usable & ~strangers, trusts * ~strangers
     through = seen_through(points.flatten(0, 1), prediction.viewmats, Ks, depths, trusts).view_as(usable)
     between = outvoted(points, prediction.viewmats, Ks, depths)
-    keep = owned(depths, prediction.viewmats, Ks, usable & ~through & ~between)
+    keep = owned(depths, prediction.viewmats, Ks, usable & ~through & ~between, fineness)
     keep = filled(depths, prediction.viewmats, Ks, keep, usable, between)
     return depths, keep, unit, int((through | between).sum())
 

@@ -37,27 +37,30 @@ def owned(
     viewmats: Float[Tensor, "V 4 4"],
     Ks: Float[Tensor, "V 3 3"],
     known: Bool[Tensor, "V H W"] | None = None,
+    fineness: Float[Tensor, " V"] | None = None,
 ) -> Bool[Tensor, "V H W"]:
     """(V, H, W) bool: the cells of each photo that it covers itself.
 
     Args:
         depths: (V, H, W) > 0. viewmats: (V, 4, 4). Ks: (V, 3, 3), pixels of the depth maps.
         known: (V, H, W) bool, the cells that may cover anything; None: all.
+        fineness: (V,) > 0 pixels of each photo in a row of a cell; None: as many in all.
     """
     known = torch.ones_like(depths, dtype=torch.bool) if known is None else known
     if len(depths) == 1:
         return known
     keep, order = torch.zeros_like(known), from_the_middle(depths, viewmats)
-    logs = depths.log().flatten(1)
+    logs, focals = depths.log().flatten(1), Ks[:, 0, 0] if fineness is None else Ks[:, 0, 0] * fineness
     for view in range(len(depths)):
         points, normals = _surface(depths[view], viewmats[view], Ks[view])
         finest, mine = torch.full_like(points[0], torch.inf), torch.zeros_like(points[0], dtype=torch.bool)
         others = order
         if len(depths) > _ALL:
             tried = _tried(depths.shape[1:])
-            others = _holders(view, points[:, tried], normals[:, tried], viewmats, Ks, logs, known, order)
+            some = points[:, tried], normals[:, tried]
+            others = _holders(view, *some, viewmats, Ks, focals, logs, known, order)
         for other in others:
-            area = _covered_area(points, normals, viewmats[other], Ks[other])
+            area = _covered_area(points, normals, viewmats[other], focals[other])
             takes = _FINER * area < finest
             if other != view:
                 takes &= _same(points, viewmats[other], Ks[other], logs[other], known[other])
@@ -190,6 +193,7 @@ def _holders(
     normals: Tensor,
     viewmats: Tensor,
     Ks: Tensor,
+    focals: Tensor,
     logs: Tensor,
     known: Tensor,
     order: list[int],
@@ -200,7 +204,7 @@ def _holders(
     towards = points - centres[..., None]  # (V, 3, n)
     distances = (towards * towards).sum(1).sqrt().clamp_min(1e-9)
     cosines = (towards * normals).sum(1).abs() / distances
-    areas = (distances / Ks[:, 0, :1]) ** 2 / cosines.clamp_min(1e-3)
+    areas = (distances / focals[:, None]) ** 2 / cosines.clamp_min(1e-3)
     pos_c = viewmats[:, :3, :3] @ points + viewmats[:, :3, 3:]
     ahead = pos_c[:, 2].clamp_min(1e-8)
     x, y = (pos_c[:, a] / ahead * Ks[:, a, a, None] + Ks[:, a, 2, None] for a in (0, 1))
@@ -228,12 +232,12 @@ def _surface(depths: Tensor, viewmat: Tensor, K: Tensor) -> tuple[Tensor, Tensor
     return points, pose[:3, :3] @ normals.flatten(0, 1).T
 
 
-def _covered_area(points: Tensor, normals: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
-    """(n,) of the surface, that one pixel of a view covers; endless where it is seen edge-on."""
+def _covered_area(points: Tensor, normals: Tensor, viewmat: Tensor, focal: Tensor) -> Tensor:
+    """(n,) of the surface, that one pixel of a photo covers; endless where it is seen edge-on."""
     towards = points - invert_rigid(viewmat)[:3, 3:]
     distances = (towards * towards).sum(0).sqrt().clamp_min(1e-9)  # `norm` over rows is ten times slower
     cosines = (towards * normals).sum(0).abs() / distances
-    return (distances / K[0, 0]) ** 2 / cosines.clamp_min(1e-3)
+    return (distances / focal) ** 2 / cosines.clamp_min(1e-3)
 
 
 def _same(points: Tensor, viewmat: Tensor, K: Tensor, log_depths: Tensor, known: Tensor) -> Tensor:

@@ -108,6 +108,15 @@ def test_the_finer_one_wins_from_twice_the_area_on(earlier, nearer, wins):
     assert keep[far_at][~common].all()  # what the nearer does not see
 
 
+@pytest.mark.parametrize(("fineness", "wins"), [(1.5, True), (1.3, False)])
+@pytest.mark.parametrize("views", [2, 3, 10])
+def test_a_larger_photo_is_finer(fineness, wins, views):
+    """Of photos from one place the last has so many more pixels in a row: their square is what counts."""
+    given = seen([camera()] * views)
+    keep = owned(*given, fineness=torch.tensor([1.0] * (views - 1) + [fineness]))
+    assert keep[-1].all() == wins and keep[0].all() != wins and not keep[1:-1].any()
+
+
 def test_a_wall_seen_from_aside_is_left_to_the_photo_that_faces_it():
     given = seen([camera((-6.0, 0.0, 1.0), turn=(1.25, 0.0)), camera()])
     keep = owned(*given)
