@@ -71,8 +71,12 @@ def owned(
 
 
 def from_the_middle(depths: Float[Tensor, "V H W"], viewmats: Float[Tensor, "V 4 4"]) -> list[int]:
-    """Photos by how near they are to all others, the nearest first: places over the median depth, and unit
-    vectors of view. Of two neither is nearer: as they come."""
+    """All V photos by how near they are to all others, the nearest first: places over the median depth (no
+    unit), and unit vectors of view. Of two neither is nearer: as they come.
+
+    Args:
+        depths, viewmats: as `owned`.
+    """
     if len(depths) <= 2:
         return [*range(len(depths))]
     poses = invert_rigid(viewmats.double())
@@ -98,6 +102,8 @@ def filled(
     bare, found = known & ~covered(depths, viewmats, Ks, keep, anything), keep.clone()
     before = depths.new_zeros(3, 0)
     for view in from_the_middle(depths, viewmats):
+        if not bool(bare[view].any()):
+            continue
         points, _ = _surface(depths[view], viewmats[view], Ks[view])
         own = bare[view] & ~_hit(before, viewmats[view], Ks[view], (1 + _ABOUT) * depths[view])
         found[view] |= own
