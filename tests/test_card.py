@@ -7,7 +7,9 @@ from tests.tools.card import Step, document_text, run_step, steps
 
 def test_a_failing_a_hanging_and_a_silent_step_are_said(tmp_path: Path):
     failing = Step("failing", ("-c", "raise SystemExit('no memory')"), 30, tmp_path / "a.json")
-    hanging = Step("hanging", ("-c", "import time; time.sleep(60)"), 1, tmp_path / "b.json")
+    hanging = Step(
+        "hanging", ("-c", "import subprocess; subprocess.run(('sleep', '60'))"), 1, tmp_path / "b.json"
+    )
     assert "no memory" in run_step(failing)["failed"]
     assert run_step(hanging)["failed"] == "longer than 1 s"
 
