@@ -5,7 +5,7 @@ from pathlib import Path
 
 from langflash_core.network.presets import PRECISIONS
 
-from ..values import minutes, part, seed, size, whole_count
+from ..values import above_zero, minutes, part, seed, size, whole_count
 from .shared import add_description, add_json, add_output, new_actions, new_command
 
 # langflash_core.lab.photos.layouts.LAYOUTS, which would bring torch along.
@@ -242,6 +242,22 @@ def _add_late(actions) -> None:
         help="with --more: what the weights say of every photo mirrored and larger teaches them instead",
     )
     add_output(late, "RUN", "folder of checkpoints and logs")
+    late.add_argument(
+        "--workers",
+        type=seed,
+        default=0,
+        metavar="N",
+        help="processes that read photos ahead, so that a graphics card waits for none (default: none)",
+    )
+    late.add_argument(
+        "--rate", type=above_zero, metavar="R", help="the peak learning rate (default: the stage's)"
+    )
+    late.add_argument(
+        "--pictures",
+        type=whole_count,
+        metavar="N",
+        help="photos of a step, of each kind (default: the stage's)",
+    )
     late.add_argument("--minutes", required=True, type=minutes, metavar="M", help="of training")
     _add_loop(late)
     _add_start(late)

@@ -2,14 +2,15 @@
 
 The late half (whole blocks), what reads it, and depth learn at once, in the space of texts, so that the
 network is whole after every step. A step sees labelled photos; photos of which little or nothing is known,
-for which the average of the weights so far says what is where in the photo's own light, and the network has
-to say so in another, with pieces of other photos before it and features left out; and every third step a
-rendered room. The teacher counts only where it is surer than it usually is of that class.
+for which the average of the weights so far says what is where in the photo's own light, as it is and
+mirrored, and the network has to say so in another, with pieces of other photos before it and features left
+out; and every third step a rendered room. What the teacher is surer of than it usually is of that class
+counts as a label; of the rest the network learns the odds, and its depth.
 
 Sizes: B photos, h w pixels of the language map, P drawn pixels, N names, C channels.
 
-Source: Sohn et al. 2020 (FixMatch); Zhang et al. 2021 (FlexMatch: a threshold of each class); Yun et al. 2019
-(CutMix); Yang et al. 2025 (UniMatch V2).
+Source: Tarvainen and Valpola 2017 (mean teacher); Sohn et al. 2020 (FixMatch); Zhang et al. 2021
+(FlexMatch: a threshold of each class); Yun et al. 2019 (CutMix); Yang et al. 2025 (UniMatch V2).
 """
 
 from copy import deepcopy
@@ -28,7 +29,7 @@ from langflash_core.lab.training.stages.depth import depth_stage
 from langflash_core.lab.training.stages.language import language_stage, thinned
 from langflash_core.lab.training.stages.pixels import evenly_drawn, nearest
 from langflash_core.lab.training.stages.stage import Loss, Stage, Words, guided
-from langflash_core.network.encoders.shared import Tokens
+from langflash_core.network.encoders.shared import Tokens, tokens_to_maps
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.layers.dpt import double
 
@@ -54,11 +55,14 @@ ATTRACTION = 0.25
 
 @dataclass(frozen=True)
 class Weights:
-    """What each part of a step's loss counts: names beside classes, what the teacher says, depth, rooms."""
+    """What each part of a step's loss counts: names beside classes, what the teacher says and, of that, the
+    odds; true depth, depth that the teacher says, rooms."""
 
     names: float = 0.5
     silent: float = 0.5
+    odds: float = 1.0
     depth: float = 1.0
+    said_depth: float = 0.3
     rooms: float = 0.5
 
 
@@ -119,6 +123,7 @@ class Averaged(nn.Module):
         super().__init__()
         head = network.language_head
         self.late, self.taught, self.out = deepcopy(network.late), deepcopy(head.taught), deepcopy(head.out)
+        self.decoder, self.depth_head = deepcopy(network.decoder), deepcopy(network.depth_head)
         self.register_buffer("usual", torch.full((len(CLASSES37),), 1 / len(CLASSES37)))
         self.register_buffer("age", torch.tensor(0))
 
@@ -128,7 +133,11 @@ class Averaged(nn.Module):
         self.age += 1
         decay = self._decay(TEACHER_DECAY)
         head = network.language_head
-        for own, other in ((self.late, network.late), (self.taught, head.taught), (self.out, head.out)):
+        pairs = (
+            (self.late, network.late), (self.taught, head.taught), (self.out, head.out),
+            (self.decoder, network.decoder), (self.depth_head, network.depth_head),
+        )  # fmt: skip
+        for own, other in pairs:
             for mine, theirs in zip(own.parameters(), other.parameters(), strict=True):
                 mine.lerp_(theirs, 1 - decay)
 
@@ -136,14 +145,22 @@ class Averaged(nn.Module):
         return min(most, int(self.age) / (9 + int(self.age)))
 
     @torch.no_grad()
-    def hidden(self, network: GuidedDepthNet, images: Tensor) -> Tensor:
-        """What its last layer reads of photos (B, 1, 3, H, W), (B, h, w, F)."""
+    def looks(self, network: GuidedDepthNet, images: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor]:
+        """What its last layer reads of photos (B, 1, 3, H, W), (B, h, w, F), and their log depths (B, H, W):
+        means of the photos as they are and mirrored. (The last layer is linear.)"""
         self.eval()
+        own, other = self._look(network, images, Ks), self._look(network, *mirrored(images, Ks))
+        return (own[0] + other[0].flip(2)) / 2, (own[1] + other[1].flip(-1)) / 2
+
+    def _look(self, network: GuidedDepthNet, images: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor]:
         tokens, early = network.encoder(images)
         named = tuple(t.unflatten(0, images.shape[:2]) for t in self.late(early, network.encoder.vit))
         tokens = Tokens(tokens.hooks, tokens.grid, named)
         taught = double(self.taught(tokens.taught_maps()), align_corners=False)
-        return torch.cat((network.language_head.own(tokens), taught), 1).movedim(1, -1)
+        hidden = torch.cat((network.language_head.own(tokens), taught), 1).movedim(1, -1)
+        deep = (tokens_to_maps(t.flatten(0, 1), tokens.grid) for t in self.decoder(tokens, Ks, None))
+        maps = self.depth_head((tokens.maps(0), tokens.maps(1), *deep), tokens)
+        return hidden, maps.log_depths[:, 0].float()
 
     @torch.no_grad()
     def surely(self, features: Tensor, classes: Tensor) -> Tensor:
@@ -180,7 +197,7 @@ def _loss(network: GuidedDepthNet, batch: FewBatch, words: Words, bank: NameBank
         depth = _depth(network, tokens.each(lambda hook: hook[known]), photos.Ks[known], photos.depths[known])
         total, told = total + counts.depth * depth, told | {"depth": float(depth.detach())}
     if batch.silent is not None:
-        said, parts = _silent(network, batch.silent, bank, counts.names, generator)
+        said, parts = _silent(network, batch.silent, bank, counts, generator)
         total, told = total + counts.silent * said, told | parts
     if batch.rooms is not None:
         said, parts = room_loss(network, batch.rooms, words, counts.depth)
@@ -267,17 +284,18 @@ def _apart(units: Tensor, texts: Tensor) -> Tensor:
 
 
 def _silent(
-    network: GuidedDepthNet, photos: DrawnPhotos, bank: NameBank, names: float, generator: torch.Generator
+    network: GuidedDepthNet, photos: DrawnPhotos, bank: NameBank, counts: Weights, generator: torch.Generator
 ) -> tuple[Tensor, dict[str, float]]:
     """What labels say where there are some, and the teacher elsewhere, of photos mixed with each other."""
     teacher, out = network.averaged, network.language_head.out
     assert isinstance(teacher, Averaged)
     teacher.follow(network)
-    seen = teacher.hidden(network, photos.images)
+    seen, logs = teacher.looks(network, photos.images, photos.Ks)
     size = (seen.shape[1], seen.shape[2])
     grid = (size[0] // 4, size[1] // 4)
     boxes, other = cut_boxes(len(seen), grid, generator)
-    pictures = pasted(photos.relit, scaled(boxes, photos.images.shape[-2] // grid[0]), other)
+    patch = photos.images.shape[-2] // grid[0]
+    pictures = pasted(photos.relit, scaled(boxes, patch), other)
     places = torch.arange(seen[..., 0].numel()).unflatten(0, seen.shape[:3])
     drawn = torch.randperm(places.numel(), generator=generator)[:SILENT_PIXELS]
     origin = pasted(places, scaled(boxes, 4), other).flatten()[drawn]  # where the teacher saw the same
@@ -286,19 +304,48 @@ def _silent(
     known = nearest(photos.classes, size).flatten()[origin.to(photos.classes.device)]
     said = torch.where(known >= 0, known, teacher.surely(vectors, bank.classes.to(vectors)))
     sure = said >= 0
-    hidden = read(network, thinned(network.encode(pictures, photos.Ks), HIDDEN, generator))
-    units = units_at(hidden, out, drawn[sure.cpu()])
-    by_class = class_loss(units, said[sure], bank)
+    tokens = network.encode(pictures, photos.Ks)
+    hidden = read(network, thinned(tokens, HIDDEN, generator))
+    units = units_at(hidden, out, drawn)
+    by_class = class_loss(units[sure], said[sure], bank)
     share = float(sure.float().mean())
-    total = share * (by_class + ATTRACTION * _apart(units, vectors[sure]))
-    told = {"silent": float(by_class.detach()), "sure": share}
+    by_odds = odds_loss(units, vectors, bank)
+    total = share * by_class + ATTRACTION * _apart(units, vectors) + counts.odds * by_odds
+    told = {"silent": float(by_class.detach()), "sure": share, "odds": float(by_odds.detach())}
+    if counts.said_depth:
+        truth = without(logs.exp(), scaled(boxes, patch))
+        deep = _depth(network, tokens, photos.Ks, truth)
+        total, told = total + counts.said_depth * deep, told | {"said_depth": float(deep.detach())}
     rows = nearest(photos.names, size).flatten()[origin.to(photos.names.device)].cpu()
     chosen = evenly_drawn(rows, NAME_PIXELS, generator)
     if len(chosen):
         of_set = photos.sets[(origin[chosen] // (size[0] * size[1])).to(photos.sets.device)]
         said = name_loss(units_at(hidden, out, drawn[chosen]), rows[chosen], of_set, bank)
-        total, told = total + names * said, told | {"silent_names": float(said.detach())}
+        total, told = total + counts.names * said, told | {"silent_names": float(said.detach())}
     return total, told
+
+
+def odds_loss(units: Tensor, said: Tensor, bank: NameBank) -> Tensor:
+    """How far the odds of unit vectors (P, C) lie from those that a teacher's say: among the 37 classes,
+    where rare ones count more, and among all names."""
+    classes, names = bank.classes.to(units), bank.vectors.to(units)
+    weights = bank.balance.to(units)[(said @ classes.T).argmax(-1)]
+    by_class = (odds_apart(units, said, classes) * weights).sum() / weights.sum()
+    return by_class + odds_apart(units, said, names).mean()
+
+
+def odds_apart(units: Tensor, said: Tensor, texts: Tensor) -> Tensor:
+    """Kullback-Leibler divergence (P,) of softmaxes over texts (N, C), in nats: what is said from what is."""
+    ours = (TEMPERATURE * units @ texts.T).float().log_softmax(-1)
+    theirs = (TEMPERATURE * said @ texts.T).float().log_softmax(-1)
+    return (theirs.exp() * (theirs - ours)).sum(-1)
+
+
+def mirrored(images: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor]:
+    """Photos (..., H, W) with left and right changed, and their intrinsics (..., 3, 3)."""
+    other = Ks.clone()
+    other[..., 0, 2] = images.shape[-1] - Ks[..., 0, 2]
+    return images.flip(-1), other
 
 
 def cut_boxes(
@@ -327,4 +374,12 @@ def pasted(maps: Tensor, boxes: list[tuple[int, int, int, int]], others: list[in
     answer = maps.clone()
     for place, ((top, left, bottom, right), other) in enumerate(zip(boxes, others, strict=True)):
         answer[place, ..., top:bottom, left:right] = maps[other, ..., top:bottom, left:right]
+    return answer
+
+
+def without(maps: Tensor, boxes: list[tuple[int, int, int, int]]) -> Tensor:
+    """Maps (B, H, W), 0 inside the boxes."""
+    answer = maps.clone()
+    for place, (top, left, bottom, right) in enumerate(boxes):
+        answer[place, top:bottom, left:right] = 0
     return answer

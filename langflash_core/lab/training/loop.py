@@ -21,6 +21,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 
+from langflash_core.lab.training.ahead import DrawnAhead
 from langflash_core.lab.training.board import Board
 from langflash_core.lab.training.draws import Draws, all_states, begin_draws, restore_draws
 from langflash_core.lab.training.mixing import loss_of
@@ -70,7 +71,7 @@ class LoopOptions:
     earlier where not None; report_s, validate_s, save_s: seconds between reports.
 
     pictures: of a batch; batches: that a step is made of, None for one a process; precision: auto, float32
-    or bfloat16; board: also write TensorBoard's logs.
+    or bfloat16; board: also write TensorBoard's logs; workers: processes that draw batches ahead, 0: none.
     """
 
     minutes: float
@@ -87,6 +88,7 @@ class LoopOptions:
     batches: int | None = None
     precision: str = "auto"
     board: bool = False
+    workers: int = 0
     optimising: Optimising = Optimising()
 
     def computing(self) -> torch.autocast:
@@ -180,11 +182,17 @@ class _Training:
         self.inner = _StageLoss(self.network, self.stage)
         self.loss: nn.Module = self.inner
         batches = len(self.draws) * world()
-        self.sets = {draws.number: _part(self.rooms, draws.number, batches) for draws in self.draws}
+        self.sets = {draws.number: self._set(draws.number, batches) for draws in self.draws}
         if world() > 1:
             self.loss = DistributedDataParallel(
                 self.inner, find_unused_parameters=True, forward_sync_buffers=False
             )
+
+    def _set(self, number: int, batches: int) -> Drawn:
+        part, options = _part(self.rooms, number, batches), self.options
+        if not options.workers:
+            return part
+        return DrawnAhead(part, options.workers, options.seed + 1_000_003 * number)
 
     def go(self) -> None:
         """Steps, reports, validation and checkpoints until time or steps run out."""

@@ -21,8 +21,9 @@ from torch.nn import functional as F
 from langflash_core.lab.training.bank import NameBank
 from langflash_core.lab.training.fewlabels import (
     HIDDEN,
-    TEMPERATURE,
     FewBatch,
+    mirrored,
+    odds_apart,
     read,
     room_loss,
     told_loss,
@@ -94,13 +95,6 @@ class Copy:
         return F.normalize(features + more, dim=1).movedim(1, -1), (logs + deeper[:, 0]) / 2
 
 
-def mirrored(images: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor]:
-    """Photos (..., H, W) with left and right changed, and their intrinsics (..., 3, 3)."""
-    other = Ks.clone()
-    other[..., 0, 2] = images.shape[-1] - Ks[..., 0, 2]
-    return images.flip(-1), other
-
-
 def twice_stage(bank: NameBank, copy: Copy, weights: Weights | None = None) -> Stage:
     """The late half, whole, and what reads it, taught by a copy of what they were."""
     counts = weights or Weights()
@@ -142,13 +136,6 @@ def said_loss(
     told = {"apart": apart, "said_classes": by_class, "said_names": by_name}
     total = counts.direction * apart + counts.classes * by_class + counts.names * by_name
     return total, {key: float(value.detach()) for key, value in told.items()}
-
-
-def odds_apart(units: Tensor, said: Tensor, texts: Tensor) -> Tensor:
-    """Kullback-Leibler divergence (P,) of softmaxes over texts (N, C), in nats: what is said from what is."""
-    ours = (TEMPERATURE * units @ texts.T).float().log_softmax(-1)
-    theirs = (TEMPERATURE * said @ texts.T).float().log_softmax(-1)
-    return (theirs.exp() * (theirs - ours)).sum(-1)
 
 
 def _depth(
