@@ -28,3 +28,10 @@ def test_steps_of_the_card_are_left_out_without_one(tmp_path: Path):
 def test_failures_stand_in_the_table():
     document = {"machine": {}, "left_out": "", "steps": {"asking": {"failed": "status 1: x", "took_s": 2}}}
     assert "Failed: status 1: x" in document_text(document)
+
+
+def test_a_limit_leaves_the_rows_that_were_done(tmp_path: Path):
+    code = 'import pathlib, sys, time; pathlib.Path(sys.argv[1]).write_text(\'{"rows": [{"ms": 1}]}\'); time.sleep(60)'
+    written = tmp_path / "a.json"
+    found = run_step(Step("pictures", ("-c", code, str(written)), 1, written))
+    assert found["rows"] == [{"ms": 1}] and "1 s" in found["cut"]

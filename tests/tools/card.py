@@ -37,11 +37,11 @@ class Step:
 
 def steps(folder: Path, quick: bool, card: bool) -> list[Step]:
     """What is measured, in order; without a card the card's own are left out."""
-    own = ["ceilings", "pictures", "asking"] if card else ["pictures", "asking"]
-    made = [_own(name, folder, quick) for name in own]
+    made = [_own(name, folder, quick) for name in (["ceilings", "asking"] if card else ["asking"])]
     networks = [("full", 256), ("mini", 224)] if card or not quick else [("mini", 224)]
     for compiled in (False, True) if card else (False,):
         made += [_network(preset, side, folder, quick, card, compiled) for preset, side in networks]
+    made.append(_own("pictures", folder, quick))
     return [*made, *([_own("gsplat", folder, quick)] if card else [])]  # last: its build may still run
 
 
@@ -75,7 +75,10 @@ def run_step(step: Step) -> dict:
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)  # compilers it started, too: they hold the pipes
         process.communicate()
-        return {"failed": f"longer than {step.seconds} s", "took_s": step.seconds}
+        if not step.written.exists():
+            return {"failed": f"longer than {step.seconds} s", "took_s": step.seconds}
+        cut = {"cut": f"ended after {step.seconds} s; these rows were done"}
+        return {**json.loads(step.written.read_text(encoding="utf-8")), **cut, "took_s": step.seconds}
     took = round(time.perf_counter() - start, 1)
     if process.returncode or not step.written.exists():
         said = (err or out).strip()[-2000:]
