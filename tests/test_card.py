@@ -31,7 +31,7 @@ def test_failures_stand_in_the_table():
 
 
 def test_a_limit_leaves_the_rows_that_were_done(tmp_path: Path):
-    code = 'import pathlib, sys, time; pathlib.Path(sys.argv[1]).write_text(\'{"rows": [{"ms": 1}]}\'); time.sleep(60)'
+    wait = "import pathlib, sys, time; pathlib.Path(sys.argv[1]).write_text(sys.argv[2]); time.sleep(60)"
     written = tmp_path / "a.json"
-    found = run_step(Step("pictures", ("-c", code, str(written)), 1, written))
+    found = run_step(Step("pictures", ("-c", wait, str(written), '{"rows": [{"ms": 1}]}'), 1, written))
     assert found["rows"] == [{"ms": 1}] and "1 s" in found["cut"]
