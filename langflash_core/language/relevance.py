@@ -28,6 +28,7 @@ Mode = Literal["relevancy", "cosine"]
 # half-precision weight maps, too, have a direction wherever relevance is not 0.
 EMPTY_NORM = 1e-4
 _PIXELS_AT_ONCE = 1 << 13  # 33 KB a phrase: 100 phrases stay in the cache, 2.6 times as quick as 1 << 16
+_ON_A_CARD = 1 << 18  # where starting work costs more than memory: 105 MB for 100 phrases
 
 
 @dataclass(frozen=True)
@@ -209,7 +210,8 @@ def feature_relevance(
         ValueError: the vectors have other numbers than the phrases.
     """
     pixels = maps.flatten(0, -2)
-    found = [_relevance(decode(part), compiled, eps) for part in pixels.split(_PIXELS_AT_ONCE)]
+    block = _PIXELS_AT_ONCE if pixels.device.type == "cpu" else _ON_A_CARD
+    found = [_relevance(decode(part), compiled, eps) for part in pixels.split(block)]
     return torch.cat(found, -1).unflatten(-1, maps.shape[:-1])
 
 
