@@ -4,7 +4,7 @@
     python -m tests.tools.card -o FOLDER [--quick]
 
 Each step runs in a process of its own with a time limit, so that one failure costs nothing else. Writes
-FOLDER/card.json and FOLDER/card.md after every step.
+FOLDER/card.json and, to be read, "card.md" beside it after every step.
 """
 
 import argparse
@@ -87,7 +87,7 @@ def run_step(step: Step) -> dict:
 
 
 def document_text(document: dict) -> str:
-    """card.md: the machine, then a table for each step."""
+    """The page: the machine, then a table for each step."""
     lines = [
         "# Measured on this machine",
         "",
