@@ -5,10 +5,13 @@ plane that holds `up`. So with m the unit normal of that plane, in the world, m 
 edges along another direction r of the room. Surfaces tell the same, less exactly: their normals n are along
 one of the directions. Edges do not know depth, so their directions are as exact as the photo is sharp.
 
-Two steps. *Search*: of directions up to `MOST_PITCH` from the camera's own up, those that most edges and
-surfaces agree on, with the weak belief that people hold cameras level. *Fit*: from each of the best, Gauss-
-Newton on a rotation R whose columns are the directions, every edge weighted by how well it fits the nearest
-one, narrower from round to round.
+Two steps. *Search*: of directions up to `MOST_PITCH` from the camera's own up, each with the walls that fit
+it best, those under which all edges are likeliest. *Fit*: from each of the best, Gauss-Newton on a rotation R
+whose columns are the directions, every edge weighted by how well it fits the nearest one, narrower from round
+to round; the likeliest of what comes out is the answer.
+
+An edge is along one of the directions or along none. Logarithms of chances add up, so that many edges outvote
+what is believed before: that people hold cameras level, and that what answers "floor" is level.
 
 Sizes: L edges, n surfaces, V cameras. Everything in float64; angles in degrees where they say so.
 
@@ -30,9 +33,11 @@ _APART = 6.0  # degrees between two directions that are both tried
 _TRIED = 5
 _EDGE, _SURFACE = 2.0, 15.0  # degrees within which an edge, or a surface, agrees with a direction
 _ROUNDS = (6.0, 4.0, 3.0, 2.0, 1.5, 1.0, 1.0, 0.7, 0.7)  # degrees, of the fit
-_SURFACES_SAY = 0.1  # of the choice; edges say the rest
+_ALONG = 0.2  # of edges, along each direction; the others are along none
+_WITNESS = 0.4  # longer sides of a photo: so much edge is one witness; edges come in pieces and in pairs
+_SEARCHED = 500  # edges, the longest; the fit and the choice see all
+_SURFACES_SAY = 10.0  # in logarithms of chances, where all of them are level or upright; edges say more
 _SURFACE_WEIGHT = 0.02  # of all surfaces beside all edges, in the fit: their depth leans
-_NOTHING = 1e-3  # of agreement: where there is none, belief decides
 _FEW = 10.0  # longer sides of photos: as if there were so many edges, where there are fewer
 _LEAST = 0.25  # degrees: no answer is more certain than lenses and photos are
 
@@ -91,7 +96,7 @@ def _starts(sights: Sights) -> list[np.ndarray]:
     home = sights.cameras[0].T
     turns = Rotation.from_euler("zx", [(roll, pitch) for roll in _ROLLS for pitch in _PITCHES], degrees=True)
     ups = (home @ turns.apply([0.0, -1.0, 0.0]).T).T  # (U, 3)
-    scores = (_upright(sights, ups) + _NOTHING) * _held(sights, ups)
+    scores = _edges_say(sights, ups) + _surfaces_say(sights, ups) + np.log(_held(sights, ups))
     chosen: list[np.ndarray] = []
     for row in np.argsort(-scores, kind="stable"):
         if all(ups[row] @ other < math.cos(math.radians(_APART)) for other in chosen):
@@ -101,15 +106,32 @@ def _starts(sights: Sights) -> list[np.ndarray]:
     return chosen
 
 
-def _upright(sights: Sights, ups: np.ndarray) -> np.ndarray:
-    """(U,) of edges that may be upright, and of surfaces that are level or upright, for directions (U, 3)."""
-    total = max(float(sights.lengths.sum()), 1e-9)
-    edges = sights.lengths @ _near(np.abs(sights.edges @ ups.T), _EDGE) / total
+def _edges_say(sights: Sights, ups: np.ndarray) -> np.ndarray:
+    """(U,) how likely the longest edges are, for directions (U, 3), each with the walls that fit it best."""
+    longest = np.argsort(-sights.lengths, kind="stable")[:_SEARCHED]
+    edges, lengths = sights.edges[longest], sights.lengths[longest]
+    scores = np.zeros(len(ups))
+    for row, up in enumerate(ups):
+        upright = _near(np.abs(edges @ up), _EDGE)[:, None]
+        along, across = (_near(np.abs(edges @ sides.T), _EDGE) for sides in _sides(up))  # (L, A)
+        scores[row] = _likely(lengths, upright + along + across, _EDGE).max()
+    return scores
+
+
+def _likely(lengths: np.ndarray, near: np.ndarray, width: float) -> np.ndarray:
+    """(A,) logarithms of the chance of edges of which `near` (L, A) is how near they are to three directions,
+    over that of edges along none, whose planes may lie in any way: their sines fill [0, 1] evenly."""
+    peak = 2 / (math.sqrt(2 * math.pi) * math.radians(width))  # of a half Gaussian
+    return lengths @ np.log(1 - 3 * _ALONG + _ALONG * peak * near) / _WITNESS
+
+
+def _surfaces_say(sights: Sights, ups: np.ndarray) -> np.ndarray:
+    """(U,) of surfaces that are level or upright, for directions (U, 3)."""
     if not len(sights.normals):
-        return edges
+        return np.zeros(len(ups))
     lean = np.abs(sights.normals @ ups.T).clip(max=1.0)
     flat = _near(np.sqrt(1 - lean**2), _SURFACE) + _near(lean, _SURFACE)
-    return edges + _SURFACES_SAY * flat.mean(0)
+    return _SURFACES_SAY * flat.mean(0)
 
 
 def _held(sights: Sights, ups: np.ndarray) -> np.ndarray:
@@ -132,11 +154,7 @@ def _maybe(shares: np.ndarray) -> np.ndarray:
 
 def _walls_of(sights: Sights, up: np.ndarray) -> np.ndarray:
     """Axes (3, 3) with this up, turned about it to where most edges and walls agree."""
-    away = np.eye(3)[np.abs(up).argmin()]
-    first = np.cross(up, away) / np.linalg.norm(np.cross(up, away))
-    angles = np.radians(np.arange(0.0, 90.0, 2.0))[:, None]
-    along = np.cos(angles) * first + np.sin(angles) * np.cross(up, first)  # (A, 3)
-    across = np.cross(up, along)
+    along, across = _sides(up)
     scores = np.zeros(len(along))
     if len(sights.lengths):
         near = np.maximum(*(_near(np.abs(sights.edges @ side.T), 1.5 * _EDGE) for side in (along, across)))
@@ -147,6 +165,15 @@ def _walls_of(sights: Sights, up: np.ndarray) -> np.ndarray:
         scores += 0.5 * near.mean(0)
     best = int(scores.argmax())
     return np.stack((along[best], across[best], up), 1)
+
+
+def _sides(up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Directions (A, 3) around up, every two degrees of a quarter turn, and those across them."""
+    away = np.eye(3)[np.abs(up).argmin()]
+    first = np.cross(up, away) / np.linalg.norm(np.cross(up, away))
+    angles = np.radians(np.arange(0.0, 90.0, 2.0))[:, None]
+    along = np.cos(angles) * first + np.sin(angles) * np.cross(up, first)
+    return along, np.cross(up, along)
 
 
 def _fitted(sights: Sights, axes: np.ndarray, fixed: bool) -> Directions:
@@ -202,16 +229,11 @@ def _error(information: np.ndarray, axes: np.ndarray) -> float:
 
 
 def _agreement(sights: Sights, axes: np.ndarray) -> float:
-    """How much speaks for three directions; upright edges count twice."""
-    up = axes[:, 2]
-    near = _near(np.abs(sights.edges @ axes), 1.0)
-    edges = (
-        sights.lengths @ np.maximum(near[:, 2], 0.5 * near.max(1)) / max(float(sights.lengths.sum()), 1e-9)
-    )
-    surfaces = _upright(
-        Sights(sights.edges[:0], sights.lengths[:0], sights.normals, sights.cameras), up[None]
-    )
-    return float((edges + surfaces[0] + _NOTHING) * _held(sights, up[None])[0])
+    """How much speaks for three directions: logarithms of chances, of edges, of surfaces and of belief."""
+    up, width = axes[:, 2][None], _ROUNDS[-1]
+    near = _near(np.abs(sights.edges @ axes), width).sum(1, keepdims=True)
+    told = _likely(sights.lengths, near, width) + _surfaces_say(sights, up) + np.log(_held(sights, up))
+    return float(told[0])
 
 
 def _near(sines: np.ndarray, degrees: float) -> np.ndarray:

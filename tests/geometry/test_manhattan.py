@@ -74,6 +74,26 @@ def test_what_is_known_to_be_level_decides_between_two_rooms():
     assert angle(found_directions(mixed).up, second) < 0.5
 
 
+def test_many_edges_outvote_a_floor_whose_depth_leans_and_a_camera_that_looks_down():
+    """Most edges are along one wall, as of a kitchen front; few are upright, and the floor's surface leans by
+    20 degrees about that wall, towards the camera's own up. Rooms turned about it explain most edges, too."""
+    up = leaning(-31, 1)
+    wall = np.cross(up, [0.0, 0.0, 1.0])
+    wall /= np.linalg.norm(wall)
+    rng = np.random.default_rng(5)
+    edges = []
+    for axis, count in ((wall, 60), (up, 8), (np.cross(wall, up), 8)):
+        planes = np.cross(axis, rng.normal(size=(count, 3)))
+        edges.append(planes / np.linalg.norm(planes, axis=1, keepdims=True))
+    stray = rng.normal(size=(30, 3))
+    every = np.concatenate((*edges, stray / np.linalg.norm(stray, axis=1, keepdims=True)))
+    every += np.radians(0.2) * rng.normal(size=every.shape)
+    every /= np.linalg.norm(every, axis=1, keepdims=True)
+    seen = Sights(every, np.full(len(every), 0.1), NONE, np.eye(3)[None], floor=leaning(-11, 1))
+    # About the wall, 16 edges off by .2 degrees tell .2 / sqrt(8) = .07; stray ones pull, as above.
+    assert angle(found_directions(seen).up, up) < 0.25
+
+
 def test_nothing_leaves_the_cameras_own_up_and_says_how_little_is_known():
     found = found_directions(Sights(NONE, np.zeros(0), NONE, np.eye(3)[None]))
     assert angle(found.up, np.array([0.0, -1, 0])) < 1e-5 and found.error > 10
