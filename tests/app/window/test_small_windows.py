@@ -265,3 +265,15 @@ def test_a_tour_and_rules_leave_the_view_to_see_that_they_are_about(
         assert left <= side[0] and top <= side[1] and right >= side[2] - 1 and bottom >= side[3]
     covered = max(0.0, right - max(left, 348 * scale)) / (size[0] - 348 * scale)
     assert covered < 0.4 and not overlap((left, top, right, bottom), views)
+
+
+def test_the_dictionary_has_room_for_its_groups_beside_a_narrow_picture(monkeypatch) -> None:
+    """At 800 x 500 it lay over the picture's tools, and showed one group and a half."""
+    monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
+    state = shown_scene()
+    state = replace(state, preferences=replace(state.preferences, dictionary_open=True))
+    with context((800, 500)):
+        theme.set_up(1.0, "dark")
+        frames(lambda seen: layout.draw_all(state, seen), look(), 6)
+        _left, top, right, bottom = box("Dictionary")
+    assert right <= 348 and bottom - top > 400
