@@ -6,6 +6,7 @@ a resting picture is a query pass and no splat pass. No torch before the first s
 
 import logging
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import moderngl
@@ -49,6 +50,7 @@ class Viewport:
         self._ctx = ctx
         self._notify = notify
         self._renderer: SplatRenderer | None = None
+        self._before: moderngl.Texture | None = None  # shown until a changed scene has a picture
         self._warming: Iterator[None] | None = None
         self._stand = Stand()
         self._adjusting = False  # what is drawn changes with every frame
@@ -82,15 +84,17 @@ class Viewport:
             log.exception("a shader could not be compiled ahead")
             return False
 
-    def set_scene(self, serial: int, scene: "Scene") -> None:
+    def set_scene(self, serial: int, scene: "Scene", changed: bool = False) -> None:
         """Upload a scene; the first one builds the renderer. What pictures of another took is given back.
-        A huge one, where OpenGL runs on the processor, waits for `thin`.
+        A huge one, where OpenGL runs on the processor, waits for `thin`. changed: it is the one on show as an
+        edit left it, whose last picture stays until there is a new one.
 
         Raises:
             GraphicsError: the OpenGL here cannot do it.
         """
         self._warming = self._awaited = self._asked = None
         renderer = self._made()
+        self._keep_look(changed)
         if self.picture is not None:
             self.picture.release(patience=0.0)
         self.picture = None
@@ -107,6 +111,21 @@ class Viewport:
 
             self.picture = CardPicture(renderer, serial, scene)
         self._fresh = True
+
+    def _keep_look(self, changed: bool) -> None:
+        """A copy of what is shown, whose texture goes with its picture; none of another scene."""
+        shown = self.texture if changed else None
+        kept = None
+        if shown is not None:
+            with suppress(moderngl.Error):  # the new picture comes all the same
+                kept = self._ctx.texture(shown.size, shown.components, shown.read(), dtype=shown.dtype)
+        self._forget_look()
+        self._before = kept
+
+    def _forget_look(self) -> None:
+        if self._before is not None:
+            self._before.release()
+        self._before = None
 
     def _begin(self, serial: int, scene: "Scene", thinned: "Scene", rows: np.ndarray) -> None:
         """Show a huge scene, now that the share of it that moves is made."""
@@ -178,13 +197,21 @@ class Viewport:
         if self._fresh:  # to take a scene took a frame's time
             self._fresh = False
             return 0.0
-        return self.picture.update(state, self._stand, touched)
+        wait = self.picture.update(state, self._stand, touched)
+        if self._own is not None:
+            self._forget_look()
+        return wait
 
     # --- what is shown ----------------------------------------------------------------------
 
     @property
     def texture(self) -> moderngl.Texture | None:
         """The picture to show, or None before the first scene, and where one that failed took its texture."""
+        return self._before if self._own is None else self._own
+
+    @property
+    def _own(self) -> moderngl.Texture | None:
+        """The scene's own picture, as it is."""
         shown = None if self.picture is None else self.picture.easel.texture
         return shown if shown is not None and hasattr(shown.mglo, "use") else None
 
@@ -194,8 +221,9 @@ class Viewport:
         return self.picture is not None and self.picture.whole
 
     def seen(self) -> UInt8[np.ndarray, "H W 3"] | None:
-        """What is shown, read back; None where nothing is."""
-        shown = self.texture
+        """The scene's own picture, read back; None where there is none: what was hidden for good may still be
+        in the one before."""
+        shown = self._own
         if shown is None:
             return None
         kind = {"f1": np.uint8, "f2": np.float16, "f4": np.float32}[shown.dtype]
@@ -263,6 +291,7 @@ class Viewport:
         if self.picture is not None:
             self.picture.release(_PATIENCE)
         self.picture = self._warming = self._awaited = None
+        self._forget_look()
         if self._renderer is not None:
             self._renderer.release()
         self._renderer = None

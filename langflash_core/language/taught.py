@@ -1,13 +1,14 @@
 """What people teach a scene: names that groups answer to as well, and words that they no longer answer to.
 
 A lesson moves its atom: towards a name t, d' = normalise(d + t); out of a denied word u, d' = d - (d . u) u,
-whose cosine with u is 0, below any negative. Atoms that look alike are moved along, all the way where they
-are the same and not at all from a cosine of `ALIKE` down:
+whose cosine with u is 0. Atoms that look alike are moved along, all the way where they are the same and not
+at all from a cosine of `ALIKE` down:
 
     d_j' = normalise(d_j + sum_k s_jk (d_k' - d_k)),
     s_jk = clamp((cos(d_j, d_k) - ALIKE) / (1 - ALIKE), 0, 1).
 
-A lone atom (`langflash_core.scene.lone`) is that of one part of a scene, and moves no other.
+A lone atom (`langflash_core.scene.lone`) is that of one part of a scene, and moves no other. Since negatives
+may lie below a cosine of 0 too, it goes as far to the other side, d' = d - 2 (d . u) u: nothing else is lost.
 
 Source: own.
 """
@@ -44,7 +45,9 @@ def taught_dictionary(
         return dictionary
     rows = torch.tensor(list(lessons), device=dictionary.device)
     before = dictionary[rows]
-    after = torch.stack([_moved(dictionary[k], *lesson, known) for k, lesson in lessons.items()])
+    after = torch.stack(
+        [_moved(dictionary[k], *lesson, known, k in record.lone_atoms) for k, lesson in lessons.items()]
+    )
     unit = normalize(dictionary, dim=-1)
     shares = ((unit @ unit[rows].T - ALIKE) / (1 - ALIKE)).clamp(0, 1)
     lone = torch.tensor([k in record.lone_atoms for k in lessons], device=dictionary.device)
@@ -67,12 +70,12 @@ def _encoded(space: LanguageSpace, text: str) -> Tensor | None:
         return None
 
 
-def _moved(atom: Tensor, name: str, denied: Sequence[str], known: Mapping[str, Tensor]) -> Tensor:
+def _moved(atom: Tensor, name: str, denied: Sequence[str], known: Mapping[str, Tensor], lone: bool) -> Tensor:
     """An atom (C,) after its own lesson; 0 where nothing of it is left."""
     if name in known:
         atom = normalize(normalize(atom, dim=0) + known[name], dim=0)
     against = [known[text] for text in denied if text in known]
     if against:
         span = torch.linalg.qr(torch.stack(against, 1))[0]  # (C, n)
-        atom = atom - span @ (span.T @ atom)
+        atom = atom - (2 if lone else 1) * span @ (span.T @ atom)
     return normalize(atom, dim=0) if float(atom.norm()) > 1e-3 else torch.zeros_like(atom)

@@ -154,8 +154,12 @@ def _shares_line(shares: tuple[float, ...]) -> str:
     return ", ".join(parts) + (f" and some of {len(some) - _NAMED} others" if len(some) > _NAMED else "")
 
 
-def world_line(world: World | None) -> str:
-    """How a scene stands and how large it may be, for people; "" where nobody looked."""
+def world_line(world: World | None, metric_scale: float | None = None) -> str:
+    """How a scene stands and how large it may be, for people; "" where nobody looked.
+
+    Args:
+        metric_scale: metres per scene unit where they are known: then nothing is guessed.
+    """
     if world is None:
         return ""
     known = {"edges": "edges of the photos", "surfaces": "surfaces", "told": "you"}[world.up_by]
@@ -163,7 +167,7 @@ def world_line(world: World | None) -> str:
     floor = {"floor": "on its floor", "lowest": "on what is lowest, for no floor is seen"}
     north = {"walls": "north along the wall that the first photo faces", "told": "north as you told it"}
     parts = [up, floor.get(world.floor_by, "on the point that you told"), north[world.north_by]]
-    if world.guess is not None:
+    if world.guess is not None and metric_scale is None:
         parts.append(guess_line(world.guess))
     return "; ".join(parts)
 

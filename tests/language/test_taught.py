@@ -57,6 +57,17 @@ def test_a_denied_word_is_refused_and_what_looks_alike_is_moved_along(scene):
     assert after[1] == pytest.approx(before[1], abs=0.02)
 
 
+def test_a_part_that_is_taken_out_is_far_below_the_threshold_even_where_negatives_are_below_zero():
+    """Groups of photos lie that way: with a cosine of 0 a plant went on to answer "plant" with .83."""
+    chair, wall = SPACE.encode(["armchair", "wall"])
+    aside = normalize(SPACE.encode(list(SPACE.negatives)).sum(0), dim=0)
+    part = normalize(chair - (chair @ aside) * aside - 0.4 * aside, dim=0)
+    scene = taught(room(torch.stack((part, wall, part))), atom_denials={2: ("armchair",)}, lone_atoms=(2,))
+    shared, _, out = score(scene, "armchair")
+    assert shared > SPACE.threshold and out < 0.1
+    assert max(score(scene, "wall")[2], score(scene, "window")[2]) < SPACE.threshold, "nothing else instead"
+
+
 def test_several_denials_leave_nothing_of_any(scene):
     record = Record(atom_denials={2: ("armchair", "chair", "seat")})
     row = taught_dictionary(scene.semantics.dictionary, record, SPACE)[2]

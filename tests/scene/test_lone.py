@@ -76,7 +76,7 @@ def test_what_a_lone_atom_is_denied_is_denied_to_no_other(room: Scene) -> None:
     denied = whole.with_record(atom_denials={atoms: ("chair",)})
     taught = taught_dictionary(whole.semantics.dictionary, denied.record, space)
     word = normalize(space.encode(["chair"])[0], dim=0)
-    assert abs(float(normalize(taught[atoms], dim=0) @ word)) < 1e-5
+    assert float(normalize(taught[atoms], dim=0) @ word) < -0.5  # on the other side
     assert torch.equal(taught[:atoms], whole.semantics.dictionary[:atoms])
     spread = replace(denied.record, lone_atoms=())
     assert not torch.equal(

@@ -64,7 +64,8 @@ def _for_people(document: dict[str, Any]) -> dict[str, Any]:
 
     says = {"detail": detail_line, "lens": lens_line, "left_out": left_out_line}
     lines = {name: line(document[name] or {}) for name, line in says.items()}
-    lines["world"] = world_line(world_from_json(document["world"]) if document["world"] else None)
+    world = world_from_json(document["world"]) if document["world"] else None
+    lines["world"] = world_line(world, document["metric_scale"])
     return {name: lines.get(name, value) for name, value in document.items() if lines.get(name) != ""}
 
 

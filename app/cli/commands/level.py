@@ -53,7 +53,7 @@ def run(args: Namespace, out: TextIO) -> None:
     if args.json:
         return write_json(document, out)
     known = scene.record.metric_scale
-    print(f"{document['scene']}: {world_line(world)}", file=out)
+    print(f"{document['scene']}: {world_line(world, known)}", file=out)
     if known:
         print(f"a unit is {known:.4g} m, as you told it", file=out)
     elif world.guess is not None:

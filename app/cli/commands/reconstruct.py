@@ -57,7 +57,7 @@ def run(args: Namespace, out: TextIO) -> None:
     else:
         print(_sentence(args.output, scene, document), file=out)
         if scene.record.world is not None:
-            print(world_line(scene.record.world), file=out)
+            print(world_line(scene.record.world, scene.record.metric_scale), file=out)
 
 
 def _written(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":

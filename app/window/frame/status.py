@@ -8,6 +8,7 @@ from imgui_bundle import imgui
 from ..kit import theme, widgets
 from ..kit.look import Look
 from ..scene.near import FADING, degrees_from_photos
+from ..scene.state import said as in_words
 from ..state import State
 
 
@@ -35,6 +36,8 @@ def figures(state: State) -> list[str]:
     """What there is to say, the most wanted first."""
     stats = state.stats
     said = [f"frame {1000 * stats.frame_seconds:.1f} ms"]
+    if state.scene.job is not None:  # its bar is at the panel's top, which may be scrolled away or covered
+        said.insert(0, f"{state.scene.job.title}: {in_words(state.scene.job.stage)}")
     aside = degrees_from_photos(state)
     if aside > FADING:
         said.append(f"{aside:.0f} degrees aside of the photos: less is known here")

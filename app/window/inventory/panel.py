@@ -23,6 +23,7 @@ _SIZE = (372.0, 560.0)  # design pixels, the height at most
 _LEAST = (300.0, 220.0)
 _BELOW, _MARGIN = 150.0, 12.0  # of axes and key frames, which are above; of the picture's border
 _BAR = 46.0  # of how sure
+_ASIDE = 120.0  # how far a caption goes to be seen
 _NAME = "##name"
 _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 
@@ -246,13 +247,16 @@ def draw_box(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
     if found is None:
         return
     x, y = found[1][0]
-    _caption(look, ImVec2(corner.x + float(x), corner.y + float(y)), name)
+    walls = boxes.windows_over((corner.x, corner.y, corner.x + size.x, corner.y + size.y))
+    left, top, right, bottom = caption_box(look, (corner.x + float(x), corner.y + float(y)), name, walls)
+    ground = imgui.IM_COL32(14, 16, 20, 205)
+    canvas.add_rect_filled(ImVec2(left, top), ImVec2(right, bottom), ground, look.px(5))
+    canvas.add_text(ImVec2(left + look.px(7), top + look.px(3)), widgets.u32(theme.DARK.TEXT), name)
 
 
-def _caption(look: Look, at: ImVec2, text: str) -> None:
-    """Words on a dark ground, centred above a point."""
-    canvas, extent = imgui.get_window_draw_list(), imgui.calc_text_size(text)
-    corner = ImVec2(at.x - extent.x / 2 - look.px(7), at.y - extent.y - look.px(14))
-    end = ImVec2(corner.x + extent.x + look.px(14), corner.y + extent.y + look.px(6))
-    canvas.add_rect_filled(corner, end, imgui.IM_COL32(14, 16, 20, 205), look.px(5))
-    canvas.add_text(ImVec2(corner.x + look.px(7), corner.y + look.px(3)), widgets.u32(theme.DARK.TEXT), text)
+def caption_box(look: Look, at: tuple[float, float], text: str, walls: tuple[boxes.Box, ...]) -> boxes.Box:
+    """Of words centred above a point, but beside the bars and panels that are there."""
+    extent = imgui.calc_text_size(text)
+    left, top = at[0] - extent.x / 2 - look.px(7), at[1] - extent.y - look.px(14)
+    box = (left, top, left + extent.x + look.px(14), top + extent.y + look.px(6))
+    return boxes.clear(box, walls, furthest=look.px(_ASIDE))

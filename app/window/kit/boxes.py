@@ -8,7 +8,7 @@ from .look import Look
 
 Box = tuple[float, float, float, float]
 
-_NARROW, _PANEL, _MARGIN = 640.0, 300.0, 12.0  # design pixels: of pictures, of panels, around windows
+_NARROW, _PANEL = 640.0, 300.0  # design pixels: of pictures, of panels
 _PASSING = imgui.WindowFlags_.child_window | imgui.WindowFlags_.tooltip | imgui.WindowFlags_.popup
 
 
@@ -59,11 +59,11 @@ def bars() -> list[Box]:
 
 def over_panel(place: ImVec2, size: ImVec2, look: Look) -> tuple[ImVec2, ImVec2] | None:
     """Corner and size of a window about a picture of `size` at `place`: over the panel at its left where the
-    picture is narrow, so that what one flies to is seen; None: it opens over the picture."""
-    margin = look.px(_MARGIN)
+    picture is narrow, so that what one flies to is seen; over all of the panel, for halves of its lines would
+    look out around the window. None: it opens over the picture."""
     if size.x >= look.px(_NARROW) or place.x < look.px(_PANEL):
         return None
-    return ImVec2(margin, margin), ImVec2(place.x - 2 * margin, place.y + size.y - 2 * margin)
+    return ImVec2(0, 0), ImVec2(place.x, place.y + size.y)
 
 
 def windows_over(picture: Box) -> tuple[Box, ...]:

@@ -99,8 +99,8 @@ class SceneEffects(Effects):
                 self._end_job(command, before)
             case ChoosePair() if state.scene.choosing and not before.scene.choosing:
                 submit(FindPair(tuple(photo.path for photo in state.scene.photos)))
-            case SceneArrived(info):
-                self._show(info, before.scene.info)
+            case SceneArrived(info, replaces=changed):
+                self._show(info, before.scene.info, changed)
                 for share in self._viewport.shares:
                     submit(Thin(info.serial, info.scene, share))
             case Thinned(scene, share, thinned, rows):
@@ -182,11 +182,11 @@ class SceneEffects(Effects):
         elif drop.scenes and not drop.films:
             perform(Instead((OpenScene(drop.scenes[0], alone=True),)))
 
-    def _show(self, info: SceneInfo, old: SceneInfo | None) -> None:
+    def _show(self, info: SceneInfo, old: SceneInfo | None, changed: bool) -> None:
         """Bring a scene to the renderer; the worker decodes its photos, of which many take longer than a
         frame. No photo of the `old` one stays on a button of another's."""
         with self._told():
-            self._viewport.set_scene(info.serial, info.scene)
+            self._viewport.set_scene(info.serial, info.scene, changed)
         photos = () if old is None else old.scene.photos
         if photos != info.scene.photos:
             for index in range(len(photos)):

@@ -35,9 +35,8 @@ class Levelled:
         marks = state.editing.marks
         if marks is None:
             return state
-        text = f"Level: {world_line(self.world)}."
-        if marks.world == self.world:
-            text = f"The scene is level already: {world_line(self.world)}."
+        stands = world_line(self.world, state.metric)
+        text = f"The scene is level already: {stands}." if marks.world == self.world else f"Level: {stands}."
         told = tuple(toast for toast in state.toasts if toast.text != LOOKING)
         after = with_edit(replace(state, toasts=told), "Level the scene", replace(marks, world=self.world))
         after = Notify(text if self.world.sure else f"{UNSURE} {text}", "info").apply(after)

@@ -9,6 +9,7 @@ from langflash_core.geometry import poses
 from langflash_core.scene.tour import Note, Stop
 
 from .. import commands as do
+from ..editing.panels.ruler import said
 from ..filming import commands as film
 from ..kit import boxes, theme, widgets
 from ..kit.look import Look
@@ -155,13 +156,8 @@ def _note(state: State, number: int, note: Note, look: Look) -> list[do.Command]
 
 
 def _measured(state: State, note: Note) -> str:
-    """A length for people; "" of a note that measures none."""
-    if note.length is None:
-        return ""
-    if state.metric is None:
-        return f"{note.length:.2f} units"
-    metres = note.length * state.metric
-    return f"{100 * metres:.0f} cm" if metres < 1 else f"{metres:.2f} m"
+    """Its length as the ruler says it; "" of a note that measures none."""
+    return "" if note.length is None else said(note.length, state.metric, state.guess)
 
 
 def draw_notes(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:

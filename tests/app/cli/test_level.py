@@ -33,6 +33,7 @@ def test_a_known_length_puts_metres_into_the_scene(run, room_file, tmp_path):
     out = tmp_path / "level.langflash"
     done = run("level", room_file, "--ceiling", "2.6", "-o", out)
     assert done.code == 0 and "as you told it" in done.out
+    assert "a guess" not in done.out + run("info", out).out, "two lengths of a unit, and one is wrong"
     assert load(out).record.metric_scale == pytest.approx(METRES, rel=0.02)
     done = run("level", room_file, "--length", "0,0,0", "0,0,1.5", "3", "--json")
     assert done.json()["metric_scale"] == pytest.approx(2.0)

@@ -114,6 +114,7 @@ def test_kept_edits_are_offered_above_the_viewpoints_and_before_panels(size: tup
     assert order.index("##offer") > max(order.index(name) for name in order if "nventory" in name)
 
 
+RULES = edited(floaters=replace(Floaters(bytes(4 * 12_300)), open=True))
 OFFER = Offer(Path("x.edits"), "living_room_left.langflash", 13, datetime(2026, 11, 25))
 
 
@@ -184,6 +185,15 @@ def test_in_the_empty_window_kept_edits_are_offered_above_what_can_be_opened(
     assert covered == []
 
 
+def test_a_scene_without_a_picture_yet_invites_nobody_to_drop_photos(items: Items) -> None:
+    """A click meant for the room opened the dialog for photos instead."""
+    with context((800, 500)):
+        theme.set_up(1.0, "dark")
+        frames(lambda seen: layout.draw_all(shown_scene(), seen), look(), 6)
+        invited = {"welcome", "Paste"} & {name.split("  ")[-1] for name in items.now()}
+    assert not invited
+
+
 @pytest.mark.parametrize(
     ("size", "scale"), [((800, 500), 0.75), ((800, 500), 1.0), ((800, 500), 2.0), ((1280, 800), 2.0)]
 )
@@ -237,18 +247,33 @@ def test_the_words_of_a_box_go_on_below_and_can_be_clicked() -> None:
     assert (True, False) in seen
 
 
+@pytest.mark.parametrize("name", ["Tour", "Rules"])
 @pytest.mark.parametrize(("size", "scale"), [((800, 500), 1.0), ((1200, 750), 1.5), ((1280, 800), 1.0)])
-def test_a_tour_leaves_the_view_to_see_that_it_takes(
-    monkeypatch, size: tuple[int, int], scale: float
+def test_a_tour_and_rules_leave_the_view_to_see_that_they_are_about(
+    monkeypatch, size: tuple[int, int], scale: float, name: str
 ) -> None:
-    """At 800 x 500 it covered the picture, the photos' strip and what a note is pinned to."""
+    """At 800 x 500 they covered the picture, the photos' strip, what a note is pinned to and what goes."""
     monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
-    state = after(shown_scene(), tour.ShowTour(True), tour.AddStop())
+    states = {"Tour": after(shown_scene(), tour.ShowTour(True), tour.AddStop()), "Rules": RULES}
     with context(size):
         theme.set_up(scale, "dark")
-        frames(lambda seen: layout.draw_all(state, seen), look(scale), 6)
-        left, top, right, bottom = box("Tour")
-        views = box("##views")
+        frames(lambda seen: layout.draw_all(states[name], seen), look(scale), 6)
+        left, top, right, bottom = box(name)
+        views, side = box("##views"), box("##panel")
     assert left >= 0 and top >= 0 and right <= size[0] and bottom <= size[1]
+    if left < 348 * scale:  # halves of the panel's lines looked out above and below it
+        assert left <= side[0] and top <= side[1] and right >= side[2] - 1 and bottom >= side[3]
     covered = max(0.0, right - max(left, 348 * scale)) / (size[0] - 348 * scale)
     assert covered < 0.4 and not overlap((left, top, right, bottom), views)
+
+
+def test_the_dictionary_has_room_for_its_groups_beside_a_narrow_picture(monkeypatch) -> None:
+    """At 800 x 500 it lay over the picture's tools, and showed one group and a half."""
+    monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
+    state = shown_scene()
+    state = replace(state, preferences=replace(state.preferences, dictionary_open=True))
+    with context((800, 500)):
+        theme.set_up(1.0, "dark")
+        frames(lambda seen: layout.draw_all(state, seen), look(), 6)
+        _left, top, right, bottom = box("Dictionary")
+    assert right <= 348 and bottom - top > 400

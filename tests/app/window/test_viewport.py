@@ -125,6 +125,33 @@ def test_a_scene_begins_without_the_targets_of_the_one_before(context) -> None:
     assert not held and drawn is not None
 
 
+def test_a_changed_scene_shows_its_last_picture_until_the_next(context) -> None:
+    """The empty window's "Drop photos of a room here" came in between, at every part taken out or copied."""
+    space = language_space("minilm")
+    shown = shown_scene()
+    assert shown.scene.info is not None
+    scene, other = (room(space.encode(list(PHRASES))) for _ in range(2))
+    state = shown.with_asking(prompts=()).with_scene(info=replace(shown.scene.info, scene=scene))
+    with context:
+        viewport = Viewport(context)
+        viewport.set_scene(1, scene)
+        while viewport.texture is None:
+            state = replace(state, now=state.now + 0.05)
+            viewport.update(state, SIZE, touched=0.0)
+        before = viewport.texture.read()
+        viewport.set_scene(2, other, changed=True)
+        kept = viewport.texture
+        assert kept is not None and kept.read() == before
+        assert viewport.seen() is None, "what was hidden for good may be in it"
+        while viewport.seen() is None:
+            state = replace(state, now=state.now + 0.05)
+            viewport.update(state, SIZE, touched=0.0)
+        assert viewport.texture is not kept and not hasattr(kept.mglo, "use")
+        viewport.set_scene(3, scene)
+        assert viewport.texture is None, "another scene's would mislead"
+        viewport.release()
+
+
 def test_a_picture_that_could_not_be_drawn_is_told_and_tried_again(context, monkeypatch) -> None:
     broken, tried = [True], []
     real = still.draw_still

@@ -12,7 +12,7 @@ from langflash_core.scene.edits import Atom
 from ... import commands as do
 from ...editing import commands as edit
 from ...editing import teaching as teach
-from ...kit import theme, widgets
+from ...kit import boxes, theme, widgets
 from ...kit.look import Look
 from ...recovery import commands as keep
 from ...state import State
@@ -69,7 +69,13 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
 
 
 def _usual(look: Look, place: ImVec2, size: ImVec2) -> tuple[int, ...]:
-    """At the picture's right, above the legend; (left, top, width, height) in design pixels."""
+    """At the picture's right, above the legend, or over the panel where that is narrow; (left, top, width,
+    height) in design pixels."""
+    aside = boxes.over_panel(place, size, look)
+    if aside is not None:
+        corner, extent = aside
+        left, top, width, height = (side / look.scale for side in (corner.x, corner.y, extent.x, extent.y))
+        return round(left), round(top), round(width), round(height)
     across, down = size.x / look.scale, size.y / look.scale
     width, height = min(_SIZE[0], across - 24), max(min(_SIZE[1], down - 24 - _LEGEND), _LEAST[1])
     left = place.x / look.scale + across - width - 12

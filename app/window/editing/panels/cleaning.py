@@ -12,7 +12,7 @@ from langflash_core.mending.recipes import COLOUR, KINDS, PRESETS, Box, Rule
 
 from ... import commands as do
 from ...dialogs import Dialog
-from ...kit import theme, widgets
+from ...kit import boxes, theme, widgets
 from ...kit.look import Look
 from ...state import State
 from .. import cleaning as clean
@@ -40,16 +40,14 @@ _EDGES = [(a, a | 1 << k) for a in range(8) for k in range(3) if not a >> k & 1]
 
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
-    """The window over the picture's right side, while a clean-up is previewed and its rules are asked for."""
+    """The window over the picture's right side, or over the panel where that is narrow, while a clean-up is
+    previewed and its rules are asked for."""
     preview = state.editing.floaters
     if preview is None or not preview.open:
         return []
-    top = place.y + look.px(_TOP)
-    room = max(place.y + size.y - top - look.px(_MARGIN), look.px(160))
-    corner = ImVec2(place.x + size.x - look.px(_MARGIN), top)
-    imgui.set_next_window_pos(corner, imgui.Cond_.appearing, ImVec2(1, 0))
-    width = min(look.px(_WIDE), size.x - 2 * look.px(_MARGIN))
-    imgui.set_next_window_size(ImVec2(width, min(look.px(_HIGH), room)), imgui.Cond_.appearing)
+    corner, extent = boxes.over_panel(place, size, look) or _over_picture(look, place, size)
+    imgui.set_next_window_pos(corner, imgui.Cond_.appearing)
+    imgui.set_next_window_size(extent, imgui.Cond_.appearing)
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     flags = imgui.WindowFlags_.no_collapse | imgui.WindowFlags_.no_saved_settings
     issued: list[do.Command] = []
@@ -60,6 +58,14 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     imgui.end()
     imgui.pop_style_var()
     return issued if kept else [*issued, clean.ShowRules(False)]
+
+
+def _over_picture(look: Look, place: ImVec2, size: ImVec2) -> tuple[ImVec2, ImVec2]:
+    """Its corner and its size where it opens."""
+    top, margin = place.y + look.px(_TOP), look.px(_MARGIN)
+    room = max(place.y + size.y - top - margin, look.px(160))
+    width = min(look.px(_WIDE), size.x - 2 * margin)
+    return ImVec2(place.x + size.x - margin - width, top), ImVec2(width, min(look.px(_HIGH), room))
 
 
 def _kinds(preview: Floaters, look: Look) -> list[do.Command]:

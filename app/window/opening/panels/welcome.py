@@ -44,6 +44,8 @@ def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Comm
         doing = f"{state.scene.job.title}: {said(state.scene.job.stage)}"
         _line(doing, ImVec2(corner.x + size.x / 2, corner.y + size.y / 2))
         return []
+    if state.scene.info is not None:  # its first picture is on its way
+        return []
     rows = _rows(state, size, look)
     tall = _TITLE + (len(rows) * (_TILE[1] + _CAPTION) + _WORDS if rows else _SAMPLES)
     top = corner.y + max((size.y - look.px(tall)) / 2, look.px(12))

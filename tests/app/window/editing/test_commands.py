@@ -16,7 +16,7 @@ from app.window.editing import pointing as point
 from app.window.editing.state import RADIUS_RANGE, Floaters, Reading, Region, Tool
 from app.window.frame.status import figures
 from app.window.scene import commands as show
-from app.window.scene.state import FLIGHT_SECONDS
+from app.window.scene.state import FLIGHT_SECONDS, Job
 from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core import pictures
@@ -271,3 +271,9 @@ def test_the_status_bar_counts_what_is_left(shown: State) -> None:
     state = after(shown, found(0, CHAIRS), edit.Delete())
     assert "9,800 of 12,300 Gaussians" in figures(state)
     assert "12,300 Gaussians" in figures(after(state, edit.Undo()))
+
+
+def test_the_status_bar_tells_what_is_under_way(shown: State) -> None:
+    """Its bar is at the panel's top: below the inventory nothing told that hiding went on."""
+    state = shown.with_scene(job=Job("Hiding", "the photos"))
+    assert figures(state)[0] == "Hiding: the photos" and not figures(shown)[0].startswith("Hiding")

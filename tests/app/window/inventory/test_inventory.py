@@ -18,6 +18,7 @@ from app.window.inventory import panel
 from app.window.inventory.effects import InventoryEffects
 from app.window.inventory.work import TakeInventory, small_picture
 from app.window.kit import theme
+from app.window.kit.boxes import overlap
 from app.window.scene.commands import SceneArrived
 from app.window.scene.standing import Levelled
 from app.window.scene.state import FLIGHT_SECONDS
@@ -105,6 +106,16 @@ def test_names_are_edits_that_are_saved_exported_and_undone(listed: State, tmp_p
     back = after(named, take.NameThing("chair 2", "")).editing.marks
     assert back is not None and back.thing_names == {}
     assert after(listed, take.NameThing("chair 2", "chair 2")).editing.marks == listed.editing.marks
+
+
+def test_the_name_at_a_box_leaves_the_bars() -> None:
+    """At 800 x 500 the bar of the selection, which a click on a row brings, stood before half of it."""
+    bar = (418.0, 64.0, 778.0, 170.0)
+    seen = []
+    with context((800, 500)):
+        theme.set_up(1.0, "dark")
+        frames(lambda at: seen.append(panel.caption_box(at, (573.0, 184.0), "yucca", (bar,))), look(), 1)
+    assert not overlap(seen[0], bar) and seen[0][1] < 184
 
 
 def test_a_click_selects_a_thing_and_flies_to_where_it_is_seen(listed: State) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from app.window.commands import Tick
 from app.window.editing import commands as edit
+from app.window.editing import pointing as point
 from app.window.editing.panels.ruler import said
 from app.window.scene import camera
 from app.window.scene.commands import SceneArrived
@@ -71,6 +72,8 @@ def test_levelling_is_an_edit_that_is_saved_and_undone(shown: State, tmp_path: P
     again = after(State(), SceneArrived(describe_scene(opened, 2, "s")))
     assert again.world == STANDS and not again.editing.unsaved
     assert told(after(state, Levelled(STANDS))).startswith("The scene is level already")
+    measured = after(state.with_editing(ruler=((0.0, 0.0, 1.0), (0.3, 0.0, 1.0))), point.SetLength(0.6))
+    assert "guess" not in told(after(measured, Levelled(STANDS))), "what was told is no guess any more"
     leans = replace(STANDS, up_by="surfaces", up_error=6.0)
     assert "do not tell for sure" in told(after(shown, Levelled(leans)))
 

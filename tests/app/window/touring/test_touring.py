@@ -7,15 +7,21 @@ import pytest
 
 from app.window import commands as do
 from app.window.editing import commands as edit
+from app.window.editing.panels.ruler import said
 from app.window.exporting.order import Order, order
 from app.window.scene import camera
+from app.window.scene.standing import Levelled
 from app.window.scene.state import FLIGHT_SECONDS
 from app.window.state import State
 from app.window.touring import commands as tour
+from app.window.touring import panel
 from langflash_core import outputs, pictures
 from langflash_core.geometry.poses import Vector, orbit, tour_seconds
+from langflash_core.records import Guess, World
 from langflash_core.scene.tour import NO_TOUR, Note
 from tests.app.window.scenes import after, shown_scene
+
+GUESS = Guess(2.0, 1.6, 2.5, ("door",))
 
 
 @pytest.fixture
@@ -91,6 +97,12 @@ def test_notes_of_a_point_and_of_a_length(shown):
     ends = Vector(0, 0, 1), Vector(0.3, 0, 1)
     state = after(shown, tour.AddNote("seat", ends[0], phrase="seat"), tour.AddNote("Measure", *ends))
     assert state.tour.notes == (Note("seat", ends[0], phrase="seat"), Note("Measure", *ends))
+    measure = state.tour.notes[1]
+    assert panel._measured(state, measure) == "0.300 units"
+    levelled = after(
+        state, Levelled(World((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "edges", 0.5, "floor", "walls", GUESS))
+    )
+    assert panel._measured(levelled, measure) == said(0.3, None, GUESS) == "about 60 cm"
     renamed = after(state, tour.ChangeNote(1, "Door"), tour.RemoveNote(0))
     assert [note.text for note in renamed.tour.notes] == ["Door"]
     assert after(renamed, edit.Undo(), edit.Undo()).tour == state.tour
