@@ -9,9 +9,9 @@ from langflash_core.geometry import poses
 from langflash_core.scene.tour import Note, Stop
 
 from .. import commands as do
-from ..editing.panels.ruler import said
 from ..filming import commands as film
 from ..kit import boxes, theme, widgets
+from ..kit.lengths import said
 from ..kit.look import Look
 from ..state import State
 from . import commands as tour

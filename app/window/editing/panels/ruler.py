@@ -8,11 +8,11 @@ from imgui_bundle import icons_fontawesome_6 as fa
 
 from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Vector
-from langflash_core.records import Guess
 from langflash_core.scene.report import guess_line
 
 from ... import commands as do
 from ...kit import theme, widgets
+from ...kit.lengths import said
 from ...kit.look import Look
 from ...state import State
 from ...touring import commands as tour
@@ -81,14 +81,3 @@ def _field(state: State, look: Look, ends: list[ImVec2]) -> list[do.Command]:
         imgui.end()
     imgui.pop_style_var(2)
     return issued
-
-
-def said(length: float, metric: float | None, guess: Guess | None = None) -> str:
-    """A length for people: in metres where the scene has a scale, about so many where that is a guess."""
-    if metric is None:
-        if guess is None:
-            return f"{length:.3f} units"
-        metres = length * guess.metres
-        return f"about {100 * metres:.0f} cm" if metres < 1 else f"about {metres:.1f} m"
-    metres = length * metric
-    return f"{100 * metres:.1f} cm" if metres < 1 else f"{metres:.2f} m"

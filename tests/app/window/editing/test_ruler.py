@@ -6,9 +6,9 @@ import pytest
 
 from app.window.editing import commands as edit
 from app.window.editing import pointing as point
-from app.window.editing.panels.ruler import said
 from app.window.editing.state import Reading, Tool
 from app.window.filming import commands as film
+from app.window.kit.lengths import said
 from app.window.scene import commands as show
 from app.window.scene.work import WriteScene, describe_scene
 from app.window.state import State

@@ -10,7 +10,7 @@ import pytest
 from app.window.commands import Tick
 from app.window.editing import commands as edit
 from app.window.editing import pointing as point
-from app.window.editing.panels.ruler import said
+from app.window.kit.lengths import said
 from app.window.scene import camera
 from app.window.scene.commands import SceneArrived
 from app.window.scene.near import orbited

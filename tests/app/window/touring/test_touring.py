@@ -7,8 +7,8 @@ import pytest
 
 from app.window import commands as do
 from app.window.editing import commands as edit
-from app.window.editing.panels.ruler import said
 from app.window.exporting.order import Order, order
+from app.window.kit.lengths import said
 from app.window.scene import camera
 from app.window.scene.standing import Levelled
 from app.window.scene.state import FLIGHT_SECONDS
