@@ -158,9 +158,7 @@ class Averaged(nn.Module):
         tokens = Tokens(tokens.hooks, tokens.grid, named)
         taught = double(self.taught(tokens.taught_maps()), align_corners=False)
         hidden = torch.cat((network.language_head.own(tokens), taught), 1).movedim(1, -1)
-        deep = (tokens_to_maps(t.flatten(0, 1), tokens.grid) for t in self.decoder(tokens, Ks, None))
-        maps = self.depth_head((tokens.maps(0), tokens.maps(1), *deep), tokens)
-        return hidden, maps.log_depths[:, 0].float()
+        return hidden, log_depths(self.decoder, self.depth_head, tokens, Ks)
 
     @torch.no_grad()
     def surely(self, features: Tensor, classes: Tensor) -> Tensor:
@@ -176,6 +174,12 @@ class Averaged(nn.Module):
         self.usual[seen] = self.usual[seen].lerp((sums / counts.clamp_min(1))[seen], step)
         needed = SURE * (self.usual / self.usual.max()).sqrt()
         return torch.where(sure >= needed[said], said, -1)
+
+
+def log_depths(decoder: nn.Module, depth_head: nn.Module, tokens: Tokens, Ks: Tensor) -> Tensor:
+    """Log depths (B, H, W) of single photos, in nats, as copies of a network's modules tell them."""
+    deep = (tokens_to_maps(t.flatten(0, 1), tokens.grid) for t in decoder(tokens, Ks, None))
+    return depth_head((tokens.maps(0), tokens.maps(1), *deep), tokens).log_depths[:, 0].float()
 
 
 def few_stage(bank: NameBank, weights: Weights | None = None) -> Stage:
@@ -320,7 +324,7 @@ def _silent(
     chosen = evenly_drawn(rows, NAME_PIXELS, generator)
     if len(chosen):
         of_set = photos.sets[(origin[chosen] // (size[0] * size[1])).to(photos.sets.device)]
-        said = name_loss(units_at(hidden, out, drawn[chosen]), rows[chosen], of_set, bank)
+        said = name_loss(units[chosen.to(units.device)], rows[chosen], of_set, bank)
         total, told = total + counts.names * said, told | {"silent_names": float(said.detach())}
     return total, told
 

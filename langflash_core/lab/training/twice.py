@@ -22,6 +22,7 @@ from langflash_core.lab.training.bank import NameBank
 from langflash_core.lab.training.fewlabels import (
     HIDDEN,
     FewBatch,
+    log_depths,
     mirrored,
     odds_apart,
     read,
@@ -34,7 +35,7 @@ from langflash_core.lab.training.pool import DrawnPhotos
 from langflash_core.lab.training.real import MODULES
 from langflash_core.lab.training.stages.language import thinned
 from langflash_core.lab.training.stages.stage import Loss, Stage, Words, guided
-from langflash_core.network.encoders.shared import Tokens, tokens_to_maps
+from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.guided import GuidedDepthNet
 
 RATES = {"late": 0.25, "language_head": 0.5, "decoder": 0.75, "depth_head": 0.75}
@@ -72,11 +73,7 @@ class Copy:
         tokens, early = self.encoder(images)
         named = tuple(t.unflatten(0, images.shape[:2]) for t in self.late(early, self.encoder.vit))
         tokens = replace(tokens, named=named)
-        return self.head(tokens)[:, 0].float(), self._log_depths(tokens, Ks)
-
-    def _log_depths(self, tokens: Tokens, Ks: Tensor) -> Tensor:
-        deep = (tokens_to_maps(t.flatten(0, 1), tokens.grid) for t in self.decoder(tokens, Ks, None))
-        return self.depth_head((tokens.maps(0), tokens.maps(1), *deep), tokens).log_depths[:, 0].float()
+        return self.head(tokens)[:, 0].float(), log_depths(self.decoder, self.depth_head, tokens, Ks)
 
     def says(self, photos: DrawnPhotos) -> tuple[Tensor, Tensor]:
         """The mean of two looks, at the photo's mirrored self and at its larger picture: unit vectors

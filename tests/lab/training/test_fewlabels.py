@@ -110,7 +110,7 @@ def test_what_a_set_does_not_name_changes_no_loss():
         cosines = texts.double()[:3] @ unit
         truth += float((TEMPERATURE * cosines).logsumexp(0) - TEMPERATURE * cosines[row])
         truth += ATTRACTION * float(1 - cosines[row])
-    assert said == pytest.approx(truth / 5, rel=1e-5)
+    assert said == pytest.approx(truth / 5, rel=1e-3)  # Adam makes rounding large; other photos: tenths
     other = torch.cat((texts[:3], units[:1]))
     changed = NameBank(bank.texts, other, texts, torch.ones(4), (), (), against)
     assert float(name_loss(units, rows, of_set, changed)) == pytest.approx(said, rel=1e-6)
@@ -157,6 +157,27 @@ def test_the_teacher_follows(network):
     assert torch.allclose(moved, torch.full_like(moved, 0.9), atol=1e-6)
 
 
+def test_the_teacher_says_the_same_of_a_mirrored_photo_mirrored(network):
+    """Two looks: changing left and right changes nothing but left and right, up to rounding of sums."""
+    teacher = Averaged(network)
+    images = torch.rand(2, 1, 3, 56, 84, generator=torch.manual_seed(0))
+    Ks = torch.tensor([[70.0, 0, 40], [0, 70, 28], [0, 0, 1]]).expand(2, 1, 3, 3)
+    hidden, logs = teacher.looks(network, images, Ks)
+    other, deeper = teacher.looks(network, *fewlabels.mirrored(images, Ks))
+    one, _ = teacher._look(network, images, Ks)
+    assert torch.allclose(hidden, other.flip(2), atol=1e-4) and torch.allclose(
+        logs, deeper.flip(-1), atol=1e-4
+    )
+    assert not torch.allclose(hidden, one, atol=1e-3), "one look is another"
+
+
+def test_depth_is_not_said_of_what_was_pasted():
+    maps = fewlabels.without(torch.ones(2, 6, 8), [(1, 2, 4, 5), (0, 0, 0, 0)])
+    assert (
+        float(maps[0].sum()) == 48 - 9 and float(maps[0, 1:4, 2:5].sum()) == 0 and bool((maps[1] == 1).all())
+    )
+
+
 def test_scaled_matrices_are_scaled_answers(network):
     """A skipping block at rest gives what the encoder's own block gives."""
     base = network.encoder.vit.blocks[-1]
@@ -194,7 +215,18 @@ def test_a_few_steps_teach_and_end_in_a_cut_half(sets, tmp_path):
     losses = [row["classes"] for row in rows if row["kind"] == "train" and "classes" in row]
     assert len(losses) == 3 and losses[-1] < losses[0] and all(map(math.isfinite, losses))
     told = {key for row in rows for key in row}
-    assert {"names", "silent", "sure", "silent_names", "depth", "phrases", "room_depth"} <= told
+    asked = {
+        "names",
+        "silent",
+        "sure",
+        "odds",
+        "said_depth",
+        "silent_names",
+        "depth",
+        "phrases",
+        "room_depth",
+    }
+    assert asked <= told
     fresh = build_network(MINI)
     assert load_averaged(fresh, tmp_path / "run", "late") == (3, pytest.approx(state.seconds))
     ours, theirs = network.state_dict(), fresh.state_dict()
@@ -221,3 +253,21 @@ def test_photos_without_labels_teach_by_the_teacher_alone(sets, network, monkeyp
     total.backward()
     taught = any(p.grad is not None and bool(p.grad.abs().sum() > 0) for p in made.late.parameters())
     assert taught == (sure == 0) and math.isfinite(float(total.detach()))
+
+
+def test_an_interrupted_run_of_batches_drawn_ahead_goes_on_as_one_that_was_not(sets, tmp_path):
+    table = build_table([Label(*names) for names in NAMES], encode)
+    options = LoopOptions(minutes=10, report_s=0.0, learning_rate=2e-3, pictures=1, workers=1)
+
+    def losses(folder, *stops: int) -> list[float]:
+        for stop in stops:
+            torch.manual_seed(0)
+            network = build_network(MINI)
+            network.late.begin(network.encoder.vit)
+            train_few(network, sets, None, table, folder, replace(options, max_steps=stop))
+        rows = [json.loads(line) for line in (folder / "late_few.jsonl").read_text().splitlines()]
+        return [row["loss"] for row in rows if row["kind"] == "train" and "loss" in row]
+
+    assert losses(tmp_path / "whole", 2)[1] == pytest.approx(
+        losses(tmp_path / "cut", 1, 2)[1], rel=1e-3
+    )  # Adam makes rounding large; other photos: tenths
