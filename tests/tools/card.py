@@ -1,7 +1,7 @@
 """Every figure that a graphics card has, in one command; without a card the rest, on the processor.
 
     python -m tests.tools.card -o FOLDER --build    # once: compiles gsplat's CUDA code, minutes
-    python -m tests.tools.card -o FOLDER [--quick]
+    python -m tests.tools.card -o FOLDER [--quick] [--only STEP ...]
 
 Each step runs in a process of its own with a time limit, so that one failure costs nothing else. Writes
 FOLDER/card.json and, to be read, "card.md" beside it after every step.
@@ -120,14 +120,16 @@ def _shown(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def measure(folder: Path, quick: bool) -> None:
-    """All steps; both files are written anew after each."""
+def measure(folder: Path, quick: bool, only: list[str] | None) -> None:
+    """All steps, or some; both files are written anew after each."""
     machine, card = card_steps.machine()
     left_out = (
         "" if card else "There is no CUDA card: its ceilings, gsplat and compiled networks are left out."
     )
     document: dict = {"machine": machine, "left_out": left_out, "steps": {}}
     for step in steps(folder, quick, card):
+        if only is not None and step.name not in only:
+            continue
         document["steps"][step.name] = run_step(step)
         text = document_text(document)
         (folder / "card.json").write_text(json.dumps(document, indent=1), encoding="utf-8")
@@ -143,6 +145,9 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--quick", action="store_true", help="small: a rehearsal")
     parser.add_argument("--build", action="store_true", help="compile gsplat's CUDA code and nothing else")
+    parser.add_argument(
+        "--only", nargs="+", metavar="STEP", help="such as network-full; all others are left out"
+    )
     parser.add_argument("--step", choices=sorted(card_steps.STEPS), help=argparse.SUPPRESS)
     args = parser.parse_args()
     args.output.mkdir(parents=True, exist_ok=True)
@@ -155,7 +160,7 @@ def main() -> None:
         found = card_steps.STEPS[args.step](args.output, args.quick)
         (args.output / f"{args.step}.json").write_text(json.dumps(found), encoding="utf-8")
     else:
-        measure(args.output, args.quick)
+        measure(args.output, args.quick, args.only)
 
 
 if __name__ == "__main__":

@@ -10,9 +10,12 @@ from typing import Any, TextIO
 
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.files import check_folder, check_output_file, readable_file
+from langflash_core.lab.labels.outlines import write_outlines
+from langflash_core.lab.labels.prompted import PromptedSam
 from langflash_core.lab.photos import chosen_ids, open_folder
 from langflash_core.lab.photos.layouts import convert
 from langflash_core.lab.photos.reading import Source
+from langflash_core.lab.photos.writing import FolderWriter
 from langflash_core.lab.training.commands import (
     run_adopt,
     run_cache,
@@ -28,6 +31,7 @@ from langflash_core.lab.training.scenes import SceneSource, source_at
 from langflash_core.lab.training.trained import run_export
 from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS
+from langflash_core.network.semantics.mobile_sam.model import load_mobile_sam
 from langflash_core.resources import asset_path
 
 from ..report import ProgressBar
@@ -47,6 +51,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "photos": _convert,
         "parts": _parts,
         "late": _late,
+        "outlines": _outlines,
         "run": _run,
         "export": _export,
     }[args.action](args, out)
@@ -107,6 +112,16 @@ def _convert(args: Namespace, out: TextIO) -> None:
     print(f"{args.output}: {count} photos", file=out)
 
 
+def _outlines(args: Namespace, out: TextIO) -> None:
+    readable_file(args.weights, "checkpoint of MobileSAM", WeightsError)
+    check_folder(args.output)
+    folder = opened_folder(args)
+    ids = folder.ids[args.part[0] :: args.part[1]]
+    sam = PromptedSam(load_mobile_sam(args.weights, args.side, args.device), args.grid)
+    write_outlines(folder, ids, FolderWriter(args.output), sam, "MobileSAM")
+    print(f"{args.output}: {len(ids)} photos outlined", file=out)
+
+
 def _parts(args: Namespace, out: TextIO) -> None:
     if not args.cache.is_dir():
         raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
@@ -142,9 +157,7 @@ def _late(args: Namespace, out: TextIO) -> None:
             replace(
                 _options(args, args.minutes),
                 device=device,
-                workers=args.workers,
-                learning_rate=args.rate,
-                pictures=args.pictures,
+                **_faster(args),
                 validate_s=min(300.0, 12 * args.minutes),
             ),
             more=more,
@@ -168,6 +181,11 @@ def _options(args: Namespace, minutes: float) -> LoopOptions:
     )
 
 
+def _faster(args: Namespace) -> dict[str, Any]:
+    """What a graphics card is told besides."""
+    return {"workers": args.workers, "learning_rate": args.rate, "pictures": args.pictures}
+
+
 def _run(args: Namespace, out: TextIO) -> None:
     if args.scenes is None and not args.cache.is_dir():
         raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
@@ -178,7 +196,8 @@ def _run(args: Namespace, out: TextIO) -> None:
         readable_file(args.sam_teacher, "checkpoint of MobileSAM", WeightsError)
     check_folder(args.output)
     with joined(args.device) as device:
-        recipe = _recipe(args, replace(_options(args, 0), device=device))
+        options = replace(_options(args, 0), device=device, **_faster(args))
+        recipe = _recipe(args, options)
         if args.sam_teacher is not None and not any(plan.stage.dense for plan in recipe.plans):
             raise InputError(
                 "no stage here regresses SAM's embedding; name grouping, or leave --sam-teacher away"
@@ -193,6 +212,7 @@ def _run(args: Namespace, out: TextIO) -> None:
             encode,
             from_scratch=args.from_scratch,
             scenes=scenes,
+            outlined=[open_folder(place) for place in args.outlined],
             sam=args.sam_teacher,
             sam_side=args.sam_side,
         )

@@ -126,6 +126,7 @@ def add_train(commands) -> None:
     adopt.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
     _add_cache(actions)
     _add_convert(actions)
+    _add_outlines(actions)
     parts = new_command(actions, "parts", "find the parts of cached rooms, for the stage naming")
     parts.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
     parts.add_argument(
@@ -193,6 +194,14 @@ def _add_stages(actions) -> None:
     run.add_argument(
         "--labels", type=Path, metavar="OUT", help="of --scenes: what langflash labels wrote of these clips"
     )
+    run.add_argument(
+        "--outlined",
+        type=Path,
+        nargs="+",
+        default=[],
+        metavar="FOLDER",
+        help="photos from which grouping learns besides: outlined, as train outlines makes them, or named",
+    )
     _add_loop(run)
     run.add_argument(
         "--sam-teacher",
@@ -211,6 +220,32 @@ def _add_stages(actions) -> None:
         "--from-scratch", action="store_true", help="draw the heads anew instead of going on with --start's"
     )
     _add_start(run, presets=("mini", "full"))
+
+
+def _add_outlines(actions) -> None:
+    command = new_command(
+        actions, "outlines", "outline what could be an object in photos without labels; what is done stays"
+    )
+    command.add_argument("folder", type=Path, metavar="FOLDER", help="photos, as train photos makes them")
+    add_description(command)
+    add_output(command, "OUT", "folder to fill: the photos, cropped, with maps of their objects")
+    command.add_argument(
+        "--weights", type=Path, required=True, metavar="FILE", help="of MobileSAM (mobile_sam.pt)"
+    )
+    command.add_argument(
+        "--side",
+        type=whole_count,
+        default=512,
+        metavar="PX",
+        help="the square that MobileSAM sees (default: 512; 1024 takes four times as long)",
+    )
+    command.add_argument(
+        "--grid", type=whole_count, default=12, metavar="N", help="points along the longer side (default: 12)"
+    )
+    command.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(default: cpu)")
+    command.add_argument(
+        "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
+    )
 
 
 def _add_late(actions) -> None:
@@ -242,22 +277,6 @@ def _add_late(actions) -> None:
         help="with --more: what the weights say of every photo mirrored and larger teaches them instead",
     )
     add_output(late, "RUN", "folder of checkpoints and logs")
-    late.add_argument(
-        "--workers",
-        type=seed,
-        default=0,
-        metavar="N",
-        help="processes that read photos ahead, so that a graphics card waits for none (default: none)",
-    )
-    late.add_argument(
-        "--rate", type=above_zero, metavar="R", help="the peak learning rate (default: the stage's)"
-    )
-    late.add_argument(
-        "--pictures",
-        type=whole_count,
-        metavar="N",
-        help="photos of a step, of each kind (default: the stage's)",
-    )
     late.add_argument("--minutes", required=True, type=minutes, metavar="M", help="of training")
     _add_loop(late)
     _add_start(late)
@@ -276,6 +295,22 @@ def _add_loop(command: argparse.ArgumentParser) -> None:
         type=whole_count,
         metavar="N",
         help="that a step is made of, shared by the processes (default: one each)",
+    )
+    command.add_argument(
+        "--workers",
+        type=seed,
+        default=0,
+        metavar="N",
+        help="processes that read ahead, so that a graphics card waits for none (default: none)",
+    )
+    command.add_argument(
+        "--rate", type=above_zero, metavar="R", help="the peak learning rate (default: the stage's)"
+    )
+    command.add_argument(
+        "--pictures",
+        type=whole_count,
+        metavar="N",
+        help="of a step, of each kind (default: the stage's)",
     )
     command.add_argument("--precision", choices=PRECISIONS, default="auto")
     command.add_argument("--board", action="store_true", help="also write TensorBoard's logs, in RUN/board")

@@ -32,6 +32,7 @@ from langflash_core.lab.training.live import LivePhotos
 from langflash_core.lab.training.loop import LoopOptions, Validate, train_stage
 from langflash_core.lab.training.mixing import MixedSet
 from langflash_core.lab.training.naming import NAMING
+from langflash_core.lab.training.outlined import outlined_set
 from langflash_core.lab.training.parts import PartSet, run_parts
 from langflash_core.lab.training.real import JointSet, KeptPhotos, PhotoTargets, train_late
 from langflash_core.lab.training.recipes import Recipe, stages_of
@@ -137,6 +138,7 @@ def run_recipe(
     *,
     from_scratch: bool = False,
     scenes: SceneSource | None = None,
+    outlined: Sequence[PhotoFolder] = (),
     sam: Path | None = None,
     sam_side: int = SIDE,
 ) -> LangFlashNet:
@@ -151,8 +153,9 @@ def run_recipe(
             for a preset that nothing is shipped for.
         from_scratch: draw the heads anew instead.
         scenes: what grouping and aggregation learn from instead of rooms; `folder` then keeps phrases and
-            what frozen networks say. sam: weights of MobileSAM, for stages that regress its embedding; these
-            see views whose longer side is `sam_side` pixels.
+            what frozen networks say. outlined: photos with outlines or names, of which grouping learns from
+            those that `split` does not keep, beside rooms. sam: weights of MobileSAM, for stages that
+            regress its embedding; these see views whose longer side is `sam_side` pixels.
     """
     if scenes is None:
         _open(folder / "train")
@@ -168,7 +171,7 @@ def run_recipe(
             )
         seed = options.seed + 1000 * list(known).index(stage.name) + done.get(stage.name, 0)
         words = Words(PhraseSampler(table), torch.Generator().manual_seed(seed))
-        learned = _learned(stage, folder) if scenes is None else _drawn(stage, scenes, network)
+        learned = _learned(stage, folder, outlined) if scenes is None else _drawn(stage, scenes, network)
         if not network.caches_tokens and not {"encoder", "decoder"} & set(stage.modules):
             reads_features = stage.name == "aggregation"
             learned = FrozenSet.of(learned, network, folder / "frozen", features=reads_features)
@@ -239,11 +242,17 @@ def _photos(folder: Path, part: str) -> Path | None:
     return place if place.is_dir() else None
 
 
-def _learned(stage: Stage, folder: Path) -> RoomSet | MixedSet | PartSet:
-    """What a stage learns from: rooms, and photos where some are cached and the stage can use them."""
+def _learned(
+    stage: Stage, folder: Path, outlined: Sequence[PhotoFolder] = ()
+) -> RoomSet | MixedSet | PartSet:
+    """What a stage learns from: rooms, and photos where some are cached and the stage can use them; grouping
+    from outlined ones instead, where there are any."""
     if stage.name == NAMING.name:
         return _parts(folder, "train")
     rooms, photos = _open(folder / "train"), _photos(folder, "train")
+    if outlined and stage.name == "grouping":
+        rooms.tokens = False  # photos have none: both are encoded as they come
+        return MixedSet(rooms, outlined_set(outlined), stage.photos)
     if stage.photos == 0 or photos is None:
         return rooms
     return MixedSet(rooms, _open(photos, photos=True), stage.photos)

@@ -12,6 +12,7 @@ from typing import Any
 import torch
 
 from langflash_core.lab.training.batches import RoomSet, SceneBatch
+from langflash_core.lab.training.outlined import OutlinedSet
 from langflash_core.lab.training.stages.stage import Loss, StageLoss, Words
 from langflash_core.network.model import LangFlashNet
 
@@ -38,7 +39,7 @@ class MixedSet:
     """Draws `share` of the pictures of a step from photos, the rest from rooms."""
 
     rooms: RoomSet
-    photos: RoomSet
+    photos: RoomSet | OutlinedSet
     share: float
 
     def __post_init__(self) -> None:
