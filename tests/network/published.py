@@ -13,6 +13,7 @@ from torch.nn import functional as F
 
 from langflash_core.network.encoders.mobile_sam import MobileSamEncoder
 from langflash_core.network.presets import PointMaps
+from langflash_core.network.semantics.mobile_sam.model import MobileSam
 
 State = dict[str, Tensor]
 
@@ -467,6 +468,17 @@ def draw_mobile_sam() -> dict[str, torch.Tensor]:
             mobile_sam_name(own), value.shape
         ).contiguous()
     return state
+
+
+def mobile_sam_file(sam: MobileSam) -> State:
+    """The whole network's tensors as the published file has them, and its classifier, which nobody asks."""
+    encoder = "image_encoder."
+    state = {
+        encoder + mobile_sam_name(name.removeprefix(encoder)) if name.startswith(encoder) else name: value
+        for name, value in sam.state_dict().items()
+    }
+    state |= {f"{encoder}norm_head.{name}": torch.zeros(320) for name in ("weight", "bias")}
+    return state | {f"{encoder}head.weight": torch.zeros(1000, 320), f"{encoder}head.bias": torch.zeros(1000)}
 
 
 def mobile_sam_name(own: str) -> str:

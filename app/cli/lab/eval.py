@@ -12,6 +12,7 @@ from langflash_core.files import check_output_file, make_folder, readable_file, 
 from langflash_core.lab.evaluation.rooms.run import run_eval
 from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.lab.photos import PhotoFolder, chosen_ids
+from langflash_core.lab.training.stages.stage import guided
 from langflash_core.network import load_network
 from langflash_core.request import spoken
 
@@ -44,6 +45,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "ablations": ablations,
         "rooms": _rooms,
         "calibrate": _calibrate,
+        "grouping": _grouping,
         "photos": _photos,
         "photos-labelled": _photos_labelled,
         "posed": _posed,
@@ -90,6 +92,19 @@ def _photos_labelled(args: Namespace, out: TextIO) -> None:
             folder, ids, renderer, args.weights, preset=args.preset, size=args.size, progress=progress
         )
     write_tables(args, result, photos_markdown(result), out)
+
+
+def _grouping(args: Namespace, out: TextIO) -> None:
+    if args.output is not None:
+        check_output_file(args.output, (".md",))
+    folder = opened_folder(args)
+    ids = chosen(args, folder)
+    from langflash_core.lab.evaluation.grouped import grouping_markdown, run_grouping
+
+    network = guided(load_network(args.preset, args.weights))
+    with ProgressBar() as progress:
+        result = run_grouping(network, folder, ids, progress)
+    write_tables(args, result, grouping_markdown(result), out)
 
 
 def _posed(args: Namespace, out: TextIO) -> None:

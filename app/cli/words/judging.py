@@ -130,6 +130,17 @@ def _add_labelled(actions) -> None:
     _add_folder(command)
     _add_choice(command, "photos, taken evenly (default: all)")
     _add_judging(command)
+    grouping = new_command(
+        actions,
+        "grouping",
+        "groups and parts of single real photos against what was named or outlined in them",
+    )
+    _add_folder(grouping)
+    _add_choice(grouping, "photos, taken evenly (default: all)")
+    grouping.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
+    grouping.add_argument("--weights", type=Path, metavar="PATH", help="(default: the shipped ones)")
+    grouping.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
+    add_json(grouping)
 
 
 def _add_posed(actions) -> None:

@@ -29,8 +29,9 @@ SMALLEST = 0.0008
 def objects_of(image: UInt8[np.ndarray, "H W 3"], proposer: MaskProposer) -> UInt16[np.ndarray, "H W"]:
     """Numbers (H, W) of what a proposer finds: sure and stable masks, each once, wholes instead of their
     parts, smaller ones over larger ones; 0 where there is none."""
-    found = without_parts(without_repeats(proposer.propose(image)))
-    masks = np.array([cleaned(mask) for mask in found.masks]).reshape(-1, *image.shape[:2])
+    proposed = proposer.propose(image)
+    found = without_parts(without_repeats(proposed.rows(proposed.masks.mean((1, 2)) >= SMALLEST)))
+    masks = np.array([cleaned(mask) for mask in found.masks], dtype=bool).reshape(-1, *image.shape[:2])
     ids = without_gaps(painted(masks, np.arange(1, len(masks) + 1), image.shape[:2]))
     small = np.bincount(ids.ravel(), minlength=len(masks) + 1) < SMALLEST * ids.size
     small[0] = True

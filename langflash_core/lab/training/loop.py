@@ -192,7 +192,7 @@ class _Training:
         part, options = _part(self.rooms, number, batches), self.options
         if not options.workers:
             return part
-        return DrawnAhead(part, options.workers, options.seed + 1_000_003 * number)
+        return DrawnAhead(part, options.workers, options.seed + 1_000_003 * number, self._sized)
 
     def go(self) -> None:
         """Steps, reports, validation and checkpoints until time or steps run out."""
@@ -255,10 +255,14 @@ class _Training:
         with self._spending("update"):
             self._update(told, seeds)
 
-    def _draw(self, draws: Draws, generator: torch.Generator) -> Any:
+    def _sized(self, generator: torch.Generator) -> tuple[int, int]:
+        """Scenes of a batch, and views of each."""
         sizes, chances = list(self.stage.views), torch.tensor(list(self.stage.views.values()))
         views = sizes[int(torch.multinomial(chances, 1, generator=generator))]
-        count = max(1, (self.options.pictures or self.stage.pictures) // views)
+        return max(1, (self.options.pictures or self.stage.pictures) // views), views
+
+    def _draw(self, draws: Draws, generator: torch.Generator) -> Any:
+        count, views = self._sized(generator)
         rooms = self.sets[draws.number]
         seek = getattr(rooms, "seek", None)
         if seek is not None:  # of sets whose steps differ

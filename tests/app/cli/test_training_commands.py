@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 from PIL import Image
+from safetensors.torch import save_file
 
 from app.cli.parser import build_parser
 from app.cli.words.training import LAYOUTS
@@ -14,9 +15,11 @@ from langflash_core.lab.photos import layouts
 from langflash_core.lab.photos.writing import FolderWriter
 from langflash_core.lab.training.shards import Label, open_shards, write_shard
 from langflash_core.network import MINI, GuidedDepthNet, load_network, save_network
+from langflash_core.network.semantics.mobile_sam.model import MobileSam
 from tests.lab.evaluation.real_photos import write_folder
 from tests.lab.rooms.conftest import TINY_PACK
 from tests.lab.training.conftest import toy_record
+from tests.network.published import mobile_sam_file
 
 PLAIN = np.tile(np.linspace(120, 136, 56).astype(np.uint8)[None, :, None], (42, 1, 3))
 """A photo of a shade: something is to be seen, and there is no corner to match."""
@@ -229,6 +232,28 @@ def test_the_late_half_goes_on_with_other_photos(run, checkpoint, photos, tmp_pa
     assert "gone/images" in run("train", "late", tmp_path / "cache", *words, *where).err
 
 
+def test_the_grouping_learns_from_named_and_outlined_photos(run, checkpoint, photos, tmp_path):
+    """Three things at once: the outlines of a network that finds nothing, a step on photos of two kinds, and
+    how well groups follow names."""
+    torch.manual_seed(0)
+    save_file(mobile_sam_file(MobileSam(128).eval()), tmp_path / "sam.safetensors")
+    out = tmp_path / "outlined"
+    words = ("--weights", tmp_path / "sam.safetensors", "--side", "128", "--grid", "2")
+    outcome = run("train", "outlines", photos, "-o", out, *words)
+    assert outcome.code == 0 and "2 photos outlined" in outcome.out, outcome.err
+    assert np.asarray(Image.open(out / "labels" / "1.png")).shape == (42, 56)
+    write_shard(tmp_path / "cache" / "train" / "a.safetensors", [toy_record(0)])
+    words = ("--stages", "grouping", "--minutes", "5", "--max-steps", "1", "--start", checkpoint)
+    where = (tmp_path / "cache", "-o", tmp_path / "run", "--outlined", photos, out, "--workers", "1")
+    outcome = run("train", "run", *where, *words, "--pictures", "4", "--rate", "1e-4")
+    assert outcome.code == 0 and "trained grouping" in outcome.out, outcome.err
+    (row,) = [json.loads(line) for line in (tmp_path / "run" / "grouping.jsonl").read_text().splitlines()][:1]
+    assert "photos_contrast" in row and row["rate"] <= 1e-4
+    outcome = run("eval", "grouping", photos, "--weights", checkpoint, "--limit", "1", "--json")
+    assert outcome.code == 0 and 0 < outcome.json()["parts"]["achievable"] <= 1, outcome.err
+    assert "| F1 of borders, 4 pixels |" in run("eval", "grouping", photos, "--weights", checkpoint).out
+
+
 def test_a_data_set_is_converted(run, tmp_path):
     (tmp_path / "seq").mkdir()
     Image.new("RGB", (56, 42)).save(tmp_path / "seq" / "frame-000000.color.png")
@@ -370,6 +395,9 @@ def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_pat
             "name some with --more",
         ),
         (["train", "photos", "nyu", "gone", "-o", "out"], "there is no gone"),
+        (["train", "outlines", "PHOTOS", "-o", "out", "--weights", "gone.pt"], "no checkpoint of MobileSAM"),
+        (["train", "outlines", "PHOTOS", "-o", "out"], "--weights"),
+        (["eval", "grouping", "gone"], "there is no folder gone/images"),
         (["train", "photos", "voc", "gone", "-o", "out"], "invalid choice"),
     ],
 )

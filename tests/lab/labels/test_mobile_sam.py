@@ -8,7 +8,7 @@ from safetensors.torch import save_file
 from langflash_core.errors import WeightsError
 from langflash_core.lab.labels.prompted import PromptedSam, grid_points, stability
 from langflash_core.network.semantics.mobile_sam.model import MobileSam, load_mobile_sam
-from tests.network.published import mobile_sam_name
+from tests.network.published import mobile_sam_file as published_file
 
 SIDE = 128
 
@@ -23,14 +23,7 @@ def sam() -> MobileSam:
 
 @pytest.fixture(scope="module")
 def file(sam) -> dict[str, torch.Tensor]:
-    """The tensors of `sam` as the published file has them, and its classifier, which nobody asks."""
-    encoder = "image_encoder."
-    state = {
-        encoder + mobile_sam_name(name.removeprefix(encoder)) if name.startswith(encoder) else name: value
-        for name, value in sam.state_dict().items()
-    }
-    state |= {f"{encoder}norm_head.{name}": torch.zeros(320) for name in ("weight", "bias")}
-    return state | {f"{encoder}head.weight": torch.zeros(1000, 320), f"{encoder}head.bias": torch.zeros(1000)}
+    return published_file(sam)
 
 
 def test_tensors_are_as_many_and_as_large_as_in_the_published_file(file):

@@ -1,0 +1,153 @@
+"""`langflash eval grouping`: how well groups and parts of single real photos follow what is in them.
+
+The truth is a folder that is named (connected regions of a name) or outlined (`langflash train outlines`);
+what nobody named or outlined is not judged. Groups are what the queries answer, parts what they are cut into
+and what atoms are made of; each pixel is its likeliest one's.
+
+Sizes: H W pixels of the photo as it is judged, G true regions.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+import torch
+from jaxtyping import Float64, Integer
+from torch.nn import functional as F
+
+from langflash_core.lab.evaluation.borders import UNKNOWN, border_f1
+from langflash_core.lab.evaluation.numbers import rounded
+from langflash_core.lab.evaluation.tables import cell
+from langflash_core.lab.photos import PhotoFolder
+from langflash_core.lab.photos.fitting import fitted, network_size
+from langflash_core.lab.training.measures import nan_mean
+from langflash_core.lab.training.outlined import Outlined
+from langflash_core.network.guided import GuidedDepthNet
+from langflash_core.network.semantics.grouping import group_weights, surviving
+from langflash_core.network.semantics.splitting import split_groups
+from langflash_core.running import Progress
+
+SMALLEST = 0.0008
+"""Share of the photo below which a region is not judged."""
+
+
+TITLES = {
+    "best_iou": "IoU of the best one, mean over true regions",
+    "recall": "true regions whose best one has an IoU over .5",
+    "achievable": "pixels right if each were named by most of what lies in it",
+    "border_f1": "F1 of borders, 4 pixels",
+    "count": "how many",
+}
+
+
+@dataclass(frozen=True)
+class GroupingScore:
+    """best_iou: mean over true regions of the IoU with the best found one; recall: share of them for which
+    it is over .5; achievable: share of judged pixels that are right if every found region is given to the
+    true one it lies in most; border_f1: of all borders (`borders`); count: found regions."""
+
+    best_iou: float
+    recall: float
+    achievable: float
+    border_f1: float
+    count: float
+
+
+def score(found: Integer[np.ndarray, "H W"], truth: Integer[np.ndarray, "H W"]) -> GroupingScore:
+    """Of a photo whose found regions are numbered from 0, true ones too (`UNKNOWN`: not judged)."""
+    known = truth >= 0
+    table = _overlaps(found[known], truth[known])
+    areas = table.sum(1)
+    rows = areas >= SMALLEST * truth.size
+    either = areas[:, None] + table.sum(0)[None] - table
+    best = (table / np.maximum(either, 1)).max(1, initial=0)[rows]
+    return GroupingScore(
+        best_iou=float(best.mean()) if rows.any() else float("nan"),
+        recall=float((best > 0.5).mean()) if rows.any() else float("nan"),
+        achievable=float(table.max(0, initial=0).sum() / max(known.sum(), 1)),
+        border_f1=border_f1(found, truth),
+        count=float(len(np.unique(found))),
+    )
+
+
+def _overlaps(
+    found: Integer[np.ndarray, " P"], truth: Integer[np.ndarray, " P"]
+) -> Float64[np.ndarray, "G J"]:
+    """Pixels that each true region (rows) and each found one share."""
+    true_ids, rows = np.unique(truth, return_inverse=True)
+    found_ids, columns = np.unique(found, return_inverse=True)
+    flat = np.bincount(rows * len(found_ids) + columns, minlength=len(true_ids) * len(found_ids))
+    return flat.reshape(len(true_ids), len(found_ids)).astype(np.float64)
+
+
+@torch.inference_mode()
+def regions_found(
+    network: GuidedDepthNet, photo_size: tuple[int, int], images: torch.Tensor, Ks: torch.Tensor
+) -> tuple[np.ndarray, np.ndarray]:
+    """Groups and parts of one photo (1, 1, 3, h, w), each (H, W) int64."""
+    tokens = network.encode(images, Ks)
+    features = network.language(tokens, images)
+    memories, finest = network.semantic_maps(tokens, images)
+    groups = network.grouping(memories, finest, 1)[-1]
+    survivors = surviving(groups, network.preset.tau_exist)
+    whole = group_weights(groups, survivors, (finest.shape[-2], finest.shape[-1]))
+    parts = split_groups(whole, finest, network.preset.splitting, photo_size, features[0].float())
+    large = F.interpolate(whole, photo_size, mode="bilinear", align_corners=False)
+    return tuple(
+        maps[0].argmax(0).numpy() if maps.shape[1] else np.zeros(photo_size, dtype=np.int64)
+        for maps in (large, parts)
+    )  # type: ignore[return-value]
+
+
+def grouping_scores(
+    network: GuidedDepthNet, folder: PhotoFolder, ids: Sequence[str]
+) -> Iterator[tuple[str, dict[str, GroupingScore]]]:
+    """Id and scores of groups and parts, photo by photo.
+
+    Raises:
+        InputError: a photo or its map cannot be used.
+    """
+    photos = Outlined(folder, tuple(ids), 1.0)
+    for row, id in enumerate(ids):
+        photo = photos.photo(row)
+        size = network_size(photo, network.preset.native_area, network.preset.patch)
+        view = fitted(photo, size)
+        side = photo.image.shape[1] / size[0], photo.image.shape[0] / size[1]
+        judged = (round(size[0] * min(side)), round(size[1] * min(side)))
+        truth = fitted(photo, judged).labels.numpy() - 1
+        images, Ks = view.rgb[None, None].float() / 255, view.K[None, None]
+        groups, parts = regions_found(network, (judged[1], judged[0]), images, Ks)
+        truth = np.where(truth < 0, UNKNOWN, truth)
+        yield id, {"groups": score(groups, truth), "parts": score(parts, truth)}
+
+
+def run_grouping(
+    network: GuidedDepthNet,
+    folder: PhotoFolder,
+    ids: Sequence[str],
+    progress: Progress = lambda stage, fraction: None,
+) -> dict:
+    """Means over photos of groups and of parts, as plain JSON.
+
+    Raises:
+        InputError: a photo or its map cannot be used.
+    """
+    rows: dict[str, list[GroupingScore]] = {"groups": [], "parts": []}
+    for number, (id, scores) in enumerate(grouping_scores(network, folder, ids), 1):
+        for kind, one in scores.items():
+            rows[kind].append(one)
+        progress(f"photo {id}, {number} of {len(ids)}", number / len(ids))
+    names = [field.name for field in fields(GroupingScore)]
+    means = {
+        kind: rounded({name: nan_mean(getattr(one, name) for one in own) for name in names})
+        for kind, own in rows.items()
+    }
+    return {"folder": folder.root.name, "photos": len(ids), **means}
+
+
+def grouping_markdown(result: dict) -> str:
+    """The means as a table."""
+    lines = [f"{result['photos']} photos of {result['folder']}", "", "| | groups | parts |", "|---|---|---|"]
+    for name, title in TITLES.items():
+        lines.append(f"| {title} | {cell(result['groups'][name])} | {cell(result['parts'][name])} |")
+    return "\n".join(lines) + "\n"
